@@ -1,0 +1,36 @@
+# `make demo`, `make test` and the others prepare .venv by themselves on a fresh machine.
+# Needs Python 3.11 or newer; name another one with `make setup PYTHON=python3.12`.
+
+PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
+	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+VENV := .venv
+STAMP := $(VENV)/.installed
+
+.PHONY: setup demo test lint bench clean
+
+setup: $(STAMP)
+
+# The last line is a start of Python: it finishes the links of the LLVM package.
+$(STAMP): pyproject.toml constraints.txt
+	@test -n "$(PYTHON)" || { echo "error: no Python 3.11 or newer; install one or pass PYTHON=..." >&2; exit 2; }
+	$(PYTHON) -m venv $(VENV)
+	$(VENV)/bin/python -m pip install --quiet --constraint constraints.txt --editable ".[dev]"
+	$(VENV)/bin/python -c "import mitex"
+	@touch $@
+
+demo: $(STAMP)
+	$(VENV)/bin/mitex demo --out out/demo
+
+test: $(STAMP)
+	$(VENV)/bin/python -m pytest -m "not slow"
+
+lint: $(STAMP)
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/pyright
+
+bench: $(STAMP)
+	$(VENV)/bin/python -m benchmarks.nca
+
+clean:
+	rm -rf $(VENV) out
