@@ -1,0 +1,30 @@
+"""Meshes that ship with Mitex; `tools/make_meshes.py` makes them."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+
+from mitex.errors import MeshError
+from mitex.mesh.mesh import Mesh
+
+DATA = Path(__file__).parents[1] / "data" / "meshes"
+
+
+def embedded_names() -> list[str]:
+    """Names of the meshes that ship with Mitex."""
+    return sorted(path.stem for path in DATA.glob("*.ply"))
+
+
+def embedded(name: str) -> Mesh:
+    """A mesh that ships with Mitex: nearly uniform edges, about 10,000 vertices, within the unit sphere.
+
+    Raises:
+        MeshError: there is none of that name.
+    """
+    names = embedded_names()
+    if name not in names:
+        close = difflib.get_close_matches(name, names, 1)
+        remedy = f"did you mean {close[0]}?" if close else f"use one of {', '.join(names)}"
+        raise MeshError(f"there is no embedded mesh {name}", remedy)
+    return Mesh.load(DATA / f"{name}.ply")

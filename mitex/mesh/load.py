@@ -1,0 +1,125 @@
+"""Mesh files: finding, reading, welding, checking."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from mitex.errors import MeshError, MeshWarning
+from mitex.mesh.embedded import embedded, embedded_names
+from mitex.mesh.mesh import Mesh
+from mitex.mesh.readers import SUFFIXES, Soup, read
+from mitex.mesh.validate import validate
+
+# A generous text line per vertex, normal, UV and two faces, and room for textures in a .glb.
+BYTES_PER_VERTEX = 400
+BYTES_ALLOWED_ANYWAY = 256 << 20
+
+
+def load(path: str | os.PathLike[str], max_vertices: int = 2_000_000) -> Mesh:
+    """Loads a mesh.
+
+    Polygons are cut into triangles. Vertices that a format splits at seams of UVs or normals (always in STL
+    and glTF, sometimes in OBJ and PLY) are welded where their positions are bit-identical, so that the graph
+    is connected; UVs stay per face corner. Flaws are handled as `validate` says. glTF node transforms are
+    applied. Materials and images are not read.
+
+    Args:
+        path: .obj, .ply, .stl, .glb, .gltf or .off; or the name of a mesh that ships with Mitex.
+        max_vertices: budget; a file is refused by its header and size before it is parsed.
+
+    Returns:
+        The mesh, in the file's units, order and place.
+
+    Raises:
+        MeshError: missing, unreadable, of an unknown kind, damaged, empty, over budget, or what `validate`
+            refuses.
+    """
+    source = Path(path)
+    if not os.path.exists(source) and str(path) in embedded_names():
+        return embedded(str(path))
+    max_bytes = BYTES_ALLOWED_ANYWAY + BYTES_PER_VERTEX * max_vertices
+    _check_file(source, max_bytes)
+    try:
+        soup = read(source, max_vertices, max_bytes)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise MeshError(f"{path} cannot be read ({reason})", "check its permissions") from error
+    for note in soup.notes:
+        warnings.warn(f"{path}: {note}", MeshWarning, stacklevel=2)
+    vertices, faces = weld(soup)
+    mesh = validate(vertices, faces, soup.uv, name=str(path), max_vertices=max_vertices)
+    return Mesh(mesh.vertices, mesh.faces, mesh.uv, source.stem)
+
+
+def weld(soup: Soup) -> tuple[np.ndarray, np.ndarray]:
+    """Joins vertices at bit-identical float32 positions, where the file only split them at seams.
+
+    That is so if the format always splits, if no two faces share a vertex, or if the vertices of one place
+    differ in UV or normal. Other coincident vertices stay apart: two sheets that touch are not one.
+
+    Returns:
+        (V', 3) float32 vertices in order of first appearance and (F, 3) int64 faces.
+    """
+    with np.errstate(over="ignore"):
+        vertices = soup.vertices.astype(np.float32) + np.float32(0.0)  # -0.0 and 0.0 are one place
+    if not len(vertices) or not len(soup.faces):
+        return vertices, soup.faces
+    place = _group(vertices)
+    used_once = np.bincount(soup.faces.ravel(), minlength=len(vertices)).max() <= 1
+    if soup.split or (used_once and len(soup.faces) > 1):
+        joined = np.ones(len(vertices), bool)
+    elif soup.attributes is None:
+        return vertices, soup.faces
+    else:
+        kind = _group(np.column_stack([place, soup.attributes]))
+        pairs = np.unique(np.stack([place, kind], axis=1), axis=0)
+        joined = (np.bincount(pairs[:, 0]) > 1)[place]
+    first = np.full(len(vertices), len(vertices))
+    np.minimum.at(first, place, np.arange(len(vertices)))
+    target = np.where(joined, first[place], np.arange(len(vertices)))
+    keep = target == np.arange(len(vertices))
+    return vertices[keep], (np.cumsum(keep) - 1)[target[soup.faces]]
+
+
+def _group(rows: np.ndarray) -> np.ndarray:
+    """(N,) the same number for equal rows of (N, k)."""
+    order = np.lexsort(rows.T)
+    changes = (rows[order][1:] != rows[order][:-1]).any(axis=1)
+    group = np.empty(len(rows), np.int64)
+    group[order] = np.concatenate([[0], np.cumsum(changes)])
+    return group
+
+
+def _check_file(source: Path, max_bytes: int) -> None:
+    formats = ", ".join(SUFFIXES)
+    if not os.path.exists(source):  # unlike Path.exists, also answers for impossible names
+        close = difflib.get_close_matches(str(source), embedded_names(), 1)
+        remedy = f"did you mean {close[0]}?" if close else "check the path"
+        raise MeshError(f"there is no mesh {source}", remedy)
+    if os.path.isdir(source):
+        raise MeshError(f"{source} is a folder", f"name a mesh file ({formats})")
+    if not os.path.isfile(source):
+        raise MeshError(f"{source} is not a regular file", f"name a mesh file ({formats})")
+    if source.suffix.lower() not in SUFFIXES:
+        found = f"'{source.suffix}'" if source.suffix else "no suffix"
+        raise MeshError(
+            f"{source} has {found}, which is no mesh format Mitex reads", f"convert it to {formats}"
+        )
+    size = source.stat().st_size
+    if not size:
+        raise MeshError(f"{source} is empty (0 bytes)", "export or download it again")
+    if size > max_bytes:
+        problem = f"{source} is {size >> 20:,} MB, more than {max_bytes >> 20:,} MB"
+        raise MeshError(problem, "simplify it, or raise max_vertices")
+    try:
+        with source.open("rb") as file:
+            start = file.read(40)
+    except OSError as error:
+        raise MeshError(f"{source} cannot be read ({error.strerror})", "check its permissions") from error
+    if start.startswith(b"version https://git-lfs"):
+        raise MeshError(f"{source} is a Git LFS pointer, not the mesh itself", "run `git lfs pull`")

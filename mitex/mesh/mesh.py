@@ -1,0 +1,173 @@
+"""The mesh that everything else works on: positions, faces, corner UVs, and what follows from them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from mitex.errors import MeshError
+from mitex.mesh.topology import EdgeGraph, edge_graph
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A triangle mesh. Its arrays are shared, not copied: treat them as constant.
+
+    Attributes:
+        vertices: (V, 3) float32 positions, finite [mesh units].
+        faces: (F, 3) int32 vertex indices in [0, V), counter-clockwise seen from outside.
+        uv: (F, 3, 2) float32 texture coordinates per face corner, so that UV seams never split vertices, or
+            None; v points up, (0, 0) is the lower left corner of the image.
+        name: for messages and file names.
+
+    Raises:
+        MeshError: An array has the wrong shape, an index is out of range, or a number is not finite.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    uv: np.ndarray | None = None
+    name: str = "mesh"
+
+    def __post_init__(self) -> None:
+        with np.errstate(over="ignore", invalid="ignore"):
+            vertices = np.ascontiguousarray(self.vertices, np.float32)
+            uv = None if self.uv is None else np.ascontiguousarray(self.uv, np.float32)
+        indices = np.asarray(self.faces)
+        _check_arrays(self.name, vertices, indices, uv)
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "faces", np.ascontiguousarray(indices, np.int32))
+        object.__setattr__(self, "uv", uv)
+
+    @staticmethod
+    def load(path: str | os.PathLike[str], max_vertices: int = 2_000_000) -> Mesh:
+        """Loads a mesh file; see `mitex.mesh.load`."""
+        from mitex.mesh.load import load
+
+        return load(path, max_vertices)
+
+    @cached_property
+    def edges(self) -> EdgeGraph:
+        """The vertex neighbourhoods: directed edges j -> i, grouped by the receiving vertex i."""
+        return edge_graph(self.faces, len(self.vertices))
+
+    @cached_property
+    def face_crosses(self) -> np.ndarray:
+        """(F, 3) float64 normals of twice the length of the face's area [mesh units^2]."""
+        a, b, c = (self.vertices[self.faces[:, k]].astype(np.float64) for k in range(3))
+        return np.cross(b - a, c - a)
+
+    @cached_property
+    def face_areas(self) -> np.ndarray:
+        """(F,) float32 areas [mesh units^2]."""
+        return (0.5 * np.linalg.norm(self.face_crosses, axis=1)).astype(np.float32)
+
+    @cached_property
+    def face_normals(self) -> np.ndarray:
+        """(F, 3) float32 unit normals; +z where a face has no area."""
+        return _unit(self.face_crosses)
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """(V, 3) float32 unit normals, the area-weighted mean of the faces around; +z where that is zero."""
+        corners = self.faces.ravel()
+        count = len(self.vertices)
+        crosses = np.repeat(self.face_crosses, 3, axis=0)
+        total = [np.bincount(corners, weights=crosses[:, k], minlength=count) for k in range(3)]
+        return _unit(np.stack(total, axis=1))
+
+    def normalised(self) -> tuple[Mesh, Similarity]:
+        """The mesh with its vertex mean at the origin and its farthest vertex at distance 1.
+
+        Returns:
+            The mesh, and the similarity that was applied.
+
+        Raises:
+            MeshError: All vertices are at one point.
+        """
+        positions = self.vertices.astype(np.float64)
+        center = positions.mean(axis=0)
+        scale = float(np.linalg.norm(positions - center, axis=1).max())
+        if scale == 0.0:
+            raise MeshError(f"all vertices of {self.name} are at one point", "check how it was exported")
+        similarity = Similarity(center, scale)
+        return self.with_vertices(similarity.apply(positions)), similarity
+
+    def with_vertices(self, vertices: np.ndarray) -> Mesh:
+        """The same faces, UVs and edges with other positions, (V, 3)."""
+        if np.shape(vertices) != self.vertices.shape:
+            problem = f"{self.name} has vertices of shape {self.vertices.shape}, not {np.shape(vertices)}"
+            raise MeshError(problem, "give one position per vertex")
+        mesh = replace(self, vertices=vertices)
+        if "edges" in self.__dict__:
+            mesh.__dict__["edges"] = self.edges
+        return mesh
+
+    def __repr__(self) -> str:
+        uv = "" if self.uv is None else ", with uv"
+        return f"Mesh({self.name!r}, {len(self.vertices)} vertices, {len(self.faces)} faces{uv})"
+
+
+@dataclass(frozen=True, eq=False)
+class Similarity:
+    """The map p -> (p - center) / scale.
+
+    Attributes:
+        center: (3,) float64 [mesh units].
+        scale: Positive [mesh units].
+    """
+
+    center: np.ndarray
+    scale: float
+
+    def apply(self, points: np.ndarray) -> np.ndarray:
+        """Maps points (..., 3) in mesh units to normalised ones, float64."""
+        return (np.asarray(points, np.float64) - self.center) / self.scale
+
+    def inverse(self, points: np.ndarray) -> np.ndarray:
+        """Maps normalised points (..., 3) back to mesh units, float64."""
+        return np.asarray(points, np.float64) * self.scale + self.center
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    safe = np.where(length > 0.0, length, 1.0)
+    return np.where(length > 0.0, vectors / safe, (0.0, 0.0, 1.0)).astype(np.float32)
+
+
+def _check_arrays(name: str, vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None) -> None:
+    for problem, remedy in _array_problems(vertices, faces, uv):
+        raise MeshError(f"{name}: {problem}", remedy)
+
+
+def _array_problems(
+    vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None
+) -> Iterator[tuple[str, str]]:
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        yield f"vertices have shape {vertices.shape}", "give (V, 3) positions"
+    if faces.ndim != 2 or faces.shape[1] != 3:
+        yield f"faces have shape {faces.shape}", "give (F, 3) indices; triangulate polygons first"
+    if not np.issubdtype(faces.dtype, np.integer):
+        yield f"faces are {faces.dtype}", "give integer indices"
+    if uv is not None and uv.shape != (*faces.shape, 2):
+        yield f"uv has shape {uv.shape}", f"give one pair per face corner, {(*faces.shape, 2)}"
+    if faces.size and faces.min() < 0:
+        yield f"a face has the negative vertex index {faces.min()}", "re-export the mesh"
+    if faces.size and faces.max() >= len(vertices):
+        yield (
+            f"a face refers to vertex {faces.max()}, but there are only {len(vertices)}",
+            "the file is damaged or truncated; re-export it",
+        )
+    bad = ~np.isfinite(vertices).all(axis=1)
+    if bad.any():
+        first = int(np.flatnonzero(bad)[0])
+        yield (
+            f"{bad.sum()} of {len(vertices)} positions are NaN or infinite (first: vertex {first})",
+            "repair the mesh and re-export it",
+        )
+    if uv is not None and not np.isfinite(uv).all():
+        yield "some texture coordinates are NaN or infinite", "unwrap the mesh again or leave the uv out"

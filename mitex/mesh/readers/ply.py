@@ -1,0 +1,237 @@
+"""Stanford PLY, text and binary.
+
+Read here and not through trimesh, because trimesh 5.2 refuses binary files that mix triangles and quads
+(Blender's default) and cuts vertices apart at UV seams.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mitex.errors import MeshError
+from mitex.mesh.readers.soup import DAMAGED, Soup, check_budget, polygon_soup
+
+# Types by any of their names, as numpy codes without byte order.
+TYPES = {
+    **dict.fromkeys(("char", "int8"), "i1"),
+    **dict.fromkeys(("uchar", "uint8"), "u1"),
+    **dict.fromkeys(("short", "int16"), "i2"),
+    **dict.fromkeys(("ushort", "uint16"), "u2"),
+    **dict.fromkeys(("int", "int32"), "i4"),
+    **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("float", "float32"), "f4"),
+    **dict.fromkeys(("double", "float64"), "f8"),
+    "int64": "i8",
+    "uint64": "u8",
+}
+UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+NORMAL_NAMES = ("nx", "ny", "nz")
+MAX_HEADER = 1 << 16
+
+
+@dataclass
+class _Element:
+    name: str
+    count: int
+    # (name, type of the list's length or None for a single number, type)
+    properties: list[tuple[str, str | None, str]] = field(default_factory=list)
+
+
+@dataclass
+class _Ragged:
+    """Lists of numbers, one after the other, and their lengths."""
+
+    values: np.ndarray
+    sizes: np.ndarray
+
+
+def read_ply(name: str, data: bytes, max_vertices: int) -> Soup:
+    """Reads a PLY file: positions, faces, and UVs and normals where there are some.
+
+    Raises:
+        MeshError: not a PLY file, a damaged header, data that end early, too many vertices.
+    """
+    order, elements, start = _header(name, data)
+    for element in elements:
+        if element.name == "vertex":
+            check_budget(name, element.count, max_vertices)
+        if element.properties and element.count > len(data):
+            problem = f"{name} promises {element.count:,} {element.name} elements, more than it has bytes"
+            raise MeshError(problem, DAMAGED)
+    body = _Text(name, data[start:]) if order == "" else _Binary(name, data, start, order)
+    tables: dict[str, dict] = {}
+    for element in elements:
+        tables[element.name] = _read_element(body, element)
+        if "vertex" in tables and "face" in tables:
+            break
+    return _assemble(name, tables)
+
+
+def _assemble(name: str, tables: dict[str, dict]) -> Soup:
+    points = tables.get("vertex", {})
+    if not all(axis in points for axis in "xyz"):
+        raise MeshError(
+            f"{name} holds no vertex positions x, y, z", "export it as a mesh with vertices and faces"
+        )
+    vertices = np.stack([points[axis] for axis in "xyz"], axis=1).astype(np.float64)
+    table = tables.get("face", {})
+    lists = table.get("vertex_indices", table.get("vertex_index"))
+    if not isinstance(lists, _Ragged):
+        lists = _Ragged(np.empty(0, np.int64), np.empty(0, np.int64))
+    with np.errstate(invalid="ignore"):
+        corners = lists.values.astype(np.int64)
+    uv_columns = next((names for names in UV_NAMES if all(n in points for n in names)), ())
+    texcoord = table.get("texcoord")
+    uv = None
+    if isinstance(texcoord, _Ragged) and np.array_equal(texcoord.sizes, 2 * lists.sizes):
+        uv = texcoord.values.astype(np.float64).reshape(-1, 2)
+    elif uv_columns and corners.size and corners.min() >= 0 and corners.max() < len(vertices):
+        uv = np.stack([points[n] for n in uv_columns], axis=1).astype(np.float64)[corners]
+    soup = polygon_soup(name, vertices, corners, lists.sizes.astype(np.int64), uv)
+    columns = [points[n] for n in (*uv_columns, *NORMAL_NAMES) if n in points]
+    if columns:
+        soup.attributes = np.stack(columns, axis=1).astype(np.float64)
+    return soup
+
+
+def _header(name: str, data: bytes) -> tuple[str, list[_Element], int]:
+    """The byte order ('<', '>', or '' for text), the elements, and where their data start."""
+    end = data.find(b"end_header", 0, MAX_HEADER)
+    if not data.startswith(b"ply") or end < 0:
+        raise MeshError(f"{name} is not a PLY file", "check its suffix and how it was exported")
+    newline = data.find(b"\n", end)
+    start = newline + 1 if newline >= 0 else len(data)
+    order, elements = None, []
+    for line in data[:end].decode("ascii", "replace").splitlines():
+        words = line.split()
+        try:
+            if words[:1] == ["format"]:
+                order = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}[words[1]]
+            elif words[:1] == ["element"]:
+                elements.append(_Element(words[1], int(words[2])))
+                if elements[-1].count < 0:
+                    raise ValueError
+            elif words[:2] == ["property", "list"]:
+                elements[-1].properties.append((words[4], TYPES[words[2]], TYPES[words[3]]))
+            elif words[:1] == ["property"]:
+                elements[-1].properties.append((words[2], None, TYPES[words[1]]))
+        except (KeyError, IndexError, ValueError) as error:
+            raise MeshError(f"the PLY header of {name} has a bad line: '{line[:60]}'", DAMAGED) from error
+    if order is None:
+        raise MeshError(f"the PLY header of {name} names no format", DAMAGED)
+    return order, elements, start
+
+
+class _Binary:
+    """Reads numbers from bytes."""
+
+    def __init__(self, name: str, data: bytes, start: int, order: str):
+        self.name, self.data, self.position, self.order = name, data, start, order
+
+    def table(self, columns: list[tuple[str, str, int]], count: int) -> dict[str, np.ndarray] | None:
+        """`count` rows of columns (name, type, width), each (count, width); None if the data end before."""
+        # Numbered fields, because the header may repeat a name.
+        fields = [(str(k), self.order + kind, (width,)) for k, (_, kind, width) in enumerate(columns)]
+        dtype = np.dtype(fields)
+        if self.position + dtype.itemsize * count > len(self.data):
+            return None
+        if not dtype.itemsize:
+            return {name: np.empty((count, 0), kind) for name, kind, _ in columns}
+        rows = np.frombuffer(self.data, dtype, count, self.position)
+        self.position += dtype.itemsize * count
+        return {name: rows[str(k)] for k, (name, _, _) in enumerate(columns)}
+
+
+class _Text:
+    """Reads numbers from text."""
+
+    def __init__(self, name: str, text: bytes):
+        self.name, self.position = name, 0
+        try:
+            self.numbers = np.array(list(map(float, text.split())))
+        except ValueError as error:
+            raise MeshError(f"{name} has something between its numbers that is none", DAMAGED) from error
+
+    def table(self, columns: list[tuple[str, str, int]], count: int) -> dict[str, np.ndarray] | None:
+        ends = np.cumsum([width for _, _, width in columns])
+        if self.position + ends[-1] * count > len(self.numbers):
+            return None
+        rows = self.numbers[self.position : self.position + ends[-1] * count].reshape(count, ends[-1])
+        self.position += ends[-1] * count
+        return {name: rows[:, end - width : end] for (name, _, width), end in zip(columns, ends, strict=True)}
+
+
+def _read_element(body: _Binary | _Text, element: _Element) -> dict:
+    """Columns by name: (count,) arrays, and `_Ragged` ones for lists."""
+    if not element.properties:
+        return {}
+    start = body.position
+    rows = _uniform(body, element)
+    if rows is None:
+        body.position = start
+        rows = _row_by_row(body, element)
+    return rows
+
+
+def _uniform(body: _Binary | _Text, element: _Element) -> dict | None:
+    """All rows at once, if their lists are as long as those of the first row; otherwise None."""
+    start = body.position
+    lengths = _first_lengths(body, element) if element.count else {}
+    body.position = start
+    columns = []
+    for name, size_type, kind in element.properties:
+        if size_type:
+            columns.append((f"{name} size", size_type, 1))
+        columns.append((name, kind, lengths.get(name, 0) if size_type else 1))
+    table = body.table(columns, element.count)
+    if table is None:
+        return None
+    result: dict = {}
+    for name, size_type, _ in element.properties:
+        values = table[name]
+        if size_type:
+            sizes = table[f"{name} size"][:, 0]
+            if not (sizes == lengths.get(name, 0)).all():
+                return None
+            result[name] = _Ragged(values.ravel(), sizes.astype(np.int64))
+        else:
+            result[name] = values[:, 0]
+    return result
+
+
+def _first_lengths(body: _Binary | _Text, element: _Element) -> dict[str, int]:
+    row = _one_row(body, element)
+    return {name: len(row[name]) for name, size_type, _ in element.properties if size_type}
+
+
+def _row_by_row(body: _Binary | _Text, element: _Element) -> dict:
+    rows = [_one_row(body, element) for _ in range(element.count)]
+    result: dict = {}
+    for name, size_type, _ in element.properties:
+        values = [row[name] for row in rows]
+        flat = np.concatenate(values) if values else np.empty(0)
+        sizes = np.array([len(v) for v in values], np.int64)
+        result[name] = _Ragged(flat, sizes) if size_type else flat
+    return result
+
+
+def _one_row(body: _Binary | _Text, element: _Element) -> dict[str, np.ndarray]:
+    row = {}
+    for name, size_type, kind in element.properties:
+        length = 1
+        if size_type:
+            size = _take(body, element, size_type, 1)[0]
+            if not 0 <= size < 2**31:
+                raise MeshError(f"{body.name} has a {element.name} list of {size} numbers", DAMAGED)
+            length = int(size)
+        row[name] = _take(body, element, kind, length)
+    return row
+
+
+def _take(body: _Binary | _Text, element: _Element, kind: str, length: int) -> np.ndarray:
+    table = body.table([("", kind, length)], 1)
+    if table is None:
+        raise MeshError(f"{body.name} ends before its {element.count} {element.name} elements do", DAMAGED)
+    return table[""][0]

@@ -1,0 +1,77 @@
+"""What a mesh file says, before it is checked and cleaned."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mitex.errors import MeshError
+from mitex.mesh.polygons import triangulate
+
+DAMAGED = "the file is damaged or cut off; export or download it again"
+
+
+@dataclass(eq=False)
+class Soup:
+    """Triangles as read.
+
+    Attributes:
+        vertices: (V, 3) float64 positions, maybe not finite.
+        faces: (F, 3) int64 indices in [0, V).
+        uv: (F, 3, 2) float64 corner UVs, v up, or None.
+        attributes: (V, k) float64 per-vertex UVs and normals, or None. Coincident vertices that differ in
+            them were one vertex before a seam split it.
+        split: the format always splits vertices at seams.
+        notes: what the reader left out, one sentence each.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    uv: np.ndarray | None = None
+    attributes: np.ndarray | None = None
+    split: bool = False
+    notes: list[str] = field(default_factory=list)
+
+
+def polygon_soup(
+    name: str, vertices: np.ndarray, corners: np.ndarray, sizes: np.ndarray, uv: np.ndarray | None = None
+) -> Soup:
+    """Triangulates polygons.
+
+    Args:
+        name: for messages.
+        vertices: (V, 3) positions.
+        corners: (N,) vertex index of every polygon corner, polygon after polygon.
+        sizes: (P,) number of corners of each polygon; those with fewer than 3 are left out.
+        uv: (N, 2) per corner, or None.
+
+    Raises:
+        MeshError: a corner is not in [0, V).
+    """
+    check_indices(name, corners, len(vertices))
+    triangles = triangulate(vertices, corners, sizes)
+    soup = Soup(vertices, corners[triangles], None if uv is None else uv[triangles])
+    short = int((sizes < 3).sum())
+    if short:
+        soup.notes.append(f"left out faces with fewer than 3 corners: {short:,}")
+    return soup
+
+
+def check_indices(name: str, corners: np.ndarray, count: int) -> None:
+    """Raises MeshError unless all of `corners` are in [0, count)."""
+    if not corners.size:
+        return
+    low, high = int(corners.min()), int(corners.max())
+    if low < 0:
+        raise MeshError(f"{name} has a face with the negative vertex index {low}", DAMAGED)
+    if high >= count:
+        problem = f"{name} has a face that refers to vertex {high} (counted from 0) of only {count}"
+        raise MeshError(problem, DAMAGED)
+
+
+def check_budget(name: str, count: int, max_vertices: int) -> None:
+    """Raises MeshError if a mesh of `count` vertices is over the budget."""
+    if count > max_vertices:
+        problem = f"{name} has {count:,} vertices, more than the budget of {max_vertices:,}"
+        raise MeshError(problem, "simplify it, or raise max_vertices")

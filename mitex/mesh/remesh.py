@@ -1,0 +1,80 @@
+"""Isotropic remeshing, through PyMeshLab (extra `remesh`)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from mitex.errors import MeshError
+from mitex.mesh.mesh import Mesh
+from mitex.mesh.subdivide import subdivide_midpoint
+from mitex.mesh.validate import validate
+
+ROUNDS = 4
+CLOSE_ENOUGH = 0.03
+# Equal edges that are all split or collapsed at once make the count jump; in a finer source they are not.
+FINER = 2
+# Measured: what the remesher makes of a wanted edge length is this much longer.
+LONGER = 1.04
+
+
+def remesh(mesh: Mesh, vertices: int, feature_angle: float = math.radians(60.0)) -> Mesh:
+    """Replaces the triangles by nearly equilateral ones of one size, as the MeshNCA paper asks for.
+
+    Explicit isotropic remeshing (Botsch and Kobbelt 2004) with an edge length that is corrected until the
+    count is within about 3 % of what was asked, or as near as four tries come. UVs are lost. Takes seconds.
+
+    Args:
+        mesh: any mesh.
+        vertices: wanted number of vertices, at least 12.
+        feature_angle: edges where the surface bends by more than this stay [rad].
+
+    Returns:
+        A new mesh of the same name in the same place.
+
+    Raises:
+        MeshError: PyMeshLab is not installed or failed, or too few vertices are asked for.
+    """
+    if vertices < 12:
+        raise MeshError(f"{vertices} vertices are too few for remeshing", "ask for 12 or more")
+    pymeshlab = _pymeshlab()
+    area = float(mesh.face_areas.sum(dtype=np.float64))
+    length = math.sqrt(2.0 * area / (math.sqrt(3.0) * vertices)) / LONGER
+    source = mesh
+    while len(source.vertices) < FINER * vertices:
+        source = subdivide_midpoint(source)
+    best, best_error = mesh, math.inf
+    for _ in range(ROUNDS):
+        made = _isotropic(pymeshlab, source, length, feature_angle)
+        ratio = len(made.vertices) / vertices
+        if abs(math.log(ratio)) < best_error:
+            best, best_error = made, abs(math.log(ratio))
+        if best_error < CLOSE_ENOUGH:
+            break
+        length *= math.sqrt(ratio)
+    return best
+
+
+def _isotropic(pymeshlab: Any, mesh: Mesh, length: float, feature_angle: float) -> Mesh:
+    meshes = pymeshlab.MeshSet(verbose=False)
+    try:
+        meshes.add_mesh(pymeshlab.Mesh(mesh.vertices.astype(np.float64), mesh.faces))
+        meshes.meshing_isotropic_explicit_remeshing(
+            iterations=12, targetlen=pymeshlab.PureValue(length), featuredeg=math.degrees(feature_angle)
+        )
+        made = meshes.current_mesh()
+        points, faces = made.vertex_matrix(), made.face_matrix()
+    except pymeshlab.PyMeshLabException as error:
+        reason = " ".join(str(error).split())
+        raise MeshError(f"{mesh.name} could not be remeshed ({reason})", "repair it in a modeller") from error
+    return validate(points, faces, name=mesh.name)
+
+
+def _pymeshlab() -> Any:
+    try:
+        import pymeshlab
+    except ImportError as error:
+        raise MeshError("remeshing needs PyMeshLab", "install it with `pip install mitex[remesh]`") from error
+    return pymeshlab

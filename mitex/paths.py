@@ -1,0 +1,156 @@
+"""Where files are written: checks beforehand, and replacement in one step."""
+
+import errno
+import os
+import secrets
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from mitex.errors import OutputError
+
+
+def prepare_output(path: str | os.PathLike[str], suffixes: Sequence[str] = ()) -> Path:
+    """Checks, before any long work, that a file can be written at `path`. Creates nothing.
+
+    Folders that do not exist yet are allowed when the nearest existing ancestor is writable;
+    `atomic_write` makes them.
+
+    Args:
+        path: The file to be written; `~` is expanded.
+        suffixes: Allowed endings with their dot, in lower case, such as `(".png", ".exr")`; empty allows any.
+
+    Returns:
+        The path, absolute.
+
+    Raises:
+        OutputError: The suffix is not allowed, a folder has that name, or the place is not writable.
+    """
+    target = _absolute(path)
+    if suffixes and target.suffix.lower() not in suffixes:
+        allowed = ", ".join(suffixes)
+        found = f"'{target.suffix}'" if target.suffix else "no suffix"
+        raise OutputError(f"cannot write '{path}' with {found}", f"use one of {allowed}")
+    try:
+        if target.is_dir():
+            raise OutputError(f"'{path}' is a folder", "name a file")
+        _check_folder(target.parent)
+        if target.exists() and not os.access(target, os.W_OK):
+            raise OutputError(f"'{path}' is write-protected", "change its permissions or name another file")
+    except OSError as e:
+        raise _translated(e, target) from e
+    return target
+
+
+def prepare_folder(path: str | os.PathLike[str]) -> Path:
+    """Makes the folder `path` (and its parents) and checks that it is writable.
+
+    Returns:
+        The path, absolute.
+
+    Raises:
+        OutputError: It is a file, or cannot be made or written to.
+    """
+    target = _absolute(path)
+    try:
+        _check_folder(target)
+        target.mkdir(parents=True, exist_ok=True)
+    except OSError as e:
+        raise _translated(e, target) from e
+    return target
+
+
+@contextmanager
+def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Yields a temporary path beside `path`; on success its file is fsynced and renamed to `path`.
+
+    Readers see the old file or the new one, never a part. When the block raises, the temporary file is
+    removed and the old file stays. Missing folders are made. The temporary name ends like `path`, since many
+    writers choose the format by suffix; the file gets the usual permissions, whatever the writer does.
+
+    Raises:
+        OutputError: The operating system refused (disk full, permission, ...) or no file was written;
+            other errors pass unchanged.
+    """
+    target = _absolute(path)
+    temporary = target.with_name(f".{target.stem[:40]}.{secrets.token_hex(4)}.tmp{target.suffix}")
+    made: list[Path] = []
+    try:
+        made = _make_parents(target)
+        temporary.touch()
+        mode = temporary.stat().st_mode  # safetensors would leave it readable for its owner only
+        temporary.unlink()
+        yield temporary
+        if not temporary.is_file():
+            raise OutputError(f"nothing was written to '{target}'", "see the messages above")
+        temporary.chmod(mode)
+        _sync(temporary)
+        os.replace(temporary, target)
+        _sync(target.parent)
+    except BaseException as e:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        for folder in reversed(made):
+            with suppress(OSError):
+                folder.rmdir()
+        if isinstance(e, OSError):
+            raise _translated(e, target) from e
+        # Writers in other languages (safetensors, OpenEXR) raise their own types with the system's words.
+        if isinstance(e, Exception) and os.strerror(errno.ENOSPC) in str(e):
+            raise _translated(OSError(errno.ENOSPC, str(e)), target) from e
+        raise
+
+
+def cache_dir() -> Path:
+    """The user's folder for things that Mitex can make again (not created here)."""
+    if sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "mitex"
+
+
+def _absolute(path: str | os.PathLike[str]) -> Path:
+    if not os.fspath(path) or "\0" in os.fspath(path):
+        raise OutputError(f"{os.fspath(path)!r} is not a path", "name a file or folder")
+    return Path(os.path.abspath(Path(path).expanduser()))
+
+
+def _check_folder(folder: Path) -> None:
+    ancestor = folder
+    while not ancestor.exists():
+        ancestor = ancestor.parent
+    if not ancestor.is_dir():
+        raise OutputError(f"'{ancestor}' is a file, so nothing can be written below it", "name another place")
+    if not os.access(ancestor, os.W_OK | os.X_OK):
+        raise OutputError(f"folder '{ancestor}' is not writable", "name another place or change permissions")
+
+
+def _make_parents(target: Path) -> list[Path]:
+    missing = []
+    folder = target.parent
+    while not folder.exists():
+        missing.append(folder)
+        folder = folder.parent
+    target.parent.mkdir(parents=True, exist_ok=True)
+    return missing[::-1]
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _translated(error: OSError, target: Path) -> OutputError:
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return OutputError(f"no space left to write '{target}'", "free some space or name another place")
+    if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+        return OutputError(f"no permission to write '{target}'", "name another place or change permissions")
+    if error.errno == errno.ENAMETOOLONG:
+        return OutputError(f"the name of '{str(target)[:80]}...' is too long", "use a shorter one")
+    reason = error.strerror or str(error)
+    return OutputError(f"could not write '{target}' ({reason})", "check the path and the disk")

@@ -1,0 +1,36 @@
+"""Which number formats this machine computes quickly."""
+
+import os
+from functools import cache
+from pathlib import Path
+
+from mitex.errors import ConfigError
+
+VARIABLE = "MITEX_BF16"
+
+
+def bfloat16_is_fast() -> bool:
+    """Whether frozen networks should run in bfloat16: the CPU has AMX or AVX-512 instructions for it.
+
+    `MITEX_BF16=0` or `1` decides instead.
+
+    Raises:
+        ConfigError: The variable has another value.
+    """
+    chosen = os.environ.get(VARIABLE, "")
+    if chosen not in ("", "0", "1"):
+        raise ConfigError(f"{VARIABLE} is '{chosen}'", "set it to 0 or 1, or unset it")
+    return chosen == "1" if chosen else bool(bfloat16_flags())
+
+
+@cache
+def bfloat16_flags(cpuinfo: str = "/proc/cpuinfo") -> tuple[str, ...]:
+    """The CPU's flags that make bfloat16 fast; empty where the system does not tell."""
+    try:
+        text = Path(cpuinfo).read_text()
+    except OSError:
+        return ()
+    flags = next(
+        (line.split(":", 1)[1].split() for line in text.splitlines() if line.startswith("flags")), []
+    )
+    return tuple(flag for flag in ("amx_bf16", "avx512_bf16") if flag in flags)

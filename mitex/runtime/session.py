@@ -1,0 +1,120 @@
+"""Starting Mitsuba in this process: LLVM first, then the variant, then the plugins."""
+
+import random
+import sys
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from mitex.errors import ConfigError, RuntimeUnavailable
+from mitex.runtime import llvm
+
+if TYPE_CHECKING:
+    import torch
+
+DEFAULT_VARIANT = "llvm_ad_rgb"
+
+_threads: int | None = None
+
+
+def init(variant: str = DEFAULT_VARIANT) -> Any:
+    """Makes Mitsuba ready and returns the module `mitsuba`; cheap to call again.
+
+    A variant that has been set already stays; use `mitsuba.set_variant` to change it. Plugins of Mitex
+    are registered for the variant in use and for every later one.
+
+    Args:
+        variant: The variant to set when none is set.
+
+    Raises:
+        ConfigError: This Mitsuba has no such variant.
+        RuntimeUnavailable: Mitsuba is not installed, or the variant needs LLVM and none is usable.
+    """
+    loaded = sys.modules.get("mitsuba")
+    wanted = (loaded.variant() if loaded else None) or variant
+    mi = load_mitsuba(needs_llvm=wanted.startswith("llvm"))
+    if wanted not in mi.variants():
+        names = ", ".join(mi.variants())
+        raise ConfigError(f"Mitsuba has no variant '{wanted}'", f"choose one of {names}")
+    import_module("mitex.plugins")
+    if mi.variant() is None:
+        try:
+            mi.set_variant(wanted)
+        except ImportError as e:
+            raise RuntimeUnavailable(
+                f"Mitsuba cannot start '{wanted}' ({e})", "choose another variant or run `mitex doctor`"
+            ) from e
+    return mi
+
+
+def load_mitsuba(needs_llvm: bool = True) -> Any:
+    """Imports Mitsuba with a usable LLVM, sets no variant, and returns the module.
+
+    Args:
+        needs_llvm: Whether the lack of a usable LLVM is an error; scalar and CUDA variants do without.
+
+    Raises:
+        RuntimeUnavailable: Mitsuba cannot be imported, or LLVM is needed and none is usable.
+    """
+    if "drjit" not in sys.modules:
+        try:
+            llvm.select_llvm()
+        except RuntimeUnavailable:
+            if needs_llvm:
+                raise
+    try:
+        mi = import_module("mitsuba")
+        dr = import_module("drjit")
+    except ImportError as e:
+        raise RuntimeUnavailable(
+            f"Mitsuba cannot be imported ({e})", "run `pip install 'mitsuba>=3.9,<3.10'` in this environment"
+        ) from e
+    if needs_llvm:
+        _check_loaded_llvm(dr)
+    if _threads not in (None, dr.thread_count()):
+        dr.set_thread_count(_threads)
+    return mi
+
+
+def _check_loaded_llvm(dr: Any) -> None:
+    """Refuses what Dr.Jit has opened, before a kernel is compiled with it: that would end the process."""
+    major, minor, patch = dr.detail.llvm_version()
+    if major >= llvm.OLDEST:
+        return
+    what = f"with LLVM {major}.{minor}.{patch}, which is too old" if major >= 0 else "without a usable LLVM"
+    remedy = f"call `mitex.init()` before the first import of mitsuba or drjit, or set {llvm.VARIABLE}"
+    try:
+        library, verdict = llvm.find_llvm()
+        remedy += f"={library.path} (LLVM {verdict.version}) before starting Python"
+    except RuntimeUnavailable:
+        remedy = llvm.REMEDY
+    raise RuntimeUnavailable(f"Dr.Jit was loaded {what}", remedy)
+
+
+def threads(count: int) -> None:
+    """Lets torch and Dr.Jit use `count` threads each; with one thread results are bit-identical.
+
+    Raises:
+        ConfigError: `count` is below 1.
+    """
+    global _threads
+    if count < 1:
+        raise ConfigError(f"{count} threads cannot work", "use at least 1")
+    _threads = count
+    import_module("torch").set_num_threads(count)
+    if "drjit" in sys.modules:
+        sys.modules["drjit"].set_thread_count(count)
+
+
+def seed_everything(seed: int) -> "torch.Generator":
+    """Seeds Python's, NumPy's and torch's global generators and returns an own CPU generator with that seed.
+
+    Raises:
+        ConfigError: `seed` is not in [0, 2**32).
+    """
+    if not 0 <= seed < 2**32:
+        raise ConfigError(f"seed {seed} is out of range", "use a whole number from 0 to 4294967295")
+    torch = import_module("torch")
+    random.seed(seed)
+    import_module("numpy").random.seed(seed)
+    torch.manual_seed(seed)
+    return torch.Generator().manual_seed(seed)

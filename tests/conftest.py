@@ -1,0 +1,68 @@
+"""Fixtures for all tests."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def _leave_no_trace() -> Iterator[None]:
+    """Gives back the variant, thread counts and Dr.Jit memory, so that no test leaks into another."""
+    before = _process_state()
+    yield
+    after = _process_state()
+    for key, value in before.items():
+        if after[key] != value:
+            {"torch": _set_torch, "drjit": _set_drjit, "variant": _set_variant}[key](value)
+    if "drjit" in sys.modules:
+        sys.modules["drjit"].flush_malloc_cache()
+
+
+def _process_state() -> dict[str, Any]:
+    state: dict[str, Any] = {}
+    if torch := sys.modules.get("torch"):
+        state["torch"] = torch.get_num_threads()
+    if dr := sys.modules.get("drjit"):
+        state["drjit"] = dr.thread_count()
+    if (mi := sys.modules.get("mitsuba")) and mi.variant():
+        state["variant"] = mi.variant()
+    return state
+
+
+def _set_torch(count: int) -> None:
+    sys.modules["torch"].set_num_threads(count)
+
+
+def _set_drjit(count: int) -> None:
+    sys.modules["drjit"].set_thread_count(count)
+
+
+def _set_variant(variant: str) -> None:
+    sys.modules["mitsuba"].set_variant(variant)
+
+
+@pytest.fixture
+def mi() -> Any:
+    """Mitsuba, started by Mitex."""
+    from mitex.runtime import init
+
+    return init()
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """A seeded NumPy generator."""
+    return np.random.default_rng(2024)
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Exemplars and meshes beside the checkout; the test is skipped without them."""
+    folder = Path(__file__).parents[2] / "shared" / "data"
+    if not folder.is_dir():
+        pytest.skip("no shared/data beside the checkout")
+    return folder

@@ -1,0 +1,39 @@
+"""Which CPUs get bfloat16."""
+
+from pathlib import Path
+
+import pytest
+
+from mitex.errors import ConfigError
+from mitex.runtime import bfloat16_is_fast
+from mitex.runtime.precision import VARIABLE, bfloat16_flags
+
+
+@pytest.mark.parametrize(
+    ("flags", "expected"),
+    [
+        ("fpu avx512f avx512_bf16 amx_bf16 amx_tile", ("amx_bf16", "avx512_bf16")),
+        ("fpu avx512_bf16", ("avx512_bf16",)),
+        ("fpu avx2 avx512f", ()),
+    ],
+)
+def test_flags_are_read(tmp_path: Path, flags: str, expected: tuple[str, ...]):
+    cpuinfo = tmp_path / "cpuinfo"
+    cpuinfo.write_text(f"processor\t: 0\nflags\t\t: {flags}\n\nprocessor\t: 1\nflags\t\t: fpu amx_bf16\n")
+    assert bfloat16_flags(str(cpuinfo)) == expected
+
+
+def test_no_flags_where_the_system_does_not_tell(tmp_path: Path):
+    assert bfloat16_flags(str(tmp_path / "absent")) == ()
+
+
+@pytest.mark.parametrize(("value", "expected"), [("0", False), ("1", True)])
+def test_the_variable_decides(monkeypatch: pytest.MonkeyPatch, value: str, expected: bool):
+    monkeypatch.setenv(VARIABLE, value)
+    assert bfloat16_is_fast() is expected
+
+
+def test_another_value_is_an_error(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv(VARIABLE, "yes")
+    with pytest.raises(ConfigError, match="MITEX_BF16 is 'yes'"):
+        bfloat16_is_fast()

@@ -1,0 +1,158 @@
+"""Starting Mitsuba: variants, plugins, and a Mitsuba that was imported before Mitex."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mitex.runtime
+from mitex.errors import ConfigError
+from mitex.runtime import llvm
+
+
+def run(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """A Python process of its own, since one process can load only one LLVM."""
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+def test_init_is_idempotent_and_sets_the_default(mi):
+    assert mi.variant() == "llvm_ad_rgb"
+    assert mitex.runtime.init() is mi and mitex.init is mitex.runtime.init
+
+
+def test_a_variant_that_is_set_already_stays(mi):
+    mi.set_variant("scalar_rgb")
+    assert mitex.runtime.init("llvm_ad_rgb").variant() == "scalar_rgb"
+
+
+PLUGIN = """
+import mitsuba as mi
+
+def register():
+    class Grey(mi.Texture):
+        def __init__(self, props):
+            super().__init__(props)
+            self.built_for = mi.variant()
+
+        def to_string(self):
+            return f"Grey[{self.built_for}]"
+
+    mi.register_texture("mitex_test_grey", Grey)
+"""
+
+
+def test_plugins_are_registered_again_for_every_variant(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    import mitex.plugins
+
+    (tmp_path / "mitex_test_grey.py").write_text(PLUGIN)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(mitex.plugins, "MODULES", ("mitex_test_grey",))
+    for variant in ("scalar_rgb", "llvm_ad_spectral", "llvm_ad_rgb", "scalar_rgb"):
+        mi.set_variant(variant)
+        assert f"Grey[{variant}]" in str(mi.load_dict({"type": "mitex_test_grey"}))
+
+
+def test_the_real_plugins_follow_the_variant(mi):
+    for variant in ("llvm_ad_mono", "llvm_ad_spectral", "llvm_ad_rgb"):
+        mi.set_variant(variant)
+        field = {"type": "vertex_field", "data": mi.TensorXf(np.zeros((3, 2)))}
+        assert isinstance(mi.load_dict(field), mi.Texture)
+        assert isinstance(mi.load_dict({"type": "feature", "field": field}), mi.Integrator)
+
+
+def test_init_refuses_an_unknown_variant():
+    done = run("import mitex; mitex.init('llvm_ad_rbg')")
+    assert "ConfigError: Mitsuba has no variant 'llvm_ad_rbg'" in done.stderr
+    assert "llvm_ad_rgb" in done.stderr
+
+
+def test_importing_mitex_loads_nothing_heavy():
+    code = "import sys, mitex.runtime; print({'torch', 'mitsuba', 'numpy'} & set(sys.modules))"
+    assert run(code).stdout.strip() == "set()"
+
+
+def test_a_mitsuba_that_was_imported_before_is_used():
+    path = llvm.find_llvm()[0].path
+    code = (
+        "import mitsuba as m; m.set_variant('llvm_ad_spectral'); import mitex; print(mitex.init().variant())"
+    )
+    assert run(code, **{llvm.VARIABLE: path}).stdout.strip() == "llvm_ad_spectral"
+
+
+def test_a_mitsuba_imported_before_without_llvm_is_refused_by_name():
+    code = "import mitsuba, os; del os.environ['DRJIT_LIBLLVM_PATH']; import mitex; mitex.init()"
+    done = run(code, **{llvm.VARIABLE: "/nowhere/libLLVM.so"})
+    assert (
+        "RuntimeUnavailable: Dr.Jit was loaded without a usable LLVM; call `mitex.init()` before"
+        in done.stderr
+    )
+    assert "(LLVM " in done.stderr
+
+
+def test_scalar_variants_need_no_llvm():
+    done = run(
+        "import mitex; print(mitex.init('scalar_rgb').variant())", **{llvm.VARIABLE: "/nowhere/libLLVM.so"}
+    )
+    assert done.stdout.strip() == "scalar_rgb", done.stderr
+
+
+def test_an_unusable_choice_of_the_user_is_an_error_not_an_abort():
+    done = run("import mitex; mitex.init()", **{llvm.VARIABLE: "/nowhere/libLLVM.so"})
+    assert (
+        done.returncode == 1 and "RuntimeUnavailable: the LLVM that DRJIT_LIBLLVM_PATH names" in done.stderr
+    )
+
+
+def test_a_real_old_library_loaded_before_is_refused_not_run():
+    old = Path("/usr/lib/x86_64-linux-gnu/libLLVM-15.so.1")
+    if not old.exists():
+        pytest.skip("no LLVM 15 on this machine")
+    code = "import mitsuba, os; del os.environ['DRJIT_LIBLLVM_PATH']; import mitex; mitex.init()"
+    done = run(code, **{llvm.VARIABLE: str(old)})
+    assert done.returncode == 1 and "Dr.Jit was loaded with LLVM 15" in done.stderr
+
+
+def test_importing_the_plugins_sets_no_variant():
+    code = "import mitex.plugins, mitsuba as m; print(m.variant()); m.set_variant('llvm_ad_rgb'); print('ok')"
+    assert run(code).stdout.split() == ["None", "ok"]
+
+
+def test_seeds_give_the_same_numbers_again():
+    import torch
+
+    def draw() -> tuple[float, ...]:
+        generator = mitex.runtime.seed_everything(7)
+        own = torch.rand((), generator=generator).item()
+        return own, torch.rand(()).item(), float(np.random.rand())
+
+    assert draw() == draw()
+
+
+@pytest.mark.parametrize("seed", [-1, 2**32])
+def test_seeds_out_of_range_are_refused(seed: int):
+    with pytest.raises(ConfigError, match="out of range"):
+        mitex.runtime.seed_everything(seed)
+
+
+def test_threads_reach_torch_and_drjit(mi):
+    import drjit as dr
+    import torch
+
+    mitex.runtime.threads(1)
+    assert torch.get_num_threads() == 1 and dr.thread_count() == 1
+    with pytest.raises(ConfigError, match="0 threads"):
+        mitex.runtime.threads(0)
+
+
+def test_threads_chosen_before_the_start_are_kept():
+    code = "import mitex.runtime as r; r.threads(1); r.init(); import drjit as dr; print(dr.thread_count())"
+    assert run(code).stdout.strip() == "1"
