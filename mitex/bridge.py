@@ -1,0 +1,216 @@
+"""Where torch meets Dr.Jit: torch tensors go in and come out, with their gradients."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from torch.autograd.function import once_differentiable
+
+from mitex.errors import ConfigError
+from mitex.runtime import load_mitsuba
+from mitex.scenes.stage import Visibility, background_values
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+
+
+def lookup(
+    field: torch.Tensor, visibility: Visibility, background: Sequence[float] | float = 0.0
+) -> torch.Tensor:
+    """Images of a per-vertex field: each pixel interpolates the vertices of the triangle that it sees.
+
+    The visibility is constant; the gradient to `field` is exact (the transposed weights). Second
+    derivatives are an error.
+
+    Args:
+        field: (V, C) float32, attached or not.
+        visibility: what the cameras see, from `Stage.visibility`, on the device of `field`.
+        background: value of pixels that see nothing, one number or C of them.
+
+    Returns:
+        (K, H, W, C) float32, in the units of the field (sRGB stays sRGB).
+
+    Raises:
+        ConfigError: if the field is not a (V, C) float32 tensor for the visibility's mesh and device.
+    """
+    _check_field(field, visibility)
+    values = background_values(background, field.shape[1])
+    image = _Lookup.apply(field, visibility).view(*visibility.shape, field.shape[1])
+    if any(values):
+        image = image + (1 - visibility.coverage)[..., None] * image.new_tensor(values)
+    return image
+
+
+def render(
+    scene: Any,
+    values: torch.Tensor | Mapping[str, torch.Tensor],
+    sensor: Any = 0,
+    integrator: Any = None,
+    spp: int = 0,
+) -> torch.Tensor:
+    """An image of a scene by its `feature` integrator, attached to the parameters that are given as tensors.
+
+    The general way, for any sensor and any scene that the integrator can image; for a field on one mesh,
+    `lookup` is several times faster. The scene keeps the values, detached.
+
+    Args:
+        scene: an `mi.Scene`.
+        values: float32 CPU tensors by parameter name as in `mi.traverse(scene)` (the integrator's own are
+            called `integrator.*` there, also when it is passed here), or one tensor if the scene has
+            exactly one `vertex_field`.
+        sensor: index of a sensor of the scene, or an `mi.Sensor`; `batch` sensors put their views side by
+            side.
+        integrator: a `feature` integrator, if not the scene's.
+        spp: samples per pixel, a square number; 0 for the integrator's own setting.
+
+    Returns:
+        (H, W, C) float32. Gradients to every tensor are exact, including those of images that were rendered
+        before the scene changed again; there are none to geometry and cameras, and no second derivatives
+        (torch says so).
+
+    Raises:
+        ConfigError: for an unknown parameter, one of the wrong size, and a tensor that is not float32 on the
+            CPU.
+    """
+    integrator = integrator or scene.integrator()
+    if not hasattr(integrator, "fields"):
+        raise ConfigError("the scene's integrator is not a `feature`", "give one as `integrator`")
+    if isinstance(values, torch.Tensor):
+        targets, tensors = [_only_field(scene, integrator)], [values]
+    else:
+        table = _parameters(scene, integrator)
+        targets, tensors = [_found(table, name) for name in values], list(values.values())
+    for target, tensor in zip(targets, tensors, strict=True):
+        target.check(tensor)
+
+    @dr.wrap(source="torch", target="drjit")
+    def attached(*arrays: Any) -> Any:
+        try:
+            for target, array in zip(targets, arrays, strict=True):
+                target.assign(array)
+            return integrator.render(scene, sensor, spp=spp)
+        finally:
+            # What stays in the scene must not keep this image's graph alive.
+            for target, array in zip(targets, arrays, strict=True):
+                target.assign(dr.detach(array))
+
+    # Dr.Jit does not convert an nn.Parameter, a view of it is a plain tensor with the same gradient.
+    return attached(*(tensor.view_as(tensor) for tensor in tensors))
+
+
+@dataclass(frozen=True)
+class _Target:
+    """One parameter of a scene, by its key in `mi.SceneParameters`."""
+
+    params: Any
+    key: str
+    name: str
+
+    def check(self, tensor: Any) -> None:
+        """Refuses a tensor that cannot become this parameter's value."""
+        current = self.params[self.key]
+        if self.params.flags(self.key) & mi.ParamFlags.NonDifferentiable or not dr.is_float_v(current):
+            raise ConfigError(
+                f"'{self.name}' is not a differentiable parameter", "set it through mi.traverse(scene)"
+            )
+        if not isinstance(tensor, torch.Tensor):
+            raise ConfigError(f"'{self.name}' is a {type(tensor).__name__}", "give a torch tensor")
+        if tensor.dtype != torch.float32 or tensor.device.type != "cpu":
+            raise ConfigError(
+                f"'{self.name}' is a tensor of {tensor.dtype} on {tensor.device}",
+                "convert it with .float().cpu()",
+            )
+        shape = dr.shape(current) if dr.is_tensor_v(current) else (dr.width(dr.ravel(current)),)
+        if tuple(tensor.shape) != tuple(shape):
+            raise ConfigError(
+                f"'{self.name}' has shape {tuple(tensor.shape)}", f"give a tensor of shape {shape}"
+            )
+
+    def assign(self, array: Any) -> None:
+        """Sets the parameter from an `mi.TensorXf`."""
+        kind = type(self.params[self.key])
+        if dr.depth_v(kind) > 1:
+            array = dr.unravel(kind, array.array)
+        elif not dr.is_tensor_v(kind):
+            array = kind(array.array)
+        self.params[self.key] = array
+        self.params.update()
+
+
+def _parameters(scene: Any, integrator: Any) -> dict[str, _Target]:
+    """Parameters of the scene, and of the integrator if it is another than the scene's."""
+    params = mi.traverse(scene)
+    table = {name: _Target(params, name, name) for name in params.keys()}  # noqa: SIM118
+    if scene.integrator() is not integrator:
+        params = mi.traverse(integrator)
+        table |= {f"integrator.{key}": _Target(params, key, f"integrator.{key}") for key in params.keys()}  # noqa: SIM118
+    return table
+
+
+def _found(table: Mapping[str, _Target], name: str) -> _Target:
+    if name not in table:
+        close = difflib.get_close_matches(name, table, n=1)
+        remedy = f"did you mean '{close[0]}'?" if close else "print(mi.traverse(scene)) lists all"
+        raise ConfigError(f"the scene has no parameter '{name}'", remedy)
+    return table[name]
+
+
+def _only_field(scene: Any, integrator: Any) -> _Target:
+    fields = {id(texture): texture for _, texture in integrator.fields(scene) if hasattr(texture, "locate")}
+    if len(fields) != 1:
+        raise ConfigError(
+            f"the integrator images {len(fields)} vertex fields, not one",
+            "give tensors by parameter name, see mi.traverse(scene)",
+        )
+    return _Target(mi.traverse(next(iter(fields.values()))), "data", "field")
+
+
+class _Lookup(torch.autograd.Function):
+    """pixels = matrix @ field, and its transpose."""
+
+    @staticmethod
+    def forward(ctx: Any, field: torch.Tensor, visibility: Visibility) -> torch.Tensor:
+        ctx.visibility = visibility
+        return visibility.matrix @ field.contiguous()
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, grad: torch.Tensor) -> tuple[torch.Tensor, None]:
+        return _transposed_product(ctx.visibility, grad), None
+
+
+def _transposed_product(visibility: Visibility, grad: torch.Tensor) -> torch.Tensor:
+    """matrix.T @ grad without sorting the matrix: on a CPU scipy adds each row's entries to their columns."""
+    if grad.device.type != "cpu":
+        rows, columns, weight = visibility.pixel, visibility.vertex_index, visibility.weight
+        out = grad.new_zeros(visibility.vertices, grad.shape[1])
+        for corner in range(3):
+            out.index_add_(0, columns[:, corner], weight[:, corner, None] * grad[rows])
+        return out
+    import scipy.sparse
+
+    matrix = scipy.sparse.csr_array(
+        (visibility.weights.numpy(), visibility.indices.numpy(), visibility.indptr.numpy()),
+        shape=(len(visibility.indptr) - 1, visibility.vertices),
+    )
+    return torch.from_numpy(np.ascontiguousarray(matrix.T @ grad.contiguous().numpy()))
+
+
+def _check_field(field: torch.Tensor, visibility: Visibility) -> None:
+    if field.ndim != 2 or field.shape[0] != visibility.vertices:
+        raise ConfigError(
+            f"a field of shape {tuple(field.shape)} does not fit a mesh of {visibility.vertices} vertices",
+            "give a tensor of shape (V, C)",
+        )
+    if field.dtype != torch.float32:
+        raise ConfigError(f"a field of {field.dtype}", "convert it with field.float()")
+    if field.device != visibility.weights.device:
+        raise ConfigError(
+            f"the field is on {field.device}, the visibility on {visibility.weights.device}",
+            "move one of them with .to(device)",
+        )

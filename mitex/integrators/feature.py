@@ -1,0 +1,236 @@
+"""`feature`: a Mitsuba integrator that images the channels of a texture, with an analytic adjoint."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from mitex.runtime import load_mitsuba
+from mitex.textures.variant import for_variant
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+
+
+class FeatureMethods:
+    """Images a texture on the visible surface: H x W x C values, no light, any sensor including `batch`.
+
+    .. pluginparameters::
+
+     * - field
+       - |texture|
+       - The texture to image, on every shape: all channels of a `vertex_field`; of any other the
+         colour that `eval` gives (3 channels in rgb variants, 1 in mono, not in spectral ones).
+       - exposed, differentiable
+     * - name
+       - |string|
+       - Instead of `field`: the name under which each shape, its BSDF or a BSDF inside that holds its
+         texture, for instance `reflectance`. Shapes without one show the background. (Default: none)
+     * - background
+       - |float| or |tensor|
+       - Value of rays that see nothing, one for all channels or C. (Default: 0)
+       - exposed, differentiable
+     * - antialias
+       - |int|
+       - n for n x n samples per pixel at the centres of a regular grid, averaged (box filter). 1 is one
+         sample at the pixel's centre. An `spp` given to `mi.render` replaces it and must be a square number.
+         (Default: 1)
+
+    The sensor's sampler and reconstruction filter are not used: the image is deterministic, the seed has no
+    effect. The result is returned and not stored in the film, which has no room for C channels.
+
+    Visibility and barycentric weights are detached, lookups are attached: `mi.render` differentiates with
+    respect to `data`, `scale`, `offset` (or any parameter of another texture) and `background`, not to
+    geometry or cameras. The adjoint scatters the image's gradient to the vertices with the barycentric
+    weights of the forward pass; no derivative passes through ray tracing or film. Calling `render` directly
+    with attached parameters returns an attached image.
+    """
+
+    def __init__(self, props: Any) -> None:
+        mi.CppADIntegrator.__init__(self, props)
+        if not mi.variant().startswith(("llvm", "cuda")):
+            raise RuntimeError(f"feature: variant '{mi.variant()}' is not supported; use an llvm or cuda one")
+        self.field = props.get("field")
+        self.name = props.get("name", "")
+        if (self.field is None) == (not self.name):
+            raise RuntimeError(
+                "feature: give either a nested texture 'field' or the 'name' of each shape's texture"
+            )
+        if self.field is not None and not isinstance(self.field, mi.Texture):
+            raise RuntimeError(f"feature: 'field' is a {type(self.field).__name__}; give a texture")
+        background = props.get("background", 0.0)
+        if isinstance(background, mi.TensorXf):
+            background = background.array
+        self.background = mi.Float(background)
+        self.antialias = int(props.get("antialias", 1))
+        if self.antialias < 1:
+            raise RuntimeError(f"feature: 'antialias' is {self.antialias}; use 1 or more")
+
+    def traverse(self, callback: Any) -> None:
+        if self.field is not None:
+            callback.put("field", self.field, mi.ParamFlags.Differentiable)
+        callback.put("background", self.background, mi.ParamFlags.Differentiable)
+
+    def aov_names(self) -> list[str]:
+        return []
+
+    def to_string(self) -> str:
+        nested = str(self.field).replace("\n", "\n  ")
+        source = f"field = {nested}" if self.field is not None else f"name = {self.name}"
+        return (
+            f"FeatureIntegrator[\n  {source},\n  background = {self.background},\n"
+            f"  antialias = {self.antialias}\n]"
+        )
+
+    def render(
+        self,
+        scene: Any,
+        sensor: Any = 0,
+        seed: Any = 0,
+        spp: int = 0,
+        develop: bool = True,
+        evaluate: bool = True,
+    ) -> Any:
+        """The image, `mi.TensorXf` (H, W, C); attached where parameters and the AD mode are."""
+        if not develop:
+            raise RuntimeError("feature: the film holds no result, so develop=True is needed")
+        image = self._image(scene, sensor, spp)[1]
+        if evaluate:
+            dr.eval(image)
+        return image
+
+    def render_forward(self, scene: Any, params: Any, sensor: Any = 0, seed: Any = 0, spp: int = 0) -> Any:
+        """Derivative of the image along the gradients set on the parameters."""
+        with dr.resume_grad():
+            image = self._image(scene, sensor, spp)[1]
+            dr.forward_to(image)
+            return dr.grad(image)
+
+    def render_backward(
+        self, scene: Any, params: Any, grad_in: Any, sensor: Any = 0, seed: Any = 0, spp: int = 0
+    ) -> None:
+        """Adds the gradient of the parameters for the image's gradient `grad_in` (H, W, C)."""
+        with dr.resume_grad():
+            values, n = self._samples(scene, sensor, spp)
+        pixel = dr.arange(mi.UInt32, dr.width(values[0])) // (n * n)
+        adjoint = dr.detach(grad_in.array) / (n * n)
+        for channel, value in enumerate(values):
+            if dr.grad_enabled(value):
+                dr.set_grad(value, dr.gather(mi.Float, adjoint, len(values) * pixel + channel))
+                dr.enqueue(dr.ADMode.Backward, value)
+        dr.traverse(dr.ADMode.Backward)
+
+    def _image(self, scene: Any, sensor: Any, spp: int) -> tuple[list[Any], Any]:
+        """Samples averaged into pixels."""
+        values, n = self._samples(scene, sensor, spp)
+        width, height = _film(scene, sensor).crop_size()
+        count = len(values)
+        flat = dr.zeros(mi.Float, width * height * count)
+        pixel = dr.arange(mi.UInt32, width * height)
+        for channel, value in enumerate(values):
+            mean = value if n == 1 else dr.block_sum(value, n * n) / (n * n)
+            dr.scatter(flat, mean, pixel * count + channel)
+        return values, mi.TensorXf(flat, (height, width, count))
+
+    def _samples(self, scene: Any, sensor: Any, spp: int) -> tuple[list[Any], int]:
+        """C values per sample, ordered by pixel, and n for n x n samples per pixel."""
+        n = self._side(spp)
+        fields = self.fields(scene)
+        with dr.suspend_grad():
+            si = _first_hits(scene, sensor, n)
+            hit = si.is_valid()
+        values: list[Any] = []
+        covered = mi.Bool(False)
+        for shape, texture in fields:
+            mask = hit if shape is None else hit & (si.shape == mi.ShapePtr(shape))
+            new = _evaluate(texture, si, mask)
+            if values and len(values) != len(new):
+                raise RuntimeError(
+                    f"feature: the textures called '{self.name}' differ in their number of channels"
+                )
+            values = [dr.select(mask, a, b) for a, b in zip(new, values or new, strict=True)]
+            covered |= mask
+        backgrounds = self._backgrounds(len(values))
+        return [dr.select(covered, v, b) for v, b in zip(values, backgrounds, strict=True)], n
+
+    def _side(self, spp: int) -> int:
+        if spp == 0:
+            return self.antialias
+        side = math.isqrt(spp)
+        if side * side != spp:
+            raise RuntimeError(
+                f"feature: spp = {spp} cannot be a regular grid; use a square number such as 4 or 16"
+            )
+        return side
+
+    def fields(self, scene: Any) -> list[tuple[Any, Any]]:
+        """The textures that are imaged, as (shape, texture) pairs; a shape of None stands for all shapes."""
+        if self.field is not None:
+            return [(None, self.field)]
+        found = [(shape, textures_named(shape, self.name)) for shape in scene.shapes()]
+        pairs = [(shape, textures[0]) for shape, textures in found if textures]
+        if not pairs:
+            raise RuntimeError(f"feature: no shape of the scene has a texture called '{self.name}'")
+        return pairs
+
+    def _backgrounds(self, channels: int) -> list[Any]:
+        given = dr.width(self.background)
+        if given not in (1, channels):
+            raise RuntimeError(
+                f"feature: 'background' has {given} values for {channels} channels; give 1 or {channels}"
+            )
+        return [dr.gather(mi.Float, self.background, c if given > 1 else 0) for c in range(channels)]
+
+
+def textures_named(thing: Any, name: str) -> list[Any]:
+    """Textures with the parameter name `name` in a shape or BSDF or nested in it, outermost first."""
+    found: list[Any] = []
+    nested: list[Any] = []
+
+    class Callback(mi.TraversalCallback):
+        def put(self, key: str, value: Any, *_flags: Any) -> None:
+            if isinstance(value, mi.Texture) and key == name:
+                found.append(value)
+            elif isinstance(value, mi.BSDF):
+                nested.append(value)
+
+    thing.traverse(Callback())
+    for child in nested:
+        found += textures_named(child, name)
+    return found
+
+
+def _evaluate(texture: Any, si: Any, active: Any) -> list[Any]:
+    """All channels of a Mitex field, else those of a colour."""
+    if hasattr(texture, "locate"):
+        with dr.suspend_grad():
+            located = texture.locate(si, active)
+        return texture.gather(located)
+    if mi.is_spectral:
+        raise RuntimeError("feature: in spectral variants only a vertex_field can be imaged")
+    return list(texture.eval(si, active))
+
+
+def _film(scene: Any, sensor: Any) -> Any:
+    return (scene.sensors()[sensor] if isinstance(sensor, int) else sensor).film()
+
+
+def _first_hits(scene: Any, sensor: Any, n: int) -> Any:
+    """Surface interactions of n x n regularly spaced rays per pixel, ordered by pixel."""
+    if isinstance(sensor, int):
+        sensor = scene.sensors()[sensor]
+    width, height = sensor.film().crop_size()
+    index = dr.arange(mi.UInt32, width * height * n * n)
+    sample, pixel = index % (n * n), index // (n * n)
+    x = mi.Float(pixel % width) + (mi.Float(sample % n) + 0.5) / n
+    y = mi.Float(pixel // width) + (mi.Float(sample // n) + 0.5) / n
+    position = mi.Point2f(x / width, y / height)
+    ray, _ = sensor.sample_ray(sensor.shutter_open(), 0.5, position, mi.Point2f(0.5))
+    found = scene.ray_intersect_preliminary(ray, coherent=True)
+    return found.compute_surface_interaction(ray, mi.RayFlags.All | mi.RayFlags.DetachShape, found.is_valid())
+
+
+def register() -> None:
+    """Registers the integrator for the current variant."""
+    cls = for_variant("FeatureIntegrator", mi.CppADIntegrator, FeatureMethods)
+    mi.register_integrator("feature", lambda props: cls(props))

@@ -1,0 +1,66 @@
+"""Lights: they load, they light, and the studio is where it says."""
+
+import numpy as np
+import pytest
+
+from mitex.scenes.lights import environment, key_and_fill, studio_image
+
+
+def sphere_picture(mi, lights: dict, radius: float = 1.0) -> np.ndarray:
+    to_world = mi.ScalarTransform4f().look_at(origin=[0, 0, 5 * radius], target=[0, 0, 0], up=[0, 1, 0])
+    film = {"type": "hdrfilm", "width": 24, "height": 24, "rfilter": {"type": "box"}}
+    sensor = {"type": "perspective", "fov": 20, "to_world": to_world, "film": film}
+    scene = {
+        "type": "scene",
+        "integrator": {"type": "path"},
+        "sensor": sensor,
+        "ball": {"type": "sphere", "radius": radius},
+    }
+    return np.array(mi.render(mi.load_dict(scene | lights), spp=64, seed=1))
+
+
+def test_studio_image():
+    image = studio_image(32)
+    assert image.shape == (32, 64, 3)
+    assert image.dtype == np.float32
+    assert np.isfinite(image).all()
+    assert image.min() > 0
+    assert image.max() > 4
+    assert image[0].mean() > image[-1].mean()  # brighter above
+
+
+def radiance_from(mi, light: dict, direction: tuple[float, float, float]) -> float:
+    si = mi.SurfaceInteraction3f()
+    si.wi = -mi.Vector3f(mi.ScalarVector3f(direction)) / float(np.linalg.norm(direction))
+    return mi.load_dict(light).eval(si)[1][0]
+
+
+@pytest.mark.parametrize("azimuth", [np.pi / 2, 0.3, -2.0])
+def test_softboxes_are_where_the_studio_says(mi, azimuth: float):
+    """Relative to a camera at the azimuth: key to its left, fill to its right, rim opposite."""
+    forward = np.array((np.cos(azimuth), 0, np.sin(azimuth)))  # from the object to the camera
+    right = np.cross((0, 1, 0), forward)
+    light = environment(azimuth=azimuth)
+    key, fill, rim, wall = (
+        radiance_from(mi, light, tuple(x * right + (0, y, 0) + z * forward))
+        for x, y, z in ((-0.8, 0.9, 0.9), (1.2, 0.3, 0.7), (0.9, 1.6, -0.9), (0.0, 0.0, -1.0))
+    )
+    assert key > rim > 4
+    assert 1 < fill < 2
+    assert wall < 0.5
+
+
+def test_environment_strength_and_key_on_the_left(mi):
+    picture = sphere_picture(mi, {"light": environment()})[..., 1]
+    assert picture[5:10, 6:11].mean() > 1.3 * picture[14:19, 13:18].mean()
+    np.testing.assert_allclose(
+        sphere_picture(mi, {"light": environment(2.0)})[..., 1], 2 * picture, rtol=1e-3
+    )
+
+
+def test_key_is_upper_left_at_any_size(mi):
+    picture = sphere_picture(mi, key_and_fill())[..., 1]
+    assert picture[5:10, 6:11].mean() > 1.5 * picture[14:19, 13:18].mean() > 0
+    small = sphere_picture(mi, key_and_fill(radius=0.1), radius=0.1)[..., 1]
+    np.testing.assert_allclose(small, picture, atol=0.02)
+    np.testing.assert_allclose(sphere_picture(mi, key_and_fill(3.0))[..., 1], 3 * picture, rtol=1e-3)

@@ -1,0 +1,206 @@
+"""The bridge: values and gradients against slow references, and clear errors at its limits."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from mitex.bridge import lookup, render
+from mitex.errors import ConfigError
+from mitex.mesh import Mesh, icosphere
+from mitex.scenes import Cameras, random_views
+from mitex.scenes.stage import Stage
+from tests.scenes.helpers import gradient, live_variables
+from tests.scenes.reference import images, matrix
+
+
+@pytest.fixture
+def mesh(rng) -> Mesh:
+    ball = icosphere(3)
+    return ball.with_vertices(ball.vertices * rng.uniform(0.85, 1.0, (len(ball.vertices), 1)))
+
+
+@pytest.fixture
+def field(mesh, rng) -> torch.Tensor:
+    return torch.from_numpy(rng.uniform(-0.5, 1.5, (len(mesh.vertices), 4)).astype(np.float32))
+
+
+def cameras(kind: str = "perspective", count: int = 2) -> Cameras:
+    views = random_views(torch.Generator().manual_seed(3), count)
+    return replace(views, kind=kind, half_width=1.1, width=11, height=9)
+
+
+@pytest.mark.parametrize("kind", ["perspective", "orthographic"])
+@pytest.mark.parametrize("antialias", [1, 2])
+@pytest.mark.parametrize("background", [0.0, (0.1, 0.2, 0.3, 0.4)])
+def test_lookup_and_its_gradient(mesh, field, rng, kind: str, antialias: int, background):
+    views = cameras(kind)
+    visibility = Stage(mesh).visibility(views, antialias)
+    attached = field.clone().requires_grad_()
+    picture = lookup(attached, visibility, background)
+    expected = images(mesh, views, field.numpy(), np.array(background), antialias)
+    assert picture.shape == (2, 9, 11, 4)
+    np.testing.assert_allclose(picture.detach().numpy(), expected, atol=1e-5)
+
+    upstream = torch.from_numpy(rng.normal(size=picture.shape).astype(np.float32))
+    (picture * upstream).sum().backward()
+    reference = field.double().requires_grad_()
+    weights = torch.from_numpy(matrix(mesh, views, antialias))
+    (weights @ reference * upstream).sum().backward()
+    np.testing.assert_allclose(gradient(attached), gradient(reference), atol=1e-5)
+
+    direction = torch.from_numpy(rng.normal(size=field.shape).astype(np.float32))
+    high, low = (lookup(field + t * direction, visibility, background).double() for t in (0.1, -0.1))
+    slope = ((high - low) * upstream).sum() / 0.2
+    assert float(slope) == pytest.approx(float((gradient(attached) * direction.numpy()).sum()), rel=1e-2)
+
+
+def test_lookup_of_a_slice_and_of_a_parameter(mesh, field):
+    visibility = Stage(mesh).visibility(cameras())
+    state = torch.nn.Parameter(field)
+    lookup(state[:, 1:3], visibility).sum().backward()
+    np.testing.assert_array_equal(gradient(state)[:, 0], 0)
+    ones = torch.ones(*visibility.shape).flatten()
+    np.testing.assert_allclose(gradient(state)[:, 1], visibility.matrix.to_dense().T @ ones, atol=1e-5)
+    with torch.no_grad():
+        np.testing.assert_array_equal(lookup(state, visibility)[..., 1:3], lookup(state[:, 1:3], visibility))
+
+
+def test_lookup_refuses_second_derivatives(mesh, field):
+    visibility = Stage(mesh).visibility(cameras())
+    attached = field.requires_grad_()
+    (first,) = torch.autograd.grad((lookup(attached, visibility) ** 2).sum(), attached, create_graph=True)
+    with pytest.raises(RuntimeError, match="once_differentiable"):
+        first.sum().backward()
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        (lambda f: f[:-1], "does not fit a mesh"),
+        (lambda f: f[None], "does not fit a mesh"),
+        (lambda f: f.double(), "float64"),
+        (lambda f: f.to(torch.uint8), "uint8"),
+        (lambda f: f.to("meta"), "meta"),
+    ],
+)
+def test_lookup_refuses(mesh, field, change, problem: str):
+    visibility = Stage(mesh).visibility(cameras())
+    with pytest.raises(ConfigError, match=problem):
+        lookup(change(field), visibility)
+    with pytest.raises(ConfigError, match="background"):
+        lookup(field, visibility, background=(0.0, 1.0))
+
+
+@pytest.fixture
+def stage(mesh) -> Stage:
+    return Stage(mesh, channels=4, background=(0.1, 0.2, 0.3, 0.4))
+
+
+def sensor(mi, views: Cameras):
+    return mi.load_dict(views.sensors()[0])
+
+
+def test_render_equals_lookup_with_its_gradient(mi, stage, field, rng):
+    views = cameras(count=1)
+    upstream = torch.from_numpy(rng.normal(size=(9, 11, 4)).astype(np.float32))
+    first, second = (field.clone().requires_grad_() for _ in range(2))
+    picture = render(stage.scene, first, sensor(mi, views))
+    expected = lookup(second, stage.visibility(views), stage.background)[0]
+    np.testing.assert_allclose(picture.detach(), expected.detach(), atol=1e-5)
+    (picture * upstream).sum().backward()
+    (expected * upstream).sum().backward()
+    np.testing.assert_allclose(gradient(first), gradient(second), atol=1e-5)
+    fine = render(stage.scene, field, sensor(mi, views), spp=4)
+    np.testing.assert_allclose(
+        fine, lookup(field, stage.visibility(views, 2), stage.background)[0], atol=1e-5
+    )
+
+
+def test_render_by_parameter_names(mi, stage, field):
+    names = (Stage.FIELD, "mesh.bsdf.reflectance.scale", "integrator.background")
+    values = field.clone(), torch.tensor([0.5]), torch.tensor([0.9, 0.8, 0.7, 0.6])
+    values = [v.requires_grad_() for v in values]
+    render(stage.scene, dict(zip(names, values, strict=True)), sensor(mi, cameras(count=1))).sum().backward()
+    visibility = stage.visibility(cameras(count=1))
+    empty = float((1 - visibility.coverage).sum())
+    np.testing.assert_allclose(gradient(values[2]), empty, rtol=1e-5)
+    assert gradient(values[1]).item() == pytest.approx(float(lookup(field, visibility).sum()), rel=1e-4)
+    expected = visibility.matrix.to_dense().sum(0)[:, None] * 0.5
+    np.testing.assert_allclose(gradient(values[0]), expected.expand(-1, 4), atol=1e-5)
+
+
+def test_render_keeps_the_gradient_of_earlier_pictures(mi, stage, field):
+    """Two pictures, then the gradient of the first: it must not be that of the scene as it is now."""
+    view = sensor(mi, cameras(count=1))
+    scale = torch.tensor([3.0], requires_grad=True)
+    first = render(stage.scene, {Stage.FIELD: field, "mesh.bsdf.reflectance.scale": scale}, view)
+    render(stage.scene, {Stage.FIELD: torch.zeros_like(field)}, view)
+    first.sum().backward()
+    expected = lookup(field, stage.visibility(cameras(count=1))).sum()
+    assert gradient(scale).item() == pytest.approx(float(expected), rel=1e-4)
+
+
+def test_render_with_another_integrator(mi, stage, field):
+    integrator = mi.load_dict({"type": "feature", "name": "reflectance", "background": 0.0})
+    background = torch.zeros(1, requires_grad=True)
+    values = {Stage.FIELD: field, "integrator.background": background}
+    picture = render(stage.scene, values, sensor(mi, cameras(count=1)), integrator)
+    np.testing.assert_allclose(picture[0, 0].detach(), 0)
+    picture.sum().backward()
+    assert gradient(background).item() > 0
+
+
+def test_render_takes_a_parameter(mi, stage, field):
+    parameter = torch.nn.Parameter(field)
+    render(stage.scene, parameter, sensor(mi, cameras(count=1))).sum().backward()
+    assert np.abs(gradient(parameter)).sum() > 0
+
+
+def test_render_refuses_second_derivatives(mi, stage, field):
+    attached = field.requires_grad_()
+    loss = (render(stage.scene, attached, sensor(mi, cameras(count=1))) ** 2).sum()
+    (first,) = torch.autograd.grad(loss, attached, create_graph=True)
+    with pytest.raises(RuntimeError, match="once_differentiable|does not require grad"):
+        first.sum().backward()
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        (lambda f: f.double(), "float64.*float()"),
+        (lambda f: f.to(torch.uint8), "uint8"),
+        (lambda f: f.to("meta"), "meta"),
+        (lambda f: f[:-1], "has shape"),
+        (lambda f: {"mesh.bsdf.reflectance.dat": f}, "did you mean 'mesh.bsdf.reflectance.data'"),
+        (lambda f: {"mesh.faces": f}, "not a differentiable"),
+        (lambda f: {Stage.FIELD: f.numpy()}, "ndarray"),
+        (lambda f: {"integrator.background": f}, "has shape"),
+    ],
+)
+def test_render_refuses(mi, stage, field, change, problem: str):
+    with pytest.raises(ConfigError, match=problem):
+        render(stage.scene, change(field), sensor(mi, cameras(count=1)))
+
+
+def test_render_needs_one_field_and_a_feature_integrator(mi, field):
+    view = {"sensor": cameras(count=1).sensors()[0]}
+    empty = mi.load_dict({"type": "scene", "integrator": {"type": "path"}} | view)
+    with pytest.raises(ConfigError, match="not a `feature`"):
+        render(empty, field)
+    checks = {"type": "feature", "field": {"type": "checkerboard"}}
+    with pytest.raises(ConfigError, match="0 vertex fields"):
+        render(mi.load_dict({"type": "scene", "integrator": checks} | view), field)
+
+
+def test_render_a_hundred_times_does_not_grow(mi, stage, field):
+    view = sensor(mi, cameras(count=1))
+
+    def use() -> int:
+        attached = field.clone().requires_grad_()
+        render(stage.scene, attached, view).sum().backward()
+        return live_variables()
+
+    counts = [use() for _ in range(100)]
+    assert counts[-1] <= max(counts[2:10])

@@ -1,0 +1,281 @@
+"""vertex_field: analytic values through standard BSDFs, with and without UVs, parameters, gradients."""
+
+import numpy as np
+import pytest
+
+from mitex.colour import srgb_to_linear
+from mitex.mesh import icosphere
+from mitex.scenes.stage import mesh_shape
+
+QUAD = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32)
+QUAD_UV = np.array([(0.1, 0), (0.7, 0.2), (0.5, 0.9), (0.2, 0.8)], np.float32)  # skewed on purpose
+FACES = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
+
+
+def quad(mi, bsdf: dict, uv: np.ndarray | None = None):
+    """A quad in the xy plane that faces +z."""
+    props = mi.Properties()
+    props["bsdf"] = mi.load_dict(bsdf)
+    shape = mi.Mesh("quad", 4, 2, props, has_vertex_texcoords=uv is not None)
+    params = mi.traverse(shape)
+    params["vertex_positions"] = QUAD.ravel()
+    params["faces"] = FACES.ravel()
+    if uv is not None:
+        params["vertex_texcoords"] = uv.ravel()
+    params.update()
+    return shape
+
+
+def field(mi, data: np.ndarray, **options) -> dict:
+    return {"type": "vertex_field", "data": mi.TensorXf(np.asarray(data, np.float32))} | options
+
+
+def radiance(mi, shape, x: np.ndarray, y: np.ndarray, light=(0.0, 0.0, -1.0)) -> np.ndarray:
+    """(N, 3) exact radiance towards +z of points of a shape under a directional light of irradiance pi."""
+    emitter = {"type": "directional", "direction": list(light), "irradiance": {"type": "rgb", "value": np.pi}}
+    scene = mi.load_dict({"type": "scene", "shape": shape, "light": emitter})
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(0, len(x))
+    origin = mi.Point3f(mi.Float(x), mi.Float(y), 3.0)
+    ray = mi.RayDifferential3f(mi.Ray3f(origin, mi.Vector3f(0, 0, -1)))
+    value, _, _ = mi.load_dict({"type": "direct"}).sample(scene, sampler, ray)
+    return np.array(value).T
+
+
+@pytest.fixture
+def points(rng) -> tuple[np.ndarray, np.ndarray]:
+    return tuple(rng.uniform(-0.95, 0.95, (2, 50)).astype(np.float32))
+
+
+@pytest.mark.parametrize("uv", [None, QUAD_UV, np.zeros_like(QUAD_UV)], ids=["none", "skewed", "degenerate"])
+def test_linear_reflectance_is_exact(mi, points, uv):
+    x, y = points
+    data = 0.5 + QUAD[:, :2] @ np.array([(0.2, 0.1, -0.3), (0.1, -0.2, 0.1)])
+    shape = quad(mi, {"type": "diffuse", "reflectance": field(mi, data, raw=True)}, uv)
+    expected = 0.5 + np.stack((x, y), axis=1) @ np.array([(0.2, 0.1, -0.3), (0.1, -0.2, 0.1)])
+    np.testing.assert_allclose(radiance(mi, shape, x, y), expected, atol=2e-6)
+
+
+def test_srgb_is_decoded_for_colours_only(mi, points):
+    x, y = points
+    data = 0.5 + 0.7 * QUAD[:, :1] * np.array([[1, -1, 0.5]])  # leaves [0, 1] at the rim
+    shape = quad(mi, {"type": "diffuse", "reflectance": field(mi, data)})
+    encoded = 0.5 + 0.7 * x[:, None] * np.array([[1, -1, 0.5]])
+    expected = srgb_to_linear(encoded.clip(0, 1))
+    np.testing.assert_allclose(radiance(mi, shape, x, y), expected, atol=2e-5)
+
+    texture = mi.load_dict(field(mi, data))
+    scene = mi.load_dict({"type": "scene", "shape": shape})
+    si = scene.ray_intersect(mi.Ray3f(mi.Point3f(mi.Float(x), mi.Float(y), 3), mi.Vector3f(0, 0, -1)))
+    np.testing.assert_allclose(np.array(texture.eval_3(si)).T, encoded, atol=2e-6)
+    np.testing.assert_allclose(texture.eval_1(si).numpy(), encoded[:, 0], atol=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("channel", "shown"), [(0, (0, 1, 2)), (2, (2, 3, 4)), (3, (3, 3, 3)), (4, (4, 4, 4))]
+)
+def test_channel_selects(mi, rng, points, channel: int, shown: tuple[int, ...]):
+    values = rng.uniform(0.1, 0.9, 5)
+    data = np.broadcast_to(values, (4, 5))
+    bsdf = {"type": "diffuse", "reflectance": field(mi, data, raw=True, channel=channel)}
+    result = radiance(mi, quad(mi, bsdf), *points)
+    np.testing.assert_allclose(result, np.broadcast_to(values[list(shown)], (50, 3)), atol=1e-6)
+
+
+def test_scale_and_offset_come_before_decoding(mi, points):
+    data = np.full((4, 3), -0.25)
+    bsdf = {"type": "diffuse", "reflectance": field(mi, data, scale=0.5, offset=0.5)}
+    np.testing.assert_allclose(
+        radiance(mi, quad(mi, bsdf), *points), srgb_to_linear(np.float64(0.375)), atol=1e-5
+    )
+
+
+@pytest.mark.parametrize("uv", [None, QUAD_UV], ids=["none", "skewed"])
+def test_bump_of_a_linear_height_tilts_the_normal(mi, points, uv):
+    slope = np.array([0.3, -0.5])
+    height = field(mi, 2 + QUAD[:, :2] @ slope)
+    nested = {"type": "diffuse", "reflectance": 0.6}
+    bsdf = {"type": "bumpmap", "height": height, "bsdf": nested, "use_shadowing_function": False}
+    light = np.array([0.3, 0.2, -1.0]) / np.linalg.norm([0.3, 0.2, -1.0])
+    normal = np.array([-slope[0], -slope[1], 1]) / np.linalg.norm([*slope, 1])
+    expected = 0.6 * np.dot(normal, -light)
+    result = radiance(mi, quad(mi, bsdf, uv), *points, light=tuple(light))
+    np.testing.assert_allclose(result, expected, atol=1e-5)
+    assert abs(expected - 0.6 * -light[2]) > 0.05
+
+
+def test_normal_map_tilts_the_normal(mi, points):
+    normal = np.array([0.3, -0.2, 0.93])
+    normal /= np.linalg.norm(normal)
+    nested = {"type": "diffuse", "reflectance": 0.6}
+    encoded = np.broadcast_to(0.5 * (normal + 1), (4, 3))
+    plain_cosine = {"type": "normalmap", "bsdf": nested, "use_shadowing_function": False}
+    bsdf = plain_cosine | {"normalmap": field(mi, encoded)}
+    shape = quad(mi, bsdf, QUAD[:, :2])  # uv = xy, so that the tangent frame is the axes
+    light = np.array([0.3, 0.2, -1.0]) / np.linalg.norm([0.3, 0.2, -1.0])
+    expected = 0.6 * np.dot(normal, -light)
+    np.testing.assert_allclose(radiance(mi, shape, *points, light=tuple(light)), expected, atol=1e-5)
+
+    flat = plain_cosine | {"normalmap": field(mi, np.full((4, 3), (0.5, 0.5, 1.0)))}
+    plain = radiance(mi, quad(mi, nested), *points, light=tuple(light))
+    np.testing.assert_allclose(radiance(mi, quad(mi, flat), *points, light=tuple(light)), plain, atol=1e-5)
+
+
+def sphere_picture(mi, bsdf: dict) -> np.ndarray:
+    to_world = mi.ScalarTransform4f().look_at(origin=[1, 2, 4], target=[0, 0, 0], up=[0, 1, 0])
+    film = {"type": "hdrfilm", "width": 16, "height": 16}
+    sensor = {"type": "perspective", "fov": 28, "to_world": to_world, "film": film}
+    light = {"type": "point", "position": [3, 4, 5], "intensity": 40.0}
+    ball = mesh_shape(icosphere(4), mi.load_dict(bsdf))
+    scene = {"type": "scene", "integrator": {"type": "path"}, "sensor": sensor, "light": light, "ball": ball}
+    return np.array(mi.render(mi.load_dict(scene), spp=4))
+
+
+def test_constant_field_equals_a_constant(mi):
+    """Albedo and roughness of a principled BSDF in a path-traced picture."""
+    constant = {
+        "type": "principled",
+        "base_color": {"type": "rgb", "value": [0.2, 0.5, 0.8]},
+        "roughness": 0.3,
+    }
+    data = np.broadcast_to([0.2, 0.5, 0.8, 0.3], (162, 4))
+    varying = {
+        "type": "principled",
+        "base_color": field(mi, data, raw=True),
+        "roughness": field(mi, data, channel=3),
+    }
+    expected = sphere_picture(mi, constant)
+    np.testing.assert_allclose(sphere_picture(mi, varying), expected, rtol=1e-4, atol=1e-5)
+    smoother = varying | {"roughness": field(mi, data, channel=3, scale=0.5)}
+    assert np.abs(sphere_picture(mi, smoother) - expected).max() > 0.05 * expected.max()
+
+
+def test_each_shape_has_its_own_field(mi):
+    near, far = (
+        quad(mi, {"type": "diffuse", "reflectance": field(mi, np.full((4, 1), v), raw=True)})
+        for v in (0.3, 0.8)
+    )
+    params = mi.traverse(far)
+    params["vertex_positions"] = (QUAD + np.array((2.5, 0, 0), np.float32)).ravel()
+    params.update()
+    emitter = {"type": "directional", "direction": [0, 0, -1], "irradiance": np.pi}
+    scene = mi.load_dict({"type": "scene", "near": near, "far": far, "light": emitter})
+    origin = mi.Point3f([0.1, 2.4, 0.3], [0.2, 0.1, -0.4], 3.0)
+    si = scene.ray_intersect(mi.Ray3f(origin, mi.Vector3f(0, 0, -1)))
+    albedo = si.bsdf().eval_diffuse_reflectance(si)
+    np.testing.assert_allclose(albedo[0].numpy(), (0.3, 0.8, 0.3), atol=1e-6)
+
+
+def test_update_through_traverse_changes_the_picture(mi, points):
+    shape = quad(mi, {"type": "diffuse", "reflectance": field(mi, np.full((4, 3), 0.2), raw=True)})
+    np.testing.assert_allclose(radiance(mi, shape, *points), 0.2, atol=1e-6)
+    params = mi.traverse(shape)
+    params["bsdf.reflectance.data"] = mi.TensorXf(np.full((4, 3), 0.7, np.float32))
+    params["bsdf.reflectance.scale"] = 0.5
+    params.update()
+    np.testing.assert_allclose(radiance(mi, shape, *points), 0.35, atol=1e-6)
+    params["bsdf.reflectance.data"] = mi.TensorXf(np.zeros((4, 2, 2), np.float32))
+    with pytest.raises(RuntimeError, match="shape"):
+        params.update()
+
+
+def test_gradient_through_a_path_tracer(mi):
+    """The picture is linear in a raw albedo seen directly: one finite difference is exact."""
+    import drjit as dr
+
+    shape = quad(mi, {"type": "diffuse", "reflectance": field(mi, np.full((4, 3), 0.5), raw=True)})
+    to_world = mi.ScalarTransform4f().look_at(origin=[0.2, 0.1, 3], target=[0, 0, 0], up=[0, 1, 0])
+    film = {"type": "hdrfilm", "width": 8, "height": 8, "rfilter": {"type": "box"}}
+    sensor = {"type": "perspective", "fov": 30, "to_world": to_world, "film": film}
+    integrator = {"type": "prb", "max_depth": 2}
+    light = {"type": "directional", "direction": [0.1, 0.2, -1]}
+    scene = mi.load_dict(
+        {"type": "scene", "quad": shape, "sensor": sensor, "integrator": integrator, "light": light}
+    )
+    params = mi.traverse(scene)
+    key = "quad.bsdf.reflectance.data"
+    dr.enable_grad(params[key])
+    params.update()
+    dr.backward(dr.sum(mi.render(scene, params, spp=64, seed=3).array))
+    gradient = np.array(dr.grad(params[key]))
+
+    def total(value: np.ndarray) -> float:
+        params[key] = mi.TensorXf(value.astype(np.float32))
+        params.update()
+        return float(np.array(mi.render(scene, spp=64, seed=3), np.float64).sum())
+
+    step = np.zeros((4, 3))
+    step[1, 2] = 0.25
+    assert gradient[1, 2] == pytest.approx((total(0.5 + step) - total(0.5 - step)) / 0.5, rel=1e-2)
+    assert gradient.min() > 0
+
+
+def test_mean_and_max(mi, rng):
+    data = rng.uniform(0, 1, (30, 4))
+    texture = mi.load_dict(field(mi, data))
+    assert texture.mean()[0] == pytest.approx(srgb_to_linear(data[:, :3]).mean(), rel=1e-4)
+    assert texture.max() == pytest.approx(srgb_to_linear(data[:, :3]).max(), rel=1e-4)
+    assert mi.load_dict(field(mi, data, raw=True, channel=3)).mean()[0] == pytest.approx(
+        data[:, 3].mean(), rel=1e-5
+    )
+    assert texture.is_spatially_varying()
+
+
+def test_to_string(mi):
+    text = str(mi.load_dict(field(mi, np.zeros((7, 5)), channel=1, scale=2.0)))
+    assert text.startswith("VertexField[\n  vertices = 7,\n  channels = 5,\n  channel = 1,\n  scale = [2]")
+    assert text.endswith("\n]")
+
+
+def test_vector_is_one_channel(mi):
+    assert "channels = 1" in str(mi.load_dict(field(mi, np.zeros(9))))
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        ({"chanel": 1}, "chanel"),
+        ({"channel": 3}, "has 0 to 2"),
+        ({"channel": -1}, "has 0 to 2"),
+        ({"data": None}, "data"),
+    ],
+)
+def test_bad_properties_are_refused(mi, options: dict, problem: str):
+    given = {k: v for k, v in (field(mi, np.zeros((4, 3))) | options).items() if v is not None}
+    with pytest.raises(RuntimeError, match=problem):
+        mi.load_dict(given)
+
+
+def test_too_few_rows_and_other_shapes_read_nothing(mi, points):
+    short = field(mi, np.full((3, 1), 0.5), raw=True, offset=0.1)  # the quad's vertex 3 is missing
+    x, y = points
+    shape = quad(mi, {"type": "diffuse", "reflectance": short})
+    np.testing.assert_allclose(radiance(mi, shape, x, y)[:, 0], np.where(x > y, 0.6, 0.1), atol=1e-6)
+    ball = mi.load_dict({"type": "sphere", "radius": 2.0, "bsdf": {"type": "diffuse", "reflectance": short}})
+    scene = mi.load_dict({"type": "scene", "ball": ball})
+    si = scene.ray_intersect(mi.Ray3f(mi.Point3f(mi.Float(x), mi.Float(y), 3), mi.Vector3f(0, 0, -1)))
+    np.testing.assert_allclose(si.bsdf().eval_diffuse_reflectance(si)[0].numpy(), 0.1, atol=1e-6)
+
+
+def test_other_variants(mi, points):
+    """Registration follows the variant; mono shows luminance, spectral has no colours, scalar is refused."""
+    before = mi.variant()
+    try:
+        mi.set_variant("llvm_ad_mono")
+        texture = field(mi, np.full((4, 3), (0.2, 0.5, 0.7)), raw=True)
+        value = radiance(mi, quad(mi, {"type": "diffuse", "reflectance": texture}), *points)
+        np.testing.assert_allclose(value, 0.2 * 0.212671 + 0.5 * 0.715160 + 0.7 * 0.072169, atol=1e-5)
+        mi.set_variant("llvm_ad_spectral")
+        colour = mi.load_dict(field(mi, np.zeros((4, 3))))
+        si = mi.load_dict({"type": "scene", "quad": quad(mi, {"type": "diffuse"})}).ray_intersect(
+            mi.Ray3f(mi.Point3f(0.1, 0.2, 3), mi.Vector3f(0, 0, -1))
+        )
+        assert colour.eval_1(si)[0] == 0
+        with pytest.raises(RuntimeError, match="rgb or mono"):
+            colour.eval(si)
+        mi.set_variant("scalar_rgb")
+        with pytest.raises(RuntimeError, match="llvm or cuda"):
+            mi.load_dict(field(mi, np.zeros((4, 3))))
+    finally:
+        mi.set_variant(before)
+    assert mi.load_dict(field(mi, np.zeros((4, 3)))).channel_count == 3
