@@ -1,0 +1,159 @@
+"""VGG-16 features of images, frozen (Simonyan & Zisserman 2015)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+
+import torch
+
+from mitex.errors import ConfigError
+from mitex.features import weights
+from mitex.features.frozen import FrozenConv, FrozenStack, Pool, Tap
+from mitex.runtime import bfloat16_is_fast
+
+BLOCKS = ((1, 2), (2, 2), (3, 3), (4, 3), (5, 3))  # (block, convolutions)
+LAYERS = tuple(f"relu{block}_{i}" for block, count in BLOCKS for i in range(1, count + 1))
+CHANNELS = {name: (64, 128, 256, 512, 512)[int(name[4]) - 1] for name in LAYERS}
+MEAN_RGB = (123.68, 116.779, 103.939)  # of ImageNet, in [0, 255]
+
+
+class Vgg16:
+    """The 13 convolution layers of VGG-16 with the package's weights.
+
+    Args:
+        pool: "average" (as in the style literature and the authors' MeshNCA) or "max" (as trained).
+        precision: "bfloat16", "float32", or "auto": bfloat16 where the CPU multiplies it natively. Its maps
+            are 0.5 % off; gradients of the MeshNCA loss have a cosine of 0.999 with those of float32 ("max"
+            0.998, Gram matrices 0.9985): rounding shuts or opens a few ReLUs, all else is negligible.
+        normalised: divide every layer by its mean activation on textures, so that losses that are not scale
+            free (moments, Gram) weigh the layers alike. Without it the published weights' means lie between
+            0.1 and 120.
+        device: where the weights live.
+    """
+
+    def __init__(
+        self, pool: str = "average", precision: str = "auto", normalised: bool = True, device: str = "cpu"
+    ) -> None:
+        if pool not in ("average", "max"):
+            raise ConfigError(f"unknown pooling {pool!r}", "use 'average' or 'max'")
+        if precision not in ("auto", "bfloat16", "float32"):
+            raise ConfigError(f"unknown precision {precision!r}", "use 'auto', 'bfloat16' or 'float32'")
+        fast = precision == "bfloat16" or (precision == "auto" and bfloat16_is_fast())
+        self.pool, self.normalised, self.device = pool, normalised, device
+        self.dtype = torch.bfloat16 if fast else torch.float32
+        self.operations: list[FrozenConv | Pool] = []
+        self.index: dict[str, int] = {}
+        self._mean = torch.tensor(MEAN_RGB, device=device)
+        tensors, before = _load(), 1.0
+        for block, count in BLOCKS:
+            if block > 1:
+                self.operations.append(Pool(pool))
+            for i in range(1, count + 1):
+                name, key = f"relu{block}_{i}", f"conv{block}_{i}"
+                after = MEAN_ACTIVATION[pool][name] if normalised else 1.0
+                weight = (tensors[f"{key}.weight"] * (before / after)).to(device)
+                bias = (tensors[f"{key}.bias"] / after).to(device)
+                # The first layer reads 3 channels: float32 costs nothing there and keeps the image exact.
+                dtype = torch.float32 if name == "relu1_1" else self.dtype
+                self.index[name] = len(self.operations)
+                self.operations.append(FrozenConv(weight, bias, dtype, self.dtype))
+                before = after
+
+    def features(self, images: torch.Tensor, layers: Iterable[str]) -> dict[str, torch.Tensor]:
+        """Whole feature maps.
+
+        Args:
+            images: (K, H, W, 3) sRGB in [0, 1] (values outside are passed on).
+            layers: names out of `LAYERS`.
+
+        Returns:
+            name -> (K, h, w, C) float32, differentiable in `images` (once).
+
+        Raises:
+            ConfigError: no or an unknown layer, images of another shape or too small for a layer.
+        """
+        names = list(layers)
+        maps = self._run(images, names, [None] * len(names))
+        return {name: m.permute(0, 2, 3, 1) for name, m in zip(names, maps, strict=True)}
+
+    def samples(self, images: torch.Tensor, positions: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+        """Features at chosen places only: what sampled losses need, without gradients on whole maps.
+
+        Args:
+            images: as in `features`.
+            positions: layer name -> (K, n) indices into that layer's flattened h * w.
+
+        Returns:
+            name -> (K, n, C) float32.
+
+        Raises:
+            ConfigError: as in `features`, or positions of another shape or outside a map.
+        """
+        return dict(zip(positions, self._run(images, list(positions), list(positions.values())), strict=True))
+
+    def extent(self, layer: str, height: int, width: int) -> tuple[int, int]:
+        """(h, w) of a layer's map for an image of (height, width)."""
+        halvings = int(layer[4]) - 1
+        return height >> halvings, width >> halvings
+
+    def _run(self, images: torch.Tensor, names: list[str], positions: Sequence[torch.Tensor | None]):
+        self._check(images, names, positions)
+        taps = [Tap(self.index[name], where) for name, where in zip(names, positions, strict=True)]
+        depth = max(tap.index for tap in taps) + 1
+        centred = images.permute(0, 3, 1, 2) * 255 - self._mean[:, None, None]
+        centred = centred.contiguous(memory_format=torch.channels_last)
+        return FrozenStack.apply(centred, self.operations[:depth], taps)
+
+    def _check(
+        self, images: torch.Tensor, names: list[str], positions: Sequence[torch.Tensor | None]
+    ) -> None:
+        if not names:
+            raise ConfigError("no VGG-16 layer is asked for", f"name some of {', '.join(LAYERS)}")
+        if images.ndim != 4 or images.shape[3] != 3 or not len(images):
+            raise ConfigError(f"images of shape {tuple(images.shape)}", "give (K, H, W, 3), K at least 1")
+        for name, where in zip(names, positions, strict=True):
+            if name not in self.index:
+                raise ConfigError(f"VGG-16 has no layer {name!r}", f"use one of {', '.join(LAYERS)}")
+            places = math.prod(self.extent(name, images.shape[1], images.shape[2]))
+            if places < 1:
+                raise ConfigError(
+                    f"images of {tuple(images.shape[1:3])} are too small for {name}", "render larger"
+                )
+            if where is None:
+                continue
+            if where.ndim != 2 or len(where) != len(images):
+                raise ConfigError(
+                    f"positions of shape {tuple(where.shape)} in {name}", f"give ({len(images)}, n) indices"
+                )
+            if where.numel() and (where.min() < 0 or where.max() >= places):
+                raise ConfigError(f"positions outside the map of {name}", f"give indices below {places}")
+
+
+@cache
+def _load() -> dict[str, torch.Tensor]:
+    from safetensors.torch import load_file
+
+    path = weights.vgg16_path()
+    weights.verify(path, weights.VGG16_SHA256)
+    return {name: tensor.float() for name, tensor in load_file(path).items()}
+
+
+# Mean activation of each layer over the albedo maps of the 12 exemplars of the MeshNCA demo at 128 x 128.
+MEAN_ACTIVATION = {
+    "average": dict(
+        zip(
+            LAYERS,
+            (25.11, 130.4, 159.6, 200.7, 164.9, 163.2, 111.3, 52.39, 24.08, 4.589, 2.742, 0.8879, 0.1414),
+            strict=True,
+        )
+    ),
+    "max": dict(
+        zip(
+            LAYERS,
+            (25.11, 130.4, 205, 246.3, 315.8, 331.9, 223, 187.4, 96.19, 17.9, 18.83, 6.638, 0.752),
+            strict=True,
+        )
+    ),
+}

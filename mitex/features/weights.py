@@ -1,0 +1,47 @@
+"""Where the weights of frozen networks are, and whether they are the right ones."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from functools import cache
+from pathlib import Path
+
+from mitex.errors import MitexError
+
+VGG16_FILE = "vgg16_conv_fp16.safetensors"
+VGG16_SHA256 = "bb5788b61d3a34c37ba2a93772a503da31be4676f46e9bc45243f09542557316"
+
+
+class WeightsError(MitexError):
+    """Weights of a frozen network are missing or not the expected file."""
+
+
+def vgg16_path() -> Path:
+    """The VGG-16 weights: `MITEX_VGG16` if set, else the file that ships with the package.
+
+    Raises:
+        WeightsError: the file is missing.
+    """
+    path = Path(os.environ.get("MITEX_VGG16") or Path(__file__).parents[1] / "data" / "weights" / VGG16_FILE)
+    if not path.is_file():
+        raise WeightsError(f"the VGG-16 weights are not at {path}", "reinstall mitex or unset MITEX_VGG16")
+    return path
+
+
+@cache
+def verify(path: Path, sha256: str) -> None:
+    """Compares a file's SHA-256 with the published one, once a process.
+
+    Raises:
+        WeightsError: the file differs, or cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            found = hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as e:
+        raise WeightsError(f"cannot read {path} ({e.strerror})", "check its permissions") from e
+    if found != sha256:
+        raise WeightsError(
+            f"{path} is not the expected file (SHA-256 {found[:12]}…)", "reinstall mitex or replace it"
+        )

@@ -1,0 +1,119 @@
+"""Configs: flat frozen dataclasses, resolved from a preset, a TOML file and `key=value` settings."""
+
+import difflib
+import tomllib
+import typing
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from mitex.errors import ConfigError
+from mitex.training import values
+
+Config = TypeVar("Config")
+
+RECORD_TABLES = ("run", "versions")  # what a run folder's config.toml tells besides the config
+
+
+def resolve(
+    presets: Mapping[str, Config],
+    preset: str | None = None,
+    file: Path | None = None,
+    overrides: Sequence[str] = (),
+) -> Config:
+    """Builds a config: the preset's values, then those of the file, then the overrides, checked together.
+
+    Args:
+        presets: Configs by name, all of one dataclass; the first is the default.
+        preset: Name of the preset; None leaves the choice to `preset` in the overrides or the file.
+        file: TOML file with any subset of the keys, or a run folder's config.toml.
+        overrides: `key=value` strings as after `--set`; any key, lists with commas, `none` where allowed.
+
+    Returns:
+        A new config of the presets' class, whose own `__post_init__` has checked it.
+
+    Raises:
+        ConfigError: An unknown key or preset (the closest match is named), a value of the wrong type, not
+            finite or out of range, an unreadable file, or a preset that contradicts the file's.
+    """
+    kinds = _kinds(next(iter(presets.values())))
+    changes = {} if file is None else _from_file(Path(file), kinds)
+    if preset is not None and changes.get("preset", preset) != preset:
+        raise ConfigError(
+            f"preset '{preset}' contradicts preset '{changes['preset']}' in '{file}'",
+            "leave out one of the two",
+        )
+    for setting in overrides:
+        key, text = _split(setting)
+        changes[key] = _read(key, text, kinds, values.parse)
+    name = changes.get("preset", preset) or next(iter(presets))
+    if name not in presets:
+        raise ConfigError(f"there is no preset '{name}'", f"use {_choices(name, presets)}")
+    return replace(presets[name], **(changes | {"preset": name}))  # type: ignore[type-var]
+
+
+def check_ranges(config: Any, **ranges: tuple[float | None, float | None]) -> None:
+    """Checks numbers, or every number of a tuple, against inclusive bounds; None leaves a side open.
+
+    Made for `__post_init__`: `check_ranges(self, steps=(1, None), fire_rate=(0, 1))`. A None value passes.
+
+    Raises:
+        ConfigError: A value is out of its range.
+    """
+    for key, (low, high) in ranges.items():
+        value = getattr(config, key)
+        for number in value if isinstance(value, tuple) else (value,):
+            if number is None:
+                continue
+            if (low is not None and number < low) or (high is not None and number > high):
+                raise ConfigError(f"{key} = {number} is out of range", f"choose {_range(low, high)}")
+
+
+def _range(low: float | None, high: float | None) -> str:
+    if low is not None and high is not None:
+        return f"from {low} to {high}"
+    return f"{low} or more" if high is None else f"{high} or less"
+
+
+def _kinds(example: Any) -> dict[str, Any]:
+    hints = typing.get_type_hints(type(example))
+    return {field.name: hints[field.name] for field in fields(example)}
+
+
+def _split(setting: str) -> tuple[str, str]:
+    key, equals, text = setting.partition("=")
+    if not equals or not key.strip():
+        raise ConfigError(f"'{setting}' is not a setting", "write key=value")
+    return key.strip(), text.strip()
+
+
+def _from_file(file: Path, kinds: Mapping[str, Any]) -> dict[str, Any]:
+    try:
+        with file.open("rb") as stream:
+            content = tomllib.load(stream)
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as e:
+        raise ConfigError(f"'{file}' is not valid TOML ({e})", "mend the file") from e
+    except (OSError, ValueError) as e:  # ValueError: a null byte in the name
+        reason = getattr(e, "strerror", None) or e
+        raise ConfigError(f"cannot read config '{file}' ({reason})", "check the path") from e
+    for table in RECORD_TABLES:
+        if isinstance(content.get(table), dict):
+            del content[table]
+    return {key: _read(key, value, kinds, values.check) for key, value in content.items()}
+
+
+def _read(key: str, value: Any, kinds: Mapping[str, Any], reader: Callable[[Any, Any], Any]) -> Any:
+    if key not in kinds:
+        raise ConfigError(f"there is no key '{key}'", f"use {_choices(key, kinds)}")
+    try:
+        return reader(value, kinds[key])
+    except ValueError as e:
+        raise ConfigError(f"{key} cannot be {value!r}", f"give {values.describe(kinds[key])}") from e
+
+
+def _choices(wrong: str, names: Iterable[str]) -> str:
+    """The closest name, or all of them when none is close."""
+    names = list(names)
+    close = difflib.get_close_matches(wrong, names, n=1, cutoff=0.6)
+    return f"'{close[0]}'" if close else "one of " + ", ".join(names)

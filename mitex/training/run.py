@@ -1,0 +1,103 @@
+"""The run folder: config.toml, checkpoints, metrics.jsonl and previews of one training."""
+
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from mitex import __version__
+from mitex.errors import CheckpointError, OutputError
+from mitex.paths import atomic_write, prepare_folder
+from mitex.training import checkpoint
+from mitex.training.metrics import Metrics
+from mitex.training.toml import to_toml
+
+CONFIG = "config.toml"
+METRICS = "metrics.jsonl"
+PREVIEWS = "previews"
+DIVERGED = "diverged.json"
+
+
+def check(out: str | os.PathLike[str], resume: bool = False) -> None:
+    """Checks, before any long work, that a run can start or go on in a folder. Creates nothing.
+
+    Without `resume` the folder may be missing, empty, or of a run that never reached a checkpoint.
+
+    Raises:
+        OutputError: There is a run already, or other files.
+        CheckpointError: There is nothing to resume.
+    """
+    folder = Path(out).expanduser()
+    try:
+        begun = any((folder / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
+        ours = begun or (folder / METRICS).exists()
+        foreign = not ours and folder.is_dir() and any(folder.iterdir())
+    except (OSError, ValueError) as e:  # ValueError: a null byte in the name
+        raise OutputError(f"cannot use '{out}' as a run folder ({e})", "name another --out") from e
+    if resume and not begun:
+        raise CheckpointError(
+            f"there is no checkpoint in '{out}' to resume", "leave out --resume to start from the beginning"
+        )
+    if begun and not resume:
+        raise OutputError(
+            f"'{out}' holds a run already", "add --resume to continue it, or name another --out"
+        )
+    if foreign:
+        raise OutputError(f"'{out}' holds other files", "name a new or empty folder with --out")
+
+
+@contextmanager
+def opened(out: str | os.PathLike[str], resume: bool) -> Iterator[tuple[Path, Metrics]]:
+    """Checks, makes and locks a run folder; yields its absolute path and its open metrics.jsonl.
+
+    If the run fails before its first step, what was made is removed again.
+    """
+    check(out, resume)
+    existed = Path(out).expanduser().exists()
+    folder = prepare_folder(out)
+    with Metrics(folder / METRICS) as metrics:
+        try:
+            yield folder, metrics
+        except BaseException:
+            if not resume and not (folder / METRICS).stat().st_size:
+                _discard(folder, existed)
+            raise
+
+
+def prepare(folder: Path, config: Any, metadata: Mapping[str, str]) -> None:
+    """Sweeps up after a killed run, and writes config.toml with the tables `run` and `versions` below."""
+    with suppress(OSError):
+        (folder / DIVERGED).unlink(missing_ok=True)
+        for pattern in (".*.tmp*", ".tmp*", f"{PREVIEWS}/.*.tmp*"):  # ours, safetensors' own, ours
+            for leftover in folder.glob(pattern):
+                leftover.unlink(missing_ok=True)
+    with atomic_write(folder / CONFIG) as temporary:
+        temporary.write_text(to_toml(config, {"run": metadata, "versions": versions()}), encoding="utf-8")
+
+
+def versions() -> dict[str, str]:
+    """Versions of Mitex and of what it computes with, read without importing them."""
+    found = {"mitex": __version__}
+    for package in ("torch", "mitsuba", "drjit"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "missing"
+    return found
+
+
+def as_json(config: Any) -> dict[str, Any]:
+    """The config's values as JSON gives them back (tuples become lists)."""
+    return json.loads(json.dumps(asdict(config)))
+
+
+def _discard(folder: Path, existed: bool) -> None:
+    with suppress(OSError):
+        for name in (METRICS, CONFIG):
+            (folder / name).unlink(missing_ok=True)
+        if not existed:
+            folder.rmdir()  # refuses when something else is in it

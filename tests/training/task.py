@@ -1,0 +1,82 @@
+"""A small stochastic task whose every part must survive a checkpoint, and tools to compare two runs."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from mitex.training import checkpoint
+
+
+@dataclass(frozen=True)
+class SmallConfig:
+    steps: int = 20
+    seed: int = 3
+    preset: str = "small"
+    lr: float = 0.01
+    width: int = 5
+    layers: tuple[str, ...] = ("relu1_1",)
+
+
+class SmallTask:
+    """Fits a random linear map; a pool outside the parameters drifts with each good step.
+
+    `faults` maps a step to what goes wrong there: a function of task and loss that returns a loss.
+    """
+
+    def __init__(self, width: int = 5, pool: int = 7, faults=None):
+        self.weight = torch.nn.Parameter(torch.linspace(-1, 1, width))
+        self.bias = torch.nn.Parameter(torch.zeros(()))
+        self.parameters = [self.weight, self.bias]
+        self.pool = torch.zeros(pool)
+        self.faults = faults or {}
+        self.steps_seen = []
+
+    def loss(self, step, generator):
+        self.steps_seen.append(step)
+        x = torch.rand(self.weight.shape, generator=generator)
+        self._drift = torch.randn(self.pool.shape, generator=generator) * 0.1 * self.weight.detach().sum()
+        error = (self.weight * x).sum() + self.bias + self.pool.mean() - 1
+        loss = error.square()
+        return self.faults.get(step, lambda task, loss: loss)(self, loss), {"error": error.item()}
+
+    def commit(self):
+        self.pool = self.pool * 0.9 + self._drift
+
+    def state(self):
+        return {"weight": self.weight, "bias": self.bias, "pool": self.pool}
+
+    @torch.no_grad()
+    def load_state(self, state):
+        if state["pool"].shape != self.pool.shape:
+            raise ValueError(f"pool of {tuple(state['pool'].shape)}")
+        self.weight.copy_(state["weight"])
+        self.bias.copy_(state["bias"])
+        self.pool = state["pool"]
+
+    def preview(self, step):
+        return np.full((4, 6, 3), 0.5, np.float32)
+
+    def metadata(self):
+        return {"method": "small"}
+
+
+def lines(folder: Path) -> list[dict]:
+    """The records of metrics.jsonl without their times."""
+    records = [json.loads(line) for line in (folder / "metrics.jsonl").read_text().splitlines()]
+    return [{key: value for key, value in record.items() if key != "seconds"} for record in records]
+
+
+def assert_same_run(one: Path, other: Path) -> None:
+    """Compares the end of two runs bit by bit: task, optimizer, generator, counters, metrics."""
+    a, b = checkpoint.load(one), checkpoint.load(other)
+    assert (a.step, a.loss, a.skipped) == (b.step, b.loss, b.skipped)
+    assert torch.equal(a.generator, b.generator)
+    for left, right in ((a.task, b.task), (a.optimizer, b.optimizer)):
+        assert left.keys() == right.keys()
+        for name in left:
+            assert torch.equal(left[name], right[name]), name
+    assert lines(one) == lines(other)
+    assert [record["step"] for record in lines(one)] == list(range(1, a.step + 1))

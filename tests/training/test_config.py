@@ -1,0 +1,212 @@
+"""Resolving configs from presets, files and settings."""
+
+import json
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import pytest
+
+from mitex.errors import ConfigError
+from mitex.training.config import check_ranges, resolve
+from mitex.training.toml import to_toml
+
+
+@dataclass(frozen=True)
+class Config:
+    steps: int = 100
+    seed: int = 0
+    preset: str = "patch"
+    lr: float = 1e-3
+    pooling: Literal["max", "average"] = "max"
+    cull: bool = False
+    layers: tuple[str, ...] = ("relu1_1", "relu2_1")
+    milestones: tuple[int, ...] = (50, 75)
+    size: tuple[int, int] = (96, 96)
+    init: str | None = None
+    cap: int | None = 5
+    pace: float | Literal["auto"] = "auto"
+
+    def __post_init__(self):
+        check_ranges(self, steps=(1, None), lr=(0, 1), size=(8, None), cap=(None, 10))
+        if self.milestones and self.milestones[-1] > self.steps:
+            raise ConfigError("milestones lie beyond steps", "raise steps")
+
+
+PRESETS = {"patch": Config(), "paper": Config(steps=900, preset="paper", lr=0.5)}
+
+
+def _error(*overrides, file=None, preset=None):
+    with pytest.raises(ConfigError) as caught:
+        resolve(PRESETS, preset, file, overrides)
+    return str(caught.value)
+
+
+def test_the_first_preset_is_the_default():
+    assert resolve(PRESETS) == Config()
+
+
+def test_order_preset_file_override(tmp_path):
+    file = tmp_path / "c.toml"
+    file.write_text("seed = 4\nlr = 0.25\n")
+    config = resolve(PRESETS, "paper", file, ["lr=0.125"])
+    assert config == Config(steps=900, seed=4, preset="paper", lr=0.125)
+
+
+@pytest.mark.parametrize(
+    ("setting", "key", "value"),
+    [
+        ("steps=1_000", "steps", 1000),
+        (" seed = -3 ", "seed", -3),
+        ("lr=1", "lr", 1.0),
+        ("lr=2.5e-1", "lr", 0.25),
+        ("pooling=average", "pooling", "average"),
+        ("cull=yes", "cull", True),
+        ("cull=TRUE", "cull", True),
+        ("cull=0", "cull", False),
+        ("layers=relu3_1", "layers", ("relu3_1",)),
+        ("layers=a, b ,", "layers", ("a", "b")),
+        ("layers=['a', \"b\"]", "layers", ("a", "b")),
+        ("layers=", "layers", ()),
+        ("milestones=[]", "milestones", ()),
+        ("milestones=1,2,3", "milestones", (1, 2, 3)),
+        ("size=(8, 16)", "size", (8, 16)),
+        ("init=a=b.safetensors", "init", "a=b.safetensors"),
+        ("init=none", "init", None),
+        ("cap=None", "cap", None),
+        ("cap=7", "cap", 7),
+        ("pace=auto", "pace", "auto"),
+        ("pace=2", "pace", 2.0),
+    ],
+)
+def test_settings_reach_every_type(setting, key, value):
+    found = getattr(resolve(PRESETS, overrides=[setting]), key)
+    assert found == value
+    assert type(found) is type(value)
+
+
+def test_settings_are_checked_together_and_the_last_one_counts():
+    assert resolve(PRESETS, overrides=["steps=10", "milestones=5", "steps=20"]).steps == 20
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [
+        "steps=1.5",
+        "steps=many",
+        "steps=",
+        "steps=none",
+        "lr=nan",
+        "lr=-inf",
+        "lr=1e999",
+        "cull=maybe",
+        "pooling=min",
+        "milestones=1,,2",
+        "milestones=1.5",
+        "size=8",
+        "size=8,8,8",
+        "cap=x",
+        "pace=slow",
+        "pace=nan",
+    ],
+)
+def test_wrong_values_name_key_value_and_what_is_wanted(setting):
+    key, _, text = setting.partition("=")
+    message = _error(setting)
+    assert message.startswith(f"{key} cannot be {text!r}; give ")
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("stepps=3", "there is no key 'stepps'; use 'steps'"),
+        ("zzz=3", "there is no key 'zzz'; use one of steps, seed, preset, lr"),
+        ("steps", "'steps' is not a setting; write key=value"),
+        ("=3", "'=3' is not a setting; write key=value"),
+        ("preset=papr", "there is no preset 'papr'; use 'paper'"),
+        ("steps=0", "steps = 0 is out of range; choose 1 or more"),
+        ("lr=2", "lr = 2.0 is out of range; choose from 0 to 1"),
+        ("cap=11", "cap = 11 is out of range; choose 10 or less"),
+        ("size=96,4", "size = 4 is out of range; choose 8 or more"),
+        ("steps=60", "milestones lie beyond steps; raise steps"),
+        ("size=a", "size cannot be 'a'; give a list of 2: a whole number, a whole number"),
+        ("layers2=a", "there is no key 'layers2'; use 'layers'"),
+        ("pace=x", "pace cannot be 'x'; give a finite number or one of 'auto'"),
+    ],
+)
+def test_messages(setting, message):
+    assert _error(setting).startswith(message)
+
+
+def test_toml_values_of_every_type(tmp_path):
+    file = tmp_path / "c.toml"
+    file.write_text(
+        'lr = 1\ncull = true\nlayers = ["x"]\nmilestones = []\ninit = "m"\ncap = "none"\npace = 3\n'
+        '[versions]\na = "1"\n'
+    )
+    config = resolve(PRESETS, file=file)
+    assert config == Config(lr=1.0, cull=True, layers=("x",), milestones=(), init="m", cap=None, pace=3.0)
+    assert type(config.lr) is float
+    assert type(config.pace) is float
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "steps = true",
+        "steps = 1.0",
+        'steps = "5"',
+        "steps = [5]",
+        "lr = nan",
+        "lr = inf",
+        "lr = true",
+        "cull = 1",
+        'cull = "true"',
+        'layers = "relu1_1"',
+        "layers = [1]",
+        "milestones = [1.0]",
+        "size = [8]",
+        "init = 3",
+        "pooling = 3",
+        "steps = 1979-05-27",
+        "[steps]\na = 1",
+        "[other]\na = 1",
+        "step = 3",
+        "steps = ",
+        "steps = 1\nsteps = 2",
+        "a = " + "[" * 5000,
+    ],
+)
+def test_bad_files(tmp_path, content):
+    file = tmp_path / "c.toml"
+    file.write_text(content)
+    _error(file=file)
+
+
+def test_unreadable_files(tmp_path):
+    binary = tmp_path / "b.toml"
+    binary.write_bytes(b"steps = \xff\xfe")
+    assert "not valid TOML" in _error(file=binary)
+    assert "cannot read config" in _error(file=tmp_path / "missing.toml")
+    assert "cannot read config" in _error(file=tmp_path)
+    assert "cannot read config" in _error(file="a\0b")
+
+
+def test_where_the_preset_comes_from(tmp_path):
+    file = tmp_path / "c.toml"
+    file.write_text('preset = "paper"\n')
+    assert resolve(PRESETS, file=file).lr == 0.5
+    assert resolve(PRESETS, "paper", file).lr == 0.5
+    assert resolve(PRESETS, "patch", overrides=["preset=paper"]).lr == 0.5
+    assert resolve(PRESETS, None, file, ["preset=patch"]).lr == 1e-3
+    assert "contradicts preset 'paper'" in _error(file=file, preset="patch")
+    assert "there is no preset 'x'" in _error(preset="x")
+
+
+def test_a_resolved_config_reads_back(tmp_path):
+    config = replace(
+        PRESETS["paper"], layers=("a,b", "none"), init='a "quoted" \\ näme', cap=None, lr=0.1 + 0.2
+    )
+    file = tmp_path / "config.toml"
+    file.write_text(to_toml(config, {"run": {"method": "nca"}, "versions": {"torch": "2"}}), encoding="utf-8")
+    assert resolve(PRESETS, file=file) == config
+    assert json.dumps(resolve(PRESETS, file=file).lr) == "0.30000000000000004"

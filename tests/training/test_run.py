@@ -1,0 +1,100 @@
+"""The run folder."""
+
+import tomllib
+
+import pytest
+
+from mitex.errors import CheckpointError, OutputError
+from mitex.training import run
+
+from .task import SmallConfig
+
+
+def _files(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_a_new_folder_is_made_and_kept_once_a_step_is_done(tmp_path):
+    out = tmp_path / "a" / "b"
+    with run.opened(out, resume=False) as (folder, metrics):
+        run.prepare(folder, SmallConfig(), {"method": "small"})
+        metrics.write({"step": 1})
+    assert folder == out
+    assert _files(out) == ["config.toml", "metrics.jsonl"]
+    run.check(out)  # it never reached a checkpoint, so nothing is lost by starting again
+
+
+@pytest.mark.parametrize("existed", [True, False])
+def test_nothing_stays_of_a_run_that_fails_before_its_first_step(tmp_path, existed):
+    out = tmp_path / "run"
+    if existed:
+        out.mkdir()
+    with pytest.raises(RuntimeError), run.opened(out, resume=False) as (folder, _):
+        run.prepare(folder, SmallConfig(), {})
+        raise RuntimeError
+    assert _files(tmp_path) == (["run"] if existed else [])
+    assert not existed or not _files(out)
+
+
+def test_config_toml_holds_config_task_and_versions(tmp_path):
+    run.prepare(tmp_path, SmallConfig(seed=8), {"method": "small"})
+    content = tomllib.loads((tmp_path / "config.toml").read_text())
+    assert content["seed"] == 8
+    assert content["layers"] == ["relu1_1"]
+    assert content["run"] == {"method": "small"}
+    assert content["versions"].keys() == {"mitex", "torch", "mitsuba", "drjit"}
+    assert content["versions"]["torch"].startswith("2.")
+
+
+def test_leftovers_of_a_killed_run_are_swept(tmp_path):
+    (tmp_path / "previews").mkdir()
+    for name in (
+        ".checkpoint.0a1b2c3d.tmp.safetensors",
+        "previews/.000001.0a1b2c3d.tmp.png",
+        "diverged.json",
+    ):
+        (tmp_path / name).touch()
+    for name in ("previews/000001.png", "notes.tmp.txt"):
+        (tmp_path / name).touch()
+    run.prepare(tmp_path, SmallConfig(), {})
+    assert _files(tmp_path) == ["config.toml", "notes.tmp.txt", "previews"]
+    assert _files(tmp_path / "previews") == ["000001.png"]
+
+
+@pytest.mark.parametrize("name", ["checkpoint.safetensors", "checkpoint.previous.safetensors"])
+def test_a_run_is_not_overwritten(tmp_path, name):
+    (tmp_path / name).touch()
+    with pytest.raises(OutputError, match="holds a run already; add --resume"):
+        run.check(tmp_path)
+    run.check(tmp_path, resume=True)
+
+
+def test_other_files_are_left_alone(tmp_path):
+    (tmp_path / "thesis.tex").touch()
+    with pytest.raises(OutputError, match="holds other files; name a new or empty folder"):
+        run.check(tmp_path)
+    assert _files(tmp_path) == ["thesis.tex"]
+
+
+@pytest.mark.parametrize("name", [".", "missing"])
+def test_nothing_to_resume(tmp_path, name):
+    with pytest.raises(CheckpointError, match="no checkpoint in .* to resume; leave out --resume"):
+        run.check(tmp_path / name, resume=True)
+    assert not _files(tmp_path)
+
+
+def test_impossible_folders(tmp_path):
+    (tmp_path / "file").touch()
+    for out in (tmp_path / "file", tmp_path / "file" / "below", "a\0b", tmp_path / ("x" * 300)):
+        with pytest.raises(OutputError), run.opened(out, resume=False):
+            pass
+    assert _files(tmp_path) == ["file"]
+
+
+def test_a_second_run_leaves_the_first_alone(tmp_path):
+    with run.opened(tmp_path / "run", resume=False) as (folder, metrics):
+        run.prepare(folder, SmallConfig(), {})
+        with pytest.raises(OutputError, match="another process"), run.opened(folder, resume=False):
+            pass
+        metrics.write({"step": 1})
+        assert _files(folder) == ["config.toml", "metrics.jsonl"]

@@ -1,0 +1,63 @@
+"""Stopping on signals."""
+
+import os
+import signal
+import threading
+
+import pytest
+
+from mitex.training.signals import StopSignals
+
+
+@pytest.fixture(autouse=True)
+def _own_handlers():
+    before = {n: signal.signal(n, signal.default_int_handler) for n in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.parametrize("first", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("second", [signal.SIGINT, signal.SIGTERM])
+def test_the_first_asks_and_the_second_forces(first, second):
+    with StopSignals() as stop:
+        assert not stop.requested
+        os.kill(os.getpid(), first)
+        assert stop.requested
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), second)
+    assert signal.getsignal(first) is signal.default_int_handler
+    assert signal.getsignal(second) is signal.default_int_handler
+
+
+def test_handlers_come_back_after_an_error():
+    with pytest.raises(RuntimeError), StopSignals():
+        raise RuntimeError
+    assert signal.getsignal(signal.SIGTERM) is signal.default_int_handler
+
+
+def test_an_ignored_signal_stays_ignored():
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with StopSignals() as stop:
+        os.kill(os.getpid(), signal.SIGINT)
+        assert not stop.requested
+
+
+def test_other_threads_change_no_handler():
+    seen = []
+
+    def work():
+        with StopSignals() as stop:
+            seen.append((signal.getsignal(signal.SIGINT), stop.requested))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert seen == [(signal.default_int_handler, False)]
+
+
+def test_the_first_signal_is_answered_unless_quiet(capfd):
+    for quiet in (True, False):
+        with StopSignals(quiet):
+            os.kill(os.getpid(), signal.SIGTERM)
+        assert ("stopping" in capfd.readouterr().err) is not quiet
