@@ -1,0 +1,162 @@
+"""`Asset`: a mesh and the maps it wears, per vertex and, once baked, as textures."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mitex.atlas import Atlas
+from mitex.errors import ConfigError
+from mitex.exemplar import MAPS
+from mitex.frames import encode, split_at_seams, unit, vertex_detail
+from mitex.mesh import Mesh
+
+FLAT = (0.5, 0.5, 1.0)  # the normal map of an even surface
+
+
+@dataclass(frozen=True, eq=False)
+class Asset:
+    """A mesh with its material maps. Immutable; values are clipped to [0, 1] when it is made.
+
+    Attributes:
+        mesh: the mesh, V vertices and F faces.
+        vertex_maps: name of `MAPS` -> (V, c) float32 in [0, 1]. Albedo is sRGB, the others are data;
+            normals are (n + 1) / 2 in the frame (tangent, cross(normal, tangent), normal) of each vertex
+            (OpenGL convention, +y up).
+        tangents: (V, 3) float32, unit: where the exemplar's +u (right) points on the surface. Needed with a
+            normal map.
+        atlas: UV layout of `texture_maps`.
+        texture_maps: name -> (N, N, c) float32 in [0, 1], row 0 on top; the normals are in the atlas' own
+            frame (`frames.split_at_seams`), which is written as glTF TANGENT.
+        name: for messages and object names.
+
+    Raises:
+        ConfigError: no maps, an unknown name, a wrong shape, values that are not finite, a normal map without
+            tangents, textures without an atlas.
+    """
+
+    mesh: Mesh
+    vertex_maps: Mapping[str, np.ndarray]
+    tangents: np.ndarray | None = None
+    atlas: Atlas | None = None
+    texture_maps: Mapping[str, np.ndarray] | None = None
+    name: str = "asset"
+
+    def __post_init__(self):
+        if not self.vertex_maps:
+            raise ConfigError("the asset has no maps", f"give at least one of {', '.join(MAPS)}")
+        vertices = len(self.mesh.vertices)
+        maps = {k: _checked(k, v, (vertices,), "vertex") for k, v in sorted(self.vertex_maps.items())}
+        object.__setattr__(self, "vertex_maps", maps)
+        if self.tangents is not None:
+            object.__setattr__(self, "tangents", _checked_tangents(self.tangents, vertices))
+        elif "normal" in maps:
+            raise ConfigError("the asset has a normal map but no tangents", "give tangents of shape (V, 3)")
+        if (self.atlas is None) != (self.texture_maps is None):
+            raise ConfigError("atlas and texture_maps belong together", "give both or neither")
+        if self.atlas is not None and self.texture_maps is not None:
+            if self.atlas.uv.shape != (len(self.mesh.faces), 3, 2):
+                raise ConfigError("the atlas belongs to another mesh", "bake the asset again")
+            shape = self.atlas.face.shape
+            textures = {k: _checked(k, v, shape, "texture") for k, v in sorted(self.texture_maps.items())}
+            object.__setattr__(self, "texture_maps", textures)
+
+    def detail_normals(self) -> np.ndarray:
+        """(V, 3) float32 unit normals in object space: the mesh's own, bent by the normal map if any."""
+        if "normal" not in self.vertex_maps or self.tangents is None:
+            return self.mesh.normals
+        return vertex_detail(self.mesh, self.tangents, self.vertex_maps["normal"])
+
+    def baked(self, resolution: int = 1024, padding: int = 8) -> Asset:
+        """The same asset with textures: every texel interpolates the vertex maps.
+
+        Uses the mesh's own UVs if nothing in them overlaps, else unwraps it. Normals are interpolated in
+        object space, where they are continuous, and written in the atlas' frame.
+
+        Args:
+            resolution: side of the textures [texels], 16 to 8192.
+            padding: how far the charts are continued outwards [texels], so that no seam shows.
+
+        Raises:
+            ConfigError: resolution or padding out of range.
+        """
+        atlas = Atlas.build(self.mesh, resolution, padding)
+        faces = self.mesh.faces
+        textures = {k: atlas.interpolate(v[faces]) for k, v in self.vertex_maps.items() if k != "normal"}
+        if "normal" in self.vertex_maps:
+            textures["normal"] = self._bake_normals(atlas)
+        return replace(self, atlas=atlas, texture_maps=textures)
+
+    def _bake_normals(self, atlas: Atlas) -> np.ndarray:
+        detail = unit(atlas.interpolate(self.detail_normals()[self.mesh.faces]))
+        frames = split_at_seams(self.mesh, atlas.uv).corner_frames()
+        encoded = encode(detail, *(unit(atlas.interpolate(v)) for v in frames))
+        encoded[atlas.face < 0] = FLAT
+        return encoded
+
+    def export(self, path: str | os.PathLike[str]) -> Path:
+        """Writes the asset; the suffix chooses the format.
+
+        - `.glb`: glTF 2.0; with PBR textures if baked, else with vertex colours.
+        - `.obj`: with `.mtl` and PNG maps beside it; bakes at the default resolution if not yet baked.
+        - `.ply`: binary, vertex colours, the other maps as float properties.
+        - `.exr`: the maps in texture space, named channels; bakes if not yet baked.
+
+        Returns:
+            The path written.
+
+        Raises:
+            OutputError: unknown suffix or unwritable place.
+        """
+        from mitex.export import write_asset
+
+        return write_asset(self, path)
+
+    def render(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Path-traces a still and writes it as PNG, JPEG or EXR; options as in `mitex.render.still`.
+
+        Raises:
+            OutputError: unknown suffix or unwritable place.
+            ConfigError: an option out of range.
+        """
+        from mitex.render import render_still
+
+        return render_still(self, path, **options)
+
+    @staticmethod
+    def load(path: str | os.PathLike[str]) -> Asset:
+        """Reads an asset that `export` wrote as .glb, .obj or .ply.
+
+        Textures are sampled at the vertices, so that `vertex_maps` is there in any case (8-bit precision).
+
+        Raises:
+            MeshError: the file is missing, damaged, or not an asset written by Mitex.
+        """
+        from mitex.export import read_asset
+
+        return read_asset(path)
+
+
+def _checked(name: str, values: np.ndarray, shape: tuple[int, ...], kind: str) -> np.ndarray:
+    if name not in MAPS:
+        raise ConfigError(f"{name!r} is not a map", f"use {', '.join(MAPS)}")
+    values = np.asarray(values, np.float32)
+    if values.shape != (*shape, MAPS[name]):
+        raise ConfigError(f"{kind} map {name} has shape {values.shape}", f"it must be {(*shape, MAPS[name])}")
+    if not np.isfinite(values).all():
+        raise ConfigError(f"{kind} map {name} holds NaN or infinite values", "check the step that made it")
+    return np.clip(values, 0.0, 1.0)
+
+
+def _checked_tangents(tangents: np.ndarray, vertices: int) -> np.ndarray:
+    tangents = np.asarray(tangents, np.float32)
+    if tangents.shape != (vertices, 3):
+        raise ConfigError(f"tangents have shape {tangents.shape}", f"they must be {(vertices, 3)}")
+    if not np.isfinite(tangents).all():
+        raise ConfigError("tangents hold NaN or infinite values", "check the step that made them")
+    return tangents

@@ -1,0 +1,55 @@
+"""Writing assets as GLB, OBJ, PLY and EXR, and reading the first three back."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from mitex.asset import Asset
+from mitex.errors import MeshError
+from mitex.export.exr import read_exr, write_exr, write_textures, write_views
+from mitex.export.glb import read_glb, write_glb
+from mitex.export.obj import read_obj, write_obj
+from mitex.export.ply import read_ply, write_ply
+from mitex.paths import prepare_output
+
+__all__ = [
+    "SUFFIXES",
+    "read_asset",
+    "read_exr",
+    "read_glb",
+    "read_obj",
+    "read_ply",
+    "write_asset",
+    "write_exr",
+    "write_glb",
+    "write_obj",
+    "write_ply",
+    "write_textures",
+    "write_views",
+]
+
+SUFFIXES = (".glb", ".obj", ".ply", ".exr")
+_WRITERS = {".glb": write_glb, ".obj": write_obj, ".ply": write_ply, ".exr": write_textures}
+_READERS = {".glb": read_glb, ".obj": read_obj, ".ply": read_ply}
+
+
+def write_asset(asset: Asset, path: str | os.PathLike[str]) -> Path:
+    """See `Asset.export`."""
+    target = prepare_output(path, SUFFIXES)
+    _WRITERS[target.suffix.lower()](asset, target)
+    return target
+
+
+def read_asset(path: str | os.PathLike[str]) -> Asset:
+    """See `Asset.load`."""
+    source = Path(path).expanduser()
+    reader = _READERS.get(source.suffix.lower())
+    if reader is None:
+        raise MeshError(f"{path} is not an asset file", f"give one of {', '.join(_READERS)}")
+    if not os.path.isfile(source):
+        raise MeshError(f"there is no asset file {path}", "check the path")
+    try:
+        return reader(source)
+    except OSError as e:
+        raise MeshError(f"{path} cannot be read ({e.strerror})", "check its permissions") from e

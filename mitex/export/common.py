@@ -1,0 +1,83 @@
+"""What the file formats share: PNG bytes, and values of a texture at the vertices."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Mapping
+
+import numpy as np
+from PIL import Image
+
+from mitex.asset import Asset
+from mitex.atlas import Atlas
+from mitex.errors import MeshError
+from mitex.frames import decode, encode, orthonormal, split_at_seams, unit
+from mitex.mesh import Mesh
+
+GENERATOR = "Mitex"
+DEFAULT_ALBEDO = 0.8  # linear grey where an asset has no albedo
+DEFAULT_ROUGHNESS = 0.5
+
+
+def foreign(path: object, what: str = "was not written by Mitex") -> MeshError:
+    """The error for a file that is damaged or comes from elsewhere."""
+    return MeshError(f"{path} {what}", "give an asset that Mitex exported, or use the file as a mesh")
+
+
+def plain_name(name: str) -> str:
+    """A file name part without spaces and specials, which material files cannot quote."""
+    return re.sub(r"[^\w.-]+", "_", name).strip(".") or "asset"
+
+
+def png(image: np.ndarray) -> bytes:
+    """An (H, W, 1 or 3) image in [0, 1] as 8-bit PNG."""
+    pixels = np.round(image * 255.0).astype(np.uint8)
+    buffer = io.BytesIO()
+    Image.fromarray(pixels[..., 0] if pixels.shape[2] == 1 else pixels).save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+def asset_from_textures(mesh: Mesh, uv: np.ndarray, textures: Mapping[str, np.ndarray], name: str) -> Asset:
+    """An asset from texture maps in the atlas' frame, sampled at the vertices.
+
+    Args:
+        mesh: F faces.
+        uv: (F, 3, 2), v upwards.
+        textures: name -> (N, N, c) in [0, 1]; normals in the frame of `split_at_seams(mesh, uv)`.
+        name: of the asset.
+    """
+    atlas = Atlas.from_uv(uv, next(iter(textures.values())).shape[0])
+    split = split_at_seams(mesh, uv)
+    # The mean over the seam's sides; without seams each vertex has one.
+    copies = np.bincount(split.source, minlength=len(mesh.vertices))
+    sampled = {k: bilinear(v, split.uv) for k, v in textures.items()}
+    if "normal" in sampled:
+        sampled["normal"] = decode(sampled["normal"], split.tangents[:, :3], split.bitangents, split.normals)
+    maps = {}
+    for key, values in sampled.items():
+        total = [np.bincount(split.source, values[:, c], len(copies)) for c in range(values.shape[1])]
+        maps[key] = np.stack(total, axis=1) / np.maximum(copies, 1)[:, None]
+    tangents = default_tangents(mesh)
+    if "normal" in maps:
+        t = tangents
+        maps["normal"] = encode(unit(maps["normal"]), t, np.cross(mesh.normals, t), mesh.normals)
+    return Asset(mesh, maps, tangents, atlas, textures, name)
+
+
+def default_tangents(mesh: Mesh) -> np.ndarray:
+    """(V, 3) some tangents; which ones does not matter where normals are encoded anew."""
+    return orthonormal(np.broadcast_to(np.array([1, 0, 0], np.float32), mesh.normals.shape), mesh.normals)
+
+
+def bilinear(image: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """Bilinear lookup of (H, W, C) at (N, 2) uv, v upwards, clamped at the border: (N, C)."""
+    height, width = image.shape[:2]
+    x = np.clip(uv[:, 0] * width - 0.5, 0.0, width - 1.0)
+    y = np.clip((1.0 - uv[:, 1]) * height - 0.5, 0.0, height - 1.0)
+    x0 = np.minimum(x.astype(np.int64), width - 2)
+    y0 = np.minimum(y.astype(np.int64), height - 2)
+    a, b = (x - x0)[:, None], (y - y0)[:, None]
+    top = image[y0, x0] * (1 - a) + image[y0, x0 + 1] * a
+    bottom = image[y0 + 1, x0] * (1 - a) + image[y0 + 1, x0 + 1] * a
+    return top * (1 - b) + bottom * b

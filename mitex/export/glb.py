@@ -1,0 +1,202 @@
+"""glTF 2.0 binary (GLB): the mesh with PBR textures, or with vertex colours where nothing is baked.
+
+Two attributes of our own (glTF reserves the leading underscore for that) make the file an exact copy of the
+mesh: `_VERTEX`, the vertex before splitting at UV seams, and `_HEIGHT`, for which glTF has no texture slot.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mitex.asset import Asset
+from mitex.colour import srgb_to_linear
+from mitex.export.common import DEFAULT_ALBEDO, DEFAULT_ROUGHNESS, GENERATOR, png
+from mitex.export.glb_read import read_glb
+from mitex.frames import split_at_seams
+from mitex.paths import atomic_write
+
+__all__ = ["glb_bytes", "read_glb", "write_glb"]
+
+_VECTORS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+_FLOAT, _UINT32 = 5126, 5125
+_VERTEX_BUFFER, _INDEX_BUFFER = 34962, 34963
+_LINEAR, _MIPMAPPED, _CLAMP = 9729, 9987, 33071
+
+
+def write_glb(asset: Asset, path: Path) -> None:
+    """Writes `glb_bytes` to a file."""
+    with atomic_write(path) as temporary:
+        temporary.write_bytes(glb_bytes(asset))
+
+
+def glb_bytes(asset: Asset) -> bytes:
+    """The asset as a GLB file.
+
+    Baked: vertices split at UV seams, NORMAL (smooth), TANGENT, TEXCOORD_0, and up to three PNG textures:
+    base colour (sRGB), occlusion (R), roughness (G) and metallic (B = 0) in one, and normal.
+    Not baked: COLOR_0 (linear), the detail normals as NORMAL, and all maps as `_NAME` attributes.
+    """
+    builder = _Builder()
+    attributes = _baked_attributes(asset) if asset.texture_maps else _vertex_attributes(asset)
+    faces = attributes.pop("faces")
+    primitive = {
+        "attributes": {
+            k: builder.accessor(v, _VERTEX_BUFFER, k == "POSITION") for k, v in attributes.items()
+        },
+        "indices": builder.accessor(faces.reshape(-1, 1).astype(np.uint32), _INDEX_BUFFER),
+        "material": 0,
+    }
+    material = _textured(asset, builder) if asset.texture_maps else _plain(asset)
+    document: dict[str, Any] = {
+        "asset": {"version": "2.0", "generator": GENERATOR},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "name": asset.name}],
+        "meshes": [{"primitives": [primitive], "name": asset.name}],
+        # Both sides: open meshes (a Moebius strip has no other choice).
+        "materials": [{"name": asset.name, "doubleSided": True, **material}],
+        **builder.document,
+    }
+    return _container(document, builder.blob)
+
+
+def _baked_attributes(asset: Asset) -> dict[str, np.ndarray]:
+    assert asset.atlas is not None
+    split = split_at_seams(asset.mesh, asset.atlas.uv)
+    attributes = {
+        "POSITION": asset.mesh.vertices[split.source],
+        "NORMAL": split.normals,
+        "TEXCOORD_0": np.stack([split.uv[:, 0], 1.0 - split.uv[:, 1]], axis=1),  # glTF's v points down
+        "_VERTEX": split.source[:, None].astype(np.float32),
+        "faces": split.faces,
+    }
+    if "normal" in (asset.texture_maps or {}):
+        attributes["TANGENT"] = split.tangents
+    if "height" in asset.vertex_maps:
+        attributes["_HEIGHT"] = asset.vertex_maps["height"][split.source]
+    return attributes
+
+
+def _vertex_attributes(asset: Asset) -> dict[str, np.ndarray]:
+    maps = asset.vertex_maps
+    attributes = {
+        "POSITION": asset.mesh.vertices,
+        "NORMAL": asset.detail_normals(),
+        "faces": asset.mesh.faces,
+    }
+    if "albedo" in maps:
+        attributes["COLOR_0"] = srgb_to_linear(maps["albedo"])
+    attributes |= {f"_{k.upper()}": v for k, v in maps.items() if k != "albedo"}
+    if asset.tangents is not None:
+        attributes["_TANGENT"] = asset.tangents
+    return attributes
+
+
+def _plain(asset: Asset) -> dict[str, Any]:
+    maps = asset.vertex_maps
+    roughness = float(maps["roughness"].mean()) if "roughness" in maps else DEFAULT_ROUGHNESS
+    grey = 1.0 if "albedo" in maps else DEFAULT_ALBEDO
+    return {
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [grey, grey, grey, 1.0],
+            "metallicFactor": 0.0,
+            "roughnessFactor": roughness,
+        }
+    }
+
+
+def _textured(asset: Asset, builder: _Builder) -> dict[str, Any]:
+    maps = dict(asset.texture_maps or {})
+    surface: dict[str, Any] = {"metallicFactor": 0.0}
+    material: dict[str, Any] = {"pbrMetallicRoughness": surface}
+    if "albedo" in maps:
+        surface["baseColorTexture"] = {"index": builder.texture(maps["albedo"], "albedo")}
+    else:
+        surface["baseColorFactor"] = [DEFAULT_ALBEDO] * 3 + [1.0]
+    if "roughness" in maps or "ambient_occlusion" in maps:
+        size = next(iter(maps.values())).shape[:2]
+        packed = np.zeros((*size, 3), np.float32)
+        packed[..., :1] = maps.get("ambient_occlusion", 1.0)
+        packed[..., 1:2] = maps.get("roughness", 1.0)
+        index = builder.texture(packed, "occlusion_roughness_metallic")
+        if "ambient_occlusion" in maps:
+            material["occlusionTexture"] = {"index": index}
+        if "roughness" in maps:
+            surface["metallicRoughnessTexture"] = {"index": index}
+    if "roughness" not in maps:
+        surface["roughnessFactor"] = DEFAULT_ROUGHNESS
+    if "normal" in maps:
+        material["normalTexture"] = {"index": builder.texture(maps["normal"], "normal")}
+    return material
+
+
+class _Builder:
+    """Collects the binary chunk and the JSON lists that point into it."""
+
+    def __init__(self):
+        self._parts: list[bytes] = []
+        self._length = 0
+        self._views: list[dict[str, Any]] = []
+        self._accessors: list[dict[str, Any]] = []
+        self._images: list[dict[str, Any]] = []
+
+    def accessor(self, values: np.ndarray, target: int, bounds: bool = False) -> int:
+        """Adds (N, c) vertex attributes (float32) or (N, 1) indices (uint32)."""
+        kind, dtype = (_UINT32, "<u4") if values.dtype == np.uint32 else (_FLOAT, "<f4")
+        data = np.ascontiguousarray(values, dtype)
+        entry = {
+            "bufferView": self._view(data.tobytes(), target=target),
+            "componentType": kind,
+            "count": len(data),
+            "type": _VECTORS[data.shape[1]],
+        }
+        if bounds:
+            entry |= {"min": data.min(axis=0).tolist(), "max": data.max(axis=0).tolist()}
+        self._accessors.append(entry)
+        return len(self._accessors) - 1
+
+    def texture(self, image: np.ndarray, name: str) -> int:
+        """Adds an (H, W, c) image in [0, 1] as PNG."""
+        self._images.append({"bufferView": self._view(png(image)), "mimeType": "image/png", "name": name})
+        return len(self._images) - 1
+
+    def _view(self, data: bytes, **more: int) -> int:
+        self._views.append({"buffer": 0, "byteOffset": self._length, "byteLength": len(data), **more})
+        padded = data + b"\0" * (-len(data) % 4)
+        self._parts.append(padded)
+        self._length += len(padded)
+        return len(self._views) - 1
+
+    @property
+    def blob(self) -> bytes:
+        return b"".join(self._parts)
+
+    @property
+    def document(self) -> dict[str, Any]:
+        lists: dict[str, Any] = {
+            "accessors": self._accessors,
+            "bufferViews": self._views,
+            "buffers": [{"byteLength": self._length}],
+        }
+        if self._images:
+            sampler = {"magFilter": _LINEAR, "minFilter": _MIPMAPPED, "wrapS": _CLAMP, "wrapT": _CLAMP}
+            lists |= {
+                "images": self._images,
+                "samplers": [sampler],
+                "textures": [{"sampler": 0, "source": k} for k in range(len(self._images))],
+            }
+        return lists
+
+
+def _container(document: dict[str, Any], blob: bytes) -> bytes:
+    text = json.dumps(document, separators=(",", ":"), ensure_ascii=False).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = (
+        struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(blob), 0x004E4942) + blob
+    )
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks

@@ -1,0 +1,114 @@
+"""Wavefront OBJ with a material file and PNG maps beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+
+from mitex.asset import Asset
+from mitex.errors import ImageError, MeshError
+from mitex.exemplar import MAPS
+from mitex.export.common import DEFAULT_ALBEDO, GENERATOR, asset_from_textures, foreign, plain_name, png
+from mitex.images import read_image
+from mitex.mesh import Mesh
+from mitex.paths import atomic_write
+
+# Material keywords, the first one is read back. `norm` and `map_Pr` are the PBR extension of the format;
+# Blender reads the normal map from `map_Bump`. Nothing standard fits occlusion: ambient colour comes closest.
+_KEYWORDS = {
+    "albedo": ("map_Kd",),
+    "ambient_occlusion": ("map_Ka",),
+    "height": ("disp",),
+    "normal": ("norm", "map_Bump"),
+    "roughness": ("map_Pr",),
+}
+
+
+def write_obj(asset: Asset, path: Path) -> None:
+    """Writes NAME.obj, NAME.mtl and NAME_MAP.png, all or none; bakes the asset first if it is not."""
+    if asset.texture_maps is None:
+        asset = asset.baked()
+    stem = plain_name(path.stem)
+    files = {f"{stem}_{k}.png": png(v) for k, v in (asset.texture_maps or {}).items()}
+    files[f"{stem}.mtl"] = _material(asset, stem).encode()
+    with ExitStack() as stack:
+        # All are written before the first one gets its name; the mesh, which refers to the others, last.
+        mesh = stack.enter_context(atomic_write(path))
+        for name, data in files.items():
+            stack.enter_context(atomic_write(path.with_name(name))).write_bytes(data)
+        with mesh.open("wb") as file:
+            _write_mesh(file, asset, stem)
+
+
+def _material(asset: Asset, stem: str) -> str:
+    grey = 1.0 if "albedo" in asset.vertex_maps else DEFAULT_ALBEDO
+    lines = [f"# {GENERATOR}", f"newmtl {stem}", f"Kd {grey} {grey} {grey}", "Ks 0 0 0", "Pm 0", "illum 2"]
+    for name in asset.texture_maps or {}:
+        lines += [f"{keyword} {stem}_{name}.png" for keyword in _KEYWORDS[name]]
+    return "\n".join(lines) + "\n"
+
+
+def _write_mesh(file, asset: Asset, stem: str) -> None:
+    mesh, atlas = asset.mesh, asset.atlas
+    assert atlas is not None
+    pairs, uv_index = np.unique(atlas.uv.reshape(-1, 2), axis=0, return_inverse=True)
+    file.write(f"# {GENERATOR}\nmtllib {stem}.mtl\no {plain_name(asset.name)}\nusemtl {stem}\n".encode())
+    # Nine digits give every float32 back exactly.
+    np.savetxt(file, mesh.vertices, "v %.9g %.9g %.9g")
+    np.savetxt(file, pairs, "vt %.9g %.9g")
+    np.savetxt(file, mesh.normals, "vn %.6g %.6g %.6g")
+    corners = np.stack([mesh.faces, uv_index.reshape(-1, 3), mesh.faces], axis=2) + 1
+    np.savetxt(file, corners.reshape(-1, 9), "f %d/%d/%d %d/%d/%d %d/%d/%d")
+
+
+def read_obj(path: Path) -> Asset:
+    """Reads what `write_obj` wrote.
+
+    Raises:
+        MeshError: damaged, not written by Mitex, or a map is missing.
+    """
+    lines = path.read_text("utf-8", "replace").split("\n")
+    if lines[0] != f"# {GENERATOR}" or not lines[1].startswith("mtllib "):
+        raise foreign(path)
+    try:
+        vertices = _rows(lines, "v ", 3, np.float32)
+        pairs = _rows(lines, "vt ", 2, np.float32)
+        faces = _rows((line.replace("/", " ") for line in lines), "f ", 9, np.int64).reshape(-1, 3, 3) - 1
+        # A negative index would silently count from the end.
+        uv = pairs[np.where(faces[..., 1] < 0, len(pairs), faces[..., 1])]
+        mesh = Mesh(vertices, faces[..., 0], uv, path.stem)
+        textures = _textures(path, path.with_name(lines[1].split()[1]))
+    except (ValueError, IndexError) as e:
+        raise foreign(path, "is damaged") from e
+    if len({v.shape[:2] for v in textures.values()}) != 1:
+        raise foreign(path, "has no maps, or maps of different sizes")
+    return asset_from_textures(mesh, uv, textures, path.stem)
+
+
+def _rows(lines: Iterable[str], start: str, width: int, dtype: type) -> np.ndarray:
+    chosen = [line[len(start) :] for line in lines if line.startswith(start)]
+    return np.array(" ".join(chosen).split(), dtype).reshape(len(chosen), width)
+
+
+def _textures(path: Path, material: Path) -> dict[str, np.ndarray]:
+    try:
+        lines = [line.split() for line in material.read_text("utf-8", "replace").split("\n")]
+    except OSError as e:
+        raise MeshError(f"{path} needs {material.name}", "keep it beside the mesh") from e
+    names = {keywords[0]: name for name, keywords in _KEYWORDS.items()}
+    textures = {}
+    for words in lines:
+        if len(words) != 2 or words[0] not in names:
+            continue
+        file = (material.parent / words[1]).resolve()
+        if not file.is_relative_to(material.parent.resolve()):
+            raise foreign(path, f"points to {words[1]}, outside of its folder")
+        name = names[words[0]]
+        try:
+            textures[name] = read_image(file, "L" if MAPS[name] == 1 else "RGB")
+        except ImageError as e:
+            raise MeshError(f"{path}: {e.problem}", "keep the maps beside the mesh") from e
+    return textures

@@ -1,0 +1,184 @@
+"""Stills and turntables as arrays and files."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from mitex.asset import Asset
+from mitex.colour import linear_to_srgb
+from mitex.errors import ConfigError, OutputError
+from mitex.export.exr import write_exr
+from mitex.images import write_image
+from mitex.paths import atomic_write, prepare_output
+from mitex.render.renderer import OrbitRenderer
+
+STILL_SUFFIXES = (".png", ".jpg", ".jpeg", ".exr")
+VIDEO_SUFFIXES = (".mp4", ".gif")
+AZIMUTH, ELEVATION = math.radians(25), math.radians(18)
+
+
+def tone(linear: np.ndarray, exposure: float = 0.0) -> np.ndarray:
+    """Linear radiance (..., 3) to display values: sRGB in [0, 1], `exposure` in stops, no film curve.
+
+    Raises:
+        ConfigError: the exposure is beyond +-10 stops.
+    """
+    if not -10.0 <= exposure <= 10.0:
+        raise ConfigError(f"exposure {exposure} is out of range", "use -10 to 10 stops")
+    return linear_to_srgb(np.clip(linear * 2.0**exposure, 0.0, 1.0)).astype(np.float32)
+
+
+def still(
+    asset: Asset,
+    *,
+    resolution: int = 512,
+    spp: int = 64,
+    azimuth: float = AZIMUTH,
+    elevation: float = ELEVATION,
+    displacement: float = 0.0,
+    ao: bool = True,
+    backdrop: bool = True,
+    seed: int = 0,
+) -> np.ndarray:
+    """A path-traced picture of an asset.
+
+    Args:
+        azimuth: from where the object is seen [rad]: 0 is its +z side, pi / 2 its +x side.
+        elevation: of the camera [rad], 0 to 85 degrees; from -85 without backdrop.
+        resolution, displacement, ao, backdrop: as in `OrbitRenderer`.
+        spp, seed: samples per pixel and the seed of their noise.
+
+    Returns:
+        (H, W, 3) float32 linear radiance; `tone` makes it displayable.
+
+    Raises:
+        ConfigError: an option out of range.
+    """
+    renderer = OrbitRenderer(
+        asset, resolution=resolution, displacement=displacement, ao=ao, backdrop=backdrop
+    )
+    return renderer.render(azimuth, renderer.frame(azimuth, elevation), spp, seed)
+
+
+def render_still(asset: Asset, path: str | os.PathLike[str], *, exposure: float = 0.0, **options) -> Path:
+    """Renders `still` and writes it: .png and .jpg in sRGB after `tone`, .exr linear (R, G, B, float16).
+
+    Returns:
+        The path written.
+
+    Raises:
+        OutputError: unknown suffix or unwritable place, before anything is rendered.
+        ConfigError: an option out of range.
+    """
+    target = prepare_output(path, STILL_SUFFIXES)
+    tone(np.zeros(3), exposure)
+    linear = still(asset, **options)
+    if target.suffix.lower() == ".exr":
+        return write_exr(target, dict(zip("RGB", np.moveaxis(linear, 2, 0) * 2.0**exposure, strict=True)))
+    return write_image(target, tone(linear, exposure))
+
+
+def turntable(
+    asset: Asset,
+    path: str | os.PathLike[str],
+    *,
+    frames: int = 72,
+    fps: int = 24,
+    resolution: int = 384,
+    spp: int = 32,
+    elevation: float = ELEVATION,
+    exposure: float = 0.0,
+    displacement: float = 0.0,
+    ao: bool = True,
+    backdrop: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Renders one full turn of the asset as a video, .mp4 (H.264) or .gif, that loops without a jump.
+
+    Args:
+        path: target.
+        frames: of one turn, 2 to 3600.
+        fps: frames per second, 1 to 60.
+        resolution: side [px]; even for .mp4.
+        progress: called with (frames done, frames) after each one.
+        spp, elevation, exposure, displacement, ao, backdrop: as in `still` and `tone`.
+
+    Returns:
+        The path written.
+
+    Raises:
+        OutputError: unknown suffix, unwritable place, or the encoder failed.
+        ConfigError: an option out of range.
+    """
+    target = prepare_output(path, VIDEO_SUFFIXES)
+    if not 2 <= frames <= 3600 or not 1 <= fps <= 60:
+        raise ConfigError(
+            f"a turntable of {frames} frames at {fps} per second is not possible", "use 2 to 3600 at 1 to 60"
+        )
+    if target.suffix.lower() == ".mp4" and resolution % 2:
+        raise ConfigError(f"MP4 needs an even size, not {resolution}", f"use {resolution + 1}")
+    tone(np.zeros(3), exposure)
+    renderer = OrbitRenderer(
+        asset, resolution=resolution, displacement=displacement, ao=ao, backdrop=backdrop
+    )
+    angles = AZIMUTH + np.linspace(0.0, 2.0 * math.pi, frames, endpoint=False)
+    view = renderer.frame(angles.tolist(), elevation)
+
+    def pictures() -> Iterator[np.ndarray]:
+        for k, angle in enumerate(angles):
+            # The same seed: noise that stands still compresses better and disturbs less.
+            picture = tone(renderer.render(float(angle), view, spp), exposure)
+            yield np.round(picture * 255.0).astype(np.uint8)
+            if progress:
+                progress(k + 1, frames)
+
+    with atomic_write(target) as temporary:
+        (_write_gif if target.suffix.lower() == ".gif" else _write_mp4)(
+            temporary, pictures(), fps, resolution
+        )
+    return target
+
+
+def _write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: int, side: int) -> None:
+    import imageio_ffmpeg
+
+    encoder = imageio_ffmpeg.write_frames(
+        str(path),
+        (side, side),
+        fps=fps,
+        codec="libx264",
+        quality=7,
+        macro_block_size=2,
+        output_params=["-movflags", "+faststart"],
+        ffmpeg_log_level="error",
+    )
+    encoder.send(None)
+    try:
+        for picture in pictures:
+            encoder.send(np.ascontiguousarray(picture))
+    finally:
+        encoder.close()
+    if not path.is_file() or path.stat().st_size == 0:
+        raise OutputError("ffmpeg wrote no video", "check the free space and `mitex doctor`")
+
+
+def _write_gif(path: Path, pictures: Iterator[np.ndarray], fps: int, side: int) -> None:
+    images = [Image.fromarray(p) for p in pictures]
+    # One palette for all frames, or colours would flicker.
+    palette = _strip(images[:: max(1, len(images) // 8)]).quantize(256, Image.Quantize.MEDIANCUT)
+    indexed = [i.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG) for i in images]
+    duration = max(20, round(1000.0 / fps))  # [ms]; viewers slow down anything faster
+    indexed[0].save(path, "GIF", save_all=True, append_images=indexed[1:], duration=duration, loop=0)
+
+
+def _strip(images: Sequence[Image.Image]) -> Image.Image:
+    strip = Image.new("RGB", (images[0].width * len(images), images[0].height))
+    for k, image in enumerate(images):
+        strip.paste(image, (k * image.width, 0))
+    return strip

@@ -1,0 +1,98 @@
+"""Files of stills and turntables."""
+
+import math
+import sys
+from typing import Any
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+from PIL import Image
+
+from mitex.asset import Asset
+from mitex.colour import linear_to_srgb
+from mitex.errors import ConfigError, OutputError
+from mitex.export import read_exr
+from mitex.mesh import icosphere
+from mitex.render import render_still, tone, turntable
+
+ASSET = Asset(icosphere(3), {"albedo": np.full((92, 3), 0.6), "height": np.zeros((92, 1))})
+SMALL: dict[str, Any] = {"resolution": 16, "spp": 1}
+
+
+def test_tone_is_srgb_with_stops():
+    linear = np.array([0.0, 0.2, 0.5, 3.0])
+    np.testing.assert_allclose(tone(linear), linear_to_srgb(np.minimum(linear, 1)), atol=1e-6)
+    np.testing.assert_allclose(tone(linear, 1.0), tone(2 * linear), atol=1e-6)
+    for exposure in (11, math.nan):
+        with pytest.raises(ConfigError, match="exposure"):
+            tone(linear, exposure)
+
+
+def test_stills_of_all_formats_agree(tmp_path):
+    exr = read_exr(ASSET.render(tmp_path / "a.exr", **SMALL))
+    png = np.asarray(Image.open(ASSET.render(tmp_path / "a.png", **SMALL)), np.float32) / 255
+    Image.open(ASSET.render(tmp_path / "a.jpg", **SMALL)).verify()
+    linear = np.stack([exr[k] for k in "RGB"], axis=2).astype(np.float32)
+    np.testing.assert_allclose(tone(linear), png, atol=0.01)
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "a.gif"])
+def test_turntables_have_all_frames_and_turn(name, tmp_path):
+    albedo = np.where(ASSET.mesh.vertices[:, :1] > 0, [[0.9, 0.1, 0.1]], [[0.1, 0.1, 0.9]])
+    seen = []
+    path = turntable(
+        Asset(ASSET.mesh, {"albedo": albedo}),
+        tmp_path / name,
+        frames=4,
+        fps=10,
+        resolution=32,
+        spp=4,
+        progress=lambda done, of: seen.append((done, of)),
+    )
+    frames = iio.imread(path)
+    assert frames.shape == (4, 32, 32, 3)
+    assert seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    red = frames[:, 12:20, 12:20].mean(axis=(1, 2))
+    assert red[1, 0] > 2 * red[1, 2] and red[3, 2] > 2 * red[3, 0]  # from +x, then from -x
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+def test_gifs_loop_forever(tmp_path):
+    image = Image.open(turntable(ASSET, tmp_path / "a.gif", frames=2, fps=10, **SMALL))
+    assert image.info["loop"] == 0 and image.info["duration"] == 100
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"frames": 1}, "turntable"),
+        ({"fps": 0}, "turntable"),
+        ({"resolution": 33}, "even size"),
+        ({"exposure": 99.0}, "exposure"),
+        ({"elevation": -0.5}, "elevation"),
+    ],
+)
+def test_wrong_options_leave_nothing(options, message, tmp_path):
+    with pytest.raises(ConfigError, match=message):
+        turntable(ASSET, tmp_path / "a.mp4", **options)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("write", [render_still, turntable])
+def test_unwritable_places_are_told_before_rendering(write, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mitsuba", None)
+    (tmp_path / "file").write_text("")
+    for name in ("a.bmp", "a", "file/a.png", "file/a.mp4"):
+        with pytest.raises(OutputError):
+            write(ASSET, tmp_path / name)
+
+
+def test_a_failing_encoder_leaves_nothing(tmp_path, monkeypatch):
+    import imageio_ffmpeg
+
+    monkeypatch.setattr(imageio_ffmpeg, "get_ffmpeg_exe", lambda: "/bin/false")
+    monkeypatch.setattr("imageio_ffmpeg._io.get_ffmpeg_exe", lambda: "/bin/false")
+    with pytest.raises(OutputError):
+        turntable(ASSET, tmp_path / "a.mp4", frames=3, **SMALL)
+    assert list(tmp_path.iterdir()) == []

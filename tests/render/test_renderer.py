@@ -1,0 +1,163 @@
+"""Pictures of spheres whose colours, light and relief are known."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mitex.asset import Asset
+from mitex.errors import ConfigError
+from mitex.mesh import Mesh, icosphere
+from mitex.render.renderer import OrbitRenderer, _facing, _material, _surface
+
+SIDE = 24
+SPHERE = icosphere(12)
+GREY = {"albedo": np.full((len(SPHERE.vertices), 3), 0.735)}  # half, linear
+
+
+def picture(
+    asset: Asset, azimuth: float = 0.0, elevation: float = 0.0, spp: int = 16, **options: Any
+) -> np.ndarray:
+    renderer = OrbitRenderer(asset, resolution=SIDE, **options)
+    return renderer.render(azimuth, renderer.frame(azimuth, elevation), spp)
+
+
+def east(mesh: Mesh) -> np.ndarray:
+    return np.stack([mesh.vertices[:, 2], 0 * mesh.vertices[:, 0], -mesh.vertices[:, 0]], axis=1)
+
+
+def bent(x: float, y: float) -> Asset:
+    """A grey sphere whose normals lean by (x, y) to the east and to the north everywhere."""
+    n = np.array([x, y, math.sqrt(1 - x * x - y * y)])
+    normal = np.tile(0.5 + 0.5 * n, (len(SPHERE.vertices), 1))
+    return Asset(SPHERE, {**GREY, "normal": normal}, east(SPHERE))
+
+
+def middle(image: np.ndarray) -> np.ndarray:
+    return image[10:14, 10:14].mean(axis=(0, 1))
+
+
+def test_background_is_white_and_the_exposure_right():
+    image = picture(Asset(SPHERE, GREY), backdrop=False, spp=64)
+    np.testing.assert_allclose(image[[0, 0, -1, -1], [0, -1, 0, -1]], 1.0, atol=1e-6)
+    lit = image[6:12, 7:13]  # turned to the key light
+    assert 0.35 < lit.mean() < 0.75  # of the half that it reflects
+    # Neutral light: no visible tint.
+    assert np.ptp(lit.mean(axis=(0, 1))) < 0.1 * lit.mean()
+
+
+def test_paper_is_light_grey():
+    image = picture(Asset(SPHERE, GREY), elevation=0.3)
+    corners = image[[0, 0, -1], [0, -1, 0]]
+    assert corners.min() > 0.6 and corners.max() < 1.1
+
+
+def test_light_comes_from_the_upper_left_at_every_azimuth():
+    renderer = OrbitRenderer(Asset(SPHERE, GREY), resolution=SIDE, backdrop=False)
+    for azimuth in (0.0, 2.0, 4.0):
+        image = renderer.render(azimuth, renderer.frame(azimuth, 0.0), 16).mean(axis=2)
+        assert image[5:9, 6:10].mean() > 2.0 * image[15:19, 14:18].mean()
+
+
+def test_azimuth_shows_the_named_side():
+    x, _, z = np.abs(SPHERE.vertices).T
+    albedo = np.stack([x > 0.6, z > 0.6, 0 * x], axis=1).astype(np.float32) * 0.8
+    renderer = OrbitRenderer(Asset(SPHERE, {"albedo": albedo}), resolution=SIDE, backdrop=False)
+    front, right = (middle(renderer.render(a, renderer.frame(a, 0.0), 16)) for a in (0.0, math.pi / 2))
+    assert front[1] > 5 * front[0] and right[0] > 5 * right[1]
+
+
+def test_map_normals_that_lean_into_the_light_are_brighter():
+    """The key light stands to the upper left, where -x and +y of the map point on the front."""
+    west, eastern = (middle(picture(bent(x, 0.0), backdrop=False)).mean() for x in (-0.5, 0.5))
+    north, south = (middle(picture(bent(0.0, y), backdrop=False)).mean() for y in (0.5, -0.5))
+    assert west > 1.3 * eastern
+    assert north > 1.3 * south
+
+
+def test_no_pixel_is_black_where_normals_turn_away():
+    for x, y in ((0.9, 0.0), (-0.9, 0.0), (0.0, 0.9)):
+        assert picture(bent(x, y), backdrop=False, spp=64).min() > 0.01
+
+
+def test_facing_changes_only_what_looks_away(rng):
+    normals = np.tile([0.0, 0.0, 1.0], (3, 1))
+    detail = np.array([[0.0, 0.0, 1.0], [0.8, 0.0, 0.6], [-0.8, 0.0, 0.6]])
+    to_camera = np.tile([0.8, 0.0, 0.6], (3, 1))
+    bent_back = _facing(detail, normals, to_camera)
+    np.testing.assert_allclose(bent_back[:2], detail[:2])
+    assert bent_back[2] @ to_camera[2] > 0.05
+    # From behind an open surface, the other way round.
+    behind = _facing(detail, normals, -to_camera)
+    assert behind[2] @ -to_camera[2] < 0.0 or np.allclose(behind[2], detail[2])
+    assert (np.einsum("nk,nk->n", behind, -to_camera) < 0).all()
+
+
+def test_occlusion_darkens_the_base_colour():
+    half = {**GREY, "ambient_occlusion": np.full((len(SPHERE.vertices), 1), 0.5)}
+    asset = Asset(SPHERE, half)
+    np.testing.assert_allclose(_material(asset, ao=True)[0], 0.5 * _material(asset, ao=False)[0])
+    np.testing.assert_allclose(_material(asset, ao=False)[0], 0.5, atol=2e-3)
+
+
+def test_roughness_stays_off_zero():
+    asset = Asset(SPHERE, {"roughness": np.zeros((len(SPHERE.vertices), 1))})
+    assert _material(asset, ao=True)[1].min() == np.float32(0.05)
+
+
+def test_displacement_moves_along_the_normals_by_the_squared_height():
+    height = np.linspace(0, 1, len(SPHERE.vertices))[:, None]
+    positions, _, detail = _surface(Asset(SPHERE, {"height": height}), 0.1)
+    np.testing.assert_allclose(np.linalg.norm(positions, axis=1), 1 + 0.1 * height[:, 0] ** 2, atol=1e-4)
+    assert np.abs(detail - SPHERE.normals).max() > 0.01  # no normal map: relief from the surface itself
+
+
+def test_the_size_of_the_mesh_does_not_matter():
+    big = SPHERE.with_vertices(100 * SPHERE.vertices + [7, 8, 9])
+    images = [picture(Asset(mesh, GREY)) for mesh in (SPHERE, big)]
+    np.testing.assert_allclose(images[0], images[1], atol=0.05)
+
+
+def test_passes_add_up_to_the_same_picture(monkeypatch):
+    renderer = OrbitRenderer(Asset(SPHERE, GREY), resolution=SIDE)
+    view = renderer.frame(0.0, 0.3)
+    once = renderer.render(0.0, view, 64)
+    monkeypatch.setattr("mitex.render.renderer.SAMPLES_PER_PASS", SIDE * SIDE * 16)
+    four = renderer.render(0.0, view, 64)
+    assert np.abs(once - four).mean() < 0.02 and (once != four).any()
+
+
+def test_seeds_make_the_noise():
+    renderer = OrbitRenderer(Asset(SPHERE, GREY), resolution=SIDE)
+    view = renderer.frame(0.0, 0.3)
+    first, again, other = (renderer.render(0.0, view, 4, seed) for seed in (0, 0, 1))
+    np.testing.assert_allclose(first, again, atol=1e-4)
+    assert np.abs(first - other).max() > 1e-2
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"resolution": 8}, "pixels is not possible"),
+        ({"resolution": 8000}, "pixels is not possible"),
+        ({"displacement": 0.6}, "out of range"),
+        ({"displacement": math.nan}, "out of range"),
+        ({"displacement": 0.1}, "needs a height map"),
+    ],
+)
+def test_wrong_options(options, message):
+    with pytest.raises(ConfigError, match=message):
+        OrbitRenderer(Asset(SPHERE, GREY), **options)
+
+
+def test_wrong_views():
+    asset = Asset(icosphere(1), {"albedo": np.zeros((12, 3))})
+    renderer = OrbitRenderer(asset, resolution=16)
+    for elevation in (-0.1, 1.55, math.nan):
+        with pytest.raises(ConfigError, match="elevation"):
+            renderer.frame(0.0, elevation)
+    for spp in (0, 70000):
+        with pytest.raises(ConfigError, match="samples per pixel"):
+            renderer.render(0.0, renderer.frame(0.0), spp)
+    OrbitRenderer(asset, resolution=16, backdrop=False).frame(0.0, -1.0)

@@ -1,0 +1,124 @@
+"""The wheel: built from the tree without a network, imported outside the checkout."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+IMPORT_NAMES = {"imageio-ffmpeg": "imageio_ffmpeg", "pillow": "PIL", "scikit-image": "skimage"}
+
+
+@pytest.fixture(scope="session")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(folder), str(ROOT)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (built,) = folder.glob("mitex-*.whl")
+    return built
+
+
+@pytest.fixture(scope="session")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    target = tmp_path_factory.mktemp("site")
+    command = [
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--no-index",
+        "--no-deps",
+        "--target",
+        str(target),
+    ]
+    subprocess.run([*command, str(wheel)], check=True, timeout=300)
+    return target
+
+
+def run_installed(installed: Path, folder: Path, code: str) -> str:
+    """Runs code against the installed copy, which comes before any editable install of the checkout."""
+    command = [sys.executable, "-P", "-c", code]
+    environment = {**os.environ, "PYTHONPATH": str(installed)}
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_everything_in_the_package_is_in_the_wheel_and_nothing_else(wheel: Path):
+    listed = subprocess.run(["git", "ls-files", "mitex"], cwd=ROOT, capture_output=True, text=True)
+    if listed.returncode != 0 or not listed.stdout:
+        pytest.skip("not a git checkout")
+    tracked = {name for name in listed.stdout.splitlines() if (ROOT / name).exists()}
+    names = {name for name in zipfile.ZipFile(wheel).namelist() if not name.endswith("/")}
+    assert tracked - names == set()
+    assert {name for name in names if not re.match(r"mitex(-[\d.]+\.dist-info)?/", name)} == set()
+
+
+def test_data_comes_with_its_license(wheel: Path):
+    names = zipfile.ZipFile(wheel).namelist()
+    folders = {name.rsplit("/", 1)[0] for name in names if name.startswith("mitex/data/weights/")}
+    assert folders and all(f"{folder}/LICENSE.txt" in names for folder in folders)
+    assert any(re.fullmatch(r"mitex-.*\.dist-info/licenses/LICENSE", name) for name in names)
+
+
+def test_the_installed_copy_works_outside_the_checkout(installed: Path, tmp_path: Path):
+    code = (
+        "import mitex\n"
+        "from mitex.features import weights\n"
+        "weights.verify(weights.vgg16_path(), weights.VGG16_SHA256)\n"
+        "print(mitex.__file__, mitex.init().variant(), mitex.__version__)"
+    )
+    place, variant, version = run_installed(installed, tmp_path, code).split()
+    assert place == str(installed / "mitex" / "__init__.py") and variant == "llvm_ad_rgb"
+    assert (installed / f"mitex-{version}.dist-info").is_dir()
+
+
+def test_public_names_resolve_in_the_installed_copy(installed: Path, tmp_path: Path):
+    code = "import mitex; print(*[type(getattr(mitex, n)).__name__ for n in mitex.__all__])"
+    assert len(run_installed(installed, tmp_path, code).split()) == 6
+
+
+def test_the_command_is_there(installed: Path, tmp_path: Path):
+    assert "mitex = mitex.cli:main" in (next(installed.glob("*.dist-info")) / "entry_points.txt").read_text()
+    assert run_installed(installed, tmp_path, "from mitex.cli import main; print(callable(main))") == "True"
+
+
+def declared() -> set[str]:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    wanted = project["dependencies"] + [
+        item for extra in project["optional-dependencies"].values() for item in extra
+    ]
+    names = {match[0] for item in wanted if (match := re.match(r"[\w.-]+", item))}
+    return {IMPORT_NAMES.get(name, name) for name in names}
+
+
+def imported(path: Path) -> set[str]:
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names.add(node.module.split(".")[0])
+    return names - set(sys.stdlib_module_names) - {"mitex"}
+
+
+def test_every_import_of_the_package_is_a_declared_dependency():
+    found = {name: path for path in sorted((ROOT / "mitex").rglob("*.py")) for name in imported(path)}
+    assert found.keys() >= {"mitsuba", "torch"}
+    assert {name: str(path) for name, path in found.items() if name not in declared()} == {}
+
+
+def test_pins_agree_with_the_declared_ranges():
+    pins = (ROOT / "constraints.txt").read_text().split()
+    assert pins == ["torch==2.13.0"]
+    assert (
+        "torch>=2.13,<2.14" in tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
+    )
