@@ -1,0 +1,103 @@
+"""`mitex apply`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from mitex.cli.checks import SEEDS, in_range, needless, not_both
+from mitex.errors import ConfigError
+
+SUFFIXES = (".glb", ".obj", ".ply", ".exr")
+RESOLUTION = 1024
+
+
+@dataclass
+class Apply:
+    """Put a learned texture on a mesh and write the result.
+
+    The suffix of --out chooses the format: .glb (PBR textures), .obj (with .mtl and PNG maps),
+    .ply (vertex colours), .exr (the maps as layers).
+
+    examples:
+      mitex apply runs/pebbles --mesh bunny.obj --out bunny.glb
+      mitex apply pebbles --mesh bunny.obj --out bunny.glb --subdivide 2 --resolution 2048
+      mitex apply pebbles --mesh scan.ply --out scan.glb --vertex-colors --seed 7 --orientation 45
+    """
+
+    model: Annotated[Positional[str], arg(metavar="RUN|MODEL")]
+    """Run folder, model file, or name of a bundled model (see `mitex models`)."""
+
+    mesh: Annotated[str, arg(metavar="MESH|NAME")]
+    """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
+
+    out: Annotated[Path, arg(metavar="ASSET")]
+    """File to write."""
+
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Random seed: another seed, another variant of the texture."""
+
+    steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the model's)")] = None
+    """Steps of the automaton."""
+
+    subdivide: Annotated[str, arg(metavar="auto|N")] = "auto"
+    """How often to subdivide the mesh, each time to four times the faces; auto: to the training's density."""
+
+    orientation: Annotated[float, arg(metavar="DEG")] = 0.0
+    """Turns the texture on the surface [degrees]."""
+
+    scale: Annotated[float, arg(metavar="X")] = 1.0
+    """Size of the pattern."""
+
+    resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 1024)")] = None
+    """Side of the baked textures [pixels]."""
+
+    vertex_colors: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Write colours at the vertices instead of textures."""
+
+    def run(self) -> None:
+        subdivide = self._subdivide()
+        in_range("--seed", self.seed, *SEEDS)
+        in_range("--steps", self.steps, 1, 10_000)
+        in_range("--orientation", self.orientation, -360.0, 360.0)
+        in_range("--scale", self.scale, 0.05, 20.0)
+        in_range("--resolution", self.resolution, 64, 8192)
+        not_both("--resolution", "--vertex-colors", self.resolution is not None and self.vertex_colors)
+        from mitex.paths import prepare_output
+
+        out = prepare_output(self.out, SUFFIXES)
+        suffix = out.suffix.lower()
+        needless("--vertex-colors", out, self.vertex_colors and suffix in (".obj", ".exr"))
+        needless("--resolution", out, self.resolution is not None and suffix == ".ply")
+        from mitex.cli.layout import with_layout
+        from mitex.mesh import Mesh
+
+        textures = suffix != ".ply" and not self.vertex_colors
+        resolution = self.resolution or RESOLUTION
+        mesh = Mesh.load(self.mesh)
+        from mitex.methods.nca import NcaTexture
+
+        texture = NcaTexture.load(self.model)
+        asset = texture.apply(
+            with_layout(mesh, resolution) if textures else mesh,
+            seed=self.seed,
+            steps=self.steps,
+            subdivide=subdivide,
+            orientation=math.radians(self.orientation),
+            scale=self.scale,
+        )
+        if textures:
+            asset = asset.baked(resolution)
+        asset.export(out)
+        print(self.out)
+
+    def _subdivide(self) -> int | str:
+        if self.subdivide == "auto":
+            return "auto"
+        if self.subdivide not in list("0123456"):
+            raise ConfigError(f"--subdivide cannot be {self.subdivide!r}", "use auto or a number from 0 to 6")
+        return int(self.subdivide)

@@ -1,0 +1,107 @@
+"""`mitex render`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from tyro.conf import Positional, arg
+
+from mitex.cli.checks import in_range, needless
+from mitex.cli.progress import bar
+
+STILLS = (".png", ".jpg", ".jpeg", ".exr")
+MOVIES = (".mp4", ".gif")
+
+
+@dataclass
+class Render:
+    """Path-trace an asset that `mitex apply` wrote: a still (.png .jpg .exr) or a turntable (.mp4 .gif).
+
+    examples:
+      mitex render bunny.glb --out bunny.png
+      mitex render bunny.glb --out bunny.exr --size 1024 --spp 256 --azimuth 30 --elevation 15
+      mitex render bunny.glb --out bunny.mp4 --frames 120 --displacement 0.02
+    """
+
+    asset: Annotated[Positional[str], arg(metavar="ASSET")]
+    """File written by `mitex apply` (.glb .obj .ply)."""
+
+    out: Annotated[Path, arg(metavar="FILE")]
+    """Image or movie to write."""
+
+    size: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 512; turntables 384)")] = None
+    """Width and height [pixels]."""
+
+    spp: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 64; turntables 32)")] = None
+    """Samples a pixel."""
+
+    azimuth: Annotated[float | None, arg(metavar="DEG", help_behavior_hint="(default: 25)")] = None
+    """Side from which a still shows the object [degrees]; 0 is +z, 90 is +x."""
+
+    elevation: Annotated[float | None, arg(metavar="DEG", help_behavior_hint="(default: 18)")] = None
+    """How high the camera stands [degrees]."""
+
+    displacement: Annotated[float, arg(metavar="X")] = 0.0
+    """Moves the surface by the squared height map, this far at most [radii of the mesh]."""
+
+    exposure: Annotated[float, arg(metavar="STOPS")] = 0.0
+    """Brightens or darkens the picture."""
+
+    floating: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Show the object before plain white instead of standing on paper; elevations down to -85 then."""
+
+    frames: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 72)")] = None
+    """Frames of a turntable."""
+
+    fps: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 24)")] = None
+    """Frames a second of a turntable."""
+
+    def run(self) -> None:
+        self._check_ranges()
+        from mitex.paths import prepare_output
+
+        out = prepare_output(self.out, STILLS + MOVIES)
+        moving = out.suffix.lower() in MOVIES
+        needless("--frames", out, not moving and self.frames is not None)
+        needless("--fps", out, not moving and self.fps is not None)
+        needless("--azimuth", out, moving and self.azimuth is not None)
+        options = self._options()
+        from mitex.asset import Asset
+
+        asset = Asset.load(self.asset)
+        if moving:
+            from mitex.render import turntable
+
+            with bar("turntable") as progress:
+                turntable(asset, out, **options, progress=progress)
+        else:
+            asset.render(out, **options)
+        print(self.out)
+
+    def _check_ranges(self) -> None:
+        in_range("--size", self.size, 16, 4096)
+        in_range("--spp", self.spp, 1, 65536)
+        in_range("--azimuth", self.azimuth, -360.0, 360.0)
+        in_range("--elevation", self.elevation, -85.0 if self.floating else 0.0, 85.0)
+        in_range("--displacement", self.displacement, -0.5, 0.5)
+        in_range("--exposure", self.exposure, -10.0, 10.0)
+        in_range("--frames", self.frames, 2, 3600)
+        in_range("--fps", self.fps, 1, 60)
+
+    def _options(self) -> dict[str, Any]:
+        """Keyword arguments of `still` and `turntable`; what was not given is left to their defaults."""
+        options = {
+            "resolution": self.size,
+            "spp": self.spp,
+            "azimuth": None if self.azimuth is None else math.radians(self.azimuth),
+            "elevation": None if self.elevation is None else math.radians(self.elevation),
+            "displacement": self.displacement,
+            "exposure": self.exposure,
+            "backdrop": not self.floating,
+            "frames": self.frames,
+            "fps": self.fps,
+        }
+        return {key: value for key, value in options.items() if value is not None}

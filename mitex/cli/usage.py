@@ -1,0 +1,64 @@
+"""Command lines to command objects: tyro parses, its boxed complaints become one line."""
+
+from __future__ import annotations
+
+import inspect
+import io
+import re
+from collections.abc import Sequence
+from contextlib import redirect_stderr
+from typing import Any
+
+from mitex.errors import MitexError
+
+
+class UsageError(MitexError):
+    """A command line that means nothing."""
+
+
+def parse(command: type, words: Sequence[str], program: str) -> Any:
+    """An instance of the dataclass `command`, filled from the words; None after `--help`, which is printed.
+
+    The class's docstring is the text of its help, as it stands.
+
+    Raises:
+        UsageError: The words do not fit the command.
+    """
+    import tyro
+
+    complaint = io.StringIO()
+    try:
+        with redirect_stderr(complaint):
+            return tyro.cli(
+                command,
+                prog=program,
+                description=inspect.cleandoc(command.__doc__ or ""),
+                args=list(words),
+                config=(tyro.conf.FlagCreatePairsOff,),
+            )
+    except SystemExit as e:
+        if e.code in (0, None):
+            return None
+        raise UsageError(one_line(complaint.getvalue()), f"see `{program} --help`") from e
+
+
+def one_line(complaint: str) -> str:
+    """What tyro says in a box (of Unicode or ASCII strokes), as a phrase; any wording gives one line."""
+    lines = [line for line in re.sub(r"\x1b\[[0-9;]*m", "", complaint).splitlines() if line.strip()]
+    title = lines[0].strip("╭─╮ ") if lines else ""
+    body: list[str] = []
+    for line in lines[1:]:
+        if not line.strip("│╰╯─- "):  # a rule; what follows the second one is an explanation
+            if body:
+                break
+            continue
+        body.append(line[2:].rstrip("│ "))
+    if title == "Required options":
+        # Names are indented by four, their explanations by more.
+        names = [line.split()[0] for line in body if re.match(r" {4}\S", line)]
+        return f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} missing"
+    text = " ".join(" ".join(body).split("Got errors:")[0].split()).rstrip(".")
+    bad_value = re.match(r"Error parsing (\S+?):.*?('[^']*')\]?$", text)
+    if bad_value:
+        return f"{bad_value[1]} cannot be {bad_value[2]}"
+    return text[:1].lower() + text[1:] or "this command line is not understood"

@@ -1,0 +1,82 @@
+"""The appearance loss: rendered views against the exemplar's pictures (MeshNCA, equation 6)."""
+
+from __future__ import annotations
+
+import torch
+
+from mitex.features import Vgg16
+from mitex.losses import channel_transport, decorrelate, moment_distance, relaxed_transport
+from mitex.methods.nca.config import NcaConfig
+from mitex.methods.nca.targets import CYCLE, Targets
+
+
+class Appearance:
+    """Compares views with pictures of the exemplar, at random places of each feature layer.
+
+    Attributes:
+        channels: the state's channels that views must have, in this order: those that any picture shows.
+    """
+
+    def __init__(self, config: NcaConfig, targets: Targets, network: Vgg16) -> None:
+        self.config, self.targets, self.network = config, targets, network
+        shown = sorted({channel for p in targets.pictures for channel in p.channels})
+        self.channels = torch.tensor(shown, device=network.device)
+        table = [[shown.index(channel) for channel in p.channels] for p in targets.pictures]
+        self._table = torch.tensor(table, device=network.device)
+
+    def __call__(self, views: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
+        """Loss of views (K, H, W, C) of the `channels` as map values; scalar.
+
+        Averaged over views, and over maps where each view shows all of them; summed over layers.
+        """
+        view, which = self._assignment(len(views), generator)
+        columns = self._table[which][:, None, None, :].expand(-1, *views.shape[1:3], -1)
+        images = views[view].gather(3, columns)
+        return self.config.appearance_weight * self._compare(images, which, generator)
+
+    def _assignment(self, count: int, generator: torch.Generator) -> tuple[torch.Tensor, torch.Tensor]:
+        """Pairs (view, picture) to compare."""
+        kinds = [p.kind for p in self.targets.pictures]
+        if not self.config.blend:
+            return torch.arange(count).repeat_interleave(len(kinds)), torch.arange(len(kinds)).repeat(count)
+        cycle = [kind for kind in CYCLE if kind in kinds]
+        if count < len(cycle):  # too few views for all kinds: other kinds in every step
+            first = int(torch.randint(len(cycle), (), generator=generator))
+            cycle = cycle[first:] + cycle[:first]
+        which = []
+        for k in range(count):
+            choices = [i for i, kind in enumerate(kinds) if kind == cycle[k % len(cycle)]]
+            which.append(choices[int(torch.randint(len(choices), (), generator=generator))])
+        return torch.arange(count), torch.tensor(which)
+
+    def _compare(self, images: torch.Tensor, which: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
+        config, (count, height, width) = self.config, images.shape[:3]
+        ours, theirs = {}, {}
+        for layer in config.layers:
+            h, w = self.network.extent(layer, height, width)
+            n = min(h * w, self.targets.size(layer), config.samples)
+            ours[layer] = _places(count, h * w, n, generator).to(images.device)
+            theirs[layer] = _places(count, self.targets.size(layer), n, generator).to(images.device)
+        total = config.colour_weight * self._colours(images, which, generator)
+        low = self.network.dtype == torch.bfloat16
+        for layer, a in self.network.samples(images, ours).items():
+            b = self.targets.sample(layer, which, theirs[layer])
+            total = total + relaxed_transport(a, b, low_precision=low).mean()
+            total = total + config.moment_weight * moment_distance(a, b, low).mean()
+        return total
+
+    def _colours(self, images: torch.Tensor, which: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
+        count, pixels = len(images), images.shape[1] * images.shape[2]
+        n = min(pixels, self.targets.size("colour"), self.config.samples)
+        here = _places(count, pixels, n, generator).to(images.device)
+        there = _places(count, self.targets.size("colour"), n, generator).to(images.device)
+        a = images.flatten(1, 2).gather(1, here[:, :, None].expand(-1, -1, 3))
+        b = self.targets.sample("colour", which, there)
+        low = self.network.dtype == torch.bfloat16
+        cost = relaxed_transport(decorrelate(a), decorrelate(b), euclidean=True, low_precision=low).mean()
+        return cost + channel_transport(a, b).mean() if self.config.colour_histogram else cost
+
+
+def _places(count: int, size: int, n: int, generator: torch.Generator) -> torch.Tensor:
+    """(count, n) indices below `size`, without repetition within a row."""
+    return torch.stack([torch.randperm(size, generator=generator)[:n] for _ in range(count)])

@@ -1,0 +1,155 @@
+"""Model files: the weights of a cell rule and what it was trained on, as safetensors.
+
+Both our own files (metadata says what the maps are) and the authors' weights (tensors fc1 and fc2, converted
+to safetensors; all five maps are assumed) can be read, and a run folder stands for its newest model.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+
+from mitex.errors import CheckpointError
+from mitex.methods.nca.model import MeshNCA
+from mitex.methods.nca.perception import HARMONICS
+from mitex.methods.nca.targets import STATE_CHANNELS
+from mitex.paths import atomic_write
+from mitex.training import checkpoint
+
+NAME = "model.safetensors"
+FORMAT = "mitex-nca-1"
+BUNDLED = Path(__file__).parents[2] / "data" / "models"
+PARAMETERS = ("fc1.weight", "fc1.bias", "fc2.weight", "fc2.bias")
+
+
+def save(path: Path, model: MeshNCA, about: dict[str, Any]) -> Path:
+    """Writes weights and `about` (JSON values; `maps` and `name` at least).
+
+    Raises:
+        OutputError: the place is not writable.
+    """
+    tensors = {name: value.detach().cpu().contiguous() for name, value in model.state_dict().items()}
+    with atomic_write(path) as temporary:
+        metadata = {"format": FORMAT, "degree": str(model.degree), "about": json.dumps(about)}
+        save_file(tensors, temporary, metadata)
+    return path
+
+
+def load(source: str | Path) -> tuple[MeshNCA, dict[str, Any]]:
+    """Reads a model by file, run folder or bundled name.
+
+    Returns:
+        The model, and what is known about it; `maps` and `name` are always there.
+
+    Raises:
+        CheckpointError: nothing there, not a model, or weights of an impossible shape.
+    """
+    path = _find(source)
+    if path.name in (checkpoint.NAME, checkpoint.PREVIOUS):
+        state = checkpoint.load(path.parent)
+        tensors = {k[6:]: v for k, v in state.task.items() if k.startswith("model.")}
+        maps = state.metadata.get("maps", "albedo").split(",")
+        about: dict[str, Any] = {"name": state.metadata.get("exemplar", path.parent.name), "maps": maps}
+        about |= {"steps": state.step, "preset": state.config.get("preset")}
+        model = _model(tensors, state.config.get("degree"), path)
+        return model, about | {"maps": _maps(maps, model, path)}
+    try:
+        with safe_open(path, "pt") as file:
+            metadata = file.metadata() or {}
+            tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 (not a mapping)
+    except (SafetensorError, OSError, ValueError) as e:
+        raise CheckpointError(
+            f"'{path}' is not a model ({e})", "give a model.safetensors or a run folder"
+        ) from e
+    model = _model(tensors, metadata.get("degree"), path)
+    return model, _about(metadata, model, path)
+
+
+def bundled() -> dict[str, Path]:
+    """The models that ship with Mitex: name -> file."""
+    return {path.stem: path for path in sorted(BUNDLED.glob("*.safetensors"))}
+
+
+def _find(source: str | Path) -> Path:
+    path = Path(source).expanduser()
+    try:
+        if path.is_dir():
+            found = [path / name for name in (NAME, checkpoint.NAME) if (path / name).is_file()]
+            if found:  # a resumed run's checkpoint is newer than the model of its first part
+                return max(found, key=lambda file: file.stat().st_mtime_ns)
+            if (path / checkpoint.PREVIOUS).is_file():
+                return path / checkpoint.PREVIOUS
+            raise CheckpointError(
+                f"there is no model in '{source}'", "name a run folder that has a checkpoint"
+            )
+        if path.is_file():
+            return path
+    except (OSError, ValueError) as e:
+        raise CheckpointError(f"cannot read '{source}' ({e})", "name a model, a file or a run folder") from e
+    known = bundled()
+    if str(source) in known:
+        return known[str(source)]
+    close = difflib.get_close_matches(str(source), known, 1)
+    remedy = f"did you mean {close[0]}?" if close else f"use a path, or one of {', '.join(known) or 'none'}"
+    raise CheckpointError(f"there is no model '{source}'", remedy)
+
+
+def _about(metadata: dict[str, str], model: MeshNCA, path: Path) -> dict[str, Any]:
+    """What a file says about itself; without any maps they are the authors' five."""
+    try:
+        about = json.loads(metadata.get("about", "{}"))
+        maps = sorted(about.get("maps", STATE_CHANNELS))
+    except (ValueError, TypeError, AttributeError) as e:
+        raise CheckpointError(f"the description in '{path}' is damaged ({e})", "save the model again") from e
+    return {"name": path.stem} | about | {"maps": _maps(maps, model, path)}
+
+
+def _maps(maps: list[str], model: MeshNCA, path: Path) -> list[str]:
+    """The names, once it is sure that the model's state shows these maps."""
+    unknown = [name for name in maps if name not in STATE_CHANNELS]
+    if unknown or not maps:
+        raise CheckpointError(f"'{path}' has unknown maps {unknown}", "it was written by another version")
+    needed = 1 + max(channel for name in maps for channel in STATE_CHANNELS[name])
+    if needed > model.channels:
+        raise CheckpointError(
+            f"the model in '{path}' has {model.channels} channels, its maps need {needed}", "train it again"
+        )
+    return maps
+
+
+def _model(tensors: dict[str, torch.Tensor], degree: object, path: Path) -> MeshNCA:
+    """The model whose shape the tensors have; `degree` of the harmonics if the file tells."""
+    problem = CheckpointError(
+        f"'{path}' does not hold a MeshNCA model", "give a file written by mitex fit nca"
+    )
+    if set(tensors) != set(PARAMETERS) or any(tensors[k].ndim != 2 - k.endswith("bias") for k in PARAMETERS):
+        raise problem
+    (channels, hidden), inputs = tensors["fc2.weight"].shape, tensors["fc1.weight"].shape[1]
+    known = _degree(degree, channels, inputs)
+    if known is None or not channels:
+        raise problem
+    condition = inputs - (HARMONICS[known] + 1) * channels
+    model = MeshNCA(channels, hidden, condition, known)
+    try:
+        model.load_state_dict({name: value.float() for name, value in tensors.items()})
+    except RuntimeError as e:
+        raise problem from e
+    if not all(torch.isfinite(value).all() for value in model.state_dict().values()):
+        raise CheckpointError(f"the weights in '{path}' are not finite", "train the model again")
+    return model
+
+
+def _degree(told: object, channels: int, inputs: int) -> int | None:
+    """Of the harmonics: what the file tells, else one that leaves no condition, else the authors' 1."""
+    widths = {degree: (count + 1) * channels for degree, count in HARMONICS.items()}
+    exact = [degree for degree, width in widths.items() if width == inputs]
+    fitting = [degree for degree, width in widths.items() if width <= inputs]
+    if told is not None:
+        return next((degree for degree in fitting if str(degree) == str(told)), None)
+    return next(iter(exact or [degree for degree in (1, 0) if degree in fitting]), None)

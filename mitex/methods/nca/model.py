@@ -1,0 +1,176 @@
+"""Mesh neural cellular automata: the model (Pajouheshgar et al. 2024, section 3.2)."""
+
+from __future__ import annotations
+
+import torch
+import torch.nn.functional as F
+from torch import nn
+
+from mitex.errors import ConfigError
+from mitex.mesh import Mesh
+from mitex.methods.nca import dense
+from mitex.methods.nca.perception import HARMONICS, Perception, perception
+
+FIRE_RATE = 0.5  # probability that a cell updates in a step (equation 3)
+
+
+class MeshNCA(nn.Module):
+    """The cell rule: perception, two-layer network, stochastic residual update.
+
+    `fc1` and `fc2` have the layout of the authors' public weights: `fc1` reads the blocks Laplacian, y, z, x
+    (of `channels` each), the state, then the condition.
+
+    Args:
+        channels: C, of a cell's state.
+        hidden: width of the hidden layer.
+        condition: d, of the condition vector h of a cell; 0 for none.
+        degree: highest degree of the spherical harmonics: 0, 1 (the paper) or 2.
+    """
+
+    def __init__(self, channels: int = 16, hidden: int = 128, condition: int = 0, degree: int = 1) -> None:
+        super().__init__()
+        if degree not in HARMONICS:
+            raise ConfigError(f"spherical harmonics of degree {degree}", "use 0, 1 or 2")
+        self.channels, self.hidden, self.condition, self.degree = channels, hidden, condition, degree
+        self.fc1 = nn.Linear((HARMONICS[degree] + 1) * channels + condition, hidden)
+        self.fc2 = nn.Linear(hidden, channels)
+
+    def initialise(self, generator: torch.Generator, gain: float = 1.2) -> None:
+        """The authors' initial weights: Xavier normal, gains 0.2 and `gain`, no bias in the last layer."""
+        nn.init.xavier_normal_(self.fc1.weight, gain=0.2, generator=generator)
+        nn.init.xavier_normal_(self.fc2.weight, gain=gain, generator=generator)
+        bound = self.fc1.in_features**-0.5
+        nn.init.uniform_(self.fc1.bias, -bound, bound, generator=generator)
+        nn.init.zeros_(self.fc2.bias)
+
+    def seed(self, mesh: Mesh | Perception, batch: int = 1) -> torch.Tensor:
+        """The initial state: zeros (B, V, C)."""
+        vertices = mesh.vertices if isinstance(mesh, Perception) else len(mesh.vertices)
+        return self.fc1.weight.new_zeros(batch, vertices, self.channels)
+
+    def update(
+        self, state: torch.Tensor, mesh: Mesh | Perception, condition: torch.Tensor | None = None
+    ) -> torch.Tensor:
+        """What every cell would add to its state, (B, V, C): equation 3 without the mask (for grafting)."""
+        return self.step(state, mesh, None, condition) - state
+
+    def step(
+        self,
+        state: torch.Tensor,
+        mesh: Mesh | Perception,
+        mask: torch.Tensor | None = None,
+        condition: torch.Tensor | None = None,
+    ) -> torch.Tensor:
+        """One step of the automaton (equations 1 to 3).
+
+        Args:
+            state: (B, V, C) float32.
+            mesh: a mesh, or its perception operator (which may carry an orientation).
+            mask: which cells update, boolean (V,) or (B, V); None updates all.
+            condition: h, (V, d) or (B, V, d); required when the model has one.
+
+        Returns:
+            The next state (B, V, C), differentiable in state, parameters and condition.
+
+        Raises:
+            ConfigError: shapes that do not fit.
+        """
+        seen = mesh if isinstance(mesh, Perception) else perception(mesh, self.degree, device=state.device)
+        self._check(state, seen, mask, condition)
+        rows = None
+        if mask is not None:
+            rows = mask.expand(state.shape[:2]).reshape(-1).nonzero().squeeze(1)
+        if condition is not None:
+            condition = condition.expand(*state.shape[:2], self.condition)
+        weights = (self.fc1.weight, self.fc1.bias, self.fc2.weight, self.fc2.bias)
+        return _Step.apply(state, condition, *weights, seen, rows)
+
+    def evolve(
+        self,
+        state: torch.Tensor,
+        mesh: Mesh | Perception,
+        steps: int,
+        generator: torch.Generator,
+        condition: torch.Tensor | None = None,
+    ) -> torch.Tensor:
+        """`steps` steps, each with a fresh random mask drawn on the CPU, so that devices agree."""
+        for _ in range(steps):
+            mask = torch.rand(state.shape[:2], generator=generator) < FIRE_RATE
+            state = self.step(state, mesh, mask.to(state.device), condition)
+        return state
+
+    def _check(
+        self, state: torch.Tensor, seen: Perception, mask: torch.Tensor | None, condition: torch.Tensor | None
+    ) -> None:
+        if state.ndim != 3 or state.shape[1:] != (seen.vertices, self.channels):
+            expected = f"(B, {seen.vertices}, {self.channels})"
+            raise ConfigError(f"a state of shape {tuple(state.shape)}", f"give {expected}")
+        if seen.blocks != HARMONICS[self.degree] + 1:
+            raise ConfigError(
+                "the perception's degree is not the model's", f"build it with degree={self.degree}"
+            )
+        shapes = ((seen.vertices,), tuple(state.shape[:2]))
+        if mask is not None and (mask.dtype != torch.bool or mask.shape not in shapes):
+            raise ConfigError(
+                f"a mask of {mask.dtype}, shape {tuple(mask.shape)}", "give booleans (V,) or (B, V)"
+            )
+        given = 0 if condition is None else condition.shape[-1]
+        if given != self.condition:
+            raise ConfigError(f"a condition of width {given}", f"this model takes {self.condition}")
+        if condition is not None and condition.shape[:-1] not in shapes:
+            raise ConfigError(f"a condition of shape {tuple(condition.shape)}", "give (V, d) or (B, V, d)")
+
+
+class _Step(torch.autograd.Function):
+    """state + fc2(relu(fc1([perception(state), condition]))) in the chosen rows, backward written out.
+
+    Only the cells that update go through the network, half of them with the usual mask.
+    """
+
+    @staticmethod
+    def forward(ctx, state, condition, w1, b1, w2, b2, seen: Perception, rows):
+        batch, vertices, channels = state.shape
+        inputs = seen(state).view(batch * vertices, -1)
+        if condition is not None:
+            inputs = torch.cat([inputs, condition.reshape(batch * vertices, -1)], 1)
+        if rows is not None:
+            inputs = inputs.index_select(0, F.pad(rows, (0, dense.padded(len(rows)) - len(rows))))
+        hidden = dense.product(inputs, w1, b1).relu_()
+        change = dense.product(hidden, w2, b2)
+        ctx.save_for_backward(inputs, hidden, w1, w2, rows)
+        ctx.seen, ctx.shape = seen, state.shape
+        if rows is None:
+            return state + change.view_as(state)
+        out = state.reshape(-1, channels).clone().index_add_(0, rows, change[: len(rows)])
+        return out.view(batch, vertices, channels)
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable
+    def backward(ctx, gradient):
+        inputs, hidden, w1, w2, rows = ctx.saved_tensors
+        batch, vertices, channels = ctx.shape
+        change = gradient.reshape(-1, channels)
+        if rows is not None:
+            change = F.pad(change.index_select(0, rows), (0, 0, 0, len(inputs) - len(rows)))
+        behind = dense.product(change, w2.t())
+        torch.ops.aten.threshold_backward.grad_input(behind, hidden, 0, grad_input=behind)
+        states = condition = None
+        if any(ctx.needs_input_grad[:2]):  # not in the first step from the pool
+            into = dense.product(behind, w1.t())
+            if rows is not None:
+                whole = into.new_zeros(batch * vertices, into.shape[1])
+                into = whole.index_copy_(0, rows, into[: len(rows)])
+            width = ctx.seen.blocks * channels
+            seen = into[:, :width].contiguous().view(batch, vertices, width)
+            states = gradient + ctx.seen.transposed(seen)
+            condition = into[:, width:].view(batch, vertices, -1) if into.shape[1] > width else None
+        return (
+            states,
+            condition,
+            dense.weight_gradient(behind, inputs),
+            behind.sum(0),
+            dense.weight_gradient(change, hidden),
+            change.sum(0),
+            None,
+            None,
+        )

@@ -1,0 +1,177 @@
+"""The contract of `main`: exit codes, one line for every complaint, help, warnings, and a quick start."""
+
+import os
+import subprocess
+import sys
+import types
+import warnings
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import pytest
+
+from mitex.cli import entry, main
+from mitex.errors import ConfigError, MeshWarning
+from mitex.training.errors import Interrupted
+
+
+@pytest.fixture
+def command(monkeypatch):
+    """A command `mitex try` whose run is replaced by `command.run = ...`."""
+
+    @dataclass
+    class Try:
+        """Try something.
+
+        examples:
+          mitex try --count 3
+        """
+
+        count: int = 1
+        """How many."""
+
+        action: ClassVar[Any] = None
+
+        def run(self):
+            return Try.action(self)
+
+    module = types.ModuleType("mitex.cli.try_it")
+    module.__dict__["Try"] = Try
+    monkeypatch.setitem(sys.modules, "mitex.cli.try_it", module)
+    monkeypatch.setitem(entry.COMMANDS, "try", ("try_it:Try", "try something"))
+    return Try
+
+
+def fail(error):
+    def action(_):
+        raise error
+
+    return action
+
+
+class TestExitCodes:
+    def test_done(self, command):
+        command.action = lambda self: None
+        assert main(["try"]) == 0
+
+    def test_a_command_may_say_its_own(self, command):
+        command.action = lambda self: 1
+        assert main(["try"]) == 1
+
+    def test_errors_are_one_line_even_with_line_breaks(self, command, capsys):
+        command.action = fail(ConfigError("this\nis  wrong", "do\nthat"))
+        assert main(["try"]) == 2
+        assert capsys.readouterr() == ("", "error: this is wrong; do that\n")
+
+    def test_interrupted(self, command, capsys, tmp_path):
+        command.action = fail(Interrupted(tmp_path / "c", 7))
+        assert main(["try"]) == 130
+        assert "step 7" in capsys.readouterr().err
+        command.action = fail(KeyboardInterrupt())
+        assert main(["try"]) == 130
+        assert capsys.readouterr().err == "interrupted\n"
+
+    def test_a_bug_shows_itself(self, command):
+        command.action = fail(ZeroDivisionError("a bug"))
+        with pytest.raises(ZeroDivisionError):
+            main(["try"])
+
+    def test_in_a_process(self):
+        for words, code in ((["--version"], 0), (["bogus"], 2)):
+            done = subprocess.run([sys.executable, "-m", "mitex", *words], capture_output=True, text=True)
+            assert done.returncode == code
+            assert ("error: " in done.stderr) == (code == 2)
+
+    def test_a_closed_pipe_is_no_error(self):
+        line = f"{sys.executable} -m mitex --help | true; exit ${{PIPESTATUS[0]}}"
+        done = subprocess.run(["bash", "-c", line], capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, "")
+
+
+class TestWarnings:
+    def test_ours_are_lines_and_others_unseen(self, command, capsys):
+        def action(_):
+            warnings.warn("the mesh has\na hole", MeshWarning, stacklevel=2)
+            warnings.warn("the mesh has\na hole", MeshWarning, stacklevel=2)
+            warnings.warn("noise of a library", UserWarning, stacklevel=2)
+
+        command.action = action
+        before = warnings.showwarning
+        assert main(["try"]) == 0
+        assert capsys.readouterr().err == "warning: the mesh has a hole\n" * 2
+        assert warnings.showwarning is before
+
+
+class TestHelp:
+    @pytest.mark.parametrize("name", entry.COMMANDS)
+    def test_every_command_has_examples_of_itself(self, name, capsys):
+        assert main([*name.split(), "--help"]) == 0
+        text = capsys.readouterr().out
+        examples = [line for line in text.split("examples:")[1].splitlines() if line.startswith("  ")]
+        assert examples[0].strip().startswith(f"mitex {name}") and "--help" in text
+
+    def test_overview_lists_every_command(self, capsys):
+        for words in (["--help"], ["-h"], ["help"]):
+            assert main(words) == 0
+            text = capsys.readouterr().out
+            assert all(f"  {name} " in text for name in entry.COMMANDS)
+
+    def test_group(self, capsys):
+        assert main(["fit", "--help"]) == 0
+        text = capsys.readouterr().out
+        assert "fit nca" in text and "render" not in text
+
+    def test_starts_without_heavy_imports(self):
+        """torch, Mitsuba and even NumPy stay out until a command runs."""
+        code = (
+            "import sys; from mitex.cli import main; main(['--help']); main(['apply', '--help']);"
+            "print({'torch', 'mitsuba', 'drjit', 'trimesh', 'scipy', 'numpy'} & set(sys.modules))"
+        )
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        assert done.stdout.splitlines()[-1] == "set()"
+
+
+class TestUsage:
+    @pytest.mark.parametrize(
+        ("words", "message"),
+        [
+            ([], "no command given; see `mitex --help`"),
+            (["modles"], "there is no command 'modles'; try `mitex models`"),
+            (["xyzzy"], "there is no command 'xyzzy'; see `mitex --help`"),
+            (["fit"], "`mitex fit` needs a method; try `mitex fit nca --help`"),
+            (["fit", "nac"], "there is no command 'fit nac'; try `mitex fit nca`"),
+            (["fit", "nca"], "--exemplar is missing; see `mitex fit nca --help`"),
+            (["apply"], "RUN|MODEL and --mesh and --out are missing; see `mitex apply --help`"),
+            (["try", "--count", "x"], "--count cannot be 'x'; see `mitex try --help`"),
+            (
+                ["try", "--count"],
+                "missing value for argument '--count'. Expected 1 values; see `mitex try --help`",
+            ),
+            (["try", "--bogus"], "unrecognized options: --bogus; see `mitex try --help`"),
+            (["try", "more"], "unrecognized options: more; see `mitex try --help`"),
+        ],
+    )
+    def test_complaints(self, command, words, message, capsys):
+        assert main(words) == 2
+        assert capsys.readouterr() == ("", f"error: {message}\n")
+
+    @pytest.mark.parametrize("encoding", ["ascii", "utf-8"])
+    def test_on_any_terminal(self, encoding):
+        """tyro draws its boxes with what the terminal has."""
+        done = subprocess.run(
+            [sys.executable, "-m", "mitex", "render"],
+            capture_output=True,
+            text=True,
+            env=os.environ | {"PYTHONIOENCODING": encoding},
+        )
+        message = "error: ASSET and --out are missing; see `mitex render --help`\n"
+        assert (done.returncode, done.stderr) == (2, message)
+
+    def test_unknown_wording_still_gives_one_line(self):
+        from mitex.cli.usage import one_line
+
+        assert (
+            one_line("╭─ Odd ──╮\n│ \x1b[31mSomething\x1b[0m\n│   new. │\n│ ────── │\n│ help   │\n╰───╯")
+            == "something new"
+        )
+        assert one_line("") == "this command line is not understood"

@@ -1,0 +1,181 @@
+"""The commands doing their work, in small: fit, apply, render, models, demo."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from mitex.asset import Asset
+from mitex.atlas import usable_uv
+from mitex.cli import demo, main
+from mitex.cli.layout import with_layout
+from mitex.cli.models import listing
+from mitex.exemplar import MAPS
+from mitex.exemplar import names as exemplar_names
+from mitex.images import read_image
+from mitex.mesh import embedded_names, subdivide_loop, torus
+from tests.cli import bad_files
+
+TINY = [
+    *(
+        "frequency=4",
+        "pool=2",
+        "view_count=1",
+        "resolution=32",
+        "target_size=32",
+        "exemplar_size=32",
+        "hidden=8",
+    ),
+    *("min_steps=2", "max_steps=2", "checkpoint_every=1", "preview_every=0", "layers=relu1_1"),
+]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    bad_files.text(tmp_path / "cube.obj", bad_files.CUBE)
+    return tmp_path
+
+
+def test_fit_apply_render(folder, capsys):
+    """From a name to a movie; every command prints the path that it wrote."""
+
+    def run(*words):
+        assert main(words) == 0
+        return capsys.readouterr().out.splitlines()[-1]
+
+    fit = ["fit", "nca", "--exemplar", "lava", "--seed", "3", "--quiet", "--set", *TINY]
+    assert run(*fit, "--steps", "2") == "runs/lava"
+    metrics = (folder / "runs/lava/metrics.jsonl").read_text().splitlines()
+    assert [json.loads(line)["step"] for line in metrics] == [1, 2]
+    assert "seed = 3" in (folder / "runs/lava/config.toml").read_text()
+    assert run(*fit, "--steps", "3", "--resume") == "runs/lava"
+    assert len((folder / "runs/lava/metrics.jsonl").read_text().splitlines()) == 3
+    assert run(*fit, "--steps", "1", "--init", "runs/lava", "--out", "child") == "child"
+
+    apply = ["apply", "runs/lava", "--mesh", "cube.obj", "--subdivide", "2", "--steps", "3", "--seed", "1"]
+    assert run(*apply, "--out", "a.glb", "--resolution", "64") == "a.glb"
+    baked = Asset.load("a.glb")
+    assert set(baked.vertex_maps) == set(MAPS) and baked.atlas is not None
+    assert run(*apply, "--out", "new/b.glb", "--vertex-colors", "--orientation", "-90") == "new/b.glb"
+    assert Asset.load("new/b.glb").atlas is None
+    assert run(*apply, "--out", "c.ply") == "c.ply"
+    assert len(Asset.load("c.ply").mesh.faces) == 12 * 16
+
+    render = ["render", "a.glb", "--size", "16", "--spp", "1"]
+    assert run(*render, "--out", "a.png", "--azimuth", "-30", "--elevation", "40") == "a.png"
+    assert read_image("a.png").shape == (16, 16, 3)
+    assert run(*render, "--out", "a.gif", "--frames", "3", "--floating", "--elevation", "-10") == "a.gif"
+    assert getattr(Image.open("a.gif"), "n_frames", 1) == 3
+
+
+def test_options_reach_the_library(folder, monkeypatch, capsys):
+    """Degrees become radians; what is not given keeps the library's default."""
+    seen = {}
+    bad_files.model(folder / "m.safetensors")
+    from mitex.methods.nca import NcaTexture
+
+    real = NcaTexture.apply
+    monkeypatch.setattr(NcaTexture, "apply", lambda self, mesh, **o: seen.update(o) or real(self, mesh, **o))
+    words = (
+        "apply m.safetensors --mesh cube.obj --out a.ply --subdivide 0 --steps 1 --orientation 90 --seed 5"
+    )
+    assert main(words.split()) == 0
+    assert seen == {"seed": 5, "steps": 1, "subdivide": 0, "orientation": np.pi / 2, "scale": 1.0}
+
+    monkeypatch.setattr(
+        "mitex.render.picture.still", lambda asset, **o: seen.update(o) or np.zeros((4, 4, 3))
+    )
+    seen.clear()
+    assert main(["render", "a.ply", "--out", "a.png", "--azimuth", "180", "--size", "32"]) == 0
+    assert seen == {"resolution": 32, "azimuth": np.pi, "displacement": 0.0, "backdrop": True}
+
+
+def test_models(folder, monkeypatch, capsys):
+    monkeypatch.setattr("mitex.methods.nca.files.BUNDLED", folder)
+    bad_files.model(folder / "moss.safetensors")
+    (folder / "moss.png").touch()
+    bad_files.model(folder / "rust.safetensors")
+    assert main(["models"]) == 0
+    text = capsys.readouterr().out
+    assert "moss" in text and "rust" in text and "albedo" in text and str(folder / "moss.png") in text
+    assert main(["models", "--json"]) == 0
+    models = json.loads(capsys.readouterr().out)
+    assert [model["name"] for model in models] == ["moss", "rust"]
+    assert models[0]["thumbnail"] == str(folder / "moss.png") and models[1]["thumbnail"] is None
+    assert models[0]["path"] == str(folder / "moss.safetensors") and models[0]["maps"] == ["albedo"]
+
+
+def test_bundled_models_are_listed_with_how_they_were_made():
+    for model in listing():
+        assert {"name", "path", "thumbnail", "maps", "preset", "steps", "seconds", "loss"} <= set(model)
+
+
+def test_what_the_demo_shows_is_there():
+    assert demo.EXEMPLAR in exemplar_names() and set(demo.MESHES) <= set(embedded_names())
+
+
+def test_layout_comes_before_subdivision(folder):
+    """Own UVs are kept where they are usable, and a layout survives the subdivision."""
+    mesh = torus(8, 6)
+    laid = with_layout(mesh, 128)
+    assert laid.uv is not None and with_layout(laid, 128) is laid
+    overlapping = replace(mesh, uv=np.zeros_like(laid.uv))
+    for result in (with_layout(overlapping, 128), subdivide_loop(laid, 2)):
+        assert result.uv is not None and usable_uv(result, result.uv)
+
+
+def test_demo(folder, monkeypatch, capsys):
+    """All of it, at toy size; the second call goes on from the first."""
+    from mitex.methods import nca
+
+    fit, grow, bake = nca.fit, nca.NcaTexture.apply, Asset.baked
+
+    def tiny_fit(*arguments, overrides, **options):
+        return fit(*arguments, overrides=[*overrides, *TINY], **options, quiet=True)
+
+    monkeypatch.setattr(nca, "fit", tiny_fit)
+    monkeypatch.setattr(nca.NcaTexture, "apply", lambda *a, **o: grow(*a, **o, subdivide=1, steps=2))
+    monkeypatch.setattr(Asset, "baked", lambda self, resolution: bake(self, 64))
+    monkeypatch.setattr(demo, "_parent", lambda: None)
+    monkeypatch.setattr(demo, "MESHES", ("cube.obj",))
+    monkeypatch.setattr(demo, "SIZE", 16)
+    monkeypatch.setattr(demo, "SAMPLES", 1)
+    for start in ("nothing", "the run in the folder"):
+        assert main(["demo", "--out", "shown", "--steps", "2"]) == 0
+        assert f"starting from {start}" in capsys.readouterr().out
+    made = {path.name for path in (folder / "shown").iterdir()}
+    assert made == {"run", "cube.glb", "cube.png", "demo.png"}
+    assert read_image(folder / "shown" / "demo.png").shape == (16, 32, 3)
+
+
+@pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_fit(folder, kind):
+    """Ctrl-C ends a real run with code 130, a checkpoint, and no traceback."""
+    words = ["fit", "nca", "--exemplar", "lava", "--steps", "100000", "--quiet", "--set", *TINY]
+    words[words.index("checkpoint_every=1")] = "checkpoint_every=1000"
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2]), "OMP_NUM_THREADS": "1"}
+    running = subprocess.Popen(
+        [sys.executable, "-m", "mitex", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment,
+    )
+    metrics = folder / "runs" / "lava" / "metrics.jsonl"
+    while running.poll() is None and not (metrics.exists() and metrics.stat().st_size):
+        time.sleep(0.05)
+    running.send_signal(kind)
+    out, err = running.communicate(timeout=120)
+    assert running.returncode == 130, err
+    assert err.startswith("interrupted after step") and err.count("\n") == 1 and not out
+    assert (folder / "runs" / "lava" / "checkpoint.safetensors").exists()
+    assert not list((folder / "runs" / "lava").glob("*.tmp*"))

@@ -1,0 +1,145 @@
+"""The appearance loss against its parts, put together by hand."""
+
+import pytest
+import torch
+
+from benchmarks import naive
+from mitex.exemplar import Exemplar
+from mitex.features import Vgg16
+from mitex.losses import decorrelate
+from mitex.methods.nca.appearance import Appearance, _places
+from mitex.methods.nca.targets import Targets, pictures_of
+from tests.methods.nca.tiny import config
+
+MAPS = ["albedo", "height", "normal", "roughness"]
+
+
+@pytest.fixture(scope="module")
+def network():
+    return Vgg16(precision="float32")
+
+
+@pytest.fixture(scope="module")
+def exemplar():
+    maps = Exemplar.load("scales").resized(32).maps
+    return Exemplar({name: maps[name] for name in MAPS})
+
+
+def _appearance(exemplar, network, settings, maps=None):
+    shown = Exemplar({name: exemplar.maps[name] for name in maps}) if maps else exemplar
+    pictures = pictures_of(sorted(shown.maps), settings.blend, 0)
+    return Appearance(settings, Targets(shown, pictures, network, settings.layers), network)
+
+
+def _views(count, channels, seed=0):
+    return torch.rand(count, 32, 32, channels, generator=torch.Generator().manual_seed(seed))
+
+
+def _expected(images, pictures, settings):
+    """Equation 6 with all positions of both sides, so that sampling draws nothing."""
+    tensors = naive.vgg_weights()
+    scale = _scale()
+    total = torch.zeros(())
+    ours, theirs = (naive.vgg(x, tensors, "average", scale) for x in (images, pictures))
+    for layer in settings.layers:
+        a, b = ours[layer].flatten(1, 2), theirs[layer].flatten(1, 2)
+        moments = settings.moment_weight * naive.moment_distance(a, b)
+        total = total + (naive.relaxed_transport(a, b) + moments).mean()
+    a, b = images.flatten(1, 2), pictures.flatten(1, 2)
+    colours = naive.relaxed_transport(decorrelate(a), decorrelate(b), euclidean=True)
+    if settings.colour_histogram:
+        colours = colours + (a.sort(1).values - b.sort(1).values).abs().mean((1, 2))
+    return settings.appearance_weight * (total + settings.colour_weight * colours.mean())
+
+
+def _scale():
+    from mitex.features.vgg import MEAN_ACTIVATION
+
+    return MEAN_ACTIVATION["average"]
+
+
+@pytest.mark.parametrize("preset", ["patch", "paper"])
+def test_loss_of_an_albedo(exemplar, network, preset):
+    settings = config("samples=4096", "views=patch", preset=preset)
+    appearance = _appearance(exemplar, network, settings, ["albedo"])
+    assert appearance.channels.tolist() == [0, 1, 2]
+    views = _views(3, 3)
+    found = appearance(views, torch.Generator().manual_seed(0))
+    expected = _expected(views, appearance.targets.images.expand(3, -1, -1, -1), settings)
+    assert found.item() == pytest.approx(expected.item(), rel=1e-4)
+
+
+def test_every_view_shows_every_map_in_the_paper(exemplar, network):
+    settings = config("samples=4096", preset="paper")
+    appearance = _appearance(exemplar, network, settings)
+    assert appearance.channels.tolist() == [0, 1, 2, 6, 7, 8, 9, 10]
+    views = _views(2, 8)
+    # Columns of the views: albedo 0-2, height 3, normal 4-6, roughness 7.
+    columns = ([0, 1, 2], [3, 3, 3], [4, 5, 6], [7, 7, 7])
+    images = torch.cat([views[..., c] for c in columns])
+    pictures = appearance.targets.images.repeat_interleave(2, 0)
+    found = appearance(views, torch.Generator().manual_seed(0))
+    assert found.item() == pytest.approx(_expected(images, pictures, settings).item(), rel=1e-4)
+
+
+def test_the_exemplar_itself_costs_nothing(exemplar, network):
+    """But for the clamp of colour distances."""
+    settings = config("samples=4096", "blend=false", "view_count=1")
+    appearance = _appearance(exemplar, network, settings)
+    maps = [torch.from_numpy(exemplar.maps[name]) for name in MAPS]
+    loss = appearance(torch.cat(maps, 2)[None], torch.Generator().manual_seed(0))
+    assert loss.item() < 1e-3
+
+
+def test_blended_views_share_the_kinds(exemplar, network):
+    appearance = _appearance(exemplar, network, config("blend=true"))
+    generator = torch.Generator().manual_seed(0)
+    kinds = [p.kind for p in appearance.targets.pictures]
+    mixes = set()
+    for _ in range(10):
+        view, which = appearance._assignment(8, generator)
+        assert view.tolist() == list(range(8))
+        shown = [kinds[i] for i in which.tolist()]
+        assert sorted(shown) == sorted(2 * ["albedo", "grey", "mix", "normal"])
+        mixes |= {i for i in which.tolist() if kinds[i] == "mix"}
+    assert len(mixes) > 6
+
+
+def test_a_few_blended_views_take_turns(exemplar, network):
+    """Fewer views than kinds: no kind is left out for ever."""
+    appearance = _appearance(exemplar, network, config("blend=true"))
+    generator = torch.Generator().manual_seed(0)
+    kinds = [p.kind for p in appearance.targets.pictures]
+    shown = {kinds[i] for _ in range(40) for i in appearance._assignment(1, generator)[1].tolist()}
+    assert shown == {"albedo", "grey", "mix", "normal"}
+
+
+@pytest.mark.parametrize("blend", ["true", "false"])
+def test_gradient_reaches_what_is_shown(exemplar, network, blend):
+    appearance = _appearance(exemplar, network, config(f"blend={blend}"))
+    views = _views(4, 8).requires_grad_()
+    appearance(views, torch.Generator().manual_seed(0)).backward()
+    assert views.grad is not None and views.grad.isfinite().all()
+    assert (views.grad.abs().amax((0, 1, 2)) > 0).all()
+
+
+def test_randomness_is_the_generators(exemplar, network):
+    appearance = _appearance(exemplar, network, config("samples=64"))
+    values = [appearance(_views(4, 8), torch.Generator().manual_seed(seed)).item() for seed in (3, 3, 4)]
+    assert values[0] == values[1] != values[2]
+
+
+def test_a_sample_estimates_the_whole(exemplar, network):
+    """Each side draws its own places, so a sample of the exemplar against itself costs a little."""
+    whole, part = (_appearance(exemplar, network, config(f"samples={n}", "blend=false")) for n in (4096, 512))
+    views = _views(4, 8)
+    everything = whole(views, torch.Generator().manual_seed(0)).item()
+    assert part(views, torch.Generator().manual_seed(0)).item() == pytest.approx(everything, rel=0.1)
+
+
+def test_places_do_not_repeat():
+    places = _places(3, 50, 40, torch.Generator().manual_seed(0))
+    assert places.shape == (3, 40)
+    for row in places.tolist():
+        assert len(set(row)) == 40 and min(row) >= 0 and max(row) < 50
+    assert not torch.equal(places[0], places[1])
