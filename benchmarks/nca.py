@@ -271,7 +271,8 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="small sizes: shows that it runs, not how fast")
     parser.add_argument("--repetitions", type=int, default=3, help="after one that warms up")
     options = parser.parse_args()
-    config = replace(PRESETS["paper"], steps=1, min_steps=STEPS, max_steps=STEPS)
+    # A small gain: with the preset's, states of an untrained rule grow without bound over the repetitions.
+    config = replace(PRESETS["paper"], steps=1, min_steps=STEPS, max_steps=STEPS, gain=0.1)
     if options.quick:
         config = replace(config, frequency=12, pool=4, view_count=2, resolution=64, target_size=64)
         options.repetitions = 1
