@@ -72,7 +72,7 @@ class Asset:
             return self.mesh.normals
         return vertex_detail(self.mesh, self.tangents, self.vertex_maps["normal"])
 
-    def baked(self, resolution: int = 1024, padding: int = 8) -> Asset:
+    def baked(self, resolution: int = 1024, padding: int | None = None) -> Asset:
         """The same asset with textures: every texel interpolates the vertex maps.
 
         Uses the mesh's own UVs if nothing in them overlaps, else unwraps it. Normals are interpolated in
@@ -80,12 +80,14 @@ class Asset:
 
         Args:
             resolution: side of the textures [texels], 16 to 8192.
-            padding: how far the charts are continued outwards [texels], so that no seam shows.
+            padding: how far the charts are continued outwards [texels], so that no seam shows; 8 if None,
+                less for textures under 64 texels.
 
         Raises:
             ConfigError: resolution or padding out of range.
         """
-        atlas = Atlas.build(self.mesh, resolution, padding)
+        wanted = max(min(8, resolution // 8), 1) if padding is None else padding
+        atlas = Atlas.build(self.mesh, resolution, wanted)
         faces = self.mesh.faces
         textures = {k: atlas.interpolate(v[faces]) for k, v in self.vertex_maps.items() if k != "normal"}
         if "normal" in self.vertex_maps:

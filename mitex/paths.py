@@ -61,6 +61,15 @@ def prepare_folder(path: str | os.PathLike[str]) -> Path:
     return target
 
 
+def missing_folders(path: str | os.PathLike[str]) -> list[Path]:
+    """Those of the folder `path` and its ancestors that do not exist, outermost first, absolute."""
+    folder, missing = _absolute(path), []
+    while not folder.exists():
+        missing.append(folder)
+        folder = folder.parent
+    return missing[::-1]
+
+
 @contextmanager
 def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yields a temporary path beside `path`; on success its file is fsynced and renamed to `path`.
@@ -77,7 +86,8 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
     temporary = target.with_name(f".{target.stem[:40]}.{secrets.token_hex(4)}.tmp{target.suffix}")
     made: list[Path] = []
     try:
-        made = _make_parents(target)
+        made = missing_folders(target.parent)
+        target.parent.mkdir(parents=True, exist_ok=True)
         temporary.touch()
         mode = temporary.stat().st_mode  # safetensors would leave it readable for its owner only
         temporary.unlink()
@@ -125,16 +135,6 @@ def _check_folder(folder: Path) -> None:
         raise OutputError(f"'{ancestor}' is a file, so nothing can be written below it", "name another place")
     if not os.access(ancestor, os.W_OK | os.X_OK):
         raise OutputError(f"folder '{ancestor}' is not writable", "name another place or change permissions")
-
-
-def _make_parents(target: Path) -> list[Path]:
-    missing = []
-    folder = target.parent
-    while not folder.exists():
-        missing.append(folder)
-        folder = folder.parent
-    target.parent.mkdir(parents=True, exist_ok=True)
-    return missing[::-1]
 
 
 def _sync(path: Path) -> None:

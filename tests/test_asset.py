@@ -79,6 +79,13 @@ def test_baked_maps_interpolate_the_vertices():
         np.testing.assert_allclose(asset.texture_maps["albedo"][row, column], expected, atol=1e-5)
 
 
+def test_small_textures_have_less_padding():
+    atlas = Asset(MESH, GREY).baked(32).atlas
+    assert atlas is not None and atlas.resolution == 32
+    with pytest.raises(ConfigError, match="padding"):
+        Asset(MESH, GREY).baked(32, padding=8)
+
+
 def test_baked_normals_decode_to_those_of_the_source():
     asset = wavy().baked(128)
     assert asset.atlas is not None and asset.texture_maps is not None

@@ -1,14 +1,15 @@
 """The atlas against point-in-triangle loops, linear functions and distances computed independently."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
 
-from mitex.atlas import Atlas, unwrap, usable_uv
+from mitex.atlas import Atlas, laid_out, unwrap, usable_uv
 from mitex.errors import ConfigError
-from mitex.mesh import Mesh, icosphere
+from mitex.mesh import Mesh, icosphere, subdivide_loop, torus
 
 
 def square(columns: int = 3) -> Mesh:
@@ -177,3 +178,13 @@ def test_degenerate_faces_and_slivers_are_survived():
 def test_sizes_out_of_range(resolution, padding):
     with pytest.raises(ConfigError, match="out of range"):
         Atlas.build(square(), resolution, padding)
+
+
+def test_layout_comes_before_subdivision():
+    """Own UVs are kept where they are usable, and a layout survives the subdivision."""
+    mesh = torus(8, 6)
+    laid = laid_out(mesh, 128)
+    assert laid.uv is not None and laid_out(laid, 128) is laid
+    overlapping = replace(mesh, uv=np.zeros_like(laid.uv))
+    for result in (laid_out(overlapping, 128), subdivide_loop(laid, 2)):
+        assert result.uv is not None and usable_uv(result, result.uv)

@@ -73,7 +73,6 @@ class Apply:
         suffix = out.suffix.lower()
         needless("--vertex-colors", out, self.vertex_colors and suffix in (".obj", ".exr"))
         needless("--resolution", out, self.resolution is not None and suffix == ".ply")
-        from mitex.cli.layout import with_layout
         from mitex.mesh import Mesh
 
         textures = suffix != ".ply" and not self.vertex_colors
@@ -83,12 +82,13 @@ class Apply:
 
         texture = NcaTexture.load(self.model)
         asset = texture.apply(
-            with_layout(mesh, resolution) if textures else mesh,
+            mesh,
             seed=self.seed,
             steps=self.steps,
             subdivide=subdivide,
             orientation=math.radians(self.orientation),
             scale=self.scale,
+            resolution=resolution if textures else None,
         )
         if textures:
             asset = asset.baked(resolution)

@@ -64,7 +64,6 @@ def demo(out: Path, seed: int, steps: int, say: Callable[[str], None] = lambda l
     Raises:
         MitexError: `out` is not usable, or Mitsuba is not.
     """
-    from mitex.cli.layout import with_layout
     from mitex.exemplar import Exemplar
     from mitex.mesh import Mesh
     from mitex.paths import prepare_output
@@ -76,7 +75,7 @@ def demo(out: Path, seed: int, steps: int, say: Callable[[str], None] = lambda l
     for source in MESHES:
         mesh = Mesh.load(source)
         say(f"{mesh.name}: growing the texture, baking, rendering")
-        asset = texture.apply(with_layout(mesh, RESOLUTION), seed=seed)
+        asset = texture.apply(mesh, seed=seed, resolution=RESOLUTION)
         picture = _picture(asset)
         pictures.append(picture)
         made += [

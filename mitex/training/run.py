@@ -11,7 +11,7 @@ from typing import Any
 
 from mitex import __version__
 from mitex.errors import CheckpointError, OutputError
-from mitex.paths import atomic_write, prepare_folder
+from mitex.paths import atomic_write, missing_folders, prepare_folder
 from mitex.training import checkpoint
 from mitex.training.metrics import Metrics
 from mitex.training.toml import to_toml
@@ -57,15 +57,20 @@ def opened(out: str | os.PathLike[str], resume: bool) -> Iterator[tuple[Path, Me
     If the run fails before its first step, what was made is removed again.
     """
     check(out, resume)
-    existed = Path(out).expanduser().exists()
+    made = missing_folders(out)
     folder = prepare_folder(out)
-    with Metrics(folder / METRICS) as metrics:
-        try:
+    fresh = [name for name in (METRICS, CONFIG) if not (folder / name).exists()]
+    try:
+        with Metrics(folder / METRICS) as metrics:
             yield folder, metrics
-        except BaseException:
-            if not resume and not (folder / METRICS).stat().st_size:
-                _discard(folder, existed)
-            raise
+    except BaseException:
+        with suppress(OSError):
+            if METRICS in fresh and not _size(folder / METRICS):  # no step was done
+                for name in fresh:
+                    (folder / name).unlink(missing_ok=True)
+                for empty in reversed(made):
+                    empty.rmdir()  # refuses when something else is in it
+        raise
 
 
 def prepare(folder: Path, config: Any, metadata: Mapping[str, str]) -> None:
@@ -95,9 +100,5 @@ def as_json(config: Any) -> dict[str, Any]:
     return json.loads(json.dumps(asdict(config)))
 
 
-def _discard(folder: Path, existed: bool) -> None:
-    with suppress(OSError):
-        for name in (METRICS, CONFIG):
-            (folder / name).unlink(missing_ok=True)
-        if not existed:
-            folder.rmdir()  # refuses when something else is in it
+def _size(path: Path) -> int:
+    return path.stat().st_size if path.exists() else 0

@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +13,12 @@ import pytest
 from PIL import Image
 
 from mitex.asset import Asset
-from mitex.atlas import usable_uv
 from mitex.cli import demo, main
-from mitex.cli.layout import with_layout
 from mitex.cli.models import listing
 from mitex.exemplar import MAPS
 from mitex.exemplar import names as exemplar_names
 from mitex.images import read_image
-from mitex.mesh import embedded_names, subdivide_loop, torus
+from mitex.mesh import embedded_names
 from tests.cli import bad_files
 
 TINY = [
@@ -89,7 +86,8 @@ def test_options_reach_the_library(folder, monkeypatch, capsys):
         "apply m.safetensors --mesh cube.obj --out a.ply --subdivide 0 --steps 1 --orientation 90 --seed 5"
     )
     assert main(words.split()) == 0
-    assert seen == {"seed": 5, "steps": 1, "subdivide": 0, "orientation": np.pi / 2, "scale": 1.0}
+    given = {"seed": 5, "steps": 1, "subdivide": 0, "orientation": np.pi / 2, "scale": 1.0}
+    assert seen == given | {"resolution": None}
 
     monkeypatch.setattr(
         "mitex.render.picture.still", lambda asset, **o: seen.update(o) or np.zeros((4, 4, 3))
@@ -121,16 +119,6 @@ def test_bundled_models_are_listed_with_how_they_were_made():
 
 def test_what_the_demo_shows_is_there():
     assert demo.EXEMPLAR in exemplar_names() and set(demo.MESHES) <= set(embedded_names())
-
-
-def test_layout_comes_before_subdivision(folder):
-    """Own UVs are kept where they are usable, and a layout survives the subdivision."""
-    mesh = torus(8, 6)
-    laid = with_layout(mesh, 128)
-    assert laid.uv is not None and with_layout(laid, 128) is laid
-    overlapping = replace(mesh, uv=np.zeros_like(laid.uv))
-    for result in (with_layout(overlapping, 128), subdivide_loop(laid, 2)):
-        assert result.uv is not None and usable_uv(result, result.uv)
 
 
 def test_demo(folder, monkeypatch, capsys):

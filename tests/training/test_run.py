@@ -1,11 +1,12 @@
 """The run folder."""
 
 import tomllib
+from unittest.mock import Mock
 
 import pytest
 
 from mitex.errors import CheckpointError, OutputError
-from mitex.training import run
+from mitex.training import checkpoint, run
 
 from .task import SmallConfig
 
@@ -24,16 +25,28 @@ def test_a_new_folder_is_made_and_kept_once_a_step_is_done(tmp_path):
     run.check(out)  # it never reached a checkpoint, so nothing is lost by starting again
 
 
-@pytest.mark.parametrize("existed", [True, False])
-def test_nothing_stays_of_a_run_that_fails_before_its_first_step(tmp_path, existed):
-    out = tmp_path / "run"
-    if existed:
-        out.mkdir()
-    with pytest.raises(RuntimeError), run.opened(out, resume=False) as (folder, _):
+@pytest.mark.parametrize("existing", [".", "a", "a/b"])
+def test_nothing_stays_of_a_run_that_fails_before_its_first_step(tmp_path, existing):
+    (tmp_path / existing).mkdir(parents=True, exist_ok=True)
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(RuntimeError), run.opened(tmp_path / "a" / "b", resume=False) as (folder, _):
         run.prepare(folder, SmallConfig(), {})
         raise RuntimeError
-    assert _files(tmp_path) == (["run"] if existed else [])
-    assert not existed or not _files(out)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_nothing_stays_where_metrics_cannot_be_opened(tmp_path, monkeypatch):
+    monkeypatch.setattr(run, "Metrics", Mock(side_effect=OutputError("full", "free space")))
+    with pytest.raises(OutputError), run.opened(tmp_path / "a" / "b", resume=False):
+        pass
+    assert not _files(tmp_path)
+
+
+def test_a_damaged_checkpoint_leaves_the_folder_as_it_was(tmp_path):
+    (tmp_path / checkpoint.NAME).write_bytes(b"damaged")
+    with pytest.raises(CheckpointError), run.opened(tmp_path, resume=True) as (folder, _):
+        checkpoint.load(folder)
+    assert _files(tmp_path) == [checkpoint.NAME]
 
 
 def test_config_toml_holds_config_task_and_versions(tmp_path):

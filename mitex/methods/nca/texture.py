@@ -11,6 +11,7 @@ import numpy as np
 import torch
 
 from mitex.asset import Asset
+from mitex.atlas import laid_out
 from mitex.errors import ConfigError
 from mitex.frames import orthonormal, unit
 from mitex.mesh import Mesh, remesh, subdivide_loop
@@ -63,6 +64,7 @@ class NcaTexture:
         subdivide: int | str = "auto",
         orientation: float = 0.0,
         scale: float = 1.0,
+        resolution: int | None = 1024,
     ) -> Asset:
         """Grows the texture on a mesh.
 
@@ -76,6 +78,8 @@ class NcaTexture:
             orientation: turns the texture about the normals, counter-clockwise [rad].
             scale: size of the pattern, 1 for what the density gives; others need a remeshing to the fitting
                 density (extra `remesh`).
+            resolution: of the textures that will be baked [texels]: UVs are laid out for it before the mesh
+                is subdivided, which is much faster. None if there will be none.
 
         Returns:
             An asset on the subdivided mesh, in the mesh's own units and place, with one map per learned map.
@@ -84,7 +88,8 @@ class NcaTexture:
             ConfigError: options out of range.
             MeshError: the mesh cannot be remeshed.
         """
-        dense = self._dense(mesh, subdivide, scale)
+        laid = mesh if resolution is None or scale != 1.0 else laid_out(mesh, resolution)
+        dense = self._dense(laid, subdivide, scale)
         state = self.grow(dense, seed=seed, steps=STEPS if steps is None else steps, orientation=orientation)
         maps = state_maps(state.numpy(), list(self.maps))
         return Asset(dense, maps, tangents(dense, orientation), name=mesh.name)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from mitex.atlas import laid_out
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, grid, icosphere, subdivide_loop
 from mitex.methods.nca import texture as room
@@ -39,7 +40,7 @@ def test_growth_is_steps_of_the_rule_from_the_seed(made, sphere):
 
 
 def test_maps_are_those_of_the_state(made, sphere):
-    asset = made.apply(sphere, seed=3, steps=20, subdivide=0)
+    asset = made.apply(sphere, seed=3, steps=20, subdivide=0, resolution=None)
     state = made.grow(sphere, seed=3, steps=20).numpy()
     assert tuple(asset.vertex_maps) == ALL
     assert np.allclose(asset.vertex_maps["albedo"], np.clip(state[:, :3] + 0.5, 0, 1))
@@ -111,7 +112,14 @@ def test_automatic_subdivision(made, sphere, monkeypatch):
     monkeypatch.setattr(room, "ENOUGH_VERTICES", 600)
     assert len(made.apply(sphere, steps=1).mesh.vertices) == 642
     monkeypatch.setattr(room, "ENOUGH_VERTICES", 162)
-    assert made.apply(sphere, steps=1).mesh is sphere
+    assert made.apply(sphere, steps=1, resolution=None).mesh is sphere
+
+
+def test_uvs_are_laid_out_before_the_subdivision(made, sphere):
+    asset = made.apply(sphere, steps=1, subdivide=1, resolution=128)
+    expected = subdivide_loop(laid_out(sphere, 128), 1).uv
+    assert expected is not None and asset.mesh.uv is not None and np.array_equal(asset.mesh.uv, expected)
+    assert made.apply(sphere, steps=1, subdivide=1, resolution=None).mesh.uv is None
 
 
 def test_place_and_units_stay(made):
