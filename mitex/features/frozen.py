@@ -10,9 +10,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import torch
 import torch.nn.functional as F
+
+GRAM_ROWS = 16_384  # feature vectors that are multiplied at a time
+
+
+class Operation(Protocol):
+    """A step of a frozen network.
+
+    Attributes:
+        needs_input: whether `backward` is given the operation's input instead of its output.
+    """
+
+    needs_input: bool
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor: ...
+
+    def backward(self, gradient: torch.Tensor, known: torch.Tensor) -> torch.Tensor:
+        """The input's gradient; may overwrite `gradient`."""
+        ...
 
 
 class FrozenConv:
@@ -20,6 +39,8 @@ class FrozenConv:
 
     The product runs in the input's `dtype`; output and gradient are kept as `kept`.
     """
+
+    needs_input = False
 
     def __init__(
         self, weight: torch.Tensor, bias: torch.Tensor, dtype: torch.dtype, kept: torch.dtype
@@ -32,14 +53,16 @@ class FrozenConv:
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         return F.conv2d(x, self.weight, self.bias, padding=1).relu_().to(self.kept)
 
-    def backward(self, gradient: torch.Tensor, output: torch.Tensor) -> torch.Tensor:
+    def backward(self, gradient: torch.Tensor, known: torch.Tensor) -> torch.Tensor:
         """Input gradient (K, I, H, W); overwrites `gradient` with its part behind the ReLU."""
-        torch.ops.aten.threshold_backward.grad_input(gradient, output, 0, grad_input=gradient)
+        torch.ops.aten.threshold_backward.grad_input(gradient, known, 0, grad_input=gradient)
         return F.conv2d(gradient, self.adjoint, padding=1)
 
 
 class Pool:
     """2x2 pooling, stride 2; an odd last row or column is dropped."""
+
+    needs_input = True
 
     def __init__(self, kind: str) -> None:
         self.kind = kind
@@ -47,14 +70,14 @@ class Pool:
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         return F.avg_pool2d(x, 2) if self.kind == "average" else F.max_pool2d(x, 2)
 
-    def backward(self, gradient: torch.Tensor, source: torch.Tensor) -> torch.Tensor:
+    def backward(self, gradient: torch.Tensor, known: torch.Tensor) -> torch.Tensor:
         if self.kind == "average":
             spread = F.interpolate(gradient, scale_factor=2.0, mode="nearest").mul_(0.25)
-            missing = (source.shape[3] - spread.shape[3], source.shape[2] - spread.shape[2])
+            missing = (known.shape[3] - spread.shape[3], known.shape[2] - spread.shape[2])
             return F.pad(spread, (0, missing[0], 0, missing[1])) if any(missing) else spread
-        _, winners = F.max_pool2d(source, 2, return_indices=True)
+        _, winners = F.max_pool2d(known, 2, return_indices=True)
         return torch.ops.aten.max_pool2d_with_indices_backward(
-            gradient, source, [2, 2], [2, 2], [0, 0], [1, 1], False, winners
+            gradient, known, [2, 2], [2, 2], [0, 0], [1, 1], False, winners
         )
 
 
@@ -65,22 +88,59 @@ class Tap:
     index: int
     positions: torch.Tensor | None = None
 
+    def read(self, x: torch.Tensor) -> torch.Tensor:
+        """What the tap gives of the map x, float32 and its own memory."""
+        if self.positions is None:
+            return x.to(torch.float32, copy=True)  # the stack keeps its own, whatever the caller does
+        return _rows(x)[_flat(self.positions, x)].float().view(*self.positions.shape, x.shape[1])
+
+    def add(self, flowing: torch.Tensor, gradient: torch.Tensor, x: torch.Tensor) -> None:
+        """Adds the gradient with respect to x, given that of `read`, to `flowing`."""
+        if self.positions is None:
+            flowing.add_(gradient)
+            return
+        gradient = gradient.reshape(-1, flowing.shape[1]).to(flowing.dtype)
+        _shared_rows(flowing).index_add_(0, _flat(self.positions, flowing), gradient)
+
+
+@dataclass(frozen=True)
+class GramTap:
+    """The Gram matrix (C, C) of the map's n feature vectors, divided by n, without a copy of the map."""
+
+    index: int
+
+    def read(self, x: torch.Tensor) -> torch.Tensor:
+        rows = _rows(x)
+        total = torch.zeros(rows.shape[1], rows.shape[1])
+        for part in rows.split(GRAM_ROWS):
+            part = part.float()
+            total.addmm_(part.t(), part)
+        return total / len(rows)
+
+    def add(self, flowing: torch.Tensor, gradient: torch.Tensor, x: torch.Tensor) -> None:
+        weight = ((gradient + gradient.t()) / len(_rows(x))).to(x.dtype)
+        for whole, part in zip(
+            _shared_rows(flowing).split(GRAM_ROWS), _rows(x).split(GRAM_ROWS), strict=True
+        ):
+            whole.addmm_(part, weight)
+
 
 class FrozenStack(torch.autograd.Function):
     """Runs operations in turn and returns what the taps ask for; differentiable in the images only.
 
-    Images (K, 3, H, W); a whole tap gives (K, C, h, w), a sampled one (K, n, C), float32 both.
+    Images (K, 3, H, W); a whole tap gives (K, C, h, w), a sampled one (K, n, C), a Gram tap (C, C), float32
+    all. Operations on surfaces take and give (n, C) instead.
     """
 
     @staticmethod
-    def forward(ctx, images: torch.Tensor, operations: Sequence[FrozenConv | Pool], taps: Sequence[Tap]):
+    def forward(ctx, images: torch.Tensor, operations: Sequence[Operation], taps: Sequence[Tap | GramTap]):
         outputs, x = [], images
         for operation in operations:
             x = operation.forward(x)
             outputs.append(x)
         ctx.operations, ctx.taps, ctx.outputs = operations, taps, outputs
         ctx.set_materialize_grads(False)
-        return tuple(_read(outputs[tap.index], tap.positions) for tap in taps)
+        return tuple(tap.read(outputs[tap.index]) for tap in taps)
 
     @staticmethod
     @torch.autograd.function.once_differentiable
@@ -93,20 +153,18 @@ class FrozenStack(torch.autograd.Function):
                 flowing = torch.zeros_like(outputs[index])
             for tap, gradient in zip(ctx.taps, gradients, strict=True):
                 if tap.index == index and gradient is not None:
-                    _add(flowing, gradient, tap.positions)
+                    tap.add(flowing, gradient, outputs[index])
             operation = ctx.operations[index]
-            if isinstance(operation, Pool):
-                flowing = operation.backward(flowing, outputs[index - 1])
-            else:
-                flowing = operation.backward(flowing, outputs[index])
+            known = outputs[index - 1 if operation.needs_input else index]
+            flowing = operation.backward(flowing, known)
             outputs[index] = None
         ctx.outputs = None
         return flowing.float() if flowing is not None else None, None, None
 
 
 def _rows(x: torch.Tensor) -> torch.Tensor:
-    """(K, C, h, w) in channels-last memory as (K * h * w, C), sharing memory."""
-    return x.permute(0, 2, 3, 1).reshape(-1, x.shape[1])
+    """(K, C, h, w) in channels-last memory as (K * h * w, C), sharing memory; (n, C) as it is."""
+    return x if x.ndim == 2 else x.permute(0, 2, 3, 1).reshape(-1, x.shape[1])
 
 
 def _flat(positions: torch.Tensor, x: torch.Tensor) -> torch.Tensor:
@@ -114,17 +172,9 @@ def _flat(positions: torch.Tensor, x: torch.Tensor) -> torch.Tensor:
     return (positions + offsets).reshape(-1)
 
 
-def _read(x: torch.Tensor, positions: torch.Tensor | None) -> torch.Tensor:
-    if positions is None:
-        return x.to(torch.float32, copy=True)  # the stack keeps its own, whatever the caller does
-    return _rows(x)[_flat(positions, x)].float().view(*positions.shape, x.shape[1])
-
-
-def _add(x: torch.Tensor, gradient: torch.Tensor, positions: torch.Tensor | None) -> None:
-    if positions is None:
-        x.add_(gradient)
-        return
+def _shared_rows(x: torch.Tensor) -> torch.Tensor:
+    """`_rows`, for writing."""
     rows = _rows(x)
     if rows.data_ptr() != x.data_ptr():
         raise RuntimeError("a feature map left channels-last memory")
-    rows.index_add_(0, _flat(positions, x), gradient.reshape(-1, x.shape[1]).to(x.dtype))
+    return rows

@@ -46,20 +46,13 @@ class Vgg16:
         self.operations: list[FrozenConv | Pool] = []
         self.index: dict[str, int] = {}
         self._mean = torch.tensor(MEAN_RGB, device=device)
-        tensors, before = _load(), 1.0
-        for block, count in BLOCKS:
-            if block > 1:
+        for name, (weight, bias) in convolutions(pool, normalised).items():
+            if name.endswith("_1") and name != "relu1_1":
                 self.operations.append(Pool(pool))
-            for i in range(1, count + 1):
-                name, key = f"relu{block}_{i}", f"conv{block}_{i}"
-                after = MEAN_ACTIVATION[pool][name] if normalised else 1.0
-                weight = (tensors[f"{key}.weight"] * (before / after)).to(device)
-                bias = (tensors[f"{key}.bias"] / after).to(device)
-                # The first layer reads 3 channels: float32 costs nothing there and keeps the image exact.
-                dtype = torch.float32 if name == "relu1_1" else self.dtype
-                self.index[name] = len(self.operations)
-                self.operations.append(FrozenConv(weight, bias, dtype, self.dtype))
-                before = after
+            # The first layer reads 3 channels: float32 costs nothing there and keeps the image exact.
+            dtype = torch.float32 if name == "relu1_1" else self.dtype
+            self.index[name] = len(self.operations)
+            self.operations.append(FrozenConv(weight.to(device), bias.to(device), dtype, self.dtype))
 
     def features(self, images: torch.Tensor, layers: Iterable[str]) -> dict[str, torch.Tensor]:
         """Whole feature maps.
@@ -129,6 +122,21 @@ class Vgg16:
                 )
             if where.numel() and (where.min() < 0 or where.max() >= places):
                 raise ConfigError(f"positions outside the map of {name}", f"give indices below {places}")
+
+
+def convolutions(pool: str, normalised: bool) -> dict[str, tuple[torch.Tensor, torch.Tensor]]:
+    """Layer -> weight (O, I, 3, 3) and bias (O,), float32, in order.
+
+    Args:
+        pool: "average" or "max", which the scales depend on.
+        normalised: divide every layer by its mean activation on textures.
+    """
+    tensors, before, layers = _load(), 1.0, {}
+    for name in LAYERS:
+        key, after = name.replace("relu", "conv"), MEAN_ACTIVATION[pool][name] if normalised else 1.0
+        layers[name] = tensors[f"{key}.weight"] * (before / after), tensors[f"{key}.bias"] / after
+        before = after
+    return layers
 
 
 @cache

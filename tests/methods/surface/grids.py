@@ -1,0 +1,47 @@
+"""Levels of a flat grid of texels, made without geodesics."""
+
+import numpy as np
+
+from mitex.methods.surface.levels import POOLS, Level, Levels
+
+
+def grid_levels(side: int) -> Levels:
+    """Of side x side texels (a multiple of 32): what `build` should find away from the border.
+
+    Taps across the border are the opposite ones. Elements are numbered block by block, as `Levels` demands.
+    """
+    place = _blocks(side, POOLS)  # (N, 2) row, column of each element
+    levels, index = [], None
+    for n in range(POOLS):
+        width = side >> n
+        here = place[:: 4**n] >> n
+        number = np.empty((width, width), np.int64)
+        number[tuple(here.T)] = np.arange(len(here))
+        taps = np.empty((len(here), 9), np.int32)
+        for tap in range(9):
+            offset = np.array(divmod(tap, 3)) - 1
+            there = here + offset
+            outside = ((there < 0) | (there >= width)).any(1)
+            there[outside] = (here - offset)[outside]
+            inside = ((there >= 0) & (there < width)).all(1)
+            there[~inside] = here[~inside]
+            taps[:, tap] = number[tuple(there.T)]
+        levels.append(Level(taps, np.full(len(here) // 4, 4, np.int32)))
+        index = taps if n == 0 else index
+    assert index is not None
+    return Levels(
+        order=(place[:, 0] * side + place[:, 1]).astype(np.int32),
+        index=index[:, :, None],
+        weight=np.ones((*index.shape, 1), np.float32),
+        levels=tuple(levels),
+    )
+
+
+def _blocks(side: int, depth: int) -> np.ndarray:
+    """(N, 2) places in Morton order within blocks of 2^depth, the blocks row by row."""
+    row, column = np.divmod(np.arange(side * side), side)
+    key = (row >> depth) * (side >> depth) + (column >> depth)
+    for bit in reversed(range(depth)):
+        key = key * 4 + ((row >> bit) & 1) * 2 + ((column >> bit) & 1)
+    ranked = np.argsort(key)
+    return np.stack([row[ranked], column[ranked]], 1)

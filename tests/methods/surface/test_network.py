@@ -1,0 +1,179 @@
+"""The surface network against the image network, and its gradients against dense references."""
+
+import numpy as np
+import pytest
+import torch
+
+from mitex.errors import ConfigError
+from mitex.features import Vgg16
+from mitex.features.vgg import LAYERS, convolutions
+from mitex.methods.surface import network as room
+from mitex.methods.surface.levels import Level
+from mitex.methods.surface.network import Neighbourhood, SurfaceConv, SurfacePool, SurfaceVgg
+from tests.methods.surface.grids import grid_levels
+
+SIDE = 224
+MARGIN = {1: 2, 2: 3, 3: 5, 4: 6, 5: 6}  # how far the border's rule reaches into the layers of a block
+
+
+@pytest.fixture(scope="module")
+def levels():
+    return grid_levels(SIDE)
+
+
+@pytest.fixture(scope="module")
+def image():
+    generator = torch.Generator().manual_seed(0)
+    return torch.rand(SIDE, SIDE, 3, generator=generator)
+
+
+def as_image(levels, values, layer):
+    """(n, C) elements of a layer as an image (h, w, C)."""
+    n = int(layer[4]) - 1
+    width = SIDE >> n
+    row, column = np.divmod(levels.order[:: 4**n], SIDE)
+    out = torch.empty(width, width, values.shape[1])
+    out[row >> n, column >> n] = values
+    return out
+
+
+@pytest.mark.parametrize("pool", ["average", "max"])
+def test_every_layer_equals_the_image_network_on_a_grid(levels, image, pool):
+    ours = SurfaceVgg(levels, pool=pool, precision="float32")
+    features = ours.features(image.view(-1, 3)[levels.order], LAYERS)
+    expected = Vgg16(pool=pool, precision="float32").features(image[None], LAYERS)
+    for layer in LAYERS:
+        inner = slice(MARGIN[int(layer[4])], -MARGIN[int(layer[4])])
+        a = as_image(levels, features[layer], layer)[inner, inner]
+        b = expected[layer][0, inner, inner]
+        assert b.numel() and (a - b).abs().max() < 1e-4 * b.abs().max(), layer
+
+
+def test_input_gradient_equals_the_image_networks(levels, image):
+    """Of the centre of each layer, in float32."""
+    ours, theirs = SurfaceVgg(levels, precision="float32"), Vgg16(precision="float32")
+    generator = torch.Generator().manual_seed(1)
+    for layer in ("relu1_1", "relu1_2", "relu2_2", "relu3_3", "relu4_3"):
+        texels = image.view(-1, 3)[levels.order].clone().requires_grad_()
+        picture = image[None].clone().requires_grad_()
+        a = as_image(levels, ours.features(texels, [layer])[layer], layer)
+        b = theirs.features(picture, [layer])[layer][0]
+        centre = slice(len(b) // 2 - 1, len(b) // 2 + 1)
+        pull = torch.randn(2, 2, b.shape[2], generator=generator)
+        (got,) = torch.autograd.grad((a[centre, centre] * pull).sum(), texels)
+        (expected,) = torch.autograd.grad((b[centre, centre] * pull).sum(), picture)
+        expected = expected.view(-1, 3)[levels.order]
+        assert (got - expected).norm() < 1e-4 * expected.norm(), layer
+
+
+@pytest.fixture(scope="module")
+def irregular():
+    """Levels with taps and groups at random: many readers of some elements, none of others."""
+    rng = np.random.default_rng(0)
+    levels, count = [], 700
+    for _ in range(5):
+        taps = rng.integers(0, count, (count, 9)).astype(np.int32)
+        taps[:, 4] = np.arange(count)
+        sizes = np.bincount(np.sort(rng.integers(0, count // 3, count)), minlength=count // 3)
+        sizes = sizes[sizes > 0].astype(np.int32)
+        levels.append(Level(taps, sizes))
+        count = len(sizes)
+    return levels
+
+
+@pytest.mark.parametrize("chunk", [1 << 20, 9 * 64 * 16])
+def test_convolution_against_autograd(irregular, chunk, monkeypatch):
+    monkeypatch.setattr(room, "CHUNK", chunk)
+    generator = torch.Generator().manual_seed(2)
+    weight, bias = torch.randn(16, 8, 3, 3, generator=generator), torch.randn(16, generator=generator)
+    taps = irregular[0].taps
+    x = torch.randn(len(taps), 8, generator=generator, requires_grad=True)
+    gathered = x[torch.from_numpy(taps).long()]
+    expected = torch.relu(torch.einsum("nki,oik->no", gathered, weight.flatten(2)) + bias)
+    conv = SurfaceConv(weight, bias, torch.float32, Neighbourhood.of(taps))
+    got = conv.forward(x.detach())
+    assert torch.allclose(got, expected, atol=1e-4)
+    pull = torch.randn(got.shape, generator=generator)
+    (wanted,) = torch.autograd.grad(expected, x, pull)
+    assert torch.allclose(conv.backward(pull.clone(), got), wanted, atol=1e-3)
+
+
+@pytest.mark.parametrize("kind", ["average", "max"])
+def test_pooling_against_loops(irregular, kind):
+    generator = torch.Generator().manual_seed(3)
+    sizes = irregular[0].sizes
+    x = torch.randn(int(sizes.sum()), 5, generator=generator, requires_grad=True)
+    parts = x.split(sizes.tolist())
+    expected = torch.stack([p.mean(0) if kind == "average" else p.amax(0) for p in parts])
+    pool = SurfacePool(kind, sizes)
+    got = pool.forward(x.detach())
+    assert torch.allclose(got, expected, atol=1e-6)
+    pull = torch.randn(got.shape, generator=generator)
+    (wanted,) = torch.autograd.grad(expected, x, pull)
+    assert torch.allclose(pool.backward(pull, x.detach()), wanted, atol=1e-6)
+
+
+def test_gram_matrices_and_their_gradient(levels, image):
+    """Against the features' own, in float32; all layers together."""
+    ours = SurfaceVgg(levels, precision="float32")
+    names = ("relu1_1", "pool1", "relu2_2", "relu3_1")
+    texels = image.view(-1, 3)[levels.order].clone().requires_grad_()
+    grams = ours.gram_matrices(texels, names)
+    features = ours.features(texels, names)
+    total, expected = torch.zeros(()), torch.zeros(())
+    for k, name in enumerate(names):
+        f = features[name]
+        gram = f.T @ f / len(f)
+        assert torch.allclose(grams[name], gram, rtol=1e-4, atol=1e-5)
+        generator = torch.Generator().manual_seed(k)
+        pull = torch.randn(gram.shape, generator=generator)
+        total, expected = total + (grams[name] * pull).sum(), expected + (gram * pull).sum()
+    (a,) = torch.autograd.grad(total, texels)
+    (b,) = torch.autograd.grad(expected, texels)
+    assert (a - b).norm() < 1e-4 * b.norm()
+
+
+def test_finite_differences(levels, image):
+    """Of the sum of all Gram matrices along a random direction."""
+    ours = SurfaceVgg(levels, precision="float32")
+    generator = torch.Generator().manual_seed(4)
+    x = image.view(-1, 3)[levels.order].clone().requires_grad_()
+
+    def value(texels):
+        return sum(g.double().sum() for g in ours.gram_matrices(texels, ("relu2_1", "pool3")).values())
+
+    (gradient,) = torch.autograd.grad(value(x), x)
+    direction = torch.randn(x.shape, generator=generator)
+    step = 1e-3
+    with torch.no_grad():
+        measured = (value(x + step * direction) - value(x - step * direction)) / (2 * step)
+    assert abs(measured - (gradient * direction).sum()) < 1e-2 * abs(measured)
+
+
+def test_bfloat16_agrees(levels, image):
+    texels = image.view(-1, 3)[levels.order]
+    results = []
+    for precision in ("float32", "bfloat16"):
+        x = texels.clone().requires_grad_()
+        grams = SurfaceVgg(levels, precision=precision).gram_matrices(x, ("relu1_2", "relu2_2", "relu3_3"))
+        loss = sum(gram.square().mean() for gram in grams.values())
+        results.append((grams, torch.autograd.grad(loss, x)[0]))
+    (exact, gradient), (rounded, close) = results
+    for name in exact:
+        assert (exact[name] - rounded[name]).norm() < 1e-2 * exact[name].norm()
+    assert torch.cosine_similarity(gradient.flatten(), close.flatten(), dim=0) > 0.999
+
+
+def test_random_weights_are_an_option(levels, image):
+    texels = image.view(-1, 3)[levels.order]
+    weights = {name: (torch.zeros_like(w), b) for name, (w, b) in convolutions("average", True).items()}
+    features = SurfaceVgg(levels, weights=weights).features(texels, ["relu2_1"])["relu2_1"]
+    assert torch.allclose(features, weights["relu2_1"][1].relu().expand_as(features), rtol=1e-2)
+
+
+def test_wrong_input_is_refused(levels, image):
+    ours = SurfaceVgg(levels)
+    with pytest.raises(ConfigError, match="relu9_9"):
+        ours.features(image.view(-1, 3), ["relu9_9"])
+    with pytest.raises(ConfigError, match="shape"):
+        ours.features(image, ["relu1_1"])
