@@ -7,7 +7,8 @@ import torch
 from mitex.features import Vgg16
 from mitex.losses import channel_transport, decorrelate, moment_distance, relaxed_transport
 from mitex.methods.nca.config import NcaConfig
-from mitex.methods.nca.targets import CYCLE, Targets
+from mitex.methods.nca.targets import Targets
+from mitex.pictures import CYCLE
 
 
 class Appearance:

@@ -1,15 +1,16 @@
-"""What a state shows: the channels of each map, and the pictures of them that the features compare."""
+"""What a state shows: the channels of each map, and the exemplar's features to compare with."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
 
 import numpy as np
 import torch
 import torch.nn.functional as F
 
-from mitex.exemplar import MAPS, Exemplar
+from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
+from mitex.pictures import Picture, picture_images
 
 # Channels of the state, as in the authors' PBR checkpoints; 3 to 5 are hidden.
 STATE_CHANNELS: dict[str, tuple[int, ...]] = {
@@ -20,9 +21,6 @@ STATE_CHANNELS: dict[str, tuple[int, ...]] = {
     "ambient_occlusion": (11,),
 }
 OFFSET = 0.5  # value = state + OFFSET
-MIXES = 12
-# With `blend`, view k shows the picture of kind CYCLE[k]; kinds that the exemplar lacks are skipped.
-CYCLE = ("albedo", "normal", "grey", "mix")
 
 
 def state_maps(state: np.ndarray, maps: list[str]) -> dict[str, np.ndarray]:
@@ -30,37 +28,9 @@ def state_maps(state: np.ndarray, maps: list[str]) -> dict[str, np.ndarray]:
     return {name: np.clip(state[:, STATE_CHANNELS[name]] + OFFSET, 0, 1) for name in maps}
 
 
-@dataclass(frozen=True)
-class Picture:
-    """Three channels looked at as if they were RGB: `channels` of the state; `kind` says why."""
-
-    kind: str
-    channels: tuple[int, ...]
-
-
-def pictures_of(maps: list[str], blend: bool, seed: int) -> list[Picture]:
-    """The pictures for a set of maps (see `NcaConfig.blend`)."""
-    colours = [Picture(name, STATE_CHANNELS[name]) for name in maps if MAPS[name] == 3]
-    grey = [STATE_CHANNELS[name][0] for name in maps if MAPS[name] == 1]
-    if not blend:
-        order = {p.kind: p for p in colours}
-        single = {name: Picture(name, STATE_CHANNELS[name] * 3) for name in maps if MAPS[name] == 1}
-        return [(order | single)[name] for name in sorted(maps)]
-    pictures = colours
-    if grey:
-        pictures = [*pictures, Picture("grey", tuple((grey * 3)[:3]))]
-    return pictures + (_mixes(maps, seed) if len(maps) > 1 else [])
-
-
-def _mixes(maps: list[str], seed: int) -> list[Picture]:
-    """Random triples of channels out of as many different maps as there are."""
-    rng = np.random.default_rng(seed)
-    mixes = []
-    for _ in range(MIXES):
-        names = list(rng.permutation(sorted(maps)))
-        chosen = [(names * 3)[k] for k in range(3)]
-        mixes.append(Picture("mix", tuple(int(rng.choice(STATE_CHANNELS[name])) for name in chosen)))
-    return mixes
+def state_layout(maps: Iterable[str]) -> dict[str, tuple[int, ...]]:
+    """Where a state shows the maps: name -> channels."""
+    return {name: STATE_CHANNELS[name] for name in maps}
 
 
 class Targets:
@@ -77,9 +47,8 @@ class Targets:
         self, exemplar: Exemplar, pictures: list[Picture], network: Vgg16, layers: tuple[str, ...]
     ) -> None:
         self.pictures = pictures
-        values = {c: m for name, array in exemplar.maps.items() for c, m in _channels(name, array)}
-        images = np.stack([np.stack([values[c] for c in p.channels], -1) for p in pictures])
-        self.images = torch.from_numpy(np.ascontiguousarray(images, np.float32)).to(network.device)
+        images = picture_images(exemplar, pictures, STATE_CHANNELS)
+        self.images = torch.from_numpy(images).to(network.device)
         self._vectors = {"colour": self.images.flatten(1, 2)}
         with torch.no_grad():
             for one in layers:
@@ -93,10 +62,6 @@ class Targets:
     def sample(self, layer: str, which: torch.Tensor, positions: torch.Tensor) -> torch.Tensor:
         """Vectors (K, n, C) float32 of pictures `which` (K,) at `positions` (K, n)."""
         return self._vectors[layer][which[:, None], positions].float()
-
-
-def _channels(name: str, array: np.ndarray):
-    return ((channel, array[..., k]) for k, channel in enumerate(STATE_CHANNELS[name]))
 
 
 def enlarged(exemplar: Exemplar, size: int) -> Exemplar:

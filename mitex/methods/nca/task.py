@@ -16,7 +16,8 @@ from mitex.methods.nca.appearance import Appearance
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.perception import perception
-from mitex.methods.nca.targets import OFFSET, STATE_CHANNELS, Targets, enlarged, pictures_of
+from mitex.methods.nca.targets import OFFSET, STATE_CHANNELS, Targets, enlarged, state_layout
+from mitex.pictures import picture_images, pictures_of
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, orbit, patch_views, random_views
 from mitex.scenes.stage import Stage
@@ -44,7 +45,7 @@ class NcaTask:
         self.stage = Stage(self.mesh, channels=len(STATE_CHANNELS))
         network = Vgg16(config.pooling)
         target = enlarged(exemplar.resized(config.exemplar_size), config.target_size)
-        pictures = pictures_of(self.maps, config.blend, config.seed)
+        pictures = pictures_of(state_layout(self.maps), config.blend, config.seed)
         self.appearance = Appearance(config, Targets(target, pictures, network, config.layers), network)
         self.pool = torch.zeros(config.pool, self.perception.vertices, config.channels)
         self._touched = torch.zeros(config.pool, dtype=torch.bool)
@@ -119,22 +120,16 @@ class NcaTask:
         whole = orbit(1, distance=2.05, resolution=2 * size)
         views = [bridge.lookup(state, self.stage.visibility(patches)).numpy()]
         views.append(bridge.lookup(state, self.stage.visibility(whole, antialias=2)).numpy())
-        pictures = pictures_of(self.maps, False, 0)
+        pictures = pictures_of(state_layout(self.maps), False, 0)
         exemplar = self.exemplar.resized(size)
         rows = []
-        for channels in (list(p.channels) for p in pictures):
-            rows.append(_row(_picture(exemplar, channels), *(v[..., channels] for v in views)))
+        shown = picture_images(exemplar, pictures, STATE_CHANNELS)
+        for image, channels in zip(shown, (list(p.channels) for p in pictures), strict=True):
+            rows.append(_row(image, *(v[..., channels] for v in views)))
         return np.clip(np.concatenate(rows, 0), 0, 1)
 
     def metadata(self) -> dict[str, str]:
         return {"method": "nca", "maps": ",".join(self.maps), "exemplar": self.exemplar.name}
-
-
-def _picture(exemplar: Exemplar, channels: list[int]) -> np.ndarray:
-    values = {}
-    for name, array in exemplar.maps.items():
-        values |= {c: array[..., k] for k, c in enumerate(STATE_CHANNELS[name])}
-    return np.stack([values[c] for c in channels], -1)
 
 
 def _row(exemplar: np.ndarray, patches: np.ndarray, whole: np.ndarray) -> np.ndarray:

@@ -6,10 +6,10 @@ import torch
 
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
-from mitex.methods.nca.targets import Picture, Targets, enlarged, pictures_of, state_maps
+from mitex.methods.nca.targets import Targets, enlarged, state_layout, state_maps
+from mitex.pictures import pictures_of
 
 ALL = ["albedo", "ambient_occlusion", "height", "normal", "roughness"]
-HIDDEN = {3, 4, 5, 12, 13, 14, 15}
 
 
 @pytest.fixture(scope="module")
@@ -37,52 +37,8 @@ def test_maps_of_a_state():
     assert list(state_maps(state, ["height"])) == ["height"]
 
 
-def test_pictures_of_the_paper():
-    """One for each map, in alphabetical order; grey ones are shown three times."""
-    assert pictures_of(["roughness", "albedo", "normal"], blend=False, seed=0) == [
-        Picture("albedo", (0, 1, 2)),
-        Picture("normal", (7, 8, 9)),
-        Picture("roughness", (10, 10, 10)),
-    ]
-
-
-def test_blended_pictures_of_all_maps():
-    pictures = pictures_of(ALL, blend=True, seed=0)
-    kinds = [p.kind for p in pictures]
-    assert kinds == ["albedo", "normal", "grey", *["mix"] * 12]
-    assert sorted(pictures[2].channels) == [6, 10, 11]
-    of = {c: name for name, channels in _channels().items() for c in channels}
-    for mix in pictures[3:]:
-        assert len({of[c] for c in mix.channels}) == 3
-    assert {of[c] for mix in pictures[3:] for c in mix.channels} == set(ALL)
-    assert not {c for p in pictures for c in p.channels} & HIDDEN
-
-
-def _channels():
-    return {
-        "albedo": (0, 1, 2),
-        "height": (6,),
-        "normal": (7, 8, 9),
-        "roughness": (10,),
-        "ambient_occlusion": (11,),
-    }
-
-
-@pytest.mark.parametrize("maps", [["albedo"], ["height"], ["albedo", "height"], ["height", "roughness"], ALL])
-@pytest.mark.parametrize("blend", [False, True])
-def test_every_map_is_in_some_picture(maps, blend):
-    shown = {c for p in pictures_of(maps, blend, 0) for c in p.channels}
-    assert shown == {c for name in maps for c in _channels()[name]}
-
-
-def test_mixes_follow_the_seed():
-    one, again, other = (pictures_of(ALL, True, seed) for seed in (1, 1, 2))
-    assert one == again != other
-    assert [p.kind for p in pictures_of(["albedo"], True, 0)] == ["albedo"]
-
-
 def test_targets_read_the_features_of_the_pictures(network, scales):
-    pictures = pictures_of(ALL, True, 0)[:4]
+    pictures = pictures_of(state_layout(ALL), True, 0)[:4]
     targets = Targets(scales, pictures, network, ("relu1_1", "relu3_1"))
     grey = torch.from_numpy(
         np.concatenate([scales.maps[name] for name in ("ambient_occlusion", "height", "roughness")], 2)

@@ -1,0 +1,62 @@
+"""Which pictures of a set of maps are looked at."""
+
+import numpy as np
+import pytest
+
+from mitex.exemplar import Exemplar
+from mitex.pictures import Picture, picture_images, pictures_of
+
+LAYOUT = {
+    "albedo": (0, 1, 2),
+    "ambient_occlusion": (11,),
+    "height": (6,),
+    "normal": (7, 8, 9),
+    "roughness": (10,),
+}
+
+
+def layout(*maps):
+    return {name: LAYOUT[name] for name in maps}
+
+
+def test_pictures_of_the_paper():
+    """One for each map, in alphabetical order; grey ones are shown three times."""
+    assert pictures_of(layout("roughness", "albedo", "normal"), blend=False, seed=0) == [
+        Picture("albedo", (0, 1, 2)),
+        Picture("normal", (7, 8, 9)),
+        Picture("roughness", (10, 10, 10)),
+    ]
+
+
+def test_blended_pictures_of_all_maps():
+    pictures = pictures_of(LAYOUT, blend=True, seed=0)
+    kinds = [p.kind for p in pictures]
+    assert kinds == ["albedo", "normal", "grey", *["mix"] * 12]
+    assert sorted(pictures[2].channels) == [6, 10, 11]
+    of = {c: name for name, channels in LAYOUT.items() for c in channels}
+    for mix in pictures[3:]:
+        assert len({of[c] for c in mix.channels}) == 3
+    assert {of[c] for mix in pictures[3:] for c in mix.channels} == set(LAYOUT)
+
+
+@pytest.mark.parametrize(
+    "maps", [["albedo"], ["height"], ["albedo", "height"], ["height", "roughness"], list(LAYOUT)]
+)
+@pytest.mark.parametrize("blend", [False, True])
+def test_every_map_is_in_some_picture(maps, blend):
+    shown = {c for p in pictures_of(layout(*maps), blend, 0) for c in p.channels}
+    assert shown == {c for name in maps for c in LAYOUT[name]}
+
+
+def test_mixes_follow_the_seed():
+    one, again, other = (pictures_of(LAYOUT, True, seed) for seed in (1, 1, 2))
+    assert one == again != other
+    assert [p.kind for p in pictures_of(layout("albedo"), True, 0)] == ["albedo"]
+
+
+def test_images_show_the_channels():
+    maps = Exemplar.load("scales").resized(32).maps
+    pictures = [Picture("mix", (10, 2, 8)), Picture("albedo", (0, 1, 2))]
+    images = picture_images(Exemplar(maps), pictures, LAYOUT)
+    expected = np.stack([maps["roughness"][..., 0], maps["albedo"][..., 2], maps["normal"][..., 1]], -1)
+    assert images.dtype == np.float32 and np.array_equal(images, [expected, maps["albedo"]])
