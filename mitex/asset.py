@@ -13,10 +13,8 @@ import numpy as np
 from mitex.atlas import Atlas
 from mitex.errors import ConfigError
 from mitex.exemplar import MAPS
-from mitex.frames import encode, split_at_seams, unit, vertex_detail
+from mitex.frames import atlas_normals, vertex_detail
 from mitex.mesh import Mesh
-
-FLAT = (0.5, 0.5, 1.0)  # the normal map of an even surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +93,7 @@ class Asset:
         return replace(self, atlas=atlas, texture_maps=textures)
 
     def _bake_normals(self, atlas: Atlas) -> np.ndarray:
-        detail = unit(atlas.interpolate(self.detail_normals()[self.mesh.faces]))
-        frames = split_at_seams(self.mesh, atlas.uv).corner_frames()
-        encoded = encode(detail, *(unit(atlas.interpolate(v)) for v in frames))
-        encoded[atlas.face < 0] = FLAT
-        return encoded
+        return atlas_normals(self.mesh, atlas, atlas.interpolate(self.detail_normals()[self.mesh.faces]))
 
     def export(self, path: str | os.PathLike[str]) -> Path:
         """Writes the asset; the suffix chooses the format.

@@ -105,6 +105,21 @@ class Atlas:
         )
 
 
+def spread(image: np.ndarray, used: np.ndarray, padding: int) -> np.ndarray:
+    """The image continued outwards from its used texels, so that filtered lookups show no seam.
+
+    Args:
+        image: (N, N, C).
+        used: (N, N) bool.
+        padding: how far [texels]; texels farther away get the mean of the used ones.
+    """
+    nearest = np.zeros((2, *used.shape), np.int32)
+    away = np.asarray(distance_transform_edt(~used, return_indices=True, indices=nearest))
+    filled = image[nearest[0], nearest[1]]
+    filled[away > padding] = image[used].mean(axis=0)
+    return filled
+
+
 def unwrap(mesh: Mesh, resolution: int, padding: int) -> np.ndarray:
     """Cuts the mesh into charts and packs them into the unit square (xatlas).
 
@@ -153,7 +168,7 @@ def usable_uv(mesh: Mesh, uv: np.ndarray, resolution: int = 512) -> bool:
     """
     if not np.isfinite(uv).all() or uv.min() < 0.0 or uv.max() > 1.0:
         return False
-    flat = np.abs(_twice_area(uv)) < 1e-12
+    flat = np.abs(twice_area(uv)) < 1e-12
     if mesh.face_areas[flat].sum() > 1e-3 * mesh.face_areas.sum():
         return False
     count = np.zeros(resolution * resolution, np.int32)
@@ -163,36 +178,61 @@ def usable_uv(mesh: Mesh, uv: np.ndarray, resolution: int = 512) -> bool:
     return bool((count > 1).sum() <= 1e-3 * max((count > 0).sum(), 1))
 
 
-def _twice_area(p: np.ndarray) -> np.ndarray:
+def twice_area(p: np.ndarray) -> np.ndarray:
+    """(F,) twice the signed areas of triangles (F, 3, 2)."""
     a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
-def _texel_space(uv: np.ndarray, resolution: int) -> np.ndarray:
-    """(F, 3, 2) float32 (column, row); texel centres are at the integers."""
-    flipped = np.stack([uv[..., 0], 1.0 - uv[..., 1]], axis=-1)
-    return (flipped.astype(np.float64) * resolution - 0.5).astype(np.float32)
+def texel_space(uv: np.ndarray, resolution: int) -> np.ndarray:
+    """UVs (..., 2) as (column, row), float64; texel centres are at the integers."""
+    flipped = np.stack([uv[..., 0], 1.0 - uv[..., 1].astype(np.float64)], axis=-1)
+    return flipped * resolution - 0.5
+
+
+def texels_in_boxes(
+    low: np.ndarray, high: np.ndarray, chunk: int = CHUNK
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Yields (face, column, row) of the texels in each face's box, about `chunk` texels at a time.
+
+    Args:
+        low, high: (F, 2) int64 first and last (column, row); a face is left out where `high` is below `low`.
+        chunk: a box larger than that is cut between its rows.
+    """
+    size = np.maximum(high - low + 1, 0)
+    for chosen in _portions(size.prod(axis=1), chunk):
+        of, row = _counted(size[chosen, 1])
+        strip = chosen[of]
+        for part in _portions(size[strip, 0], chunk):
+            of, column = _counted(size[strip[part], 0])
+            face = strip[part][of]
+            yield face, column + low[face, 0], row[part][of] + low[face, 1]
+
+
+def _portions(count: np.ndarray, chunk: int) -> Iterator[np.ndarray]:
+    """Yields the indices of the positive counts in order, as many together as sum to about `chunk`."""
+    index = np.flatnonzero(count)
+    group = np.cumsum(count[index]) // chunk
+    if len(index):
+        yield from np.split(index, np.flatnonzero(np.diff(group)) + 1)
+
+
+def _counted(count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Index k repeated count[k] times, and the numbers 0 to count[k] - 1 beside it."""
+    index = np.repeat(np.arange(len(count)), count)
+    return index, np.arange(len(index)) - np.repeat(np.cumsum(count) - count, count)
 
 
 def _candidates(uv: np.ndarray, resolution: int) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Yields (face, texel, barycentric) of the texels in each face's bounding box and a ring around it."""
-    p = _texel_space(uv, resolution)
-    area = _twice_area(p)
+    p = texel_space(uv, resolution).astype(np.float32)
+    area = twice_area(p)
     low = np.clip(np.ceil(p.min(axis=1) - RING), 0, resolution - 1).astype(np.int64)
     high = np.clip(np.floor(p.max(axis=1) + RING), 0, resolution - 1).astype(np.int64)
-    size = np.where((np.abs(area) > 1e-7)[:, None], high - low + 1, 0)
-    count = size.prod(axis=1)
-    chunk = np.cumsum(count) // CHUNK
-    for k in np.unique(chunk[count > 0]):
-        chosen = np.flatnonzero((chunk == k) & (count > 0))
-        face = np.repeat(chosen, count[chosen])
-        start = np.cumsum(count[chosen]) - count[chosen]
-        offset = np.arange(len(face)) - np.repeat(start, count[chosen])
-        row, column = np.divmod(offset, size[face, 0])
-        column += low[face, 0]
-        row += low[face, 1]
-        # Affine in the texel: two gradients per face instead of three areas per texel.
-        origin, gradient = _barycentric_gradients(p, area)
+    high[np.abs(area) <= 1e-7] = -1
+    # Affine in the texel: two gradients per face instead of three areas per texel.
+    origin, gradient = barycentric_gradients(p, area)
+    for face, column, row in texels_in_boxes(low, high):
         dx = column.astype(np.float32) - origin[face, 0]
         dy = row.astype(np.float32) - origin[face, 1]
         b1 = gradient[face, 0] * dx + gradient[face, 1] * dy
@@ -200,8 +240,13 @@ def _candidates(uv: np.ndarray, resolution: int) -> Iterator[tuple[np.ndarray, n
         yield face, row * resolution + column, np.stack([1.0 - b1 - b2, b1, b2], axis=1)
 
 
-def _barycentric_gradients(p: np.ndarray, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """First corners (F, 2) and (F, 4) gradients (db1/dx, db1/dy, db2/dx, db2/dy)."""
+def barycentric_gradients(p: np.ndarray, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First corners (F, 2) and gradients (F, 4), (db1/dx, db1/dy, db2/dx, db2/dy), of triangles (F, 3, 2).
+
+    Args:
+        p: the triangles.
+        area: (F,) their `twice_area`.
+    """
     a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
     inverse = np.divide(1.0, area, out=np.zeros_like(area), where=area != 0)[:, None]
     return p[:, 0], np.stack([b[:, 1], -b[:, 0], -a[:, 1], a[:, 0]], axis=1) * inverse
@@ -214,7 +259,7 @@ def _rasterize(uv: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray,
     the nearest face linearly, which makes the lookup exact at the border; the continuation is limited to
     half an edge, for faces smaller than a texel.
     """
-    p = _texel_space(uv, resolution)
+    p = texel_space(uv, resolution).astype(np.float32)
     texels = resolution * resolution
     best = np.full(texels, np.inf, np.float32)
     face = np.full(texels, -1, np.int32)
@@ -238,7 +283,7 @@ def _distance(
     """Distance from texel centres to faces [texels], 0 inside, infinite when surely beyond the ring."""
     edge = p[:, [2, 0, 1]] - p[:, [1, 2, 0]]  # opposite to each corner
     length2 = np.maximum((edge**2).sum(axis=2), 1e-20)
-    height = np.abs(_twice_area(p))[:, None] / np.sqrt(length2)
+    height = np.abs(twice_area(p))[:, None] / np.sqrt(length2)
     outside = -(barycentric * height[face]).min(axis=1)
     distance = np.where(barycentric.min(axis=1) >= -1e-6, 0.0, np.inf).astype(np.float32)
     ring = np.flatnonzero((distance > 0) & (outside <= 1.5 * RING))

@@ -14,6 +14,7 @@ from torch.autograd.function import once_differentiable
 from mitex.errors import ConfigError
 from mitex.runtime import load_mitsuba
 from mitex.scenes.stage import Visibility, background_values
+from mitex.textures.field import Field
 
 mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
@@ -62,7 +63,7 @@ def render(
         scene: an `mi.Scene`.
         values: float32 CPU tensors by parameter name as in `mi.traverse(scene)` (the integrator's own are
             called `integrator.*` there, also when it is passed here), or one tensor if the scene has
-            exactly one `vertex_field`.
+            exactly one `vertex_field` or `texel_field`.
         sensor: index of a sensor of the scene, or an `mi.Sensor`; `batch` sensors put their views side by
             side.
         integrator: a `feature` integrator, if not the scene's.
@@ -161,10 +162,10 @@ def _found(table: Mapping[str, _Target], name: str) -> _Target:
 
 
 def _only_field(scene: Any, integrator: Any) -> _Target:
-    fields = {id(texture): texture for _, texture in integrator.fields(scene) if hasattr(texture, "locate")}
+    fields = {id(texture): texture for _, texture in integrator.fields(scene) if isinstance(texture, Field)}
     if len(fields) != 1:
         raise ConfigError(
-            f"the integrator images {len(fields)} vertex fields, not one",
+            f"the integrator images {len(fields)} fields, not one",
             "give tensors by parameter name, see mi.traverse(scene)",
         )
     return _Target(mi.traverse(next(iter(fields.values()))), "data", "field")

@@ -10,8 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mitex.atlas import Atlas
 from mitex.mesh import Mesh
 
+FLAT = (0.5, 0.5, 1.0)  # the normal map of an even surface
 MIN_Z = 0.05  # detail normals stay this far above the surface: maps cannot show an overhang
 
 
@@ -133,3 +135,20 @@ def split_at_seams(mesh: Mesh, uv: np.ndarray) -> Split:
         normals=normals.astype(np.float32),
         tangents=np.concatenate([orthonormal(summed, normals), handedness], axis=1).astype(np.float32),
     )
+
+
+def atlas_normals(mesh: Mesh, atlas: Atlas, detail: np.ndarray) -> np.ndarray:
+    """The normal map of an atlas.
+
+    Args:
+        mesh: the atlas' mesh.
+        atlas: the layout.
+        detail: (N, N, 3) detail normals in object space, of any length; anything where no chart is near.
+
+    Returns:
+        (N, N, 3) in [0, 1], in the frames of `split_at_seams`.
+    """
+    frames = split_at_seams(mesh, atlas.uv).corner_frames()
+    encoded = encode(unit(detail), *(unit(atlas.interpolate(v)) for v in frames))
+    encoded[atlas.face < 0] = FLAT
+    return encoded

@@ -190,7 +190,7 @@ def test_render_needs_one_field_and_a_feature_integrator(mi, field):
     with pytest.raises(ConfigError, match="not a `feature`"):
         render(empty, field)
     checks = {"type": "feature", "field": {"type": "checkerboard"}}
-    with pytest.raises(ConfigError, match="0 vertex fields"):
+    with pytest.raises(ConfigError, match="0 fields"):
         render(mi.load_dict({"type": "scene", "integrator": checks} | view), field)
 
 

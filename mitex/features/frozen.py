@@ -168,6 +168,8 @@ def _rows(x: torch.Tensor) -> torch.Tensor:
 
 
 def _flat(positions: torch.Tensor, x: torch.Tensor) -> torch.Tensor:
+    if x.ndim == 2:
+        return positions.reshape(-1)
     offsets = torch.arange(x.shape[0], device=x.device)[:, None] * (x.shape[2] * x.shape[3])
     return (positions + offsets).reshape(-1)
 

@@ -16,6 +16,7 @@ from mitex.runtime import bfloat16_is_fast
 BLOCKS = ((1, 2), (2, 2), (3, 3), (4, 3), (5, 3))  # (block, convolutions)
 LAYERS = tuple(f"relu{block}_{i}" for block, count in BLOCKS for i in range(1, count + 1))
 CHANNELS = {name: (64, 128, 256, 512, 512)[int(name[4]) - 1] for name in LAYERS}
+Weights = Mapping[str, tuple[torch.Tensor, torch.Tensor]]  # layer -> weight (O, I, 3, 3), bias (O,)
 MEAN_RGB = (123.68, 116.779, 103.939)  # of ImageNet, in [0, 255]
 
 
@@ -31,10 +32,16 @@ class Vgg16:
             free (moments, Gram) weigh the layers alike. Without it the published weights' means lie between
             0.1 and 120.
         device: where the weights live.
+        weights: layer -> weight, bias; None takes the package's.
     """
 
     def __init__(
-        self, pool: str = "average", precision: str = "auto", normalised: bool = True, device: str = "cpu"
+        self,
+        pool: str = "average",
+        precision: str = "auto",
+        normalised: bool = True,
+        device: str = "cpu",
+        weights: Weights | None = None,
     ) -> None:
         if pool not in ("average", "max"):
             raise ConfigError(f"unknown pooling {pool!r}", "use 'average' or 'max'")
@@ -46,7 +53,7 @@ class Vgg16:
         self.operations: list[FrozenConv | Pool] = []
         self.index: dict[str, int] = {}
         self._mean = torch.tensor(MEAN_RGB, device=device)
-        for name, (weight, bias) in convolutions(pool, normalised).items():
+        for name, (weight, bias) in (weights or convolutions(pool, normalised)).items():
             if name.endswith("_1") and name != "relu1_1":
                 self.operations.append(Pool(pool))
             # The first layer reads 3 channels: float32 costs nothing there and keeps the image exact.
@@ -124,7 +131,7 @@ class Vgg16:
                 raise ConfigError(f"positions outside the map of {name}", f"give indices below {places}")
 
 
-def convolutions(pool: str, normalised: bool) -> dict[str, tuple[torch.Tensor, torch.Tensor]]:
+def convolutions(pool: str, normalised: bool) -> Weights:
     """Layer -> weight (O, I, 3, 3) and bias (O,), float32, in order.
 
     Args:

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from mitex.runtime import load_mitsuba
+from mitex.textures.field import Field
 from mitex.textures.variant import for_variant
 
 mi: Any = load_mitsuba(needs_llvm=False)
@@ -19,8 +20,8 @@ class FeatureMethods:
 
      * - field
        - |texture|
-       - The texture to image, on every shape: all channels of a `vertex_field`; of any other the
-         colour that `eval` gives (3 channels in rgb variants, 1 in mono, not in spectral ones).
+       - The texture to image, on every shape: all channels of a `vertex_field` or `texel_field`; of
+         any other the colour that `eval` gives (3 channels in rgb variants, 1 in mono, not in spectral ones).
        - exposed, differentiable
      * - name
        - |string|
@@ -39,11 +40,11 @@ class FeatureMethods:
     The sensor's sampler and reconstruction filter are not used: the image is deterministic, the seed has no
     effect. The result is returned and not stored in the film, which has no room for C channels.
 
-    Visibility and barycentric weights are detached, lookups are attached: `mi.render` differentiates with
+    Visibility and the weights of a lookup are detached, lookups are attached: `mi.render` differentiates with
     respect to `data`, `scale`, `offset` (or any parameter of another texture) and `background`, not to
-    geometry or cameras. The adjoint scatters the image's gradient to the vertices with the barycentric
-    weights of the forward pass; no derivative passes through ray tracing or film. Calling `render` directly
-    with attached parameters returns an attached image.
+    geometry or cameras. The adjoint scatters the image's gradient to the vertices or texels with the weights
+    of the forward pass; no derivative passes through ray tracing or film. Calling `render` directly with
+    attached parameters returns an attached image.
     """
 
     def __init__(self, props: Any) -> None:
@@ -202,12 +203,12 @@ def textures_named(thing: Any, name: str) -> list[Any]:
 
 def _evaluate(texture: Any, si: Any, active: Any) -> list[Any]:
     """All channels of a Mitex field, else those of a colour."""
-    if hasattr(texture, "locate"):
+    if isinstance(texture, Field):
         with dr.suspend_grad():
             located = texture.locate(si, active)
         return texture.gather(located)
     if mi.is_spectral:
-        raise RuntimeError("feature: in spectral variants only a vertex_field can be imaged")
+        raise RuntimeError("feature: in spectral variants only a vertex_field or texel_field can be imaged")
     return list(texture.eval(si, active))
 
 

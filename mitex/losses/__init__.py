@@ -1,12 +1,13 @@
 """Losses on images, features and states: pure torch."""
 
-from mitex.losses.gram import gram_loss, gram_matrix
+from mitex.losses.gram import gram_distance, gram_loss, gram_matrix
 from mitex.losses.overflow import overflow_loss
 from mitex.losses.transport import channel_transport, decorrelate, moment_distance, relaxed_transport
 
 __all__ = [
     "channel_transport",
     "decorrelate",
+    "gram_distance",
     "gram_loss",
     "gram_matrix",
     "moment_distance",

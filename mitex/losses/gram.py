@@ -27,8 +27,17 @@ def gram_loss(
     Returns:
         Scalar, averaged over the K images.
     """
-    total = torch.zeros((), device=next(iter(features.values())).device)
+    return gram_distance({layer: gram_matrix(features[layer]) for layer in targets}, targets, weights)
+
+
+def gram_distance(
+    grams: Mapping[str, torch.Tensor],
+    targets: Mapping[str, torch.Tensor],
+    weights: Mapping[str, float] | None = None,
+) -> torch.Tensor:
+    """`gram_loss` of Gram matrices (..., C, C) that are known already."""
+    total = torch.zeros((), device=next(iter(grams.values())).device)
     for layer, target in targets.items():
         weight = 1.0 if weights is None else weights.get(layer, 1.0)
-        total = total + weight * (gram_matrix(features[layer]) - target).square().mean()
+        total = total + weight * (grams[layer] - target).square().mean()
     return total

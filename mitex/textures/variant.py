@@ -9,7 +9,10 @@ def for_variant(name: str, base: Any, methods: type) -> Any:
     """A class called `name` with Mitsuba's `base` of the current variant and the members of `methods`.
 
     Every variant has its own base classes, and they allow neither a second base nor another metaclass, so the
-    members are copied. They call the base as `mi.Texture.__init__(self, props)`, not through `super()`.
+    members are copied, inherited ones too. They call the base as `mi.Texture.__init__(self, props)`, not
+    through `super()`.
     """
-    members = {key: value for key, value in vars(methods).items() if key not in ("__dict__", "__weakref__")}
+    members: dict[str, Any] = {}
+    for cls in reversed(methods.__mro__[:-1]):  # without `object`
+        members |= {key: value for key, value in vars(cls).items() if key not in ("__dict__", "__weakref__")}
     return type(name, (base,), members)

@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from mitex.runtime import load_mitsuba
+from mitex.textures.field import FieldMethods, Located
 from mitex.textures.variant import for_variant
 
 mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 
-class VertexFieldMethods:
+class VertexFieldMethods(FieldMethods):
     """Values at the vertices of a mesh, interpolated linearly over each triangle.
 
     .. pluginparameters::
@@ -40,54 +41,29 @@ class VertexFieldMethods:
     where a triangle refers to a vertex beyond the data, it is `offset`. `eval` needs an rgb or mono variant.
 
     Barycentric weights: a mesh without UVs gives them exactly in `si.uv`. With UVs they are solved from
-        `si.p`
-    in the triangle, the way Mitsuba evaluates its own mesh attributes: `si.uv` cannot be inverted where the
-    UV map folds or is degenerate, and mesh attributes themselves hold only 1 or 3 channels. `si.p` is in
-    world space, so a mesh with UVs must not be placed through an `instance`.
+    `si.p` in the triangle, the way Mitsuba evaluates its own mesh attributes: `si.uv` cannot be inverted
+    where the UV map folds or is degenerate, and mesh attributes themselves hold only 1 or 3 channels. `si.p`
+    is in world space, so a mesh with UVs must not be placed through an `instance`.
 
-    Other Mitex code reads all channels: `locate` (geometry only) and `gather` (data only) are two steps, such
-        that
-    the first can be detached.
+    Other Mitex code reads all channels: it is a `mitex.textures.field.Field`.
     """
 
+    plugin = "vertex_field"
+
     def __init__(self, props: Any) -> None:
-        mi.Texture.__init__(self, props)
-        if not mi.variant().startswith(("llvm", "cuda")):
-            raise RuntimeError(
-                f"vertex_field: variant '{mi.variant()}' is not supported; use an llvm or cuda one"
-            )
-        self.data = mi.TensorXf(props["data"])
+        self._read(props)
         if self.data.ndim == 1:
             self.data = mi.TensorXf(self.data.array, (self.data.shape[0], 1))
-        self.channel = int(props.get("channel", 0))
-        self.scale = mi.Float(props.get("scale", 1.0))
-        self.offset = mi.Float(props.get("offset", 0.0))
-        self.raw = bool(props.get("raw", False))
         self._check()
 
-    @property
-    def channel_count(self) -> int:
-        """C, the number of channels of the data."""
-        return self.data.shape[1]
-
-    def traverse(self, callback: Any) -> None:
-        for name in ("data", "scale", "offset"):
-            callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
-
-    def parameters_changed(self, keys: Any = ()) -> None:
-        self._check()
-
-    def _check(self) -> None:
+    def _check_data(self) -> None:
         if self.data.ndim != 2 or 0 in self.data.shape:
             raise RuntimeError(f"vertex_field: 'data' has shape {self.data.shape}; give one of shape (V, C)")
-        if not 0 <= self.channel < self.channel_count:
-            raise RuntimeError(
-                f"vertex_field: 'channel' is {self.channel}; 'data' has 0 to {self.channel_count - 1}"
-            )
-        # A virtual function call cannot evaluate what it captures.
-        dr.eval(self.data)
 
-    def locate(self, si: Any, active: Any = True) -> tuple[Any, Any, Any]:
+    def _rows(self) -> Any:
+        return dr.arange(mi.UInt32, self.data.shape[0])
+
+    def locate(self, si: Any, active: Any = True) -> Located:
         """Vertices (3 indices) and barycentric weights (3) of the points `si`, and which have any."""
         mesh = mi.MeshPtr(si.shape)
         active = mi.Bool(active) & si.shape.is_mesh()
@@ -98,27 +74,7 @@ class VertexFieldMethods:
         u, v = _solve(e1, e2, d1, d2)
         has_uv = mesh.has_vertex_texcoords()
         u, v = dr.select(has_uv, u, si.uv.x), dr.select(has_uv, v, si.uv.y)
-        return index, (1 - u - v, u, v), active
-
-    def gather(self, located: tuple[Any, Any, Any], channels: range | None = None) -> list[Any]:
-        """Interpolated `scale * data + offset` of the channels (default: all), one Float each."""
-        index, weights, active = located
-        count = self.channel_count
-        values = []
-        for channel in range(count) if channels is None else channels:
-            corner = (dr.gather(mi.Float, self.data.array, count * i + channel, active) for i in index)
-            value = sum(w * c for w, c in zip(weights, corner, strict=True))
-            values.append(dr.fma(dr.select(active, value, 0), self.scale, self.offset))
-        return values
-
-    def eval(self, si: Any, active: Any = True) -> Any:
-        return self._color(self._three(si, active))
-
-    def eval_1(self, si: Any, active: Any = True) -> Any:
-        return self.gather(self.locate(si, active), range(self.channel, self.channel + 1))[0]
-
-    def eval_3(self, si: Any, active: Any = True) -> Any:
-        return self._three(si, active)
+        return tuple(index), (1 - u - v, u, v), active
 
     def eval_1_grad(self, si: Any, active: Any = True) -> Any:
         """Derivatives along `si.dp_du` and `si.dp_dv`: the interpolant's surface gradient, projected on each.
@@ -126,58 +82,16 @@ class VertexFieldMethods:
         On a mesh without UVs those two are an orthonormal frame and `si.uv` has other units, so differences
         of vertex values over `si.uv` would be wrong.
         """
-        index, _, active = self.locate(si, active)
+        located = self.locate(si, active)
+        index, _, active = located
         _, e1, e2 = _edges(mi.MeshPtr(si.shape), index, active)
-        corner = [
-            dr.gather(mi.Float, self.data.array, self.channel_count * i + self.channel, active) for i in index
-        ]
+        corner = self._row_values(located, self.channel)
         a, b = _solve(e1, e2, corner[1] - corner[0], corner[2] - corner[0])
         gradient = self.scale * dr.select(active, a * e1 + b * e2, 0)
         return mi.Vector2f(dr.dot(gradient, si.dp_du), dr.dot(gradient, si.dp_dv))
 
-    def mean(self) -> Any:
-        """Mean over the vertices of what `eval` returns."""
-        return dr.mean(dr.mean(self._vertex_colors()))
-
-    def max(self) -> float:
-        """Largest value at a vertex of what `eval` returns."""
-        return float(dr.max(dr.max(self._vertex_colors()))[0])
-
-    def is_spatially_varying(self) -> bool:
-        return True
-
     def to_string(self) -> str:
-        vertices, channels = self.data.shape
-        return (
-            f"VertexField[\n  vertices = {vertices},\n  channels = {channels},\n  channel = {self.channel},\n"
-            f"  scale = {self.scale},\n  offset = {self.offset},\n  raw = {str(self.raw).lower()}\n]"
-        )
-
-    def _selection(self) -> range:
-        """Channels that a colour is made of."""
-        enough = self.channel + 3 <= self.channel_count
-        return range(self.channel, self.channel + (3 if enough else 1))
-
-    def _three(self, si: Any, active: Any) -> Any:
-        values = self.gather(self.locate(si, active), self._selection())
-        return mi.Color3f(*values) if len(values) == 3 else mi.Color3f(values[0])
-
-    def _color(self, rgb: Any) -> Any:
-        if mi.is_spectral:
-            raise RuntimeError(
-                "vertex_field: colours need an rgb or mono variant; roughness and normals work in any"
-            )
-        if not self.raw:
-            rgb = mi.math.srgb_to_linear(dr.clip(rgb, 0, 1))
-        return mi.Color1f(mi.luminance(rgb)) if mi.is_monochromatic else rgb
-
-    def _vertex_colors(self) -> Any:
-        row = dr.arange(mi.UInt32, self.data.shape[0]) * self.channel_count
-        values = [
-            dr.fma(dr.gather(mi.Float, self.data.array, row + c), self.scale, self.offset)
-            for c in self._selection()
-        ]
-        return self._color(mi.Color3f(*values) if len(values) == 3 else mi.Color3f(values[0]))
+        return self._description("VertexField", vertices=self.data.shape[0], channels=self.channel_count)
 
 
 def _edges(mesh: Any, index: Any, active: Any) -> tuple[Any, Any, Any]:

@@ -2,7 +2,9 @@
 
 import importlib.util
 from pathlib import Path
+from types import ModuleType
 
+import numpy as np
 import pytest
 
 from mitex.images import read_image
@@ -10,11 +12,16 @@ from mitex.images import read_image
 SCRIPTS = Path(__file__).parents[2] / "scenes"
 
 
-def test_vertex_field_script(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    spec = importlib.util.spec_from_file_location("vertex_field_script", SCRIPTS / "vertex_field.py")
+def load(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"{name}_script", SCRIPTS / f"{name}.py")
     assert spec is not None and spec.loader is not None
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
+    return script
+
+
+def test_vertex_field_script(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    script = load("vertex_field")
     monkeypatch.setattr(script, "ROUND", 96)
     monkeypatch.setattr(script, "ACROSS", 48)
     script.main(str(tmp_path / "ring.png"), spp=1)
@@ -29,3 +36,21 @@ def test_vertex_field_script(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     cool = color[ring][:, 2] > 1.5 * color[ring][:, 0]
     assert warm.mean() > 0.2 and cool.mean() > 0.2
     assert 0.2 < traced[~ring].mean() < 0.8  # the lit floor
+
+
+def test_texel_field_script(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    script = load("texel_field")
+    monkeypatch.setattr(script, "RESOLUTION", 256)
+    script.main(str(tmp_path / "vase.png"), spp=4)
+
+    picture = read_image(tmp_path / "vase.png")
+    assert picture.shape == (480, 800, 3)
+    traced, charts = picture[:, :400], picture[:, 400:]
+    vase = charts.max(axis=-1) > 0
+    assert 0.1 < vase.mean() < 0.6
+    # One colour for each chart and blends only at borders: samples of a pixel mix there, texels never do.
+    _, count = np.unique((255 * charts[vase]).round(), axis=0, return_counts=True)
+    assert np.sort(count)[-25:].sum() > 0.9 * vase.sum()
+    warm = traced[vase][:, 0] > 1.5 * traced[vase][:, 2]
+    cool = traced[vase][:, 2] > 1.5 * traced[vase][:, 0]
+    assert warm.mean() > 0.15 and cool.mean() > 0.1

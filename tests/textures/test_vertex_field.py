@@ -4,47 +4,13 @@ import numpy as np
 import pytest
 
 from mitex.colour import srgb_to_linear
-from mitex.mesh import icosphere
-from mitex.scenes.stage import mesh_shape
+from tests.textures.helpers import QUAD, quad, radiance, sphere_picture
 
-QUAD = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32)
 QUAD_UV = np.array([(0.1, 0), (0.7, 0.2), (0.5, 0.9), (0.2, 0.8)], np.float32)  # skewed on purpose
-FACES = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
-
-
-def quad(mi, bsdf: dict, uv: np.ndarray | None = None):
-    """A quad in the xy plane that faces +z."""
-    props = mi.Properties()
-    props["bsdf"] = mi.load_dict(bsdf)
-    shape = mi.Mesh("quad", 4, 2, props, has_vertex_texcoords=uv is not None)
-    params = mi.traverse(shape)
-    params["vertex_positions"] = QUAD.ravel()
-    params["faces"] = FACES.ravel()
-    if uv is not None:
-        params["vertex_texcoords"] = uv.ravel()
-    params.update()
-    return shape
 
 
 def field(mi, data: np.ndarray, **options) -> dict:
     return {"type": "vertex_field", "data": mi.TensorXf(np.asarray(data, np.float32))} | options
-
-
-def radiance(mi, shape, x: np.ndarray, y: np.ndarray, light=(0.0, 0.0, -1.0)) -> np.ndarray:
-    """(N, 3) exact radiance towards +z of points of a shape under a directional light of irradiance pi."""
-    emitter = {"type": "directional", "direction": list(light), "irradiance": {"type": "rgb", "value": np.pi}}
-    scene = mi.load_dict({"type": "scene", "shape": shape, "light": emitter})
-    sampler = mi.load_dict({"type": "independent"})
-    sampler.seed(0, len(x))
-    origin = mi.Point3f(mi.Float(x), mi.Float(y), 3.0)
-    ray = mi.RayDifferential3f(mi.Ray3f(origin, mi.Vector3f(0, 0, -1)))
-    value, _, _ = mi.load_dict({"type": "direct"}).sample(scene, sampler, ray)
-    return np.array(value).T
-
-
-@pytest.fixture
-def points(rng) -> tuple[np.ndarray, np.ndarray]:
-    return tuple(rng.uniform(-0.95, 0.95, (2, 50)).astype(np.float32))
 
 
 @pytest.mark.parametrize("uv", [None, QUAD_UV, np.zeros_like(QUAD_UV)], ids=["none", "skewed", "degenerate"])
@@ -119,16 +85,6 @@ def test_normal_map_tilts_the_normal(mi, points):
     flat = plain_cosine | {"normalmap": field(mi, np.full((4, 3), (0.5, 0.5, 1.0)))}
     plain = radiance(mi, quad(mi, nested), *points, light=tuple(light))
     np.testing.assert_allclose(radiance(mi, quad(mi, flat), *points, light=tuple(light)), plain, atol=1e-5)
-
-
-def sphere_picture(mi, bsdf: dict) -> np.ndarray:
-    to_world = mi.ScalarTransform4f().look_at(origin=[1, 2, 4], target=[0, 0, 0], up=[0, 1, 0])
-    film = {"type": "hdrfilm", "width": 16, "height": 16}
-    sensor = {"type": "perspective", "fov": 28, "to_world": to_world, "film": film}
-    light = {"type": "point", "position": [3, 4, 5], "intensity": 40.0}
-    ball = mesh_shape(icosphere(4), mi.load_dict(bsdf))
-    scene = {"type": "scene", "integrator": {"type": "path"}, "sensor": sensor, "light": light, "ball": ball}
-    return np.array(mi.render(mi.load_dict(scene), spp=4))
 
 
 def test_constant_field_equals_a_constant(mi):

@@ -77,7 +77,7 @@ class NcaConfig:
     samples: int = 1024
     colour_weight: float = 1.0
     colour_histogram: bool = False
-    moment_weight: float = 1.0
+    moment_weight: float = 0.1
     appearance_weight: float = 2.0
     overflow_weight: float = 1e4
     lr: float = 1e-3
@@ -138,7 +138,6 @@ PRESETS = {
         blend=True,
         colour_weight=10.0,
         colour_histogram=True,
-        moment_weight=0.1,
         milestones=(750, 900),
     ),
     "paper": NcaConfig(steps=4000, preset="paper"),

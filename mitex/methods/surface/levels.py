@@ -8,8 +8,11 @@ surface are near in memory.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+
+from mitex.methods.surface.operations import Neighbourhood
 
 POOLS = 5  # of VGG
 
@@ -27,6 +30,11 @@ class Level:
     taps: np.ndarray
     sizes: np.ndarray
 
+    @cached_property
+    def neighbourhood(self) -> Neighbourhood:
+        """The taps and their transpose."""
+        return Neighbourhood.of(self.taps)
+
 
 @dataclass(frozen=True, eq=False)
 class Levels:
@@ -35,7 +43,7 @@ class Levels:
     Attributes:
         order: (N,) int32, the number in `Texels` of each element of level 0.
         index, weight: (N, 9, 4) int32 and float32, the bilinear taps of the first convolution.
-        levels: `POOLS` of them, level 0 first.
+        levels: level 0 first; `POOLS` of them, and more if coarser scales of the texture are looked at.
     """
 
     order: np.ndarray

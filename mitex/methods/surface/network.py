@@ -1,174 +1,23 @@
-"""VGG-16 on a surface: the weights of the image network, the neighbourhoods of the levels.
-
-A convolution gathers the nine elements of its taps and multiplies; the gradient with respect to its input is
-the same with the adjoint weights, gathering for each element and tap the gradients of whoever read it there.
-Both work in chunks small enough for the cache, so that the nine-fold map never exists.
-"""
+"""VGG-16 on a surface: the weights of the image network, the neighbourhoods of the levels."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse
 import torch
-import torch.nn.functional as F
 
 from mitex.errors import ConfigError
 from mitex.features.frozen import FrozenStack, GramTap, Operation, Tap
-from mitex.features.vgg import LAYERS, MEAN_RGB, convolutions
+from mitex.features.vgg import LAYERS, MEAN_RGB, Weights, convolutions
 from mitex.methods.surface.levels import Levels
+from mitex.methods.surface.operations import BilinearConv, SurfaceConv, SurfacePool
 from mitex.runtime import bfloat16_is_fast
-from mitex.sparse import csr_tensor
 
-CHUNK = 1 << 20  # gathered values that are multiplied at a time
 POOLED = tuple(f"pool{n}" for n in range(1, 6))
-
-
-@dataclass(frozen=True, eq=False)
-class Neighbourhood:
-    """The taps of a level and their transpose.
-
-    Slot 9 j + k stands for element j being read through tap k. Most slots have one reader; those without one,
-    and the further readers of the others, are listed.
-
-    Attributes:
-        taps: (n, 9), whom element i reads through tap k.
-        reader: (n, 9), who reads element j through tap k.
-        empty: (e,) slots without a reader, ascending.
-        slot, further: (d,) slots, ascending, and their second, third, ... readers.
-    """
-
-    taps: torch.Tensor
-    reader: torch.Tensor
-    empty: torch.Tensor
-    slot: torch.Tensor
-    further: torch.Tensor
-
-    @staticmethod
-    def of(taps: np.ndarray) -> Neighbourhood:
-        slots = (taps.astype(np.int64) * 9 + np.arange(9)).ravel()
-        ranked = np.argsort(slots, kind="stable")
-        slots, readers = slots[ranked], (ranked // 9).astype(np.int32)
-        first = np.concatenate([[True], slots[1:] != slots[:-1]])
-        reader = np.full(taps.size, -1, np.int32)
-        reader[slots[first]] = readers[first]
-        empty = np.flatnonzero(reader < 0)
-        reader[empty] = 0
-        arrays = (taps.astype(np.int32), reader.reshape(-1, 9), empty, slots[~first], readers[~first])
-        return Neighbourhood(*(torch.from_numpy(np.ascontiguousarray(a)) for a in arrays))
-
-
-class SurfaceConv:
-    """A 3 x 3 convolution with bias and ReLU of values (n, I) on the elements of a level (equation 2).
-
-    Args:
-        weight: (O, I, 3, 3).
-        bias: (O,).
-        dtype: of the values.
-        around: whom each element reads.
-    """
-
-    needs_input = False
-
-    def __init__(
-        self, weight: torch.Tensor, bias: torch.Tensor, dtype: torch.dtype, around: Neighbourhood
-    ) -> None:
-        outputs, inputs = weight.shape[:2]
-        self.weight = weight.permute(2, 3, 1, 0).reshape(9 * inputs, outputs).to(dtype)
-        self.adjoint = weight.permute(2, 3, 0, 1).reshape(9 * outputs, inputs).to(dtype)
-        self.bias, self.around = bias.to(dtype), around
-        self.rows, self.back_rows = _rows(inputs), _rows(outputs)
-        # Where the chunks of the backward pass begin in the lists of irregular slots.
-        starts = 9 * torch.arange(0, len(around.taps) + self.back_rows, self.back_rows)
-        self.starts = [torch.searchsorted(slots, starts).tolist() for slots in (around.empty, around.slot)]
-
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        out = x.new_empty(len(x), len(self.bias))
-        for into, which in zip(out.split(self.rows), self.around.taps.split(self.rows), strict=True):
-            gathered = x.index_select(0, which.view(-1)).view(len(which), -1)
-            torch.addmm(self.bias, gathered, self.weight, out=into)
-            into.relu_()
-        return out
-
-    def backward(self, gradient: torch.Tensor, known: torch.Tensor) -> torch.Tensor:
-        torch.ops.aten.threshold_backward.grad_input(gradient, known, 0, grad_input=gradient)
-        around = self.around
-        out = gradient.new_empty(len(gradient), self.adjoint.shape[1])
-        for k, into in enumerate(out.split(self.back_rows)):
-            start = k * self.back_rows
-            gathered = gradient.index_select(0, around.reader[start : start + self.back_rows].view(-1))
-            empty, more = (slice(s[k], s[k + 1]) for s in self.starts)
-            gathered.index_fill_(0, around.empty[empty] - 9 * start, 0)
-            further = gradient.index_select(0, around.further[more])
-            gathered.index_add_(0, around.slot[more] - 9 * start, further)
-            torch.mm(gathered.view(len(into), -1), self.adjoint, out=into)
-        return out
-
-
-class BilinearConv:
-    """The first convolution: its taps interpolate the texels (section 3.1); float32 in, `kept` out.
-
-    Args:
-        weight, bias: as in `SurfaceConv`.
-        kept: dtype of the output.
-        index, share: (n, 9, k) elements that each tap reads, and their shares.
-    """
-
-    needs_input = False
-
-    def __init__(
-        self,
-        weight: torch.Tensor,
-        bias: torch.Tensor,
-        kept: torch.dtype,
-        index: np.ndarray,
-        share: np.ndarray,
-    ) -> None:
-        self.weight, self.bias, self.kept = weight.permute(0, 2, 3, 1).flatten(1), bias, kept
-        count, used = len(index), share.ravel() > 0
-        rows = np.repeat(np.arange(9 * count, dtype=np.int32), index.shape[2])[used]
-        entries = share.ravel()[used], (rows, index.ravel()[used])
-        matrix = scipy.sparse.csr_array(entries, shape=(9 * count, count))
-        self.matrix, self.adjoint = csr_tensor(matrix), csr_tensor(matrix.T.tocsr())
-
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        taps = (self.matrix @ x).view(len(x), -1)
-        return F.linear(taps, self.weight, self.bias).relu_().to(self.kept)
-
-    def backward(self, gradient: torch.Tensor, known: torch.Tensor) -> torch.Tensor:
-        torch.ops.aten.threshold_backward.grad_input(gradient, known, 0, grad_input=gradient)
-        taps = gradient.float() @ self.weight
-        return self.adjoint @ taps.view(9 * len(taps), -1)
-
-
-class SurfacePool:
-    """Pooling (n, C) -> (m, C) over successive elements, `sizes` (m,) of them each (section 3.2)."""
-
-    needs_input = True
-
-    def __init__(self, kind: str, sizes: np.ndarray) -> None:
-        self.kind = kind
-        self.sizes = torch.from_numpy(sizes.astype(np.int64))
-        self.parent = torch.repeat_interleave(self.sizes)
-        share = (1.0 / sizes).astype(np.float32).repeat(sizes)
-        ends = np.concatenate([[0], np.cumsum(sizes)])
-        shape = (len(sizes), len(share))
-        self.mean = csr_tensor(scipy.sparse.csr_array((share, np.arange(len(share)), ends), shape=shape))
-        self.share = torch.from_numpy(share)[:, None]
-
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        if self.kind == "average":
-            return (self.mean @ x.float()).to(x.dtype)
-        return torch.segment_reduce(x.float(), "max", lengths=self.sizes).to(x.dtype)
-
-    def backward(self, gradient: torch.Tensor, known: torch.Tensor) -> torch.Tensor:
-        if self.kind == "average":
-            return gradient.index_select(0, self.parent).mul_(self.share.to(gradient.dtype))
-        best = known == self.forward(known).index_select(0, self.parent)
-        equals = (self.mean @ best.float()) * self.sizes[:, None]  # a draw is shared
-        return (gradient / equals).to(gradient.dtype).index_select(0, self.parent).mul_(best)
+ALL_LAYERS = tuple(  # in the order in which they are computed
+    name for n in range(1, 6) for name in (*(x for x in LAYERS if x.startswith(f"relu{n}_")), f"pool{n}")
+)
 
 
 class SurfaceVgg:
@@ -178,8 +27,8 @@ class SurfaceVgg:
         levels: of the surface.
         pool: "average" or "max".
         precision: "bfloat16", "float32", or "auto": bfloat16 where the CPU multiplies it natively.
-        normalised: as in `Vgg16`, with which features are compared.
         bilinear: False makes the first convolution read nearest texels too (an ablation).
+        scale: the image is the texels pooled so many times; the first convolution then reads nearest ones.
         weights: layer -> weight, bias; None takes the package's (random ones are an ablation).
     """
 
@@ -188,26 +37,28 @@ class SurfaceVgg:
         levels: Levels,
         pool: str = "average",
         precision: str = "auto",
-        normalised: bool = True,
         bilinear: bool = True,
-        weights: dict[str, tuple[torch.Tensor, torch.Tensor]] | None = None,
+        scale: int = 0,
+        weights: Weights | None = None,
     ) -> None:
         fast = precision == "bfloat16" or (precision == "auto" and bfloat16_is_fast())
         self.dtype = torch.bfloat16 if fast else torch.float32
         self.texels = len(levels.order)
         self.operations: list[Operation] = []
         self.index: dict[str, int] = {}
-        layers = convolutions(pool, normalised) if weights is None else weights
-        for n, level in enumerate(levels.levels):
-            around = Neighbourhood.of(level.taps)
+        layers = convolutions(pool, normalised=False) if weights is None else weights
+        for level in levels.levels[:scale]:
+            self.operations.append(SurfacePool("average", level.sizes))
+        for n, level in enumerate(levels.levels[scale : scale + len(POOLED)]):
+            around = level.neighbourhood
             for name in (name for name in LAYERS if name.startswith(f"relu{n + 1}_")):
-                if name == "relu1_1":
-                    index, share = levels.index, levels.weight
-                    if not bilinear:
-                        index, share = level.taps[:, :, None], np.ones((*level.taps.shape, 1), np.float32)
-                    self._append(name, BilinearConv(*layers[name], self.dtype, index, share))
-                else:
+                if name != "relu1_1":
                     self._append(name, SurfaceConv(*layers[name], self.dtype, around))
+                    continue
+                index, share = levels.index, levels.weight
+                if scale or not bilinear:
+                    index, share = level.taps[:, :, None], np.ones((*level.taps.shape, 1), np.float32)
+                self._append(name, BilinearConv(*layers[name], self.dtype, index, share))
             self._append(POOLED[n], SurfacePool(pool, level.sizes))
 
     def features(self, texels: torch.Tensor, layers: Iterable[str]) -> dict[str, torch.Tensor]:
@@ -236,7 +87,3 @@ class SurfaceVgg:
         depth = max(tap.index for tap in chosen) + 1
         centred = texels * 255 - torch.tensor(MEAN_RGB)
         return dict(zip(taps, FrozenStack.apply(centred, self.operations[:depth], chosen), strict=True))
-
-
-def _rows(channels: int) -> int:
-    return max(CHUNK // (9 * channels), 64)

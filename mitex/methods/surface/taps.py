@@ -56,24 +56,24 @@ class Surroundings:
         return index, weight, end.arrived
 
 
-def build(around: Surroundings) -> Levels:
-    """Finds taps and groups of all levels by geodesics.
+def build(around: Surroundings, count: int = POOLS) -> Levels:
+    """Finds taps and groups of `count` levels by geodesics.
 
     Linear in texels but for sorting.
     """
     texels = around.texels
     index, weight = _bilinear_taps(around)
     edges = _texel_graph(index, weight)
-    labels = _groups(texels, edges)
+    labels = _groups(texels, edges, count)
     order = np.lexsort(labels).astype(np.int32)
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order), dtype=np.int32)
     labels = [_renumbered(label[order]) for label in labels]
     index, weight, edges = rank[index[order]], weight[order], rank[edges]
     taps = [np.take_along_axis(index, np.argmax(weight, axis=2, keepdims=True), 2)[:, :, 0]]
-    taps += [_group_taps(around, order, rank, labels[n], edges, n) for n in range(1, POOLS)]
+    taps += [_group_taps(around, order, rank, labels[n], edges, n) for n in range(1, count)]
     levels = []
-    for n in range(POOLS):
+    for n in range(count):
         first = np.concatenate([[True], labels[n][1:] != labels[n][:-1]])
         levels.append(Level(taps[n], np.bincount(labels[n + 1][first]).astype(np.int32)))
     return Levels(order, index, weight, tuple(levels))
@@ -109,8 +109,8 @@ def _texel_graph(index: np.ndarray, weight: np.ndarray) -> np.ndarray:
     return np.stack([first, second], 1)[first != second]
 
 
-def _groups(texels: Texels, edges: np.ndarray) -> list[np.ndarray]:
-    """Labels (N,) of the texels' groups in levels 0 to `POOLS` (section 3.2).
+def _groups(texels: Texels, edges: np.ndarray, depth: int) -> list[np.ndarray]:
+    """Labels (N,) of the texels' groups in levels 0 to `depth` (section 3.2).
 
     A group holds the texels of a voxel of side 2^n s that are connected within it.
     """
@@ -118,7 +118,7 @@ def _groups(texels: Texels, edges: np.ndarray) -> list[np.ndarray]:
     # The lowest texel centres are half a texel inside; the rest keeps rounding away from the voxels' walls.
     offset = (texels.position - texels.position.min(0)) / texels.size + (0.5 - 1e-3)
     labels = [np.arange(count)]
-    for n in range(1, POOLS + 1):
+    for n in range(1, depth + 1):
         voxel = np.floor(offset / 2**n).astype(np.int64)
         key = np.ravel_multi_index(tuple(voxel.T), tuple(voxel.max(0) + 1))
         inside = edges[key[edges[:, 0]] == key[edges[:, 1]]]
@@ -185,7 +185,7 @@ def _reached(
         found = group[index]
         if related is not None:
             weight = np.where(related(searching[:, None], found), weight, 0.0)
-        best = np.argmax(weight, axis=1, keepdims=True)
+        best = np.asarray(weight).argmax(1)[:, None]
         hit = arrived & (np.take_along_axis(weight, best, 1)[:, 0] > 0)
         reached[searching[hit]] = np.take_along_axis(found, best, 1)[hit, 0]
         searching = searching[arrived & ~hit]

@@ -7,9 +7,10 @@ import torch
 from mitex.errors import ConfigError
 from mitex.features import Vgg16
 from mitex.features.vgg import LAYERS, convolutions
-from mitex.methods.surface import network as room
+from mitex.methods.surface import operations as room
 from mitex.methods.surface.levels import Level
-from mitex.methods.surface.network import Neighbourhood, SurfaceConv, SurfacePool, SurfaceVgg
+from mitex.methods.surface.network import SurfaceVgg
+from mitex.methods.surface.operations import Neighbourhood, SurfaceConv, SurfacePool
 from tests.methods.surface.grids import grid_levels
 
 SIDE = 224
@@ -41,7 +42,7 @@ def as_image(levels, values, layer):
 def test_every_layer_equals_the_image_network_on_a_grid(levels, image, pool):
     ours = SurfaceVgg(levels, pool=pool, precision="float32")
     features = ours.features(image.view(-1, 3)[levels.order], LAYERS)
-    expected = Vgg16(pool=pool, precision="float32").features(image[None], LAYERS)
+    expected = Vgg16(pool=pool, precision="float32", normalised=False).features(image[None], LAYERS)
     for layer in LAYERS:
         inner = slice(MARGIN[int(layer[4])], -MARGIN[int(layer[4])])
         a = as_image(levels, features[layer], layer)[inner, inner]
@@ -51,7 +52,7 @@ def test_every_layer_equals_the_image_network_on_a_grid(levels, image, pool):
 
 def test_input_gradient_equals_the_image_networks(levels, image):
     """Of the centre of each layer, in float32."""
-    ours, theirs = SurfaceVgg(levels, precision="float32"), Vgg16(precision="float32")
+    ours, theirs = SurfaceVgg(levels, precision="float32"), Vgg16(precision="float32", normalised=False)
     generator = torch.Generator().manual_seed(1)
     for layer in ("relu1_1", "relu1_2", "relu2_2", "relu3_3", "relu4_3"):
         texels = image.view(-1, 3)[levels.order].clone().requires_grad_()

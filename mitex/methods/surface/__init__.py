@@ -1,0 +1,1 @@
+"""Surface-aware mesh texture synthesis (Kovacs, Hermosilla and Raidou 2024)."""

@@ -1,0 +1,100 @@
+"""Settings of the surface texture synthesis, and its presets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mitex.errors import ConfigError
+from mitex.methods.surface.network import ALL_LAYERS
+from mitex.training import check_ranges
+
+FRAMES = ("smooth", "fixed")
+LOSSES = ("gram", "transport")
+WEIGHTS = ("vgg16", "random")
+
+
+@dataclass(frozen=True)
+class SurfaceConfig:
+    """Everything that shapes a synthesis; every key can be set from a TOML file or `--set`.
+
+    Attributes:
+        steps, seed, preset: as in every method.
+        resolution: side of the texture [texels].
+        exemplar_size: the exemplar's central square is resized to it [px]; a pixel becomes a texel.
+        frames: "fixed" (the paper: Gram-Schmidt with a fixed vector) or "smooth" (least turning).
+        angle: turns the texture about the normals, counter-clockwise from outside [degrees].
+        correct: walk geodesics back that overshoot (figure 3).
+        bilinear: the first convolution interpolates the texels; False: it reads the nearest ones.
+        weights: "vgg16", or "random" ones (the ablation of figure 5).
+        pooling: "average" or "max".
+        layers: that are compared; VGG's convolutions and poolings.
+        loss: "gram" (the paper) or "transport" (relaxed optimal transport with moments).
+        samples: feature vectors compared in each layer by "transport".
+        scales: how many coarser pyramids of texels are matched first, each half as fine.
+        coarse_share: of the steps, spent on the coarser scales together.
+        pictures: views of the maps compared in a step, when the exemplar has several maps.
+        noise: the texture starts uniform in [0, noise].
+        lr, milestones, decay: Adam and its schedule.
+        checkpoint_every, preview_every: in steps.
+    """
+
+    steps: int
+    preset: str
+    seed: int = 0
+    resolution: int = 512
+    exemplar_size: int = 256
+    frames: str = "smooth"
+    angle: float = 0.0
+    correct: bool = True
+    bilinear: bool = True
+    weights: str = "vgg16"
+    pooling: str = "average"
+    layers: tuple[str, ...] = ALL_LAYERS
+    loss: str = "gram"
+    samples: int = 1024
+    scales: int = 0
+    coarse_share: float = 0.4
+    pictures: int = 2
+    noise: float = 0.2
+    lr: float = 0.1
+    milestones: tuple[int, ...] = (200, 400)
+    decay: float = 0.5
+    checkpoint_every: int = 50
+    preview_every: int = 50
+
+    def __post_init__(self) -> None:
+        check_ranges(
+            self,
+            steps=(1, None),
+            seed=(0, 2**63 - 1),
+            resolution=(1, 4096),
+            exemplar_size=(32, 2048),
+            angle=(-360, 360),
+            samples=(1, None),
+            scales=(0, 3),
+            coarse_share=(0, 0.95),
+            pictures=(1, 16),
+            noise=(0, 1),
+            lr=(0, None),
+            decay=(0, None),
+            checkpoint_every=(1, None),
+            preview_every=(0, None),
+        )
+        choices = {
+            "frames": FRAMES,
+            "weights": WEIGHTS,
+            "pooling": ("average", "max"),
+            "loss": LOSSES,
+        }
+        for key, allowed in choices.items():
+            if getattr(self, key) not in allowed:
+                raise ConfigError(f"{key} = '{getattr(self, key)}' is unknown", f"use {' or '.join(allowed)}")
+        unknown = [layer for layer in self.layers if layer not in ALL_LAYERS]
+        if unknown or not self.layers:
+            raise ConfigError(f"layers holds {unknown or 'nothing'}", f"use some of {', '.join(ALL_LAYERS)}")
+
+
+PRESETS = {
+    "fast": SurfaceConfig(steps=300, preset="fast", scales=2, milestones=(180, 250)),
+    "paper": SurfaceConfig(steps=500, preset="paper", frames="fixed", exemplar_size=512),
+}

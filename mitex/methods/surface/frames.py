@@ -1,0 +1,200 @@
+"""Where an exemplar's right and up point on the surface (Kovacs et al. 2024, section 3.1, "Tangent Frame").
+
+The paper takes a fixed vector w and, by Gram-Schmidt, what of it lies across the normal, or another vector w'
+where the two are parallel. It allows for smoother frames: "smooth" is a direction field that follows w where
+w says something and is as parallel as possible elsewhere, in the manner of Knoppel, Crane, Pinkall and
+Schroder, "Globally optimal direction fields" (2013): complex numbers in the vertices' tangent planes, and a
+sparse linear system. The authors' frames are left-handed seen from outside, which mirrors the exemplar; here
+right x up is the outward normal.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mitex.errors import ConfigError
+from mitex.frames import orthonormal
+from mitex.mesh import Mesh
+from mitex.mesh.topology import mesh_edges
+
+KINDS = ("fixed", "smooth")
+UP = np.array([0.0, 1.0, 0.0])  # w: image up
+SPARE_UP = np.array([0.0, 0.0, -1.0])  # w', image up where the surface is level: seen from above, right is +x
+PARALLEL = 1e-3  # w' where 1 - |cos| of the angle between normal and w is smaller, 2.6 degrees
+FIDELITY = 100.0  # pull to the fixed field against smoothness; directions adapt over 0.13 sqrt(area)
+LEVEL_PULL = 0.05  # how strongly level places are pulled to w', relative to upright ones to w
+FOLD = 1e-6  # 1 + cos between normals: nothing is carried over edges folded onto themselves
+FAINT = 1e-6  # vectors shorter than that have no direction
+
+
+def tangent_frames(
+    mesh: Mesh,
+    face: np.ndarray,
+    barycentric: np.ndarray,
+    kind: str = "smooth",
+    angle: float = 0.0,
+    field: np.ndarray | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The exemplar's right and up at points of the surface.
+
+    Directions of the vertices are interpolated, projected onto the plane of the flat face, and normalised;
+    where they cancel, any direction across the normal is taken, always the same.
+
+    Args:
+        mesh: V vertices, F faces.
+        face: (M,) the faces that the points lie on.
+        barycentric: (M, 3) where on them.
+        kind: "fixed", as in the paper: right is y x normal. "smooth": alike where the surface is upright,
+            smooth elsewhere.
+        angle: turns both counter-clockwise seen from outside [rad].
+        field: (V, 3) where right should point, of any length and direction, in place of `kind`. Where it is
+            zero or along the normal, the fixed frame is taken.
+
+    Returns:
+        Right and up, (M, 3) float64 each, orthonormal, across the face's normal; right x up is the outward
+        normal. Faces without an area have frames across +z.
+
+    Raises:
+        ConfigError: unknown kind; a field that does not fit or is not finite; an angle that is not finite.
+    """
+    if not np.isfinite(angle):
+        raise ConfigError(f"an orientation of {angle}", "give an angle in radians")
+    directions = vertex_directions(mesh, kind, field)
+    face = np.asarray(face)
+    normal = face_normals(mesh)[face]
+    right = np.zeros((len(face), 3))
+    for k in range(3):
+        right += np.asarray(barycentric)[:, k, None] * directions[mesh.faces[face, k]]
+    right = orthonormal(_without_faint(right), normal)
+    up = np.cross(normal, right)
+    cos, sin = np.cos(angle), np.sin(angle)
+    return cos * right + sin * up, cos * up - sin * right
+
+
+def vertex_directions(mesh: Mesh, kind: str = "smooth", field: np.ndarray | None = None) -> np.ndarray:
+    """(V, 3) float64 unit vectors across the vertex normals: where right points; see `tangent_frames`.
+
+    Vertices at one place have one normal and one direction.
+    """
+    if kind not in KINDS:
+        raise ConfigError(f"unknown tangent frames {kind!r}", f"use one of {', '.join(KINDS)}")
+    place = welded(mesh)
+    corners = place[mesh.faces]
+    count = int(place.max(initial=-1)) + 1
+    normals = _unit(_summed(corners.ravel(), np.repeat(mesh.face_crosses, 3, axis=0), count))
+    directions = _fixed(normals)
+    if field is not None:
+        wanted = _summed(place, _checked(field, len(place)), count)
+        wanted = _without_faint(_across(wanted, normals))
+        directions = np.where(wanted.any(axis=1, keepdims=True), orthonormal(wanted, normals), directions)
+    elif kind == "smooth":
+        areas = np.linalg.norm(mesh.face_crosses, axis=1) / 6.0
+        share = np.bincount(corners.ravel(), np.repeat(areas, 3), count)
+        directions = _smooth(normals, share, mesh_edges(corners, count)[0], directions)
+    return directions[place]
+
+
+def face_normals(mesh: Mesh) -> np.ndarray:
+    """(F, 3) float64 unit normals; +z where a face has no area."""
+    return _unit(mesh.face_crosses)
+
+
+def welded(mesh: Mesh) -> np.ndarray:
+    """(V,) int64, the same number for vertices at bit-identical positions."""
+    # Adding zero turns -0.0 into 0.0.
+    return np.unique(mesh.vertices + np.float32(0.0), axis=0, return_inverse=True)[1].reshape(-1)
+
+
+def _fixed(normals: np.ndarray) -> np.ndarray:
+    level = 1.0 - np.abs(normals @ UP) < PARALLEL
+    return orthonormal(np.cross(np.where(level[:, None], SPARE_UP, UP), normals), normals)
+
+
+def _smooth(normals: np.ndarray, areas: np.ndarray, edges: np.ndarray, spare: np.ndarray) -> np.ndarray:
+    """Minimises sum_edges |u_i - r_ij u_j|^2 + lambda sum_i A_i |u_i - q_i|^2 over complex u.
+
+    r_ij carries a direction from j to i by the smallest rotation between the normals. q_i is y x n_i, whose
+    length is the sine of their angle, plus a little of w' x n_i at level places: else a level plane would
+    have no direction at all. The first sum does not depend on the units, nor much on the resolution; lambda =
+    `FIDELITY` / sum_i A_i makes the same of the second.
+
+    Args:
+        normals: (V, 3) unit.
+        areas: (V,) A_i [mesh units^2].
+        edges: (E, 2) vertex pairs.
+        spare: (V, 3) unit, across the normals, taken where the solution vanishes.
+    """
+    count = len(normals)
+    x = orthonormal(np.zeros_like(normals), normals)
+    y = np.cross(normals, x)
+    weight = FIDELITY * np.maximum(areas / max(areas.sum(), np.finfo(np.float64).tiny), 1e-6 / count)
+    upright = np.cross(UP, normals)
+    tilt = np.linalg.norm(upright, axis=1, keepdims=True)
+    wanted = upright + LEVEL_PULL * np.maximum(1.0 - 2.0 * tilt, 0.0) * np.cross(SPARE_UP, normals)
+    q = _dot(wanted, x) + 1j * _dot(wanted, y)
+    u = _solve(edges, _transport(normals, x, y, edges), weight, q)
+    solution = _without_faint(np.real(u)[:, None] * x + np.imag(u)[:, None] * y)
+    return np.where(solution.any(axis=1, keepdims=True), orthonormal(solution, normals), spare)
+
+
+def _transport(normals: np.ndarray, x: np.ndarray, y: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """(E,) r_ij: the number that the x axis of j becomes in the plane of i; 0 over folded edges."""
+    i, j = edges.T
+    cos1 = 1.0 + _dot(normals[i], normals[j])
+    carried = x[j] - (_dot(x[j], normals[i]) / np.maximum(cos1, FOLD))[:, None] * (normals[i] + normals[j])
+    return np.where(cos1 > FOLD, _dot(carried, x[i]) + 1j * _dot(carried, y[i]), 0.0)
+
+
+def _solve(edges: np.ndarray, transport: np.ndarray, weight: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """(V,) complex solution of (L + W) u = W q with the connection Laplacian L."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.linalg import splu
+
+    edges, transport = edges[transport != 0], transport[transport != 0]
+    i, j = edges.T
+    count = len(weight)
+    diagonal = weight + np.bincount(edges.ravel(), minlength=count)
+    values = np.concatenate([-transport, -transport.conj(), diagonal])
+    rows, columns = np.concatenate([i, j, np.arange(count)]), np.concatenate([j, i, np.arange(count)])
+    matrix = coo_array((values, (rows, columns)), (count, count)).tocsc()
+    # Hermitian and positive definite: no pivoting, and an ordering for symmetric patterns.
+    factors = splu(matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    return factors.solve(weight * q)
+
+
+def _checked(field: np.ndarray, vertices: int) -> np.ndarray:
+    """The field with unit vectors and zeros."""
+    field = np.asarray(field, np.float64)
+    if field.shape != (vertices, 3):
+        raise ConfigError(
+            f"an orientation field of shape {field.shape}", f"give one of shape {(vertices, 3)}"
+        )
+    if not np.isfinite(field).all():
+        raise ConfigError(
+            "an orientation field with NaN or infinite entries", "use zeros where it is unknown"
+        )
+    largest = np.abs(field).max(axis=1, keepdims=True, initial=0.0)
+    field = field / np.where(largest > 0.0, largest, 1.0)
+    length = np.linalg.norm(field, axis=1, keepdims=True)
+    return field / np.where(length > 0.0, length, 1.0)
+
+
+def _summed(index: np.ndarray, vectors: np.ndarray, count: int) -> np.ndarray:
+    return np.stack([np.bincount(index, vectors[:, k], count) for k in range(3)], axis=1)
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("nk,nk->n", a, b)
+
+
+def _across(vectors: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    return vectors - _dot(vectors, normals)[:, None] * normals
+
+
+def _without_faint(vectors: np.ndarray) -> np.ndarray:
+    return np.where(np.linalg.norm(vectors, axis=1, keepdims=True) > FAINT, vectors, 0.0)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.where(length > 0.0, vectors / np.where(length > 0.0, length, 1.0), (0.0, 0.0, 1.0))

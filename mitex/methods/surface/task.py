@@ -1,0 +1,140 @@
+"""The synthesis of a texture on a surface as a task for the loop (Kovacs et al. 2024, section 3.4)."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from mitex.exemplar import Exemplar
+from mitex.features import Vgg16
+from mitex.features.vgg import LAYERS, Weights, convolutions
+from mitex.losses import gram_distance
+from mitex.methods.surface.config import SurfaceConfig
+from mitex.methods.surface.levels import Levels
+from mitex.methods.surface.network import SurfaceVgg
+from mitex.methods.surface.statistics import exemplar_grams
+from mitex.methods.surface.texels import Texels
+from mitex.methods.surface.texture import texel_layout
+from mitex.pictures import CYCLE, picture_images, pictures_of
+from mitex.runtime import keep_freed_memory
+
+
+class SurfaceTask:
+    """Texels whose features shall have the Gram matrices of the exemplar's.
+
+    With several maps, a step looks at some pictures of them in turn (see `mitex.pictures`): the mixed ones
+    tie the maps together.
+
+    Attributes:
+        values: (N, C) leaf, the maps' channels by `layout`, in the order of `levels`, in [0, 1].
+
+    Args:
+        config: settings.
+        exemplar: maps to match.
+        texels, levels: of the surface.
+    """
+
+    def __init__(self, config: SurfaceConfig, exemplar: Exemplar, texels: Texels, levels: Levels) -> None:
+        keep_freed_memory()
+        self.config, self.exemplar, self.texels, self.levels = config, exemplar, texels, levels
+        self.layout = texel_layout(list(exemplar.maps))
+        self.pictures = pictures_of(self.layout, True, config.seed)
+        channels = 1 + max(c for channels in self.layout.values() for c in channels)
+        generator = torch.Generator().manual_seed(config.seed)
+        start = config.noise * torch.rand(len(levels.order), channels, generator=generator)
+        self.values = start.requires_grad_()
+        weights = random_weights(generator) if config.weights == "random" else None
+        # The image network has the same weights: what differs is only where it looks.
+        image_network = Vgg16(config.pooling, normalised=False, weights=weights)
+        self.networks, self.targets = [], []
+        for scale in range(config.scales + 1):
+            self.networks.append(
+                SurfaceVgg(
+                    levels,
+                    config.pooling,
+                    bilinear=config.bilinear,
+                    scale=scale,
+                    weights=weights,
+                )
+            )
+            shown = exemplar.resized(max(config.exemplar_size >> scale, 16))
+            images = torch.from_numpy(picture_images(shown, self.pictures, self.layout))
+            self.targets.append([exemplar_grams(image_network, image, config.layers) for image in images])
+
+    @property
+    def parameters(self) -> list[torch.Tensor]:
+        return [self.values]
+
+    def loss(self, step: int, generator: torch.Generator) -> tuple[torch.Tensor, dict[str, float]]:
+        scale = self.scale(step)
+        chosen = self._chosen(step, generator)
+        total = torch.zeros(())
+        for k in chosen:
+            colours = self.values[:, self.pictures[k].channels]
+            grams = self.networks[scale].gram_matrices(colours, self.config.layers)
+            total = total + gram_distance(grams, self.targets[scale][k])
+        return total / (len(chosen) * len(self.config.layers)), {"scale": float(scale)}
+
+    def scale(self, step: int) -> int:
+        """How often the texels are pooled before the network sees them in a step."""
+        coarse = round(self.config.coarse_share * self.config.steps) if self.config.scales else 0
+        return 0 if step >= coarse else self.config.scales - step * self.config.scales // coarse
+
+    def commit(self) -> None:
+        with torch.no_grad():
+            self.values.clamp_(0.0, 1.0)
+
+    def state(self) -> dict[str, torch.Tensor]:
+        return {"values": self.values}
+
+    def load_state(self, state: dict[str, torch.Tensor]) -> None:
+        with torch.no_grad():
+            if state["values"].shape != self.values.shape:
+                raise ValueError(f"texels of shape {tuple(state['values'].shape)}")
+            self.values.copy_(state["values"])
+
+    def images(self) -> dict[str, np.ndarray]:
+        """The maps so far: name -> (R, R, c) float32, row 0 on top; unused texels are 0."""
+        image = self.texels.image(self.in_texel_order())
+        return {name: image[..., channels] for name, channels in self.layout.items()}
+
+    def in_texel_order(self) -> np.ndarray:
+        """(N, C) values in the order of `Texels`."""
+        values = np.empty(tuple(self.values.shape), np.float32)
+        values[self.levels.order] = self.values.detach().numpy()
+        return values
+
+    def preview(self, step: int) -> np.ndarray:
+        """The exemplar's pictures beside those of the texture."""
+        size = self.config.resolution
+        whole = Exemplar(self.images())
+        exemplar = self.exemplar.resized(min(self.config.exemplar_size, size))
+        rows = []
+        for picture in (p for p in self.pictures if p.kind != "mix"):
+            left = np.ones((size, exemplar.size[1], 3), np.float32)
+            left[: exemplar.size[0]] = picture_images(exemplar, [picture], self.layout)[0]
+            rows.append(np.concatenate([left, picture_images(whole, [picture], self.layout)[0]], 1))
+        return np.concatenate(rows, 0)
+
+    def metadata(self) -> dict[str, str]:
+        return {"method": "surface", "maps": ",".join(self.layout), "exemplar": self.exemplar.name}
+
+    def _chosen(self, step: int, generator: torch.Generator) -> list[int]:
+        """The pictures of a step: kinds in turn, any of a kind."""
+        kinds = [kind for kind in CYCLE if any(p.kind == kind for p in self.pictures)]
+        count = min(self.config.pictures, len(kinds))
+        return [self._one(kinds[(step * count + k) % len(kinds)], generator) for k in range(count)]
+
+    def _one(self, kind: str, generator: torch.Generator) -> int:
+        of_kind = [k for k, p in enumerate(self.pictures) if p.kind == kind]
+        return of_kind[int(torch.randint(len(of_kind), (), generator=generator))]
+
+
+def random_weights(generator: torch.Generator) -> Weights:
+    """Weights of the network's shape, drawn as He et al. do, without biases (figure 5 b)."""
+    drawn = {}
+    for name in LAYERS:
+        weight, bias = convolutions("average", False)[name]
+        scale = (2.0 / weight[0].numel()) ** 0.5
+        drawn[name] = torch.randn(weight.shape, generator=generator) * scale, torch.zeros_like(bias)
+    return drawn

@@ -1,0 +1,160 @@
+"""A texture synthesized on one mesh: how it is kept, and the asset that it makes."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+
+from mitex.asset import Asset
+from mitex.atlas import Atlas, spread
+from mitex.errors import CheckpointError, ConfigError
+from mitex.exemplar import MAPS
+from mitex.frames import atlas_normals, decode
+from mitex.mesh import Mesh
+from mitex.methods.surface.frames import face_normals, tangent_frames, vertex_directions
+from mitex.methods.surface.texels import Texels
+from mitex.paths import atomic_write
+
+NAME = "texture.safetensors"
+FORMAT = "mitex-surface-1"
+PADDING = 8  # texels by which charts are continued outwards
+
+
+def texel_layout(maps: list[str]) -> dict[str, tuple[int, ...]]:
+    """Where texels hold the maps: name -> channels, in alphabetical order."""
+    layout, first = {}, 0
+    for name in sorted(maps):
+        layout[name] = tuple(range(first, first + MAPS[name]))
+        first += MAPS[name]
+    return layout
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceTexture:
+    """A texture and the mesh that it was synthesized on.
+
+    Attributes:
+        mesh: with the UVs of the texture.
+        values: (N, C) float32 in [0, 1], the maps' channels by `texel_layout`, in the order of `texels`.
+        maps: their names.
+        about: how it was made; `resolution`, `frames` and `angle` [degrees] at least.
+    """
+
+    mesh: Mesh
+    values: np.ndarray
+    maps: tuple[str, ...]
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def texels(self) -> Texels:
+        """The texels that `values` belong to."""
+        assert self.mesh.uv is not None
+        return Texels.rasterize(self.mesh, self.mesh.uv, int(self.about["resolution"]))
+
+    def apply(self, mesh: Mesh | None = None) -> Asset:
+        """The asset: the mesh with baked maps.
+
+        Args:
+            mesh: the mesh that the texture was made for, if the caller wants that checked.
+
+        Raises:
+            ConfigError: it is another mesh: a surface texture belongs to the mesh it was synthesized on.
+        """
+        if mesh is not None and not same_surface(mesh, self.mesh):
+            raise ConfigError(
+                f"this texture belongs to mesh '{self.mesh.name}', not to '{mesh.name}'",
+                "synthesize it there: mitex fit surface --mesh NEW --config RUN/config.toml",
+            )
+        texels, layout = self.texels, texel_layout(list(self.maps))
+        assert self.mesh.uv is not None
+        atlas = Atlas.from_uv(self.mesh.uv, texels.resolution, PADDING)
+        used = texels.image(np.ones((len(self.values), 1), np.float32))[..., 0] > 0
+        textures = {}
+        for name, channels in layout.items():
+            textures[name] = spread(texels.image(self.values[:, channels]), used, PADDING)
+        angle = math.radians(float(self.about["angle"]))
+        kind = str(self.about["frames"])
+        if "normal" in layout:
+            textures["normal"] = self._normals(atlas, layout["normal"], used, kind, angle)
+        at_vertices = self._at_vertices()
+        tangents = _turned(vertex_directions(self.mesh, kind), self.mesh.normals, angle)
+        maps = {name: at_vertices[:, channels] for name, channels in layout.items()}
+        return Asset(self.mesh, maps, tangents, atlas, textures, self.mesh.name)
+
+    def save(self, path: str | Path) -> Path:
+        """Writes mesh, texels and `about` as one safetensors file."""
+        assert self.mesh.uv is not None
+        arrays = {"vertices": self.mesh.vertices, "faces": self.mesh.faces, "uv": self.mesh.uv}
+        tensors = {name: torch.from_numpy(np.ascontiguousarray(a)) for name, a in arrays.items()}
+        tensors["values"] = torch.from_numpy(np.ascontiguousarray(self.values, np.float16))
+        about = {**self.about, "maps": list(self.maps), "mesh": self.mesh.name}
+        with atomic_write(path) as temporary:
+            save_file(tensors, temporary, {"format": FORMAT, "about": json.dumps(about)})
+        return Path(path)
+
+    @staticmethod
+    def load(source: str | Path) -> SurfaceTexture:
+        """Reads a texture file, or that of a run folder.
+
+        Raises:
+            CheckpointError: there is none, or it is damaged.
+        """
+        path = Path(source).expanduser()
+        path = path / NAME if path.is_dir() else path
+        try:
+            with safe_open(path, "pt") as file:
+                metadata = file.metadata() or {}
+                arrays = {key: file.get_tensor(key).numpy() for key in file.keys()}  # noqa: SIM118
+            if metadata.get("format") != FORMAT:
+                raise ValueError("another format")
+            about = json.loads(metadata["about"])
+            mesh = Mesh(arrays["vertices"], arrays["faces"], arrays["uv"], str(about["mesh"]))
+            texture = SurfaceTexture(mesh, arrays["values"].astype(np.float32), tuple(about["maps"]), about)
+            if len(texture.texels.index) != len(texture.values):
+                raise ValueError("texels are missing")
+            return texture
+        except (SafetensorError, OSError, ValueError, KeyError, TypeError) as e:
+            raise CheckpointError(
+                f"'{path}' is not a surface texture ({e})", "name the run folder of mitex fit surface"
+            ) from e
+
+    def _at_vertices(self) -> np.ndarray:
+        """(V, C) values at the vertices, from the first face around each; 0 without a face."""
+        corners = self.mesh.faces.ravel()
+        vertices, first = np.unique(corners, return_index=True)
+        index, weight = self.texels.bilinear(first // 3, np.eye(3)[first % 3])
+        values = np.zeros((len(self.mesh.vertices), self.values.shape[1]), np.float32)
+        values[vertices] = np.einsum("nk,nkc->nc", weight, self.values[index])
+        return values
+
+    def _normals(
+        self, atlas: Atlas, channels: tuple[int, ...], used: np.ndarray, kind: str, angle: float
+    ) -> np.ndarray:
+        """The normal map, from the texels' frames into those of the atlas."""
+        texels = self.texels
+        right, up = tangent_frames(self.mesh, texels.face, texels.barycentric, kind, angle)
+        # Bumps are added to the smooth surface that viewers shade, not to its flat faces.
+        corners = self.mesh.normals[self.mesh.faces[texels.face]]
+        smooth = np.einsum("nk,nkc->nc", texels.barycentric, corners)
+        flat = face_normals(self.mesh)[texels.face]
+        detail = decode(self.values[:, channels], right, up, flat) - flat + smooth
+        return atlas_normals(self.mesh, atlas, spread(texels.image(detail), used, PADDING))
+
+
+def same_surface(a: Mesh, b: Mesh) -> bool:
+    """Whether two meshes have the same vertices and faces."""
+    return np.array_equal(a.vertices, b.vertices) and np.array_equal(a.faces, b.faces)
+
+
+def _turned(right: np.ndarray, normals: np.ndarray, angle: float) -> np.ndarray:
+    return (np.cos(angle) * right + np.sin(angle) * np.cross(normals, right)).astype(np.float32)

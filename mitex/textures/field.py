@@ -1,0 +1,153 @@
+"""What the fields of Mitex share: textures that carry any number of channels on a surface."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol, runtime_checkable
+
+from mitex.runtime import load_mitsuba
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+
+# Rows of the data, their weights, and whether there are any, for each lookup.
+Located = tuple[tuple[Any, ...], tuple[Any, ...], Any]
+
+
+@runtime_checkable
+class Field(Protocol):
+    """A texture of which all channels can be read, in two steps; the first can be detached.
+
+    `isinstance(texture, Field)` tells it from Mitsuba's own textures. A lookup is linear in the data, so its
+    adjoint is a scatter with the weights that `locate` returned.
+    """
+
+    def locate(self, si: Any, active: Any = True) -> Located:
+        """Where the points `si` read: K rows (K UInt32), weights (K Float), and which read any (Bool)."""
+        ...
+
+    def gather(self, located: Located, channels: range | None = None) -> list[Any]:
+        """Interpolated `scale * data + offset` of the channels (default: all), one Float each."""
+        ...
+
+
+class FieldMethods:
+    """Members of a field's plugin class; a subclass adds `locate`, `eval_1_grad`, `_check_data` and `_rows`.
+
+    `data` is a tensor whose last axis are the C channels; all others together are its rows, in memory order.
+    """
+
+    plugin: str  # type of the plugin, for messages
+    data: Any
+
+    def _read(self, props: Any) -> None:
+        """Reads the properties that all fields have."""
+        mi.Texture.__init__(self, props)
+        if not mi.variant().startswith(("llvm", "cuda")):
+            raise RuntimeError(
+                f"{self.plugin}: variant '{mi.variant()}' is not supported; use an llvm or cuda one"
+            )
+        self.data = mi.TensorXf(props["data"])
+        self.channel = int(props.get("channel", 0))
+        self.scale = mi.Float(props.get("scale", 1.0))
+        self.offset = mi.Float(props.get("offset", 0.0))
+        self.raw = bool(props.get("raw", False))
+
+    @property
+    def channel_count(self) -> int:
+        """C, the number of channels of the data."""
+        return self.data.shape[-1]
+
+    def traverse(self, callback: Any) -> None:
+        for name in ("data", "scale", "offset"):
+            callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
+
+    def parameters_changed(self, keys: Any = ()) -> None:
+        self._check()
+
+    def _check(self) -> None:
+        self._check_data()
+        if not 0 <= self.channel < self.channel_count:
+            raise RuntimeError(
+                f"{self.plugin}: 'channel' is {self.channel}; 'data' has 0 to {self.channel_count - 1}"
+            )
+        # A virtual function call cannot evaluate what it captures.
+        dr.eval(self.data)
+
+    def _check_data(self) -> None:
+        """Raises a RuntimeError if the data has a wrong shape."""
+        raise NotImplementedError
+
+    def _rows(self) -> Any:
+        """Rows of the data (UInt32) over which `mean` and `max` go."""
+        raise NotImplementedError
+
+    def locate(self, si: Any, active: Any = True) -> Located:
+        raise NotImplementedError
+
+    def gather(self, located: Located, channels: range | None = None) -> list[Any]:
+        """Interpolated `scale * data + offset` of the channels (default: all), one Float each."""
+        _, weights, active = located
+        values = []
+        for channel in range(self.channel_count) if channels is None else channels:
+            rows = self._row_values(located, channel)
+            value = sum(w * r for w, r in zip(weights, rows, strict=True))
+            values.append(dr.fma(dr.select(active, value, 0), self.scale, self.offset))
+        return values
+
+    def _row_values(self, located: Located, channel: int) -> list[Any]:
+        """The data of one channel at the K rows of the lookups."""
+        index, _, active = located
+        return [dr.gather(mi.Float, self.data.array, self.channel_count * i + channel, active) for i in index]
+
+    def eval(self, si: Any, active: Any = True) -> Any:
+        return self._color(self._three(si, active))
+
+    def eval_1(self, si: Any, active: Any = True) -> Any:
+        return self.gather(self.locate(si, active), range(self.channel, self.channel + 1))[0]
+
+    def eval_3(self, si: Any, active: Any = True) -> Any:
+        return self._three(si, active)
+
+    def mean(self) -> Any:
+        """Mean over the data's rows of what `eval` returns."""
+        return dr.mean(dr.mean(self._row_colors()))
+
+    def max(self) -> float:
+        """Largest value in the data's rows of what `eval` returns."""
+        return float(dr.max(dr.max(self._row_colors()))[0])
+
+    def is_spatially_varying(self) -> bool:
+        return True
+
+    def _description(self, name: str, **own: object) -> str:
+        """The text of `to_string`, with the plugin's own properties first."""
+        raw = str(self.raw).lower()
+        common = {"channel": self.channel, "scale": self.scale, "offset": self.offset, "raw": raw}
+        lines = (f"  {key} = {value}" for key, value in (own | common).items())
+        return f"{name}[\n" + ",\n".join(lines) + "\n]"
+
+    def _selection(self) -> range:
+        """Channels that a colour is made of."""
+        enough = self.channel + 3 <= self.channel_count
+        return range(self.channel, self.channel + (3 if enough else 1))
+
+    def _three(self, si: Any, active: Any) -> Any:
+        values = self.gather(self.locate(si, active), self._selection())
+        return mi.Color3f(*values) if len(values) == 3 else mi.Color3f(values[0])
+
+    def _color(self, rgb: Any) -> Any:
+        if mi.is_spectral:
+            raise RuntimeError(
+                f"{self.plugin}: colours need an rgb or mono variant; roughness and normals work in any"
+            )
+        if not self.raw:
+            rgb = mi.math.srgb_to_linear(dr.clip(rgb, 0, 1))
+        return mi.Color1f(mi.luminance(rgb)) if mi.is_monochromatic else rgb
+
+    def _row_colors(self) -> Any:
+        row = self._rows() * self.channel_count
+        values = [
+            dr.fma(dr.gather(mi.Float, self.data.array, row + c), self.scale, self.offset)
+            for c in self._selection()
+        ]
+        return self._color(mi.Color3f(*values) if len(values) == 3 else mi.Color3f(values[0]))

@@ -1,0 +1,45 @@
+"""A quad, light on it, and a picture of a sphere, for tests of textures."""
+
+import numpy as np
+
+from mitex.mesh import icosphere
+from mitex.scenes.stage import mesh_shape
+
+QUAD = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32)
+FACES = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
+
+
+def quad(mi, bsdf: dict, uv: np.ndarray | None = None):
+    """A quad in the xy plane that faces +z."""
+    props = mi.Properties()
+    props["bsdf"] = mi.load_dict(bsdf)
+    shape = mi.Mesh("quad", 4, 2, props, has_vertex_texcoords=uv is not None)
+    params = mi.traverse(shape)
+    params["vertex_positions"] = QUAD.ravel()
+    params["faces"] = FACES.ravel()
+    if uv is not None:
+        params["vertex_texcoords"] = uv.ravel()
+    params.update()
+    return shape
+
+
+def radiance(mi, shape, x: np.ndarray, y: np.ndarray, light=(0.0, 0.0, -1.0)) -> np.ndarray:
+    """(N, 3) exact radiance towards +z of points of a shape under a directional light of irradiance pi."""
+    emitter = {"type": "directional", "direction": list(light), "irradiance": {"type": "rgb", "value": np.pi}}
+    scene = mi.load_dict({"type": "scene", "shape": shape, "light": emitter})
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(0, len(x))
+    origin = mi.Point3f(mi.Float(x), mi.Float(y), 3.0)
+    ray = mi.RayDifferential3f(mi.Ray3f(origin, mi.Vector3f(0, 0, -1)))
+    value, _, _ = mi.load_dict({"type": "direct"}).sample(scene, sampler, ray)
+    return np.array(value).T
+
+
+def sphere_picture(mi, bsdf: dict) -> np.ndarray:
+    to_world = mi.ScalarTransform4f().look_at(origin=[1, 2, 4], target=[0, 0, 0], up=[0, 1, 0])
+    film = {"type": "hdrfilm", "width": 16, "height": 16}
+    sensor = {"type": "perspective", "fov": 28, "to_world": to_world, "film": film}
+    light = {"type": "point", "position": [3, 4, 5], "intensity": 40.0}
+    ball = mesh_shape(icosphere(4), mi.load_dict(bsdf))
+    scene = {"type": "scene", "integrator": {"type": "path"}, "sensor": sensor, "light": light, "ball": ball}
+    return np.array(mi.render(mi.load_dict(scene), spp=4))
