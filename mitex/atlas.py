@@ -13,6 +13,9 @@ from mitex.errors import ConfigError
 from mitex.mesh import Mesh
 
 MAX_RESOLUTION = 8192
+LARGE = 40_000  # meshes of more faces are unwrapped in pieces
+SMOOTHINGS = 8
+ROUGHNESS = 0.03  # [edge lengths]
 CHUNK = 4_000_000  # candidate texels that are looked at together; bounds the memory at about 300 MB
 RING = 1.0  # [texel] how far outside a triangle its own plane is still continued, see `_rasterize`
 
@@ -132,7 +135,10 @@ def unwrap(mesh: Mesh, resolution: int, padding: int) -> np.ndarray:
         (F, 3, 2) float32 in [0, 1], v upwards. Charts may be mirrored.
     """
     atlas = xatlas.Atlas()
-    atlas.add_mesh(mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32))
+    pieces, positions = _pieces(mesh), _rough(mesh)
+    for piece in pieces:
+        used, faces = np.unique(mesh.faces[piece], return_inverse=True)
+        atlas.add_mesh(positions[used], faces.reshape(-1, 3).astype(np.uint32))
     pack = xatlas.PackOptions()
     pack.resolution = resolution
     # xatlas only estimates the texel size and packs into up to 1.4 times the side asked for.
@@ -142,10 +148,50 @@ def unwrap(mesh: Mesh, resolution: int, padding: int) -> np.ndarray:
     # Flattening a chart takes more than linear time; this keeps a mesh of 20k faces at one or two seconds.
     chart.max_chart_area = 0.1 * float(mesh.face_areas.sum())
     atlas.generate(chart, pack)
-    _, corners, uv = atlas.get_mesh(0)
     # Back to texels and down by one factor, so that texels stay square.
     side = np.array([atlas.width, atlas.height], np.float32)
-    return np.clip(uv * side / side.max(), 0.0, 1.0)[corners.astype(np.int64)].astype(np.float32)
+    result = np.empty((len(mesh.faces), 3, 2), np.float32)
+    for k, piece in enumerate(pieces):
+        _, corners, uv = atlas.get_mesh(k)
+        result[piece] = np.clip(uv * side / side.max(), 0.0, 1.0)[corners.astype(np.int64)]
+    return result
+
+
+def _pieces(mesh: Mesh) -> list[np.ndarray]:
+    """Indices of the faces that are flattened together: large meshes in six parts, which takes less time.
+
+    They are cut along the directions that the faces look at, after these are smoothed over the neighbours.
+    """
+    if len(mesh.faces) <= LARGE:
+        return [np.arange(len(mesh.faces))]
+    normals = mesh.normals
+    for _ in range(SMOOTHINGS):
+        normals = normals + _summed(mesh, normals[mesh.edges.indices])
+    towards = normals[mesh.faces].sum(1)
+    axis = np.abs(towards).argmax(1)
+    side = 2 * axis + (np.take_along_axis(towards, axis[:, None], 1)[:, 0] > 0)
+    return [piece for k in range(6) if len(piece := np.flatnonzero(side == k))]
+
+
+def _rough(mesh: Mesh) -> np.ndarray:
+    """Positions (V, 3), of large meshes moved along the normals by up to 3 % of the edges around.
+
+    xatlas takes faces nearly parallel to their neighbours for flat and grows its first charts over them
+    without an end, around whole spheres if they are fine enough, and exhausts the stack.
+    """
+    if len(mesh.faces) <= LARGE:
+        return mesh.vertices
+    edges = mesh.vertices[mesh.edges.indices] - mesh.vertices[mesh.edges.rows]
+    length = _summed(mesh, np.linalg.norm(edges, axis=1, keepdims=True))
+    length /= np.maximum(np.diff(mesh.edges.indptr), 1)[:, None]
+    shift = np.random.default_rng(0).uniform(-ROUGHNESS, ROUGHNESS, (len(mesh.vertices), 1))
+    return (mesh.vertices + shift * length * mesh.normals).astype(np.float32)
+
+
+def _summed(mesh: Mesh, values: np.ndarray) -> np.ndarray:
+    """(V, C) sums of values (E, C) of the directed edges over those that each vertex receives."""
+    count = len(mesh.vertices)
+    return np.stack([np.bincount(mesh.edges.rows, column, count) for column in values.T], axis=1)
 
 
 def laid_out(mesh: Mesh, resolution: int, padding: int = 8) -> Mesh:

@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
 from mitex.cli.checks import SEEDS, in_range, needless, not_both
 from mitex.errors import ConfigError
+
+if TYPE_CHECKING:
+    from mitex.asset import Asset
+    from mitex.mesh import Mesh
 
 SUFFIXES = (".glb", ".obj", ".ply", ".exr")
 RESOLUTION = 1024
@@ -27,6 +31,7 @@ class Apply:
       mitex apply runs/pebbles --mesh bunny.obj --out bunny.glb
       mitex apply pebbles --mesh bunny.obj --out bunny.glb --subdivide 2 --resolution 2048
       mitex apply pebbles --mesh scan.ply --out scan.glb --vertex-colors --seed 7 --orientation 45
+      mitex apply runs/bunny --mesh bunny.obj --out bunny.glb   (of mitex fit surface: same mesh, no options)
     """
 
     model: Annotated[Positional[str], arg(metavar="RUN|MODEL")]
@@ -60,7 +65,7 @@ class Apply:
     """Write colours at the vertices instead of textures."""
 
     def run(self) -> None:
-        subdivide = self._subdivide()
+        self._subdivide()
         in_range("--seed", self.seed, *SEEDS)
         in_range("--steps", self.steps, 1, 10_000)
         in_range("--orientation", self.orientation, -360.0, 360.0)
@@ -75,25 +80,44 @@ class Apply:
         needless("--resolution", out, self.resolution is not None and suffix == ".ply")
         from mitex.mesh import Mesh
 
-        textures = suffix != ".ply" and not self.vertex_colors
-        resolution = self.resolution or RESOLUTION
         mesh = Mesh.load(self.mesh)
+        asset = self._synthesized(mesh) if self._belongs_to_a_mesh() else self._grown(mesh, suffix)
+        asset.export(out)
+        print(self.out)
+
+    def _grown(self, mesh: Mesh, suffix: str) -> Asset:
+        """By a cellular automaton, on any mesh."""
         from mitex.methods.nca import NcaTexture
 
-        texture = NcaTexture.load(self.model)
-        asset = texture.apply(
+        textures = suffix != ".ply" and not self.vertex_colors
+        resolution = self.resolution or RESOLUTION
+        asset = NcaTexture.load(self.model).apply(
             mesh,
             seed=self.seed,
             steps=self.steps,
-            subdivide=subdivide,
+            subdivide=self._subdivide(),
             orientation=math.radians(self.orientation),
             scale=self.scale,
             resolution=resolution if textures else None,
         )
-        if textures:
-            asset = asset.baked(resolution)
-        asset.export(out)
-        print(self.out)
+        return asset.baked(resolution) if textures else asset
+
+    def _synthesized(self, mesh: Mesh) -> Asset:
+        """A surface texture on the mesh that it was synthesized on."""
+        for name in ("seed", "steps", "subdivide", "orientation", "scale", "resolution", "vertex_colors"):
+            if getattr(self, name) != getattr(Apply, name, None):
+                option = f"--{name.replace('_', '-')}"
+                raise ConfigError(
+                    f"{option} means nothing for a surface texture, which is finished", f"leave {option} out"
+                )
+        from mitex.methods.surface import SurfaceTexture
+
+        return SurfaceTexture.load(self.model).apply(mesh)
+
+    def _belongs_to_a_mesh(self) -> bool:
+        from mitex.methods.surface.texture import is_texture
+
+        return is_texture(self.model)
 
     def _subdivide(self) -> int | str:
         if self.subdivide == "auto":

@@ -22,6 +22,7 @@ COMMANDS = {
     "doctor": ("doctor:Doctor", "check that everything Mitex needs works here"),
     "demo": ("demo:Demo", "learn, apply, render and export a texture in a few minutes"),
     "fit nca": ("fit_nca:FitNca", "learn a living texture from an image or PBR maps (MeshNCA)"),
+    "fit surface": ("fit_surface:FitSurface", "synthesize a texture on one mesh (tangent-space CNN)"),
     "apply": ("apply:Apply", "put a learned texture on a mesh"),
     "render": ("render:Render", "path-trace an asset: a still or a turntable"),
     "models": ("models:Models", "list the textures that ship with Mitex"),

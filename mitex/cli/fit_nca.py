@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import UseAppendAction, arg
+from tyro.conf import arg
 
-from mitex.cli.checks import SEEDS, in_range, not_both, settings
+from mitex.cli.checks import not_both
+from mitex.cli.fitting import Fitting
 
 
-@dataclass
-class FitNca:
+@dataclass(kw_only=True)
+class FitNca(Fitting):
     """Learn a texture from an image or a set of PBR maps with a neural cellular automaton (MeshNCA).
 
     The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl and previews; Ctrl-C saves, and
@@ -25,45 +26,15 @@ class FitNca:
       mitex fit nca --exemplar pebbles.png --out runs/pebbles --resume
     """
 
-    exemplar: Annotated[str, arg(metavar="IMAGE|DIR|NAME")]
-    """PNG or JPEG, a folder with any of albedo, height, normal, roughness, ambient_occlusion, or a name."""
-
-    out: Annotated[Path | None, arg(metavar="RUN", help_behavior_hint="(default: runs/EXEMPLAR)")] = None
-    """Run folder."""
-
     preset: Annotated[str | None, arg(metavar="patch|paper", help_behavior_hint="(default: patch)")] = None
     """Settings to start from: `patch` is fast, `paper` follows the publication."""
-
-    config: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None
-    """TOML file with any of the settings, or a run's config.toml."""
-
-    set: Annotated[
-        tuple[tuple[str, ...], ...],
-        UseAppendAction,
-        arg(metavar="KEY=VALUE ...", help_behavior_hint="(repeatable)"),
-    ] = ()
-    """Any setting."""
-
-    resume: Annotated[bool, arg(help_behavior_hint="")] = False
-    """Go on from the run's checkpoint."""
 
     init: Annotated[str | None, arg(metavar="MODEL|RUN", help_behavior_hint="")] = None
     """Start from the weights of a model or a run."""
 
-    seed: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the preset's)")] = None
-    """Random seed."""
-
-    steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the preset's)")] = None
-    """Training steps."""
-
-    quiet: Annotated[bool, arg(help_behavior_hint="")] = False
-    """Show no progress."""
-
     def run(self) -> None:
-        in_range("--seed", self.seed, *SEEDS)
-        in_range("--steps", self.steps, 1)
+        overrides = self.overrides()
         not_both("--resume", "--init", self.resume and self.init is not None)
-        overrides = settings(self.set, seed=self.seed, steps=self.steps)
         from mitex.exemplar import Exemplar
 
         exemplar = Exemplar.load(self.exemplar)

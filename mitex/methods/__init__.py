@@ -3,8 +3,10 @@
 from importlib import import_module
 from typing import Any
 
+NAMES = ("nca", "surface")
+
 
 def __getattr__(name: str) -> Any:
-    if name == "nca":
-        return import_module("mitex.methods.nca")
+    if name in NAMES:
+        return import_module(f"mitex.methods.{name}")
     raise AttributeError(f"mitex.methods has no {name!r}")

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from mitex.asset import Asset
+from mitex.atlas import twice_area
 from mitex.colour import srgb_to_linear
 from mitex.errors import ConfigError
 from mitex.export.common import DEFAULT_ALBEDO, DEFAULT_ROUGHNESS
-from mitex.frames import unit
+from mitex.frames import split_at_seams, unit
 from mitex.mesh import Mesh
 from mitex.render.framing import FOV, View, frame, hull, rotation
 from mitex.render.studio import GREY, backdrop, lights
@@ -26,9 +28,10 @@ VIEW_MARGIN = 0.1  # least cosine between a shading normal and the view, see `_f
 class OrbitRenderer:
     """Path-traced pictures of one asset from all around.
 
-    Base colour and roughness come from the vertex maps through the `vertex_field` texture, relief from the
-    normal map as shading normals. The object is normalised to radius 1 and turns about +y in front of a fixed
-    camera, so light always comes from the upper left.
+    Base colour and roughness come from the textures of a baked asset through `texel_field`, else from the
+    vertex maps through `vertex_field`; relief from the normal map, of vertices as shading normals. The object
+    is normalised to radius 1 and turns about +y in front of a fixed camera, so light always comes from the
+    upper left.
 
     Args:
         asset: what to render.
@@ -63,7 +66,14 @@ class OrbitRenderer:
         self._on_backdrop = backdrop
         self._positions, self._normals, self._detail = _surface(asset, displacement)
         self._hull = hull(self._positions)
-        self._scene, self._params = self._build(asset, ao)
+        mesh = replace(asset.mesh, uv=None)
+        if asset.atlas is not None:  # a vertex for each UV
+            split = split_at_seams(mesh, asset.atlas.uv)
+            self._positions, self._normals, self._detail = (
+                a[split.source] for a in (self._positions, self._normals, self._detail)
+            )
+            mesh = Mesh(mesh.vertices[split.source], split.faces, split.uv[split.faces], mesh.name)
+        self._scene, self._params = self._build(asset, mesh, ao)
 
     def frame(self, azimuths: float | Sequence[float] = 0.0, elevation: float = math.radians(18)) -> View:
         """The camera from which the object, at any of the azimuths [rad], fills the picture.
@@ -107,22 +117,16 @@ class OrbitRenderer:
         finally:
             mi.set_log_level(level)
 
-    def _build(self, asset: Asset, ao: bool) -> tuple[Any, Any]:
+    def _build(self, asset: Asset, mesh: Mesh, ao: bool) -> tuple[Any, Any]:
         from mitex.runtime import init
 
         mi = init()
-        albedo, roughness = _material(asset, ao)
-        bsdf = {
-            "type": "principled",
-            "base_color": {"type": "vertex_field", "data": mi.TensorXf(albedo), "raw": True},
-            "roughness": {"type": "vertex_field", "data": mi.TensorXf(roughness), "raw": True},
-            "specular": 0.5,
-        }
+        bsdf = _bsdf(mi, asset, ao)
         scene = {
             "type": "scene",
             "integrator": {"type": "path", "max_depth": MAX_DEPTH, "rr_depth": 99, "hide_emitters": True},
             "sensor": _sensor(mi, self.resolution),
-            "object": _shape(mi, "object", asset.mesh, {"type": "twosided", "bsdf": bsdf}, normals=True),
+            "object": _shape(mi, "object", mesh, {"type": "twosided", "bsdf": bsdf}, normals=True),
             **lights(),
         }
         if self._on_backdrop:
@@ -169,25 +173,56 @@ class OrbitRenderer:
 def _surface(asset: Asset, displacement: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Positions of radius 1, vertex normals and detail normals, (V, 3) float64 each."""
     mesh, _ = asset.mesh.normalised()
-    detail = asset.detail_normals()
+    textured = asset.texture_maps is not None  # relief is the material's then
+    detail = asset.mesh.normals if textured else asset.detail_normals()
     if displacement:
         offset = displacement * asset.vertex_maps["height"] ** 2
         mesh = mesh.with_vertices(mesh.vertices + offset * mesh.normals)
-        if "normal" not in asset.vertex_maps:
+        if textured or "normal" not in asset.vertex_maps:
             detail = mesh.normals
     return (mesh.vertices.astype(np.float64), mesh.normals.astype(np.float64), detail.astype(np.float64))
 
 
-def _material(asset: Asset, ao: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Linear base colour (V, 3) and roughness (V, 1)."""
-    maps, count = asset.vertex_maps, len(asset.mesh.vertices)
-    albedo = np.full((count, 3), DEFAULT_ALBEDO, np.float32)
+def _bsdf(mi: Any, asset: Asset, ao: bool) -> dict[str, Any]:
+    """The material, from textures if the asset has them, else from vertex maps."""
+    maps, kind = asset.vertex_maps, "vertex_field"
+    if asset.texture_maps is not None:
+        maps, kind = asset.texture_maps, "texel_field"
+
+    def texture(values: np.ndarray) -> dict[str, Any]:
+        return {"type": kind, "data": mi.TensorXf(np.ascontiguousarray(values, np.float32)), "raw": True}
+
+    albedo, roughness = _material(maps, ao)
+    bsdf = {
+        "type": "principled",
+        "base_color": texture(albedo),
+        "roughness": texture(roughness),
+        "specular": 0.5,
+    }
+    if asset.texture_maps is None or "normal" not in asset.texture_maps:
+        return bsdf
+    return {"type": "normalmap", "normalmap": texture(_unmirrored(asset)), "bsdf": bsdf}
+
+
+def _material(maps: Mapping[str, np.ndarray], ao: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Linear base colour (..., 3) and roughness (..., 1)."""
+    shape = next(iter(maps.values())).shape[:-1]
+    albedo = np.full((*shape, 3), DEFAULT_ALBEDO, np.float32)
     if "albedo" in maps:
         albedo = srgb_to_linear(maps["albedo"])
     if ao and "ambient_occlusion" in maps:
         albedo = albedo * maps["ambient_occlusion"]
-    roughness = maps.get("roughness", np.full((count, 1), DEFAULT_ROUGHNESS, np.float32))
-    return albedo.astype(np.float32), np.maximum(roughness, MIN_ROUGHNESS).astype(np.float32)
+    roughness = maps.get("roughness", np.full((*shape, 1), DEFAULT_ROUGHNESS, np.float32))
+    return albedo, np.maximum(roughness, MIN_ROUGHNESS)
+
+
+def _unmirrored(asset: Asset) -> np.ndarray:
+    """The normal map as Mitsuba means it: its bitangent is normal x tangent in mirrored charts too."""
+    assert asset.atlas is not None and asset.texture_maps is not None
+    normals = asset.texture_maps["normal"].copy()
+    mirrored = (twice_area(asset.atlas.uv) < 0)[asset.atlas.face] & (asset.atlas.face >= 0)
+    normals[mirrored, 1] = 1.0 - normals[mirrored, 1]
+    return normals
 
 
 def _facing(detail: np.ndarray, normals: np.ndarray, to_camera: np.ndarray) -> np.ndarray:
@@ -203,8 +238,14 @@ def _facing(detail: np.ndarray, normals: np.ndarray, to_camera: np.ndarray) -> n
 def _shape(mi: Any, name: str, mesh: Mesh, bsdf: dict[str, Any], normals: bool = False) -> Any:
     props = mi.Properties()
     props["bsdf"] = mi.load_dict(bsdf)
-    shape = mi.Mesh(name, len(mesh.vertices), len(mesh.faces), has_vertex_normals=normals, props=props)
+    counts = len(mesh.vertices), len(mesh.faces)
+    textured = mesh.uv is not None
+    shape = mi.Mesh(name, *counts, has_vertex_normals=normals, has_vertex_texcoords=textured, props=props)
     params = mi.traverse(shape)
+    if mesh.uv is not None:  # every vertex has one
+        texcoords = np.zeros((len(mesh.vertices), 2), np.float32)
+        texcoords[mesh.faces] = mesh.uv
+        params["vertex_texcoords"] = texcoords.ravel()
     params["vertex_positions"] = mesh.vertices.ravel()
     params["faces"] = mesh.faces.astype(np.uint32).ravel()
     params.update()

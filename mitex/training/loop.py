@@ -44,6 +44,7 @@ def train(
     milestones: Sequence[int] = (),
     decay: float = 1.0,
     normalise_gradients: bool = False,
+    shared_moment: bool = False,
     checkpoint_every: int,
     preview_every: int = 0,
     resume: bool = False,
@@ -62,6 +63,7 @@ def train(
         milestones: Steps from which on the learning rate is multiplied by `decay` once more.
         decay: Factor at each milestone.
         normalise_gradients: Divide each parameter tensor's gradient by its own norm + 1e-8.
+        shared_moment: Adam keeps one second moment for each parameter tensor.
         checkpoint_every: Steps between checkpoints; one more is saved at the end.
         preview_every: Steps between previews; one more is made at the end. 0 makes none.
         resume: Go on from the folder's checkpoint. On one thread the result is bit-identical with that of an
@@ -78,7 +80,7 @@ def train(
         raise ConfigError("checkpoints and previews need a spacing", "set checkpoint_every to 1 or more")
     schedule = lr if callable(lr) else optim.multistep(lr, milestones, decay)
     with run.opened(out, resume) as (folder, metrics):
-        state = TrainState(task, config, schedule, normalise_gradients)
+        state = TrainState(task, config, schedule, normalise_gradients, shared_moment)
         if resume:
             state.restore(checkpoint.load(folder))
         run.prepare(folder, config, task.metadata())

@@ -17,6 +17,8 @@ class Adam:
         parameters: Tensors to update, in an order that stays the same between runs.
         betas: Decay of the first and the second moment.
         eps: Added to the root of the second moment.
+        shared: One second moment for a whole tensor, the mean of its elements': elements whose gradient is
+            small and mostly noise then move little, where torch's Adam moves all alike.
     """
 
     def __init__(
@@ -24,12 +26,14 @@ class Adam:
         parameters: Sequence[torch.Tensor],
         betas: tuple[float, float] = (0.9, 0.999),
         eps: float = 1e-8,
+        shared: bool = False,
     ):
         self.parameters = list(parameters)
         self.betas = betas
         self.eps = eps
+        self.shared = shared
         self.first = [torch.zeros_like(p) for p in self.parameters]
-        self.second = [torch.zeros_like(p) for p in self.parameters]
+        self.second = [torch.zeros_like(p.mean() if shared else p) for p in self.parameters]
         self.counts = [0] * len(self.parameters)
 
     @torch.no_grad()
@@ -42,9 +46,12 @@ class Adam:
             self.counts[i] += 1
             m, v, n = self.first[i], self.second[i], self.counts[i]
             m.lerp_(p.grad, 1 - b1)
-            v.mul_(b2).addcmul_(p.grad, p.grad, value=1 - b2)
+            if self.shared:
+                v.mul_(b2).add_(p.grad.square().mean(), alpha=1 - b2)
+            else:
+                v.mul_(b2).addcmul_(p.grad, p.grad, value=1 - b2)
             denominator = (v.sqrt() / math.sqrt(1 - b2**n)).add_(self.eps)
-            p.addcdiv_(m, denominator, value=-lr / (1 - b1**n))
+            p.addcdiv_(m, denominator.expand_as(p), value=-lr / (1 - b1**n))
 
     def clear(self) -> None:
         """Drops all gradients."""

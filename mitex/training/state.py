@@ -25,6 +25,7 @@ class TrainState:
         config: The resolved config, with a `seed`.
         schedule: Learning rate by step from 0.
         normalise: Divide each parameter tensor's gradient by its own norm.
+        shared: One second moment for each parameter tensor (see `Adam`).
 
     Attributes:
         step: Steps done.
@@ -32,12 +33,19 @@ class TrainState:
         loss: Loss averaged over about 50 steps; NaN before the first.
     """
 
-    def __init__(self, task: Task, config: Any, schedule: Callable[[int], float], normalise: bool):
+    def __init__(
+        self,
+        task: Task,
+        config: Any,
+        schedule: Callable[[int], float],
+        normalise: bool,
+        shared: bool = False,
+    ):
         self.task = task
         self.config = config
         self.schedule = schedule
         self.normalise = normalise
-        self.optimizer = optim.Adam(task.parameters)
+        self.optimizer = optim.Adam(task.parameters, shared=shared)
         self.generator = torch.Generator().manual_seed(config.seed)
         self.step = 0
         self.skipped = 0

@@ -97,13 +97,15 @@ def test_facing_changes_only_what_looks_away(rng):
 def test_occlusion_darkens_the_base_colour():
     half = {**GREY, "ambient_occlusion": np.full((len(SPHERE.vertices), 1), 0.5)}
     asset = Asset(SPHERE, half)
-    np.testing.assert_allclose(_material(asset, ao=True)[0], 0.5 * _material(asset, ao=False)[0])
-    np.testing.assert_allclose(_material(asset, ao=False)[0], 0.5, atol=2e-3)
+    np.testing.assert_allclose(
+        _material(asset.vertex_maps, ao=True)[0], 0.5 * _material(asset.vertex_maps, ao=False)[0]
+    )
+    np.testing.assert_allclose(_material(asset.vertex_maps, ao=False)[0], 0.5, atol=2e-3)
 
 
 def test_roughness_stays_off_zero():
     asset = Asset(SPHERE, {"roughness": np.zeros((len(SPHERE.vertices), 1))})
-    assert _material(asset, ao=True)[1].min() == np.float32(0.05)
+    assert _material(asset.vertex_maps, ao=True)[1].min() == np.float32(0.05)
 
 
 def test_displacement_moves_along_the_normals_by_the_squared_height():

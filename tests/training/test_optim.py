@@ -81,3 +81,16 @@ def test_normalise_gradients_by_tensor():
     p.grad = torch.tensor([1e-8, 0.0])  # the 1e-8 in the denominator halves it
     normalise_gradients([p])
     assert math.isclose(p.grad[0].item(), 0.5, rel_tol=1e-6)
+
+
+def test_a_shared_second_moment_keeps_the_gradients_proportions():
+    """The first step is lr g / rms(g): elements with a small gradient move little."""
+    gradient = torch.tensor([3.0, -4.0, 0.0, 1e-4])
+    x = torch.zeros(4, requires_grad=True)
+    adam = Adam([x], shared=True)
+    x.grad = gradient.clone()
+    adam.step(0.1)
+    assert torch.allclose(x.detach(), -0.1 * gradient / gradient.square().mean().sqrt(), rtol=1e-5)
+    again = Adam([torch.zeros(4)], shared=True)
+    again.load_state(adam.state())
+    assert torch.equal(again.second[0], adam.second[0]) and again.second[0].ndim == 0

@@ -35,6 +35,8 @@ class SurfaceConfig:
         pictures: views of the maps compared in a step, when the exemplar has several maps.
         noise: the texture starts uniform in [0, noise].
         lr, milestones, decay: Adam and its schedule.
+        shared_moment: Adam's second moment is one number for the whole texture, which leaves noise alone that
+            the features do not see; False gives each texel its own (the paper), which amplifies it.
         checkpoint_every, preview_every: in steps.
     """
 
@@ -59,6 +61,7 @@ class SurfaceConfig:
     lr: float = 0.1
     milestones: tuple[int, ...] = (200, 400)
     decay: float = 0.5
+    shared_moment: bool = True
     checkpoint_every: int = 50
     preview_every: int = 50
 
@@ -96,5 +99,5 @@ class SurfaceConfig:
 
 PRESETS = {
     "fast": SurfaceConfig(steps=300, preset="fast", scales=2, milestones=(180, 250)),
-    "paper": SurfaceConfig(steps=500, preset="paper", frames="fixed", exemplar_size=512),
+    "paper": SurfaceConfig(steps=500, preset="paper", frames="fixed", exemplar_size=512, shared_moment=False),
 }

@@ -66,7 +66,8 @@ def fit(
     surface = with_layout(mesh if isinstance(mesh, Mesh) else Mesh.load(mesh), settings, keep_uvs)
     assert surface.uv is not None
     texels = Texels.rasterize(surface, surface.uv, settings.resolution)
-    task = SurfaceTask(settings, shown, texels, find_levels(surface, texels, settings))
+    identity = f"{surface.name} {content_key(surface.vertices, surface.faces, surface.uv)}"
+    task = SurfaceTask(settings, shown, texels, find_levels(surface, texels, settings), identity)
     result = train(
         task,
         settings,
@@ -74,6 +75,7 @@ def fit(
         lr=settings.lr,
         milestones=settings.milestones,
         decay=settings.decay,
+        shared_moment=settings.shared_moment,
         checkpoint_every=settings.checkpoint_every,
         preview_every=settings.preview_every,
         resume=resume,

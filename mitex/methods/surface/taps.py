@@ -120,7 +120,7 @@ def _groups(texels: Texels, edges: np.ndarray, depth: int) -> list[np.ndarray]:
     labels = [np.arange(count)]
     for n in range(1, depth + 1):
         voxel = np.floor(offset / 2**n).astype(np.int64)
-        key = np.ravel_multi_index(tuple(voxel.T), tuple(voxel.max(0) + 1))
+        key = np.asarray(np.ravel_multi_index(tuple(voxel.T), tuple(voxel.max(0) + 1)))
         inside = edges[key[edges[:, 0]] == key[edges[:, 1]]]
         graph = scipy.sparse.coo_array((np.ones(len(inside), bool), tuple(inside.T)), shape=(count, count))
         labels.append(connected_components(graph, directed=False)[1])
@@ -185,7 +185,7 @@ def _reached(
         found = group[index]
         if related is not None:
             weight = np.where(related(searching[:, None], found), weight, 0.0)
-        best = np.asarray(weight).argmax(1)[:, None]
+        best = np.argmax(weight, axis=1, keepdims=True)
         hit = arrived & (np.take_along_axis(weight, best, 1)[:, 0] > 0)
         reached[searching[hit]] = np.take_along_axis(found, best, 1)[hit, 0]
         searching = searching[arrived & ~hit]

@@ -32,11 +32,15 @@ class SurfaceTask:
         config: settings.
         exemplar: maps to match.
         texels, levels: of the surface.
+        mesh: what tells it from other meshes, for a resumed run.
     """
 
-    def __init__(self, config: SurfaceConfig, exemplar: Exemplar, texels: Texels, levels: Levels) -> None:
+    def __init__(
+        self, config: SurfaceConfig, exemplar: Exemplar, texels: Texels, levels: Levels, mesh: str = ""
+    ) -> None:
         keep_freed_memory()
         self.config, self.exemplar, self.texels, self.levels = config, exemplar, texels, levels
+        self.mesh = mesh
         self.layout = texel_layout(list(exemplar.maps))
         self.pictures = pictures_of(self.layout, True, config.seed)
         channels = 1 + max(c for channels in self.layout.values() for c in channels)
@@ -117,7 +121,8 @@ class SurfaceTask:
         return np.concatenate(rows, 0)
 
     def metadata(self) -> dict[str, str]:
-        return {"method": "surface", "maps": ",".join(self.layout), "exemplar": self.exemplar.name}
+        maps = ",".join(self.layout)
+        return {"method": "surface", "maps": maps, "exemplar": self.exemplar.name, "mesh": self.mesh}
 
     def _chosen(self, step: int, generator: torch.Generator) -> list[int]:
         """The pictures of a step: kinds in turn, any of a kind."""

@@ -1,7 +1,8 @@
-"""Levels of a flat grid of texels, made without geodesics."""
+"""Levels of a flat grid of texels, made without geodesics, and a flat mesh whose atlas is the identity."""
 
 import numpy as np
 
+from mitex.mesh import Mesh
 from mitex.methods.surface.levels import POOLS, Level, Levels
 
 
@@ -45,3 +46,16 @@ def _blocks(side: int, depth: int) -> np.ndarray:
         key = key * 4 + ((row >> bit) & 1) * 2 + ((column >> bit) & 1)
     ranked = np.argsort(key)
     return np.stack([row[ranked], column[ranked]], 1)
+
+
+def flat_square(columns: int) -> Mesh:
+    """[0, 1]^2 in the plane z = 0, seen from +z; its UVs are x and y. Inner vertices are moved at random."""
+    x, y = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, columns + 1))
+    moved = np.random.default_rng(0).uniform(-0.3, 0.3, (2, columns - 1, columns - 1)) / columns
+    x[1:-1, 1:-1] += moved[0]
+    y[1:-1, 1:-1] += moved[1]
+    a = (np.arange(columns)[:, None] * (columns + 1) + np.arange(columns)).ravel()
+    b, c, d = a + 1, a + columns + 1, a + columns + 2
+    faces = np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, c], 1)])
+    points = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], 1)
+    return Mesh(points, faces, points[faces][..., :2], "square")

@@ -8,10 +8,14 @@ from mitex.errors import ConfigError
 from mitex.features import Vgg16
 from mitex.features.vgg import LAYERS, convolutions
 from mitex.methods.surface import operations as room
+from mitex.methods.surface.exponential import GeodesicTracer
+from mitex.methods.surface.frames import tangent_frames
 from mitex.methods.surface.levels import Level
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.operations import Neighbourhood, SurfaceConv, SurfacePool
-from tests.methods.surface.grids import grid_levels
+from mitex.methods.surface.taps import Surroundings, build
+from mitex.methods.surface.texels import Texels
+from tests.methods.surface.grids import flat_square, grid_levels
 
 SIDE = 224
 MARGIN = {1: 2, 2: 3, 3: 5, 4: 6, 5: 6}  # how far the border's rule reaches into the layers of a block
@@ -20,6 +24,16 @@ MARGIN = {1: 2, 2: 3, 3: 5, 4: 6, 5: 6}  # how far the border's rule reaches int
 @pytest.fixture(scope="module")
 def levels():
     return grid_levels(SIDE)
+
+
+@pytest.fixture(scope="module")
+def found():
+    """The levels of a flat square of triangles whose atlas is the identity."""
+    mesh = flat_square(40)
+    assert mesh.uv is not None
+    texels = Texels.rasterize(mesh, mesh.uv, SIDE)
+    frames = tangent_frames(mesh, texels.face, texels.barycentric, "fixed")
+    return build(Surroundings(texels, GeodesicTracer(mesh), *frames))
 
 
 @pytest.fixture(scope="module")
@@ -38,8 +52,9 @@ def as_image(levels, values, layer):
     return out
 
 
-@pytest.mark.parametrize("pool", ["average", "max"])
-def test_every_layer_equals_the_image_network_on_a_grid(levels, image, pool):
+@pytest.mark.parametrize(("kind", "pool"), [("levels", "average"), ("levels", "max"), ("found", "average")])
+def test_every_layer_equals_the_image_network_on_a_grid(request, kind, image, pool):
+    levels = request.getfixturevalue(kind)
     ours = SurfaceVgg(levels, pool=pool, precision="float32")
     features = ours.features(image.view(-1, 3)[levels.order], LAYERS)
     expected = Vgg16(pool=pool, precision="float32", normalised=False).features(image[None], LAYERS)
@@ -50,8 +65,10 @@ def test_every_layer_equals_the_image_network_on_a_grid(levels, image, pool):
         assert b.numel() and (a - b).abs().max() < 1e-4 * b.abs().max(), layer
 
 
-def test_input_gradient_equals_the_image_networks(levels, image):
+@pytest.mark.parametrize("kind", ["levels", "found"])
+def test_input_gradient_equals_the_image_networks(request, kind, image):
     """Of the centre of each layer, in float32."""
+    levels = request.getfixturevalue(kind)
     ours, theirs = SurfaceVgg(levels, precision="float32"), Vgg16(precision="float32", normalised=False)
     generator = torch.Generator().manual_seed(1)
     for layer in ("relu1_1", "relu1_2", "relu2_2", "relu3_3", "relu4_3"):
@@ -141,7 +158,8 @@ def test_finite_differences(levels, image):
     x = image.view(-1, 3)[levels.order].clone().requires_grad_()
 
     def value(texels):
-        return sum(g.double().sum() for g in ours.gram_matrices(texels, ("relu2_1", "pool3")).values())
+        grams = ours.gram_matrices(texels, ("relu2_1", "pool3"))
+        return torch.stack([gram.double().sum() for gram in grams.values()]).sum()
 
     (gradient,) = torch.autograd.grad(value(x), x)
     direction = torch.randn(x.shape, generator=generator)
@@ -157,7 +175,7 @@ def test_bfloat16_agrees(levels, image):
     for precision in ("float32", "bfloat16"):
         x = texels.clone().requires_grad_()
         grams = SurfaceVgg(levels, precision=precision).gram_matrices(x, ("relu1_2", "relu2_2", "relu3_3"))
-        loss = sum(gram.square().mean() for gram in grams.values())
+        loss = torch.stack([gram.square().mean() for gram in grams.values()]).sum()
         results.append((grams, torch.autograd.grad(loss, x)[0]))
     (exact, gradient), (rounded, close) = results
     for name in exact:

@@ -1,0 +1,63 @@
+"""`mitex fit surface`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import arg
+
+from mitex.cli.fitting import Fitting
+
+
+@dataclass(kw_only=True)
+class FitSurface(Fitting):
+    """Synthesize a texture directly on one mesh, without views and without seams (tangent-space CNN).
+
+    The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the texture;
+    `mitex apply RUN --mesh MESH --out ASSET` writes it. Ctrl-C saves, and --resume goes on.
+
+    examples:
+      mitex fit surface --exemplar pebbles.png --mesh bunny.obj --out runs/bunny
+      mitex fit surface --exemplar scales --mesh octopus --resolution 1024
+      mitex fit surface --exemplar maps/ --mesh bunny.obj --preset paper --out runs/paper
+      mitex fit surface --exemplar pebbles.png --mesh bunny.obj --out runs/bunny --resume
+    """
+
+    mesh: Annotated[str, arg(metavar="MESH|NAME")]
+    """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
+
+    out: Annotated[Path | None, arg(metavar="RUN", help_behavior_hint="(default: runs/EXEMPLAR-MESH)")] = None
+    """Run folder."""
+
+    preset: Annotated[str | None, arg(metavar="fast|paper", help_behavior_hint="(default: fast)")] = None
+    """Settings to start from: `fast` is quick and clean, `paper` follows the publication."""
+
+    resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the preset's)")] = None
+    """Side of the texture [texels]."""
+
+    keep_uvs: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Use the mesh's own UVs, which must not overlap."""
+
+    def run(self) -> None:
+        overrides = self.overrides(resolution=self.resolution)
+        from mitex.exemplar import Exemplar
+        from mitex.mesh import Mesh
+
+        exemplar, mesh = Exemplar.load(self.exemplar), Mesh.load(self.mesh)
+        out = self.out or Path("runs") / f"{exemplar.name}-{mesh.name}"
+        from mitex.methods import surface
+
+        surface.fit(
+            exemplar,
+            mesh,
+            out,
+            preset=self.preset,
+            config=self.config,
+            overrides=overrides,
+            keep_uvs=self.keep_uvs,
+            resume=self.resume,
+            quiet=self.quiet,
+        )
+        print(out)
