@@ -135,6 +135,8 @@ def unwrap(mesh: Mesh, resolution: int, padding: int) -> np.ndarray:
         (F, 3, 2) float32 in [0, 1], v upwards. Charts may be mirrored.
     """
     atlas = xatlas.Atlas()
+    # xatlas has absolute tolerances.
+    mesh = mesh if not np.ptp(mesh.vertices) else mesh.normalised()[0]
     pieces, positions = _pieces(mesh), _rough(mesh)
     for piece in pieces:
         used, faces = np.unique(mesh.faces[piece], return_inverse=True)

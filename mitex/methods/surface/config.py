@@ -33,7 +33,8 @@ class SurfaceConfig:
         scales: how many coarser pyramids of texels are matched first, each half as fine.
         coarse_share: of the steps, spent on the coarser scales together.
         pictures: views of the maps compared in a step, when the exemplar has several maps.
-        noise: the texture starts uniform in [0, noise].
+        noise: the texture starts with uniform noise of this width,
+        mean_start: around the mean of the exemplar; False: from 0 on (the paper).
         lr, milestones, decay: Adam and its schedule.
         shared_moment: Adam's second moment is one number for the whole texture, which leaves noise alone that
             the features do not see; False gives each texel its own (the paper), which amplifies it.
@@ -58,6 +59,7 @@ class SurfaceConfig:
     coarse_share: float = 0.4
     pictures: int = 2
     noise: float = 0.2
+    mean_start: bool = True
     lr: float = 0.1
     milestones: tuple[int, ...] = (200, 400)
     decay: float = 0.5
@@ -99,5 +101,7 @@ class SurfaceConfig:
 
 PRESETS = {
     "fast": SurfaceConfig(steps=300, preset="fast", scales=2, milestones=(180, 250)),
-    "paper": SurfaceConfig(steps=500, preset="paper", frames="fixed", exemplar_size=512, shared_moment=False),
+    "paper": SurfaceConfig(
+        steps=500, preset="paper", frames="fixed", exemplar_size=512, mean_start=False, shared_moment=False
+    ),
 }

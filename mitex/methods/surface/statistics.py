@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 import torch.nn.functional as F
 
@@ -27,11 +28,17 @@ def exemplar_features(
     Returns:
         layer -> (n, C) float32.
     """
-    margin = min(MARGIN, (min(image.shape[:2]) - 1) // 32 * 32)
-    padded = F.pad(image.permute(2, 0, 1)[None], (margin,) * 4, mode="reflect").permute(0, 2, 3, 1)
+    around = ((MARGIN, MARGIN), (MARGIN, MARGIN), (0, 0))
+    padded = torch.from_numpy(np.pad(image.numpy(), around, mode="reflect"))[None]
+    sources = {layer: _source(network, layer) for layer in layers}
+    with torch.no_grad():
+        maps = network.features(padded, dict.fromkeys(sources.values()))
     found = {}
-    for layer in layers:
-        features, cut = _layer(network, padded, layer, margin)
+    for layer, source in sources.items():
+        features, shrunk = maps[source], 1 << (int(layer[4]) - 1)
+        if layer != source:
+            features, shrunk = _pooled(network, features), 2 * shrunk
+        cut = min(MARGIN // shrunk, (features.shape[1] - 1) // 2, (features.shape[2] - 1) // 2)
         found[layer] = features[0, cut : features.shape[1] - cut, cut : features.shape[2] - cut].flatten(0, 1)
     return found
 
@@ -41,13 +48,11 @@ def exemplar_grams(network: Vgg16, image: torch.Tensor, layers: tuple[str, ...])
     return {name: gram_matrix(f) for name, f in exemplar_features(network, image, layers).items()}
 
 
-@torch.no_grad()
-def _layer(network: Vgg16, images: torch.Tensor, layer: str, margin: int) -> tuple[torch.Tensor, int]:
-    """A layer's map, and the margin in it."""
-    block = int(layer[4])
-    if layer.startswith("relu"):
-        return network.features(images, [layer])[layer], margin >> (block - 1)
-    last = max(name for name in network.index if name.startswith(f"relu{block}_"))
-    maps = network.features(images, [last])[last].permute(0, 3, 1, 2)
-    pooled = F.avg_pool2d(maps, 2) if network.pool == "average" else F.max_pool2d(maps, 2)
-    return pooled.permute(0, 2, 3, 1), margin >> block
+def _source(network: Vgg16, layer: str) -> str:
+    """The convolution that a layer is, or that it pools."""
+    return layer if layer in network.index else max(x for x in network.index if x[4] == layer[4])
+
+
+def _pooled(network: Vgg16, maps: torch.Tensor) -> torch.Tensor:
+    pool = F.avg_pool2d if network.pool == "average" else F.max_pool2d
+    return pool(maps.permute(0, 3, 1, 2), 2).permute(0, 2, 3, 1)

@@ -43,10 +43,8 @@ class SurfaceTask:
         self.mesh = mesh
         self.layout = texel_layout(list(exemplar.maps))
         self.pictures = pictures_of(self.layout, True, config.seed)
-        channels = 1 + max(c for channels in self.layout.values() for c in channels)
         generator = torch.Generator().manual_seed(config.seed)
-        start = config.noise * torch.rand(len(levels.order), channels, generator=generator)
-        self.values = start.requires_grad_()
+        self.values = self._start(generator).requires_grad_()
         weights = random_weights(generator) if config.weights == "random" else None
         # The image network has the same weights: what differs is only where it looks.
         image_network = Vgg16(config.pooling, normalised=False, weights=weights)
@@ -123,6 +121,12 @@ class SurfaceTask:
     def metadata(self) -> dict[str, str]:
         maps = ",".join(self.layout)
         return {"method": "surface", "maps": maps, "exemplar": self.exemplar.name, "mesh": self.mesh}
+
+    def _start(self, generator: torch.Generator) -> torch.Tensor:
+        means = [self.exemplar.maps[name].mean((0, 1)) for name in self.layout]
+        mean = torch.from_numpy(np.concatenate(means))
+        noise = self.config.noise * torch.rand(len(self.levels.order), len(mean), generator=generator)
+        return (noise + mean - self.config.noise / 2).clamp(0, 1) if self.config.mean_start else noise
 
     def _chosen(self, step: int, generator: torch.Generator) -> list[int]:
         """The pictures of a step: kinds in turn, any of a kind."""

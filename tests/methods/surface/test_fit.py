@@ -1,0 +1,187 @@
+"""A small real synthesis, its texture, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from mitex.asset import Asset
+from mitex.atlas import usable_uv
+from mitex.errors import CheckpointError, ConfigError
+from mitex.exemplar import Exemplar
+from mitex.mesh import Mesh, embedded, icosphere
+from mitex.methods import surface
+from mitex.methods.surface.config import PRESETS
+from mitex.methods.surface.fit import with_layout
+from mitex.methods.surface.task import SurfaceTask
+from mitex.methods.surface.texels import charts
+from mitex.methods.surface.texture import NAME, SurfaceTexture, is_texture
+from mitex.training import resolve
+
+SMALL = ["resolution=48", "exemplar_size=48", "steps=12", "scales=0", "checkpoint_every=6", "preview_every=0"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def cache(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return icosphere(6)
+
+
+@pytest.fixture(scope="module")
+def exemplar():
+    return Exemplar.load("cobblestone").resized(48)
+
+
+@pytest.fixture(scope="module")
+def made(mesh, exemplar, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run") / "run"
+    return folder, surface.fit(exemplar, mesh, folder, overrides=SMALL, quiet=True)
+
+
+def losses(folder):
+    import json
+
+    return [json.loads(line)["loss"] for line in (folder / "metrics.jsonl").read_text().splitlines()]
+
+
+def test_the_loss_falls_and_the_colours_come_near(exemplar, tmp_path):
+    colours = Exemplar({"albedo": exemplar.maps["albedo"]})
+    texture = surface.fit(
+        colours, embedded("vase"), tmp_path / "run", overrides=[*SMALL, "steps=60"], quiet=True
+    )
+    found = losses(tmp_path / "run")
+    assert found[-1] < 0.15 * found[0]
+    wanted = exemplar.maps["albedo"].reshape(-1, 3)
+    assert np.abs(texture.values.mean(0) - wanted.mean(0)).max() < 0.06
+    assert np.abs(texture.values.std(0) - wanted.std(0)).max() < 0.08
+
+
+def test_all_maps_are_synthesized(made, exemplar):
+    _, texture = made
+    asset = texture.apply()
+    assert isinstance(asset, Asset) and asset.texture_maps is not None
+    assert set(asset.texture_maps) == set(asset.vertex_maps) == set(exemplar.maps)
+    assert asset.texture_maps["albedo"].shape == (48, 48, 3)
+
+
+def test_textures_agree_with_vertex_maps(made, mesh):
+    """Both are read from the same texels."""
+    asset = made[1].apply(mesh)
+    assert asset.atlas is not None and asset.texture_maps is not None
+    row = (1 - asset.atlas.uv[..., 1]) * 48 - 0.5
+    column = asset.atlas.uv[..., 0] * 48 - 0.5
+    nearest = asset.texture_maps["albedo"][
+        np.rint(row).astype(int).clip(0, 47), np.rint(column).astype(int).clip(0, 47)
+    ]
+    at_corners = asset.vertex_maps["albedo"][asset.mesh.faces]
+    assert np.corrcoef(nearest.ravel(), at_corners.ravel())[0, 1] > 0.5
+
+
+def test_files_round_trip(made, mesh):
+    folder, texture = made
+    again = SurfaceTexture.load(folder)
+    assert is_texture(folder) and is_texture(folder / NAME) and not is_texture(folder / "config.toml")
+    assert np.abs(again.values - texture.values).max() < 1e-3 and again.maps == texture.maps
+    assert np.array_equal(again.mesh.faces, mesh.faces) and again.about["steps"] == 12
+    with pytest.raises(ConfigError, match="belongs to mesh 'icosphere6', not to 'icosphere5'; synthesize"):
+        again.apply(icosphere(5))
+
+
+@pytest.mark.parametrize("name", ["config.toml", "nothing", "metrics.jsonl"])
+def test_what_is_no_texture_is_refused(made, name):
+    with pytest.raises(CheckpointError, match="surface texture"):
+        SurfaceTexture.load(made[0] / name)
+
+
+def test_resuming_changes_nothing(mesh, exemplar, tmp_path):
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        whole = surface.fit(exemplar, mesh, tmp_path / "whole", overrides=SMALL, quiet=True)
+        part = [*SMALL, "steps=6"]
+        surface.fit(exemplar, mesh, tmp_path / "part", overrides=part, quiet=True)
+        assert is_texture(tmp_path / "part")
+        rest = surface.fit(exemplar, mesh, tmp_path / "part", overrides=["steps=12"], resume=True, quiet=True)
+    finally:
+        torch.set_num_threads(threads)
+    assert np.array_equal(whole.values, rest.values)
+
+
+def test_resuming_on_another_mesh_is_refused(made, exemplar):
+    with pytest.raises(CheckpointError):
+        surface.fit(exemplar, icosphere(7), made[0], overrides=["steps=14"], resume=True, quiet=True)
+
+
+@pytest.mark.parametrize(
+    "setting",
+    ["frames=fixed", "weights=random", "bilinear=false", "correct=false", "scales=2", "pooling=max"],
+)
+def test_options_run(mesh, exemplar, tmp_path, setting):
+    overrides = [*SMALL, "steps=3", "pictures=1", setting]
+    if setting == "scales=2":
+        overrides.remove("scales=0")
+    texture = surface.fit(exemplar, mesh, tmp_path / "run", overrides=overrides, quiet=True)
+    assert np.isfinite(texture.values).all() and np.ptp(texture.values) > 0.1
+
+
+def test_noise_start_and_range(mesh, exemplar, tmp_path):
+    texture = surface.fit(exemplar, mesh, tmp_path / "run", overrides=[*SMALL, "steps=1", "lr=0"], quiet=True)
+    means = np.concatenate([exemplar.maps[name].mean((0, 1)) for name in texture.maps])
+    assert np.abs(texture.values.mean(0) - means).max() < 0.05
+    assert (np.ptp(texture.values, axis=0) <= 0.2 + 1e-6).all()
+    overrides = [*SMALL, "steps=1", "lr=0", "mean_start=false"]
+    texture = surface.fit(exemplar, mesh, tmp_path / "paper", overrides=overrides, quiet=True)
+    assert texture.values.min() >= 0 and texture.values.max() <= 0.2
+    assert abs(texture.values.mean() - 0.1) < 0.005
+
+
+def test_the_scale_becomes_finer():
+    task = object.__new__(SurfaceTask)
+    task.config = resolve(PRESETS, None, None, ["steps=100", "scales=2", "coarse_share=0.4"])
+    assert [task.scale(k) for k in (0, 19, 20, 39, 40, 99)] == [2, 2, 1, 1, 0, 0]
+
+
+class TestLayouts:
+    CONFIG = resolve(PRESETS, None, None, ["resolution=64"])
+
+    def test_own_uvs_are_kept_on_request(self, mesh):
+        laid = with_layout(mesh, self.CONFIG, False)
+        assert laid.uv is not None and usable_uv(laid, laid.uv)
+        assert with_layout(laid, self.CONFIG, True) is laid
+        assert len(np.unique(charts(laid, laid.uv))) >= 2
+
+    def test_missing_uvs(self, mesh):
+        with pytest.raises(ConfigError, match="no UVs to keep"):
+            with_layout(mesh, self.CONFIG, True)
+
+    @pytest.mark.parametrize("damage", ["overlap", "outside", "nan"])
+    def test_unusable_uvs(self, mesh, damage):
+        uv = np.array(with_layout(mesh, self.CONFIG, False).uv)
+        uv[: len(uv) // 2] = uv[len(uv) // 2 :] if damage == "overlap" else uv[: len(uv) // 2]
+        if damage == "outside":
+            uv = 2 * uv
+        if damage == "nan":
+            uv[0, 0] = 1e30
+        with pytest.raises(ConfigError, match="overlap"):
+            with_layout(replace(mesh, uv=uv), self.CONFIG, True)
+
+
+def test_one_triangle_is_enough(exemplar, tmp_path):
+    mesh = Mesh(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]), name="one")
+    texture = surface.fit(exemplar, mesh, tmp_path / "run", overrides=[*SMALL, "steps=2"], quiet=True)
+    assert np.isfinite(texture.values).all()
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_size_does_not_matter(mesh, exemplar, tmp_path, factor):
+    large = mesh.with_vertices(mesh.vertices * factor)
+    a = surface.fit(exemplar, mesh, tmp_path / "a", overrides=[*SMALL, "steps=2"], quiet=True)
+    b = surface.fit(exemplar, large, tmp_path / "b", overrides=[*SMALL, "steps=2"], quiet=True)
+    assert np.isfinite(b.values).all() and abs(len(a.values) - len(b.values)) < 0.2 * len(a.values)
