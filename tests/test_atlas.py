@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
 
-from mitex.atlas import Atlas, laid_out, unwrap, usable_uv
+from mitex.atlas import Atlas, laid_out, spread, unwrap, usable_uv
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, icosphere, subdivide_loop, torus
 
@@ -188,3 +188,31 @@ def test_layout_comes_before_subdivision():
     overlapping = replace(mesh, uv=np.zeros_like(laid.uv))
     for result in (laid_out(overlapping, 128), subdivide_loop(laid, 2)):
         assert result.uv is not None and usable_uv(result, result.uv)
+
+
+def test_fine_smooth_meshes_are_unwrapped():
+    """xatlas alone exhausts the stack here (its issue 146)."""
+    sphere = icosphere(66)  # 87,120 faces
+    uv = unwrap(sphere, 512, 2)
+    assert usable_uv(sphere, uv)
+    area = np.abs(np.linalg.det(uv[:, 1:].astype(float) - uv[:, :1]))
+    stretch = np.sqrt(sphere.face_areas / area)
+    assert np.ptp(np.percentile(stretch, [2, 98])) < 0.2 * np.median(stretch)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+def test_unwrapping_does_not_depend_on_size(scale):
+    mesh = torus(12, 8)
+    mesh = mesh.with_vertices(scale * mesh.vertices)
+    assert usable_uv(mesh, unwrap(mesh, 64, 2))
+
+
+def test_spreading_continues_the_used_texels():
+    rng = np.random.default_rng(3)
+    used = np.zeros((20, 20), bool)
+    used[6:9, 5:12] = True
+    image = np.where(used[..., None], rng.random((20, 20, 2)), 7.0)
+    found = spread(image, used, 3)
+    assert np.array_equal(found[used], image[used])
+    assert np.array_equal(found[4, 8], image[6, 8]) and np.array_equal(found[7, 2], image[7, 5])
+    assert np.allclose(found[19, 19], image[used].mean(0)) and np.allclose(found[7, 1], image[used].mean(0))

@@ -1,6 +1,7 @@
 """Pictures of spheres whose colours, light and relief are known."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -163,3 +164,26 @@ def test_wrong_views():
         with pytest.raises(ConfigError, match="samples per pixel"):
             renderer.render(0.0, renderer.frame(0.0), spp)
     OrbitRenderer(asset, resolution=16, backdrop=False).frame(0.0, -1.0)
+
+
+@pytest.mark.parametrize("lean", [(0.0, 0.0), (0.5, 0.2), (-0.4, 0.4)])
+def test_textures_look_like_the_vertex_maps_they_were_baked_from(lean):
+    """Colour and relief, in mirrored charts too; Mitsuba darkens leaning normals of maps by some percent."""
+    asset = bent(*lean)
+    maps = {**asset.vertex_maps, "albedo": 0.3 + 0.5 * (SPHERE.vertices * 0.5 + 0.5)}
+    asset = Asset(SPHERE, maps, asset.tangents)
+    baked = asset.baked(256)
+    a, b = picture(asset, spp=64), picture(baked, spp=64)
+    inner = slice(7, 17)
+    assert np.abs(a - b)[inner, inner].max() < 0.18 and np.abs(a - b)[inner, inner].mean() < 0.08
+
+
+def test_a_texture_shows_what_no_vertex_holds():
+    """The vertex maps are grey, the texture is red."""
+    baked = Asset(icosphere(2), {"albedo": np.full((42, 3), 0.5)}).baked(64)
+    assert baked.texture_maps is not None
+    red_map = np.zeros((64, 64, 3), np.float32)
+    red_map[:, :, 0] = 1.0
+    image = picture(replace(baked, texture_maps={"albedo": red_map}))
+    red, green, _ = middle(image)
+    assert red > 5 * green

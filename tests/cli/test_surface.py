@@ -1,0 +1,161 @@
+"""`mitex fit surface`, and `mitex apply` of what it makes."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from mitex.asset import Asset
+from mitex.atlas import unwrap
+from mitex.cli import main
+from mitex.export import write_asset
+from mitex.mesh import Mesh
+from mitex.training import checkpoint
+from tests.cli import bad_files as bad
+from tests.cli.refusals import check_refused
+
+QUICK = "--quiet --set resolution=32 exemplar_size=32 steps=4 checkpoint_every=2 preview_every=0 scales=0"
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path_factory, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+
+
+def fit(words=QUICK, exemplar="good.png", mesh="good.obj", out="out/run"):
+    return f"fit surface --exemplar {exemplar} --mesh {mesh} --out {out} {words}".split()
+
+
+@pytest.fixture
+def run(files, capsys):
+    bad.image(files / "good.png")
+    assert main(fit()) == 0
+    assert capsys.readouterr().out.strip() == "out/run"
+    return files / "out" / "run"
+
+
+def test_fit_apply_render(files, run, capsys):
+    assert sorted(p.name for p in run.iterdir()) == [
+        *("checkpoint.previous.safetensors", "checkpoint.safetensors", "config.toml", "metrics.jsonl"),
+        "texture.safetensors",
+    ]
+    assert main(["apply", "out/run", "--mesh", "good.obj", "--out", "out/a.glb"]) == 0
+    scene: Any = trimesh.load(files / "out" / "a.glb", process=False)
+    (geometry,) = scene.geometry.values()
+    assert geometry.visual.material.baseColorTexture.size == (32, 32)
+    cube = Mesh.load(files / "good.obj").vertices
+    assert np.allclose(geometry.bounds, [cube.min(0), cube.max(0)], atol=1e-6)
+    assert main(["render", "out/a.glb", "--out", "out/a.png", "--size", "32", "--spp", "1"]) == 0
+    assert main(["apply", "out/run", "--mesh", "good.obj", "--out", "out/a.ply"]) == 0
+    assert "out/a.ply" in capsys.readouterr().out
+
+
+def test_resume(files, run):
+    assert main(fit("--resume --quiet --set steps=6")) == 0
+    assert checkpoint.load(run).step == 6
+
+
+def test_own_uvs(files, run, capsys):
+    cube = Mesh.load(files / "good.obj")
+    mesh = replace(cube, uv=unwrap(cube, 32, 2))
+    grey = {"albedo": np.full((len(mesh.vertices), 3), 0.5)}
+    write_asset(Asset(mesh, grey).baked(32), files / "own.glb")
+    assert main(fit(f"{QUICK} --keep-uvs", mesh="own.glb", out="out/own")) == 0
+
+
+BAD_FITS = {
+    "no mesh": (["fit", "surface", "--exemplar", "good.png", "--out", "out/x"], "--mesh"),
+    "unknown mesh": (fit(mesh="no.obj"), "no.obj"),
+    "damaged mesh": (fit(mesh="cut.obj"), "cut.obj"),
+    "unknown exemplar": (fit(exemplar="no.png"), "no.png"),
+    "unknown preset": (fit(f"{QUICK} --preset best"), "best"),
+    "unknown key": (fit("--set resolutoin=64"), "resolution"),
+    "resolution 0": (fit("--resolution 0"), "resolution = 0"),
+    "resolution beyond memory": (fit("--resolution 100000"), "resolution = 100000"),
+    "resolution twice": (fit("--resolution 64 --set resolution=32"), "resolution"),
+    "steps 0": (fit("--steps 0"), "--steps 0"),
+    "unknown layer": (fit("--set layers=relu6_1"), "relu6_1"),
+    "unknown frames": (fit("--set frames=straight"), "straight"),
+    "unknown weights": (fit("--set weights=resnet"), "resnet"),
+    "angle": (fit("--set angle=1000"), "angle"),
+    "no UVs to keep": (fit(f"{QUICK} --keep-uvs"), "no UVs to keep"),
+    "overlapping UVs": (fit(f"{QUICK} --keep-uvs", mesh="overlap.obj"), "overlap"),
+    "UVs outside": (fit(f"{QUICK} --keep-uvs", mesh="outside.obj"), "overlap"),
+    "below a file": (fit(out="good.obj/run"), "is a file"),
+    "other files": (fit(out="full"), "other files"),
+    "nothing to resume": (fit(f"{QUICK} --resume"), "resume"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FITS)
+def test_bad_fits(files, name, capsys):
+    bad.image(files / "good.png")
+    bad.text(files / "cut.obj", "v 0 0 0\nf 1 2")
+    bad.text(files / "full" / "other.txt")
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\n"
+    bad.text(files / "overlap.obj", corners + "vt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\nf 2/1 4/2 3/3\n")
+    bad.text(files / "outside.obj", corners + "vt 0 0\nvt 3 0\nvt 0 2\nf 1/1 2/2 3/3\n")
+    words, message = BAD_FITS[name]
+    check_refused(files, words, message, capsys)
+
+
+BAD_APPLIES = {
+    "another mesh": ("--mesh other.obj --out out/a.glb", "belongs to mesh 'good', not to 'other'"),
+    "seed": ("--mesh good.obj --out out/a.glb --seed 3", "--seed means nothing"),
+    "resolution": ("--mesh good.obj --out out/a.glb --resolution 64", "--resolution means nothing"),
+    "vertex colours": ("--mesh good.obj --out out/a.glb --vertex-colors", "--vertex-colors means nothing"),
+    "subdivide": ("--mesh good.obj --out out/a.glb --subdivide 1", "--subdivide means nothing"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_APPLIES)
+def test_bad_applies(files, run, name, capsys):
+    bad.text(files / "other.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    words, message = BAD_APPLIES[name]
+    check_refused(files, ["apply", "out/run", *words.split()], message, capsys)
+
+
+def test_a_run_that_is_not_finished(files, run, capsys):
+    (run / "texture.safetensors").unlink()
+    check_refused(files, ["apply", "out/run", "--mesh", "good.obj", "--out", "out/a.glb"], "--resume", capsys)
+
+
+def test_a_damaged_texture(files, run, capsys):
+    bad.cut(run / "texture.safetensors")
+    check_refused(files, ["apply", "out/run", "--mesh", "good.obj", "--out", "out/a.glb"], "texture", capsys)
+
+
+HARD = {
+    "zero-area faces": "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2 0 0\nf 1 2 3\nf 1 2 4\n",
+    "duplicate vertices": "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 4 6 5\n",
+    "T-junction": "v 0 0 0\nv 2 0 0\nv 0 2 0\nv 1 0 0\nv 1 -1 0\nf 1 2 3\nf 4 1 5\nf 2 4 5\n",
+    "non-manifold edge": "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nf 1 2 3\nf 2 1 4\nf 1 2 5\n",
+    "one triangle": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+    "opposite windings": "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 3 4\n",
+    "two components": "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 0 0\nv 6 0 0\nv 5 1 0\nf 1 2 3\nf 4 5 6\n",
+    "a sliver": "v 0 0 0\nv 1 0 0\nv 0.5 1e-7 0\nv 0.5 1 0\nf 1 2 3\nf 1 3 4\nf 3 2 4\n",
+    "tiny": "v 0 0 0\nv 1e-6 0 0\nv 0 1e-6 0\nf 1 2 3\n",
+    "huge": "v 0 0 0\nv 1e6 0 0\nv 0 1e6 0\nf 1 2 3\n",
+}
+
+
+@pytest.mark.parametrize("name", HARD)
+def test_hard_meshes_get_a_texture(files, name, capsys):
+    bad.image(files / "good.png")
+    bad.text(files / "hard.obj", HARD[name])
+    assert main(fit(mesh="hard.obj")) == 0
+    assert main(["apply", "out/run", "--mesh", "hard.obj", "--out", "out/a.glb"]) == 0
+    captured = capsys.readouterr()
+    assert all(line.startswith("warning: ") for line in captured.err.splitlines())
+
+
+def test_one_texel(files):
+    bad.image(files / "good.png")
+    assert main(fit("--quiet --resolution 1 --steps 2 --set scales=0")) == 0
+
+
+def test_a_moebius_strip(files, shared_data):
+    bad.image(files / "good.png")
+    assert main(fit(mesh=str(shared_data / "meshes" / "mobius.obj"))) == 0
