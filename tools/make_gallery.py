@@ -1,10 +1,10 @@
 """Renders the gallery: each bundled model on the training sphere and on unseen meshes, the exemplar beside
 it.
 
-usage: python tools/make_gallery.py EXEMPLARS MESHES [NAME ...]
+usage: python tools/make_gallery.py EXEMPLARS MESHES [NAME | SHEET=EXEMPLAR=RUN ...]
 
-EXEMPLARS and MESHES are folders; the sheets go to docs/gallery/NAME.jpg. Below the path-traced pictures are
-the maps as they are, to see that they are in register.
+EXEMPLARS and MESHES are folders; the sheets go to docs/gallery/NAME.jpg, or SHEET.jpg for a run folder. Below
+the path-traced pictures are the maps as they are, to see that they are in register.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def maps_of(asset: Asset) -> list[np.ndarray]:
     return views
 
 
-def one(name: str, texture: NcaTexture, exemplar: Exemplar, meshes: Path) -> np.ndarray:
+def one(texture: NcaTexture, exemplar: Exemplar, meshes: Path) -> np.ndarray:
     """The sheet of a model, (H, W, 3) sRGB in [0, 1]."""
     sphere = texture.apply(icosphere(64))
     shown = [sphere, *(texture.apply(Mesh.load(meshes / f"{mesh}.obj")) for mesh in UNSEEN)]
@@ -70,9 +70,10 @@ def main() -> None:
     GALLERY.mkdir(parents=True, exist_ok=True)
     if len(sys.argv) == 3:
         write_image(GALLERY / "teaser.jpg", teaser())
-    for name in sys.argv[3:] or EXEMPLARS:
-        exemplar = Exemplar.load(exemplars / EXEMPLARS[name])
-        write_image(GALLERY / f"{name}.jpg", one(name, NcaTexture.load(name), exemplar, meshes))
+    for word in sys.argv[3:] or EXEMPLARS:
+        name, given, source = word.split("=") if "=" in word else (word, EXEMPLARS[word], word)
+        exemplar = Exemplar.load(exemplars / given)
+        write_image(GALLERY / f"{name}.jpg", one(NcaTexture.load(source), exemplar, meshes))
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ class FitSurface(Fitting):
       mitex fit surface --exemplar pebbles.png --mesh bunny.obj --out runs/bunny
       mitex fit surface --exemplar scales --mesh octopus --resolution 1024
       mitex fit surface --exemplar maps/ --mesh bunny.obj --preset paper --out runs/paper
+      mitex fit surface --exemplar painting.png --mesh bunny.obj --content ao --out runs/painted
       mitex fit surface --exemplar pebbles.png --mesh bunny.obj --out runs/bunny --resume
     """
 
@@ -31,11 +32,17 @@ class FitSurface(Fitting):
     out: Annotated[Path | None, arg(metavar="RUN", help_behavior_hint="(default: runs/EXEMPLAR-MESH)")] = None
     """Run folder."""
 
-    preset: Annotated[str | None, arg(metavar="fast|paper", help_behavior_hint="(default: fast)")] = None
-    """Settings to start from: `fast` is quick and clean, `paper` follows the publication."""
+    preset: Annotated[str | None, arg(metavar="fast|paper|style", help_behavior_hint="(default: fast)")] = (
+        None
+    )
+    """Settings to start from: `fast` is quick and clean, `paper` follows the publication, `style` goes with
+    --content."""
 
     resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the preset's)")] = None
     """Side of the texture [texels]."""
+
+    content: Annotated[str | None, arg(metavar="IMAGE|ao", help_behavior_hint="")] = None
+    """Style transfer: keep the structure of this texture (on the mesh's own UVs), or of ambient occlusion."""
 
     keep_uvs: Annotated[bool, arg(help_behavior_hint="")] = False
     """Use the mesh's own UVs, which must not overlap."""
@@ -57,6 +64,7 @@ class FitSurface(Fitting):
             config=self.config,
             overrides=overrides,
             keep_uvs=self.keep_uvs,
+            content=self.content,
             resume=self.resume,
             quiet=self.quiet,
         )

@@ -9,7 +9,6 @@ from mitex.methods.surface.network import ALL_LAYERS
 from mitex.training import check_ranges
 
 FRAMES = ("smooth", "fixed")
-LOSSES = ("gram", "transport")
 WEIGHTS = ("vgg16", "random")
 
 
@@ -28,8 +27,8 @@ class SurfaceConfig:
         weights: "vgg16", or "random" ones (the ablation of figure 5).
         pooling: "average" or "max".
         layers: that are compared; VGG's convolutions and poolings.
-        loss: "gram" (the paper) or "transport" (relaxed optimal transport with moments).
-        samples: feature vectors compared in each layer by "transport".
+        content_layer, content_weight: whose features shall stay those of the content texture, where one is
+            given (style transfer), and how much that counts.
         scales: how many coarser pyramids of texels are matched first, each half as fine.
         coarse_share: of the steps, spent on the coarser scales together.
         pictures: views of the maps compared in a step, when the exemplar has several maps.
@@ -53,8 +52,8 @@ class SurfaceConfig:
     weights: str = "vgg16"
     pooling: str = "average"
     layers: tuple[str, ...] = ALL_LAYERS
-    loss: str = "gram"
-    samples: int = 1024
+    content_layer: str = "relu4_2"
+    content_weight: float = 1000.0
     scales: int = 0
     coarse_share: float = 0.4
     pictures: int = 2
@@ -75,7 +74,7 @@ class SurfaceConfig:
             resolution=(1, 4096),
             exemplar_size=(32, 2048),
             angle=(-360, 360),
-            samples=(1, None),
+            content_weight=(0, None),
             scales=(0, 3),
             coarse_share=(0, 0.95),
             pictures=(1, 16),
@@ -89,12 +88,11 @@ class SurfaceConfig:
             "frames": FRAMES,
             "weights": WEIGHTS,
             "pooling": ("average", "max"),
-            "loss": LOSSES,
         }
         for key, allowed in choices.items():
             if getattr(self, key) not in allowed:
                 raise ConfigError(f"{key} = '{getattr(self, key)}' is unknown", f"use {' or '.join(allowed)}")
-        unknown = [layer for layer in self.layers if layer not in ALL_LAYERS]
+        unknown = [layer for layer in (*self.layers, self.content_layer) if layer not in ALL_LAYERS]
         if unknown or not self.layers:
             raise ConfigError(f"layers holds {unknown or 'nothing'}", f"use some of {', '.join(ALL_LAYERS)}")
 
@@ -103,5 +101,11 @@ PRESETS = {
     "fast": SurfaceConfig(steps=300, preset="fast", scales=2, milestones=(180, 250)),
     "paper": SurfaceConfig(
         steps=500, preset="paper", frames="fixed", exemplar_size=512, mean_start=False, shared_moment=False
+    ),
+    "style": SurfaceConfig(
+        steps=300,
+        preset="style",
+        layers=("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"),
+        milestones=(180, 250),
     ),
 }

@@ -13,6 +13,7 @@ from mitex.exemplar import Exemplar
 from mitex.mesh import Mesh
 from mitex.methods.surface.cache import cached_levels, content_key
 from mitex.methods.surface.config import PRESETS, SurfaceConfig
+from mitex.methods.surface.content import AO, content_colours
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.frames import tangent_frames
 from mitex.methods.surface.levels import POOLS, Levels
@@ -34,6 +35,7 @@ def fit(
     config: Path | None = None,
     overrides: Sequence[str] = (),
     keep_uvs: bool = False,
+    content: str | Path | None = None,
     resume: bool = False,
     quiet: bool = False,
 ) -> SurfaceTexture:
@@ -43,10 +45,12 @@ def fit(
         exemplar: maps, or what `Exemplar.load` takes.
         mesh: or what `Mesh.load` takes.
         out: run folder; must be new or empty, or hold a run to `resume`.
-        preset: "fast" (default) or "paper".
+        preset: "fast" (default), "paper", or "style" (default with `content`).
         config: TOML file with any of `SurfaceConfig`'s keys.
         overrides: `key=value`, for any key.
         keep_uvs: use the mesh's own UVs.
+        content: style transfer: a texture on the mesh's own UVs (an image file), which are kept then, or "ao"
+            for the mesh's ambient occlusion.
         resume: go on from the run's checkpoint, with its config as far as no other is given.
         quiet: show no progress.
 
@@ -61,13 +65,17 @@ def fit(
     run.check(out, resume)
     if resume and config is None and (out / run.CONFIG).is_file():
         config = out / run.CONFIG
+    if content is not None and config is None:
+        preset = preset or "style"
     settings = resolve(PRESETS, preset, config, overrides)
     shown = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
-    surface = with_layout(mesh if isinstance(mesh, Mesh) else Mesh.load(mesh), settings, keep_uvs)
+    image = content is not None and str(content) != AO
+    surface = with_layout(mesh if isinstance(mesh, Mesh) else Mesh.load(mesh), settings, keep_uvs or image)
     assert surface.uv is not None
     texels = Texels.rasterize(surface, surface.uv, settings.resolution)
     identity = f"{surface.name} {content_key(surface.vertices, surface.faces, surface.uv)}"
-    task = SurfaceTask(settings, shown, texels, find_levels(surface, texels, settings), identity)
+    start = None if content is None else content_colours(content, surface, texels)
+    task = SurfaceTask(settings, shown, texels, find_levels(surface, texels, settings), identity, start)
     result = train(
         task,
         settings,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import torch
@@ -69,6 +69,16 @@ class SurfaceVgg:
         """Layer -> (C, C), mean outer products of the features, differentiable in `texels` (once)."""
         return self._run(texels, {name: GramTap(self._place(name)) for name in layers})
 
+    def compared(
+        self, texels: torch.Tensor, gram_layers: Iterable[str], whole_layers: Iterable[str]
+    ) -> tuple[dict[str, torch.Tensor], dict[str, torch.Tensor]]:
+        """`gram_matrices` of some layers and `features` of others, in one pass."""
+        taps: dict[str, Tap | GramTap] = {f"gram {name}": GramTap(self._place(name)) for name in gram_layers}
+        taps |= {f"whole {name}": Tap(self._place(name)) for name in whole_layers}
+        found = [(name.split(), value) for name, value in self._run(texels, taps).items()]
+        grams = {name: value for (kind, name), value in found if kind == "gram"}
+        return grams, {name: value for (kind, name), value in found if kind == "whole"}
+
     def _append(self, name: str, operation: Operation) -> None:
         self.index[name] = len(self.operations)
         self.operations.append(operation)
@@ -78,9 +88,7 @@ class SurfaceVgg:
             raise ConfigError(f"there is no layer {layer!r}", f"use {', '.join(self.index)}")
         return self.index[layer]
 
-    def _run(
-        self, texels: torch.Tensor, taps: dict[str, Tap] | dict[str, GramTap]
-    ) -> dict[str, torch.Tensor]:
+    def _run(self, texels: torch.Tensor, taps: Mapping[str, Tap | GramTap]) -> dict[str, torch.Tensor]:
         if texels.shape != (self.texels, 3):
             raise ConfigError(f"texels of shape {tuple(texels.shape)}", f"give ({self.texels}, 3)")
         chosen = list(taps.values())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 
+from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
 from mitex.features.vgg import LAYERS, Weights, convolutions
@@ -33,14 +34,29 @@ class SurfaceTask:
         exemplar: maps to match.
         texels, levels: of the surface.
         mesh: what tells it from other meshes, for a resumed run.
+        content: (N, 3) sRGB in [0, 1] in the order of `texels`, whose structure shall stay while the look
+            becomes the exemplar's (style transfer). The synthesis starts from it.
+
+    Raises:
+        ConfigError: a content for more than the albedo, or on several scales.
     """
 
     def __init__(
-        self, config: SurfaceConfig, exemplar: Exemplar, texels: Texels, levels: Levels, mesh: str = ""
+        self,
+        config: SurfaceConfig,
+        exemplar: Exemplar,
+        texels: Texels,
+        levels: Levels,
+        mesh: str = "",
+        content: np.ndarray | None = None,
     ) -> None:
         keep_freed_memory()
         self.config, self.exemplar, self.texels, self.levels = config, exemplar, texels, levels
         self.mesh = mesh
+        if content is not None and (list(exemplar.maps) != ["albedo"] or config.scales):
+            raise ConfigError(
+                "style transfer takes one image and one scale", "give an image as --exemplar, and scales=0"
+            )
         self.layout = texel_layout(list(exemplar.maps))
         self.pictures = pictures_of(self.layout, True, config.seed)
         generator = torch.Generator().manual_seed(config.seed)
@@ -62,6 +78,12 @@ class SurfaceTask:
             shown = exemplar.resized(max(config.exemplar_size >> scale, 16))
             images = torch.from_numpy(picture_images(shown, self.pictures, self.layout))
             self.targets.append([exemplar_grams(image_network, image, config.layers) for image in images])
+        self.content: torch.Tensor | None = None
+        if content is not None:
+            start = torch.from_numpy(content[levels.order].astype(np.float32))
+            with torch.no_grad():
+                self.values.copy_(start)
+                self.content = self.networks[0].features(start, [config.content_layer])[config.content_layer]
 
     @property
     def parameters(self) -> list[torch.Tensor]:
@@ -73,9 +95,13 @@ class SurfaceTask:
         total = torch.zeros(())
         for k in chosen:
             colours = self.values[:, self.pictures[k].channels]
-            grams = self.networks[scale].gram_matrices(colours, self.config.layers)
-            total = total + gram_distance(grams, self.targets[scale][k])
-        return total / (len(chosen) * len(self.config.layers)), {"scale": float(scale)}
+            whole = () if self.content is None else (self.config.content_layer,)
+            grams, features = self.networks[scale].compared(colours, self.config.layers, whole)
+            total = total + gram_distance(grams, self.targets[scale][k]) / len(self.config.layers)
+            if self.content is not None:
+                difference = features[self.config.content_layer] - self.content
+                total = total + self.config.content_weight * difference.square().mean()
+        return total / len(chosen), {"scale": float(scale)}
 
     def scale(self, step: int) -> int:
         """How often the texels are pooled before the network sees them in a step."""

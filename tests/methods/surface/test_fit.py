@@ -10,14 +10,17 @@ from mitex.asset import Asset
 from mitex.atlas import usable_uv
 from mitex.errors import CheckpointError, ConfigError
 from mitex.exemplar import Exemplar
+from mitex.images import write_image
 from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods import surface
 from mitex.methods.surface.config import PRESETS
+from mitex.methods.surface.content import content_colours
 from mitex.methods.surface.fit import with_layout
 from mitex.methods.surface.task import SurfaceTask
-from mitex.methods.surface.texels import charts
+from mitex.methods.surface.texels import Texels, charts
 from mitex.methods.surface.texture import NAME, SurfaceTexture, is_texture
 from mitex.training import resolve
+from tests.methods.surface.grids import flat_square
 
 SMALL = ["resolution=48", "exemplar_size=48", "steps=12", "scales=0", "checkpoint_every=6", "preview_every=0"]
 
@@ -185,3 +188,44 @@ def test_size_does_not_matter(mesh, exemplar, tmp_path, factor):
     a = surface.fit(exemplar, mesh, tmp_path / "a", overrides=[*SMALL, "steps=2"], quiet=True)
     b = surface.fit(exemplar, large, tmp_path / "b", overrides=[*SMALL, "steps=2"], quiet=True)
     assert np.isfinite(b.values).all() and abs(len(a.values) - len(b.values)) < 0.2 * len(a.values)
+
+
+class TestStyleTransfer:
+    STYLE = [*SMALL, "steps=20"]
+
+    def test_ambient_occlusion_keeps_its_structure(self, exemplar, tmp_path):
+        """The result still follows the content, in the exemplar's colours."""
+        mesh = embedded("mushrooms")
+        image = Exemplar({"albedo": exemplar.maps["albedo"]})
+        made = surface.fit(image, mesh, tmp_path / "run", content="ao", overrides=self.STYLE, quiet=True)
+        content = content_colours("ao", made.mesh, made.texels)
+        assert content.std() > 0.05 and content.min() >= 0 and content.max() <= 1
+        assert np.corrcoef(content.mean(1), made.values.mean(1))[0, 1] > 0.3
+        assert np.abs(made.values - content).mean() > 0.02
+
+    def test_without_style_nothing_changes(self, mesh, exemplar, tmp_path):
+        """All weight on the content: its texture is the optimum from the start."""
+        image = Exemplar({"albedo": exemplar.maps["albedo"]})
+        overrides = [*self.STYLE, "content_weight=1e12", "lr=0.001", "steps=2"]
+        made = surface.fit(image, mesh, tmp_path / "run", content="ao", overrides=overrides, quiet=True)
+        assert np.abs(made.values - content_colours("ao", made.mesh, made.texels)).max() < 0.02
+
+    def test_images_are_read_on_the_meshs_own_uvs(self, tmp_path):
+        """A ramp in u and v; every texel gets its own uv as colour."""
+        square = flat_square(4)
+        assert square.uv is not None
+        u, v = np.meshgrid((np.arange(256) + 0.5) / 256, 1 - (np.arange(256) + 0.5) / 256)
+        write_image(tmp_path / "ramp.png", np.stack([u, v, 0 * u], -1))
+        texels = Texels.rasterize(square, square.uv, 32)
+        found = content_colours(tmp_path / "ramp.png", square, texels)
+        assert np.abs(found[:, :2] - texels.position[:, :2]).max() < 0.01 and not found[:, 2].any()
+
+    def test_an_image_needs_uvs(self, mesh, exemplar, tmp_path):
+        image = Exemplar({"albedo": exemplar.maps["albedo"]})
+        with pytest.raises(ConfigError, match="no UVs"):
+            surface.fit(image, mesh, tmp_path / "run", content="a.png", overrides=self.STYLE, quiet=True)
+
+    def test_one_image_is_transferred(self, mesh, exemplar, tmp_path):
+        with pytest.raises(ConfigError, match="one image"):
+            surface.fit(exemplar, mesh, tmp_path / "run", content="ao", overrides=self.STYLE, quiet=True)
+        assert not (tmp_path / "run").exists()

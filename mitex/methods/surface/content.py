@@ -1,0 +1,39 @@
+"""Content textures: what style transfer starts from and keeps (Kovacs et al. 2024, section 4)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+from mitex.images import read_image
+from mitex.mesh import Mesh
+from mitex.methods.surface.texels import Texels
+
+AO = "ao"
+
+
+def content_colours(content: str | Path, mesh: Mesh, texels: Texels) -> np.ndarray:
+    """The colours (N, 3) float32, sRGB in [0, 1], of texels in a content texture.
+
+    Args:
+        content: an image on the mesh's UVs, or "ao" for the mesh's ambient occlusion as grey.
+        mesh: with UVs.
+        texels: of it.
+
+    Raises:
+        ImageError: the image cannot be read.
+    """
+    if str(content) == AO:
+        from mitex.scenes.occlusion import ambient_occlusion
+
+        corners = mesh.normals[mesh.faces[texels.face]].astype(np.float64)
+        normals = np.einsum("nk,nkc->nc", texels.barycentric, corners)
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+        return np.repeat(ambient_occlusion(mesh, texels.position, normals)[:, None], 3, axis=1)
+    image = read_image(Path(content))
+    uv = np.einsum("nk,nkc->nc", texels.barycentric, texels.uv[texels.face].astype(np.float64))
+    row, column = (1 - uv[:, 1]) * image.shape[0] - 0.5, uv[:, 0] * image.shape[1] - 0.5
+    looked = [map_coordinates(image[..., k], [row, column], order=1, mode="nearest") for k in range(3)]
+    return np.stack(looked, axis=1).astype(np.float32)
