@@ -31,6 +31,7 @@ lint: $(STAMP)
 
 bench: $(STAMP)
 	$(VENV)/bin/python -m benchmarks.nca
+	$(VENV)/bin/python -m benchmarks.surface
 
 clean:
 	rm -rf $(VENV) out

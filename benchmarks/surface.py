@@ -1,0 +1,158 @@
+"""How fast a surface texture is prepared and synthesized.
+
+usage: python -m benchmarks.surface [--quick]
+
+For a small and a large closed mesh and several resolutions: the layout (xatlas), the precomputation (texels,
+frames, taps, groups), and a step of the synthesis, its rate beside that of plain bfloat16 matrix products in
+the same run. The paper's figures (12 cores in Rust; a large GPU) stand beside them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import resource
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from rich.console import Console
+from rich.table import Table
+
+from mitex.features.vgg import CHANNELS, LAYERS
+from mitex.mesh import Mesh, icosphere
+from mitex.methods.surface.config import PRESETS
+from mitex.methods.surface.exponential import GeodesicTracer
+from mitex.methods.surface.fit import with_layout
+from mitex.methods.surface.frames import tangent_frames
+from mitex.methods.surface.levels import Levels
+from mitex.methods.surface.network import ALL_LAYERS, SurfaceVgg
+from mitex.methods.surface.taps import Surroundings, build
+from mitex.methods.surface.texels import Texels
+from mitex.runtime import keep_freed_memory
+
+PREPARED = {(5_120, 256): 21, (5_120, 512): 42, (5_120, 1024): 104, (200_000, 1024): 150}  # the paper [s]
+STEP = {256: 0.46, 512: 1.5, 1024: 5.7}  # the paper [s]
+
+
+@dataclass
+class Result:
+    """Of one mesh at one resolution: faces, side of the texture, used texels, and times [s]."""
+
+    faces: int
+    resolution: int
+    texels: int
+    layout: float
+    prepared: float
+    step: float
+    operations: float
+
+
+def measure(mesh: Mesh, resolution: int, repetitions: int) -> Result:
+    """Prepares a mesh and times the best of some steps."""
+    config = replace(PRESETS["fast"], resolution=resolution)
+    begun = time.perf_counter()
+    laid = with_layout(mesh, config, keep_uvs=False)
+    assert laid.uv is not None
+    between = time.perf_counter()
+    texels = Texels.rasterize(laid, laid.uv, resolution)
+    frames = tangent_frames(laid, texels.face, texels.barycentric)
+    levels = build(Surroundings(texels, GeodesicTracer(laid), *frames))
+    prepared = time.perf_counter()
+    network = SurfaceVgg(levels)
+    values = torch.rand(len(levels.order), 3).requires_grad_()
+    step = min(_step(network, values) for _ in range(repetitions + 1))
+    return Result(
+        faces=len(mesh.faces),
+        resolution=resolution,
+        texels=len(levels.order),
+        layout=between - begun,
+        prepared=prepared - between,
+        step=step,
+        operations=operations(levels),
+    )
+
+
+def _step(network: SurfaceVgg, values: torch.Tensor) -> float:
+    begun = time.perf_counter()
+    grams = network.gram_matrices(values, ALL_LAYERS)
+    torch.stack([gram.square().mean() for gram in grams.values()]).sum().backward()
+    values.grad = None
+    return time.perf_counter() - begun
+
+
+def operations(levels: Levels) -> float:
+    """Floating-point operations of a step: convolutions, there and back, and Gram matrices."""
+    total, inputs = 0.0, 3
+    for name in LAYERS:
+        count, outputs = len(levels.levels[int(name[4]) - 1].taps), CHANNELS[name]
+        total += 4 * 9 * inputs * outputs * count + 4 * outputs**2 * count
+        inputs = outputs
+    return total
+
+
+def product_rate() -> float:
+    """Operations per second of a large bfloat16 matrix product."""
+    a = torch.rand(4096, 4096).bfloat16()
+    times = []
+    for _ in range(4):
+        begun = time.perf_counter()
+        torch.mm(a, a)
+        times.append(time.perf_counter() - begun)
+    return 2 * 4096**3 / min(times)
+
+
+def exponent(x: list[float], y: list[float]) -> float:
+    """The slope of log y over log x."""
+    return float(np.polyfit(np.log(x), np.log(y), 1)[0])
+
+
+def show(results: list[Result], rate: float, console: Console) -> None:
+    """The table, and what follows from it."""
+    table = Table(
+        "faces", "texture", "texels", "layout [s]", "prepared [s]", "paper", "step [s]", "paper", "rate"
+    )
+    for r in results:
+        paper = PREPARED.get((r.faces, r.resolution), "")
+        share = f"{r.operations / r.step / 1e9:.0f} GF/s = {100 * r.operations / r.step / rate:.0f} %"
+        times = (
+            f"{r.layout:.1f}",
+            f"{r.prepared:.1f}",
+            str(paper),
+            f"{r.step:.2f}",
+            str(STEP.get(r.resolution, "")),
+        )
+        table.add_row(f"{r.faces:,}", f"{r.resolution}^2", f"{r.texels:,}", *times, share)
+    console.print(table)
+    console.print(f"bfloat16 products: {rate / 1e9:.0f} GF/s (goal: steps at 20 %, better 40 %)")
+    small = [r for r in results if r.faces == results[0].faces]
+    if len(small) > 1:
+        slope = exponent([r.texels for r in small], [r.prepared for r in small])
+        console.print(f"preparing goes with texels^{slope:.2f}")
+    last = [r for r in results if r.resolution == results[-1].resolution]
+    if len(last) > 1:
+        slope = exponent([r.faces for r in last], [r.prepared for r in last])
+        console.print(f"preparing goes with faces^{slope:.2f} at {results[-1].resolution}^2")
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9
+    console.print(f"peak memory {peak:.2f} GB (goal: under 3 at 1024^2)")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="small sizes: shows that it runs, not how fast")
+    options = parser.parse_args()
+    keep_freed_memory()
+    sizes = (32, 64) if options.quick else (256, 512, 1024)
+    frequencies = (4, 8) if options.quick else (16, 100)
+    rate = product_rate()
+    results = [measure(icosphere(frequencies[0]), size, 1 if options.quick else 2) for size in sizes]
+    results.append(measure(icosphere(frequencies[1]), sizes[-1], 1))
+    assert all(math.isfinite(r.step) for r in results)
+    show(results, rate, Console())
+
+
+if __name__ == "__main__":
+    main()
