@@ -124,3 +124,12 @@ def boundary_loops(faces: np.ndarray, vertices: int) -> int:
     index = index.reshape(pairs.shape)
     # An edge as a face that goes back to its start has no other neighbours than its two ends.
     return components(edge_graph(np.column_stack([index, index[:, 0]]), int(index.max()) + 1))[0]
+
+
+def welded(vertices: np.ndarray) -> np.ndarray:
+    """(V,) int64, the same number for vertices (V, 3) at one position (0 equals -0), ascending from 0."""
+    order = np.lexsort(vertices.T)
+    ordered = vertices[order]
+    number = np.empty(len(order), np.int64)
+    number[order] = np.cumsum(np.r_[False, (ordered[1:] != ordered[:-1]).any(axis=1)][: len(order)])
+    return number

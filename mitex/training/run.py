@@ -50,6 +50,17 @@ def check(out: str | os.PathLike[str], resume: bool = False) -> None:
         raise OutputError(f"'{out}' holds other files", "name a new or empty folder with --out")
 
 
+def checked_config(out: Path, resume: bool, config: Path | None) -> Path | None:
+    """Checks the folder as `check` does; the config file to start from: the given one, else a resumed run's.
+
+    Raises:
+        OutputError, CheckpointError: as `check`.
+    """
+    check(out, resume)
+    own = out / CONFIG
+    return own if resume and config is None and own.is_file() else config
+
+
 @contextmanager
 def opened(out: str | os.PathLike[str], resume: bool) -> Iterator[tuple[Path, Metrics]]:
     """Checks, makes and locks a run folder; yields its absolute path and its open metrics.jsonl.

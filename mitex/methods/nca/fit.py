@@ -48,9 +48,7 @@ def fit(
         Interrupted: a checkpoint has been saved.
     """
     out = Path(out).expanduser()
-    run.check(out, resume)
-    if resume and config is None and (out / run.CONFIG).is_file():
-        config = out / run.CONFIG
+    config = run.checked_config(out, resume, config)
     settings = resolve(PRESETS, preset, config, overrides)
     shown = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
     task = NcaTask(settings, shown, None if init is None else _parent(init, settings))

@@ -62,9 +62,7 @@ def fit(
         Interrupted: a checkpoint has been saved.
     """
     out = Path(out).expanduser()
-    run.check(out, resume)
-    if resume and config is None and (out / run.CONFIG).is_file():
-        config = out / run.CONFIG
+    config = run.checked_config(out, resume, config)
     if content is not None and config is None:
         preset = preset or "style"
     settings = resolve(PRESETS, preset, config, overrides)

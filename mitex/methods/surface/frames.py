@@ -15,7 +15,7 @@ import numpy as np
 from mitex.errors import ConfigError
 from mitex.frames import orthonormal
 from mitex.mesh import Mesh
-from mitex.mesh.topology import mesh_edges
+from mitex.mesh.topology import mesh_edges, welded
 
 KINDS = ("fixed", "smooth")
 UP = np.array([0.0, 1.0, 0.0])  # w: image up
@@ -78,7 +78,7 @@ def vertex_directions(mesh: Mesh, kind: str = "smooth", field: np.ndarray | None
     """
     if kind not in KINDS:
         raise ConfigError(f"unknown tangent frames {kind!r}", f"use one of {', '.join(KINDS)}")
-    place = welded(mesh)
+    place = welded(mesh.vertices)
     corners = place[mesh.faces]
     count = int(place.max(initial=-1)) + 1
     normals = _unit(_summed(corners.ravel(), np.repeat(mesh.face_crosses, 3, axis=0), count))
@@ -97,12 +97,6 @@ def vertex_directions(mesh: Mesh, kind: str = "smooth", field: np.ndarray | None
 def face_normals(mesh: Mesh) -> np.ndarray:
     """(F, 3) float64 unit normals; +z where a face has no area."""
     return _unit(mesh.face_crosses)
-
-
-def welded(mesh: Mesh) -> np.ndarray:
-    """(V,) int64, the same number for vertices at bit-identical positions."""
-    # Adding zero turns -0.0 into 0.0.
-    return np.unique(mesh.vertices + np.float32(0.0), axis=0, return_inverse=True)[1].reshape(-1)
 
 
 def _fixed(normals: np.ndarray) -> np.ndarray:

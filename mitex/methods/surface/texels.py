@@ -18,8 +18,7 @@ from scipy.spatial import KDTree
 from mitex.atlas import MAX_RESOLUTION, barycentric_gradients, texel_space, texels_in_boxes, twice_area
 from mitex.errors import ConfigError, MeshError
 from mitex.mesh import Mesh
-from mitex.mesh.topology import face_edges
-from mitex.methods.surface.frames import welded
+from mitex.mesh.topology import face_edges, welded
 
 CHUNK = 1 << 17  # texels or points that are looked at together: a megabyte per array stays in the cache
 FLAT = 1e-12  # [texel^2] faces of a smaller area in the layout show nothing
@@ -191,7 +190,7 @@ class Texels:
 
 def charts(mesh: Mesh, uv: np.ndarray) -> np.ndarray:
     """(F,) int32 UV chart of each face of a layout (F, 3, 2), numbered by their first faces; see `Texels`."""
-    place = welded(mesh)[mesh.faces].ravel()
+    place = welded(mesh.vertices)[mesh.faces].ravel()
     pairs = np.ascontiguousarray(uv.reshape(-1, 2) + np.float32(0.0)).view(np.int64)[:, 0]  # -0.0 becomes 0.0
     distinct, point = np.unique(pairs, return_inverse=True)
     _, corner = np.unique(place * len(distinct) + point, return_inverse=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mitex.mesh import Mesh
-from mitex.mesh.topology import face_edges
+from mitex.mesh.topology import face_edges, welded
 from mitex.mesh.validate import degenerate_faces
 
 
@@ -39,7 +39,7 @@ def unfold(mesh: Mesh) -> Unfolding:
     Faces that have two corners at one position are left out, which glues the neighbours on their other two
     sides together; no side is glued to them.
     """
-    return Unfolding(*_planes(mesh), _glue(_welded(mesh)))
+    return Unfolding(*_planes(mesh), _glue(welded(mesh.vertices)[mesh.faces]))
 
 
 def _planes(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
@@ -54,16 +54,6 @@ def _planes(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     axes = np.where(flat[:, None, None], 0.0, np.stack([along, np.cross(normal, along)], axis=1))
     height = np.where(flat, 0.0, twice_area / safe)
     return np.stack([length, ((c - a) * along).sum(axis=1), height], axis=1), axes
-
-
-def _welded(mesh: Mesh) -> np.ndarray:
-    """(F, 3) int64 corners, numbered by position."""
-    # Equal numbers, rather than equal bits, so that -0.0 is 0.0.
-    order = np.lexsort(mesh.vertices.T)
-    ordered = mesh.vertices[order]
-    number = np.empty(len(order), np.int64)
-    number[order] = np.cumsum(np.r_[False, (ordered[1:] != ordered[:-1]).any(axis=1)][: len(order)])
-    return number[mesh.faces]
 
 
 def _glue(corners: np.ndarray) -> np.ndarray:
