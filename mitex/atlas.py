@@ -135,8 +135,10 @@ def unwrap(mesh: Mesh, resolution: int, padding: int) -> np.ndarray:
         (F, 3, 2) float32 in [0, 1], v upwards. Charts may be mirrored.
     """
     atlas = xatlas.Atlas()
-    # xatlas has absolute tolerances.
-    mesh = mesh if not np.ptp(mesh.vertices) else mesh.normalised()[0]
+    # xatlas has absolute tolerances; a power of two changes no digits.
+    extent = float(np.ptp(mesh.vertices, axis=0).max())
+    if extent > 0:
+        mesh = mesh.with_vertices(mesh.vertices * 2.0 ** -np.rint(np.log2(extent / 2)))
     pieces, positions = _pieces(mesh), _rough(mesh)
     for piece in pieces:
         used, faces = np.unique(mesh.faces[piece], return_inverse=True)
