@@ -98,7 +98,7 @@ class SurfaceConfig:
 
 
 PRESETS = {
-    "fast": SurfaceConfig(steps=300, preset="fast", scales=2, milestones=(180, 250)),
+    "fast": SurfaceConfig(steps=300, preset="fast", milestones=(180, 250)),
     "paper": SurfaceConfig(
         steps=500, preset="paper", frames="fixed", exemplar_size=512, mean_start=False, shared_moment=False
     ),
