@@ -18,6 +18,7 @@ DECORRELATION = (
 
 # With fewer channels, rounding does not average out, and float32 costs little.
 LOW_PRECISION_CHANNELS = 32
+SQUARES = (1e-5, 1e5)  # between which a squared distance counts
 
 
 def decorrelate(colours: torch.Tensor) -> torch.Tensor:
@@ -33,7 +34,7 @@ def relaxed_transport(
     Args:
         a: (K, n, C) feature vectors.
         b: (K, m, C) feature vectors.
-        euclidean: adds the squared Euclidean distance, clamped to [1e-5, 1e5] and divided by C, to the cosine
+        euclidean: adds the squared Euclidean distance, clamped to `SQUARES` and divided by C, to the cosine
             distance (the indicator of equation 4, for colours).
         low_precision: searches the nearest vectors in bfloat16 (the cost of the pairs found stays exact).
 
@@ -41,8 +42,8 @@ def relaxed_transport(
         (K,) costs; differentiable in both.
     """
     nearest_b, nearest_a = _matches(a.detach(), b.detach(), euclidean, low_precision)
-    forth = _pair_cost(a, _take(b, nearest_b), euclidean).mean(1)
-    back = _pair_cost(_take(a, nearest_a), b, euclidean).mean(1)
+    forth = _PairCost.apply(a, b, nearest_b, euclidean)
+    back = _PairCost.apply(b, a, nearest_a, euclidean)
     return torch.maximum(forth, back)
 
 
@@ -86,14 +87,55 @@ def _covariance(centred: torch.Tensor, dtype: torch.dtype) -> torch.Tensor:
 def _take(vectors: torch.Tensor, index: torch.Tensor) -> torch.Tensor:
     """Rows `index` (K, n) of `vectors` (K, m, C)."""
     offsets = torch.arange(len(vectors), device=vectors.device)[:, None] * vectors.shape[1]
-    return vectors.reshape(-1, vectors.shape[2])[(index + offsets).reshape(-1)].view(*index.shape, -1)
+    rows = vectors.reshape(-1, vectors.shape[2])[(index + offsets).reshape(-1)]
+    return rows.view(*index.shape, vectors.shape[2])
 
 
-def _pair_cost(a: torch.Tensor, b: torch.Tensor, euclidean: bool) -> torch.Tensor:
-    cost = 1 - F.cosine_similarity(a, b, dim=-1, eps=1e-8)
-    if euclidean:
-        cost = cost + (a - b).square().sum(-1).clamp(1e-5, 1e5) / a.shape[-1]
-    return cost
+class _PairCost(torch.autograd.Function):
+    """Mean cost (K,) of each vector of x (K, n, C) and the one of y (K, m, C) that `index` (K, n) names.
+
+    With its own derivative, since autograd's goes over these large arrays three times as often; sets whose
+    cost the maximum of equation 4 leaves out are passed over.
+    """
+
+    @staticmethod
+    def forward(ctx, x: torch.Tensor, y: torch.Tensor, index: torch.Tensor, euclidean: bool) -> torch.Tensor:
+        pair = _take(y, index)
+        lengths = [v.norm(dim=-1, keepdim=True).clamp_(min=1e-8) for v in (x, pair)]
+        cosine = (x * pair).sum(-1, keepdim=True) / (lengths[0] * lengths[1])
+        cost = 1 - cosine
+        if euclidean:
+            square = (x - pair).square().sum(-1, keepdim=True)
+            cost = cost + square.clamp(*SQUARES) / x.shape[-1]
+        ctx.euclidean = euclidean
+        ctx.save_for_backward(x, y, index, *lengths, cosine)
+        return cost.mean((1, 2))
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable
+    def backward(ctx, gradient):
+        x, y, index, x_length, y_length, cosine = ctx.saved_tensors
+        chosen = gradient.nonzero()[:, 0]
+        share = (gradient[chosen] / x.shape[1])[:, None, None]
+        left, right = x[chosen], _take(y[chosen], index[chosen])
+        cosine, lengths = cosine[chosen], (x_length[chosen], y_length[chosen])
+        across = -share / (lengths[0] * lengths[1])
+        along = [share * cosine / length.square() for length in lengths]
+        if ctx.euclidean:
+            square = (left - right).square().sum(-1, keepdim=True)
+            inside = (square >= SQUARES[0]) & (square <= SQUARES[1])
+            pull = 2 / x.shape[-1] * share * inside
+            across, along = across - pull, [a + pull for a in along]
+        found: list[torch.Tensor | None] = [None, None]
+        if ctx.needs_input_grad[0]:
+            found[0] = torch.zeros_like(x)
+            found[0][chosen] = torch.addcmul(left * along[0], right, across)
+        if ctx.needs_input_grad[1]:
+            found[1] = torch.zeros_like(y)
+            places = (index[chosen] + chosen[:, None] * y.shape[1]).reshape(-1)
+            rows = torch.addcmul(right * along[1], left, across)
+            found[1].view(-1, y.shape[2]).index_add_(0, places, rows.view(-1, y.shape[2]))
+        return *found, None, None
 
 
 @torch.no_grad()
