@@ -102,10 +102,13 @@ def _replacements(arrived: np.ndarray) -> np.ndarray:
 def _texel_graph(index: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """(E, 2) pairs of texels of which one reads the other, each once in either direction."""
     count = len(index)
-    reader, tap, corner = np.nonzero(weight > 0)
-    read = index[reader, tap, corner].astype(np.int64)
-    pairs = np.unique(np.concatenate([reader * count + read, read * count + reader]))
-    first, second = np.divmod(pairs, count)
+    used = (weight > 0).reshape(count, -1)
+    ends = np.concatenate([[0], np.cumsum(used.sum(1))])
+    entries = np.ones(ends[-1], bool), index.reshape(count, -1)[used], ends
+    reads = scipy.sparse.csr_array(entries, shape=(count, count))
+    reads.sum_duplicates()
+    graph = (reads + reads.T.tocsr()).tocoo()
+    first, second = graph.coords
     return np.stack([first, second], 1)[first != second]
 
 
