@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import torch
+
 from mitex.errors import ConfigError
 from mitex.images import write_image
 from mitex.paths import atomic_write
@@ -44,13 +46,13 @@ def train(
     milestones: Sequence[int] = (),
     decay: float = 1.0,
     normalise_gradients: bool = False,
-    shared_moment: bool = False,
+    optimizer: Callable[[Sequence[torch.Tensor]], optim.Optimizer] = optim.Adam,
     checkpoint_every: int,
     preview_every: int = 0,
     resume: bool = False,
     quiet: bool = False,
 ) -> TrainResult:
-    """Trains a task with Adam, and keeps a run folder from which it can go on after any end.
+    """Trains a task, and keeps a run folder from which it can go on after any end.
 
     A step whose loss or gradient is not finite is skipped: parameters and task state stay as they were.
 
@@ -63,7 +65,7 @@ def train(
         milestones: Steps from which on the learning rate is multiplied by `decay` once more.
         decay: Factor at each milestone.
         normalise_gradients: Divide each parameter tensor's gradient by its own norm + 1e-8.
-        shared_moment: Adam keeps one second moment for each parameter tensor.
+        optimizer: Makes the optimizer of the task's parameters.
         checkpoint_every: Steps between checkpoints; one more is saved at the end.
         preview_every: Steps between previews; one more is made at the end. 0 makes none.
         resume: Go on from the folder's checkpoint. On one thread the result is bit-identical with that of an
@@ -80,7 +82,7 @@ def train(
         raise ConfigError("checkpoints and previews need a spacing", "set checkpoint_every to 1 or more")
     schedule = lr if callable(lr) else optim.multistep(lr, milestones, decay)
     with run.opened(out, resume) as (folder, metrics):
-        state = TrainState(task, config, schedule, normalise_gradients, shared_moment)
+        state = TrainState(task, config, schedule, normalise_gradients, optimizer)
         if resume:
             state.restore(checkpoint.load(folder))
         run.prepare(folder, config, task.metadata())

@@ -1,10 +1,33 @@
-"""Adam, its schedule and the gradient treatment that all methods share."""
+"""Optimizers, their schedule and the gradient treatment that all methods share."""
 
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import torch
+
+
+class Optimizer(Protocol):
+    """What the loop needs of an optimizer."""
+
+    parameters: list[torch.Tensor]
+
+    def step(self, lr: float) -> None:
+        """Updates every parameter that has a gradient."""
+        ...
+
+    def clear(self) -> None:
+        """Drops all gradients."""
+        ...
+
+    def state(self) -> dict[str, torch.Tensor]:
+        """What a resumed run needs."""
+        ...
+
+    def load_state(self, state: dict[str, torch.Tensor]) -> None:
+        """Restores what `state` returned; ValueError if it belongs to other parameters."""
+        ...
 
 
 class Adam:
@@ -73,13 +96,18 @@ class Adam:
         own = self.state()
         if own.keys() != state.keys():
             raise ValueError(f"{(len(state) - 1) // 2} parameters instead of {len(self.parameters)}")
-        for name, tensor in own.items():
-            if tensor.shape != state[name].shape:
-                found, wanted = tuple(state[name].shape), tuple(tensor.shape)
-                raise ValueError(f"parameter {name.rpartition('/')[2]} has shape {found} instead of {wanted}")
-        for name, tensor in own.items():
-            tensor.copy_(state[name])
+        copy_state(state, own)
         self.counts = own["counts"].tolist()
+
+
+def copy_state(state: dict[str, torch.Tensor], own: dict[str, torch.Tensor]) -> None:
+    """Copies a saved state into an optimizer's own tensors; ValueError if a shape does not fit."""
+    for name, tensor in own.items():
+        if tensor.shape != state[name].shape:
+            found, wanted = tuple(state[name].shape), tuple(tensor.shape)
+            raise ValueError(f"parameter {name.rpartition('/')[2]} has shape {found} instead of {wanted}")
+    for name, tensor in own.items():
+        tensor.copy_(state[name])
 
 
 def multistep(lr: float, milestones: Sequence[int] = (), decay: float = 1.0) -> Callable[[int], float]:

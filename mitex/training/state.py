@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import torch
@@ -25,7 +25,7 @@ class TrainState:
         config: The resolved config, with a `seed`.
         schedule: Learning rate by step from 0.
         normalise: Divide each parameter tensor's gradient by its own norm.
-        shared: One second moment for each parameter tensor (see `Adam`).
+        optimizer: Makes the optimizer of the task's parameters.
 
     Attributes:
         step: Steps done.
@@ -39,13 +39,13 @@ class TrainState:
         config: Any,
         schedule: Callable[[int], float],
         normalise: bool,
-        shared: bool = False,
+        optimizer: Callable[[Sequence[torch.Tensor]], optim.Optimizer] = optim.Adam,
     ):
         self.task = task
         self.config = config
         self.schedule = schedule
         self.normalise = normalise
-        self.optimizer = optim.Adam(task.parameters, shared=shared)
+        self.optimizer = optimizer(task.parameters)
         self.generator = torch.Generator().manual_seed(config.seed)
         self.step = 0
         self.skipped = 0
