@@ -89,6 +89,21 @@ class Visibility:
         return Visibility(*moved, vertices=self.vertices, shape=self.shape, samples=self.samples)
 
 
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """Where the samples of some cameras' pixels meet the surface.
+
+    Attributes:
+        hit: (K H W n n,) bool, which samples do, n x n for each pixel.
+        face: (P,) int32, the triangle under each of those that do.
+        barycentric: (P, 3) float32, where on it.
+    """
+
+    hit: torch.Tensor
+    face: torch.Tensor
+    barycentric: torch.Tensor
+
+
 class Stage:
     """One mesh in one Mitsuba scene; everything that changes afterwards is an update of its parameters.
 
@@ -151,27 +166,32 @@ class Stage:
         Raises:
             ConfigError: if `antialias` is below 1.
         """
-        if antialias < 1:
-            raise ConfigError(f"antialias {antialias}", "use 1 for one sample per pixel, or n for n x n")
-        hit, triangle, u, v = self._trace(cameras, antialias)
+        hits = self.hits(cameras, antialias)
         samples = antialias * antialias
-        if not bool(hit.all()):
-            kept = hit.nonzero().view(-1)
-            triangle, u, v = triangle[kept], u[kept], v[kept]
-        weights = torch.stack((1 - u - v, u, v), dim=1).view(-1)
+        weights = hits.barycentric.view(-1)
         if samples > 1:
             weights /= samples
-        entries = 3 * hit.view(-1, samples).sum(1, dtype=torch.int32)
+        entries = 3 * hits.hit.view(-1, samples).sum(1, dtype=torch.int32)
         indptr = entries.new_zeros(len(entries) + 1)
         torch.cumsum(entries, 0, dtype=torch.int32, out=indptr[1:])
         return Visibility(
             indptr,
-            self._faces.to(hit.device)[triangle].view(-1),
+            self._faces.to(weights.device)[hits.face].view(-1),
             weights,
             vertices=len(self.mesh.vertices),
             shape=cameras.shape,
             samples=samples,
         )
+
+    def hits(self, cameras: Cameras, antialias: int = 1) -> Hits:
+        """Where the pixels of all cameras meet the surface; arguments and errors as in `visibility`."""
+        if antialias < 1:
+            raise ConfigError(f"antialias {antialias}", "use 1 for one sample per pixel, or n for n x n")
+        hit, face, u, v = self._trace(cameras, antialias)
+        if not bool(hit.all()):
+            kept = hit.nonzero().view(-1)
+            face, u, v = face[kept], u[kept], v[kept]
+        return Hits(hit, face, torch.stack((1 - u - v, u, v), dim=1))
 
     def _trace(self, cameras: Cameras, n: int) -> tuple[torch.Tensor, ...]:
         """Hit (bool), triangle (int32), barycentrics u and v of every sample, (K H W n n,) each."""
