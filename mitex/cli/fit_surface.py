@@ -23,6 +23,7 @@ class FitSurface(Fitting):
       mitex fit surface --exemplar scales --mesh octopus --resolution 1024
       mitex fit surface --exemplar maps/ --mesh bunny.obj --preset paper --out runs/paper
       mitex fit surface --exemplar painting.png --mesh bunny.obj --content ao --out runs/painted
+      mitex fit surface --exemplar bark.png --mesh tree.obj --orientation along.npy --out runs/tree
       mitex fit surface --exemplar pebbles.png --mesh bunny.obj --out runs/bunny --resume
     """
 
@@ -43,6 +44,9 @@ class FitSurface(Fitting):
 
     content: Annotated[str | None, arg(metavar="IMAGE|ao", help_behavior_hint="")] = None
     """Style transfer: keep the structure of this texture (on the mesh's own UVs), or of ambient occlusion."""
+
+    orientation: Annotated[Path | None, arg(metavar="FIELD.npy", help_behavior_hint="")] = None
+    """Where the exemplar's right shall point: a NumPy array (V, 3), a vector for each vertex of the mesh."""
 
     keep_uvs: Annotated[bool, arg(help_behavior_hint="")] = False
     """Use the mesh's own UVs, which must not overlap."""
@@ -65,6 +69,7 @@ class FitSurface(Fitting):
             overrides=overrides,
             keep_uvs=self.keep_uvs,
             content=self.content,
+            orientation=self.orientation,
             resume=self.resume,
             quiet=self.quiet,
         )

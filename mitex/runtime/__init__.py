@@ -1,12 +1,13 @@
 """What Mitex runs on: LLVM, Mitsuba and its variant, threads, seeds, number formats, and their report."""
 
 from mitex.runtime.health import Check, doctor
-from mitex.runtime.memory import keep_freed_memory
+from mitex.runtime.memory import available_memory, keep_freed_memory
 from mitex.runtime.precision import bfloat16_is_fast
 from mitex.runtime.session import init, load_mitsuba, seed_everything, threads
 
 __all__ = [
     "Check",
+    "available_memory",
     "bfloat16_is_fast",
     "doctor",
     "init",

@@ -1,8 +1,10 @@
-"""What the C library does with memory that is freed."""
+"""How much memory is free, and what the C library does with what is freed."""
 
 import ctypes
 import os
+from contextlib import suppress
 from functools import cache
+from pathlib import Path
 
 _MMAP_THRESHOLD, _TRIM_THRESHOLD = -3, -1  # names of mallopt(3)
 _NEVER = 2**31 - 1  # the largest value it takes
@@ -27,6 +29,16 @@ def keep_freed_memory() -> bool:
     # glibc before 2.35 refuses thresholds above 32 MB.
     large = mallopt(_MMAP_THRESHOLD, 1 << 30) or mallopt(_MMAP_THRESHOLD, 32 << 20)
     return bool(large and mallopt(_TRIM_THRESHOLD, _NEVER))
+
+
+def available_memory() -> int | None:
+    """Memory that can be taken without swapping [bytes], by the system's estimate; None if it has none."""
+    with suppress(OSError, ValueError):
+        for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
+            name, _, rest = line.partition(":")
+            if name == "MemAvailable":
+                return int(rest.split()[0]) * 1024
+    return None
 
 
 def _is_glibc() -> bool:

@@ -1,6 +1,7 @@
 """`mitex fit surface`, and `mitex apply` of what it makes."""
 
 from dataclasses import replace
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -73,7 +74,9 @@ BAD_FITS = {
     "unknown preset": (fit(f"{QUICK} --preset best"), "best"),
     "unknown key": (fit("--set resolutoin=64"), "resolution"),
     "resolution 0": (fit("--resolution 0"), "resolution = 0"),
-    "resolution beyond memory": (fit("--resolution 100000"), "resolution = 100000"),
+    "resolution out of range": (fit("--resolution 100000"), "resolution = 100000"),
+    "no orientation": (fit(f"{QUICK} --orientation no.npy"), "no.npy"),
+    "no VGG-19": (fit(f"{QUICK} --set weights=vgg19"), "VGG-19"),
     "resolution twice": (fit("--resolution 64 --set resolution=32"), "resolution"),
     "steps 0": (fit("--steps 0"), "--steps 0"),
     "unknown layer": (fit("--set layers=relu6_1"), "relu6_1"),
@@ -115,6 +118,13 @@ def test_bad_applies(files, run, name, capsys):
     bad.text(files / "other.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     words, message = BAD_APPLIES[name]
     check_refused(files, ["apply", "out/run", *words.split()], message, capsys)
+
+
+def test_a_resolution_beyond_memory(files, monkeypatch, capsys):
+    bad.image(files / "good.png")
+    room = import_module("mitex.methods.surface.fit")
+    monkeypatch.setattr(room, "available_memory", lambda: 10**6)
+    check_refused(files, fit("--resolution 512"), "GB of memory", capsys)
 
 
 def test_a_run_that_is_not_finished(files, run, capsys):

@@ -5,11 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from mitex.errors import ConfigError
-from mitex.methods.surface.network import ALL_LAYERS
+from mitex.features.vgg import LAYERS
+from mitex.features.vgg19 import LAYERS_19
+from mitex.methods.surface.network import layers_of
 from mitex.training import check_ranges
 
 FRAMES = ("smooth", "fixed")
-WEIGHTS = ("vgg16", "random")
+WEIGHTS = ("vgg16", "vgg19", "random")
+LOSSES = ("gram", "transport")
+OPTIMIZERS = ("adam", "lbfgs")
 
 
 @dataclass(frozen=True)
@@ -24,9 +28,13 @@ class SurfaceConfig:
         angle: turns the texture about the normals, counter-clockwise from outside [degrees].
         correct: walk geodesics back that overshoot (figure 3).
         bilinear: the first convolution interpolates the texels; False: it reads the nearest ones.
-        weights: "vgg16", or "random" ones (the ablation of figure 5).
+        weights: "vgg16"; "vgg19", which the user provides (see `mitex.features.vgg19`); or "random" ones (the
+            ablation of figure 5).
         pooling: "average" or "max".
-        layers: that are compared; VGG's convolutions and poolings.
+        loss: "gram" (the paper), or "transport": MeshNCA's relaxed optimal transport and moments, of
+        samples: feature vectors a layer and step,
+        moment_weight: the moments counting as much.
+        layers: that are compared; VGG's convolutions and poolings. None stands for all.
         content_layer, content_weight: whose features shall stay those of the content texture, where one is
             given (style transfer), and how much that counts.
         scales: how many coarser pyramids of texels are matched first, each half as fine.
@@ -34,7 +42,8 @@ class SurfaceConfig:
         pictures: views of the maps compared in a step, when the exemplar has several maps.
         noise: the texture starts with uniform noise of this width,
         mean_start: around the mean of the exemplar; False: from 0 on (the paper).
-        lr, milestones, decay: Adam and its schedule.
+        optimizer: "adam" (the paper), or "lbfgs" for one map and the Gram loss.
+        lr, milestones, decay: its learning rate, for "lbfgs" the largest change in a step, and the schedule.
         shared_moment: Adam's second moment is one number for the whole texture, which leaves noise alone that
             the features do not see; False gives each texel its own (the paper), which amplifies it.
         checkpoint_every, preview_every: in steps.
@@ -51,7 +60,10 @@ class SurfaceConfig:
     bilinear: bool = True
     weights: str = "vgg16"
     pooling: str = "average"
-    layers: tuple[str, ...] = ALL_LAYERS
+    loss: str = "gram"
+    samples: int = 2048
+    moment_weight: float = 0.1
+    layers: tuple[str, ...] = ()
     content_layer: str = "relu4_2"
     content_weight: float = 1000.0
     scales: int = 0
@@ -59,6 +71,7 @@ class SurfaceConfig:
     pictures: int = 2
     noise: float = 0.2
     mean_start: bool = True
+    optimizer: str = "adam"
     lr: float = 0.1
     milestones: tuple[int, ...] = (200, 400)
     decay: float = 0.5
@@ -79,6 +92,8 @@ class SurfaceConfig:
             coarse_share=(0, 0.95),
             pictures=(1, 16),
             noise=(0, 1),
+            samples=(1, None),
+            moment_weight=(0, None),
             lr=(0, None),
             decay=(0, None),
             checkpoint_every=(1, None),
@@ -87,14 +102,24 @@ class SurfaceConfig:
         choices = {
             "frames": FRAMES,
             "weights": WEIGHTS,
+            "loss": LOSSES,
+            "optimizer": OPTIMIZERS,
             "pooling": ("average", "max"),
         }
         for key, allowed in choices.items():
             if getattr(self, key) not in allowed:
                 raise ConfigError(f"{key} = '{getattr(self, key)}' is unknown", f"use {' or '.join(allowed)}")
-        unknown = [layer for layer in (*self.layers, self.content_layer) if layer not in ALL_LAYERS]
-        if unknown or not self.layers:
-            raise ConfigError(f"layers holds {unknown or 'nothing'}", f"use some of {', '.join(ALL_LAYERS)}")
+        known = layers_of(LAYERS_19 if self.weights == "vgg19" else LAYERS)
+        unknown = [layer for layer in (*self.layers, self.content_layer) if layer not in known]
+        if unknown:
+            raise ConfigError(f"layers holds {', '.join(unknown)}", f"use some of {', '.join(known)}")
+        if self.optimizer == "lbfgs" and self.loss != "gram":
+            raise ConfigError("lbfgs needs a loss without randomness", "set loss=gram or optimizer=adam")
+
+    @property
+    def compared(self) -> tuple[str, ...]:
+        """The layers that are compared, by name."""
+        return self.layers or layers_of(LAYERS_19 if self.weights == "vgg19" else LAYERS)
 
 
 PRESETS = {

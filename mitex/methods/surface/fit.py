@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
-from mitex.atlas import unwrap, usable_uv
+import numpy as np
+
+from mitex.atlas import twice_area, unwrap, usable_uv
 from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.mesh import Mesh
@@ -17,12 +20,18 @@ from mitex.methods.surface.content import AO, content_colours
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.frames import tangent_frames
 from mitex.methods.surface.levels import POOLS, Levels
+from mitex.methods.surface.orientation import read_orientation
 from mitex.methods.surface.taps import Surroundings, build
 from mitex.methods.surface.task import SurfaceTask
 from mitex.methods.surface.texels import Texels
 from mitex.methods.surface.texture import NAME, SurfaceTexture
+from mitex.runtime import available_memory
 from mitex.training import resolve, run, train
+from mitex.training.lbfgs import Lbfgs
+from mitex.training.optim import Adam
 
+# Peak over precomputation and steps, measured at 512^2 and 1024^2 with bfloat16 features.
+BYTES_PER_TEXEL, BYTES_PER_PICTURE = 3600, 900
 PADDING = 2  # texels between charts: bilinear taps of one never see the other
 
 
@@ -36,6 +45,7 @@ def fit(
     overrides: Sequence[str] = (),
     keep_uvs: bool = False,
     content: str | Path | None = None,
+    orientation: np.ndarray | str | Path | None = None,
     resume: bool = False,
     quiet: bool = False,
 ) -> SurfaceTexture:
@@ -51,6 +61,8 @@ def fit(
         keep_uvs: use the mesh's own UVs.
         content: style transfer: a texture on the mesh's own UVs (an image file), which are kept then, or "ao"
             for the mesh's ambient occlusion.
+        orientation: (V, 3) where the exemplar's right shall point, or what `read_orientation` takes; else the
+            frames follow the config.
         resume: go on from the run's checkpoint, with its config as far as no other is given.
         quiet: show no progress.
 
@@ -69,11 +81,14 @@ def fit(
     shown = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
     image = content is not None and str(content) != AO
     surface = with_layout(mesh if isinstance(mesh, Mesh) else Mesh.load(mesh), settings, keep_uvs or image)
+    field = read_orientation(orientation, surface) if isinstance(orientation, str | Path) else orientation
     assert surface.uv is not None
+    check_memory(surface, settings, len(shown.maps))
     texels = Texels.rasterize(surface, surface.uv, settings.resolution)
-    identity = f"{surface.name} {content_key(surface.vertices, surface.faces, surface.uv)}"
     start = None if content is None else content_colours(content, surface, texels)
-    task = SurfaceTask(settings, shown, texels, find_levels(surface, texels, settings), identity, start)
+    levels = find_levels(surface, texels, settings, field)
+    known = {"content": content_key(start), "orientation": content_key(field)}
+    task = SurfaceTask(settings, shown, surface, texels, levels, start, known)
     result = train(
         task,
         settings,
@@ -81,7 +96,7 @@ def fit(
         lr=settings.lr,
         milestones=settings.milestones,
         decay=settings.decay,
-        shared_moment=settings.shared_moment,
+        optimizer=Lbfgs if settings.optimizer == "lbfgs" else partial(Adam, shared=settings.shared_moment),
         checkpoint_every=settings.checkpoint_every,
         preview_every=settings.preview_every,
         resume=resume,
@@ -98,7 +113,7 @@ def fit(
     }
     if math.isfinite(result.loss):
         about["loss"] = result.loss
-    texture = SurfaceTexture(surface, task.in_texel_order(), tuple(task.layout), about)
+    texture = SurfaceTexture(surface, task.in_texel_order(), tuple(task.layout), about, field)
     texture.save(out / NAME)
     return texture
 
@@ -121,15 +136,37 @@ def with_layout(mesh: Mesh, config: SurfaceConfig, keep_uvs: bool) -> Mesh:
     return mesh
 
 
-def find_levels(mesh: Mesh, texels: Texels, config: SurfaceConfig) -> Levels:
+def check_memory(mesh: Mesh, config: SurfaceConfig, maps: int = 1) -> None:
+    """Refuses a resolution whose synthesis does not fit into the memory that is free.
+
+    Raises:
+        ConfigError: with the estimate.
+    """
+    assert mesh.uv is not None
+    share = 0.5 * np.abs(twice_area(mesh.uv)).sum()
+    each = BYTES_PER_TEXEL + BYTES_PER_PICTURE * (min(config.pictures, maps) - 1)
+    needed = each * share * config.resolution**2
+    free = available_memory()
+    if free is not None and needed > free:
+        fits = int(config.resolution * math.sqrt(free / needed))
+        raise ConfigError(
+            f"a texture of {config.resolution}^2 needs about {needed / 1e9:.1f} GB of memory, "
+            f"and {free / 1e9:.1f} GB are free",
+            f"set --resolution {max(fits, 1)} or less",
+        )
+
+
+def find_levels(
+    mesh: Mesh, texels: Texels, config: SurfaceConfig, orientation: np.ndarray | None = None
+) -> Levels:
     """The levels of a surface, from the cache if it has been seen before."""
     assert mesh.uv is not None
     angle = math.radians(config.angle)
     count = POOLS + config.scales
-    options = (config.resolution, config.frames, angle, config.correct, count)
+    options = (config.resolution, config.frames, angle, config.correct, count, orientation)
 
     def find() -> Levels:
-        right, up = tangent_frames(mesh, texels.face, texels.barycentric, config.frames, angle)
+        right, up = tangent_frames(mesh, texels.face, texels.barycentric, config.frames, angle, orientation)
         return build(Surroundings(texels, GeodesicTracer(mesh), right, up, config.correct), count)
 
     return cached_levels(content_key(mesh.vertices, mesh.faces, mesh.uv, *options), find)

@@ -1,4 +1,4 @@
-"""What the features of an exemplar are like: Gram matrices of the image network."""
+"""What the features of an exemplar are like, seen by the image network."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import torch
 import torch.nn.functional as F
 
 from mitex.features import Vgg16
-from mitex.losses import gram_matrix
 
 MARGIN = 64  # of mirrored pixels around the exemplar
 
@@ -41,11 +40,6 @@ def exemplar_features(
         cut = min(MARGIN // shrunk, (features.shape[1] - 1) // 2, (features.shape[2] - 1) // 2)
         found[layer] = features[0, cut : features.shape[1] - cut, cut : features.shape[2] - cut].flatten(0, 1)
     return found
-
-
-def exemplar_grams(network: Vgg16, image: torch.Tensor, layers: tuple[str, ...]) -> dict[str, torch.Tensor]:
-    """layer -> (C, C) Gram matrix of `exemplar_features`."""
-    return {name: gram_matrix(f) for name, f in exemplar_features(network, image, layers).items()}
 
 
 def _source(network: Vgg16, layer: str) -> str:

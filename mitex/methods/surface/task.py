@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import torch
 
 from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
+from mitex.features.frozen import Tap
 from mitex.features.vgg import LAYERS, Weights, convolutions
-from mitex.losses import gram_distance
+from mitex.features.vgg19 import vgg19_convolutions
+from mitex.mesh import Mesh
+from mitex.methods.surface.cache import content_key
+from mitex.methods.surface.comparison import Comparison, GramComparison, TransportComparison
 from mitex.methods.surface.config import SurfaceConfig
 from mitex.methods.surface.levels import Levels
 from mitex.methods.surface.network import SurfaceVgg
-from mitex.methods.surface.statistics import exemplar_grams
 from mitex.methods.surface.texels import Texels
 from mitex.methods.surface.texture import texel_layout
+from mitex.methods.surface.views import Views
 from mitex.pictures import CYCLE, picture_images, pictures_of
 from mitex.runtime import keep_freed_memory
+
+VIEW = 384  # side of a preview's pictures [px]
+CONTENT = "content"
 
 
 class SurfaceTask:
@@ -32,52 +41,53 @@ class SurfaceTask:
     Args:
         config: settings.
         exemplar: maps to match.
-        texels, levels: of the surface.
-        mesh: what tells it from other meshes, for a resumed run.
+        mesh: the surface, with UVs,
+        texels, levels: and what is on it.
+        known: further things that a resumed run must share: name -> what tells it from others.
         content: (N, 3) sRGB in [0, 1] in the order of `texels`, whose structure shall stay while the look
             becomes the exemplar's (style transfer). The synthesis starts from it.
 
     Raises:
-        ConfigError: a content for more than the albedo, or on several scales.
+        ConfigError: a content for more than the albedo, or on several scales; L-BFGS for several maps.
     """
 
     def __init__(
         self,
         config: SurfaceConfig,
         exemplar: Exemplar,
+        mesh: Mesh,
         texels: Texels,
         levels: Levels,
-        mesh: str = "",
         content: np.ndarray | None = None,
+        known: Mapping[str, str] | None = None,
     ) -> None:
         keep_freed_memory()
         self.config, self.exemplar, self.texels, self.levels = config, exemplar, texels, levels
-        self.mesh = mesh
+        self.known = dict(known or {})
+        self.mesh, self.views = mesh, Views(mesh, texels, VIEW)
         if content is not None and (list(exemplar.maps) != ["albedo"] or config.scales):
             raise ConfigError(
                 "style transfer takes one image and one scale", "give an image as --exemplar, and scales=0"
             )
         self.layout = texel_layout(list(exemplar.maps))
+        if config.optimizer == "lbfgs" and len(self.layout) > 1:
+            raise ConfigError("lbfgs takes one map", "give an image as --exemplar, or set optimizer=adam")
         self.pictures = pictures_of(self.layout, True, config.seed)
         generator = torch.Generator().manual_seed(config.seed)
         self.values = self._start(generator).requires_grad_()
-        weights = random_weights(generator) if config.weights == "random" else None
+        weights = _weights(config, generator)
         # The image network has the same weights: what differs is only where it looks.
-        image_network = Vgg16(config.pooling, normalised=False, weights=weights)
-        self.networks, self.targets = [], []
+        image_network = Vgg16(config.pooling, weights=weights)
+        self.networks: list[SurfaceVgg] = []
+        self.comparisons: list[Comparison] = []
         for scale in range(config.scales + 1):
-            self.networks.append(
-                SurfaceVgg(
-                    levels,
-                    config.pooling,
-                    bilinear=config.bilinear,
-                    scale=scale,
-                    weights=weights,
-                )
+            network = SurfaceVgg(
+                levels, config.pooling, bilinear=config.bilinear, scale=scale, weights=weights
             )
+            self.networks.append(network)
             shown = exemplar.resized(max(config.exemplar_size >> scale, 16))
             images = torch.from_numpy(picture_images(shown, self.pictures, self.layout))
-            self.targets.append([exemplar_grams(image_network, image, config.layers) for image in images])
+            self.comparisons.append(_comparison(config, image_network, images))
         self.content: torch.Tensor | None = None
         if content is not None:
             start = torch.from_numpy(content[levels.order].astype(np.float32))
@@ -91,16 +101,19 @@ class SurfaceTask:
 
     def loss(self, step: int, generator: torch.Generator) -> tuple[torch.Tensor, dict[str, float]]:
         scale = self.scale(step)
+        network, comparison = self.networks[scale], self.comparisons[scale]
         chosen = self._chosen(step, generator)
         total = torch.zeros(())
         for k in chosen:
             colours = self.values[:, self.pictures[k].channels]
-            whole = () if self.content is None else (self.config.content_layer,)
-            grams, features = self.networks[scale].compared(colours, self.config.layers, whole)
-            total = total + gram_distance(grams, self.targets[scale][k]) / len(self.config.layers)
+            taps = comparison.taps(network, generator)
             if self.content is not None:
-                difference = features[self.config.content_layer] - self.content
+                taps[CONTENT] = Tap(network.place(self.config.content_layer))
+            found = network.read(colours, taps)
+            if self.content is not None:
+                difference = found.pop(CONTENT) - self.content
                 total = total + self.config.content_weight * difference.square().mean()
+            total = total + comparison.cost(found, colours, k, generator)
         return total / len(chosen), {"scale": float(scale)}
 
     def scale(self, step: int) -> int:
@@ -133,20 +146,19 @@ class SurfaceTask:
         return values
 
     def preview(self, step: int) -> np.ndarray:
-        """The exemplar's pictures beside those of the texture."""
-        size = self.config.resolution
-        whole = Exemplar(self.images())
-        exemplar = self.exemplar.resized(min(self.config.exemplar_size, size))
-        rows = []
-        for picture in (p for p in self.pictures if p.kind != "mix"):
-            left = np.ones((size, exemplar.size[1], 3), np.float32)
-            left[: exemplar.size[0]] = picture_images(exemplar, [picture], self.layout)[0]
-            rows.append(np.concatenate([left, picture_images(whole, [picture], self.layout)[0]], 1))
-        return np.concatenate(rows, 0)
+        """For each picture but the mixtures a row: the exemplar, and the mesh from two sides, unlit."""
+        views = self.views.images(self.in_texel_order())
+        shown = [p for p in self.pictures if p.kind != "mix"]
+        exemplars = picture_images(self.exemplar.resized(VIEW), shown, self.layout)
+        pairs = zip(shown, exemplars, strict=True)
+        return np.concatenate([np.hstack([e, *views[..., list(p.channels)]]) for p, e in pairs])
 
     def metadata(self) -> dict[str, str]:
         maps = ",".join(self.layout)
-        return {"method": "surface", "maps": maps, "exemplar": self.exemplar.name, "mesh": self.mesh}
+        assert self.mesh.uv is not None
+        key = content_key(self.mesh.vertices, self.mesh.faces, self.mesh.uv)
+        mesh = f"{self.mesh.name} {key}"
+        return {"method": "surface", "maps": maps, "exemplar": self.exemplar.name, "mesh": mesh} | self.known
 
     def _start(self, generator: torch.Generator) -> torch.Tensor:
         means = [self.exemplar.maps[name].mean((0, 1)) for name in self.layout]
@@ -163,6 +175,21 @@ class SurfaceTask:
     def _one(self, kind: str, generator: torch.Generator) -> int:
         of_kind = [k for k, p in enumerate(self.pictures) if p.kind == kind]
         return of_kind[int(torch.randint(len(of_kind), (), generator=generator))]
+
+
+def _weights(config: SurfaceConfig, generator: torch.Generator) -> Weights:
+    if config.weights == "random":
+        return random_weights(generator)
+    if config.weights == "vgg19":
+        return vgg19_convolutions()
+    # Moments are not scale free; Gram matrices want the published scale.
+    return convolutions(config.pooling, normalised=config.loss == "transport")
+
+
+def _comparison(config: SurfaceConfig, network: Vgg16, images: torch.Tensor) -> Comparison:
+    if config.loss == "gram":
+        return GramComparison(network, images, config.compared)
+    return TransportComparison(network, images, config.compared, config.samples, config.moment_weight)
 
 
 def random_weights(generator: torch.Generator) -> Weights:

@@ -49,12 +49,14 @@ class SurfaceTexture:
         values: (N, C) float32 in [0, 1], the maps' channels by `texel_layout`, in the order of `texels`.
         maps: their names.
         about: how it was made; `resolution`, `frames` and `angle` [degrees] at least.
+        orientation: (V, 3) float32 where the exemplar's right was asked to point, in place of `frames`.
     """
 
     mesh: Mesh
     values: np.ndarray
     maps: tuple[str, ...]
     about: Mapping[str, Any] = field(default_factory=dict)
+    orientation: np.ndarray | None = None
 
     @cached_property
     def texels(self) -> Texels:
@@ -88,7 +90,7 @@ class SurfaceTexture:
         if "normal" in layout:
             textures["normal"] = self._normals(atlas, layout["normal"], used, kind, angle)
         at_vertices = self._at_vertices()
-        tangents = _turned(vertex_directions(self.mesh, kind), self.mesh.normals, angle)
+        tangents = _turned(vertex_directions(self.mesh, kind, self.orientation), self.mesh.normals, angle)
         maps = {name: at_vertices[:, channels] for name, channels in layout.items()}
         return Asset(self.mesh, maps, tangents, atlas, textures, self.mesh.name)
 
@@ -96,6 +98,8 @@ class SurfaceTexture:
         """Writes mesh, texels and `about` as one safetensors file."""
         assert self.mesh.uv is not None
         arrays = {"vertices": self.mesh.vertices, "faces": self.mesh.faces, "uv": self.mesh.uv}
+        if self.orientation is not None:
+            arrays["orientation"] = self.orientation
         tensors = {name: torch.from_numpy(np.ascontiguousarray(a)) for name, a in arrays.items()}
         tensors["values"] = torch.from_numpy(np.ascontiguousarray(self.values, np.float16))
         about = {**self.about, "maps": list(self.maps), "mesh": self.mesh.name}
@@ -124,7 +128,8 @@ class SurfaceTexture:
                 raise ValueError("another format")
             about = json.loads(metadata["about"])
             mesh = Mesh(arrays["vertices"], arrays["faces"], arrays["uv"], str(about["mesh"]))
-            texture = SurfaceTexture(mesh, arrays["values"].astype(np.float32), tuple(about["maps"]), about)
+            values, orientation = arrays["values"].astype(np.float32), arrays.get("orientation")
+            texture = SurfaceTexture(mesh, values, tuple(about["maps"]), about, orientation)
             if len(texture.texels.index) != len(texture.values):
                 raise ValueError("texels are missing")
             return texture
@@ -147,7 +152,7 @@ class SurfaceTexture:
     ) -> np.ndarray:
         """The normal map, from the texels' frames into those of the atlas."""
         texels = self.texels
-        right, up = tangent_frames(self.mesh, texels.face, texels.barycentric, kind, angle)
+        right, up = tangent_frames(self.mesh, texels.face, texels.barycentric, kind, angle, self.orientation)
         # Bumps are added to the smooth surface that viewers shade, not to its flat faces.
         corners = self.mesh.normals[self.mesh.faces[texels.face]]
         smooth = np.einsum("nk,nkc->nc", texels.barycentric, corners)

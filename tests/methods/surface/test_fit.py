@@ -1,6 +1,7 @@
 """A small real synthesis, its texture, and what is refused."""
 
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -15,8 +16,10 @@ from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods import surface
 from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.content import content_colours
-from mitex.methods.surface.fit import with_layout
-from mitex.methods.surface.task import SurfaceTask
+from mitex.methods.surface.fit import find_levels, with_layout
+from mitex.methods.surface.network import ALL_LAYERS
+from mitex.methods.surface.orientation import read_orientation
+from mitex.methods.surface.task import VIEW, SurfaceTask
 from mitex.methods.surface.texels import Texels, charts
 from mitex.methods.surface.texture import NAME, SurfaceTexture, is_texture
 from mitex.training import resolve
@@ -124,7 +127,10 @@ def test_resuming_on_another_mesh_is_refused(made, exemplar):
 
 @pytest.mark.parametrize(
     "setting",
-    ["frames=fixed", "weights=random", "bilinear=false", "correct=false", "scales=2", "pooling=max"],
+    [
+        *("frames=fixed", "weights=random", "bilinear=false", "correct=false", "scales=2", "pooling=max"),
+        *("loss=transport", "shared_moment=false", "layers=relu1_1,pool2"),
+    ],
 )
 def test_options_run(mesh, exemplar, tmp_path, setting):
     overrides = [*SMALL, "steps=3", "pictures=1", setting]
@@ -132,6 +138,126 @@ def test_options_run(mesh, exemplar, tmp_path, setting):
         overrides.remove("scales=0")
     texture = surface.fit(exemplar, mesh, tmp_path / "run", overrides=overrides, quiet=True)
     assert np.isfinite(texture.values).all() and np.ptp(texture.values) > 0.1
+
+
+def test_lbfgs_matches_better_than_adam_after_the_same_steps(mesh, exemplar, tmp_path):
+    colours = Exemplar({"albedo": exemplar.maps["albedo"]})
+    for optimizer in ("adam", "lbfgs"):
+        overrides = [*SMALL, "steps=40", f"optimizer={optimizer}"]
+        surface.fit(colours, mesh, tmp_path / optimizer, overrides=overrides, quiet=True)
+    adam, lbfgs = (losses(tmp_path / optimizer) for optimizer in ("adam", "lbfgs"))
+    assert lbfgs[-1] < 0.5 * adam[-1] and lbfgs[-1] < 0.06 * lbfgs[0]
+
+
+def test_transport_gives_the_exemplars_colours(mesh, exemplar, tmp_path):
+    colours = Exemplar({"albedo": exemplar.maps["albedo"]})
+    overrides = [*SMALL, "steps=60", "loss=transport", "layers=relu1_1,relu2_1,relu3_1"]
+    texture = surface.fit(colours, mesh, tmp_path / "run", overrides=overrides, quiet=True)
+    found = losses(tmp_path / "run")
+    assert np.mean(found[-5:]) < 0.5 * found[0]
+    assert np.abs(texture.values.mean(0) - exemplar.maps["albedo"].mean((0, 1))).max() < 0.06
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (["optimizer=lbfgs", "loss=transport"], "without randomness"),
+        (["optimizer=lbfgs"], "one map"),
+        (["optimizer=sgd"], "adam or lbfgs"),
+        (["loss=l2"], "gram or transport"),
+        (["layers=relu3_4"], "relu3_4"),
+        (["weights=vgg19", "layers=relu3_5"], "relu3_5"),
+    ],
+)
+def test_settings_that_do_not_go_together(mesh, exemplar, tmp_path, settings, message):
+    with pytest.raises(ConfigError, match=message):
+        surface.fit(exemplar, mesh, tmp_path / "run", overrides=[*SMALL, *settings], quiet=True)
+    assert not (tmp_path / "run").exists()
+
+
+def test_vgg19_compares_its_own_layers():
+    config = resolve(PRESETS, None, None, ["weights=vgg19"])
+    assert len(config.compared) == 21 and "relu5_4" in config.compared
+    assert resolve(PRESETS, None, None, []).compared == ALL_LAYERS
+
+
+def test_more_than_the_memory_is_refused_with_the_estimate(mesh, monkeypatch):
+    room = import_module("mitex.methods.surface.fit")
+    config = resolve(PRESETS, None, None, ["resolution=2000"])
+    half = replace(
+        mesh, uv=np.tile(np.array([[0, 0], [1, 0], [0, 1]], np.float32), (1, 1, 1)), faces=mesh.faces[:1]
+    )
+    monkeypatch.setattr(room, "available_memory", lambda: 2_000_000 * room.BYTES_PER_TEXEL + 1)
+    room.check_memory(half, config)
+    monkeypatch.setattr(room, "available_memory", lambda: 500_000 * room.BYTES_PER_TEXEL)
+    with pytest.raises(
+        ConfigError, match=r"2000\^2 needs about 7.2 GB of memory, and 1.8 GB are free; set --resolution 1000"
+    ):
+        room.check_memory(half, config)
+    monkeypatch.setattr(room, "available_memory", lambda: None)
+    room.check_memory(half, config)
+
+
+class TestOrientation:
+    def test_a_field_turns_the_frames_and_stays_with_the_texture(self, mesh, exemplar, tmp_path):
+        down = np.tile(np.array([0.0, -1.0, 0.0], np.float32), (len(mesh.vertices), 1))
+        np.save(tmp_path / "down.npy", down)
+        given = {"overrides": [*SMALL, "steps=2"], "quiet": True, "orientation": tmp_path / "down.npy"}
+        surface.fit(exemplar, mesh, tmp_path / "run", **given)
+        made = SurfaceTexture.load(tmp_path / "run")
+        tangents = made.apply().tangents
+        assert made.orientation is not None and tangents is not None
+        assert np.array_equal(made.orientation, down)
+        around = np.abs(mesh.normals[:, 1]) < 0.5
+        assert (tangents[around, 1] < -0.8).all()
+
+    def test_resuming_with_another_field_is_refused(self, mesh, exemplar, tmp_path):
+        given = {"overrides": [*SMALL, "steps=2"], "quiet": True}
+        surface.fit(exemplar, mesh, tmp_path / "run", **given)
+        with pytest.raises(CheckpointError, match="orientation"):
+            surface.fit(exemplar, mesh, tmp_path / "run", **given, orientation=mesh.vertices, resume=True)
+
+    @pytest.mark.parametrize(
+        "kind", ["missing", "text", "shape", "words", "nan", "objects", "archive", "cut"]
+    )
+    def test_what_is_no_field_is_refused(self, mesh, tmp_path, kind):
+        path = tmp_path / "field.npy"
+        whole = np.zeros((len(mesh.vertices), 3), np.float32)
+        arrays = {
+            "shape": whole[:-1],
+            "words": np.full(whole.shape, "x"),
+            "nan": np.full_like(whole, np.nan),
+            "objects": whole.astype(object),
+        }
+        if kind in arrays:
+            np.save(path, arrays[kind])
+        elif kind == "text":
+            path.write_text("hello")
+        elif kind == "archive":
+            with path.open("wb") as file:
+                np.savez(file, whole)
+        elif kind == "cut":
+            np.save(path, whole)
+            path.write_bytes(path.read_bytes()[:-100])
+        with pytest.raises(ConfigError):
+            read_orientation(path, mesh)
+
+
+def test_previews_show_the_mesh_beside_the_exemplar(mesh, exemplar):
+    config = resolve(PRESETS, None, None, SMALL)
+    laid = with_layout(mesh, config, False)
+    assert laid.uv is not None
+    texels = Texels.rasterize(laid, laid.uv, 48)
+    task = SurfaceTask(config, exemplar, laid, texels, find_levels(laid, texels, config))
+    red = [task.layout["albedo"][0]]
+    with torch.no_grad():
+        task.values.zero_()
+        task.values[:, red] = 1.0
+    picture = task.preview(3)
+    assert picture.shape == (3 * VIEW, 3 * VIEW, 3)  # colours, normals and the grey maps in turn
+    sphere = picture[VIEW // 2, VIEW + VIEW // 2]
+    assert sphere[0] > 0.9 and (sphere[1:] == 0).all()
+    assert (picture[0, VIEW] == 1).all()
 
 
 def test_noise_start_and_range(mesh, exemplar, tmp_path):

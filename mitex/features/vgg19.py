@@ -1,0 +1,84 @@
+"""VGG-19's convolutions from a file of the user's; Mitex ships VGG-16 only."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load_file
+
+from mitex.features.vgg import CHANNELS, Weights
+from mitex.features.weights import WeightsError
+from mitex.paths import cache_dir
+
+VARIABLE = "MITEX_VGG19"
+FILE = "vgg19.safetensors"
+LAYERS_19 = tuple(
+    f"relu{block}_{i}" for block, count in enumerate((2, 2, 4, 4, 4), 1) for i in range(1, count + 1)
+)
+SPREAD_RGB = (0.229, 0.224, 0.225)  # torchvision's networks read (x - mean) / spread, x in [0, 1]
+
+
+def vgg19_path() -> Path:
+    """`MITEX_VGG19` if set, else vgg19.safetensors in the user's cache folder.
+
+    Raises:
+        WeightsError: there is no such file.
+    """
+    path = Path(os.environ.get(VARIABLE) or cache_dir() / "weights" / FILE)
+    if not path.is_file():
+        raise WeightsError(
+            f"the VGG-19 weights are not at {path}",
+            f"put a safetensors file there or name one in {VARIABLE}; the package's VGG-16 needs none",
+        )
+    return path
+
+
+def vgg19_convolutions(path: Path | None = None) -> Weights:
+    """Layer -> weight (O, I, 3, 3) and bias (O,), float32, in order, for RGB in [0, 255] minus the mean.
+
+    Args:
+        path: a safetensors file that names its tensors like Mitex's VGG-16 ("conv1_1.weight") or like
+            torchvision's network ("features.0.weight"), as converted files of it do; `vgg19_path()` if None.
+
+    Raises:
+        WeightsError: there is none, or it is not VGG-19's.
+    """
+    path = path or vgg19_path()
+    try:
+        tensors = load_file(path)
+    except (SafetensorError, OSError) as e:
+        raise WeightsError(f"'{path}' is not a safetensors file ({e})", "convert the weights") from e
+    torchvision = "features.0.weight" in tensors
+    layers: dict[str, tuple[torch.Tensor, torch.Tensor]] = {}
+    inputs = 3
+    for name, place in zip(LAYERS_19, _places(), strict=True):
+        key = f"features.{place}" if torchvision else name.replace("relu", "conv")
+        outputs = CHANNELS[f"{name[:5]}_1"]
+        weight, bias = tensors.get(f"{key}.weight"), tensors.get(f"{key}.bias")
+        if (
+            weight is None
+            or bias is None
+            or weight.shape != (outputs, inputs, 3, 3)
+            or bias.shape != (outputs,)
+        ):
+            raise WeightsError(f"'{path}' has no {key} of VGG-19", "name another file")
+        layers[name] = weight.float(), bias.float()
+        inputs = outputs
+    if torchvision:
+        weight, bias = layers["relu1_1"]
+        layers["relu1_1"] = weight / (255 * torch.tensor(SPREAD_RGB))[:, None, None], bias
+    return layers
+
+
+def _places() -> list[int]:
+    """Numbers of the convolutions in torchvision's list, which counts ReLUs and poolings too."""
+    places, place = [], 0
+    for name in LAYERS_19:
+        if name.endswith("_1") and name != "relu1_1":
+            place += 1
+        places.append(place)
+        place += 2
+    return places

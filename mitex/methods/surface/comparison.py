@@ -1,0 +1,105 @@
+"""How the features of a texture are compared with the exemplar's: Gram matrices, or relaxed transport."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+import torch
+
+from mitex.features import Vgg16
+from mitex.features.frozen import GramTap, Tap
+from mitex.losses import (
+    decorrelate,
+    gram_distance,
+    gram_matrix,
+    moment_distance,
+    relaxed_transport,
+)
+from mitex.methods.surface.network import SurfaceVgg
+from mitex.methods.surface.statistics import exemplar_features
+
+Taps = dict[str, Tap | GramTap]
+
+
+class Comparison(Protocol):
+    """What a loss reads of the network, and what it makes of that."""
+
+    def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Taps: ...
+
+    def cost(
+        self, found: Mapping[str, torch.Tensor], colours: torch.Tensor, k: int, generator: torch.Generator
+    ) -> torch.Tensor:
+        """Scalar distance from picture k, given what the taps read of the texels' colours (N, 3)."""
+        ...
+
+
+class GramComparison:
+    """Squared distance of Gram matrices, averaged over layers (equation 4).
+
+    Args:
+        network: of images.
+        images: (P, H, W, 3) the exemplar's pictures.
+        layers: that are compared.
+    """
+
+    def __init__(self, network: Vgg16, images: torch.Tensor, layers: tuple[str, ...]) -> None:
+        self.layers = layers
+        self.targets = []
+        for image in images:
+            features = exemplar_features(network, image, layers)
+            self.targets.append({layer: gram_matrix(f) for layer, f in features.items()})
+
+    def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Taps:
+        return {layer: GramTap(network.place(layer)) for layer in self.layers}
+
+    def cost(
+        self, found: Mapping[str, torch.Tensor], colours: torch.Tensor, k: int, generator: torch.Generator
+    ) -> torch.Tensor:
+        return gram_distance(found, self.targets[k]) / len(self.layers)
+
+
+class TransportComparison:
+    """Relaxed optimal transport and moments at random places (MeshNCA, equations 4 to 6), and of colours.
+
+    Args:
+        network: of images, with layers of equal scale, as the moments are not scale free.
+        images: (P, H, W, 3) the exemplar's pictures.
+        layers: that are compared.
+        samples: feature vectors of each layer in a step.
+        moment_weight: of the moments.
+    """
+
+    def __init__(
+        self,
+        network: Vgg16,
+        images: torch.Tensor,
+        layers: tuple[str, ...],
+        samples: int,
+        moment_weight: float,
+    ) -> None:
+        self.layers, self.samples, self.moment_weight = layers, samples, moment_weight
+        self.low = network.dtype == torch.bfloat16
+        self.colours = [image.flatten(0, 1) for image in images]
+        self.targets = [exemplar_features(network, image, layers) for image in images]
+
+    def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Taps:
+        return {
+            layer: Tap(network.place(layer), self._places(network.counts[layer], generator)[None])
+            for layer in self.layers
+        }
+
+    def cost(
+        self, found: Mapping[str, torch.Tensor], colours: torch.Tensor, k: int, generator: torch.Generator
+    ) -> torch.Tensor:
+        ours, theirs = (c[self._places(len(c), generator)][None] for c in (colours, self.colours[k]))
+        total = relaxed_transport(decorrelate(ours), decorrelate(theirs), euclidean=True).sum()
+        for layer, a in found.items():
+            target = self.targets[k][layer]
+            b = target[self._places(len(target), generator)][None]
+            total = total + relaxed_transport(a, b, low_precision=self.low).sum()
+            total = total + self.moment_weight * moment_distance(a, b, self.low).sum()
+        return total
+
+    def _places(self, count: int, generator: torch.Generator) -> torch.Tensor:
+        return torch.randint(count, (min(count, self.samples),), generator=generator)
