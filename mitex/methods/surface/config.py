@@ -40,8 +40,10 @@ class SurfaceConfig:
         scales: how many coarser pyramids of texels are matched first, each half as fine.
         coarse_share: of the steps, spent on the coarser scales together.
         pictures: views of the maps compared in a step, when the exemplar has several maps.
-        noise: the texture starts with uniform noise of this width,
-        mean_start: around the mean of the exemplar; False: from 0 on (the paper).
+        whitened: the optimizer works in the principal components of the exemplar's channels, each measured by
+            its spread, so that colours move together as they do there; False: in the channels (the paper).
+        noise: width of the uniform noise that the texture starts with: from 0 on (the paper), or around the
+            exemplar's mean and in multiples of the spread, if `whitened`.
         optimizer: "adam" (the paper), or "lbfgs" for one map and the Gram loss.
         lr, milestones, decay: its learning rate, for "lbfgs" the largest change in a step, and the schedule.
         shared_moment: Adam's second moment is one number for the whole texture, which leaves noise alone that
@@ -69,10 +71,10 @@ class SurfaceConfig:
     scales: int = 0
     coarse_share: float = 0.4
     pictures: int = 2
-    noise: float = 0.2
-    mean_start: bool = True
+    whitened: bool = True
+    noise: float = 1.0
     optimizer: str = "adam"
-    lr: float = 0.1
+    lr: float = 0.2
     milestones: tuple[int, ...] = (200, 400)
     decay: float = 0.5
     shared_moment: bool = True
@@ -91,7 +93,7 @@ class SurfaceConfig:
             scales=(0, 3),
             coarse_share=(0, 0.95),
             pictures=(1, 16),
-            noise=(0, 1),
+            noise=(0, 10),
             samples=(1, None),
             moment_weight=(0, None),
             lr=(0, None),
@@ -125,7 +127,14 @@ class SurfaceConfig:
 PRESETS = {
     "fast": SurfaceConfig(steps=300, preset="fast", milestones=(180, 250)),
     "paper": SurfaceConfig(
-        steps=500, preset="paper", frames="fixed", exemplar_size=512, mean_start=False, shared_moment=False
+        steps=500,
+        preset="paper",
+        frames="fixed",
+        exemplar_size=512,
+        whitened=False,
+        noise=0.2,
+        lr=0.1,
+        shared_moment=False,
     ),
     "style": SurfaceConfig(
         steps=300,

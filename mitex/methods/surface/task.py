@@ -19,6 +19,7 @@ from mitex.methods.surface.comparison import Comparison, GramComparison, Transpo
 from mitex.methods.surface.config import SurfaceConfig
 from mitex.methods.surface.levels import Levels
 from mitex.methods.surface.network import SurfaceVgg
+from mitex.methods.surface.space import Space
 from mitex.methods.surface.texels import Texels
 from mitex.methods.surface.texture import texel_layout
 from mitex.methods.surface.views import Views
@@ -36,7 +37,8 @@ class SurfaceTask:
     tie the maps together.
 
     Attributes:
-        values: (N, C) leaf, the maps' channels by `layout`, in the order of `levels`, in [0, 1].
+        space: what the optimizer works in.
+        coordinates: (N, C) leaf, the texels there, in the order of `levels`.
 
     Args:
         config: settings.
@@ -74,7 +76,8 @@ class SurfaceTask:
             raise ConfigError("lbfgs takes one map", "give an image as --exemplar, or set optimizer=adam")
         self.pictures = pictures_of(self.layout, True, config.seed)
         generator = torch.Generator().manual_seed(config.seed)
-        self.values = self._start(generator).requires_grad_()
+        self.space = Space.of(exemplar, self.layout) if config.whitened else Space.plain(self.channels)
+        self.coordinates = self._start(generator).requires_grad_()
         weights = _weights(config, generator)
         # The image network has the same weights: what differs is only where it looks.
         image_network = Vgg16(config.pooling, weights=weights)
@@ -92,20 +95,30 @@ class SurfaceTask:
         if content is not None:
             start = torch.from_numpy(content[levels.order].astype(np.float32))
             with torch.no_grad():
-                self.values.copy_(start)
+                self.coordinates.copy_(self.space.coordinates(start))
                 self.content = self.networks[0].features(start, [config.content_layer])[config.content_layer]
 
     @property
     def parameters(self) -> list[torch.Tensor]:
-        return [self.values]
+        return [self.coordinates]
+
+    @property
+    def channels(self) -> int:
+        """C."""
+        return sum(map(len, self.layout.values()))
+
+    @property
+    def values(self) -> torch.Tensor:
+        """(N, C) the maps' channels by `layout`, in the order of `levels`, in [0, 1]."""
+        return self.space.values(self.coordinates)
 
     def loss(self, step: int, generator: torch.Generator) -> tuple[torch.Tensor, dict[str, float]]:
         scale = self.scale(step)
         network, comparison = self.networks[scale], self.comparisons[scale]
         chosen = self._chosen(step, generator)
-        total = torch.zeros(())
+        total, values = torch.zeros(()), self.values
         for k in chosen:
-            colours = self.values[:, self.pictures[k].channels]
+            colours = values[:, self.pictures[k].channels]
             taps = comparison.taps(network, generator)
             if self.content is not None:
                 taps[CONTENT] = Tap(network.place(self.config.content_layer))
@@ -123,26 +136,24 @@ class SurfaceTask:
 
     def commit(self) -> None:
         with torch.no_grad():
-            self.values.clamp_(0.0, 1.0)
+            values = self.values
+            inside = values.clamp(0.0, 1.0)
+            if not torch.equal(values, inside):
+                self.coordinates.copy_(self.space.coordinates(inside))
 
     def state(self) -> dict[str, torch.Tensor]:
-        return {"values": self.values}
+        return {"coordinates": self.coordinates}
 
     def load_state(self, state: dict[str, torch.Tensor]) -> None:
         with torch.no_grad():
-            if state["values"].shape != self.values.shape:
-                raise ValueError(f"texels of shape {tuple(state['values'].shape)}")
-            self.values.copy_(state["values"])
-
-    def images(self) -> dict[str, np.ndarray]:
-        """The maps so far: name -> (R, R, c) float32, row 0 on top; unused texels are 0."""
-        image = self.texels.image(self.in_texel_order())
-        return {name: image[..., channels] for name, channels in self.layout.items()}
+            if state["coordinates"].shape != self.coordinates.shape:
+                raise ValueError(f"texels of shape {tuple(state['coordinates'].shape)}")
+            self.coordinates.copy_(state["coordinates"])
 
     def in_texel_order(self) -> np.ndarray:
         """(N, C) values in the order of `Texels`."""
-        values = np.empty(tuple(self.values.shape), np.float32)
-        values[self.levels.order] = self.values.detach().numpy()
+        values = np.empty(tuple(self.coordinates.shape), np.float32)
+        values[self.levels.order] = self.values.detach().clamp(0, 1).numpy()
         return values
 
     def preview(self, step: int) -> np.ndarray:
@@ -161,10 +172,9 @@ class SurfaceTask:
         return {"method": "surface", "maps": maps, "exemplar": self.exemplar.name, "mesh": mesh} | self.known
 
     def _start(self, generator: torch.Generator) -> torch.Tensor:
-        means = [self.exemplar.maps[name].mean((0, 1)) for name in self.layout]
-        mean = torch.from_numpy(np.concatenate(means))
-        noise = self.config.noise * torch.rand(len(self.levels.order), len(mean), generator=generator)
-        return (noise + mean - self.config.noise / 2).clamp(0, 1) if self.config.mean_start else noise
+        noise = torch.rand(len(self.levels.order), self.channels, generator=generator)
+        noise = self.config.noise * (noise - 0.5 if self.config.whitened else noise)
+        return self.space.coordinates(self.space.values(noise).clamp(0, 1))
 
     def _chosen(self, step: int, generator: torch.Generator) -> list[int]:
         """The pictures of a step: kinds in turn, any of a kind."""

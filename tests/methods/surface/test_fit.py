@@ -129,7 +129,7 @@ def test_resuming_on_another_mesh_is_refused(made, exemplar):
     "setting",
     [
         *("frames=fixed", "weights=random", "bilinear=false", "correct=false", "scales=2", "pooling=max"),
-        *("loss=transport", "shared_moment=false", "layers=relu1_1,pool2"),
+        *("loss=transport", "shared_moment=false", "whitened=false", "layers=relu1_1,pool2"),
     ],
 )
 def test_options_run(mesh, exemplar, tmp_path, setting):
@@ -140,13 +140,15 @@ def test_options_run(mesh, exemplar, tmp_path, setting):
     assert np.isfinite(texture.values).all() and np.ptp(texture.values) > 0.1
 
 
-def test_lbfgs_matches_better_than_adam_after_the_same_steps(mesh, exemplar, tmp_path):
-    colours = Exemplar({"albedo": exemplar.maps["albedo"]})
-    for optimizer in ("adam", "lbfgs"):
-        overrides = [*SMALL, "steps=40", f"optimizer={optimizer}"]
-        surface.fit(colours, mesh, tmp_path / optimizer, overrides=overrides, quiet=True)
-    adam, lbfgs = (losses(tmp_path / optimizer) for optimizer in ("adam", "lbfgs"))
-    assert lbfgs[-1] < 0.5 * adam[-1] and lbfgs[-1] < 0.06 * lbfgs[0]
+def test_optimizers_and_spaces(mesh, exemplar, tmp_path):
+    """After the same steps principal components are nearer than channels, and L-BFGS than Adam."""
+    colours, last = Exemplar({"albedo": exemplar.maps["albedo"]}), {}
+    for setting in ("whitened=false noise=0.2 lr=0.1", "optimizer=adam", "optimizer=lbfgs lr=1"):
+        overrides = [*SMALL, "steps=40", *setting.split()]
+        surface.fit(colours, mesh, tmp_path / setting, overrides=overrides, quiet=True)
+        last[setting] = losses(tmp_path / setting)[-1]
+    channels, adam, lbfgs = last.values()
+    assert adam < 0.7 * channels and lbfgs < 0.85 * adam
 
 
 def test_transport_gives_the_exemplars_colours(mesh, exemplar, tmp_path):
@@ -249,23 +251,25 @@ def test_previews_show_the_mesh_beside_the_exemplar(mesh, exemplar):
     assert laid.uv is not None
     texels = Texels.rasterize(laid, laid.uv, 48)
     task = SurfaceTask(config, exemplar, laid, texels, find_levels(laid, texels, config))
-    red = [task.layout["albedo"][0]]
+    values = torch.zeros(len(texels.index), task.channels)
+    values[:, task.layout["albedo"][0]] = 1.0
     with torch.no_grad():
-        task.values.zero_()
-        task.values[:, red] = 1.0
+        task.coordinates.copy_(task.space.coordinates(values))
     picture = task.preview(3)
     assert picture.shape == (3 * VIEW, 3 * VIEW, 3)  # colours, normals and the grey maps in turn
     sphere = picture[VIEW // 2, VIEW + VIEW // 2]
-    assert sphere[0] > 0.9 and (sphere[1:] == 0).all()
+    assert sphere[0] > 0.9 and (sphere[1:] < 1e-4).all()
     assert (picture[0, VIEW] == 1).all()
 
 
 def test_noise_start_and_range(mesh, exemplar, tmp_path):
     texture = surface.fit(exemplar, mesh, tmp_path / "run", overrides=[*SMALL, "steps=1", "lr=0"], quiet=True)
-    means = np.concatenate([exemplar.maps[name].mean((0, 1)) for name in texture.maps])
-    assert np.abs(texture.values.mean(0) - means).max() < 0.05
-    assert (np.ptp(texture.values, axis=0) <= 0.2 + 1e-6).all()
-    overrides = [*SMALL, "steps=1", "lr=0", "mean_start=false"]
+    maps = [exemplar.maps[name] for name in texture.maps]
+    assert np.abs(texture.values.mean(0) - np.concatenate([m.mean((0, 1)) for m in maps])).max() < 0.05
+    spread = np.concatenate([m.std((0, 1)) for m in maps])
+    # Uniform noise of width 1 deviates by 0.289; a channel that hardly varies gets a little of the floor.
+    assert np.abs(texture.values.std(0) - 0.289 * spread).max() < 0.02
+    overrides = [*SMALL, "steps=1", "lr=0", "whitened=false", "noise=0.2"]
     texture = surface.fit(exemplar, mesh, tmp_path / "paper", overrides=overrides, quiet=True)
     assert texture.values.min() >= 0 and texture.values.max() <= 0.2
     assert abs(texture.values.mean() - 0.1) < 0.005

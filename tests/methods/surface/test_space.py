@@ -1,0 +1,43 @@
+"""Coordinates of the optimizer."""
+
+import numpy as np
+import torch
+
+from mitex.exemplar import Exemplar
+from mitex.methods.surface.space import LEAST, Space
+from mitex.methods.surface.texture import texel_layout
+
+
+def exemplar():
+    """Grey with a little noise in blue, and a height that follows it."""
+    rng = np.random.default_rng(0)
+    grey = rng.random((40, 50, 1)).astype(np.float32)
+    albedo = np.concatenate([grey, grey, 0.9 * grey + 0.1 * rng.random(grey.shape)], 2).astype(np.float32)
+    return Exemplar({"albedo": albedo, "height": 1 - grey})
+
+
+def test_the_exemplar_is_white_but_for_the_floor():
+    shown = exemplar()
+    layout = texel_layout(list(shown.maps))
+    space = Space.of(shown, layout)
+    pixels = torch.from_numpy(np.concatenate([shown.maps[name] for name in layout], 2)).view(-1, 4)
+    found = space.coordinates(pixels)
+    covariance = torch.cov(found.T)
+    assert found.mean(0).abs().max() < 1e-5
+    assert (covariance - covariance.diag().diag()).abs().max() < 1e-4
+    assert covariance.diag().max() <= 1 + 1e-4 and abs(covariance[3, 3] - 1) < 1e-4
+    lengths = space.basis.norm(dim=1)
+    assert lengths.min() >= LEAST * lengths.max() * (1 - 1e-5)
+
+
+def test_round_trips():
+    shown = exemplar()
+    x = torch.rand(7, 4, generator=torch.Generator().manual_seed(0))
+    for space in (Space.of(shown, texel_layout(list(shown.maps))), Space.plain(4)):
+        assert torch.allclose(space.values(space.coordinates(x)), x, atol=1e-5)
+    assert torch.equal(Space.plain(4).values(x), x)
+
+
+def test_one_constant_map():
+    space = Space.of(Exemplar({"height": np.full((8, 8, 1), 0.5, np.float32)}), {"height": (0,)})
+    assert torch.isfinite(space.coordinates(torch.rand(3, 1))).all()
