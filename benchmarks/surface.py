@@ -38,7 +38,9 @@ STEP = {256: 0.46, 512: 1.5, 1024: 5.7}  # the paper [s]
 
 @dataclass
 class Result:
-    """Of one mesh at one resolution: faces, side of the texture, used texels, and times [s]."""
+    """Of one mesh at one resolution: faces, side of the texture, used texels, times [s], operations of a
+    step, and how many elements of each level a group joins.
+    """
 
     faces: int
     resolution: int
@@ -47,6 +49,7 @@ class Result:
     prepared: float
     step: float
     operations: float
+    joined: list[float]
 
 
 def measure(mesh: Mesh, resolution: int, repetitions: int) -> Result:
@@ -71,6 +74,7 @@ def measure(mesh: Mesh, resolution: int, repetitions: int) -> Result:
         prepared=prepared - between,
         step=step,
         operations=operations(levels),
+        joined=[len(level.taps) / len(level.sizes) for level in levels.levels],
     )
 
 
@@ -134,6 +138,8 @@ def show(results: list[Result], rate: float, console: Console) -> None:
     if len(last) > 1:
         slope = exponent([r.faces for r in last], [r.prepared for r in last])
         console.print(f"preparing goes with faces^{slope:.2f} at {results[-1].resolution}^2")
+    joined = ", ".join(f"{ratio:.2f}" for ratio in results[-1].joined)
+    console.print(f"groups of the largest join {joined} elements (4 on a flat square)")
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9
     console.print(f"peak memory {peak:.2f} GB (goal: under 3 at 1024^2)")
 

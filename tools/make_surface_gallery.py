@@ -1,68 +1,134 @@
 """Synthesizes surface textures on meshes and renders them, the exemplar beside them.
 
-usage: python tools/make_surface_gallery.py EXEMPLARS MESHES RUNS SHEET MESH=EXEMPLAR ... [KEY=VALUE ...]
+usage: python tools/make_surface_gallery.py EXEMPLARS MESHES RUNS SHEET MESH=EXEMPLAR[,SETTING=VALUE ...] ...
+           [SETTING=VALUE ...]
 
-EXEMPLARS and MESHES are folders (embedded names work too), RUNS is where the run folders go: finished ones
-are used again, begun ones go on. The sheet goes to docs/gallery/SHEET.jpg, a row for each MESH=EXEMPLAR: the
-exemplar, and the mesh from two sides. Words whose left side is a setting change the synthesis
-(`resolution=512`, `pictures=1`, ...). Only the albedo is synthesized with `maps=albedo`.
+EXEMPLARS and MESHES are folders; names of embedded ones work too, and the exemplar `letters` is drawn. MESH^N
+is MESH with all faces split in four N times, MESH~N a coarse copy with N faces, and `scene` is made up. RUNS
+is where the run folders go: finished ones are used again, begun ones go on. The sheet goes to
+docs/gallery/SHEET.jpg, a row for each MESH=EXEMPLAR: the exemplar, and the mesh from two sides; the ratio
+across seams is printed. Settings change the synthesis, of a row or of all (`resolution=512`, `pictures=1`,
+...); `maps=albedo` leaves out other maps, `content=ao` transfers the style.
 """
 
 from __future__ import annotations
 
 import math
 import sys
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
+from PIL import Image, ImageDraw, ImageFont
 
 from mitex.exemplar import Exemplar
 from mitex.exemplar import names as exemplar_names
 from mitex.images import write_image
-from mitex.mesh import Mesh, embedded_names
+from mitex.mesh import Mesh, embedded_names, grid, subdivide_midpoint
+from mitex.mesh.topology import welded
 from mitex.methods import surface
+from mitex.methods.surface.seams import seam_ratio
 from mitex.methods.surface.texture import NAME
 from mitex.render import sheet, still, tone
 from mitex.training import checkpoint
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
-SIDES = (20, 200)  # azimuths [degrees]
+SIDES = {"scene": (25, 65)}  # azimuths [degrees]
+OTHER_SIDES = (20, 200)
 CELL = 320
+KEYS = {field.name for field in fields(surface.SurfaceConfig)} | {"maps", "content"}
 
 
-def texture(exemplar: Exemplar, mesh: Mesh, run: Path, settings: list[str]) -> surface.SurfaceTexture:
+def letters(size: int = 256) -> Exemplar:
+    """Letters that look different in a mirror, upright, on paper."""
+    image = Image.new("RGB", (size, size), (236, 226, 204))
+    draw, font = ImageDraw.Draw(image), ImageFont.load_default(size // 5)
+    for k in range(25):
+        row, column = divmod(k, 5)
+        ink = ((30, 40, 70), (150, 40, 30), (40, 90, 60))[k % 3]
+        draw.text(((column + 0.18) * size / 5, (row - 0.05) * size / 5), "RFGPE"[(k + row) % 5], ink, font)
+    return Exemplar({"albedo": np.asarray(image, np.float32) / 255}, "letters")
+
+
+def scene(meshes: Path) -> Mesh:
+    """A floor and two walls with furniture, scanned badly: a bumpy open surface with holes."""
+    rng = np.random.default_rng(0)
+    square = grid(70, 70)
+    x, y = square.vertices[:, 0], square.vertices[:, 1]
+    sheets = [(x, -1 + 0 * x, -y), (x, y, -1 + 0 * x), (-1 + 0 * x, y, -x)]
+    parts = [(np.stack(s, 1), square.faces) for s in sheets]
+    for name, scale, at in (("chair", 0.55, (0.3, -0.45, 0.2)), ("mug", 0.25, (-0.5, -0.78, 0.45))):
+        thing = Mesh.load(meshes / f"{name}.obj").normalised()[0]
+        parts.append((scale * thing.vertices + at, thing.faces))
+    vertices = np.concatenate([v for v, _ in parts])
+    starts = np.cumsum([0, *(len(v) for v, _ in parts)])
+    faces = np.concatenate([f + start for (_, f), start in zip(parts, starts, strict=False)])
+    vertices = vertices + rng.normal(0, 0.002, vertices.shape)[welded(vertices)]
+    centres = vertices[faces].mean(1)
+    holes = centres[rng.integers(len(centres), size=14)]
+    kept = (np.linalg.norm(centres[:, None] - holes, axis=2) > rng.uniform(0.04, 0.12, 14)).all(1)
+    return Mesh(vertices.astype(np.float32), faces[kept], name="scene")
+
+
+def find_mesh(name: str, meshes: Path) -> Mesh:
+    """A mesh by the name that the command line gives it."""
+    if name == "scene":
+        return scene(meshes)
+    base = name.split("^")[0].split("~")[0]
+    mesh = Mesh.load(base if base in embedded_names() else meshes / f"{base}.obj")
+    if "^" in name:
+        mesh = subdivide_midpoint(mesh, int(name.split("^")[1]))
+    if "~" in name:
+        from mitex.mesh import remesh
+
+        mesh = remesh(mesh, int(name.split("~")[1]) // 2)
+    return replace(mesh, name=name)
+
+
+def find_exemplar(name: str, exemplars: Path, maps: str | None) -> Exemplar:
+    """An exemplar by the name that the command line gives it."""
+    if name == "letters":
+        return letters()
+    exemplar = Exemplar.load(name if name in exemplar_names() else exemplars / name)
+    if maps is None:
+        return exemplar
+    return Exemplar({key: exemplar.maps[key] for key in maps.split(",")}, exemplar.name)
+
+
+def texture(exemplar: Exemplar, mesh: Mesh, run: Path, settings: dict[str, str]) -> surface.SurfaceTexture:
     """The texture in a run folder, synthesized if it is not there yet."""
     if (run / NAME).is_file():
         return surface.SurfaceTexture.load(run)
-    return surface.fit(exemplar, mesh, run, overrides=settings, resume=(run / checkpoint.NAME).is_file())
+    overrides = [f"{key}={value}" for key, value in settings.items() if key != "content"]
+    resume = (run / checkpoint.NAME).is_file()
+    return surface.fit(
+        exemplar, mesh, run, overrides=overrides, content=settings.get("content"), resume=resume
+    )
 
 
 def row(exemplar: Exemplar, made: surface.SurfaceTexture) -> list[np.ndarray]:
-    """The exemplar and the mesh from all `SIDES`."""
-    asset = made.apply()
-    shown = [tone(still(asset, resolution=CELL, spp=64, azimuth=math.radians(a))) for a in SIDES]
+    """The exemplar and the mesh from its sides."""
+    asset, sides = made.apply(), SIDES.get(made.mesh.name, OTHER_SIDES)
+    shown = [tone(still(asset, resolution=CELL, spp=64, azimuth=math.radians(a))) for a in sides]
     return [exemplar.resized(CELL).maps["albedo"], *shown]
 
 
 def main() -> None:
     exemplars, meshes, runs, name = Path(sys.argv[1]), Path(sys.argv[2]), Path(sys.argv[3]), sys.argv[4]
-    keys = {field.name for field in fields(surface.SurfaceConfig)} | {"maps"}
-    words = [word.split("=") for word in sys.argv[5:]]
-    settings = {key: value for key, value in words if key in keys}
-    maps = settings.pop("maps", None)
+    shared = dict(word.split("=") for word in sys.argv[5:] if word.split("=")[0] in KEYS)
     cells, labels = [], []
-    for mesh_name, exemplar_name in (pair for pair in words if pair[0] not in keys):
-        mesh = Mesh.load(mesh_name if mesh_name in embedded_names() else meshes / f"{mesh_name}.obj")
-        known = exemplar_name in exemplar_names()
-        exemplar = Exemplar.load(exemplar_name if known else exemplars / exemplar_name)
-        if maps is not None:
-            exemplar = Exemplar({key: exemplar.maps[key] for key in maps.split(",")}, exemplar.name)
-        overrides = [f"{key}={value}" for key, value in settings.items()]
-        made = texture(exemplar, mesh, runs / f"{name}-{mesh_name}-{exemplar_name}", overrides)
+    for word in (word for word in sys.argv[5:] if word.split("=")[0] not in KEYS):
+        pair, *own = word.split(",")
+        settings = shared | dict(setting.split("=") for setting in own)
+        maps = settings.pop("maps", None)
+        mesh_name, exemplar_name = pair.split("=")
+        mesh, exemplar = find_mesh(mesh_name, meshes), find_exemplar(exemplar_name, exemplars, maps)
+        run = runs / "-".join([name, mesh_name, exemplar_name, *(word.replace("=", "") for word in own)])
+        made = texture(exemplar, mesh, run, settings)
+        print(f"{run.name}: {made.about['seconds']} s, seams {seam_ratio(made):.3f}", flush=True)
         cells += row(exemplar, made)
-        labels += [f"exemplar {exemplar.name}", mesh.name, f"{mesh.name}, other side"]
-    write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=1 + len(SIDES), labels=labels, cell=CELL))
+        labels += [f"exemplar {exemplar.name}", mesh.name, " ".join(own) or f"{mesh.name}, other side"]
+    write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=1 + len(OTHER_SIDES), labels=labels, cell=CELL))
 
 
 if __name__ == "__main__":

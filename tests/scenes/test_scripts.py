@@ -7,6 +7,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from mitex.exemplar import Exemplar
 from mitex.images import read_image
 
 SCRIPTS = Path(__file__).parents[2] / "scenes"
@@ -54,3 +55,18 @@ def test_texel_field_script(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     warm = traced[vase][:, 0] > 1.5 * traced[vase][:, 2]
     cool = traced[vase][:, 2] > 1.5 * traced[vase][:, 0]
     assert warm.mean() > 0.15 and cool.mean() > 0.1
+
+
+def test_surface_synthesis_script(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    script = load("surface_synthesis")
+    small = ["resolution=48", "exemplar_size=48", "steps=40", "milestones=30", "preview_every=0"]
+    script.main(str(tmp_path / "octopus.png"), str(tmp_path / "run"), small, spp=4)
+
+    picture = read_image(tmp_path / "octopus.png")
+    assert picture.shape == (512, 1024, 3)
+    wanted = Exemplar.load("scales").maps["albedo"].mean((0, 1))
+    assert (
+        wanted.argmax() == picture[200:312, 200:312].mean((0, 1)).argmax()
+    )  # the exemplar's hue on the body
+    assert (tmp_path / "run" / "octopus.glb").stat().st_size > 100_000
