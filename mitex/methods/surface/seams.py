@@ -12,7 +12,7 @@ from mitex.methods.surface.texture import SurfaceTexture
 def seam_ratio(texture: SurfaceTexture, seed: int = 0) -> float:
     """How much more a texture changes across the seams of its layout than elsewhere.
 
-    From every texel a geodesic goes as far as a texel is wide, in a random direction, to a neighbour: the mean
+    From every texel a geodesic goes as far as a texel is wide, in a random direction, to a neighbour: mean
     absolute difference of the neighbours that lie in another chart, over that of the others. 1 where seams
     cannot be seen. Texels whose centres lie outside their chart do not count.
 
