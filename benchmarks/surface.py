@@ -22,6 +22,7 @@ from rich.table import Table
 
 from mitex.features.vgg import CHANNELS, LAYERS
 from mitex.mesh import Mesh, icosphere
+from mitex.methods.surface.borders import Border
 from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.fit import with_layout
@@ -61,7 +62,9 @@ def measure(mesh: Mesh, resolution: int, repetitions: int) -> Result:
     between = time.perf_counter()
     texels = Texels.rasterize(laid, laid.uv, resolution)
     frames = tangent_frames(laid, texels.face, texels.barycentric)
-    levels = build(Surroundings(texels, GeodesicTracer(laid), *frames))
+    tracer = GeodesicTracer(laid)
+    border = Border.continued(laid, texels, tracer)
+    levels = build(Surroundings(texels, tracer, *frames, border=border))
     prepared = time.perf_counter()
     network = SurfaceVgg(levels)
     values = torch.rand(len(levels.order), 3).requires_grad_()

@@ -11,11 +11,12 @@ from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from mitex.methods.surface.levels import Level, Levels
 from mitex.paths import cache_dir
 
-VERSION = "1"  # to be raised when levels are found in another way
+VERSION = "2"  # to be raised when levels are found in another way
 
 
 def content_key(*parts: object) -> str:
@@ -57,7 +58,14 @@ def _read(place: Path) -> Levels:
     if not count:
         raise KeyError(place)
     levels = tuple(Level(array(f"taps{n}"), array(f"sizes{n}")) for n in range(count))
-    return Levels(array("order"), array("index"), array("weight"), levels)
+    order = array("order")
+
+    def matrix(name: str, rows: int) -> csr_array:
+        parts = tuple(array(f"{name}_{part}") for part in ("data", "indices", "indptr"))
+        return csr_array(parts, shape=(rows, len(order)))
+
+    spread = matrix("spread", len(array("spread_indptr")) - 1)
+    return Levels(order, matrix("lookup", 9 * len(order)), spread, levels)
 
 
 def _write(place: Path, levels: Levels) -> None:
@@ -65,7 +73,9 @@ def _write(place: Path, levels: Levels) -> None:
     place.parent.mkdir(parents=True, exist_ok=True)
     filling = Path(tempfile.mkdtemp(prefix=".filling-", dir=place.parent))
     try:
-        arrays = {"order": levels.order, "index": levels.index, "weight": levels.weight}
+        arrays = {"order": levels.order}
+        for name, matrix in (("lookup", levels.lookup), ("spread", levels.spread)):
+            arrays |= {f"{name}_{part}": getattr(matrix, part) for part in ("data", "indices", "indptr")}
         for n, level in enumerate(levels.levels):
             arrays |= {f"taps{n}": level.taps, f"sizes{n}": level.sizes}
         for name, values in arrays.items():

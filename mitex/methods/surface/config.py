@@ -27,6 +27,8 @@ class SurfaceConfig:
         frames: "fixed" (the paper: Gram-Schmidt with a fixed vector) or "smooth" (least turning).
         angle: turns the texture about the normals, counter-clockwise from outside [degrees].
         correct: walk geodesics back that overshoot (figure 3).
+        continued: texels whose centres lie outside their chart show what lies across the seam; False: they
+            have values of their own (the paper).
         bilinear: the first convolution interpolates the texels; False: it reads the nearest ones.
         weights: "vgg16"; "vgg19", which the user provides (see `mitex.features.vgg19`); or "random" ones (the
             ablation of figure 5).
@@ -59,6 +61,7 @@ class SurfaceConfig:
     frames: str = "smooth"
     angle: float = 0.0
     correct: bool = True
+    continued: bool = True
     bilinear: bool = True
     weights: str = "vgg16"
     pooling: str = "average"
@@ -130,6 +133,7 @@ PRESETS = {
         steps=500,
         preset="paper",
         frames="fixed",
+        continued=False,
         exemplar_size=512,
         whitened=False,
         noise=0.2,

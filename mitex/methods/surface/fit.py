@@ -14,6 +14,7 @@ from mitex.atlas import twice_area, unwrap, usable_uv
 from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.mesh import Mesh
+from mitex.methods.surface.borders import Border
 from mitex.methods.surface.cache import cached_levels, content_key
 from mitex.methods.surface.config import PRESETS, SurfaceConfig
 from mitex.methods.surface.content import AO, content_colours
@@ -163,10 +164,12 @@ def find_levels(
     assert mesh.uv is not None
     angle = math.radians(config.angle)
     count = POOLS + config.scales
-    options = (config.resolution, config.frames, angle, config.correct, count, orientation)
+    options = (config.resolution, config.frames, angle, config.correct, config.continued, count, orientation)
 
     def find() -> Levels:
         right, up = tangent_frames(mesh, texels.face, texels.barycentric, config.frames, angle, orientation)
-        return build(Surroundings(texels, GeodesicTracer(mesh), right, up, config.correct), count)
+        tracer = GeodesicTracer(mesh)
+        border = Border.continued(mesh, texels, tracer) if config.continued else None
+        return build(Surroundings(texels, tracer, right, up, config.correct, border), count)
 
     return cached_levels(content_key(mesh.vertices, mesh.faces, mesh.uv, *options), find)

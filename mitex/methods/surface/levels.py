@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from mitex.methods.surface.operations import Neighbourhood
 
@@ -35,18 +36,26 @@ class Level:
         """The taps and their transpose."""
         return Neighbourhood.of(self.taps)
 
+    @property
+    def nearest(self) -> csr_array:
+        """(9 n, n) CSR float32: each tap reads its element."""
+        size = self.taps.size
+        entries = np.ones(size, np.float32), self.taps.ravel(), np.arange(size + 1, dtype=np.int32)
+        return csr_array(entries, shape=(size, len(self.taps)))
+
 
 @dataclass(frozen=True, eq=False)
 class Levels:
-    """All resolutions of N texels.
+    """All resolutions of a surface with N texels, n of which have values of their own.
 
     Attributes:
-        order: (N,) int32, the number in `Texels` of each element of level 0.
-        index, weight: (N, 9, 4) int32 and float32, the bilinear taps of the first convolution.
+        order: (n,) int32, the number in `Texels` of each element of level 0.
+        lookup: (9 n, n) CSR float32, the bilinear taps of the first convolution: row 9 i + k is tap k of i.
+        spread: (N, n) CSR float32, the values of all `Texels` from those of the elements.
         levels: level 0 first; `POOLS` of them, and more if coarser scales of the texture are looked at.
     """
 
     order: np.ndarray
-    index: np.ndarray
-    weight: np.ndarray
+    lookup: csr_array
+    spread: csr_array
     levels: tuple[Level, ...]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-import numpy as np
 import torch
 
 from mitex.errors import ConfigError
@@ -68,10 +67,8 @@ class SurfaceVgg:
                 if name != "relu1_1":
                     self._append(name, SurfaceConv(*layers[name], self.dtype, around), count)
                     continue
-                index, share = levels.index, levels.weight
-                if scale or not bilinear:
-                    index, share = level.taps[:, :, None], np.ones((*level.taps.shape, 1), np.float32)
-                self._append(name, BilinearConv(*layers[name], self.dtype, index, share), count)
+                lookup = level.nearest if scale or not bilinear else levels.lookup
+                self._append(name, BilinearConv(*layers[name], self.dtype, lookup), count)
             self._append(POOLED[n], SurfacePool(pool, level.sizes), len(level.sizes))
 
     def features(self, texels: torch.Tensor, layers: Iterable[str]) -> dict[str, torch.Tensor]:

@@ -106,7 +106,7 @@ class BilinearConv:
     Args:
         weight, bias: as in `SurfaceConv`.
         kept: dtype of the output.
-        index, share: (n, 9, k) elements that each tap reads, and their shares.
+        lookup: (9 n, n) CSR, the shares that each tap reads; row 9 i + k is tap k of element i.
     """
 
     needs_input = False
@@ -116,15 +116,10 @@ class BilinearConv:
         weight: torch.Tensor,
         bias: torch.Tensor,
         kept: torch.dtype,
-        index: np.ndarray,
-        share: np.ndarray,
+        lookup: scipy.sparse.csr_array,
     ) -> None:
         self.weight, self.bias, self.kept = weight.permute(0, 2, 3, 1).flatten(1), bias, kept
-        count, used = len(index), share.ravel() > 0
-        rows = np.repeat(np.arange(9 * count, dtype=np.int32), index.shape[2])[used]
-        entries = share.ravel()[used], (rows, index.ravel()[used])
-        matrix = scipy.sparse.csr_array(entries, shape=(9 * count, count))
-        self.matrix, self.adjoint = csr_tensor(matrix), csr_tensor(matrix.T.tocsr())
+        self.matrix, self.adjoint = csr_tensor(lookup), csr_tensor(lookup.T.tocsr())
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         taps = (self.matrix @ x).view(len(x), -1)

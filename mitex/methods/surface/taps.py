@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse
 from scipy.sparse.csgraph import connected_components
 
+from mitex.methods.surface.borders import Border
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.levels import POOLS, Level, Levels
 from mitex.methods.surface.texels import Texels
@@ -31,6 +32,7 @@ class Surroundings:
         tracer: of the mesh.
         right, up: (N, 3) tangent frames of the texels.
         correct: walk a geodesic back that overshoots (figure 3).
+        border: which texels have values of their own; all if None.
     """
 
     texels: Texels
@@ -38,6 +40,7 @@ class Surroundings:
     right: np.ndarray
     up: np.ndarray
     correct: bool = True
+    border: Border | None = None
 
     def arrivals(
         self, start: np.ndarray, tap: int, length: float
@@ -62,35 +65,61 @@ def build(around: Surroundings, count: int = POOLS) -> Levels:
     Linear in texels but for sorting.
     """
     texels = around.texels
-    index, weight = _bilinear_taps(around)
-    edges = _texel_graph(index, weight)
-    labels = _groups(texels, edges, count)
+    border = around.border or Border.none(len(texels.index))
+    elements, follows = border.elements, _largest(border.spread)
+    index, weight = _bilinear_taps(around, elements)
+    lookup = _lookup(index, weight, len(texels.index)) @ border.spread
+    edges = _texel_graph(lookup)
+    labels = _groups(texels.position[elements], texels.size, edges, count)
     order = np.lexsort(labels).astype(np.int32)
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order), dtype=np.int32)
-    labels = [_renumbered(label[order]) for label in labels]
-    index, weight, edges = rank[index[order]], weight[order], rank[edges]
-    taps = [np.take_along_axis(index, np.argmax(weight, axis=2, keepdims=True), 2)[:, :, 0]]
-    taps += [_group_taps(around, order, rank, labels[n], edges, n) for n in range(1, count)]
+    labels, edges = [_renumbered(label[order]) for label in labels], rank[edges]
+    nearest = np.take_along_axis(index, np.argmax(weight, axis=2, keepdims=True), 2)[:, :, 0]
+    taps = [rank[follows[nearest[order]]]]
+    own, followed = elements[order].astype(np.int32), rank[follows]
+    taps += [_group_taps(around, own, followed, labels[n], edges, n) for n in range(1, count)]
     levels = []
     for n in range(count):
         first = np.concatenate([[True], labels[n][1:] != labels[n][:-1]])
         levels.append(Level(taps[n], np.bincount(labels[n + 1][first]).astype(np.int32)))
-    return Levels(order, index, weight, tuple(levels))
+    lookup = _renamed(lookup[(9 * order[:, None] + np.arange(9)).ravel()], rank)
+    return Levels(own, lookup, _renamed(border.spread, rank), tuple(levels))
 
 
-def _bilinear_taps(around: Surroundings) -> tuple[np.ndarray, np.ndarray]:
-    """(N, 9, 4) texels and weights; a tap that does not arrive is the opposite one, else the centre."""
-    count = len(around.texels.index)
-    own = np.arange(count, dtype=np.int32)
+def _bilinear_taps(around: Surroundings, elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 9, 4) texels and weights of texels `elements` (n,); a tap that does not arrive is the opposite one,
+    else the centre.
+    """
+    count = len(elements)
     index = np.empty((count, 9, 4), np.int32)
     weight = np.zeros((count, 9, 4), np.float32)
     arrived = np.ones((count, 9), bool)
-    index[:, CENTRE], weight[:, CENTRE, 0] = own[:, None], 1.0
+    index[:, CENTRE], weight[:, CENTRE, 0] = elements[:, None], 1.0
     for tap in OUTER:
-        index[:, tap], weight[:, tap], arrived[:, tap] = around.arrivals(own, tap, around.texels.size)
-    rows, source = own[:, None], _replacements(arrived)
+        index[:, tap], weight[:, tap], arrived[:, tap] = around.arrivals(elements, tap, around.texels.size)
+    rows, source = np.arange(count)[:, None], _replacements(arrived)
     return index[rows, source], weight[rows, source]
+
+
+def _lookup(index: np.ndarray, weight: np.ndarray, texels: int) -> scipy.sparse.csr_array:
+    """(9 n, texels) matrix of bilinear taps (n, 9, 4)."""
+    used = weight.reshape(-1, 4) > 0
+    ends = np.concatenate([[0], np.cumsum(used.sum(1))])
+    entries = weight.reshape(-1, 4)[used], index.reshape(-1, 4)[used], ends
+    return scipy.sparse.csr_array(entries, shape=(len(used), texels))
+
+
+def _renamed(matrix: scipy.sparse.csr_array, rank: np.ndarray) -> scipy.sparse.csr_array:
+    """The matrix with column j called rank[j], indices of 32 bits."""
+    entries = matrix.data, rank[matrix.indices], matrix.indptr.astype(np.int32)
+    return scipy.sparse.csr_array(entries, shape=matrix.shape)
+
+
+def _largest(matrix: scipy.sparse.csr_array) -> np.ndarray:
+    """The column of the largest entry of each row; no row is empty."""
+    rows = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+    return matrix.indices[np.lexsort((matrix.data, rows))[matrix.indptr[1:] - 1]]
 
 
 def _replacements(arrived: np.ndarray) -> np.ndarray:
@@ -99,12 +128,10 @@ def _replacements(arrived: np.ndarray) -> np.ndarray:
     return np.where(arrived, own, np.where(arrived[:, ::-1], own[::-1], CENTRE))
 
 
-def _texel_graph(index: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """(E, 2) pairs of texels of which one reads the other, each once in either direction."""
-    count = len(index)
-    used = (weight > 0).reshape(count, -1)
-    ends = np.concatenate([[0], np.cumsum(used.sum(1))])
-    entries = np.ones(ends[-1], bool), index.reshape(count, -1)[used], ends
+def _texel_graph(lookup: scipy.sparse.csr_array) -> np.ndarray:
+    """(E, 2) pairs of elements of which one reads the other, each once in either direction."""
+    count = lookup.shape[1]
+    entries = np.ones(lookup.nnz, bool), lookup.indices.copy(), lookup.indptr[::9].copy()
     reads = scipy.sparse.csr_array(entries, shape=(count, count))
     reads.sum_duplicates()
     graph = (reads + reads.T.tocsr()).tocoo()
@@ -112,14 +139,14 @@ def _texel_graph(index: np.ndarray, weight: np.ndarray) -> np.ndarray:
     return np.stack([first, second], 1)[first != second]
 
 
-def _groups(texels: Texels, edges: np.ndarray, depth: int) -> list[np.ndarray]:
-    """Labels (N,) of the texels' groups in levels 0 to `depth` (section 3.2).
+def _groups(position: np.ndarray, size: float, edges: np.ndarray, depth: int) -> list[np.ndarray]:
+    """Labels (n,) of the groups of texels at (n, 3) in levels 0 to `depth` (section 3.2).
 
     A group holds the texels of a voxel of side 2^n s that are connected within it.
     """
-    count = len(texels.index)
+    count = len(position)
     # The lowest texel centres are half a texel inside; the rest keeps rounding away from the voxels' walls.
-    offset = (texels.position - texels.position.min(0)) / texels.size + (0.5 - 1e-3)
+    offset = (position - position.min(0)) / size + (0.5 - 1e-3)
     labels = [np.arange(count)]
     for n in range(1, depth + 1):
         voxel = np.floor(offset / 2**n).astype(np.int64)
@@ -152,20 +179,29 @@ def representatives(position: np.ndarray, labels: np.ndarray, size: float) -> np
 
 def _group_taps(
     around: Surroundings,
-    order: np.ndarray,
-    rank: np.ndarray,
+    own: np.ndarray,
+    followed: np.ndarray,
     labels: np.ndarray,
     edges: np.ndarray,
     level: int,
 ) -> np.ndarray:
-    """(m, 9) int32 taps of the groups of a level, by geodesics from their representatives."""
+    """(m, 9) int32 taps of the groups of a level, by geodesics from their representatives.
+
+    Args:
+        around: of the surface.
+        own: (n,) texels of the elements of level 0.
+        followed: (N,) the element that each texel follows most.
+        labels: (n,) ascending groups of the elements.
+        edges: (E, 2) neighbouring elements.
+        level: n.
+    """
     texels = around.texels
-    start = order[representatives(texels.position[order], labels, texels.size)]
+    start = own[representatives(texels.position[own], labels, texels.size)]
     related = _related(labels, edges) if around.correct else None
     taps = np.empty((len(start), 9), np.int32)
     taps[:, CENTRE] = np.arange(len(start))
     for tap in OUTER:
-        taps[:, tap] = _reached(around, start, tap, texels.size * 2**level, labels[rank], related)
+        taps[:, tap] = _reached(around, start, tap, texels.size * 2**level, labels[followed], related)
     return np.take_along_axis(taps, _replacements(taps >= 0), 1)
 
 

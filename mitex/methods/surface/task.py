@@ -38,7 +38,7 @@ class SurfaceTask:
 
     Attributes:
         space: what the optimizer works in.
-        coordinates: (N, C) leaf, the texels there, in the order of `levels`.
+        coordinates: (n, C) leaf, the texels with values of their own there, in the order of `levels`.
 
     Args:
         config: settings.
@@ -109,7 +109,7 @@ class SurfaceTask:
 
     @property
     def values(self) -> torch.Tensor:
-        """(N, C) the maps' channels by `layout`, in the order of `levels`, in [0, 1]."""
+        """(n, C) the maps' channels by `layout`, in the order of `levels`, in [0, 1]."""
         return self.space.values(self.coordinates)
 
     def loss(self, step: int, generator: torch.Generator) -> tuple[torch.Tensor, dict[str, float]]:
@@ -152,9 +152,7 @@ class SurfaceTask:
 
     def in_texel_order(self) -> np.ndarray:
         """(N, C) values in the order of `Texels`."""
-        values = np.empty(tuple(self.coordinates.shape), np.float32)
-        values[self.levels.order] = self.values.detach().clamp(0, 1).numpy()
-        return values
+        return self.levels.spread @ self.values.detach().clamp(0, 1).numpy()
 
     def preview(self, step: int) -> np.ndarray:
         """For each picture but the mixtures a row: the exemplar, and the mesh from two sides, unlit."""

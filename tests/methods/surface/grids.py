@@ -3,6 +3,7 @@
 import numpy as np
 
 from mitex.mesh import Mesh
+from mitex.methods.surface.borders import Border
 from mitex.methods.surface.levels import POOLS, Level, Levels
 
 
@@ -12,7 +13,7 @@ def grid_levels(side: int) -> Levels:
     Taps across the border are the opposite ones. Elements are numbered block by block, as `Levels` demands.
     """
     place = _blocks(side, POOLS)  # (N, 2) row, column of each element
-    levels, index = [], None
+    levels = []
     for n in range(POOLS):
         width = side >> n
         here = place[:: 4**n] >> n
@@ -28,12 +29,10 @@ def grid_levels(side: int) -> Levels:
             there[~inside] = here[~inside]
             taps[:, tap] = number[tuple(there.T)]
         levels.append(Level(taps, np.full(len(here) // 4, 4, np.int32)))
-        index = taps if n == 0 else index
-    assert index is not None
     return Levels(
         order=(place[:, 0] * side + place[:, 1]).astype(np.int32),
-        index=index[:, :, None],
-        weight=np.ones((*index.shape, 1), np.float32),
+        lookup=levels[0].nearest,
+        spread=Border.none(side * side).spread[place[:, 0] * side + place[:, 1]].T.tocsr(),
         levels=tuple(levels),
     )
 

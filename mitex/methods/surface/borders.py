@@ -1,0 +1,106 @@
+"""Texels at the border of a chart: their centres lie outside, so they show what lies across the seam.
+
+A texel counts as used when any of its square overlaps a face, as bilinear lookups read it then. The paper
+gives those whose centres lie outside a life of their own, at the nearest point of the surface; then both
+sides of a seam hold values for the same places, which may differ. Here the texture is continued over the seam
+along geodesics: such a texel is a mixture of the texels that lie where its centre unfolds to.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from mitex.atlas import barycentric_gradients, texel_space, twice_area
+from mitex.mesh import Mesh
+from mitex.methods.surface.exponential import GeodesicTracer
+from mitex.methods.surface.texels import Texels
+
+ROUNDS = 24  # in which border texels that read each other are resolved
+FAINT = 1e-3  # shares below are left out
+LEAST = 0.05  # of a border texel that must come from others; else it stays one of its own
+FARTHEST = 2.0  # [texels] a stretched face does not carry a centre farther
+
+
+@dataclass(frozen=True, eq=False)
+class Border:
+    """Which texels have values of their own, and what the others are.
+
+    Attributes:
+        elements: (n,) int64 ascending texels with values of their own.
+        spread: (N, n) CSR float32, the values of all texels from those; rows sum to 1.
+    """
+
+    elements: np.ndarray
+    spread: csr_array
+
+    @staticmethod
+    def none(count: int) -> Border:
+        """All N texels have their own values (the paper)."""
+        own = np.arange(count)
+        return Border(own, csr_array((np.ones(count, np.float32), own, np.arange(count + 1))))
+
+    @staticmethod
+    def continued(mesh: Mesh, texels: Texels, tracer: GeodesicTracer) -> Border:
+        """The texture goes on over seams.
+
+        Where there is no other side, a border texel is read from inside its own chart; one without any other
+        texel to read keeps a value of its own.
+
+        Args:
+            mesh: the surface.
+            texels: of it, N.
+            tracer: of the mesh.
+        """
+        count, inside = len(texels.index), np.flatnonzero(texels.inside)
+        outside = np.flatnonzero(~texels.inside)
+        if not len(inside) or not len(outside):
+            return Border.none(count)
+        shares = _resolved(_reads(mesh, texels, tracer, outside), inside, outside)
+        total = np.asarray(shares.sum(axis=1))
+        known = total > LEAST
+        elements = np.sort(np.concatenate([inside, outside[~known]]))
+        number = np.empty(count, np.int64)
+        number[elements] = np.arange(len(elements))
+        shares = shares.tocoo()
+        line, column = shares.coords
+        used = known[line]
+        line, column, data = line[used], column[used], shares.data[used]
+        rows = np.concatenate([elements, outside[line]])
+        columns = np.concatenate([number[elements], number[inside[column]]])
+        values = np.concatenate([np.ones(len(elements)), data / total[line]]).astype(np.float32)
+        return Border(elements, csr_array((values, (rows, columns)), shape=(count, len(elements))))
+
+
+def _reads(mesh: Mesh, texels: Texels, tracer: GeodesicTracer, outside: np.ndarray) -> csr_array:
+    """(G, N) bilinear weights of the texels around the points that the centres of `outside` unfold to."""
+    face, barycentric = texels.face[outside], texels.barycentric[outside]
+    corners = texel_space(texels.uv[face], texels.resolution)
+    row, column = np.divmod(texels.index[outside], texels.resolution)
+    away = np.stack([column, row], 1) - np.einsum("nk,nkc->nc", barycentric, corners)
+    slopes = barycentric_gradients(corners, twice_area(corners))[1]
+    rates = np.stack([(slopes[:, :2] * away).sum(1), (slopes[:, 2:] * away).sum(1)], 1)
+    points = mesh.vertices[mesh.faces[face]].astype(np.float64)
+    direction = np.einsum("nk,nkc->nc", rates, points[:, 1:] - points[:, :1])
+    length = np.minimum(np.linalg.norm(direction, axis=1), FARTHEST * texels.size)
+    end = tracer.trace(face, barycentric, direction, length)
+    index, weight = texels.bilinear(end.face, end.barycentric)
+    weight = np.where(index == outside[:, None], 0.0, weight)  # not itself
+    total = weight.sum(1, keepdims=True)
+    weight = weight / np.where(total > 0, total, 1.0)
+    ends = 4 * np.arange(len(outside) + 1)
+    return csr_array((weight.ravel(), index.ravel(), ends), shape=(len(outside), len(texels.index)))
+
+
+def _resolved(reads: csr_array, inside: np.ndarray, outside: np.ndarray) -> csr_array:
+    """(G, inside) shares, where texels outside that read others outside are traced on to those inside."""
+    columns = reads.tocsc()
+    direct, through = columns[:, inside].tocsr(), columns[:, outside].tocsr()
+    shares = direct
+    for _ in range(ROUNDS):
+        shares = direct + through @ shares
+    shares.data[shares.data < FAINT] = 0.0
+    shares.eliminate_zeros()
+    return shares
