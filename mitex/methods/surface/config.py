@@ -128,7 +128,7 @@ class SurfaceConfig:
 
 
 PRESETS = {
-    "fast": SurfaceConfig(steps=300, preset="fast", milestones=(180, 250)),
+    "fast": SurfaceConfig(steps=200, preset="fast", scales=2, milestones=(150, 180)),
     "paper": SurfaceConfig(
         steps=500,
         preset="paper",
