@@ -44,9 +44,11 @@ class SurfaceConfig:
         pictures: views of the maps compared in a step, when the exemplar has several maps.
         whitened: the optimizer works in the principal components of the exemplar's channels, each measured by
             its spread, so that colours move together as they do there; False: in the channels (the paper).
+        diffusion: part of each texel that is replaced in every step by the mean of what its taps read, which
+            wears down what the first convolution, as it interpolates, cannot see. 0 in the paper.
         noise: width of the uniform noise that the texture starts with: from 0 on (the paper), or around the
             exemplar's mean and in multiples of the spread, if `whitened`.
-        optimizer: "adam" (the paper), or "lbfgs" for one map and the Gram loss.
+        optimizer: "adam" (the paper), or "lbfgs" for one map, one scale and the Gram loss.
         lr, milestones, decay: its learning rate, for "lbfgs" the largest change in a step, and the schedule.
         shared_moment: Adam's second moment is one number for the whole texture, which leaves noise alone that
             the features do not see; False gives each texel its own (the paper), which amplifies it.
@@ -75,6 +77,7 @@ class SurfaceConfig:
     coarse_share: float = 0.4
     pictures: int = 2
     whitened: bool = True
+    diffusion: float = 0.03
     noise: float = 1.0
     optimizer: str = "adam"
     lr: float = 0.2
@@ -96,6 +99,7 @@ class SurfaceConfig:
             scales=(0, 3),
             coarse_share=(0, 0.95),
             pictures=(1, 16),
+            diffusion=(0, 1),
             noise=(0, 10),
             samples=(1, None),
             moment_weight=(0, None),
@@ -118,8 +122,9 @@ class SurfaceConfig:
         unknown = [layer for layer in (*self.layers, self.content_layer) if layer not in known]
         if unknown:
             raise ConfigError(f"layers holds {', '.join(unknown)}", f"use some of {', '.join(known)}")
-        if self.optimizer == "lbfgs" and self.loss != "gram":
-            raise ConfigError("lbfgs needs a loss without randomness", "set loss=gram or optimizer=adam")
+        if self.optimizer == "lbfgs" and (self.loss != "gram" or self.scales):
+            problem = "lbfgs needs a loss without randomness, the same throughout"
+            raise ConfigError(problem, "set loss=gram and scales=0, or optimizer=adam")
 
     @property
     def compared(self) -> tuple[str, ...]:
@@ -136,6 +141,7 @@ PRESETS = {
         continued=False,
         exemplar_size=512,
         whitened=False,
+        diffusion=0.0,
         noise=0.2,
         lr=0.1,
         shared_moment=False,

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 
 import numpy as np
 import torch
+from scipy.sparse import csr_array
 
 from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
@@ -25,6 +27,7 @@ from mitex.methods.surface.texture import texel_layout
 from mitex.methods.surface.views import Views
 from mitex.pictures import CYCLE, picture_images, pictures_of
 from mitex.runtime import keep_freed_memory
+from mitex.sparse import csr_tensor
 
 VIEW = 384  # side of a preview's pictures [px]
 CONTENT = "content"
@@ -136,6 +139,8 @@ class SurfaceTask:
 
     def commit(self) -> None:
         with torch.no_grad():
+            if self.config.diffusion:
+                self.coordinates.lerp_(self._mean_of_taps @ self.coordinates, self.config.diffusion)
             values = self.values
             inside = values.clamp(0.0, 1.0)
             if not torch.equal(values, inside):
@@ -168,6 +173,15 @@ class SurfaceTask:
         key = content_key(self.mesh.vertices, self.mesh.faces, self.mesh.uv)
         mesh = f"{self.mesh.name} {key}"
         return {"method": "surface", "maps": maps, "exemplar": self.exemplar.name, "mesh": mesh} | self.known
+
+    @cached_property
+    def _mean_of_taps(self) -> torch.Tensor:
+        """(n, n) sparse: for each element the mean over the taps of the first convolution."""
+        lookup = self.levels.lookup
+        count, rows = lookup.shape[1], np.arange(lookup.shape[0] + 1, dtype=np.int32)
+        ones = np.full(lookup.shape[0], 1 / 9, np.float32)
+        mean = csr_array((ones, rows[:-1], rows[::9]), shape=(count, lookup.shape[0]))
+        return csr_tensor(mean @ lookup)
 
     def _start(self, generator: torch.Generator) -> torch.Tensor:
         noise = torch.rand(len(self.levels.order), self.channels, generator=generator)
