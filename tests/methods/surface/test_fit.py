@@ -277,6 +277,16 @@ def test_noise_start_and_range(mesh, exemplar, tmp_path):
     assert abs(texture.values.mean() - 0.1) < 0.005
 
 
+def test_diffusion_wears_down_what_is_finer_than_the_taps(mesh, exemplar, tmp_path):
+    """Without a gradient noise fades and the mean stays."""
+    made = {}
+    for amount in ("0", "0.1"):
+        overrides = [*SMALL, "lr=0", f"diffusion={amount}"]
+        made[amount] = surface.fit(exemplar, mesh, tmp_path / amount, overrides=overrides, quiet=True).values
+    assert np.abs(made["0.1"].mean(0) - made["0"].mean(0)).max() < 0.01
+    assert (made["0.1"].std(0) < 0.6 * made["0"].std(0)).all()
+
+
 def test_the_scale_becomes_finer():
     task = object.__new__(SurfaceTask)
     task.config = resolve(PRESETS, None, None, ["steps=100", "scales=2", "coarse_share=0.4"])
