@@ -35,7 +35,7 @@ from mitex.training import checkpoint
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 SIDES = {"scene": (25, 65)}  # azimuths [degrees]
 OTHER_SIDES = (20, 200)
-CELL = 320
+CELL = 272
 KEYS = {field.name for field in fields(surface.SurfaceConfig)} | {"maps", "content"}
 
 
