@@ -6,9 +6,10 @@ usage: python tools/make_surface_gallery.py EXEMPLARS MESHES RUNS SHEET MESH=EXE
 EXEMPLARS and MESHES are folders; names of embedded ones work too, and the exemplar `letters` is drawn. MESH^N
 is MESH with all faces split in four N times, MESH~N a coarse copy with N faces, and `scene` is made up. RUNS
 is where the run folders go: finished ones are used again, begun ones go on. The sheet goes to
-docs/gallery/SHEET.jpg, a row for each MESH=EXEMPLAR: the exemplar, and the mesh from two sides; the ratio
-across seams is printed. Settings change the synthesis, of a row or of all (`resolution=512`, `pictures=1`,
-...); `maps=albedo` leaves out other maps, `content=ao` transfers the style.
+docs/gallery/SHEET.jpg, a row for each MESH=EXEMPLAR: the exemplar, and the mesh from two sides (or, if all
+are of one pair, the exemplar and one side of each variant); the ratio across seams is printed. Settings
+change the synthesis, of a row or of all (`resolution=512`, `pictures=1`, ...); `maps=albedo` leaves out other
+maps, `content=ao` transfers the style.
 """
 
 from __future__ import annotations
@@ -106,19 +107,19 @@ def texture(exemplar: Exemplar, mesh: Mesh, run: Path, settings: dict[str, str])
     )
 
 
-def row(exemplar: Exemplar, made: surface.SurfaceTexture) -> list[np.ndarray]:
-    """The exemplar and the mesh from its sides."""
-    asset, sides = made.apply(), SIDES.get(made.mesh.name, OTHER_SIDES)
-    shown = [tone(still(asset, resolution=CELL, spp=64, azimuth=math.radians(a))) for a in sides]
-    return [exemplar.resized(CELL).maps["albedo"], *shown]
+def pictures(made: surface.SurfaceTexture, count: int) -> list[np.ndarray]:
+    """The mesh from `count` of its sides."""
+    asset, sides = made.apply(), SIDES.get(made.mesh.name, OTHER_SIDES)[:count]
+    return [tone(still(asset, resolution=CELL, spp=64, azimuth=math.radians(a))) for a in sides]
 
 
 def main() -> None:
     exemplars, meshes, runs, name = Path(sys.argv[1]), Path(sys.argv[2]), Path(sys.argv[3]), sys.argv[4]
     shared = dict(word.split("=") for word in sys.argv[5:] if word.split("=")[0] in KEYS)
+    rows = [word.split(",") for word in sys.argv[5:] if word.split("=")[0] not in KEYS]
+    variants = len({pair for pair, *_ in rows}) == 1  # of one synthesis: the exemplar once, one side each
     cells, labels = [], []
-    for word in (word for word in sys.argv[5:] if word.split("=")[0] not in KEYS):
-        pair, *own = word.split(",")
+    for pair, *own in rows:
         settings = shared | dict(setting.split("=") for setting in own)
         maps = settings.pop("maps", None)
         mesh_name, exemplar_name = pair.split("=")
@@ -126,9 +127,12 @@ def main() -> None:
         run = runs / "-".join([name, mesh_name, exemplar_name, *(word.replace("=", "") for word in own)])
         made = texture(exemplar, mesh, run, settings)
         print(f"{run.name}: {made.about['seconds']} s, seams {seam_ratio(made):.3f}", flush=True)
-        cells += row(exemplar, made)
-        labels += [f"exemplar {exemplar.name}", mesh.name, " ".join(own) or f"{mesh.name}, other side"]
-    write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=1 + len(OTHER_SIDES), labels=labels, cell=CELL))
+        if not (variants and cells):
+            cells.append(exemplar.resized(CELL).maps["albedo"])
+            labels.append(f"exemplar {exemplar.name}")
+        cells += pictures(made, 1 if variants else 2)
+        labels += [" ".join(own) or "default"] if variants else [mesh.name, "the other side"]
+    write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=3, labels=labels, cell=CELL))
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse
@@ -68,7 +69,7 @@ def build(around: Surroundings, count: int = POOLS) -> Levels:
     border = around.border or Border.none(len(texels.index))
     elements, follows = border.elements, _largest(border.spread)
     index, weight = _bilinear_taps(around, elements)
-    lookup = _lookup(index, weight, len(texels.index)) @ border.spread
+    lookup: Any = _lookup(index, weight, len(texels.index)) @ border.spread
     edges = _texel_graph(lookup)
     labels = _groups(texels.position[elements], texels.size, edges, count)
     order = np.lexsort(labels).astype(np.int32)
@@ -110,13 +111,13 @@ def _lookup(index: np.ndarray, weight: np.ndarray, texels: int) -> scipy.sparse.
     return scipy.sparse.csr_array(entries, shape=(len(used), texels))
 
 
-def _renamed(matrix: scipy.sparse.csr_array, rank: np.ndarray) -> scipy.sparse.csr_array:
+def _renamed(matrix: Any, rank: np.ndarray) -> scipy.sparse.csr_array:
     """The matrix with column j called rank[j], indices of 32 bits."""
     entries = matrix.data, rank[matrix.indices], matrix.indptr.astype(np.int32)
     return scipy.sparse.csr_array(entries, shape=matrix.shape)
 
 
-def _largest(matrix: scipy.sparse.csr_array) -> np.ndarray:
+def _largest(matrix: Any) -> np.ndarray:
     """The column of the largest entry of each row; no row is empty."""
     rows = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
     return matrix.indices[np.lexsort((matrix.data, rows))[matrix.indptr[1:] - 1]]
@@ -128,7 +129,7 @@ def _replacements(arrived: np.ndarray) -> np.ndarray:
     return np.where(arrived, own, np.where(arrived[:, ::-1], own[::-1], CENTRE))
 
 
-def _texel_graph(lookup: scipy.sparse.csr_array) -> np.ndarray:
+def _texel_graph(lookup: Any) -> np.ndarray:
     """(E, 2) pairs of elements of which one reads the other, each once in either direction."""
     count = lookup.shape[1]
     entries = np.ones(lookup.nnz, bool), lookup.indices.copy(), lookup.indptr[::9].copy()

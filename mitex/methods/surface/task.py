@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import torch
@@ -177,7 +178,7 @@ class SurfaceTask:
     @cached_property
     def _mean_of_taps(self) -> torch.Tensor:
         """(n, n) sparse: for each element the mean over the taps of the first convolution."""
-        lookup = self.levels.lookup
+        lookup: Any = self.levels.lookup
         count, rows = lookup.shape[1], np.arange(lookup.shape[0] + 1, dtype=np.int32)
         ones = np.full(lookup.shape[0], 1 / 9, np.float32)
         mean = csr_array((ones, rows[:-1], rows[::9]), shape=(count, lookup.shape[0]))
