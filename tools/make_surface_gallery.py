@@ -117,7 +117,7 @@ def main() -> None:
     exemplars, meshes, runs, name = Path(sys.argv[1]), Path(sys.argv[2]), Path(sys.argv[3]), sys.argv[4]
     shared = dict(word.split("=") for word in sys.argv[5:] if word.split("=")[0] in KEYS)
     rows = [word.split(",") for word in sys.argv[5:] if word.split("=")[0] not in KEYS]
-    variants = len(rows) > 1 == len({pair for pair, *_ in rows})  # of one synthesis: the exemplar once, one side each
+    variants = len(rows) > 1 == len({pair for pair, *_ in rows})  # one side each
     cells, labels = [], []
     for pair, *own in rows:
         settings = shared | dict(setting.split("=") for setting in own)
