@@ -64,7 +64,8 @@ def test_lookup_of_a_slice_and_of_a_parameter(mesh, field):
     ones = torch.ones(*visibility.shape).flatten()
     np.testing.assert_allclose(gradient(state)[:, 1], visibility.matrix.to_dense().T @ ones, atol=1e-5)
     with torch.no_grad():
-        np.testing.assert_array_equal(lookup(state, visibility)[..., 1:3], lookup(state[:, 1:3], visibility))
+        whole, part = lookup(state, visibility), lookup(state[:, 1:3], visibility)
+        np.testing.assert_allclose(whole[..., 1:3], part, atol=1e-6)  # sums may be in another order
 
 
 def test_lookup_refuses_second_derivatives(mesh, field):

@@ -65,6 +65,7 @@ def test_surface_synthesis_script(mi, tmp_path: Path, monkeypatch: pytest.Monkey
 
     picture = read_image(tmp_path / "octopus.png")
     assert picture.shape == (512, 1024, 3)
-    for image in (Exemplar.load("scales").maps["albedo"], picture[200:312, 200:312]):  # teal both
-        assert image.mean((0, 1)).argmin() == 0
+    for image in (Exemplar.load("scales").maps["albedo"], picture[200:312, 200:312]):  # greenish both
+        red, green, _ = image.mean((0, 1))
+        assert green > red + 0.1
     assert (tmp_path / "run" / "octopus.glb").stat().st_size > 100_000

@@ -253,7 +253,7 @@ def test_previews_show_the_mesh_beside_the_exemplar(mesh, exemplar):
     assert laid.uv is not None
     texels = Texels.rasterize(laid, laid.uv, 48)
     task = SurfaceTask(config, exemplar, laid, texels, find_levels(laid, texels, config))
-    values = torch.zeros(len(texels.index), task.channels)
+    values = torch.zeros(len(task.coordinates), task.channels)
     values[:, task.layout["albedo"][0]] = 1.0
     with torch.no_grad():
         task.coordinates.copy_(task.space.coordinates(values))
