@@ -64,8 +64,10 @@ def test_lookup_of_a_slice_and_of_a_parameter(mesh, field):
     ones = torch.ones(*visibility.shape).flatten()
     np.testing.assert_allclose(gradient(state)[:, 1], visibility.matrix.to_dense().T @ ones, atol=1e-5)
     with torch.no_grad():
-        whole, part = lookup(state, visibility), lookup(state[:, 1:3], visibility)
-        np.testing.assert_allclose(whole[..., 1:3], part, atol=1e-6)  # sums may be in another order
+        part = lookup(state[:, 1:3], visibility)
+        np.testing.assert_array_equal(part, lookup(state[:, 1:3].contiguous(), visibility))
+        # Products of four and of two columns take different code on some CPUs: equal up to the last bits.
+        np.testing.assert_array_max_ulp(lookup(state, visibility)[..., 1:3].numpy(), part.numpy(), maxulp=8)
 
 
 def test_lookup_refuses_second_derivatives(mesh, field):
