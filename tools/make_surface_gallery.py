@@ -6,10 +6,10 @@ usage: python tools/make_surface_gallery.py EXEMPLARS MESHES RUNS SHEET MESH=EXE
 EXEMPLARS and MESHES are folders; names of embedded ones work too, and the exemplar `letters` is drawn. MESH^N
 is MESH with all faces split in four N times, MESH~N a coarse copy with N faces, and `scene` is made up. RUNS
 is where the run folders go: finished ones are used again, begun ones go on. The sheet goes to
-docs/gallery/SHEET.jpg, a row for each MESH=EXEMPLAR: the exemplar, and the mesh from two sides (or, if all
-are of one pair, the exemplar and one side of each variant); the ratio across seams is printed. Settings
-change the synthesis, of a row or of all (`resolution=512`, `pictures=1`, ...); `maps=albedo` leaves out other
-maps, `content=ao` transfers the style.
+docs/gallery/SHEET.jpg, a row for each exemplar: itself, and the mesh from two sides, or one side of each of
+its meshes or variants, in the order that they are given; the ratio across seams is printed. Settings change
+the synthesis, of one MESH=EXEMPLAR or of all (`resolution=512`, `pictures=1`, ...); `maps=albedo` leaves out
+other maps, `content=ao` transfers the style.
 """
 
 from __future__ import annotations
@@ -117,22 +117,25 @@ def main() -> None:
     exemplars, meshes, runs, name = Path(sys.argv[1]), Path(sys.argv[2]), Path(sys.argv[3]), sys.argv[4]
     shared = dict(word.split("=") for word in sys.argv[5:] if word.split("=")[0] in KEYS)
     rows = [word.split(",") for word in sys.argv[5:] if word.split("=")[0] not in KEYS]
-    variants = len(rows) > 1 == len({pair for pair, *_ in rows})  # one side each
-    cells, labels = [], []
-    for pair, *own in rows:
+    pairs = [pair.split("=") for pair, *_ in rows]
+    several = len({exemplar for _, exemplar in pairs}) < len(pairs)  # results of an exemplar: one side each
+    variants = several and len({mesh for mesh, _ in pairs}) == 1
+    cells, labels, last = [], [], None
+    for (mesh_name, exemplar_name), (_, *own) in zip(pairs, rows, strict=True):
         settings = shared | dict(setting.split("=") for setting in own)
         maps = settings.pop("maps", None)
-        mesh_name, exemplar_name = pair.split("=")
         mesh, exemplar = find_mesh(mesh_name, meshes), find_exemplar(exemplar_name, exemplars, maps)
         run = runs / "-".join([name, mesh_name, exemplar_name, *(word.replace("=", "") for word in own)])
         made = texture(exemplar, mesh, run, settings)
         print(f"{run.name}: {made.about['seconds']} s, seams {seam_ratio(made):.3f}", flush=True)
-        if not (variants and cells):
+        if exemplar_name != last:
             cells.append(exemplar.resized(CELL).maps["albedo"])
             labels.append(f"exemplar {exemplar.name}")
-        cells += pictures(made, 1 if variants else 2)
-        labels += [" ".join(own) or "default"] if variants else [mesh.name, "the other side"]
-    write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=3, labels=labels, cell=CELL))
+        cells += pictures(made, 1 if several else 2)
+        labels += [" ".join(own) or "default"] if variants else [mesh.name, "the other side"][: 2 - several]
+        last = exemplar_name
+    columns = 3 if variants or not several else 1 + len({mesh for mesh, _ in pairs})
+    write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=columns, labels=labels, cell=CELL))
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from typing import Protocol
 import torch
 import torch.nn.functional as F
 
-GRAM_ROWS = 16_384  # feature vectors that are multiplied at a time
+GRAM_ROWS = 8192  # feature vectors that are multiplied at a time
 
 
 class Operation(Protocol):
@@ -105,7 +105,10 @@ class Tap:
 
 @dataclass(frozen=True)
 class GramTap:
-    """The Gram matrix (C, C) of the map's n feature vectors, divided by n, without a copy of the map."""
+    """The Gram matrix (C, C) of the map's n feature vectors, divided by n, without a copy of the map.
+
+    Products are taken in the map's type and summed in float32: bfloat16 maps give it to 1e-3.
+    """
 
     index: int
 
@@ -113,8 +116,7 @@ class GramTap:
         rows = _rows(x)
         total = torch.zeros(rows.shape[1], rows.shape[1])
         for part in rows.split(GRAM_ROWS):
-            part = part.float()
-            total.addmm_(part.t(), part)
+            total += part.t() @ part
         return total / len(rows)
 
     def add(self, flowing: torch.Tensor, gradient: torch.Tensor, x: torch.Tensor) -> None:

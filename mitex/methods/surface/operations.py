@@ -16,7 +16,8 @@ import torch.nn.functional as F
 
 from mitex.sparse import csr_tensor
 
-CHUNK = 1 << 20  # gathered values that are multiplied at a time
+CHUNK = 1 << 20  # gathered values that are multiplied at a time,
+LEAST_ROWS = 512  # but so many elements at least: each product reads all weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,4 +161,4 @@ class SurfacePool:
 
 
 def _rows(channels: int) -> int:
-    return max(CHUNK // (9 * channels), 64)
+    return max(CHUNK // (9 * channels), LEAST_ROWS)
