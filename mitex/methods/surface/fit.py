@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from mitex.atlas import twice_area, unwrap, usable_uv
+from mitex.cache import content_key
 from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.mesh import Mesh
 from mitex.methods.surface.borders import Border
-from mitex.methods.surface.cache import cached_levels, content_key
+from mitex.methods.surface.cache import VERSION, cached_levels
 from mitex.methods.surface.config import PRESETS, SurfaceConfig
 from mitex.methods.surface.content import AO, content_colours
 from mitex.methods.surface.exponential import GeodesicTracer
@@ -164,7 +165,16 @@ def find_levels(
     assert mesh.uv is not None
     angle = math.radians(config.angle)
     count = POOLS + config.scales
-    options = (config.resolution, config.frames, angle, config.correct, config.continued, count, orientation)
+    options = (
+        VERSION,
+        config.resolution,
+        config.frames,
+        angle,
+        config.correct,
+        config.continued,
+        count,
+        orientation,
+    )
 
     def find() -> Levels:
         right, up = tangent_frames(mesh, texels.face, texels.barycentric, config.frames, angle, orientation)

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from scipy.sparse import csr_array
 
+from mitex.cache import content_key
 from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
@@ -17,7 +18,6 @@ from mitex.features.frozen import Tap
 from mitex.features.vgg import LAYERS, Weights, convolutions
 from mitex.features.vgg19 import vgg19_convolutions
 from mitex.mesh import Mesh
-from mitex.methods.surface.cache import content_key
 from mitex.methods.surface.comparison import Comparison, GramComparison, TransportComparison
 from mitex.methods.surface.config import SurfaceConfig
 from mitex.methods.surface.levels import Levels

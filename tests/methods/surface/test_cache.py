@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitex.methods.surface.cache import cached_levels, content_key
+from mitex.methods.surface.cache import cached_levels
 from tests.methods.surface.grids import grid_levels
 
 
@@ -50,11 +50,3 @@ def test_a_damaged_cache_is_replaced(tmp_path, levels, damage):
 def test_no_place_for_a_cache_is_no_error(tmp_path, levels):
     (tmp_path / "file").touch()
     assert cached_levels("key", lambda: levels, tmp_path / "file") is levels
-
-
-def test_keys_follow_the_content():
-    a = np.arange(6.0)
-    assert content_key(a, 1, "x") == content_key(a.copy(), 1, "x")
-    others = [content_key(a.reshape(2, 3), 1, "x"), content_key(a + 1, 1, "x"), content_key(a, 2, "x")]
-    others += [content_key(a.astype(np.float32), 1, "x"), content_key(a, 1, "y")]
-    assert len({content_key(a, 1, "x"), *others}) == 6

@@ -1,0 +1,59 @@
+"""Results on disk: found once, kept under a hash of everything that they follow from."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+Result = TypeVar("Result")
+
+
+def content_key(*parts: object) -> str:
+    """A hash of arrays (dtype, shape and content) and of anything else by its `repr`."""
+    digest = hashlib.sha256()
+    for part in parts:
+        if isinstance(part, np.ndarray):
+            digest.update(repr((part.dtype.str, part.shape)).encode())
+            digest.update(np.ascontiguousarray(part).data)
+        else:
+            digest.update(repr(part).encode())
+    return digest.hexdigest()[:32]
+
+
+def cached(
+    place: Path,
+    find: Callable[[], Result],
+    read: Callable[[Path], Result],
+    write: Callable[[Path, Result], None],
+) -> Result:
+    """The result kept in the folder `place`, else the one that `find` finds, which is kept then.
+
+    A cache that cannot be read or written is no error: the result is found again.
+
+    Args:
+        place: of this result alone.
+        find: the long computation.
+        read: gives the result from a folder; OSError, ValueError or KeyError if it is not whole.
+        write: fills an empty folder, which is renamed afterwards, so that all files appear together.
+    """
+    with suppress(OSError, ValueError, KeyError):
+        return read(place)
+    result = find()
+    with suppress(OSError):
+        place.parent.mkdir(parents=True, exist_ok=True)
+        filling = Path(tempfile.mkdtemp(prefix=".filling-", dir=place.parent))
+        try:
+            write(filling, result)
+            shutil.rmtree(place, ignore_errors=True)  # a damaged one
+            os.rename(filling, place)
+        finally:
+            shutil.rmtree(filling, ignore_errors=True)
+    return result
