@@ -164,17 +164,8 @@ def find_levels(
     """The levels of a surface, from the cache if it has been seen before."""
     assert mesh.uv is not None
     angle = math.radians(config.angle)
-    count = POOLS + config.scales
-    options = (
-        VERSION,
-        config.resolution,
-        config.frames,
-        angle,
-        config.correct,
-        config.continued,
-        count,
-        orientation,
-    )
+    frames, count = config.frames, POOLS + config.scales
+    options = (config.resolution, frames, angle, config.correct, config.continued, count, orientation)
 
     def find() -> Levels:
         right, up = tangent_frames(mesh, texels.face, texels.barycentric, config.frames, angle, orientation)
@@ -182,4 +173,4 @@ def find_levels(
         border = Border.continued(mesh, texels, tracer) if config.continued else None
         return build(Surroundings(texels, tracer, right, up, config.correct, border), count)
 
-    return cached_levels(content_key(mesh.vertices, mesh.faces, mesh.uv, *options), find)
+    return cached_levels(content_key(VERSION, mesh.vertices, mesh.faces, mesh.uv, *options), find)
