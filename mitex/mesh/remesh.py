@@ -1,8 +1,9 @@
-"""Isotropic remeshing, through PyMeshLab (extra `remesh`)."""
+"""Isotropic remeshing and simplification, through PyMeshLab (extra `remesh`)."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,6 @@ def remesh(mesh: Mesh, vertices: int, feature_angle: float = math.radians(60.0))
     """
     if vertices < 12:
         raise MeshError(f"{vertices} vertices are too few for remeshing", "ask for 12 or more")
-    pymeshlab = _pymeshlab()
     area = float(mesh.face_areas.sum(dtype=np.float64))
     length = math.sqrt(2.0 * area / (math.sqrt(3.0) * vertices)) / LONGER
     source = mesh
@@ -47,7 +47,7 @@ def remesh(mesh: Mesh, vertices: int, feature_angle: float = math.radians(60.0))
         source = subdivide_midpoint(source)
     best, best_error = mesh, math.inf
     for _ in range(ROUNDS):
-        made = _isotropic(pymeshlab, source, length, feature_angle)
+        made = _isotropic(source, length, feature_angle)
         ratio = len(made.vertices) / vertices
         if abs(math.log(ratio)) < best_error:
             best, best_error = made, abs(math.log(ratio))
@@ -57,19 +57,49 @@ def remesh(mesh: Mesh, vertices: int, feature_angle: float = math.radians(60.0))
     return best
 
 
-def _isotropic(pymeshlab: Any, mesh: Mesh, length: float, feature_angle: float) -> Mesh:
+def simplified(mesh: Mesh, faces: int) -> Mesh:
+    """A coarse mesh of the same topology: quadric edge collapse (Garland and Heckbert 1997).
+
+    Args:
+        mesh: any mesh.
+        faces: wanted; there are more if the topology needs them.
+
+    Raises:
+        MeshError: PyMeshLab is not installed or failed.
+    """
+
+    def collapse(meshes: Any) -> None:
+        meshes.meshing_decimation_quadric_edge_collapse(
+            targetfacenum=faces, preservetopology=True, preserveboundary=True, preservenormal=True
+        )
+
+    return _filtered(mesh, collapse)
+
+
+def _isotropic(mesh: Mesh, length: float, feature_angle: float) -> Mesh:
+    def remeshed(meshes: Any) -> None:
+        meshes.meshing_isotropic_explicit_remeshing(
+            iterations=12,
+            targetlen=_pymeshlab().PureValue(length),
+            featuredeg=math.degrees(feature_angle),
+        )
+
+    return _filtered(mesh, remeshed)
+
+
+def _filtered(mesh: Mesh, change: Callable[[Any], None]) -> Mesh:
+    """The mesh after a filter of PyMeshLab."""
+    pymeshlab = _pymeshlab()
     meshes = pymeshlab.MeshSet(verbose=False)
     try:
         meshes.add_mesh(pymeshlab.Mesh(mesh.vertices.astype(np.float64), mesh.faces))
-        meshes.meshing_isotropic_explicit_remeshing(
-            iterations=12, targetlen=pymeshlab.PureValue(length), featuredeg=math.degrees(feature_angle)
-        )
+        change(meshes)
         made = meshes.current_mesh()
-        points, faces = made.vertex_matrix(), made.face_matrix()
+        points, found = made.vertex_matrix(), made.face_matrix()
     except pymeshlab.PyMeshLabException as error:
         reason = " ".join(str(error).split())
         raise MeshError(f"{mesh.name} could not be remeshed ({reason})", "repair it in a modeller") from error
-    return validate(points, faces, name=mesh.name)
+    return validate(points, found, name=mesh.name)
 
 
 def _pymeshlab() -> Any:

@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import Any
 
-NAMES = ("nca", "surface")
+NAMES = ("nca", "surface", "geometric")
 
 
 def __getattr__(name: str) -> Any:

@@ -1,0 +1,63 @@
+"""Which faces meet along which sides: a face's convolutional neighbourhood (Hertz et al. 2020, figure 3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from mitex.mesh.topology import face_edges
+
+
+@dataclass(frozen=True, eq=False)
+class FaceGraph:
+    """The three neighbours of every face. Side k goes from corner k to corner k + 1.
+
+    A side is open if it is no one else's, that of more than two faces, or run through in the same direction
+    by the other face (the windings disagree). Across an open side lies the mirror image of the face itself.
+
+    Attributes:
+        faces: (F, 3) int64 vertex indices.
+        neighbours: (F, 3) int64, the face across each side; the face itself across open ones.
+        opposite: (F, 3) int64, that face's vertex off the side; the own one across open ones.
+        open: (F, 3) bool.
+        incident: (V,) float32, number of faces around each vertex, at least 1.
+    """
+
+    faces: torch.Tensor
+    neighbours: torch.Tensor
+    opposite: torch.Tensor
+    open: torch.Tensor
+    incident: torch.Tensor
+
+    @staticmethod
+    def of(faces: np.ndarray, vertices: int) -> FaceGraph:
+        """The graph of faces (F, 3) without repeated vertices, of which there are `vertices`."""
+        faces = faces.astype(np.int64)
+        across = _across(faces, vertices)
+        closed = across >= 0
+        own = np.arange(faces.size).reshape(-1, 3)
+        partner = np.where(closed, across, own)
+        neighbours = partner // 3
+        opposite = faces[neighbours, (partner + 2 - 3 * neighbours) % 3]
+        incident = np.maximum(np.bincount(faces.ravel(), minlength=vertices), 1).astype(np.float32)
+        arrays = (faces, neighbours, opposite, ~closed, incident)
+        return FaceGraph(*(torch.from_numpy(np.ascontiguousarray(a)) for a in arrays))
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+
+def _across(faces: np.ndarray, vertices: int) -> np.ndarray:
+    """(F, 3) the side 3 f + k that meets each side in the opposite direction; -1 across open ones."""
+    pairs, edges = face_edges(faces, vertices)
+    edge = edges.ravel()
+    ahead = (faces < np.roll(faces, -1, axis=1)).ravel()
+    total = np.bincount(edge, minlength=len(pairs))
+    forward = np.bincount(edge, weights=ahead, minlength=len(pairs))
+    meets = (total == 2) & (forward == 1)
+    side = np.arange(faces.size)
+    of_edge = np.full((len(pairs), 2), -1)
+    of_edge[edge, ahead.astype(int)] = side
+    return np.where(meets[edge], of_edge[edge, 1 - ahead.astype(int)], -1).reshape(-1, 3)

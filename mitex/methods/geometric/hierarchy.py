@@ -1,0 +1,47 @@
+"""Scales of one mesh: every level has four times the faces of the one before, and edges as long."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+
+from mitex.mesh import Mesh, subdivide_midpoint
+from mitex.mesh.topology import face_edges
+from mitex.methods.geometric.connectivity import FaceGraph
+
+
+@dataclass(frozen=True, eq=False)
+class Hierarchy:
+    """The connectivity of a mesh subdivided 0, 1, 2, ... times.
+
+    Attributes:
+        meshes: the mesh on each level: only its faces and UVs matter.
+        graphs: of each level.
+        pairs: for each level but the last, (E, 2) int64, the ends of the edges that are split next.
+    """
+
+    meshes: tuple[Mesh, ...]
+    graphs: tuple[FaceGraph, ...]
+    pairs: tuple[torch.Tensor, ...]
+
+    @staticmethod
+    def of(mesh: Mesh, levels: int) -> Hierarchy:
+        """The hierarchy of a mesh, `levels` >= 1 of them with its own."""
+        meshes = [mesh]
+        for _ in range(levels - 1):
+            meshes.append(subdivide_midpoint(meshes[-1]))
+        graphs = tuple(FaceGraph.of(m.faces, len(m.vertices)) for m in meshes)
+        pairs = tuple(torch.from_numpy(face_edges(m.faces, len(m.vertices))[0]) for m in meshes[:-1])
+        return Hierarchy(tuple(meshes), graphs, pairs)
+
+    def finer(self, vertices: torch.Tensor, level: int) -> torch.Tensor:
+        """Vertices (..., V, 3) of a level, split and scaled by 2 for the next: edges keep their length."""
+        ends = vertices[..., self.pairs[level], :]
+        return torch.cat([2 * vertices, ends.sum(-2)], -2)
+
+
+def mean_edge(vertices: torch.Tensor, graph: FaceGraph) -> torch.Tensor:
+    """Mean length of the sides of all faces (F, 3) of vertices (V, 3); an inner edge counts twice."""
+    corners = vertices[graph.faces]
+    return (corners.roll(-1, 1) - corners).norm(dim=-1).mean()

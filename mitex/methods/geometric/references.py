@@ -1,0 +1,123 @@
+"""Reference shapes by formula: surfaces with a geometric texture to learn from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from mitex.mesh import Mesh, icosphere, torus
+
+FREQUENCY = 56  # of the spheres: 62,720 faces
+GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+
+
+def spikes() -> Mesh:
+    """A ball with 90 pointed spikes."""
+    near = _near(_spread(90))
+    return _sphere(0.45 * np.clip(1 - near / 0.17, 0, 1) ** 1.4, "spikes")
+
+
+def scales() -> Mesh:
+    """A ball covered by 140 domed plates with grooves in between."""
+    first, second = _two_nearest(_spread(140))
+    inside = np.clip((second - first) / 0.14, 0, 1)  # 0 on the border between two plates
+    return _sphere(0.16 * np.sqrt(inside * (2 - inside)), "scales")
+
+
+def knobs() -> Mesh:
+    """A ball with 60 mushrooms: their heads hang over their stems, which no height map can say."""
+    points, centres = icosphere(FREQUENCY).vertices.astype(np.float64), _spread(60)
+    index = np.argmax(points @ centres.T, axis=1)
+    centre = centres[index]
+    angle = np.arccos(np.clip((points * centre).sum(1), -1, 1))
+    rim = 0.21
+    t = np.clip(1 - angle / rim, 0, 1)  # 0 at the foot, 1 at the top
+    # Profile of a mushroom: inwards to the stem, up, outwards under the head, and over it.
+    stops = np.array([0.0, 0.2, 0.4, 0.55, 0.7, 0.85, 1.0])
+    radii = np.array([1.0, 0.42, 0.38, 0.8, 0.85, 0.55, 0.0]) * rim
+    heights = np.array([0.0, 0.02, 0.14, 0.17, 0.25, 0.33, 0.35])
+    radius, height = np.interp(t, stops, radii), np.interp(t, stops, heights)
+    outwards = points - (points * centre).sum(1, keepdims=True) * centre
+    outwards /= np.maximum(np.linalg.norm(outwards, axis=1, keepdims=True), 1e-12)
+    placed = np.cos(radius)[:, None] * centre + np.sin(radius)[:, None] * outwards
+    moved = np.where((angle < rim)[:, None], placed * (1 + height)[:, None], points)
+    return _mesh(moved, "knobs")
+
+
+def ridges() -> Mesh:
+    """A ball with the winding ridges of a brain coral."""
+    rng = np.random.default_rng(3)
+    points = icosphere(FREQUENCY).vertices.astype(np.float64)
+    waves = rng.normal(size=(160, 3))
+    waves *= 30.0 / np.linalg.norm(waves, axis=1, keepdims=True)
+    field = np.cos(points @ waves.T + rng.uniform(0, 2 * np.pi, 160)).sum(1) / np.sqrt(80)
+    return _sphere(0.12 * (1 + np.tanh(2.5 * field)), "ridges")
+
+
+def craters() -> Mesh:
+    """A ball with 70 craters, each a bowl with a raised rim."""
+    near = _near(_spread(70)) / 0.17
+    bowl = np.where(near < 1, near**2 - 1, 0.0)
+    rim = np.exp(-(((near - 1.05) / 0.22) ** 2))
+    return _sphere(0.13 * bowl + 0.09 * rim, "craters")
+
+
+def warts() -> Mesh:
+    """A torus with 170 round warts: a reference of genus 1."""
+    base = torus(256, 112, tube=0.45)
+    points = base.vertices.astype(np.float64)
+    k = np.arange(170)
+    around, across = 2 * np.pi * (k * 0.618034 % 1), 2 * np.pi * (k + 0.5) / 170
+    reach = 1 + 0.45 * np.cos(across)
+    centres = np.stack([reach * np.sin(around), 0.45 * np.sin(across), reach * np.cos(around)], 1)
+    near = np.linalg.norm(points[:, None] - centres, axis=2).min(1)
+    dome = np.sqrt(np.clip(1 - (near / 0.125) ** 2, 0, 1))
+    return Mesh(points + 0.11 * dome[:, None] * base.normals, base.faces, name="warts")
+
+
+REFERENCES: dict[str, Callable[[], Mesh]] = {
+    "spikes": spikes,
+    "scales": scales,
+    "knobs": knobs,
+    "ridges": ridges,
+    "craters": craters,
+    "warts": warts,
+}
+
+
+def find_reference(source: str | Path) -> Mesh:
+    """A reference by name, or from a file or embedded mesh as `Mesh.load` finds it."""
+    return REFERENCES[str(source)]() if str(source) in REFERENCES else Mesh.load(source)
+
+
+def _spread(count: int) -> np.ndarray:
+    """(count, 3) directions, evenly spread along a spiral."""
+    y = 1 - (2 * np.arange(count) + 1) / count
+    angle = GOLDEN * np.arange(count)
+    ring = np.sqrt(1 - y * y)
+    return np.stack([ring * np.sin(angle), y, ring * np.cos(angle)], 1)
+
+
+def _angles(centres: np.ndarray) -> np.ndarray:
+    return np.arccos(np.clip(icosphere(FREQUENCY).vertices.astype(np.float64) @ centres.T, -1, 1))
+
+
+def _near(centres: np.ndarray) -> np.ndarray:
+    """(V,) the angle from each vertex of the sphere to the nearest centre."""
+    return _angles(centres).min(1)
+
+
+def _two_nearest(centres: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    nearest = np.partition(_angles(centres), 1, axis=1)
+    return nearest[:, 0], nearest[:, 1]
+
+
+def _sphere(height: np.ndarray, name: str) -> Mesh:
+    points = icosphere(FREQUENCY).vertices.astype(np.float64)
+    return _mesh(points * (1 + height)[:, None], name)
+
+
+def _mesh(points: np.ndarray, name: str) -> Mesh:
+    return Mesh(points, icosphere(FREQUENCY).faces, name=name)

@@ -1,0 +1,68 @@
+"""How well a training mesh follows the reference, and whether it is a sound surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from scipy.spatial import KDTree
+
+from mitex.losses.chamfer import Samples, chamfer, sample_surface
+from mitex.mesh import Mesh
+from mitex.scenes.crossings import crossing_edges
+
+SAMPLES = 30_000
+
+
+@dataclass(frozen=True)
+class FitReport:
+    """Numbers of one level; distances as parts of half the reference's largest extent.
+
+    Attributes:
+        faces: of the training mesh.
+        chamfer: mean distance to the nearest point of the other surface, mean of both directions.
+        hausdorff: largest of these distances.
+        normals: mean angle between the normals there [degrees].
+        flipped: faces whose normal is more than a right angle away from that of the nearest point.
+        crossings: edges that pierce a face.
+    """
+
+    faces: int
+    chamfer: float
+    hausdorff: float
+    normals: float
+    flipped: int
+    crossings: int
+
+    def __str__(self) -> str:
+        return (
+            f"{self.faces:,} faces, distance {self.chamfer:.4f} (largest {self.hausdorff:.3f}), normals off "
+            f"by {self.normals:.0f} degrees, {self.flipped} flipped faces, {self.crossings} crossing edges"
+        )
+
+
+def report(mesh: Mesh, reference: Mesh, seed: int = 0) -> FitReport:
+    """Compares a training mesh with the reference in the same place."""
+    generator = torch.Generator().manual_seed(seed)
+    ours, theirs = _samples(mesh, generator), _samples(reference, generator)
+    extent = float((reference.vertices.max(0) - reference.vertices.min(0)).max()) / 2
+    to, back, cos_to, cos_back = (float(x) for x in chamfer(ours, theirs))
+    tree = KDTree(theirs.points.numpy())
+    centres = mesh.vertices[mesh.faces].mean(1)
+    nearest = theirs.normals.numpy()[tree.query(centres)[1]]
+    both = (ours.points.numpy(), theirs.points.numpy())
+    far = max(float(KDTree(b).query(a)[0].max()) for a, b in (both, both[::-1]))
+    return FitReport(
+        faces=len(mesh.faces),
+        chamfer=(to + back) / 2 / extent,
+        hausdorff=far / extent,
+        normals=float(np.degrees(np.arccos(np.clip(1 - (cos_to + cos_back) / 2, -1, 1)))),
+        flipped=int(((mesh.face_normals * nearest).sum(1) < 0).sum()),
+        crossings=len(crossing_edges(mesh)),
+    )
+
+
+def _samples(mesh: Mesh, generator: torch.Generator) -> Samples:
+    faces = torch.from_numpy(mesh.faces).long()
+    return sample_surface(torch.from_numpy(mesh.vertices), faces, SAMPLES, generator)

@@ -1,0 +1,176 @@
+"""Training the generators, level after level, as one task for the loop (Hertz et al. 2020, section 3.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import torch
+
+from mitex.methods.geometric.config import MAX_LEVELS, GeometricConfig
+from mitex.methods.geometric.features import face_features
+from mitex.methods.geometric.gan import adversarial_loss, critic_loss, generate
+from mitex.methods.geometric.hierarchy import Hierarchy
+from mitex.methods.geometric.model import grow, network
+from mitex.methods.geometric.pictures import portrait
+from mitex.training.optim import Adam
+
+HALVINGS = 4  # of the learning rate on a level
+
+
+class GeometricTask:
+    """Generators that turn the template into the reference, or something like it, on each level.
+
+    A step updates the generator of its level; the critics have optimizers of their own and take turns with it
+    inside `loss`. Generators of lower levels stay as they are.
+
+    Args:
+        config: settings.
+        hierarchy: of the template, with a level for each training mesh.
+        template: (V, 3) its vertices, in units of their mean edge length.
+        meshes: vertices of the training mesh of each level.
+        name: of the reference.
+
+    Attributes:
+        generators, critics: a network for each possible level, so that a resumed run may go on to more.
+        fixed: (V, 3) the noise from which the reference shall come; 0 on higher levels.
+    """
+
+    def __init__(
+        self,
+        config: GeometricConfig,
+        hierarchy: Hierarchy,
+        template: torch.Tensor,
+        meshes: list[torch.Tensor],
+        name: str,
+    ) -> None:
+        self.config, self.hierarchy, self.template, self.name = config, hierarchy, template, name
+        self.meshes = meshes
+        drawn = torch.Generator().manual_seed(config.seed)
+        self.generators = [network(level, 3, drawn) for level in range(MAX_LEVELS)]
+        self.critics = [network(level, 1, drawn) for level in range(MAX_LEVELS)]
+        self.fixed = config.noise * torch.randn(template.shape, generator=drawn)
+        self.optimizers = [Adam(critic.parameters, betas(config)) for critic in self.critics]
+        with torch.no_grad():
+            self.real = [face_features(v, g) for v, g in zip(meshes, hierarchy.graphs, strict=True)]
+        self._start: tuple[int, torch.Tensor] | None = None
+
+    @property
+    def parameters(self) -> list[torch.Tensor]:
+        return [p for generator in self.generators for p in generator.parameters]
+
+    def level(self, step: int) -> int:
+        """Which level a step trains."""
+        return min(step // self.config.level_steps, self.config.levels - 1)
+
+    def loss(self, step: int, generator: torch.Generator) -> tuple[torch.Tensor, dict[str, float]]:
+        level = self.level(step)
+        if step == level * self.config.level_steps and level >= self.config.carried:
+            self.generators[level].load(self.generators[level - 1].parameters)
+            self.critics[level].load(self.critics[level - 1].parameters)
+        record = {"level": float(level)}
+        for _ in range(self._critic_turns(step)):
+            record |= self._train_critic(level, step, generator)
+        graph = self.hierarchy.graphs[level]
+        fake = self._sample(level, generator)
+        adversarial = adversarial_loss(self.critics[level], fake, graph)
+        noise = self.fixed if level == 0 else 0.0
+        made = generate(self.generators[level], self._rebuilt(level), graph, noise, self.config.remeasure)
+        error = (made - self.meshes[level]).square().mean()
+        record |= {"adversarial": adversarial.item(), "reconstruction": error.item()}
+        return adversarial + self.config.reconstruction * error, record
+
+    def commit(self) -> None:
+        """The critics' weights were changed in `loss`."""
+
+    def state(self) -> dict[str, torch.Tensor]:
+        state = {}
+        for level, pair in enumerate(zip(self.generators, self.critics, strict=True)):
+            for kind, net in zip(("generator", "critic"), pair, strict=True):
+                state |= {f"{kind}/{level}/{k}": p.detach() for k, p in enumerate(net.parameters)}
+            moments = self.optimizers[level].state()
+            state |= {f"optimizer/{level}/{key}": value for key, value in moments.items()}
+        return state
+
+    def load_state(self, state: dict[str, torch.Tensor]) -> None:
+        for level, pair in enumerate(zip(self.generators, self.critics, strict=True)):
+            for kind, net in zip(("generator", "critic"), pair, strict=True):
+                net.load([state[f"{kind}/{level}/{k}"] for k in range(len(net.parameters))])
+            start = f"optimizer/{level}/"
+            moments = {k.removeprefix(start): v for k, v in state.items() if k.startswith(start)}
+            self.optimizers[level].load_state(moments)
+        self._start = None
+
+    def preview(self, step: int) -> np.ndarray:
+        """The training mesh of the level, its reconstruction, and two random samples."""
+        level = self.level(step - 1)
+        faces = self.hierarchy.graphs[level].faces.numpy()
+        drawn = torch.Generator().manual_seed(self.config.seed)
+        with torch.no_grad():
+            *_, rebuilt = self._grown(level, [self.fixed])
+            samples = [self._sample(level, drawn) for _ in range(2)]
+        meshes = (self.meshes[level], rebuilt, *samples)
+        return np.hstack([portrait(vertices.numpy(), faces) for vertices in meshes])
+
+    def metadata(self) -> dict[str, str]:
+        return {"method": "geometric", "reference": self.name}
+
+    def _critic_turns(self, step: int) -> int:
+        """How many steps of the critic come before a step of the generator: they are spread evenly."""
+        turns, of = self.config.critic_steps, self.config.generator_steps
+        return (step + 1) * turns // of - step * turns // of
+
+    def _train_critic(self, level: int, step: int, generator: torch.Generator) -> dict[str, float]:
+        graph, optimizer = self.hierarchy.graphs[level], self.optimizers[level]
+        with torch.no_grad():
+            fake = face_features(self._sample(level, generator), graph)
+        mix = torch.rand((), generator=generator)
+        with torch.enable_grad():
+            loss, distance = critic_loss(
+                self.critics[level], self.real[level], fake, graph, mix, self.config.penalty
+            )
+            gradients = torch.autograd.grad(loss, self.critics[level].parameters)
+        for parameter, gradient in zip(self.critics[level].parameters, gradients, strict=True):
+            parameter.grad = gradient
+        optimizer.step(learning_rate(self.config, step))
+        return {"critic": loss.item(), "distance": distance.item()}
+
+    def _sample(self, level: int, generator: torch.Generator) -> torch.Tensor:
+        """A random mesh of a level; only its own generator has a gradient."""
+        vertices = self.template
+        for k in range(level + 1):
+            if k:
+                vertices = self.hierarchy.finer(vertices, k - 1)
+            noise = self.config.noise * torch.randn(vertices.shape, generator=generator)
+            with torch.set_grad_enabled(k == level and torch.is_grad_enabled()):
+                graph = self.hierarchy.graphs[k]
+                vertices = generate(self.generators[k], vertices, graph, noise, self.config.remeasure)
+        return vertices
+
+    def _rebuilt(self, level: int) -> torch.Tensor:
+        """Where the reconstruction of a level starts from; the lower levels are finished and stay."""
+        if self._start is None or self._start[0] != level:
+            start = self.template
+            if level:
+                with torch.no_grad():
+                    *_, below = self._grown(level - 1, [self.fixed])
+                start = self.hierarchy.finer(below, level - 1)
+            self._start = level, start
+        return self._start[1]
+
+    def _grown(self, level: int, noises: list[torch.Tensor]) -> Iterator[torch.Tensor]:
+        """The meshes of levels 0 to `level`; noise 0 where none is given."""
+        count = level + 1
+        given = [*noises[:count], *[0.0] * (count - len(noises))]
+        return grow(self.generators[:count], self.hierarchy, self.template, given, self.config.remeasure)
+
+
+def betas(config: GeometricConfig) -> tuple[float, float]:
+    """Of Adam."""
+    return config.beta1, config.beta2
+
+
+def learning_rate(config: GeometricConfig, step: int) -> float:
+    """Halved four times on each level, anew on the next."""
+    part = step % config.level_steps * HALVINGS // config.level_steps
+    return config.lr * 0.5**part

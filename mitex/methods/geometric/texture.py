@@ -1,0 +1,196 @@
+"""A learned geometric texture, and growing it on any mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from mitex.asset import Asset
+from mitex.errors import ConfigError
+from mitex.mesh import Mesh, subdivide_midpoint
+from mitex.methods.geometric import files
+from mitex.methods.geometric.hierarchy import Hierarchy, mean_edge
+from mitex.methods.geometric.model import grow
+from mitex.methods.geometric.network import FaceNetwork
+from mitex.methods.geometric.pictures import clay
+from mitex.runtime import keep_freed_memory
+
+START = 2  # the paper starts at level 2 or 3
+MOST_FACES = 4_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class GeometricTexture:
+    """Generators of successive levels.
+
+    Attributes:
+        generators: of levels 0 to `levels` - 1.
+        template: the mesh that training started from, mean edge 1.
+        fixed: (V, 3) the noise on it from which the reference comes.
+        about: how it was made; `levels`, `noise` and `remeasure` at least.
+    """
+
+    generators: Sequence[FaceNetwork]
+    template: Mesh
+    fixed: torch.Tensor
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def levels(self) -> int:
+        return len(self.generators)
+
+    @staticmethod
+    def load(source: str | Path) -> GeometricTexture:
+        """Loads a model file or a run folder.
+
+        Raises:
+            CheckpointError: there is none, or it is damaged.
+        """
+        generators, template, fixed, about = files.load(source)
+        return GeometricTexture(generators, template, fixed, about)
+
+    def save(self, path: str | Path) -> Path:
+        """Writes the model file (safetensors)."""
+        return files.save(Path(path), list(self.generators), self.template, self.fixed, self.about)
+
+    def apply(
+        self, mesh: Mesh, *, seed: int = 0, start_level: int | None = None, end_level: int | None = None
+    ) -> Asset:
+        """Grows the texture on a mesh; every level after the first splits each face in four.
+
+        The size of the texture follows the mesh's mean edge, whatever its connectivity and genus.
+
+        Args:
+            mesh: any mesh; near-uniform edges give an even texture (`mitex.mesh.remesh`).
+            seed: of the noise.
+            start_level: generator to begin with; 2, or the last one, if None. Low levels change the shape.
+            end_level: the last generator; the last one trained if None.
+
+        Returns:
+            The displaced mesh in light grey, in the mesh's own units and place; UVs are interpolated.
+
+        Raises:
+            ConfigError: levels out of range, or too many faces.
+        """
+        course = self.course(mesh, start_level, end_level)
+        *_, last = course.run(course.noise(seed))
+        return clay(last)
+
+    def interpolate(
+        self,
+        mesh: Mesh,
+        seeds: tuple[int, int],
+        frames: int,
+        *,
+        start_level: int | None = None,
+        end_level: int | None = None,
+    ) -> Iterator[Mesh]:
+        """Meshes between those of two seeds: the noise goes along a great circle, so that its variance stays.
+
+        Args:
+            mesh, start_level, end_level: as in `apply`.
+            seeds: of the first and the last mesh.
+            frames: number of meshes, at least 2.
+        """
+        course = self.course(mesh, start_level, end_level)
+        first, last = (course.noise(seed) for seed in seeds)
+        for t in np.linspace(0, 1, frames):
+            *_, made = course.run([slerp(a, b, float(t)) for a, b in zip(first, last, strict=True)])
+            yield made
+
+    def generate(self, seed: int = 0, start_level: int = 0, end_level: int | None = None) -> Mesh:
+        """A variation of the reference itself, from the template.
+
+        Args:
+            seed: of the noise from `start_level` on; below it the reference's own global shape is rebuilt.
+            start_level, end_level: as in `apply`.
+        """
+        course = self.course(self.template, 0, end_level)
+        rebuilt = [self.fixed, *[torch.zeros(())] * (len(course.generators) - 1)]
+        noises = [*rebuilt[:start_level], *course.noise(seed)[start_level:]]
+        *_, made = course.run(noises)
+        return made
+
+    def growth(
+        self,
+        mesh: Mesh,
+        frames: int = 12,
+        *,
+        seed: int = 0,
+        start_level: int | None = None,
+        end_level: int | None = None,
+    ) -> Iterator[Mesh]:
+        """The texture growing on a mesh: `frames` meshes for each level, from undisplaced to displaced."""
+        course = self.course(mesh, start_level, end_level)
+        before = mesh
+        for level, after in enumerate(course.run(course.noise(seed))):
+            start = subdivide_midpoint(before) if level else before
+            for t in np.linspace(0, 1, frames + 1)[0 if level == 0 else 1 :]:
+                yield after.with_vertices(start.vertices + t * (after.vertices - start.vertices))
+            before = after
+
+    def course(self, mesh: Mesh, start_level: int | None, end_level: int | None) -> Course:
+        """What happens to a mesh between two levels.
+
+        Raises:
+            ConfigError: levels out of range, or too many faces.
+        """
+        last = self.levels - 1
+        end = last if end_level is None else end_level
+        start = min(START, end) if start_level is None else start_level
+        if not 0 <= start <= end <= last:
+            raise ConfigError(
+                f"levels {start} to {end} are out of range", f"this texture has the levels 0 to {last}"
+            )
+        faces = len(mesh.faces) * 4 ** (end - start)
+        if faces > MOST_FACES:
+            raise ConfigError(
+                f"{mesh.name} would have {faces:,} faces after level {end}",
+                f"stay below {MOST_FACES:,}: remesh it more coarsely, or use fewer levels",
+            )
+        keep_freed_memory()
+        generators = self.generators[start : end + 1]
+        hierarchy = Hierarchy.of(mesh, len(generators))
+        return Course(generators, hierarchy, float(self.about["noise"]), bool(self.about["remeasure"]))
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Generators about to be run on a mesh."""
+
+    generators: Sequence[FaceNetwork]
+    hierarchy: Hierarchy
+    spread: float
+    remeasure: bool
+
+    def noise(self, seed: int) -> list[torch.Tensor]:
+        """Noise (V, 3) for each level."""
+        drawn = torch.Generator().manual_seed(seed)
+        counts = [len(mesh.vertices) for mesh in self.hierarchy.meshes]
+        return [self.spread * torch.randn(count, 3, generator=drawn) for count in counts]
+
+    @torch.no_grad()
+    def run(self, noises: Sequence[torch.Tensor]) -> Iterator[Mesh]:
+        """The mesh after each level, in its own units and place."""
+        mesh, graph = self.hierarchy.meshes[0], self.hierarchy.graphs[0]
+        centre = mesh.vertices.mean(0, dtype=np.float64)
+        centred = torch.from_numpy((mesh.vertices - centre).astype(np.float32))
+        unit = float(mean_edge(centred, graph))
+        steps = grow(self.generators, self.hierarchy, centred / unit, noises, self.remeasure)
+        for level, vertices in enumerate(steps):
+            placed = vertices.numpy().astype(np.float64) * (unit / 2**level) + centre
+            yield self.hierarchy.meshes[level].with_vertices(placed)
+
+
+def slerp(a: torch.Tensor, b: torch.Tensor, t: float) -> torch.Tensor:
+    """From a (t = 0) to b (t = 1) along the great circle through their directions (Shoemake 1985)."""
+    norms = a.norm() * b.norm()
+    angle = torch.arccos((a * b).sum().div(norms.clamp_min(1e-12)).clamp(-1, 1))
+    if angle < 1e-4:
+        return torch.lerp(a, b, t)
+    return (torch.sin((1 - t) * angle) * a + torch.sin(t * angle) * b) / torch.sin(angle)

@@ -1,0 +1,50 @@
+"""Self-intersections: edges that pierce a face of the same mesh."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mitex.mesh import Mesh
+from mitex.mesh.topology import mesh_edges
+from mitex.runtime import init, load_mitsuba
+from mitex.scenes.stage import mesh_shape
+
+mi: Any = load_mitsuba(needs_llvm=False)
+
+PAST = 1e-4  # part of an edge by which a ray goes on behind a face that it may touch
+
+
+def crossing_edges(mesh: Mesh) -> np.ndarray:
+    """(E, 2) int64 vertex pairs of the edges that pierce a face not their own, found by rays along them.
+
+    Two faces that cross have at least one such edge; faces that lie in one plane are not found.
+    """
+    init()
+    scene = mi.load_dict({"type": "scene", "mesh": mesh_shape(mesh)})
+    pairs, _ = mesh_edges(mesh.faces, len(mesh.vertices))
+    start, end = (mesh.vertices[pairs[:, k]] for k in range(2))
+    crossing = np.zeros(len(pairs), bool)
+    left, begun = np.arange(len(pairs)), np.full(len(pairs), PAST, np.float32)
+    while len(left):
+        hit, face, t = _first(scene, start[left], end[left], begun)
+        face, t = face[hit], t[hit]
+        corners = mesh.faces[face]
+        own = (corners[:, :, None] == pairs[left[hit]][:, None]).any((1, 2))
+        crossing[left[hit][~own]] = True
+        left, begun = left[hit][own], np.nextafter(t[own] + PAST, np.float32(2))
+    return pairs[crossing]
+
+
+def _first(
+    scene: Any, start: np.ndarray, end: np.ndarray, begun: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of edges, from the part `begun` on: whether a face is hit, which one, and at what part."""
+    way = end - start
+    origin = mi.Point3f(np.ascontiguousarray((start + begun[:, None] * way).T))
+    ray = mi.Ray3f(origin, mi.Vector3f(np.ascontiguousarray(way.T)))
+    ray.maxt = mi.Float(np.maximum(1 - PAST - begun, 0))
+    found = scene.ray_intersect_preliminary(ray)
+    hit, face, t = (np.asarray(a) for a in (found.is_valid(), found.prim_index, found.t))
+    return hit.astype(bool), face, begun + t
