@@ -4,17 +4,18 @@ usage: python tools/make_surface_gallery.py EXEMPLARS MESHES RUNS SHEET MESH=EXE
            [SETTING=VALUE ...]
 
 EXEMPLARS and MESHES are folders; names of embedded ones work too, and the exemplar `letters` is drawn. MESH^N
-is MESH with all faces split in four N times, MESH~N a coarse copy with N faces, and `scene` is made up. RUNS
-is where the run folders go: finished ones are used again, begun ones go on. The sheet goes to
-docs/gallery/SHEET.jpg, a row for each exemplar: itself, and the mesh from two sides, or one side of each of
-its meshes or variants, in the order that they are given; the ratio across seams is printed. Settings change
-the synthesis, of one MESH=EXEMPLAR or of all (`resolution=512`, `pictures=1`, ...); `maps=albedo` leaves out
-other maps, `content=ao` transfers the style.
+is MESH with all faces split in four N times, MESH~N a remeshed copy with N faces (MESH~N^M: split afterwards),
+and `scene` is made up. RUNS is where the run folders go: finished ones are used again, begun ones go on. The
+sheet goes to docs/gallery/SHEET.jpg, a row for each exemplar: itself, and the mesh from two sides, or one side
+of each of its meshes or variants, in the order that they are given; the ratio across seams is printed.
+Settings change the synthesis, of one MESH=EXEMPLAR or of all (`resolution=512`, `pictures=1`, ...);
+`maps=albedo` leaves out other maps, `content=ao` transfers the style.
 """
 
 from __future__ import annotations
 
 import math
+import re
 import sys
 from dataclasses import fields, replace
 from pathlib import Path
@@ -25,7 +26,7 @@ from PIL import Image, ImageDraw, ImageFont
 from mitex.exemplar import Exemplar
 from mitex.exemplar import names as exemplar_names
 from mitex.images import write_image
-from mitex.mesh import Mesh, embedded_names, grid, subdivide_midpoint
+from mitex.mesh import Mesh, embedded_names, grid, remesh, subdivide_midpoint
 from mitex.mesh.topology import welded
 from mitex.methods import surface
 from mitex.methods.surface.seams import seam_ratio
@@ -75,14 +76,12 @@ def find_mesh(name: str, meshes: Path) -> Mesh:
     """A mesh by the name that the command line gives it."""
     if name == "scene":
         return scene(meshes)
-    base = name.split("^")[0].split("~")[0]
+    base = re.split(r"[~^]", name)[0]
     mesh = Mesh.load(base if base in embedded_names() else meshes / f"{base}.obj")
-    if "^" in name:
-        mesh = subdivide_midpoint(mesh, int(name.split("^")[1]))
-    if "~" in name:
-        from mitex.mesh import remesh
-
-        mesh = remesh(mesh, int(name.split("~")[1]) // 2)
+    if coarse := re.search(r"~(\d+)", name):
+        mesh = remesh(mesh, int(coarse[1]) // 2)
+    if split := re.search(r"\^(\d+)", name):
+        mesh = subdivide_midpoint(mesh, int(split[1]))
     return replace(mesh, name=name)
 
 
@@ -132,9 +131,11 @@ def main() -> None:
             cells.append(exemplar.resized(CELL).maps["albedo"])
             labels.append(f"exemplar {exemplar.name}")
         cells += pictures(made, 1 if several else 2)
-        labels += [" ".join(own) or "default"] if variants else [mesh.name, "the other side"][: 2 - several]
+        shown = own if variants else [mesh.name, *own]
+        labels += [" ".join(shown) or "default", *["the other side"] * (not several)]
         last = exemplar_name
-    columns = 3 if variants or not several else 1 + len({mesh for mesh, _ in pairs})
+    one = len({exemplar for _, exemplar in pairs}) == 1
+    columns = 3 if one or not several else 1 + len({mesh for mesh, _ in pairs})
     write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=columns, labels=labels, cell=CELL))
 
 
