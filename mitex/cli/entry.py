@@ -23,6 +23,7 @@ COMMANDS = {
     "demo": ("demo:Demo", "learn, apply, render and export a texture in a few minutes"),
     "fit nca": ("fit_nca:FitNca", "learn a living texture from an image or PBR maps (MeshNCA)"),
     "fit surface": ("fit_surface:FitSurface", "synthesize a texture on one mesh (tangent-space CNN)"),
+    "fit geometric": ("fit_geometric:FitGeometric", "learn the relief of a mesh (face-convolution GAN)"),
     "apply": ("apply:Apply", "put a learned texture on a mesh"),
     "render": ("render:Render", "path-trace an asset: a still or a turntable"),
     "models": ("models:Models", "list the textures that ship with Mitex"),

@@ -9,11 +9,11 @@ from typing import Annotated
 from tyro.conf import arg
 
 from mitex.cli.checks import not_both
-from mitex.cli.fitting import Fitting
+from mitex.cli.fitting import ExemplarFitting
 
 
 @dataclass(kw_only=True)
-class FitNca(Fitting):
+class FitNca(ExemplarFitting):
     """Learn a texture from an image or a set of PBR maps with a neural cellular automaton (MeshNCA).
 
     The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl and previews; Ctrl-C saves, and

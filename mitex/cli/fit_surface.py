@@ -8,11 +8,11 @@ from typing import Annotated
 
 from tyro.conf import arg
 
-from mitex.cli.fitting import Fitting
+from mitex.cli.fitting import ExemplarFitting
 
 
 @dataclass(kw_only=True)
-class FitSurface(Fitting):
+class FitSurface(ExemplarFitting):
     """Synthesize a texture directly on one mesh, without views and without seams (tangent-space CNN).
 
     The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the texture;

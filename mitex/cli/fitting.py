@@ -15,12 +15,6 @@ from mitex.cli.checks import SEEDS, in_range, settings
 class Fitting:
     """Options shared by the methods' commands."""
 
-    exemplar: Annotated[str, arg(metavar="IMAGE|DIR|NAME")]
-    """PNG or JPEG, a folder with any of albedo, height, normal, roughness, ambient_occlusion, or a name."""
-
-    out: Annotated[Path | None, arg(metavar="RUN", help_behavior_hint="(default: runs/EXEMPLAR)")] = None
-    """Run folder."""
-
     config: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None
     """TOML file with any of the settings, or a run's config.toml."""
 
@@ -48,3 +42,14 @@ class Fitting:
         in_range("--seed", self.seed, *SEEDS)
         in_range("--steps", self.steps, 1)
         return settings(self.set, seed=self.seed, steps=self.steps, **flags)
+
+
+@dataclass(kw_only=True)
+class ExemplarFitting(Fitting):
+    """Options of the methods that learn from images."""
+
+    exemplar: Annotated[str, arg(metavar="IMAGE|DIR|NAME")]
+    """PNG or JPEG, a folder with any of albedo, height, normal, roughness, ambient_occlusion, or a name."""
+
+    out: Annotated[Path | None, arg(metavar="RUN", help_behavior_hint="(default: runs/EXEMPLAR)")] = None
+    """Run folder."""
