@@ -18,6 +18,11 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".glb", ".obj", ".ply", ".exr")
 RESOLUTION = 1024
+OPTIONS = {  # those that mean something, by method
+    "nca": ("seed", "steps", "subdivide", "orientation", "scale", "resolution", "vertex_colors"),
+    "surface": (),
+    "geometric": ("seed", "start_level", "end_level", "remesh"),
+}
 
 
 @dataclass
@@ -32,6 +37,7 @@ class Apply:
       mitex apply pebbles --mesh bunny.obj --out bunny.glb --subdivide 2 --resolution 2048
       mitex apply pebbles --mesh scan.ply --out scan.glb --vertex-colors --seed 7 --orientation 45
       mitex apply runs/bunny --mesh bunny.obj --out bunny.glb   (of mitex fit surface: same mesh, no options)
+      mitex apply runs/spikes --mesh bunny.obj --out bunny.glb --remesh 2000   (of mitex fit geometric)
     """
 
     model: Annotated[Positional[str], arg(metavar="RUN|MODEL")]
@@ -64,6 +70,15 @@ class Apply:
     vertex_colors: Annotated[bool, arg(help_behavior_hint="")] = False
     """Write colours at the vertices instead of textures."""
 
+    start_level: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 2)")] = None
+    """Geometric textures: the generator to begin with; low ones change the shape."""
+
+    end_level: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the last)")] = None
+    """Geometric textures: the last generator; each one after the first splits every face in four."""
+
+    remesh: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None
+    """Geometric textures: give the mesh N even vertices first; fewer make the texture larger."""
+
     def run(self) -> None:
         self._subdivide()
         in_range("--seed", self.seed, *SEEDS)
@@ -71,6 +86,9 @@ class Apply:
         in_range("--orientation", self.orientation, -360.0, 360.0)
         in_range("--scale", self.scale, 0.05, 20.0)
         in_range("--resolution", self.resolution, 64, 8192)
+        in_range("--start-level", self.start_level, 0, 6)
+        in_range("--end-level", self.end_level, 0, 6)
+        in_range("--remesh", self.remesh, 12, 2_000_000)
         not_both("--resolution", "--vertex-colors", self.resolution is not None and self.vertex_colors)
         from mitex.paths import prepare_output
 
@@ -81,9 +99,24 @@ class Apply:
         from mitex.mesh import Mesh
 
         mesh = Mesh.load(self.mesh)
-        asset = self._synthesized(mesh) if self._belongs_to_a_mesh() else self._grown(mesh, suffix)
+        method = self._method()
+        if method == "nca":
+            asset = self._grown(mesh, suffix)
+        else:
+            asset = self._synthesized(mesh) if method == "surface" else self._displaced(mesh)
         asset.export(out)
         print(self.out)
+
+    def _method(self) -> str:
+        """The method that the model is of; options of others are refused."""
+        from mitex.methods.kind import kind
+
+        method = kind(self.model)
+        for name in sorted({name for names in OPTIONS.values() for name in names} - {*OPTIONS[method]}):
+            if getattr(self, name) != getattr(Apply, name, None):
+                option = f"--{name.replace('_', '-')}"
+                raise ConfigError(f"{option} means nothing for textures of {method}", f"leave {option} out")
+        return method
 
     def _grown(self, mesh: Mesh, suffix: str) -> Asset:
         """By a cellular automaton, on any mesh."""
@@ -104,20 +137,18 @@ class Apply:
 
     def _synthesized(self, mesh: Mesh) -> Asset:
         """A surface texture on the mesh that it was synthesized on."""
-        for name in ("seed", "steps", "subdivide", "orientation", "scale", "resolution", "vertex_colors"):
-            if getattr(self, name) != getattr(Apply, name, None):
-                option = f"--{name.replace('_', '-')}"
-                raise ConfigError(
-                    f"{option} means nothing for a surface texture, which is finished", f"leave {option} out"
-                )
         from mitex.methods.surface import SurfaceTexture
 
         return SurfaceTexture.load(self.model).apply(mesh)
 
-    def _belongs_to_a_mesh(self) -> bool:
-        from mitex.methods.surface.texture import is_texture
+    def _displaced(self, mesh: Mesh) -> Asset:
+        """By a geometric texture, on any mesh."""
+        from mitex.mesh import remesh
+        from mitex.methods.geometric import GeometricTexture
 
-        return is_texture(self.model)
+        texture = GeometricTexture.load(self.model)
+        even = mesh if self.remesh is None else remesh(mesh, self.remesh)
+        return texture.apply(even, seed=self.seed, start_level=self.start_level, end_level=self.end_level)
 
     def _subdivide(self) -> int | str:
         if self.subdivide == "auto":

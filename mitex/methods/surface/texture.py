@@ -24,7 +24,6 @@ from mitex.mesh import Mesh
 from mitex.methods.surface.frames import face_normals, tangent_frames, vertex_directions
 from mitex.methods.surface.texels import Texels
 from mitex.paths import atomic_write
-from mitex.training import checkpoint
 
 NAME = "texture.safetensors"
 FORMAT = "mitex-surface-1"
@@ -159,25 +158,6 @@ class SurfaceTexture:
         flat = face_normals(self.mesh)[texels.face]
         detail = decode(self.values[:, channels], right, up, flat) - flat + smooth
         return atlas_normals(self.mesh, atlas, spread(texels.image(detail), used, PADDING))
-
-
-def is_texture(source: str | Path) -> bool:
-    """Whether a path is a surface texture, or the run folder of one, finished or not."""
-    path = Path(source).expanduser()
-    try:
-        if not path.is_dir():
-            return path.is_file() and _metadata(path).get("format") == FORMAT
-        if (path / NAME).is_file():
-            return True
-        found = [path / name for name in (checkpoint.NAME, checkpoint.PREVIOUS) if (path / name).is_file()]
-        return bool(found) and _metadata(found[0]).get("task.method") == "surface"
-    except (OSError, ValueError, SafetensorError):
-        return False
-
-
-def _metadata(path: Path) -> dict[str, str]:
-    with safe_open(path, "pt") as file:
-        return file.metadata() or {}
 
 
 def same_surface(a: Mesh, b: Mesh) -> bool:

@@ -14,6 +14,7 @@ from mitex.exemplar import Exemplar
 from mitex.images import write_image
 from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods import surface
+from mitex.methods.kind import kind
 from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.content import content_colours
 from mitex.methods.surface.fit import find_levels, with_layout
@@ -21,7 +22,7 @@ from mitex.methods.surface.network import ALL_LAYERS
 from mitex.methods.surface.orientation import read_orientation
 from mitex.methods.surface.task import VIEW, SurfaceTask
 from mitex.methods.surface.texels import Texels, charts
-from mitex.methods.surface.texture import NAME, SurfaceTexture, is_texture
+from mitex.methods.surface.texture import NAME, SurfaceTexture
 from mitex.training import resolve
 from tests.methods.surface.grids import flat_square
 
@@ -93,7 +94,7 @@ def test_textures_agree_with_vertex_maps(made, mesh):
 def test_files_round_trip(made, mesh):
     folder, texture = made
     again = SurfaceTexture.load(folder)
-    assert is_texture(folder) and is_texture(folder / NAME) and not is_texture(folder / "config.toml")
+    assert kind(folder) == kind(folder / NAME) == "surface" and kind(folder / "config.toml") == "nca"
     assert np.abs(again.values - texture.values).max() < 1e-3 and again.maps == texture.maps
     assert np.array_equal(again.mesh.faces, mesh.faces) and again.about["steps"] == 12
     with pytest.raises(ConfigError, match="belongs to mesh 'icosphere6', not to 'icosphere5'; synthesize"):
@@ -113,7 +114,7 @@ def test_resuming_changes_nothing(mesh, exemplar, tmp_path):
         whole = surface.fit(exemplar, mesh, tmp_path / "whole", overrides=SMALL, quiet=True)
         part = [*SMALL, "steps=6"]
         surface.fit(exemplar, mesh, tmp_path / "part", overrides=part, quiet=True)
-        assert is_texture(tmp_path / "part")
+        assert kind(tmp_path / "part") == "surface"
         rest = surface.fit(exemplar, mesh, tmp_path / "part", overrides=["steps=12"], resume=True, quiet=True)
     finally:
         torch.set_num_threads(threads)

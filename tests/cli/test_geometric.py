@@ -1,0 +1,117 @@
+"""`mitex fit geometric`, and `mitex apply` of what it makes."""
+
+import pytest
+
+from mitex.cli import main
+from mitex.mesh import Mesh, icosphere
+from tests.cli import bad_files as bad
+from tests.cli.refusals import check_refused
+
+QUICK = "--quiet --set steps=4 level_steps=2 fit_steps=20 fit_samples=200 checkpoint_every=2 preview_every=0"
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path_factory, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+
+
+def fit(words=QUICK, reference="good.obj", out="out/run"):
+    return f"fit geometric --reference {reference} --out {out} {words}".split()
+
+
+@pytest.fixture
+def run(files, capsys):
+    assert main(fit()) == 0
+    assert capsys.readouterr().out.strip() == "out/run"
+    return files / "out" / "run"
+
+
+def apply(words="", mesh="good.obj"):
+    return f"apply out/run --mesh {mesh} --out out/a.ply {words}".split()
+
+
+def test_fit_apply_render(files, run):
+    assert main(apply("--start-level 0 --end-level 1 --seed 3")) == 0
+    assert len(Mesh.load(files / "out" / "a.ply").faces) == 4 * 12
+    assert main(["render", "out/a.ply", "--out", "out/a.png", "--size", "32", "--spp", "1"]) == 0
+
+
+def test_further_levels_by_resuming(files, run):
+    assert main(fit("--resume --quiet --steps 6")) == 0
+    assert main(apply("--start-level 0 --end-level 2")) == 0
+    assert len(Mesh.load(files / "out" / "a.ply").faces) == 16 * 12
+
+
+def test_remeshing_first(files, run):
+    pytest.importorskip("pymeshlab")
+    assert main(apply("--remesh 200 --start-level 1")) == 0
+    assert 150 < len(Mesh.load(files / "out" / "a.ply").vertices) < 260
+
+
+BAD_FITS = {
+    "no options": ("fit geometric", "--reference is missing"),
+    "missing reference": (fit(reference="none.obj"), "none.obj"),
+    "misspelt reference": (fit(reference="spike"), "spike"),
+    "empty reference": (fit(reference="empty.obj"), "empty.obj"),
+    "non-manifold reference": (fit(reference="fan.obj"), "repair it"),
+    "inconsistent winding": (fit(reference="wound.obj"), "repair it"),
+    "reference without area": (fit(reference="flat.obj"), "degenerate"),
+    "template of another genus": (
+        fit(f"--template octopus {QUICK}", reference="warts"),
+        "--template of the same",
+    ),
+    "missing template": (fit(f"--template none.obj {QUICK}"), "none.obj"),
+    "too many levels": (fit("--quiet --steps 100 --set level_steps=1"), "levels"),
+    "unknown key": (fit("--quiet --set level_step=1"), "level_steps"),
+    "unknown preset": (fit("--quiet --preset quick"), "quick"),
+    "negative noise": (fit("--quiet --set noise=-1"), "noise"),
+    "an exemplar": (fit("--exemplar good.png"), "--exemplar"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FITS)
+def test_bad_fits(files, name, capsys):
+    bad.text(files / "empty.obj", "")
+    bad.text(files / "fan.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nf 1 2 3\nf 2 1 4\nf 1 2 5\n")
+    bad.text(files / "wound.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 3 4\n")
+    bad.text(files / "flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
+    words, message = BAD_FITS[name]
+    check_refused(files, words.split() if isinstance(words, str) else words, message, capsys)
+
+
+BAD_APPLIES = {
+    "level beyond": ("--end-level 5", "this texture has the levels 0 to 1"),
+    "level below": ("--start-level -1", "--start-level"),
+    "levels in reverse": ("--start-level 1 --end-level 0", "out of range"),
+    "orientation": ("--orientation 30", "--orientation means nothing"),
+    "steps": ("--steps 10", "--steps means nothing"),
+    "few vertices": ("--remesh 3", "--remesh"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_APPLIES)
+def test_bad_applies(files, run, name, capsys):
+    words, message = BAD_APPLIES[name]
+    check_refused(files, apply(words), message, capsys)
+
+
+def test_options_of_geometric_textures_mean_nothing_to_others(files, capsys):
+    words = ["apply", "cobblestone", "--mesh", "good.obj", "--out", "out/a.glb", "--start-level", "1"]
+    check_refused(files, words, "--start-level means nothing for textures of nca", capsys)
+
+
+def test_too_many_faces(files, run, capsys):
+    ball = icosphere(250)
+    lines = [f"v {x} {y} {z}" for x, y, z in ball.vertices] + [f"f {a} {b} {c}" for a, b, c in ball.faces + 1]
+    bad.text(files / "fine.obj", "\n".join(lines))
+    check_refused(files, apply("--start-level 0", mesh="fine.obj"), "remesh it more coarsely", capsys)
+
+
+def test_an_unfinished_run(files, run, capsys):
+    (run / "geometry.safetensors").unlink()
+    check_refused(files, apply(), "--resume", capsys)
+
+
+def test_a_damaged_model(files, run, capsys):
+    bad.cut(run / "geometry.safetensors")
+    check_refused(files, apply(), "geometric texture", capsys)

@@ -1,0 +1,274 @@
+"""A small real training, its model, and growing it on other meshes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from mitex.errors import CheckpointError, ConfigError
+from mitex.mesh import Mesh, grid, icosphere, subdivide_midpoint, torus
+from mitex.methods import geometric
+from mitex.methods.geometric import files
+from mitex.methods.geometric.config import PRESETS, GeometricConfig
+from mitex.methods.geometric.hierarchy import Hierarchy
+from mitex.methods.geometric.task import GeometricTask, learning_rate
+from mitex.methods.geometric.texture import GeometricTexture, slerp
+from mitex.methods.kind import kind
+from mitex.training import checkpoint
+from tests.shapes import fan, moebius
+
+SMALL = [
+    "steps=9",
+    "level_steps=3",
+    "fit_steps=40",
+    "fit_samples=300",
+    "checkpoint_every=4",
+    "preview_every=0",
+]
+
+
+def bumpy() -> Mesh:
+    ball = icosphere(12)
+    height = 1 + 0.15 * np.sin(7 * ball.vertices).prod(1, keepdims=True)
+    return replace(ball.with_vertices(ball.vertices * height), name="bumpy")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def cache(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs") / "bumpy"
+    return folder, geometric.fit(bumpy(), folder, overrides=SMALL, quiet=True)
+
+
+def small_task(**changes) -> GeometricTask:
+    config = replace(GeometricConfig(steps=9, level_steps=3), **changes)
+    ball = icosphere(1)
+    hierarchy = Hierarchy.of(ball, config.levels)
+    drawn = torch.Generator().manual_seed(4)
+    meshes = [
+        torch.from_numpy(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=drawn)
+        for k, mesh in enumerate(hierarchy.meshes)
+    ]
+    return GeometricTask(config, hierarchy, torch.from_numpy(ball.vertices), meshes, "ball")
+
+
+def test_the_run_folder(made):
+    folder, texture = made
+    assert {p.name for p in folder.iterdir()} >= {"config.toml", "metrics.jsonl", checkpoint.NAME, files.NAME}
+    assert kind(folder) == kind(folder / files.NAME) == "geometric"
+    assert texture.levels == 3 and texture.about["steps"] == 9
+    assert [level["faces"] for level in texture.about["fit"]] == [20, 80, 320]
+
+
+def test_models_round_trip(made):
+    folder, texture = made
+    again = GeometricTexture.load(folder)
+    assert dict(again.about) == dict(texture.about)
+    mesh = icosphere(4)
+    for seed in (0, 1):
+        a, b = (t.apply(mesh, seed=seed).mesh.vertices for t in (texture, again))
+        assert np.array_equal(a, b)
+
+
+@pytest.mark.parametrize("damage", ["cut", "foreign", "nan", "missing"])
+def test_what_is_no_model_is_refused(made, tmp_path, damage):
+    from safetensors.torch import load_file, save_file
+
+    source = made[0] / files.NAME
+    path = tmp_path / files.NAME
+    if damage == "cut":
+        path.write_bytes(source.read_bytes()[:-100])
+    elif damage == "foreign":
+        save_file({"x": torch.zeros(3)}, path)
+    elif damage == "nan":
+        texture = GeometricTexture.load(source)
+        with torch.no_grad():
+            texture.generators[0].parameters[0][0, 0] = torch.nan
+        texture.save(path)
+        assert load_file(path)
+    with pytest.raises(CheckpointError, match="geometric texture"):
+        GeometricTexture.load(tmp_path)
+
+
+def test_the_mesh_is_split_on_every_level_but_the_first(made):
+    mesh = torus(12, 6)
+    for start, end, factor in ((0, 2, 16), (1, 2, 4), (2, 2, 1), (0, 0, 1)):
+        asset = made[1].apply(mesh, start_level=start, end_level=end)
+        assert len(asset.mesh.faces) == factor * len(mesh.faces)
+        assert np.array_equal(asset.mesh.faces, subdivide_midpoint(mesh, end - start).faces)
+
+
+def test_results_keep_place_and_size(made):
+    """Scaling and moving the mesh scales and moves the result; the noise decides the rest."""
+    mesh = icosphere(6)
+    a = made[1].apply(mesh, seed=3).mesh.vertices
+    b = made[1].apply(mesh.with_vertices(5 * mesh.vertices + [1, 2, 3]), seed=3).mesh.vertices
+    assert np.allclose(5 * a + [1, 2, 3], b, atol=2e-3)
+    assert not np.allclose(a, made[1].apply(mesh, seed=4).mesh.vertices, atol=1e-4)
+
+
+def test_uvs_are_interpolated(made):
+    mesh = grid(6, 6)
+    asset = made[1].apply(mesh, start_level=1)
+    expected = subdivide_midpoint(mesh).uv
+    assert asset.mesh.uv is not None and expected is not None and np.array_equal(asset.mesh.uv, expected)
+
+
+@pytest.mark.parametrize("mesh", [grid(5, 4), moebius(), fan(), torus(8, 4)])
+def test_open_and_unsound_meshes_are_displaced(made, mesh):
+    moved = made[1].apply(mesh, start_level=1).mesh
+    assert np.isfinite(moved.vertices).all()
+    assert not np.allclose(moved.vertices, subdivide_midpoint(mesh).vertices)
+
+
+def test_two_components_are_displaced_alike(made):
+    """Without noise: the instance norm is taken over both."""
+    ball = bumpy()
+    two = Mesh(
+        np.concatenate([ball.vertices, ball.vertices + [3.0, 0, 0]]),
+        np.concatenate([ball.faces, ball.faces + len(ball.vertices)]),
+    )
+    moved = replace_about(made[1], noise=0.0).apply(two, start_level=2).mesh.vertices
+    count = len(ball.vertices)
+    assert np.allclose(moved[:count] + [3.0, 0, 0], moved[count:], atol=1e-3)
+    assert not np.allclose(moved, two.vertices, atol=1e-2)
+
+
+def replace_about(texture: GeometricTexture, **changes) -> GeometricTexture:
+    return replace(texture, about={**texture.about, **changes})
+
+
+@pytest.mark.parametrize(("start", "end"), [(-1, 2), (2, 1), (0, 3), (3, None)])
+def test_levels_out_of_range(made, start, end):
+    with pytest.raises(ConfigError, match="this texture has the levels 0 to 2"):
+        made[1].apply(icosphere(2), start_level=start, end_level=end)
+
+
+def test_too_many_faces(made):
+    with pytest.raises(ConfigError, match="remesh it more coarsely"):
+        made[1].apply(icosphere(120), start_level=0)
+
+
+def test_growth_starts_at_the_mesh_and_ends_at_the_result(made):
+    mesh = icosphere(3)
+    shown = list(made[1].growth(mesh, frames=4, seed=2, start_level=1))
+    assert [len(m.faces) for m in shown] == [180] * 5 + [720] * 4
+    assert np.array_equal(shown[0].vertices, mesh.vertices)
+    assert np.allclose(shown[-1].vertices, made[1].apply(mesh, seed=2, start_level=1).mesh.vertices)
+
+
+def test_interpolation_joins_two_seeds(made):
+    mesh = icosphere(3)
+    shown = list(made[1].interpolate(mesh, (0, 1), 5))
+    ends = [made[1].apply(mesh, seed=seed).mesh.vertices for seed in (0, 1)]
+    assert np.allclose(shown[0].vertices, ends[0], atol=1e-5)
+    assert np.allclose(shown[-1].vertices, ends[1], atol=1e-5)
+    assert not np.allclose(shown[2].vertices, ends[0], atol=1e-4)
+
+
+def test_the_great_circle_keeps_the_variance():
+    a, b = (torch.randn(5000, 3, generator=torch.Generator().manual_seed(k)) for k in range(2))
+    for t in (0.0, 0.3, 0.5, 1.0):
+        assert float(slerp(a, b, t).std()) == pytest.approx(1, abs=0.03)
+    assert float(torch.lerp(a, b, 0.5).std()) < 0.75
+    assert torch.allclose(slerp(a, a, 0.4), a)
+
+
+def test_variations_of_the_reference(made):
+    first, second = (made[1].generate(seed) for seed in (0, 1))
+    assert len(first.faces) == 320 and not np.allclose(first.vertices, second.vertices, atol=1e-4)
+    # From a level on that does not exist nothing is random: the reconstruction.
+    kept = [made[1].generate(seed, start_level=3).vertices for seed in (0, 1)]
+    assert np.array_equal(kept[0], kept[1])
+
+
+def test_resuming_changes_nothing(tmp_path):
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        whole = geometric.fit(bumpy(), tmp_path / "whole", overrides=SMALL, quiet=True)
+        part = [*SMALL, "steps=4"]
+        # As many levels from the start: what is trained must not depend on where a run was cut.
+        geometric.fit(bumpy(), tmp_path / "part", overrides=part, quiet=True)
+        more = geometric.fit(bumpy(), tmp_path / "part", overrides=["steps=9"], resume=True, quiet=True)
+    finally:
+        torch.set_num_threads(threads)
+    for a, b in zip(whole.generators, more.generators, strict=True):
+        assert all(torch.equal(p, q) for p, q in zip(a.parameters, b.parameters, strict=True))
+
+
+def test_each_step_trains_the_generator_of_its_level():
+    task = small_task()
+    drawn = torch.Generator().manual_seed(0)
+    for step, level in ((0, 0), (2, 0), (3, 1), (8, 2)):
+        for parameter in task.parameters:
+            parameter.grad = None
+        loss, record = task.loss(step, drawn)
+        loss.backward()
+        assert record["level"] == level
+        for k, generator in enumerate(task.generators):
+            assert all((p.grad is not None) == (k == level) for p in generator.parameters)
+
+
+def test_critics_take_turns():
+    task = small_task(critic_steps=2, generator_steps=3)
+    drawn = torch.Generator().manual_seed(0)
+    trained = ["critic" in task.loss(step, drawn)[1] for step in range(6)]
+    assert sum(trained) == 4 and trained[:3] == trained[3:]
+    often = small_task(critic_steps=5, generator_steps=1)
+    before = often.critics[0].parameters[0].clone()
+    often.loss(0, drawn)
+    assert often.optimizers[0].counts == [5] * len(often.critics[0].parameters)
+    assert not torch.equal(before, often.critics[0].parameters[0])
+
+
+def test_weights_are_carried_up():
+    task = small_task(steps=5, level_steps=1, carried=3)
+    drawn = torch.Generator().manual_seed(0)
+    second = [p.detach().clone() for p in task.generators[2].parameters]
+    task.loss(2, drawn)
+    assert all(torch.equal(p, q) for p, q in zip(task.generators[2].parameters, second, strict=True))
+    task.loss(3, drawn)
+    for p, q in zip(task.generators[3].parameters, task.generators[2].parameters, strict=True):
+        assert torch.equal(p, q)
+
+
+def test_the_reconstruction_comes_near():
+    """Without a critic's pull the generator learns the one mesh from the fixed noise."""
+    task = small_task(steps=300, level_steps=300, reconstruction=100.0, lr=5e-3)
+    from mitex.training.optim import Adam
+
+    optimizer, drawn = Adam(task.parameters), torch.Generator().manual_seed(0)
+    errors = []
+    for step in range(120):
+        optimizer.clear()
+        loss, record = task.loss(step, drawn)
+        loss.backward()
+        optimizer.step(5e-3)
+        errors.append(record["reconstruction"])
+    assert np.mean(errors[-10:]) < 0.4 * errors[0]
+
+
+def test_the_learning_rate_is_halved_on_each_level():
+    config = GeometricConfig(steps=30, level_steps=8, lr=1.0)
+    rates = [learning_rate(config, step) for step in range(10)]
+    assert rates == [1, 1, 0.5, 0.5, 0.25, 0.25, 0.125, 0.125, 1, 1]
+
+
+def test_settings():
+    assert PRESETS["paper"].levels == 5 and PRESETS["fast"].levels == 5
+    assert GeometricConfig(steps=42_000).levels == 7
+    with pytest.raises(ConfigError, match="8 levels; set steps to 42000 or less"):
+        GeometricConfig(steps=42_001)
+
+
+def test_previews(made):
+    task = small_task()
+    assert task.preview(9).shape == (256, 4 * 256, 3)
