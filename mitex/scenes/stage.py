@@ -204,17 +204,18 @@ class Stage:
         return hit.torch(), triangle.torch().view(torch.int32), u.torch(), v.torch()
 
 
-def mesh_shape(mesh: Mesh, bsdf: Any = None) -> Any:
-    """A Mitsuba mesh with the vertices and faces of `mesh`, without UVs and vertex normals.
+def mesh_shape(mesh: Mesh, bsdf: Any = None, smooth: bool = False) -> Any:
+    """A Mitsuba mesh with the vertices and faces of `mesh`, without UVs.
 
     Args:
         mesh: the mesh.
         bsdf: a loaded Mitsuba BSDF, or None for the default one.
+        smooth: shade with vertex normals, which Mitsuba finds and keeps up when vertices move.
     """
     props = mi.Properties()
     if bsdf is not None:
         props["bsdf"] = bsdf
-    shape = mi.Mesh(mesh.name, len(mesh.vertices), len(mesh.faces), props)
+    shape = mi.Mesh(mesh.name, len(mesh.vertices), len(mesh.faces), has_vertex_normals=smooth, props=props)
     params = mi.traverse(shape)
     params["vertex_positions"] = mesh.vertices.ravel()
     params["faces"] = mesh.faces.astype(np.uint32).ravel()

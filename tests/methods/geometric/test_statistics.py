@@ -14,9 +14,8 @@ def test_a_plane():
     inner = (np.abs(points[:, :2]) < 0.99).all(1)
     assert np.allclose(found["curvature"][inner], 0, atol=1e-9)
     assert found["edges"].mean() == pytest.approx(1)
-    assert np.ptp(found["edges"]) == pytest.approx(
-        (np.sqrt(2) - 1) / ((16 * 9 / 8 + 8 * np.sqrt(2)) / 26), rel=0.01
-    )
+    mean = (144 + 64 * np.sqrt(2)) / 208  # sides and diagonals, in cells
+    assert np.ptp(found["edges"]) == pytest.approx((np.sqrt(2) - 1) / mean, rel=1e-5)
 
 
 @pytest.mark.parametrize("radius", [0.1, 1.0, 30.0])

@@ -1,0 +1,61 @@
+"""Derivatives of images with respect to vertices."""
+
+import numpy as np
+import pytest
+import torch
+
+from mitex.errors import ConfigError
+from mitex.integrators.geometry import GeometryRenderer
+from mitex.mesh import icosphere
+from mitex.scenes.cameras import orbit
+
+
+@pytest.fixture(scope="module")
+def renderer():
+    return GeometryRenderer(icosphere(8), orbit(2, resolution=32), samples=1024, gradient_samples=1024)
+
+
+def weighted(images: torch.Tensor) -> torch.Tensor:
+    """A number that depends on where in the pictures something is."""
+    ramp = torch.linspace(0, 1, images.shape[2])
+    return (images * ramp[:, None]).mean()
+
+
+def inner(images: torch.Tensor) -> torch.Tensor:
+    """The brightness well inside the outlines: only shading changes it."""
+    return images[0, 12:20, 12:20].mean()
+
+
+MOVES = {
+    "larger": (lambda v: v, weighted),
+    "sideways": (lambda v: torch.tensor([1.0, 0.0, 0.0]).expand_as(v), weighted),
+    "taller": (lambda v: v * torch.tensor([0.0, 1.0, 0.0]), weighted),
+    "slanted": (lambda v: torch.tensor([0.0, 0.0, 1.0]) * v[:, 1:2], inner),
+}
+
+
+@pytest.mark.parametrize("name", MOVES)
+def test_derivatives_by_finite_differences(renderer, name):
+    start = torch.from_numpy(icosphere(8).vertices)
+    move, measure = MOVES[name]
+    way, step = move(start), 0.03
+    vertices = start.clone().requires_grad_()
+    measure(renderer.render(vertices, seed=3)).backward()
+    assert vertices.grad is not None
+    found = float((vertices.grad * way).sum())
+    values = [float(measure(renderer.render(start + sign * step * way, seed=3))) for sign in (1, -1)]
+    expected = (values[0] - values[1]) / (2 * step)
+    assert abs(expected) > 5e-3
+    assert found == pytest.approx(expected, rel=0.08)
+
+
+def test_images_come_without_a_graph_too(renderer):
+    images = renderer.render(torch.from_numpy(icosphere(8).vertices))
+    assert images.shape == (2, 32, 32, 3) and not images.requires_grad
+    assert float(images.min()) >= 0 and np.ptp(images.numpy()) > 0.1
+
+
+@pytest.mark.parametrize("vertices", [torch.zeros(3, 3), torch.zeros(642, 3, dtype=torch.float64)])
+def test_other_vertices_are_refused(renderer, vertices):
+    with pytest.raises(ConfigError, match=r"float32 tensor of shape \(162, 3\)"):
+        renderer.render(vertices)
