@@ -11,7 +11,7 @@ from mitex.errors import ConfigError
 
 @pytest.mark.parametrize("value", [None, 1, 2.5, 10])
 def test_in_range_passes(value):
-    in_range("--x", value, 1, 10)
+    assert in_range("--x", value, 1, 10) is None
 
 
 @pytest.mark.parametrize("value", [0.999, 10.1, -1, math.nan, math.inf, -math.inf])
