@@ -86,18 +86,19 @@ class GeometryRenderer:
 
     def pull_back(self, vertices: np.ndarray, gradient: np.ndarray, seed: int) -> np.ndarray:
         """(V, 3) gradient of the vertices, given that of the images (K, H, W, 3)."""
-        positions = mi.Float(vertices.ravel())
-        dr.enable_grad(positions)
-        self._move(positions)
-        integrator = self.scene.integrator()
+        integrator, found = self.scene.integrator(), np.zeros(vertices.size, np.float32)
         for k, sensor in enumerate(self.sensors):
+            # One leaf for each view: a backward pass clears the way from the normals to the positions.
+            positions = mi.Float(vertices.ravel())
+            dr.enable_grad(positions)
+            self._move(positions)
             given = mi.TensorXf(np.ascontiguousarray(gradient[k]))
             integrator.render_backward(
                 self.scene, self._params, given, sensor, seed + k, self.gradient_samples
             )
-        found = np.asarray(dr.grad(positions)).reshape(vertices.shape)
-        self._move(dr.detach(positions))
-        return found
+            found += np.asarray(dr.grad(positions))
+            self._move(dr.detach(positions))
+        return found.reshape(vertices.shape)
 
     def _move(self, positions: Any) -> None:
         self._params[self._key] = positions

@@ -24,6 +24,8 @@ def weighted(images: torch.Tensor) -> torch.Tensor:
 MOVES = {
     "larger": lambda v: v,
     "sideways": lambda v: torch.tensor([1.0, 0.0, 0.0]).expand_as(v),
+    "taller": lambda v: v * torch.tensor([0.0, 1.0, 0.0]),
+    "slanted": lambda v: torch.tensor([0.0, 0.0, 0.5]) * v[:, 1:2],
 }
 
 
