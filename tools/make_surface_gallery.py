@@ -37,7 +37,7 @@ from mitex.training import checkpoint
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 SIDES = {"scene": (25, 65)}  # azimuths [degrees]
 OTHER_SIDES = (20, 200)
-CELL = 272
+CELL, SMALL = 272, 200  # sides of pictures [px], in rows of three and longer ones
 KEYS = {field.name for field in fields(surface.SurfaceConfig)} | {"maps", "content"}
 
 
@@ -106,10 +106,10 @@ def texture(exemplar: Exemplar, mesh: Mesh, run: Path, settings: dict[str, str])
     )
 
 
-def pictures(made: surface.SurfaceTexture, count: int) -> list[np.ndarray]:
-    """The mesh from `count` of its sides."""
+def pictures(made: surface.SurfaceTexture, count: int, side: int) -> list[np.ndarray]:
+    """The mesh from `count` of its sides, each picture with `side` pixels in rows and columns."""
     asset, sides = made.apply(), SIDES.get(made.mesh.name, OTHER_SIDES)[:count]
-    return [tone(still(asset, resolution=CELL, spp=64, azimuth=math.radians(a))) for a in sides]
+    return [tone(still(asset, resolution=side, spp=64, azimuth=math.radians(a))) for a in sides]
 
 
 def main() -> None:
@@ -119,6 +119,9 @@ def main() -> None:
     pairs = [pair.split("=") for pair, *_ in rows]
     several = len({exemplar for _, exemplar in pairs}) < len(pairs)  # results of an exemplar: one side each
     variants = several and len({mesh for mesh, _ in pairs}) == 1
+    one = len({exemplar for _, exemplar in pairs}) == 1
+    columns = 3 if one or not several else 1 + len({mesh for mesh, _ in pairs})
+    side = CELL if columns == 3 else SMALL
     cells, labels, last = [], [], None
     for (mesh_name, exemplar_name), (_, *own) in zip(pairs, rows, strict=True):
         settings = shared | dict(setting.split("=") for setting in own)
@@ -128,15 +131,13 @@ def main() -> None:
         made = texture(exemplar, mesh, run, settings)
         print(f"{run.name}: {made.about['seconds']} s, seams {seam_ratio(made):.3f}", flush=True)
         if exemplar_name != last:
-            cells.append(exemplar.resized(CELL).maps["albedo"])
+            cells.append(exemplar.resized(side).maps["albedo"])
             labels.append(f"exemplar {exemplar.name}")
-        cells += pictures(made, 1 if several else 2)
+        cells += pictures(made, 1 if several else 2, side)
         shown = own if variants else [mesh.name, *own]
         labels += [" ".join(shown) or "default", *["the other side"] * (not several)]
         last = exemplar_name
-    one = len({exemplar for _, exemplar in pairs}) == 1
-    columns = 3 if one or not several else 1 + len({mesh for mesh, _ in pairs})
-    write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=columns, labels=labels, cell=CELL))
+    write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=columns, labels=labels, cell=side))
 
 
 if __name__ == "__main__":
