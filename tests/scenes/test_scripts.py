@@ -69,3 +69,9 @@ def test_surface_synthesis_script(mi, tmp_path: Path, monkeypatch: pytest.Monkey
         red, green, _ = image.mean((0, 1))
         assert green > red + 0.1
     assert (tmp_path / "run" / "octopus.glb").stat().st_size > 100_000
+
+
+def test_shape_from_images_script(mi, tmp_path: Path):
+    losses = load("shape_from_images").main(str(tmp_path / "shape.png"), steps=6, resolution=24, spp=4)
+    assert read_image(tmp_path / "shape.png").shape == (384, 3 * 384, 3)
+    assert losses[-1] < 0.8 * losses[0]
