@@ -105,26 +105,30 @@ class Tap:
 
 @dataclass(frozen=True)
 class GramTap:
-    """The Gram matrix (C, C) of the map's n feature vectors, divided by n, without a copy of the map.
+    """Gram matrices (regions, C, C) of the map's feature vectors, each divided by how many there are.
 
-    Products are taken in the map's type and summed in float32: bfloat16 maps give it to 1e-3.
+    The vectors are cut into regions of (nearly) equal numbers in the order in which they come. Products are
+    taken in the map's type and summed in float32, without a copy of the map: bfloat16 maps give it to 1e-3.
     """
 
     index: int
+    regions: int = 1
 
     def read(self, x: torch.Tensor) -> torch.Tensor:
         rows = _rows(x)
-        total = torch.zeros(rows.shape[1], rows.shape[1])
-        for part in rows.split(GRAM_ROWS):
-            total += part.t() @ part
-        return total / len(rows)
+        total = torch.zeros(self.regions, rows.shape[1], rows.shape[1])
+        for gram, region in zip(total, rows.tensor_split(self.regions), strict=True):
+            for part in region.split(GRAM_ROWS):
+                gram += part.t() @ part
+            gram /= len(region)
+        return total
 
     def add(self, flowing: torch.Tensor, gradient: torch.Tensor, x: torch.Tensor) -> None:
-        weight = ((gradient + gradient.t()) / len(_rows(x))).to(x.dtype)
-        for whole, part in zip(
-            _shared_rows(flowing).split(GRAM_ROWS), _rows(x).split(GRAM_ROWS), strict=True
-        ):
-            whole.addmm_(part, weight)
+        known, wanted = (rows.tensor_split(self.regions) for rows in (_rows(x), _shared_rows(flowing)))
+        for weight, region, changed in zip(gradient, known, wanted, strict=True):
+            weight = ((weight + weight.t()) / len(region)).to(x.dtype)
+            for whole, part in zip(changed.split(GRAM_ROWS), region.split(GRAM_ROWS), strict=True):
+                whole.addmm_(part, weight)
 
 
 class FrozenStack(torch.autograd.Function):

@@ -19,6 +19,7 @@ from mitex.losses import (
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.statistics import exemplar_features
 
+LEAST = 256  # feature vectors of a region
 Taps = dict[str, Tap | GramTap]
 
 
@@ -35,23 +36,36 @@ class Comparison(Protocol):
 
 
 class GramComparison:
-    """Squared distance of Gram matrices, averaged over layers (equation 4).
+    """Squared distance of Gram matrices, averaged over layers (equation 4) and regions of the surface.
+
+    One matrix for the whole surface says nothing of where its features are: a texture may be strong in one
+    place and faint elsewhere. Elements are numbered by groups, so a range of them is a region.
 
     Args:
         network: of images.
         images: (P, H, W, 3) the exemplar's pictures.
         layers: that are compared.
+        region: texels of a region at the images' scale; None compares the whole surface, as the paper does.
+            Regions of deep layers are larger where that is needed for `LEAST` feature vectors in each.
     """
 
-    def __init__(self, network: Vgg16, images: torch.Tensor, layers: tuple[str, ...]) -> None:
-        self.layers = layers
+    def __init__(
+        self, network: Vgg16, images: torch.Tensor, layers: tuple[str, ...], region: int | None = None
+    ) -> None:
+        self.layers, self.region = layers, region
         self.targets = []
         for image in images:
             features = exemplar_features(network, image, layers)
             self.targets.append({layer: gram_matrix(f) for layer, f in features.items()})
 
     def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Taps:
-        return {layer: GramTap(network.place(layer)) for layer in self.layers}
+        return {layer: GramTap(network.place(layer), self._regions(network, layer)) for layer in self.layers}
+
+    def _regions(self, network: SurfaceVgg, layer: str) -> int:
+        if self.region is None:
+            return 1
+        most = network.counts[layer] // LEAST
+        return max(min(network.counts["relu1_1"] // self.region, most), 1)
 
     def cost(
         self, found: Mapping[str, torch.Tensor], colours: torch.Tensor, k: int, generator: torch.Generator

@@ -36,6 +36,8 @@ class SurfaceConfig:
         loss: "gram" (the paper), or "transport": MeshNCA's relaxed optimal transport and moments, of
         samples: feature vectors a layer and step,
         moment_weight: the moments counting as much.
+        region: Gram matrices are compared region by region of the surface, each a square of so many times the
+            exemplar's side in area, which keeps the contrast even; 0: of the whole surface (the paper).
         layers: that are compared; VGG's convolutions and poolings. None stands for all.
         content_layer, content_weight: whose features shall stay those of the content texture, where one is
             given (style transfer), and how much that counts.
@@ -70,6 +72,7 @@ class SurfaceConfig:
     loss: str = "gram"
     samples: int = 2048
     moment_weight: float = 0.1
+    region: float = 0.5
     layers: tuple[str, ...] = ()
     content_layer: str = "relu4_2"
     content_weight: float = 1000.0
@@ -102,6 +105,7 @@ class SurfaceConfig:
             diffusion=(0, 1),
             noise=(0, 10),
             samples=(1, None),
+            region=(0, 10),
             moment_weight=(0, None),
             lr=(0, None),
             decay=(0, None),
@@ -141,6 +145,7 @@ PRESETS = {
         continued=False,
         exemplar_size=512,
         whitened=False,
+        region=0.0,
         diffusion=0.0,
         noise=0.2,
         lr=0.1,

@@ -77,7 +77,8 @@ class SurfaceVgg:
 
     def gram_matrices(self, texels: torch.Tensor, layers: Iterable[str]) -> dict[str, torch.Tensor]:
         """Layer -> (C, C), mean outer products of the features, differentiable in `texels` (once)."""
-        return self.read(texels, {name: GramTap(self.place(name)) for name in layers})
+        grams = self.read(texels, {name: GramTap(self.place(name)) for name in layers})
+        return {name: gram[0] for name, gram in grams.items()}
 
     def read(self, texels: torch.Tensor, taps: Mapping[str, Tap | GramTap]) -> dict[str, torch.Tensor]:
         """What taps give of texel colours, under their names, in one pass."""

@@ -92,8 +92,8 @@ class SurfaceTask:
                 levels, config.pooling, bilinear=config.bilinear, scale=scale, weights=weights
             )
             self.networks.append(network)
-            shown = exemplar.resized(max(config.exemplar_size >> scale, 16))
-            images = torch.from_numpy(picture_images(shown, self.pictures, self.layout))
+            size = max(config.exemplar_size >> scale, 16)
+            images = torch.from_numpy(picture_images(exemplar.resized(size), self.pictures, self.layout))
             self.comparisons.append(_comparison(config, image_network, images))
         self.content: torch.Tensor | None = None
         if content is not None:
@@ -211,7 +211,8 @@ def _weights(config: SurfaceConfig, generator: torch.Generator) -> Weights:
 
 def _comparison(config: SurfaceConfig, network: Vgg16, images: torch.Tensor) -> Comparison:
     if config.loss == "gram":
-        return GramComparison(network, images, config.compared)
+        region = round((config.region * images.shape[1]) ** 2) or None
+        return GramComparison(network, images, config.compared, region)
     return TransportComparison(network, images, config.compared, config.samples, config.moment_weight)
 
 

@@ -6,6 +6,7 @@ import torch
 
 from mitex.errors import ConfigError
 from mitex.features import Vgg16
+from mitex.features.frozen import GramTap
 from mitex.features.vgg import LAYERS, convolutions
 from mitex.methods.surface import operations as room
 from mitex.methods.surface.exponential import GeodesicTracer
@@ -131,17 +132,17 @@ def test_pooling_against_loops(irregular, kind):
     assert torch.allclose(pool.backward(pull, x.detach()), wanted, atol=1e-6)
 
 
-def test_gram_matrices_and_their_gradient(levels, image):
-    """Against the features' own, in float32; all layers together."""
+@pytest.mark.parametrize("regions", [1, 7])
+def test_gram_matrices_and_their_gradient(levels, image, regions):
+    """Against those of the features, in float32; all layers together."""
     ours = SurfaceVgg(levels, precision="float32")
     names = ("relu1_1", "pool1", "relu2_2", "relu3_1")
     texels = image.view(-1, 3)[levels.order].clone().requires_grad_()
-    grams = ours.gram_matrices(texels, names)
+    grams = ours.read(texels, {name: GramTap(ours.place(name), regions) for name in names})
     features = ours.features(texels, names)
     total, expected = torch.zeros(()), torch.zeros(())
     for k, name in enumerate(names):
-        f = features[name]
-        gram = f.T @ f / len(f)
+        gram = torch.stack([f.T @ f / len(f) for f in features[name].tensor_split(regions)])
         assert torch.allclose(grams[name], gram, rtol=1e-4, atol=1e-5)
         generator = torch.Generator().manual_seed(k)
         pull = torch.randn(gram.shape, generator=generator)

@@ -1,0 +1,59 @@
+"""How textures are compared with an exemplar."""
+
+import pytest
+import torch
+
+from mitex.features import Vgg16
+from mitex.losses import gram_matrix
+from mitex.methods.surface.comparison import LEAST, GramComparison
+from mitex.methods.surface.network import SurfaceVgg
+from mitex.methods.surface.statistics import exemplar_features
+from tests.methods.surface.grids import grid_levels
+
+SIDE = 64
+LAYER = "relu1_1"
+
+
+@pytest.fixture(scope="module")
+def network():
+    return SurfaceVgg(grid_levels(SIDE), precision="float32")
+
+
+@pytest.fixture(scope="module")
+def image():
+    return torch.rand(SIDE, SIDE, 3, generator=torch.Generator().manual_seed(1))
+
+
+def cost(network, colours, image, layers, region):
+    comparison = GramComparison(Vgg16(precision="float32", normalised=False), image[None], layers, region)
+    generator = torch.Generator()
+    found = network.read(colours, comparison.taps(network, generator))
+    return comparison.cost(found, colours, 0, generator)
+
+
+def test_regions_are_compared_one_by_one(network, image):
+    """The mean over quarters of the texels of their own distances."""
+    colours = torch.rand(SIDE**2, 3, generator=torch.Generator().manual_seed(2))
+    target = gram_matrix(
+        exemplar_features(Vgg16(precision="float32", normalised=False), image, (LAYER,))[LAYER]
+    )
+    quarters = network.features(colours, [LAYER])[LAYER].chunk(4)
+    expected = torch.stack([(gram_matrix(f) - target).square().mean() for f in quarters]).mean()
+    assert cost(network, colours, image, (LAYER,), SIDE**2 // 4) == pytest.approx(float(expected), rel=1e-4)
+
+
+def test_only_regions_see_that_contrast_is_uneven(network):
+    """A texture equal to its exemplar, strong in one half and flat in the other."""
+    uneven = torch.rand(SIDE, SIDE, 3, generator=torch.Generator().manual_seed(3))
+    uneven[SIDE // 2 :] = 0.5
+    colours = uneven.view(-1, 3)[grid_levels(SIDE).order]
+    whole, parts = (cost(network, colours, uneven, (LAYER,), region) for region in (None, SIDE**2 // 4))
+    assert parts > 20 * whole
+
+
+def test_regions_of_deep_layers_hold_enough_elements(network, image):
+    comparison = GramComparison(
+        Vgg16(precision="float32", normalised=False), image[None], (LAYER, "relu2_1", "relu4_1"), 256
+    )
+    taps = comparison.taps(network, torch.Generator())
+    assert [tap.regions for tap in taps.values()] == [SIDE**2 // 256, SIDE**2 // 4 // LEAST, 1]
