@@ -17,7 +17,7 @@ def save(path: Path, value: int | tuple[int, ...] = 128, size=(32, 32), mode="RG
     Image.new(mode, size, value if mode == "L" or isinstance(value, tuple) else (value,) * 3).save(path)
 
 
-def refused(path, *words):
+def assert_refused(path, *words):
     with pytest.raises(ImageError) as caught:
         Exemplar.load(path)
     for word in words:
@@ -105,40 +105,40 @@ class TestLoad:
 
 class TestRefuses:
     def test_nothing_there(self, tmp_path):
-        refused(tmp_path / "none", "there is no exemplar")
-        refused("cobbleston", "did you mean cobblestone?")
-        refused("a\0b")
-        refused("x" * 5000)
+        assert_refused(tmp_path / "none", "there is no exemplar")
+        assert_refused("cobbleston", "did you mean cobblestone?")
+        assert_refused("a\0b")
+        assert_refused("x" * 5000)
 
     def test_empty_and_unknown_folders(self, tmp_path):
-        refused(tmp_path, "is empty", "albedo.png")
+        assert_refused(tmp_path, "is empty", "albedo.png")
         save(tmp_path / "preview.png")
-        refused(tmp_path, "no map that Mitex knows")
+        assert_refused(tmp_path, "no map that Mitex knows")
         (tmp_path / "albedo.tif").write_bytes(b"II*\0")
-        refused(tmp_path, "albedo.tif", "convert")
+        assert_refused(tmp_path, "albedo.tif", "convert")
 
     def test_contradictory_duplicates(self, tmp_path):
         save(tmp_path / "albedo.png")
         save(tmp_path / "basecolor.jpg")
-        refused(tmp_path, "albedo twice", "albedo.png", "basecolor.jpg", "remove one")
+        assert_refused(tmp_path, "albedo twice", "albedo.png", "basecolor.jpg", "remove one")
 
     def test_aspect_ratios_that_differ(self, tmp_path):
         save(tmp_path / "albedo.png", size=(32, 32))
         save(tmp_path / "height.png", size=(64, 32))
-        refused(tmp_path, "aspect ratio", "64 x 32")
+        assert_refused(tmp_path, "aspect ratio", "64 x 32")
 
     def test_a_damaged_map(self, tmp_path):
         save(tmp_path / "albedo.png")
         (tmp_path / "ao.png").write_text("not an image")
-        refused(tmp_path, "ao.png", "is not an image")
+        assert_refused(tmp_path, "ao.png", "is not an image")
 
     def test_too_small(self, tmp_path):
         save(tmp_path / "dot.png", size=(300, 15))
-        refused(tmp_path / "dot.png", "300 x 15", "at least 16")
+        assert_refused(tmp_path / "dot.png", "300 x 15", "at least 16")
 
     def test_a_normal_map_that_is_none(self, tmp_path):
         save(tmp_path / "normal.png", (200, 100, 20))
-        refused(tmp_path, "not a tangent-space normal map")
+        assert_refused(tmp_path, "not a tangent-space normal map")
 
     @pytest.mark.parametrize(
         "maps",

@@ -31,7 +31,7 @@ def png_claiming(width, height, depth=8, kind=2):
     return b"\x89PNG\r\n\x1a\n" + data
 
 
-def refused(path, *words, **options):
+def assert_refused(path, *words, **options):
     with pytest.raises(ImageError) as caught:
         read_image(path, **options)
     message = str(caught.value)
@@ -104,44 +104,44 @@ class TestReads:
 
 class TestRefuses:
     def test_missing_folder_and_empty(self, tmp_path):
-        refused(tmp_path / "no.png", "does not exist")
-        refused(tmp_path, "is a folder")
+        assert_refused(tmp_path / "no.png", "does not exist")
+        assert_refused(tmp_path, "is a folder")
         (tmp_path / "a.png").touch()
-        refused(tmp_path / "a.png", "is empty")
-        refused(tmp_path / ("x" * 300 + ".png"), "does not exist")
+        assert_refused(tmp_path / "a.png", "is empty")
+        assert_refused(tmp_path / ("x" * 300 + ".png"), "does not exist")
 
     def test_devices_and_pipes(self, tmp_path):
         os.mkfifo(tmp_path / "pipe.png")
-        refused(tmp_path / "pipe.png", "not a regular file")
+        assert_refused(tmp_path / "pipe.png", "not a regular file")
 
     @pytest.mark.parametrize(
         ("kind", "word"), [("GIF", "GIF"), ("TIFF", "TIFF"), ("WEBP", "WebP"), ("BMP", "BMP")]
     )
     def test_other_kinds_renamed(self, tmp_path, kind, word):
         Image.fromarray(pixels()).save(tmp_path / "a.png", format=kind)
-        refused(tmp_path / "a.png", word, "give a PNG or JPEG")
+        assert_refused(tmp_path / "a.png", word, "give a PNG or JPEG")
 
     @pytest.mark.parametrize("content", [b"hello", b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"\0" * 999])
     def test_text_and_damaged_headers(self, tmp_path, content):
         (tmp_path / "a.png").write_bytes(content)
-        refused(tmp_path / "a.png")
+        assert_refused(tmp_path / "a.png")
 
     def test_animated(self, tmp_path):
         frames = [Image.fromarray(pixels(seed=s)) for s in range(3)]
         frames[0].save(tmp_path / "a.png", save_all=True, append_images=frames[1:])
-        refused(tmp_path / "a.png", "animated")
+        assert_refused(tmp_path / "a.png", "animated")
 
     def test_transparent(self, tmp_path):
         data = np.dstack([pixels(), np.full((5, 7, 1), 255, np.uint8)])
         data[2, 3, 3] = 0
         Image.fromarray(data).save(tmp_path / "a.png")
-        refused(tmp_path / "a.png", "transparent", "flatten")
+        assert_refused(tmp_path / "a.png", "transparent", "flatten")
 
     @pytest.mark.parametrize("size", [(50_000, 50_000), (20_000, 5_000), (12_000, 8_000), (2**31 - 1, 1)])
     def test_huge_header_costs_nothing(self, tmp_path, size):
         (tmp_path / "a.png").write_bytes(png_claiming(*size))
         tracemalloc.start()
-        refused(tmp_path / "a.png", "over the limit of 64 megapixels")
+        assert_refused(tmp_path / "a.png", "over the limit of 64 megapixels")
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         assert peak < 2e6
@@ -152,21 +152,21 @@ class TestRefuses:
         at = data.index(b"\xff\xc0") + 5
         data[at : at + 4] = struct.pack(">HH", 65_000, 65_000)
         (tmp_path / "a.jpg").write_bytes(data)
-        refused(tmp_path / "a.jpg", "over the limit")
+        assert_refused(tmp_path / "a.jpg", "over the limit")
 
     def test_budget_is_an_option(self, tmp_path):
         Image.fromarray(pixels()).save(tmp_path / "a.png")
         assert read_image(tmp_path / "a.png", max_pixels=35).shape == (5, 7, 3)
-        refused(tmp_path / "a.png", "limit of 34 pixels", max_pixels=34)
+        assert_refused(tmp_path / "a.png", "limit of 34 pixels", max_pixels=34)
 
     @pytest.mark.parametrize("size", [(0, 10), (10, 0)])
     def test_zero_size(self, tmp_path, size):
         (tmp_path / "a.png").write_bytes(png_claiming(*size))
-        refused(tmp_path / "a.png")
+        assert_refused(tmp_path / "a.png")
 
     def test_less_data_than_the_header_says(self, tmp_path):
         (tmp_path / "a.png").write_bytes(png_claiming(400, 400))
-        refused(tmp_path / "a.png", "damaged or cut short")
+        assert_refused(tmp_path / "a.png", "damaged or cut short")
 
     def test_text_chunk_bomb(self, tmp_path):
         bomb = zlib.compress(b"x" * 80_000_000, 9)
@@ -174,7 +174,7 @@ class TestRefuses:
         chunk = struct.pack(">I", len(body)) + b"zTXt" + body + struct.pack(">I", zlib.crc32(b"zTXt" + body))
         whole = png_claiming(16, 16)
         (tmp_path / "a.png").write_bytes(whole[:33] + chunk + whole[33:])
-        refused(tmp_path / "a.png")
+        assert_refused(tmp_path / "a.png")
 
     @pytest.mark.parametrize("suffix", [".png", ".jpg"])
     def test_truncated_anywhere(self, tmp_path, suffix):
@@ -182,7 +182,7 @@ class TestRefuses:
         data = (tmp_path / f"a{suffix}").read_bytes()
         for share in (0.02, 0.1, 0.3, 0.6, 0.9):
             (tmp_path / "cut").write_bytes(data[: int(len(data) * share)])
-            refused(tmp_path / "cut")
+            assert_refused(tmp_path / "cut")
 
     @settings(max_examples=60, deadline=None)
     @given(at=st.integers(0, 3000), value=st.integers(0, 255), kind=st.sampled_from(["PNG", "JPEG"]))

@@ -39,20 +39,11 @@ class FitGeometric(Fitting):
     """Coarse mesh of the reference's topology from which its training meshes are made."""
 
     def run(self) -> None:
-        overrides = self.overrides()
+        shared = self.shared()
         from mitex.methods import geometric
         from mitex.methods.geometric.references import find_reference
 
         reference = find_reference(self.reference)
         out = self.out or Path("runs") / reference.name
-        geometric.fit(
-            reference,
-            out,
-            template=self.template,
-            preset=self.preset,
-            config=self.config,
-            overrides=overrides,
-            resume=self.resume,
-            quiet=self.quiet,
-        )
+        geometric.fit(reference, out, template=self.template, **shared)
         print(out)

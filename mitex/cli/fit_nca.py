@@ -33,7 +33,7 @@ class FitNca(ExemplarFitting):
     """Start from the weights of a model or a run."""
 
     def run(self) -> None:
-        overrides = self.overrides()
+        shared = self.shared()
         not_both("--resume", "--init", self.resume and self.init is not None)
         from mitex.exemplar import Exemplar
 
@@ -41,14 +41,5 @@ class FitNca(ExemplarFitting):
         out = self.out or Path("runs") / exemplar.name
         from mitex.methods import nca
 
-        nca.fit(
-            exemplar,
-            out,
-            preset=self.preset,
-            config=self.config,
-            overrides=overrides,
-            resume=self.resume,
-            init=self.init,
-            quiet=self.quiet,
-        )
+        nca.fit(exemplar, out, init=self.init, **shared)
         print(out)

@@ -52,7 +52,7 @@ class FitSurface(ExemplarFitting):
     """Use the mesh's own UVs, which must not overlap."""
 
     def run(self) -> None:
-        overrides = self.overrides(resolution=self.resolution)
+        shared = self.shared(resolution=self.resolution)
         from mitex.exemplar import Exemplar
         from mitex.mesh import Mesh
 
@@ -64,13 +64,9 @@ class FitSurface(ExemplarFitting):
             exemplar,
             mesh,
             out,
-            preset=self.preset,
-            config=self.config,
-            overrides=overrides,
             keep_uvs=self.keep_uvs,
             content=self.content,
             orientation=self.orientation,
-            resume=self.resume,
-            quiet=self.quiet,
+            **shared,
         )
         print(out)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from tyro.conf import UseAppendAction, arg
 
@@ -14,6 +14,9 @@ from mitex.cli.checks import SEEDS, in_range, settings
 @dataclass(kw_only=True)
 class Fitting:
     """Options shared by the methods' commands."""
+
+    preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
+    """Settings to start from."""
 
     config: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None
     """TOML file with any of the settings, or a run's config.toml."""
@@ -37,11 +40,17 @@ class Fitting:
     quiet: Annotated[bool, arg(help_behavior_hint="")] = False
     """Show no progress."""
 
-    def overrides(self, **flags: object) -> list[str]:
-        """Checks seed and steps; all settings as `key=value`, those of further `flags` included."""
+    def shared(self, **flags: object) -> dict[str, Any]:
+        """Checks seed and steps; what every `fit` takes, with these and further `flags` as settings."""
         in_range("--seed", self.seed, *SEEDS)
         in_range("--steps", self.steps, 1)
-        return settings(self.set, seed=self.seed, steps=self.steps, **flags)
+        return {
+            "preset": self.preset,
+            "config": self.config,
+            "overrides": settings(self.set, seed=self.seed, steps=self.steps, **flags),
+            "resume": self.resume,
+            "quiet": self.quiet,
+        }
 
 
 @dataclass(kw_only=True)

@@ -14,6 +14,7 @@ from safetensors.torch import save_file
 
 from mitex.errors import CheckpointError, MitexWarning
 from mitex.paths import atomic_write
+from mitex.training import model_file
 
 NAME = "checkpoint.safetensors"
 PREVIOUS = "checkpoint.previous.safetensors"
@@ -117,9 +118,7 @@ def read(path: Path) -> Checkpoint:
         CheckpointError: It is missing, damaged, or not a Mitex checkpoint.
     """
     try:
-        with safe_open(path, framework="pt") as file:
-            metadata = file.metadata() or {}
-            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+        tensors, metadata = model_file.read(path)
         if metadata.get("mitex_checkpoint") != FORMAT:
             raise CheckpointError(
                 f"'{path}' is not a checkpoint of this version of Mitex", "name the run folder of a fit"

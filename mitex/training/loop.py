@@ -1,6 +1,7 @@
 """The one training loop: every method hands it a task."""
 
 import json
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +37,11 @@ class TrainResult:
     loss: float
     seconds: float
 
+    def about(self, name: str, preset: str) -> dict[str, Any]:
+        """What a model file tells of its training, as JSON values; `name` is that of what was learned."""
+        told = {"name": name, "preset": preset, "steps": self.steps, "seconds": round(self.seconds, 1)}
+        return told | ({"loss": self.loss} if math.isfinite(self.loss) else {})
+
 
 def train(
     task: Task,
@@ -47,8 +53,6 @@ def train(
     decay: float = 1.0,
     normalise_gradients: bool = False,
     optimizer: Callable[[Sequence[torch.Tensor]], optim.Optimizer] = optim.Adam,
-    checkpoint_every: int,
-    preview_every: int = 0,
     resume: bool = False,
     quiet: bool = False,
 ) -> TrainResult:
@@ -58,7 +62,8 @@ def train(
 
     Args:
         task: The method's part.
-        config: The method's resolved config, a flat dataclass with `steps` and `seed`.
+        config: The method's resolved config, a flat dataclass with `steps`, `seed`, `checkpoint_every` (one
+            more is saved at the end) and `preview_every` (one more is made at the end; 0 makes none).
         out: Run folder: missing, empty, or of a run that never reached a checkpoint; with `resume`, one with
             a checkpoint.
         lr: Learning rate, or a function from the step (from 0) to it.
@@ -66,8 +71,6 @@ def train(
         decay: Factor at each milestone.
         normalise_gradients: Divide each parameter tensor's gradient by its own norm + 1e-8.
         optimizer: Makes the optimizer of the task's parameters.
-        checkpoint_every: Steps between checkpoints; one more is saved at the end.
-        preview_every: Steps between previews; one more is made at the end. 0 makes none.
         resume: Go on from the folder's checkpoint. On one thread the result is bit-identical with that of an
             uninterrupted run. The config may differ in `mitex.training.state.FREE_KEYS` only.
         quiet: Show no progress.
@@ -78,7 +81,7 @@ def train(
         TrainingDiverged: Loss or gradients were not finite three steps in a row.
         Interrupted: SIGINT or SIGTERM; a checkpoint of the last whole step has been saved.
     """
-    if checkpoint_every < 1 or preview_every < 0:
+    if config.checkpoint_every < 1 or config.preview_every < 0:
         raise ConfigError("checkpoints and previews need a spacing", "set checkpoint_every to 1 or more")
     schedule = lr if callable(lr) else optim.multistep(lr, milestones, decay)
     with run.opened(out, resume) as (folder, metrics):
@@ -87,9 +90,8 @@ def train(
             state.restore(checkpoint.load(folder))
         run.prepare(folder, config, task.metadata())
         metrics.truncate(state.step)
-        writer = _Writer(
-            folder, state, metrics, checkpoint_every, preview_every, saved=state.step if resume else -1
-        )
+        every = config.checkpoint_every, config.preview_every
+        writer = _Writer(folder, state, metrics, *every, saved=state.step if resume else -1)
         title = task.metadata().get("method", "training")
         with Progress(title, folder, state.step, config.steps, quiet) as progress, StopSignals(quiet) as stop:
             while state.step < config.steps and not stop.requested:

@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
@@ -13,6 +13,7 @@ from mitex import __version__
 from mitex.errors import CheckpointError, OutputError
 from mitex.paths import atomic_write, missing_folders, prepare_folder
 from mitex.training import checkpoint
+from mitex.training.config import Config, resolve
 from mitex.training.metrics import Metrics
 from mitex.training.toml import to_toml
 
@@ -50,15 +51,24 @@ def check(out: str | os.PathLike[str], resume: bool = False) -> None:
         raise OutputError(f"'{out}' holds other files", "name a new or empty folder with --out")
 
 
-def checked_config(out: Path, resume: bool, config: Path | None) -> Path | None:
-    """Checks the folder as `check` does; the config file to start from: the given one, else a resumed run's.
+def settings(
+    presets: Mapping[str, Config],
+    out: Path,
+    preset: str | None,
+    config: Path | None,
+    overrides: Sequence[str],
+    resume: bool,
+) -> Config:
+    """Checks the folder as `check` does, and resolves a config; a resumed run's own one unless one is given.
 
     Raises:
         OutputError, CheckpointError: as `check`.
+        ConfigError: as `resolve`.
     """
     check(out, resume)
     own = out / CONFIG
-    return own if resume and config is None and own.is_file() else config
+    file = own if resume and config is None and own.is_file() else config
+    return resolve(presets, preset, file, overrides)
 
 
 @contextmanager

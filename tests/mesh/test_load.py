@@ -149,7 +149,7 @@ def test_order_of_welded_vertices(tmp_path):
     assert list(dict.fromkeys(flat)) == list(range(6))  # numbered as they appear
 
 
-def refused(path, words, **options):
+def assert_refused(path, words, **options):
     with pytest.raises(MeshError) as caught, warnings.catch_warnings():
         warnings.simplefilter("error")
         Mesh.load(path, **options)
@@ -188,16 +188,16 @@ def refused(path, words, **options):
 def test_refuses_files(name, content, words, tmp_path):
     path = tmp_path / name
     path.write_bytes(content)
-    refused(path, words)
+    assert_refused(path, words)
 
 
 def test_refuses_places(tmp_path):
-    refused(tmp_path / "none.obj", "there is no mesh")
+    assert_refused(tmp_path / "none.obj", "there is no mesh")
     (tmp_path / "folder.obj").mkdir()
-    refused(tmp_path / "folder.obj", "is a folder")
-    refused("/dev/null", "not a regular file")
-    refused("x" * 5000, "there is no mesh")
-    refused("a\0b.obj", "there is no mesh")
+    assert_refused(tmp_path / "folder.obj", "is a folder")
+    assert_refused("/dev/null", "not a regular file")
+    assert_refused("x" * 5000, "there is no mesh")
+    assert_refused("a\0b.obj", "there is no mesh")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
@@ -205,33 +205,33 @@ def test_refuses_what_may_not_be_read(tmp_path):
     path = tmp_path / "a.obj"
     path.write_text(obj_text(octahedron()))
     path.chmod(0)
-    refused(path, "cannot be read")
+    assert_refused(path, "cannot be read")
 
 
 def test_budget_is_checked_before_parsing(tmp_path):
     path = tmp_path / "a.obj"
     path.write_text("v 0 0 0\n" * 11 + "f this is not parsed\n")
-    refused(path, "11 vertices, more than the budget of 10", max_vertices=10)
+    assert_refused(path, "11 vertices, more than the budget of 10", max_vertices=10)
     path = tmp_path / "a.ply"
     path.write_bytes(ply_bytes(FAN_POINTS, TETRAHEDRON).replace(b"vertex 4", b"vertex 9999999999"))
-    refused(path, "9,999,999,999 vertices")
+    assert_refused(path, "9,999,999,999 vertices")
     path = tmp_path / "a.stl"
     path.write_bytes(b"\0" * 80 + (1000).to_bytes(4, "little") + b"\0" * 50_000)
-    refused(path, "500 vertices, more than the budget of 10", max_vertices=10)
+    assert_refused(path, "500 vertices, more than the budget of 10", max_vertices=10)
     path = tmp_path / "a.off"
     path.write_text("OFF\n11 1 0\n")
-    refused(path, "11 vertices, more than the budget of 10", max_vertices=10)
+    assert_refused(path, "11 vertices, more than the budget of 10", max_vertices=10)
 
 
 def test_file_size_is_checked_before_reading(tmp_path):
     path = tmp_path / "a.obj"
     with path.open("wb") as file:
         file.truncate(300 << 20)  # a hole: takes no space
-    refused(path, "300 MB, more than 256 MB", max_vertices=10)
+    assert_refused(path, "300 MB, more than 256 MB", max_vertices=10)
 
 
 def test_budget_counts_what_is_in_the_file(tmp_path):
     path = tmp_path / "a.obj"
     path.write_text(obj_text(octahedron()))
     assert len(Mesh.load(path, max_vertices=6).vertices) == 6
-    refused(path, "budget of 5", max_vertices=5)
+    assert_refused(path, "budget of 5", max_vertices=5)

@@ -17,6 +17,8 @@ class SmallConfig:
     preset: str = "small"
     lr: float = 0.01
     width: int = 5
+    checkpoint_every: int = 5
+    preview_every: int = 0
     layers: tuple[str, ...] = ("relu1_1",)
 
 

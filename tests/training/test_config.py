@@ -179,7 +179,7 @@ def test_toml_values_of_every_type(tmp_path):
 def test_bad_files(tmp_path, content):
     file = tmp_path / "c.toml"
     file.write_text(content)
-    _error(file=file)
+    assert "; " in _error(file=file)  # what is wrong; what to do
 
 
 def test_unreadable_files(tmp_path):

@@ -24,7 +24,7 @@ def _one_thread():
 def _train(out, task=None, config=None, **options):
     task = task or SmallTask()
     config = config or SmallConfig()
-    options = {"lr": config.lr, "checkpoint_every": 5, "quiet": True} | options
+    options = {"lr": config.lr, "quiet": True} | options
     return task, train(task, config, out, **options)
 
 
@@ -45,7 +45,7 @@ def _signal(number):
 
 
 def test_it_learns(tmp_path):
-    _, result = _train(tmp_path / "a", config=SmallConfig(steps=300), lr=0.05, checkpoint_every=100)
+    _, result = _train(tmp_path / "a", config=SmallConfig(steps=300, checkpoint_every=100), lr=0.05)
     losses = [line["loss"] for line in lines(tmp_path / "a")]
     assert sum(losses[-50:]) < 0.3 * sum(losses[:50])
     assert result.steps == 300
@@ -166,7 +166,7 @@ def test_an_error_in_the_first_step_leaves_nothing(tmp_path):
         _train(tmp_path / "run", SmallTask(faults={0: fail}))
     assert not list(tmp_path.iterdir())
     with pytest.raises(ConfigError):
-        _train(tmp_path / "run", checkpoint_every=0)
+        _train(tmp_path / "run", config=SmallConfig(checkpoint_every=0))
 
 
 @pytest.mark.parametrize(("fault", "kind"), [(_nan, "loss"), (_bad_gradient, "gradient")])
@@ -280,7 +280,7 @@ def test_previews_and_checkpoints_come_when_due(tmp_path, monkeypatch):
     saved = []
     real = checkpoint.save
     monkeypatch.setattr(checkpoint, "save", lambda folder, c: saved.append(c.step) or real(folder, c))
-    _train(tmp_path, preview_every=8, checkpoint_every=6)
+    _train(tmp_path, config=SmallConfig(preview_every=8, checkpoint_every=6))
     assert saved == [6, 12, 18, 20]
     assert sorted(path.name for path in (tmp_path / "previews").iterdir()) == [
         "000008.png",
@@ -292,7 +292,7 @@ def test_previews_and_checkpoints_come_when_due(tmp_path, monkeypatch):
 
 
 def test_previews_do_not_change_the_run(tmp_path):
-    _train(tmp_path / "with", preview_every=1)
+    _train(tmp_path / "with", config=SmallConfig(preview_every=1))
     _train(tmp_path / "without")
     assert_same_run(tmp_path / "with", tmp_path / "without")
 

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 
-from mitex.errors import CheckpointError
 from mitex.mesh import Mesh
 from mitex.methods.geometric.model import network
 from mitex.methods.geometric.network import FaceNetwork
-from mitex.paths import atomic_write
+from mitex.training import model_file
 
 NAME = "geometry.safetensors"
-FORMAT = "mitex-geometric-1"
+KIND = "geometric"
 
 
 def save(
@@ -34,15 +30,13 @@ def save(
         OutputError: the place is not writable.
     """
     tensors = {
-        f"{level}/{k}": value.detach().contiguous()
+        f"{level}/{k}": value
         for level, generator in enumerate(generators)
         for k, value in enumerate(generator.parameters)
     }
     tensors |= {"vertices": torch.from_numpy(template.vertices), "faces": torch.from_numpy(template.faces)}
-    tensors["fixed"] = fixed.contiguous()
-    with atomic_write(path) as temporary:
-        save_file(tensors, temporary, {"format": FORMAT, "about": json.dumps(dict(about))})
-    return path
+    tensors["fixed"] = fixed
+    return model_file.save(path, tensors, KIND, about)
 
 
 def load(source: str | Path) -> tuple[list[FaceNetwork], Mesh, torch.Tensor, dict[str, Any]]:
@@ -51,19 +45,7 @@ def load(source: str | Path) -> tuple[list[FaceNetwork], Mesh, torch.Tensor, dic
     Raises:
         CheckpointError: there is none, or it is damaged.
     """
-    path = Path(source).expanduser()
-    path = path / NAME if path.is_dir() else path
-    if not path.is_file():
-        raise CheckpointError(
-            f"there is no finished geometric texture at '{source}'", "go on with mitex fit geometric --resume"
-        )
-    try:
-        with safe_open(path, "pt") as file:
-            metadata = file.metadata() or {}
-            tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 (not a mapping)
-        if metadata.get("format") != FORMAT:
-            raise ValueError("another format")
-        about = json.loads(metadata["about"])
+    with model_file.opened(source, KIND, NAME) as (tensors, about):
         template = Mesh(
             tensors["vertices"].numpy(), tensors["faces"].numpy(), name=f"{about['name']} template"
         )
@@ -72,10 +54,6 @@ def load(source: str | Path) -> tuple[list[FaceNetwork], Mesh, torch.Tensor, dic
         if tensors["fixed"].shape != tensors["vertices"].shape:
             raise ValueError("noise of another template")
         return _generators(tensors, int(about["levels"])), template, tensors["fixed"], about
-    except (SafetensorError, OSError, ValueError, KeyError, TypeError, RuntimeError) as e:
-        raise CheckpointError(
-            f"'{path}' is not a geometric texture ({e})", "name the run folder of mitex fit geometric"
-        ) from e
 
 
 def _generators(tensors: Mapping[str, torch.Tensor], levels: int) -> list[FaceNetwork]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Sequence
 from functools import partial
@@ -24,7 +23,7 @@ from mitex.methods.geometric.texture import GeometricTexture
 from mitex.methods.geometric.training_meshes import fit_level
 from mitex.paths import cache_dir
 from mitex.runtime import keep_freed_memory
-from mitex.training import resolve, run, train
+from mitex.training import run, train
 from mitex.training.optim import Adam
 
 VERSION = 1  # of the training meshes in the cache
@@ -64,8 +63,7 @@ def fit(
         Interrupted: a checkpoint has been saved.
     """
     out = Path(out).expanduser()
-    config = run.checked_config(out, resume, config)
-    settings = resolve(PRESETS, preset, config, overrides)
+    settings = run.settings(PRESETS, out, preset, config, overrides, resume)
     shape = reference if isinstance(reference, Mesh) else find_reference(reference)
     given = Mesh.load(template) if isinstance(template, str | Path) else template
     shape, start = normalised(shape, find_template(shape, given))
@@ -79,23 +77,12 @@ def fit(
         out,
         lr=partial(learning_rate, settings),
         optimizer=partial(Adam, betas=betas(settings)),
-        checkpoint_every=settings.checkpoint_every,
-        preview_every=settings.preview_every,
         resume=resume,
         quiet=quiet,
     )
-    about = {
-        "name": shape.name,
-        "preset": settings.preset,
-        "levels": settings.levels,
-        "noise": settings.noise,
-        "remeasure": settings.remeasure,
-        "steps": result.steps,
-        "seconds": round(result.seconds, 1),
-        "fit": [vars(r) for r in reports],
-    }
-    if math.isfinite(result.loss):
-        about["loss"] = result.loss
+    about = result.about(shape.name, settings.preset)
+    about |= {key: getattr(settings, key) for key in ("levels", "noise", "remeasure")}
+    about["fit"] = [vars(r) for r in reports]
     texture = GeometricTexture(task.generators[: settings.levels], start, task.fixed, about)
     texture.save(out / files.NAME)
     return texture

@@ -12,18 +12,15 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors import SafetensorError
 
 from mitex.errors import CheckpointError
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.perception import HARMONICS
 from mitex.methods.nca.targets import STATE_CHANNELS
-from mitex.paths import atomic_write
-from mitex.training import checkpoint
+from mitex.training import checkpoint, model_file
 
 NAME = "model.safetensors"
-FORMAT = "mitex-nca-1"
 BUNDLED = Path(__file__).parents[2] / "data" / "models"
 PARAMETERS = ("fc1.weight", "fc1.bias", "fc2.weight", "fc2.bias")
 
@@ -34,11 +31,7 @@ def save(path: Path, model: MeshNCA, about: dict[str, Any]) -> Path:
     Raises:
         OutputError: the place is not writable.
     """
-    tensors = {name: value.detach().cpu().contiguous() for name, value in model.state_dict().items()}
-    with atomic_write(path) as temporary:
-        metadata = {"format": FORMAT, "degree": str(model.degree), "about": json.dumps(about)}
-        save_file(tensors, temporary, metadata)
-    return path
+    return model_file.save(path, model.state_dict(), "nca", about, degree=str(model.degree))
 
 
 def load(source: str | Path) -> tuple[MeshNCA, dict[str, Any]]:
@@ -60,9 +53,7 @@ def load(source: str | Path) -> tuple[MeshNCA, dict[str, Any]]:
         model = _model(tensors, state.config.get("degree"), path)
         return model, about | {"maps": _maps(maps, model, path)}
     try:
-        with safe_open(path, "pt") as file:
-            metadata = file.metadata() or {}
-            tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 (not a mapping)
+        tensors, metadata = model_file.read(path)
     except (SafetensorError, OSError, ValueError) as e:
         raise CheckpointError(
             f"'{path}' is not a model ({e})", "give a model.safetensors or a run folder"

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from mitex.errors import CheckpointError
 from mitex.exemplar import Exemplar
@@ -14,7 +12,7 @@ from mitex.methods.nca.config import PRESETS, NcaConfig
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.task import NcaTask
 from mitex.methods.nca.texture import NcaTexture
-from mitex.training import resolve, run, train
+from mitex.training import run, train
 
 
 def fit(
@@ -48,8 +46,7 @@ def fit(
         Interrupted: a checkpoint has been saved.
     """
     out = Path(out).expanduser()
-    config = run.checked_config(out, resume, config)
-    settings = resolve(PRESETS, preset, config, overrides)
+    settings = run.settings(PRESETS, out, preset, config, overrides, resume)
     shown = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
     task = NcaTask(settings, shown, None if init is None else _parent(init, settings))
     result = train(
@@ -60,20 +57,11 @@ def fit(
         milestones=settings.milestones,
         decay=settings.decay,
         normalise_gradients=settings.normalise_gradients,
-        checkpoint_every=settings.checkpoint_every,
-        preview_every=settings.preview_every,
         resume=resume,
         quiet=quiet,
     )
-    about: dict[str, Any] = {
-        "name": shown.name,
-        "exemplar": shown.name,
-        "preset": settings.preset,
-        "density": settings.density,
-    }
-    about |= {"steps": result.steps, "seconds": round(result.seconds, 1)}
-    if math.isfinite(result.loss):
-        about["loss"] = round(result.loss, 4)
+    about = result.about(shown.name, settings.preset)
+    about |= {"exemplar": shown.name, "density": settings.density}
     if init is not None:
         about["parent"] = str(files.load(init)[1]["name"])
     texture = NcaTexture(task.model, tuple(task.maps), about)

@@ -28,7 +28,7 @@ from mitex.methods.surface.task import SurfaceTask
 from mitex.methods.surface.texels import Texels
 from mitex.methods.surface.texture import NAME, SurfaceTexture
 from mitex.runtime import available_memory
-from mitex.training import resolve, run, train
+from mitex.training import run, train
 from mitex.training.lbfgs import Lbfgs
 from mitex.training.optim import Adam
 
@@ -76,10 +76,8 @@ def fit(
         Interrupted: a checkpoint has been saved.
     """
     out = Path(out).expanduser()
-    config = run.checked_config(out, resume, config)
-    if content is not None and config is None:
-        preset = preset or "style"
-    settings = resolve(PRESETS, preset, config, overrides)
+    presets = PRESETS if content is None else {"style": PRESETS["style"], **PRESETS}
+    settings = run.settings(presets, out, preset, config, overrides, resume)
     shown = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
     image = content is not None and str(content) != AO
     surface = with_layout(mesh if isinstance(mesh, Mesh) else Mesh.load(mesh), settings, keep_uvs or image)
@@ -99,22 +97,11 @@ def fit(
         milestones=settings.milestones,
         decay=settings.decay,
         optimizer=Lbfgs if settings.optimizer == "lbfgs" else partial(Adam, shared=settings.shared_moment),
-        checkpoint_every=settings.checkpoint_every,
-        preview_every=settings.preview_every,
         resume=resume,
         quiet=quiet,
     )
-    about = {
-        "name": shown.name,
-        "preset": settings.preset,
-        "resolution": settings.resolution,
-        "frames": settings.frames,
-        "angle": settings.angle,
-        "steps": result.steps,
-        "seconds": round(result.seconds, 1),
-    }
-    if math.isfinite(result.loss):
-        about["loss"] = result.loss
+    about = result.about(shown.name, settings.preset)
+    about |= {key: getattr(settings, key) for key in ("resolution", "frames", "angle")}
     texture = SurfaceTexture(surface, task.in_texel_order(), tuple(task.layout), about, field)
     texture.save(out / NAME)
     return texture

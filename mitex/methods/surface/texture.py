@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,21 +11,19 @@ from typing import Any
 
 import numpy as np
 import torch
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 
 from mitex.asset import Asset
 from mitex.atlas import Atlas, spread
-from mitex.errors import CheckpointError, ConfigError
+from mitex.errors import ConfigError
 from mitex.exemplar import MAPS
 from mitex.frames import atlas_normals, decode
 from mitex.mesh import Mesh
 from mitex.methods.surface.frames import face_normals, tangent_frames, vertex_directions
 from mitex.methods.surface.texels import Texels
-from mitex.paths import atomic_write
+from mitex.training import model_file
 
 NAME = "texture.safetensors"
-FORMAT = "mitex-surface-1"
+KIND = "surface"
 PADDING = 8  # texels by which charts are continued outwards
 
 
@@ -102,9 +99,7 @@ class SurfaceTexture:
         tensors = {name: torch.from_numpy(np.ascontiguousarray(a)) for name, a in arrays.items()}
         tensors["values"] = torch.from_numpy(np.ascontiguousarray(self.values, np.float16))
         about = {**self.about, "maps": list(self.maps), "mesh": self.mesh.name}
-        with atomic_write(path) as temporary:
-            save_file(tensors, temporary, {"format": FORMAT, "about": json.dumps(about)})
-        return Path(path)
+        return model_file.save(path, tensors, KIND, about)
 
     @staticmethod
     def load(source: str | Path) -> SurfaceTexture:
@@ -113,29 +108,14 @@ class SurfaceTexture:
         Raises:
             CheckpointError: there is none, or it is damaged.
         """
-        path = Path(source).expanduser()
-        path = path / NAME if path.is_dir() else path
-        if not path.is_file():
-            raise CheckpointError(
-                f"there is no finished surface texture at '{source}'", "go on with mitex fit surface --resume"
-            )
-        try:
-            with safe_open(path, "pt") as file:
-                metadata = file.metadata() or {}
-                arrays = {key: file.get_tensor(key).numpy() for key in file.keys()}  # noqa: SIM118
-            if metadata.get("format") != FORMAT:
-                raise ValueError("another format")
-            about = json.loads(metadata["about"])
+        with model_file.opened(source, KIND, NAME) as (tensors, about):
+            arrays = {key: tensor.numpy() for key, tensor in tensors.items()}
             mesh = Mesh(arrays["vertices"], arrays["faces"], arrays["uv"], str(about["mesh"]))
             values, orientation = arrays["values"].astype(np.float32), arrays.get("orientation")
             texture = SurfaceTexture(mesh, values, tuple(about["maps"]), about, orientation)
             if len(texture.texels.index) != len(texture.values):
                 raise ValueError("texels are missing")
             return texture
-        except (SafetensorError, OSError, ValueError, KeyError, TypeError) as e:
-            raise CheckpointError(
-                f"'{path}' is not a surface texture ({e})", "name the run folder of mitex fit surface"
-            ) from e
 
     def _at_vertices(self) -> np.ndarray:
         """(V, C) values at the vertices, from the first face around each; 0 without a face."""

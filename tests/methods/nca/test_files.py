@@ -10,7 +10,7 @@ from safetensors.torch import load_file, save_file
 
 from mitex.errors import CheckpointError, OutputError
 from mitex.methods.nca import MeshNCA, NcaTexture, files
-from mitex.training import checkpoint
+from mitex.training import checkpoint, model_file
 from mitex.training.checkpoint import Checkpoint
 from tests.methods.nca.tiny import texture
 
@@ -238,7 +238,7 @@ def test_saving_is_atomic(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(files, "save_file", full)
+    monkeypatch.setattr(model_file, "save_file", full)
     with pytest.raises(OutputError, match="no space left"):
         texture(seed=2).save(path)
     assert all(torch.equal(v, before[k]) for k, v in load_file(path).items())

@@ -154,7 +154,7 @@ def test_metadata(task):
 
 
 def _run(exemplar, folder, steps, resume=False):
-    settings = config(f"steps={steps}", "checkpoint_every=2")
+    settings = config(f"steps={steps}", "checkpoint_every=2", "preview_every=0")
     task = NcaTask(settings, exemplar)
     train(
         task,
@@ -162,7 +162,6 @@ def _run(exemplar, folder, steps, resume=False):
         folder,
         lr=settings.lr,
         normalise_gradients=True,
-        checkpoint_every=2,
         resume=resume,
         quiet=True,
     )

@@ -56,4 +56,8 @@ def test_regions_of_deep_layers_hold_enough_elements(network, image):
         Vgg16(precision="float32", normalised=False), image[None], (LAYER, "relu2_1", "relu4_1"), 256
     )
     taps = comparison.taps(network, torch.Generator())
-    assert [tap.regions for tap in taps.values()] == [SIDE**2 // 256, SIDE**2 // 4 // LEAST, 1]
+    assert [getattr(tap, "regions", None) for tap in taps.values()] == [
+        SIDE**2 // 256,
+        SIDE**2 // 4 // LEAST,
+        1,
+    ]

@@ -1,0 +1,73 @@
+"""Model files: tensors, the name of a format and a description as JSON, in one safetensors file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+
+from mitex.errors import CheckpointError
+from mitex.paths import atomic_write
+
+
+def save(
+    path: str | Path, tensors: Mapping[str, torch.Tensor], kind: str, about: Mapping[str, Any], **further: str
+) -> Path:
+    """Writes what a method made: `kind` is its name, `about` holds JSON values, `further` is more metadata.
+
+    Raises:
+        OutputError: the place is not writable.
+    """
+    own = {name: value.detach().cpu().contiguous() for name, value in tensors.items()}
+    metadata = {"format": _format(kind), "about": json.dumps(dict(about)), **further}
+    with atomic_write(path) as temporary:
+        save_file(own, temporary, metadata)
+    return Path(path)
+
+
+@contextmanager
+def opened(
+    source: str | Path, kind: str, name: str
+) -> Iterator[tuple[dict[str, torch.Tensor], dict[str, Any]]]:
+    """Yields tensors and `about` of a file, or of the file `name` of a run folder.
+
+    What goes wrong in the body for lack of good tensors (a missing key, a wrong shape) means a damaged file.
+
+    Raises:
+        CheckpointError: there is none, or it is damaged.
+    """
+    path = Path(source).expanduser()
+    path = path / name if path.is_dir() else path
+    if not path.is_file():
+        raise CheckpointError(
+            f"there is no finished {kind} texture at '{source}'", f"go on with mitex fit {kind} --resume"
+        )
+    try:
+        tensors, metadata = read(path)
+        if metadata.get("format") != _format(kind):
+            raise ValueError("another format")
+        yield tensors, json.loads(metadata["about"])
+    except (SafetensorError, OSError, ValueError, KeyError, TypeError, RuntimeError) as e:
+        raise CheckpointError(
+            f"'{path}' is not a {kind} texture ({e})", f"name the run folder of mitex fit {kind}"
+        ) from e
+
+
+def read(path: Path) -> tuple[dict[str, torch.Tensor], dict[str, str]]:
+    """Tensors, in memory of their own, and metadata of any safetensors file.
+
+    Raises:
+        SafetensorError, OSError: it is missing or damaged.
+    """
+    with safe_open(path, "pt") as file:
+        return {key: file.get_tensor(key) for key in file.keys()}, file.metadata() or {}  # noqa: SIM118
+
+
+def _format(kind: str) -> str:
+    return f"mitex-{kind}-1"
