@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, arg
 
 from mitex.cli.checks import SEEDS, in_range, needless, not_both
+from mitex.cli.displacing import TEMPLATE, Displacing
 from mitex.errors import ConfigError
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
-    from mitex.mesh import Mesh
 
 SUFFIXES = (".glb", ".obj", ".ply", ".exr")
 RESOLUTION = 1024
@@ -26,7 +26,7 @@ OPTIONS = {  # those that mean something, by method
 
 
 @dataclass
-class Apply:
+class Apply(Displacing):
     """Put a learned texture on a mesh and write the result.
 
     The suffix of --out chooses the format: .glb (PBR textures), .obj (with .mtl and PNG maps),
@@ -44,7 +44,8 @@ class Apply:
     """Run folder, model file, or name of a bundled model (see `mitex models`)."""
 
     mesh: Annotated[str, arg(metavar="MESH|NAME")]
-    """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
+    """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh; `template`, for geometric
+    textures: a variation of their reference."""
 
     out: Annotated[Path, arg(metavar="ASSET")]
     """File to write."""
@@ -70,15 +71,6 @@ class Apply:
     vertex_colors: Annotated[bool, arg(help_behavior_hint="")] = False
     """Write colours at the vertices instead of textures."""
 
-    start_level: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 2)")] = None
-    """Geometric textures: the generator to begin with; low ones change the shape."""
-
-    end_level: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the last)")] = None
-    """Geometric textures: the last generator; each one after the first splits every face in four."""
-
-    remesh: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None
-    """Geometric textures: give the mesh N even vertices first; fewer make the texture larger."""
-
     def run(self) -> None:
         self._subdivide()
         in_range("--seed", self.seed, *SEEDS)
@@ -86,9 +78,7 @@ class Apply:
         in_range("--orientation", self.orientation, -360.0, 360.0)
         in_range("--scale", self.scale, 0.05, 20.0)
         in_range("--resolution", self.resolution, 64, 8192)
-        in_range("--start-level", self.start_level, 0, 6)
-        in_range("--end-level", self.end_level, 0, 6)
-        in_range("--remesh", self.remesh, 12, 2_000_000)
+        self.check_displacing()
         not_both("--resolution", "--vertex-colors", self.resolution is not None and self.vertex_colors)
         from mitex.paths import prepare_output
 
@@ -96,14 +86,11 @@ class Apply:
         suffix = out.suffix.lower()
         needless("--vertex-colors", out, self.vertex_colors and suffix in (".obj", ".exr"))
         needless("--resolution", out, self.resolution is not None and suffix == ".ply")
-        from mitex.mesh import Mesh
-
-        mesh = Mesh.load(self.mesh)
         method = self._method()
         if method == "nca":
-            asset = self._grown(mesh, suffix)
+            asset = self._grown(suffix)
         else:
-            asset = self._synthesized(mesh) if method == "surface" else self._displaced(mesh)
+            asset = self._synthesized() if method == "surface" else self._displaced()
         asset.export(out)
         print(self.out)
 
@@ -118,10 +105,12 @@ class Apply:
                 raise ConfigError(f"{option} means nothing for textures of {method}", f"leave {option} out")
         return method
 
-    def _grown(self, mesh: Mesh, suffix: str) -> Asset:
+    def _grown(self, suffix: str) -> Asset:
         """By a cellular automaton, on any mesh."""
+        from mitex.mesh import Mesh
         from mitex.methods.nca import NcaTexture
 
+        mesh = Mesh.load(self.mesh)
         textures = suffix != ".ply" and not self.vertex_colors
         resolution = self.resolution or RESOLUTION
         asset = NcaTexture.load(self.model).apply(
@@ -135,20 +124,26 @@ class Apply:
         )
         return asset.baked(resolution) if textures else asset
 
-    def _synthesized(self, mesh: Mesh) -> Asset:
+    def _synthesized(self) -> Asset:
         """A surface texture on the mesh that it was synthesized on."""
+        from mitex.mesh import Mesh
         from mitex.methods.surface import SurfaceTexture
 
+        mesh = Mesh.load(self.mesh)
         return SurfaceTexture.load(self.model).apply(mesh)
 
-    def _displaced(self, mesh: Mesh) -> Asset:
-        """By a geometric texture, on any mesh."""
-        from mitex.mesh import remesh
+    def _displaced(self) -> Asset:
+        """By a geometric texture, on any mesh, or on its own template."""
         from mitex.methods.geometric import GeometricTexture
+        from mitex.methods.geometric.pictures import clay
 
         texture = GeometricTexture.load(self.model)
-        even = mesh if self.remesh is None else remesh(mesh, self.remesh)
-        return texture.apply(even, seed=self.seed, start_level=self.start_level, end_level=self.end_level)
+        if self.mesh == TEMPLATE:
+            return clay(texture.generate(self.seed, self.start_level or 0, self.end_level))
+        mesh = self.even_mesh(self.mesh)
+        made = texture.apply(mesh, seed=self.seed, start_level=self.start_level, end_level=self.end_level)
+        self.advise(texture, mesh)
+        return made
 
     def _subdivide(self) -> int | str:
         if self.subdivide == "auto":

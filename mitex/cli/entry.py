@@ -25,6 +25,7 @@ COMMANDS = {
     "fit surface": ("fit_surface:FitSurface", "synthesize a texture on one mesh (tangent-space CNN)"),
     "fit geometric": ("fit_geometric:FitGeometric", "learn the relief of a mesh (face-convolution GAN)"),
     "apply": ("apply:Apply", "put a learned texture on a mesh"),
+    "animate": ("animate:Animate", "film how a geometric texture grows or changes"),
     "render": ("render:Render", "path-trace an asset: a still or a turntable"),
     "models": ("models:Models", "list the textures that ship with Mitex"),
 }

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
 from mitex.asset import Asset
 from mitex.colour import linear_to_srgb
-from mitex.errors import ConfigError, OutputError
+from mitex.errors import ConfigError
 from mitex.export.exr import write_exr
 from mitex.images import write_image
-from mitex.paths import atomic_write, prepare_output
+from mitex.paths import prepare_output
 from mitex.render.renderer import OrbitRenderer
+from mitex.render.video import check_video, write_video
 
 STILL_SUFFIXES = (".png", ".jpg", ".jpeg", ".exr")
-VIDEO_SUFFIXES = (".mp4", ".gif")
 AZIMUTH, ELEVATION = math.radians(25), math.radians(18)
 
 
@@ -116,13 +115,7 @@ def turntable(
         OutputError: unknown suffix, unwritable place, or the encoder failed.
         ConfigError: an option out of range.
     """
-    target = prepare_output(path, VIDEO_SUFFIXES)
-    if not 2 <= frames <= 3600 or not 1 <= fps <= 60:
-        raise ConfigError(
-            f"a turntable of {frames} frames at {fps} per second is not possible", "use 2 to 3600 at 1 to 60"
-        )
-    if target.suffix.lower() == ".mp4" and resolution % 2:
-        raise ConfigError(f"MP4 needs an even size, not {resolution}", f"use {resolution + 1}")
+    target = check_video(path, frames, fps, resolution)
     tone(np.zeros(3), exposure)
     renderer = OrbitRenderer(
         asset, resolution=resolution, displacement=displacement, ao=ao, backdrop=backdrop
@@ -133,52 +126,8 @@ def turntable(
     def pictures() -> Iterator[np.ndarray]:
         for k, angle in enumerate(angles):
             # The same seed: noise that stands still compresses better and disturbs less.
-            picture = tone(renderer.render(float(angle), view, spp), exposure)
-            yield np.round(picture * 255.0).astype(np.uint8)
+            yield tone(renderer.render(float(angle), view, spp), exposure)
             if progress:
                 progress(k + 1, frames)
 
-    with atomic_write(target) as temporary:
-        (_write_gif if target.suffix.lower() == ".gif" else _write_mp4)(
-            temporary, pictures(), fps, resolution
-        )
-    return target
-
-
-def _write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: int, side: int) -> None:
-    import imageio_ffmpeg
-
-    encoder = imageio_ffmpeg.write_frames(
-        str(path),
-        (side, side),
-        fps=fps,
-        codec="libx264",
-        quality=7,
-        macro_block_size=2,
-        output_params=["-movflags", "+faststart"],
-        ffmpeg_log_level="error",
-    )
-    encoder.send(None)
-    try:
-        for picture in pictures:
-            encoder.send(np.ascontiguousarray(picture))
-    finally:
-        encoder.close()
-    if not path.is_file() or path.stat().st_size == 0:
-        raise OutputError("ffmpeg wrote no video", "check the free space and `mitex doctor`")
-
-
-def _write_gif(path: Path, pictures: Iterator[np.ndarray], fps: int, side: int) -> None:
-    images = [Image.fromarray(p) for p in pictures]
-    # One palette for all frames, or colours would flicker.
-    palette = _strip(images[:: max(1, len(images) // 8)]).quantize(256, Image.Quantize.MEDIANCUT)
-    indexed = [i.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG) for i in images]
-    duration = max(20, round(1000.0 / fps))  # [ms]; viewers slow down anything faster
-    indexed[0].save(path, "GIF", save_all=True, append_images=indexed[1:], duration=duration, loop=0)
-
-
-def _strip(images: Sequence[Image.Image]) -> Image.Image:
-    strip = Image.new("RGB", (images[0].width * len(images), images[0].height))
-    for k, image in enumerate(images):
-        strip.paste(image, (k * image.width, 0))
-    return strip
+    return write_video(target, pictures(), fps, resolution)

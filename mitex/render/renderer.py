@@ -16,6 +16,7 @@ from mitex.errors import ConfigError
 from mitex.export.common import DEFAULT_ALBEDO, DEFAULT_ROUGHNESS
 from mitex.frames import split_at_seams, unit
 from mitex.mesh import Mesh
+from mitex.mesh.mesh import Similarity
 from mitex.render.framing import FOV, View, frame, hull, rotation
 from mitex.render.studio import GREY, backdrop, lights
 
@@ -42,6 +43,8 @@ class OrbitRenderer:
             they are taken from the displaced surface.
         ao: whether ambient occlusion darkens the base colour.
         backdrop: whether the object stands on a grey sweep; without, it floats before plain white.
+        like: the mesh that is normalised to radius 1, and stands on the backdrop; the asset moves with it, so
+            that several assets can be compared. The asset's own mesh if None.
 
     Raises:
         ConfigError: an option out of range, or displacement without a height map.
@@ -55,6 +58,7 @@ class OrbitRenderer:
         displacement: float = 0.0,
         ao: bool = True,
         backdrop: bool = True,
+        like: Mesh | None = None,
     ):
         if not 16 <= resolution <= 4096:
             raise ConfigError(f"a picture of {resolution} pixels is not possible", "use 16 to 4096")
@@ -64,8 +68,10 @@ class OrbitRenderer:
             raise ConfigError("displacement needs a height map", "leave it out or use a model with height")
         self.resolution = resolution
         self._on_backdrop = backdrop
-        self._positions, self._normals, self._detail = _surface(asset, displacement)
-        self._hull = hull(self._positions)
+        _, place = (like or asset.mesh).normalised()
+        self._positions, self._normals, self._detail = _surface(asset, place, displacement)
+        framed = self._positions if like is None else place.apply(like.vertices)
+        self._hull, self._floor = hull(framed), float(framed[:, 1].min())
         mesh = replace(asset.mesh, uv=None)
         if asset.atlas is not None:  # a vertex for each UV
             split = split_at_seams(mesh, asset.atlas.uv)
@@ -134,7 +140,7 @@ class OrbitRenderer:
             scene["backdrop"] = _shape(
                 mi,
                 "backdrop",
-                backdrop(float(self._positions[:, 1].min())),
+                backdrop(self._floor),
                 {"type": "twosided", "bsdf": paper},
             )
         loaded = mi.load_dict(scene)
@@ -170,9 +176,11 @@ class OrbitRenderer:
         return (colour + (1.0 - alpha.clip(0.0, 1.0))).astype(np.float32)
 
 
-def _surface(asset: Asset, displacement: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions of radius 1, vertex normals and detail normals, (V, 3) float64 each."""
-    mesh, _ = asset.mesh.normalised()
+def _surface(
+    asset: Asset, place: Similarity, displacement: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions in the scene, vertex normals and detail normals, (V, 3) float64 each."""
+    mesh = asset.mesh.with_vertices(place.apply(asset.mesh.vertices))
     textured = asset.texture_maps is not None  # relief is the material's then
     detail = asset.mesh.normals if textured else asset.detail_normals()
     if displacement:

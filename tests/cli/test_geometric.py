@@ -1,5 +1,7 @@
 """`mitex fit geometric`, and `mitex apply` of what it makes."""
 
+import imageio.v3 as iio
+import numpy as np
 import pytest
 
 from mitex.cli import main
@@ -46,6 +48,63 @@ def test_remeshing_first(files, run):
     pytest.importorskip("pymeshlab")
     assert main(apply("--remesh 200 --start-level 1")) == 0
     assert 150 < len(Mesh.load(files / "out" / "a.ply").vertices) < 260
+
+
+def test_a_variation_of_the_reference(files, run):
+    assert main(apply("--seed 2", mesh="template")) == 0
+    assert len(Mesh.load(files / "out" / "a.ply").faces) == 4 * 20
+
+
+def test_advice_on_the_size(files, run, capsys):
+    """The cube has 12 faces, the template 80 on level 1, the last one here."""
+    assert main(apply()) == 0
+    assert "features are 2.6 times as large as on the reference" in capsys.readouterr().err
+
+
+def animate(words="", mesh="good.obj", model="out/run", out="out/a.gif"):
+    return f"animate {model} --mesh {mesh} --out {out} --size 32 --spp 1 {words}".split()
+
+
+@pytest.mark.parametrize(
+    ("words", "mesh", "count"),
+    [("--start-level 0 --frames 2", "good.obj", 5), ("--frames 2", "template", 5)],
+)
+def test_films_of_growth(files, run, words, mesh, count):
+    """The bare mesh, and two frames a level."""
+    assert main(animate(f"{words} --meshes out/frames", mesh)) == 0
+    assert len(iio.imread("out/a.gif")) == count
+    frames = sorted((files / "out" / "frames").iterdir())
+    assert [p.name for p in frames] == [f"{k:04}.ply" for k in range(count)]
+    faces = 12 if mesh == "good.obj" else 20
+    assert [len(Mesh.load(p).faces) for p in frames] == [faces] * 3 + [4 * faces] * 2
+
+
+def test_a_film_from_seed_to_seed(files, run):
+    """Its first and last mesh are the seeds' own."""
+    assert main(animate("--seed 3 --to-seed 4 --frames 3 --meshes out/frames")) == 0
+    for name, seed in (("0000", 3), ("0002", 4)):
+        assert main(apply(f"--seed {seed}")) == 0
+        alone, frame = Mesh.load("out/a.ply"), Mesh.load(f"out/frames/{name}.ply")
+        assert np.abs(alone.vertices - frame.vertices).max() < 1e-5
+
+
+BAD_FILMS = {
+    "a still": (animate(out="out/a.png"), ".mp4"),
+    "one frame": (animate("--frames 1"), "--frames"),
+    "no frames a second": (animate("--fps 0"), "--fps"),
+    "huge pictures": (animate("--size 9999"), "--size"),
+    "odd size": (animate("--size 33", out="out/a.mp4"), "even size"),
+    "level beyond": (animate("--end-level 5"), "this texture has the levels 0 to 1"),
+    "missing mesh": (animate(mesh="none.obj"), "none.obj"),
+    "another method": (animate(model="cobblestone"), "name a run of mitex fit geometric"),
+    "meshes in a file": (animate("--meshes good.obj"), "good.obj"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILMS)
+def test_bad_films(files, run, name, capsys):
+    words, message = BAD_FILMS[name]
+    check_refused(files, words, message, capsys)
 
 
 BAD_FITS = {

@@ -14,7 +14,7 @@ from mitex.colour import linear_to_srgb
 from mitex.errors import ConfigError, OutputError
 from mitex.export import read_exr
 from mitex.mesh import icosphere
-from mitex.render import render_still, tone, turntable
+from mitex.render import film, render_still, tone, turntable
 
 ASSET = Asset(icosphere(3), {"albedo": np.full((92, 3), 0.6), "height": np.zeros((92, 1))})
 SMALL: dict[str, Any] = {"resolution": 16, "spp": 1}
@@ -58,6 +58,18 @@ def test_turntables_have_all_frames_and_turn(name, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == [name]
 
 
+def test_films_show_assets_in_turn_without_moving_the_camera(tmp_path):
+    """A ball, and one half as large: its silhouette has a quarter of the pixels."""
+    ball = ASSET.mesh
+    small = ball.with_vertices(0.5 * ball.vertices)
+    dark = {"albedo": np.zeros((92, 3))}
+    assets = [Asset(mesh, dark) for mesh in (ball, small, ball)]
+    path = film(assets, tmp_path / "a.gif", frames=3, like=ball, resolution=64, spp=4)
+    shown = (iio.imread(path).mean(axis=3) < 60).sum(axis=(1, 2))
+    assert shown[0] == shown[2] > 800
+    assert shown[1] / shown[0] == pytest.approx(0.25, abs=0.05)
+
+
 def test_gifs_loop_forever(tmp_path):
     image = Image.open(turntable(ASSET, tmp_path / "a.gif", frames=2, fps=10, **SMALL))
     assert image.info["loop"] == 0 and image.info["duration"] == 100
@@ -66,8 +78,8 @@ def test_gifs_loop_forever(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"frames": 1}, "turntable"),
-        ({"fps": 0}, "turntable"),
+        ({"frames": 1}, "a video of 1 frames"),
+        ({"fps": 0}, "at 0 per second"),
         ({"resolution": 33}, "even size"),
         ({"exposure": 99.0}, "exposure"),
         ({"elevation": -0.5}, "elevation"),

@@ -111,7 +111,7 @@ def test_roughness_stays_off_zero():
 
 def test_displacement_moves_along_the_normals_by_the_squared_height():
     height = np.linspace(0, 1, len(SPHERE.vertices))[:, None]
-    positions, _, detail = _surface(Asset(SPHERE, {"height": height}), 0.1)
+    positions, _, detail = _surface(Asset(SPHERE, {"height": height}), SPHERE.normalised()[1], 0.1)
     np.testing.assert_allclose(np.linalg.norm(positions, axis=1), 1 + 0.1 * height[:, 0] ** 2, atol=1e-4)
     assert np.abs(detail - SPHERE.normals).max() > 0.01  # no normal map: relief from the surface itself
 

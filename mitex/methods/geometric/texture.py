@@ -134,6 +134,16 @@ class GeometricTexture:
                 yield after.with_vertices(start.vertices + t * (after.vertices - start.vertices))
             before = after
 
+    def relative_size(self, mesh: Mesh, start_level: int | None = None) -> tuple[float, int]:
+        """How large features will be beside a mesh, in relation to their size beside the reference.
+
+        Returns:
+            That ratio, and with how many vertices of the mesh, `remesh`ed, it would be about 1.
+        """
+        start = min(START, self.levels - 1) if start_level is None else start_level
+        faces = len(self.template.faces) * 4**start
+        return (faces / len(mesh.faces)) ** 0.5, max(faces // 2, 12)
+
     def course(self, mesh: Mesh, start_level: int | None, end_level: int | None) -> Course:
         """What happens to a mesh between two levels.
 

@@ -1,0 +1,78 @@
+"""Grows geometric textures on meshes and renders them, the reference beside them.
+
+usage: python tools/make_geometric_gallery.py RUNS MESHES SHEET REFERENCE[,REFERENCE ...] MESH~VERTICES ...
+
+RUNS holds a finished run of `mitex fit geometric` for each reference, MESHES is a folder; `torus` and names
+of embedded meshes work too. Every mesh is remeshed to so many vertices, displaced from level 2 on, and
+rendered: docs/gallery/SHEET.jpg has a row for each reference, which stands first, and above them the meshes
+alone. For every pair the Wasserstein-1 distances between the local statistics of result and reference are
+printed, and those of the mesh itself, remeshed to as many vertices as the result has.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from mitex.images import write_image
+from mitex.mesh import Mesh, embedded_names, remesh, torus
+from mitex.methods.geometric import GeometricTexture
+from mitex.methods.geometric.pictures import clay
+from mitex.methods.geometric.references import find_reference
+from mitex.methods.geometric.statistics import statistic_distances
+from mitex.render import sheet, still, tone
+
+GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
+CELL = 224  # side of a picture [px]
+AZIMUTH = math.radians(20)
+
+
+def find_mesh(name: str, meshes: Path) -> Mesh:
+    """A mesh by the name that the command line gives it."""
+    if name == "torus":
+        return torus()
+    return Mesh.load(name if name in embedded_names() else meshes / f"{name}.obj")
+
+
+def picture(mesh: Mesh) -> np.ndarray:
+    """From one side, in light grey."""
+    return tone(still(clay(mesh), resolution=CELL, spp=96, azimuth=AZIMUTH))
+
+
+def main() -> None:
+    runs, meshes, name, references, *wanted = sys.argv[1:]
+    pairs = [word.split("~") for word in wanted]
+    found = [find_mesh(mesh, Path(meshes)) for mesh, _ in pairs]
+    coarse = [replace(remesh(m, int(n)), name=m.name) for m, (_, n) in zip(found, pairs, strict=True)]
+    fine: dict[tuple[str, int], Mesh] = {}
+    cells, labels = [np.ones((CELL, CELL, 3)), *map(picture, found)], ["", *(m.name for m in found)]
+    for reference in references.split(","):
+        texture = GeometricTexture.load(Path(runs) / reference)
+        learned = texture.generate(
+            start_level=texture.levels
+        )  # the reference with edges as long as the results'
+        cells.append(picture(find_reference(reference)))
+        labels.append(reference)
+        for mesh, even in zip(found, coarse, strict=True):
+            begun = time.perf_counter()
+            grown = texture.apply(even).mesh
+            seconds = time.perf_counter() - begun
+            key = mesh.name, len(grown.vertices)
+            fine.setdefault(key, remesh(mesh, key[1]))
+            ours, theirs = statistic_distances(grown, learned), statistic_distances(fine[key], learned)
+            told = ", ".join(f"{k} {ours[k]:.3f} of {theirs[k]:.3f}" for k in ours)
+            print(
+                f"{reference} on {mesh.name}, {len(grown.faces):,} faces, {seconds:.1f} s: {told}", flush=True
+            )
+            cells.append(picture(grown))
+            labels.append(mesh.name)
+    write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=1 + len(found), labels=labels, cell=CELL))
+
+
+if __name__ == "__main__":
+    main()
