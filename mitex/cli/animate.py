@@ -69,7 +69,7 @@ class Animate(Displacing):
         in_range("--fps", self.fps, 1, 60)
         from mitex.methods.kind import kind
         from mitex.paths import prepare_folder, prepare_output
-        from mitex.render import VIDEO_SUFFIXES, film
+        from mitex.render import VIDEO_SUFFIXES, check_video, film
 
         out = prepare_output(self.out, VIDEO_SUFFIXES)
         if (method := kind(self.model)) != "geometric":
@@ -83,6 +83,11 @@ class Animate(Displacing):
         else:
             mesh = self.even_mesh(self.mesh)
         made = list(self._sequence(texture, mesh, start))
+        check_video(out, len(made), self.fps, self.size)
+        if self.meshes is not None:
+            folder = prepare_folder(self.meshes)
+            for k, frame in enumerate(made):
+                clay(frame).export(folder / f"{k:04}.ply")
         with bar("film") as progress:
             film(
                 map(clay, made),
@@ -94,10 +99,6 @@ class Animate(Displacing):
                 spp=self.spp,
                 progress=progress,
             )
-        if self.meshes is not None:
-            folder = prepare_folder(self.meshes)
-            for k, mesh in enumerate(made):
-                clay(mesh).export(folder / f"{k:04}.ply")
         if self.mesh != TEMPLATE:
             self.advise(texture, mesh)
         print(self.out)
