@@ -16,6 +16,8 @@ from mitex.exemplar import MAPS
 from mitex.frames import atlas_normals, vertex_detail
 from mitex.mesh import Mesh
 
+CLAY = 0.7  # sRGB
+
 
 @dataclass(frozen=True, eq=False)
 class Asset:
@@ -136,6 +138,11 @@ class Asset:
         from mitex.export import read_asset
 
         return read_asset(path)
+
+
+def clay(mesh: Mesh) -> Asset:
+    """A mesh without a look of its own: in light grey."""
+    return Asset(mesh, {"albedo": np.full((len(mesh.vertices), 3), CLAY, np.float32)}, name=mesh.name)
 
 
 def _checked(name: str, values: np.ndarray, shape: tuple[int, ...], kind: str) -> np.ndarray:

@@ -19,10 +19,10 @@ from pathlib import Path
 
 import numpy as np
 
+from mitex.asset import clay
 from mitex.images import write_image
 from mitex.mesh import Mesh, embedded_names, remesh, torus
 from mitex.methods.geometric import GeometricTexture
-from mitex.methods.geometric.pictures import clay
 from mitex.methods.geometric.references import find_reference
 from mitex.methods.geometric.statistics import statistic_distances
 from mitex.render import sheet, still, tone

@@ -74,8 +74,8 @@ class Animate(Displacing):
         out = prepare_output(self.out, VIDEO_SUFFIXES)
         if (method := kind(self.model)) != "geometric":
             raise ConfigError(f"textures of {method} do not grow", "name a run of mitex fit geometric")
+        from mitex.asset import clay
         from mitex.methods.geometric import GeometricTexture
-        from mitex.methods.geometric.pictures import clay
 
         texture, start = GeometricTexture.load(self.model), self.start_level
         if self.mesh == TEMPLATE:

@@ -134,8 +134,8 @@ class Apply(Displacing):
 
     def _displaced(self) -> Asset:
         """By a geometric texture, on any mesh, or on its own template."""
+        from mitex.asset import clay
         from mitex.methods.geometric import GeometricTexture
-        from mitex.methods.geometric.pictures import clay
 
         texture = GeometricTexture.load(self.model)
         if self.mesh == TEMPLATE:

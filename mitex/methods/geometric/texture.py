@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 import torch
 
-from mitex.asset import Asset
+from mitex.asset import Asset, clay
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, subdivide_midpoint
 from mitex.methods.geometric import files
 from mitex.methods.geometric.hierarchy import Hierarchy, mean_edge
 from mitex.methods.geometric.model import grow
 from mitex.methods.geometric.network import FaceNetwork
-from mitex.methods.geometric.pictures import clay
 from mitex.runtime import keep_freed_memory
 
 START = 2  # the paper starts at level 2 or 3

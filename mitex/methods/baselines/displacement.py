@@ -1,0 +1,96 @@
+"""Displacement maps: a height map of a reference, put on a mesh (Hertz et al. 2020, figure 11).
+
+The authors draw the map by hand. Here it is baked, as modelling programs do: a square window is looked at
+from outside, along parallel rays, and what remains of the depths after the large shape is taken off are the
+heights. What hangs over is hidden, and vertices move along their normals only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+from mitex.asset import Asset, clay
+from mitex.atlas import laid_out, twice_area
+from mitex.errors import ConfigError
+from mitex.mesh import Mesh, subdivide_midpoint
+from mitex.runtime import init, load_mitsuba
+from mitex.scenes.stage import mesh_shape
+
+mi: Any = load_mitsuba(needs_llvm=False)
+
+WINDOW = 0.35  # side of the window, of the reference's extent
+ATLAS = 1024  # resolution that the target's charts are packed for
+
+
+@dataclass(frozen=True, eq=False)
+class DisplacementMap:
+    """Heights of a square piece of a surface.
+
+    Attributes:
+        heights: (N, N) float64, mean 0 [parts of the root of the reference's area].
+        side: of the square [parts of the root of the reference's area].
+    """
+
+    heights: np.ndarray
+    side: float
+
+    @staticmethod
+    def bake(reference: Mesh, resolution: int = 256) -> DisplacementMap:
+        """Takes the map off the side of the reference that faces +z.
+
+        Raises:
+            ConfigError: nothing of it lies in a part of the window.
+        """
+        low, high = reference.vertices.min(0), reference.vertices.max(0)
+        extent, centre = float((high - low).max()), 0.5 * (low + high)
+        side = WINDOW * extent
+        place = (np.arange(resolution) + 0.5) / resolution - 0.5
+        x, y = (side * a.ravel() for a in np.meshgrid(place, place))
+        start = np.stack([centre[0] + x, centre[1] + y, np.full_like(x, high[2] + extent)], 1)
+        depth = _depth(reference, start)
+        if not np.isfinite(depth).all():
+            raise ConfigError(
+                f"'{reference.name}' has holes where a height map is taken off", "turn another side to +z"
+            )
+        # A quadric is the large shape: what is left are the heights.
+        terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], 1)
+        heights = -depth - terms @ np.linalg.lstsq(terms, -depth, rcond=None)[0]
+        unit = float(np.sqrt(reference.face_areas.sum(dtype=np.float64)))
+        return DisplacementMap(heights.reshape(resolution, resolution) / unit, side / unit)
+
+    def apply(self, mesh: Mesh, size: float = 1.0, levels: int = 0) -> Asset:
+        """A mesh displaced along its normals by the map, repeated in mirrored squares over its UVs.
+
+        Args:
+            mesh: its own UVs are used if they do not overlap, else new ones.
+            size: of the features in relation to the mesh, beside that on the reference.
+            levels: how often every face is split in four first.
+
+        Returns:
+            The displaced mesh in light grey; where charts meet, heights are averaged and the pattern breaks.
+        """
+        fine = subdivide_midpoint(laid_out(mesh, ATLAS), levels)
+        assert fine.uv is not None
+        area = float(fine.face_areas.sum(dtype=np.float64))
+        stretch = np.sqrt(area / max(0.5 * np.abs(twice_area(fine.uv)).sum(), 1e-12))  # [mesh units per UV]
+        unit = size * np.sqrt(area)  # of the map's lengths, on this mesh
+        squares = fine.uv * (stretch / (self.side * unit))
+        at = squares[..., ::-1].reshape(-1, 2).T * len(self.heights) - 0.5
+        corners = map_coordinates(self.heights, at, order=1, mode="reflect") * unit
+        count = np.maximum(np.bincount(fine.faces.ravel(), minlength=len(fine.vertices)), 1)
+        height = np.bincount(fine.faces.ravel(), corners, len(fine.vertices)) / count
+        return clay(fine.with_vertices(fine.vertices + height[:, None] * fine.normals))
+
+
+def _depth(mesh: Mesh, start: np.ndarray) -> np.ndarray:
+    """(N,) how far along -z the mesh is first met; infinite where it is not."""
+    init()
+    scene = mi.load_dict({"type": "scene", "mesh": mesh_shape(mesh)})
+    rays = mi.Ray3f(mi.Point3f(np.ascontiguousarray(start.T, np.float32)), mi.Vector3f(0, 0, -1))
+    found = scene.ray_intersect_preliminary(rays)
+    hit, t = np.asarray(found.is_valid()).astype(bool), np.asarray(found.t)
+    return np.where(hit, t, np.inf).astype(np.float64)
