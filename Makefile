@@ -32,6 +32,7 @@ lint: $(STAMP)
 bench: $(STAMP)
 	$(VENV)/bin/python -m benchmarks.nca
 	$(VENV)/bin/python -m benchmarks.surface
+	$(VENV)/bin/python -m benchmarks.geometric
 
 clean:
 	rm -rf $(VENV) out

@@ -14,6 +14,8 @@ from safetensors.torch import load_file
 
 from mitex.features import weights
 from mitex.mesh import Mesh
+from mitex.methods.geometric.connectivity import FaceGraph
+from mitex.methods.geometric.network import FaceNetwork
 from mitex.methods.nca import MeshNCA
 from mitex.methods.nca.perception import harmonics
 from mitex.scenes.stage import Visibility
@@ -124,3 +126,19 @@ def moment_distance(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
 
     means = (a.mean(1) - b.mean(1)).abs().mean(1)
     return means + (covariance(a) - covariance(b)).abs().mean((1, 2))
+
+
+def face_network(net: FaceNetwork, features: torch.Tensor, graph: FaceGraph) -> torch.Tensor:
+    """The network of Hertz et al. as the paper writes it: [neighbour, self] for each neighbour, the largest.
+
+    Features (..., F, 3, 4) to (..., F, outputs).
+    """
+    side, *layers, bias = net.parameters
+    x = torch.stack([features[..., k, :] @ side for k in range(3)]).amax(0)
+    for across, own in zip(layers[::2], layers[1::2], strict=True):
+        x = (x - x.mean(-2, keepdim=True)) / (x.var(-2, correction=0, keepdim=True) + 1e-5).sqrt()
+        x = F.leaky_relu(x, 0.2)
+        weight = torch.cat([across, own])
+        pairs = [torch.cat([x[..., graph.neighbours[:, k], :], x], -1) @ weight for k in range(3)]
+        x = torch.stack(pairs).amax(0)
+    return x + bias

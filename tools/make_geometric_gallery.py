@@ -1,12 +1,13 @@
 """Grows geometric textures on meshes and renders them, the reference beside them.
 
-usage: python tools/make_geometric_gallery.py RUNS MESHES SHEET REFERENCE[,REFERENCE ...] MESH~VERTICES ...
+usage: python tools/make_geometric_gallery.py RUNS MESHES SHEET REFERENCE[:map][,...] MESH~VERTICES ...
 
 RUNS holds a finished run of `mitex fit geometric` for each reference, MESHES is a folder; `torus` and names
 of embedded meshes work too. Every mesh is remeshed to so many vertices, displaced from level 2 on, and
 rendered: docs/gallery/SHEET.jpg has a row for each reference, which stands first, and above them the meshes
 alone. For every pair the Wasserstein-1 distances between the local statistics of result and reference are
-printed, and those of the mesh itself, remeshed to as many vertices as the result has.
+printed, and those of the mesh itself, remeshed to as many vertices as the result has. REFERENCE:map makes a
+row of displacement maps.
 """
 
 from __future__ import annotations
@@ -22,9 +23,11 @@ import numpy as np
 from mitex.asset import clay
 from mitex.images import write_image
 from mitex.mesh import Mesh, embedded_names, remesh, torus
+from mitex.methods.baselines.displacement import DisplacementMap
 from mitex.methods.geometric import GeometricTexture
 from mitex.methods.geometric.references import find_reference
 from mitex.methods.geometric.statistics import statistic_distances
+from mitex.methods.geometric.texture import START
 from mitex.render import sheet, still, tone
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
@@ -44,6 +47,14 @@ def picture(mesh: Mesh) -> np.ndarray:
     return tone(still(clay(mesh), resolution=CELL, spp=96, azimuth=AZIMUTH))
 
 
+def displaced(texture: GeometricTexture, reference: Mesh, mesh: Mesh, mapped: bool) -> Mesh:
+    """The mesh with its texture, or with a displacement map of the reference, features as large."""
+    if not mapped:
+        return texture.apply(mesh).mesh
+    size, _ = texture.relative_size(mesh)
+    return DisplacementMap.bake(reference).apply(mesh, size, texture.levels - 1 - START).mesh
+
+
 def main() -> None:
     runs, meshes, name, references, *wanted = sys.argv[1:]
     pairs = [word.split("~") for word in wanted]
@@ -51,24 +62,23 @@ def main() -> None:
     coarse = [replace(remesh(m, int(n)), name=m.name) for m, (_, n) in zip(found, pairs, strict=True)]
     fine: dict[tuple[str, int], Mesh] = {}
     cells, labels = [np.ones((CELL, CELL, 3)), *map(picture, found)], ["", *(m.name for m in found)]
-    for reference in references.split(","):
+    for word in references.split(","):
+        reference, *mapped = word.split(":")
         texture = GeometricTexture.load(Path(runs) / reference)
         learned = texture.generate(
             start_level=texture.levels
         )  # the reference with edges as long as the results'
         cells.append(picture(find_reference(reference)))
-        labels.append(reference)
+        labels.append(" ".join([reference, *mapped]))
         for mesh, even in zip(found, coarse, strict=True):
             begun = time.perf_counter()
-            grown = texture.apply(even).mesh
+            grown = displaced(texture, find_reference(reference), even, bool(mapped))
             seconds = time.perf_counter() - begun
             key = mesh.name, len(grown.vertices)
             fine.setdefault(key, remesh(mesh, key[1]))
             ours, theirs = statistic_distances(grown, learned), statistic_distances(fine[key], learned)
             told = ", ".join(f"{k} {ours[k]:.3f} of {theirs[k]:.3f}" for k in ours)
-            print(
-                f"{reference} on {mesh.name}, {len(grown.faces):,} faces, {seconds:.1f} s: {told}", flush=True
-            )
+            print(f"{word} on {mesh.name}, {len(grown.faces):,} faces, {seconds:.1f} s: {told}", flush=True)
             cells.append(picture(grown))
             labels.append(mesh.name)
     write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=1 + len(found), labels=labels, cell=CELL))

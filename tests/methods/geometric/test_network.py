@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 import torch
-import torch.nn.functional as F
 
+from benchmarks.naive import face_network
 from mitex.mesh import Mesh, grid, icosphere
 from mitex.methods.geometric.connectivity import FaceGraph
 from mitex.methods.geometric.features import face_features
 from mitex.methods.geometric.gan import critic_loss, generate, gradient_penalty
 from mitex.methods.geometric.hierarchy import Hierarchy, mean_edge
 from mitex.methods.geometric.model import network
-from mitex.methods.geometric.network import FaceNetwork, largest, normalised
+from mitex.methods.geometric.network import largest, normalised
 
 
 @pytest.fixture(scope="module")
@@ -25,23 +25,10 @@ def features(graph):
     return torch.randn(len(graph), 3, 4, generator=torch.Generator().manual_seed(1))
 
 
-def naive(net: FaceNetwork, features: torch.Tensor, graph: FaceGraph) -> torch.Tensor:
-    """The network as the paper writes it: [neighbour, self] for each neighbour, then the largest."""
-    side, *layers, bias = net.parameters
-    x = torch.stack([features[:, k] @ side for k in range(3)]).max(0).values
-    for across, own in zip(layers[::2], layers[1::2], strict=True):
-        x = (x - x.mean(0)) / (x.var(0, correction=0) + 1e-5).sqrt()
-        x = F.leaky_relu(x, 0.2)
-        weight = torch.cat([across, own])
-        pairs = [torch.cat([x[graph.neighbours[:, k]], x], 1) @ weight for k in range(3)]
-        x = torch.stack(pairs).max(0).values
-    return x + bias
-
-
 @pytest.mark.parametrize("level", [0, 1, 2, 5])
 def test_the_factored_network_equals_the_naive_one(graph, features, level):
     net = network(level, 3, torch.Generator().manual_seed(level))
-    a, b = net(features, graph), naive(net, features, graph)
+    a, b = net(features, graph), face_network(net, features, graph)
     assert a.shape == (len(graph), 3)
     assert torch.allclose(a, b, atol=1e-5)
 
