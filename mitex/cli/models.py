@@ -31,20 +31,26 @@ class Models:
             return
         for model in models:
             made = [f"{key} {model[key]}" for key in ("preset", "steps", "seconds", "loss") if key in model]
-            print(f"{model['name']:16}  {', '.join(model['maps'])}")
+            print(f"{model['name']:16}  {model['method']}: {', '.join(model.get('maps', ['relief']))}")
             print(f"{'':16}  {', '.join(made)}")
             if model["thumbnail"]:
                 print(f"{'':16}  {model['thumbnail']}")
 
 
 def listing() -> list[dict[str, Any]]:
-    """What is known about every bundled model: name, path, thumbnail or None, maps, how it was made."""
-    from mitex.methods.nca import files
+    """What is known about every bundled model: name, method, path, thumbnail or None, how it was made.
+
+    Those of nca have their maps there too.
+    """
+    from mitex.methods.geometric import GeometricTexture
+    from mitex.methods.kind import bundled
+    from mitex.methods.nca import NcaTexture
 
     models = []
-    for name, path in files.bundled().items():
-        about = files.load(path)[1]
-        models.append({**about, "name": name, "path": str(path), "thumbnail": _thumbnail(path)})
+    for method, texture in (("nca", NcaTexture), ("geometric", GeometricTexture)):
+        for name, path in bundled(method).items():
+            known = {**texture.load(path).about, "name": name, "method": method}
+            models.append({**known, "path": str(path), "thumbnail": _thumbnail(path)})
     return models
 
 

@@ -1,4 +1,4 @@
-"""Which method a model file or a run folder is of."""
+"""Which method a model file or a run folder is of, and the models that ship with Mitex."""
 
 from __future__ import annotations
 
@@ -8,13 +8,21 @@ from safetensors import SafetensorError, safe_open
 
 from mitex.methods import NAMES
 
-DEFAULT = "nca"  # models by name, and files that do not say what they are
+DEFAULT = "nca"  # names of no model, and files that do not say what they are
+BUNDLED = Path(__file__).parents[1] / "data" / "models"
+
+
+def bundled(method: str) -> dict[str, Path]:
+    """The models of a method that ship with Mitex: name -> file."""
+    return {path.stem: path for path in sorted(BUNDLED.glob("*.safetensors")) if kind(path) == method}
 
 
 def kind(source: str | Path) -> str:
-    """One of `NAMES`: what the file, or any file of the run folder, finished or not, says."""
+    """One of `NAMES`: what the file, any of the run folder, or the model of that name says."""
     path = Path(source).expanduser()
     try:
+        if not path.exists() and (shipped := BUNDLED / f"{source}.safetensors").is_file():
+            path = shipped
         files = sorted(path.glob("*.safetensors")) if path.is_dir() else [path] * path.is_file()
     except (OSError, ValueError):
         return DEFAULT

@@ -98,7 +98,7 @@ def test_options_reach_the_library(folder, monkeypatch, capsys):
 
 
 def test_models(folder, monkeypatch, capsys):
-    monkeypatch.setattr("mitex.methods.nca.files.BUNDLED", folder)
+    monkeypatch.setattr("mitex.methods.kind.BUNDLED", folder)
     bad_files.model(folder / "moss.safetensors")
     (folder / "moss.png").touch()
     bad_files.model(folder / "rust.safetensors")
@@ -114,7 +114,8 @@ def test_models(folder, monkeypatch, capsys):
 
 def test_bundled_models_are_listed_with_how_they_were_made():
     for model in listing():
-        assert {"name", "path", "thumbnail", "maps", "preset", "steps", "seconds", "loss"} <= set(model)
+        assert {"name", "method", "path", "thumbnail", "preset", "steps", "seconds", "loss"} <= set(model)
+        assert model["thumbnail"] and (model["method"] == "geometric" or model["maps"])
 
 
 def test_what_the_demo_shows_is_there():

@@ -75,3 +75,14 @@ def test_shape_from_images_script(mi, tmp_path: Path):
     losses = load("shape_from_images").main(str(tmp_path / "shape.png"), steps=6, resolution=24, spp=4)
     assert read_image(tmp_path / "shape.png").shape == (384, 3 * 384, 3)
     assert losses[-1] < 0.8 * losses[0]
+
+
+def test_relief_and_colour(tmp_path: Path):
+    """Both pictures show one shape: grey without a hue on the left, in the pebbles' colours on the right."""
+    pytest.importorskip("pymeshlab")
+    load("relief_and_colour").main(str(tmp_path / "a.png"), vertices=60, resolution=48, spp=8)
+    picture = read_image(tmp_path / "a.png")
+    half = picture.shape[1] // 2
+    grey, coloured = picture[:, :half], picture[:, -half:]
+    middle = np.s_[half // 3 : 2 * half // 3, half // 3 : 2 * half // 3]
+    assert np.ptp(grey[middle], axis=2).mean() < 0.03 < 0.06 < np.ptp(coloured[middle], axis=2).mean()

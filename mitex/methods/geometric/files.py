@@ -11,6 +11,7 @@ import torch
 from mitex.mesh import Mesh
 from mitex.methods.geometric.model import network
 from mitex.methods.geometric.network import FaceNetwork
+from mitex.methods.kind import bundled
 from mitex.training import model_file
 
 NAME = "geometry.safetensors"
@@ -40,11 +41,13 @@ def save(
 
 
 def load(source: str | Path) -> tuple[list[FaceNetwork], Mesh, torch.Tensor, dict[str, Any]]:
-    """Reads a model file, or that of a run folder: generators, template, noise, and what is known of it.
+    """Reads a model by file, run folder or bundled name: generators, template, noise, what is known.
 
     Raises:
         CheckpointError: there is none, or it is damaged.
     """
+    if not Path(source).expanduser().exists():
+        source = bundled(KIND).get(str(source), source)
     with model_file.opened(source, KIND, NAME) as (tensors, about):
         template = Mesh(
             tensors["vertices"].numpy(), tensors["faces"].numpy(), name=f"{about['name']} template"

@@ -45,7 +45,7 @@ class GeometricTexture:
 
     @staticmethod
     def load(source: str | Path) -> GeometricTexture:
-        """Loads a model file or a run folder.
+        """Loads a model by file, run folder or bundled name.
 
         Raises:
             CheckpointError: there is none, or it is damaged.

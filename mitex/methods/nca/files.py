@@ -15,13 +15,13 @@ import torch
 from safetensors import SafetensorError
 
 from mitex.errors import CheckpointError
+from mitex.methods.kind import bundled
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.perception import HARMONICS
 from mitex.methods.nca.targets import STATE_CHANNELS
 from mitex.training import checkpoint, model_file
 
 NAME = "model.safetensors"
-BUNDLED = Path(__file__).parents[2] / "data" / "models"
 PARAMETERS = ("fc1.weight", "fc1.bias", "fc2.weight", "fc2.bias")
 
 
@@ -62,11 +62,6 @@ def load(source: str | Path) -> tuple[MeshNCA, dict[str, Any]]:
     return model, _about(metadata, model, path)
 
 
-def bundled() -> dict[str, Path]:
-    """The models that ship with Mitex: name -> file."""
-    return {path.stem: path for path in sorted(BUNDLED.glob("*.safetensors"))}
-
-
 def _find(source: str | Path) -> Path:
     path = Path(source).expanduser()
     try:
@@ -83,7 +78,7 @@ def _find(source: str | Path) -> Path:
             return path
     except (OSError, ValueError) as e:
         raise CheckpointError(f"cannot read '{source}' ({e})", "name a model, a file or a run folder") from e
-    known = bundled()
+    known = bundled("nca")
     if str(source) in known:
         return known[str(source)]
     close = difflib.get_close_matches(str(source), known, 1)

@@ -12,7 +12,10 @@ from mitex.methods import geometric
 from mitex.methods.geometric import files
 from mitex.methods.geometric.config import PRESETS, GeometricConfig
 from mitex.methods.geometric.hierarchy import Hierarchy
+from mitex.methods.geometric.references import find_reference
+from mitex.methods.geometric.report import report
 from mitex.methods.geometric.task import GeometricTask, learning_rate
+from mitex.methods.geometric.template import normalised
 from mitex.methods.geometric.texture import GeometricTexture, slerp
 from mitex.methods.kind import kind
 from mitex.training import checkpoint
@@ -272,3 +275,16 @@ def test_settings():
 def test_previews(made):
     task = small_task()
     assert task.preview(9).shape == (256, 4 * 256, 3)
+
+
+@pytest.mark.parametrize("name", ["spikes", "scales"])
+def test_bundled_models_are_found_by_name(name):
+    """Without noise they rebuild their reference, about as near as the mesh that they were trained with."""
+    assert kind(name) == "geometric"
+    texture = GeometricTexture.load(name)
+    assert texture.about["name"] == name and texture.levels == 5
+    rebuilt = texture.generate(start_level=5)
+    assert len(rebuilt.faces) == 5120
+    found = report(rebuilt, normalised(find_reference(name), texture.template)[0])
+    assert found.chamfer < 1.2 * texture.about["fit"][-1]["chamfer"]
+    assert found.normals < 1.2 * texture.about["fit"][-1]["normals"]

@@ -9,6 +9,7 @@ import torch
 from safetensors.torch import load_file, save_file
 
 from mitex.errors import CheckpointError, OutputError
+from mitex.methods.kind import bundled
 from mitex.methods.nca import MeshNCA, NcaTexture, files
 from mitex.training import checkpoint, model_file
 from mitex.training.checkpoint import Checkpoint
@@ -119,7 +120,7 @@ def test_the_previous_checkpoint_will_do(tmp_path):
 
 
 def test_bundled_models_are_found_by_name():
-    found = files.bundled()
+    found = bundled("nca")
     assert found, "no model is bundled"
     for name, path in found.items():
         loaded = NcaTexture.load(name)
