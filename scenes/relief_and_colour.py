@@ -22,4 +22,4 @@ def main(out: str = "relief.png", vertices: int = 800, resolution: int = 384, sp
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:2])
+    main(sys.argv[1] if len(sys.argv) > 1 else "relief.png")
