@@ -45,6 +45,14 @@ def _set_variant(variant: str) -> None:
     sys.modules["mitsuba"].set_variant(variant)
 
 
+@pytest.fixture(scope="module")
+def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """An empty cache folder for the tests of a module, in place of the user's."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
 @pytest.fixture
 def mi() -> Any:
     """Mitsuba, started by Mitex."""

@@ -9,12 +9,8 @@ from mitex.mesh import Mesh, icosphere
 from tests.cli import bad_files as bad
 from tests.cli.refusals import check_refused
 
+pytestmark = pytest.mark.usefixtures("own_cache")
 QUICK = "--quiet --set steps=4 level_steps=2 fit_steps=20 fit_samples=200 checkpoint_every=2 preview_every=0"
-
-
-@pytest.fixture(autouse=True)
-def cache(tmp_path_factory, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
 
 
 def fit(words=QUICK, reference="good.obj", out="out/run"):

@@ -18,12 +18,8 @@ from tests.cli import bad_files as bad
 from tests.cli.refusals import check_refused
 from tests.shapes import moebius
 
+pytestmark = pytest.mark.usefixtures("own_cache")
 QUICK = "--quiet --set resolution=32 exemplar_size=32 steps=4 checkpoint_every=2 preview_every=0 scales=0"
-
-
-@pytest.fixture(autouse=True)
-def cache(tmp_path_factory, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
 
 
 def fit(words=QUICK, exemplar="good.png", mesh="good.obj", out="out/run"):

@@ -10,6 +10,7 @@ import pytest
 from mitex.exemplar import Exemplar
 from mitex.images import read_image
 
+pytestmark = pytest.mark.usefixtures("own_cache")
 SCRIPTS = Path(__file__).parents[2] / "scenes"
 
 
@@ -57,8 +58,7 @@ def test_texel_field_script(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert warm.mean() > 0.15 and cool.mean() > 0.1
 
 
-def test_surface_synthesis_script(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+def test_surface_synthesis_script(mi, tmp_path: Path):
     script = load("surface_synthesis")
     small = ["resolution=48", "exemplar_size=48", "steps=40", "milestones=30", "preview_every=0"]
     script.main(str(tmp_path / "octopus.png"), str(tmp_path / "run"), small, spp=4)

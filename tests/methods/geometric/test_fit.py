@@ -21,6 +21,7 @@ from mitex.methods.kind import kind
 from mitex.training import checkpoint
 from tests.shapes import fan, moebius
 
+pytestmark = pytest.mark.usefixtures("own_cache")
 SMALL = [
     "steps=9",
     "level_steps=3",
@@ -35,13 +36,6 @@ def bumpy() -> Mesh:
     ball = icosphere(12)
     height = 1 + 0.15 * np.sin(7 * ball.vertices).prod(1, keepdims=True)
     return replace(ball.with_vertices(ball.vertices * height), name="bumpy")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def cache(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        yield
 
 
 @pytest.fixture(scope="module")

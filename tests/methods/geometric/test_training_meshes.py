@@ -18,12 +18,8 @@ from mitex.methods.geometric.report import report
 from mitex.methods.geometric.template import find_template, normalised, topology
 from tests.shapes import fan, moebius
 
+pytestmark = pytest.mark.usefixtures("own_cache")
 QUICK = GeometricConfig(steps=3, level_steps=1, fit_steps=150, fit_samples=500)
-
-
-@pytest.fixture(autouse=True)
-def cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
 
 
 def egg() -> Mesh:

@@ -26,14 +26,8 @@ from mitex.methods.surface.texture import NAME, SurfaceTexture
 from mitex.training import resolve
 from tests.methods.surface.grids import flat_square
 
+pytestmark = pytest.mark.usefixtures("own_cache")
 SMALL = ["resolution=48", "exemplar_size=48", "steps=12", "scales=0", "checkpoint_every=6", "preview_every=0"]
-
-
-@pytest.fixture(scope="module", autouse=True)
-def cache(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        yield
 
 
 @pytest.fixture(scope="module")

@@ -43,9 +43,9 @@ def test_nothing_to_compare(blank):
     assert np.isnan(seam_ratio(blank))
 
 
-def test_a_synthesis_has_no_seams(tmp_path, monkeypatch):
+@pytest.mark.usefixtures("own_cache")
+def test_a_synthesis_has_no_seams(tmp_path):
     """At most a tenth more across seams than elsewhere."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     exemplar = Exemplar({"albedo": Exemplar.load("cobblestone").maps["albedo"]})
     settings = ["resolution=128", "exemplar_size=64", "steps=60", "milestones=40,50", "preview_every=0"]
     made = surface.fit(exemplar, icosphere(12), tmp_path / "run", overrides=settings, quiet=True)
