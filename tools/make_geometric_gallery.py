@@ -1,9 +1,9 @@
 """Grows geometric textures on meshes and renders them, the reference beside them.
 
-usage: python tools/make_geometric_gallery.py RUNS MESHES SHEET REFERENCE[:map][,...] MESH~VERTICES ...
+usage: python tools/make_geometric_gallery.py RUNS MESHES SHEET REFERENCE[:map][,...] MESH~FACES ...
 
-RUNS holds a finished run of `mitex fit geometric` for each reference, MESHES is a folder; `torus` and names
-of embedded meshes work too. Every mesh is remeshed to so many vertices, displaced from level 2 on, and
+RUNS holds a finished run of `mitex fit geometric` for each reference, MESHES is a folder; meshes are named as
+for make_surface_gallery.py, so that they are remeshed first. Each one is displaced from level 2 on, and
 rendered: docs/gallery/SHEET.jpg has a row for each reference, which stands first, and above them the meshes
 alone. For every pair the Wasserstein-1 distances between the local statistics of result and reference are
 printed, and those of the mesh itself, remeshed to as many vertices as the result has. REFERENCE:map makes a
@@ -15,14 +15,14 @@ from __future__ import annotations
 import math
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from make_surface_gallery import find_mesh
 
 from mitex.asset import clay
 from mitex.images import write_image
-from mitex.mesh import Mesh, embedded_names, remesh, torus
+from mitex.mesh import Mesh, remesh
 from mitex.methods.baselines.displacement import DisplacementMap
 from mitex.methods.geometric import GeometricTexture
 from mitex.methods.geometric.references import find_reference
@@ -33,13 +33,6 @@ from mitex.render import sheet, still, tone
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 CELL = 224  # side of a picture [px]
 AZIMUTH = math.radians(20)
-
-
-def find_mesh(name: str, meshes: Path) -> Mesh:
-    """A mesh by the name that the command line gives it."""
-    if name == "torus":
-        return torus()
-    return Mesh.load(name if name in embedded_names() else meshes / f"{name}.obj")
 
 
 def picture(mesh: Mesh) -> np.ndarray:
@@ -57,9 +50,8 @@ def displaced(texture: GeometricTexture, reference: Mesh, mesh: Mesh, mapped: bo
 
 def main() -> None:
     runs, meshes, name, references, *wanted = sys.argv[1:]
-    pairs = [word.split("~") for word in wanted]
-    found = [find_mesh(mesh, Path(meshes)) for mesh, _ in pairs]
-    coarse = [replace(remesh(m, int(n)), name=m.name) for m, (_, n) in zip(found, pairs, strict=True)]
+    found = [find_mesh(word.split("~")[0], Path(meshes)) for word in wanted]
+    coarse = [find_mesh(word, Path(meshes)) for word in wanted]
     fine: dict[tuple[str, int], Mesh] = {}
     cells, labels = [np.ones((CELL, CELL, 3)), *map(picture, found)], ["", *(m.name for m in found)]
     for word in references.split(","):

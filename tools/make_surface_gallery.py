@@ -5,8 +5,8 @@ usage: python tools/make_surface_gallery.py EXEMPLARS MESHES RUNS SHEET MESH=EXE
 
 EXEMPLARS and MESHES are folders; names of embedded ones work too, and the exemplar `letters` is drawn. MESH^N
 is MESH with all faces split in four N times, MESH~N a remeshed copy with N faces (MESH~N^M: then split),
-and `scene` is made up. RUNS is where the run folders go: finished ones are used again, begun ones go on. The
-sheet is docs/gallery/SHEET.jpg, a row for each exemplar: itself, and the mesh from two sides, or one side
+and `scene` and `torus` are made up. RUNS is where the run folders go: finished ones are used again, begun
+ones go on. The sheet is docs/gallery/SHEET.jpg, a row for each exemplar: itself, and the mesh from two sides, or one side
 of each of its meshes or variants, in the order that they are given; the ratio across seams is printed.
 Settings change the synthesis, of one MESH=EXEMPLAR or of all (`resolution=512`, `pictures=1`, ...);
 `maps=albedo` leaves out other maps, `content=ao` transfers the style.
@@ -26,7 +26,7 @@ from PIL import Image, ImageDraw, ImageFont
 from mitex.exemplar import Exemplar
 from mitex.exemplar import names as exemplar_names
 from mitex.images import write_image
-from mitex.mesh import Mesh, embedded_names, grid, remesh, subdivide_midpoint
+from mitex.mesh import Mesh, embedded_names, grid, remesh, subdivide_midpoint, torus
 from mitex.mesh.topology import welded
 from mitex.methods import surface
 from mitex.methods.surface.seams import seam_ratio
@@ -77,7 +77,10 @@ def find_mesh(name: str, meshes: Path) -> Mesh:
     if name == "scene":
         return scene(meshes)
     base = re.split(r"[~^]", name)[0]
-    mesh = Mesh.load(base if base in embedded_names() else meshes / f"{base}.obj")
+    if base == "torus":
+        mesh = torus()
+    else:
+        mesh = Mesh.load(base if base in embedded_names() else meshes / f"{base}.obj")
     if coarse := re.search(r"~(\d+)", name):
         mesh = remesh(mesh, int(coarse[1]) // 2)
     if split := re.search(r"\^(\d+)", name):
