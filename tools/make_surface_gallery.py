@@ -6,8 +6,9 @@ usage: python tools/make_surface_gallery.py EXEMPLARS MESHES RUNS SHEET MESH=EXE
 EXEMPLARS and MESHES are folders; names of embedded ones work too, and the exemplar `letters` is drawn. MESH^N
 is MESH with all faces split in four N times, MESH~N a remeshed copy with N faces (MESH~N^M: then split),
 and `scene` and `torus` are made up. RUNS is where the run folders go: finished ones are used again, begun
-ones go on. The sheet is docs/gallery/SHEET.jpg, a row for each exemplar: itself, and the mesh from two sides, or one side
-of each of its meshes or variants, in the order that they are given; the ratio across seams is printed.
+ones go on. The sheet is docs/gallery/SHEET.jpg, a row for each exemplar: itself, and the mesh from two sides,
+or one side of each of its meshes or variants, in the order that they are given; the ratio across seams is
+printed.
 Settings change the synthesis, of one MESH=EXEMPLAR or of all (`resolution=512`, `pictures=1`, ...);
 `maps=albedo` leaves out other maps, `content=ao` transfers the style.
 """
