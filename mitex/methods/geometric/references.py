@@ -27,18 +27,18 @@ def scales() -> Mesh:
 
 
 def knobs() -> Mesh:
-    """A ball with 36 mushrooms: their heads hang over their stems, which no height map can say."""
+    """A ball with 36 balls on it, more than half of each: they hang over, which no height map can say."""
     points, centres = icosphere(FREQUENCY).vertices.astype(np.float64), _spread(36)
     index = np.argmax(points @ centres.T, axis=1)
     centre = centres[index]
     angle = np.arccos(np.clip((points * centre).sum(1), -1, 1))
-    rim = 0.29
+    rim, size, up = 0.29, 0.2, 0.12
     t = np.clip(1 - angle / rim, 0, 1)  # 0 at the foot, 1 at the top
-    # Profile of a mushroom: inwards to the stem, up, outwards under the head, and over it.
-    stops = np.array([0.0, 0.2, 0.4, 0.55, 0.7, 0.85, 1.0])
-    radii = np.array([1.0, 0.6, 0.52, 0.74, 0.8, 0.5, 0.0]) * rim
-    heights = np.array([0.0, 0.04, 0.14, 0.18, 0.28, 0.39, 0.43])
-    radius, height = np.interp(t, stops, radii), np.interp(t, stops, heights)
+    # Profile: inwards to where the small ball leaves the large one, and over the small one.
+    neck = np.arccos(-up / size)
+    around = np.interp(t, [0.2, 1.0], [neck, 0.0])
+    radius = np.where(t < 0.2, np.interp(t, [0.0, 0.2], [rim, size * np.sin(neck)]), size * np.sin(around))
+    height = np.where(t < 0.2, 0.0, up + size * np.cos(around))
     outwards = points - (points * centre).sum(1, keepdims=True) * centre
     outwards /= np.maximum(np.linalg.norm(outwards, axis=1, keepdims=True), 1e-12)
     placed = np.cos(radius)[:, None] * centre + np.sin(radius)[:, None] * outwards
