@@ -157,7 +157,6 @@ PRESETS = {
         layers=("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"),
         # The content's colours may be none of the exemplar's: in its components they would hardly change.
         whitened=False,
-        shared_moment=False,
         lr=0.1,
         milestones=(180, 250),
     ),
