@@ -51,9 +51,9 @@ def ridges() -> Mesh:
     rng = np.random.default_rng(3)
     points = icosphere(FREQUENCY).vertices.astype(np.float64)
     waves = rng.normal(size=(160, 3))
-    waves *= 30.0 / np.linalg.norm(waves, axis=1, keepdims=True)
+    waves *= 20.0 / np.linalg.norm(waves, axis=1, keepdims=True)
     field = np.cos(points @ waves.T + rng.uniform(0, 2 * np.pi, 160)).sum(1) / np.sqrt(80)
-    return _sphere(0.12 * (1 + np.tanh(2.5 * field)), "ridges")
+    return _sphere(0.14 * (1 + np.tanh(2 * field)), "ridges")
 
 
 def craters() -> Mesh:
@@ -61,7 +61,7 @@ def craters() -> Mesh:
     near = _near(_spread(70)) / 0.17
     bowl = np.where(near < 1, near**2 - 1, 0.0)
     rim = np.exp(-(((near - 1.05) / 0.22) ** 2))
-    return _sphere(0.13 * bowl + 0.09 * rim, "craters")
+    return _sphere(0.17 * bowl + 0.09 * rim, "craters")
 
 
 def warts() -> Mesh:
