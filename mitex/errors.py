@@ -26,6 +26,10 @@ class ImageError(MitexError):
     """An image or a map set that cannot be read or used."""
 
 
+class CaptureError(MitexError):
+    """Photos with cameras that cannot be read or used."""
+
+
 class ConfigError(MitexError):
     """An unknown, ill-typed, out-of-range or contradictory option."""
 
@@ -44,6 +48,10 @@ class RuntimeUnavailable(MitexError):
 
 class MitexWarning(UserWarning):
     """Something was unusual and has been handled."""
+
+
+class CaptureWarning(MitexWarning):
+    """A capture had flaws that have been handled."""
 
 
 class MeshWarning(MitexWarning):

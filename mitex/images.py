@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
@@ -53,14 +54,22 @@ def read_image(
     Raises:
         ImageError: missing, empty, not a PNG or JPEG, animated, over the budget, transparent, damaged.
     """
-    path = Path(path)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Pillow's own size warning; the budget below is stricter
-        with _open(path, max_pixels) as image:
-            pixels = _decode(image, path)
+    pixels = _read(Path(path), max_pixels, _opaque)
     if mode == "L":
         return pixels.mean(axis=2, keepdims=True, dtype=np.float32)
     return pixels if pixels.shape[2] == 3 else pixels.repeat(3, axis=2)
+
+
+def read_bytes(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> np.ndarray:
+    """Read a PNG or JPEG with its alpha channel; otherwise as `read_image`.
+
+    Returns:
+        (H, W, 4) uint8, or (H, W, 3) from a file without alpha; straight alpha, row 0 on top.
+
+    Raises:
+        ImageError: missing, empty, not a PNG or JPEG, animated, over the budget, damaged.
+    """
+    return _read(Path(path), max_pixels, _bytes)
 
 
 def write_image(path: str | os.PathLike[str], array: np.ndarray) -> Path:
@@ -160,25 +169,42 @@ def _what_it_is(path: Path) -> str:
     return "is not an image"
 
 
-def _decode(image: Image.Image, path: Path) -> np.ndarray:
+def _read(path: Path, max_pixels: int, convert: Callable[[Image.Image, Path], np.ndarray]) -> np.ndarray:
+    """Check, decode, turn upright and convert."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Pillow's own size warning; the budget is stricter
+        with _open(path, max_pixels) as image:
+            try:
+                image.load()
+                return convert(ImageOps.exif_transpose(image), path)
+            except ImageError:
+                raise
+            except MemoryError as error:
+                raise ImageError(f"{path} does not fit in memory", "scale the image down") from error
+            except Exception as error:  # see _open
+                raise ImageError(
+                    f"{path} is damaged or cut short", "save or download the image again"
+                ) from error
+
+
+def _opaque(image: Image.Image, path: Path) -> np.ndarray:
     """Pixels as (H, W, 1 or 3) float32 in [0, 1]."""
-    try:
-        image.load()
-        image = ImageOps.exif_transpose(image)
-        if image.mode.startswith("I"):  # 16-bit grey
-            return np.asarray(image).astype(np.float32)[:, :, None] / 65535.0
-        if image.has_transparency_data:
-            image = image.convert("RGBA")
-            _check_opaque(image, path)
-        image = image.convert("L" if image.mode in ("1", "L") else "RGB")
-        pixels = np.asarray(image, dtype=np.float32) / np.float32(255.0)
-    except ImageError:
-        raise
-    except MemoryError as error:
-        raise ImageError(f"{path} does not fit in memory", "scale the image down") from error
-    except Exception as error:  # see _open
-        raise ImageError(f"{path} is damaged or cut short", "save or download the image again") from error
+    if image.mode.startswith("I"):  # 16-bit grey
+        return np.asarray(image).astype(np.float32)[:, :, None] / 65535.0
+    if image.has_transparency_data:
+        image = image.convert("RGBA")
+        _check_opaque(image, path)
+    image = image.convert("L" if image.mode in ("1", "L") else "RGB")
+    pixels = np.asarray(image, dtype=np.float32) / np.float32(255.0)
     return pixels if pixels.ndim == 3 else pixels[:, :, None]
+
+
+def _bytes(image: Image.Image, path: Path) -> np.ndarray:
+    """Pixels as (H, W, 3 or 4) uint8."""
+    if image.mode.startswith("I"):
+        grey = np.round(np.asarray(image).astype(np.float32) / 257.0).astype(np.uint8)
+        return grey[:, :, None].repeat(3, axis=2)
+    return np.array(image.convert("RGBA" if image.has_transparency_data else "RGB"))
 
 
 def _check_opaque(image: Image.Image, path: Path) -> None:

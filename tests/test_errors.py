@@ -12,6 +12,7 @@ from mitex import errors
     [
         errors.MeshError,
         errors.ImageError,
+        errors.CaptureError,
         errors.ConfigError,
         errors.OutputError,
         errors.CheckpointError,

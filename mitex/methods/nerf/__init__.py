@@ -1,0 +1,1 @@
+"""NeRF-Texture: textures with a meso-structure, captured from photos (Huang et al. 2023)."""

@@ -1,0 +1,168 @@
+"""Reading `transforms.json`: the cameras of a capture as frames, every number and path checked."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mitex.errors import CaptureError
+from mitex.images import SUFFIXES
+
+ONE_FILE = "transforms.json"
+SPLIT_FILES = ("transforms_train.json", "transforms_val.json", "transforms_test.json")
+ASPECT = 0.01  # singular values of a rotation may differ by this ratio
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A photo and its camera, as written in the file.
+
+    Attributes:
+        name: Path of the image relative to the folder.
+        image, mask: Files; `mask` is None where the image's alpha has to do.
+        pose: (3, 4) float64 camera -> world of the capture, rotation orthonormal; x right, y up, looks
+            along -z.
+        lens: The numbers of the file that describe the lens, the frame's own before those of all frames.
+    """
+
+    name: str
+    image: Path
+    mask: Path | None
+    pose: np.ndarray
+    lens: Mapping[str, Any]
+
+    def intrinsics(self, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+        """(fx, fy, cx, cy) [pixels] and (k1, k2, p1, p2) for an image of that size, float64.
+
+        Raises:
+            CaptureError: The file tells another size, no focal length, or numbers that make no sense.
+        """
+        given = (self._number("w", width), self._number("h", height))
+        if given != (width, height):
+            raise CaptureError(
+                f"{self.name} is {width} x {height}, but its camera {given[0]:g} x {given[1]:g} pixels",
+                "use the images that the cameras were computed from",
+            )
+        fx, fy = self._focal("x", width), self._focal("y", height)
+        if fx is None and fy is None:
+            raise CaptureError(f"{self.name} has no focal length", "add fl_x or camera_angle_x to its file")
+        fx, fy = fx or fy, fy or fx
+        centre = self._number("cx", width / 2), self._number("cy", height / 2)
+        if self.lens.get("is_fisheye") or any(self._number(k, 0.0) for k in ("k3", "k4")):
+            raise CaptureError(
+                f"{self.name} has a lens other than k1, k2, p1, p2", "undistort the images beforehand"
+            )
+        distortion = [self._number(k, 0.0) for k in ("k1", "k2", "p1", "p2")]
+        return np.array([fx, fy, *centre], np.float64), np.array(distortion, np.float64)
+
+    def _focal(self, axis: str, size: int) -> float | None:
+        if (focal := self._number(f"fl_{axis}", None)) is None:
+            if (angle := self._number(f"camera_angle_{axis}", None)) is None:
+                return None
+            if not 0.0 < angle < math.pi:
+                raise CaptureError(f"{self.name} has camera_angle_{axis} {angle:g}", "give radians below pi")
+            focal = size / (2.0 * math.tan(0.5 * angle))
+        if not 0.0 < focal < math.inf:
+            raise CaptureError(f"{self.name} has fl_{axis} {focal:g}", "give a focal length in pixels")
+        return focal
+
+    def _number(self, key: str, default: Any) -> Any:
+        value = self.lens.get(key, default)
+        if value is not default and not _is_number(value):
+            raise CaptureError(f"{self.name} has {key} {str(value)[:40]!r}", "give a finite number")
+        return value
+
+
+def transforms_files(folder: Path) -> list[Path]:
+    """The files that list the cameras: `transforms.json`, or those of the splits of NeRF-synthetic."""
+    if (one := folder / ONE_FILE).is_file():
+        return [one]
+    return [path for name in SPLIT_FILES if (path := folder / name).is_file()]
+
+
+def read_frames(path: Path) -> list[Frame]:
+    """The frames of a `transforms*.json`, images and masks found but not opened.
+
+    Raises:
+        CaptureError: The file is damaged, or a frame lacks its image or a proper pose.
+    """
+    try:
+        tree = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError) as error:
+        reason = " ".join(str(error).split())
+        raise CaptureError(f"{path} cannot be read ({reason})", "write it again") from error
+    frames = tree.get("frames") if isinstance(tree, dict) else None
+    if not isinstance(frames, list) or not frames:
+        raise CaptureError(f"{path} has no list of frames", "give one frame for every image")
+    return [_frame(path.parent, tree, frame, f"{path.name}: frame {k}") for k, frame in enumerate(frames)]
+
+
+def _frame(folder: Path, tree: dict[str, Any], frame: Any, where: str) -> Frame:
+    given = frame.get("file_path") if isinstance(frame, dict) else None
+    if not isinstance(given, str) or not given:
+        raise CaptureError(f"{where} has no file_path", "name its image")
+    image = _find(folder, given, where)
+    name = image.relative_to(folder.resolve()).as_posix()
+    lens = {k: v for k, v in (tree | frame).items() if k not in ("frames", "transform_matrix")}
+    mask = _mask(folder, image, frame.get("mask_path"), where)
+    return Frame(name, image, mask, _pose(frame.get("transform_matrix"), name), lens)
+
+
+def _find(folder: Path, given: str, where: str) -> Path:
+    """The file that a frame names, with or without its suffix."""
+    for suffix in ("", *SUFFIXES):
+        path = _inside(folder, given + suffix, where)
+        if path.is_file():
+            return path
+    raise CaptureError(f"{where} names '{given}', which does not exist", "add the file or drop the frame")
+
+
+def _inside(folder: Path, given: str, where: str) -> Path:
+    try:
+        path = (folder / given).resolve()
+    except (OSError, ValueError, RuntimeError) as error:
+        raise CaptureError(f"{where} names {given[:80]!r}, which is no path", "name a file") from error
+    if not path.is_relative_to(folder.resolve()):
+        raise CaptureError(f"{where} names '{given}', outside of {folder}", "keep all files in the folder")
+    return path
+
+
+def _mask(folder: Path, image: Path, given: Any, where: str) -> Path | None:
+    """The mask that the frame names, or the one in `masks/`."""
+    if given is not None:
+        if not isinstance(given, str):
+            raise CaptureError(f"{where} has a mask_path that is no text", "name the mask")
+        return _find(folder, given, where)
+    for name in (f"{image.stem}.png", f"{image.name}.png"):
+        if (path := folder / "masks" / name).is_file():
+            return path
+    return None
+
+
+def _pose(matrix: Any, name: str) -> np.ndarray:
+    """(3, 4) with an exact rotation: a uniform scale of the axes is dropped."""
+    try:
+        pose = np.array(matrix, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        pose = np.zeros(0)
+    if pose.shape not in ((4, 4), (3, 4)):
+        raise CaptureError(f"{name} has no 4 x 4 transform_matrix", "give camera to world, row by row")
+    if not np.isfinite(pose).all():
+        raise CaptureError(f"{name} has a pose that is not finite", "drop the frame or repair its pose")
+    left, sizes, right = np.linalg.svd(pose[:3, :3])
+    if not sizes[2] > (1.0 - ASPECT) * sizes[0]:
+        raise CaptureError(f"{name} has a pose that is no rotation", "drop the frame or repair its pose")
+    rotation = left @ right
+    if np.linalg.det(rotation) < 0.0:
+        raise CaptureError(f"{name} has a pose that mirrors", "flip an axis: x right, y up, looks along -z")
+    return np.concatenate([rotation, pose[:3, 3:]], axis=1)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e12
