@@ -34,7 +34,7 @@ def initial_light() -> np.ndarray:
 
 
 def shade(normal: Any, view: Any, kd: Any, ks: Any, glossiness: Any, light: Any, bands: int = BANDS) -> Any:
-    """Radiance that N points send back along their view rays; differentiable in all but `bands`.
+    """Radiance that points, at least one, send back along view rays; differentiable in all but `bands`.
 
     The diffuse part is kd times the light convolved with the clamped cosine over pi, exactly; the specular
     part is ks times the light convolved with a lobe of coefficients exp(-l^2 / 2g) around the mirrored ray,
@@ -52,7 +52,7 @@ def shade(normal: Any, view: Any, kd: Any, ks: Any, glossiness: Any, light: Any,
     Returns:
         `mi.Color3f`, linear, at least 0; see `to_display`.
     """
-    radiance = _coefficients(light, bands)
+    radiance = _coefficients(light, bands, dr.width(normal, view))
     lobe = [dr.exp(-degree * degree / (2 * glossiness)) for degree in range(bands)]
     diffuse = kd * _expand(radiance, COSINE[:bands], normal)
     specular = ks * _expand(radiance, lobe, view - 2 * dr.dot(normal, view) * normal)
@@ -99,10 +99,11 @@ def project_environment(image: np.ndarray) -> np.ndarray:
     return np.array(light, np.float32)
 
 
-def _coefficients(light: Any, bands: int) -> list[Any]:
-    """The first `bands` squared coefficients, one `mi.Float` or `mi.Color3f` each."""
+def _coefficients(light: Any, bands: int, count: int) -> list[Any]:
+    """The first `bands` squared coefficients for `count` points, `mi.Float`s or `mi.Color3f`s."""
     kind = mi.Color3f if light.shape[-1] == 3 else mi.Float
-    return [dr.gather(kind, light.array, k) for k in range(bands * bands)]
+    # One index a point, not one for all: the gradients are then summed where they arise, five times as fast.
+    return [dr.gather(kind, light.array, dr.full(mi.UInt32, k, count)) for k in range(bands * bands)]
 
 
 def _expand(radiance: Sequence[Any], weights: Sequence[Any], direction: Any) -> Any:
