@@ -1,0 +1,41 @@
+"""Surfaces of values on a regular grid."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import ndimage
+
+from mitex.errors import MeshError
+from mitex.mesh import Mesh
+
+
+def isosurface(values: np.ndarray, level: float, *, low: np.ndarray, cell: float, name: str = "mesh") -> Mesh:
+    """The surface around what is above a level: marching cubes (Lorensen and Cline 1987).
+
+    Args:
+        values: (X, Y, Z) float32; beyond the grid they are taken to be below the level, so that the surface
+            closes there.
+        level: somewhere exceeded.
+        low: (3,) place of `values[0, 0, 0]`.
+        cell: distance of neighbouring values.
+        name: of the mesh.
+
+    Raises:
+        MeshError: scikit-image is not installed.
+    """
+    try:
+        from skimage.measure import marching_cubes
+    except ImportError as e:
+        raise MeshError("scikit-image is not installed", "run `pip install 'mitex[nerf]'`") from e
+    below = min(float(values.min()), level - 1.0)
+    padded = np.pad(values, 1, constant_values=below)
+    # "ascent" winds the faces around large values counter-clockwise as seen from outside.
+    vertices, faces, _, _ = marching_cubes(padded, level, gradient_direction="ascent", allow_degenerate=False)
+    return Mesh(low + cell * (vertices - 1.0), faces, name=name)
+
+
+def without_cavities(values: np.ndarray, level: float) -> np.ndarray:
+    """The values, raised to their maximum in the hollows that are enclosed by what is above the level."""
+    solid = values > level
+    hollow = np.asarray(ndimage.binary_fill_holes(solid)) & ~solid
+    return np.where(hollow, values.max(), values)
