@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+
+import numpy as np
 
 from mitex.asset import Asset
 from mitex.mesh import Mesh
@@ -26,31 +28,22 @@ def film(
     elevation: float = ELEVATION,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Renders assets in turn as a video, .mp4 (H.264) or .gif.
+    """Renders assets in turn as a video; returns and raises what `turntable` does.
 
     Args:
         assets: one for each frame; they are made as they are rendered.
-        path: target.
-        frames: how many there are.
+        path, fps, resolution, progress: as in `turntable`.
+        frames: how many assets there are.
         like: the mesh whose place and size the camera is set for.
-        fps, resolution, spp, azimuth, elevation, progress: as in `turntable` and `still`.
-
-    Returns:
-        The path written.
-
-    Raises:
-        OutputError: unknown suffix, unwritable place, or the encoder failed.
-        ConfigError: an option out of range.
+        spp, azimuth, elevation: as in `still`.
     """
     target = check_video(path, frames, fps, resolution)
 
-    def pictures():
+    def pictures() -> Iterator[np.ndarray]:
         view = None
-        for k, asset in enumerate(assets):
+        for asset in assets:
             renderer = OrbitRenderer(asset, resolution=resolution, like=like)
             view = view or renderer.frame(azimuth, elevation)
             yield tone(renderer.render(azimuth, view, spp))
-            if progress:
-                progress(k + 1, frames)
 
-    return write_video(target, pictures(), fps, resolution)
+    return write_video(target, pictures(), frames, fps, resolution, progress)

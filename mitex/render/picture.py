@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -122,12 +122,6 @@ def turntable(
     )
     angles = AZIMUTH + np.linspace(0.0, 2.0 * math.pi, frames, endpoint=False)
     view = renderer.frame(angles.tolist(), elevation)
-
-    def pictures() -> Iterator[np.ndarray]:
-        for k, angle in enumerate(angles):
-            # The same seed: noise that stands still compresses better and disturbs less.
-            yield tone(renderer.render(float(angle), view, spp), exposure)
-            if progress:
-                progress(k + 1, frames)
-
-    return write_video(target, pictures(), fps, resolution)
+    # The same seed: noise that stands still compresses better and disturbs less.
+    pictures = (tone(renderer.render(float(angle), view, spp), exposure) for angle in angles)
+    return write_video(target, pictures, frames, fps, resolution, progress)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -32,15 +32,30 @@ def check_video(path: str | os.PathLike[str], frames: int, fps: int, resolution:
     return target
 
 
-def write_video(target: Path, pictures: Iterable[np.ndarray], fps: int, side: int) -> Path:
-    """Writes pictures (side, side, 3), sRGB in [0, 1], as .mp4 (H.264) or .gif, by the suffix.
+def write_video(
+    target: Path,
+    pictures: Iterable[np.ndarray],
+    frames: int,
+    fps: int,
+    side: int,
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Writes `frames` pictures (side, side, 3), sRGB in [0, 1], as .mp4 (H.264) or .gif, by the suffix.
+
+    They are made as they are written; `progress` is called with (frames done, frames) after each one.
 
     Raises:
         OutputError: the encoder failed, or the place is not writable; nothing is left then.
     """
-    bytes_of = (np.round(picture * 255.0).astype(np.uint8) for picture in pictures)
+
+    def bytes_of() -> Iterator[np.ndarray]:
+        for done, picture in enumerate(pictures, 1):
+            yield np.round(picture * 255.0).astype(np.uint8)
+            if progress:
+                progress(done, frames)
+
     with atomic_write(target) as temporary:
-        (_write_gif if target.suffix.lower() == ".gif" else _write_mp4)(temporary, bytes_of, fps, side)
+        (_write_gif if target.suffix.lower() == ".gif" else _write_mp4)(temporary, bytes_of(), fps, side)
     return target
 
 
