@@ -1,0 +1,57 @@
+"""The flat texture of table 2: pictures of patches, quilted."""
+
+import numpy as np
+import pytest
+
+from mitex.errors import ConfigError
+from mitex.mesh import grid
+from mitex.methods.baselines.quilted import quilted_albedo
+from mitex.methods.nerf.patches import Patches, extract_patches
+
+
+def checks(patches: Patches) -> np.ndarray:
+    """What a plane of blue and orange waves looks like from above."""
+    u, v = (0.5 + 0.5 * np.sin(25.0 * patches.points[..., k]) for k in (0, 1))
+    return np.stack([u, 0.5 * (u + v), v], -1)
+
+
+@pytest.fixture(scope="module")
+def patches() -> Patches:
+    right = np.array([1.0, 0.0, 0.0])
+    rng = np.random.default_rng(1)
+    return extract_patches(grid(24, 24), rng, count=400, size=32, pattern_rate=0.15, direction=right)
+
+
+def test_colours_go_on(patches: Patches):
+    """The waves stay in step, to the precision that the patches' places allow."""
+    image = quilted_albedo(patches, checks, (130, 170), np.random.default_rng(2))
+    assert image.shape == (130, 170, 3) and image.dtype == np.float32
+    assert image.min() >= 0.0 and image.max() <= 1.0
+    assert np.abs(image[..., 1] - 0.5 * (image[..., 0] + image[..., 2])).max() < 1e-5
+    # Red varies along columns only, blue along rows only, and no step is much steeper than the waves.
+    steepest = 0.5 * 25.0 * patches.gap
+    assert np.abs(np.diff(image, axis=0)).max() < 2.0 * steepest
+    assert np.abs(np.diff(image, axis=1)).max() < 2.0 * steepest
+    assert image[..., 0].std(0).mean() < 0.5 * image[..., 0].std(1).mean()
+    assert image[..., 2].std(1).mean() < 0.5 * image[..., 2].std(0).mean()
+
+
+def test_tileable(patches: Patches):
+    image = quilted_albedo(patches, checks, (96, 64), np.random.default_rng(2), tileable=True)
+    for axis in (0, 1):
+        steps = np.square(np.diff(image, axis=axis)).mean((1 - axis, 2))
+        across = np.square(image.take(0, axis) - image.take(-1, axis)).mean()
+        assert across <= steps.max()
+
+
+def test_same_seed_same_image(patches: Patches):
+    a, b = (quilted_albedo(patches, checks, (40, 40), np.random.default_rng(3)) for _ in range(2))
+    assert (a == b).all()
+
+
+def test_refusals(patches: Patches):
+    rng = np.random.default_rng(0)
+    with pytest.raises(ConfigError, match="pictures of patches of shape"):
+        quilted_albedo(patches, lambda p: checks(p)[1:], (40, 40), rng)
+    with pytest.raises(ConfigError, match="NaN"):
+        quilted_albedo(patches, lambda p: checks(p) * np.nan, (40, 40), rng)
