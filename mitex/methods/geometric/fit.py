@@ -70,7 +70,7 @@ def fit(
     keep_freed_memory()
     meshes, reports = training_meshes(shape, start, settings, quiet)
     hierarchy = Hierarchy.of(start, settings.levels)
-    task = GeometricTask(settings, hierarchy, torch.from_numpy(start.vertices), meshes, shape.name)
+    task = GeometricTask(settings, hierarchy, torch.from_numpy(start.vertices), meshes, shape)
     result = train(
         task,
         settings,

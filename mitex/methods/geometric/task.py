@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import torch
 
+from mitex.mesh import Mesh
 from mitex.methods.geometric.config import MAX_LEVELS, GeometricConfig
 from mitex.methods.geometric.features import face_features
 from mitex.methods.geometric.gan import adversarial_loss, critic_loss, generate
@@ -29,7 +30,7 @@ class GeometricTask:
         hierarchy: of the template, with a level for each training mesh.
         template: (V, 3) its vertices, in units of their mean edge length.
         meshes: vertices of the training mesh of each level.
-        name: of the reference.
+        reference: what they were fitted to; previews show it.
 
     Attributes:
         generators, critics: a network for each possible level, so that a resumed run may go on to more.
@@ -42,10 +43,10 @@ class GeometricTask:
         hierarchy: Hierarchy,
         template: torch.Tensor,
         meshes: list[torch.Tensor],
-        name: str,
+        reference: Mesh,
     ) -> None:
-        self.config, self.hierarchy, self.template, self.name = config, hierarchy, template, name
-        self.meshes = meshes
+        self.config, self.hierarchy, self.template = config, hierarchy, template
+        self.meshes, self.reference = meshes, reference
         drawn = torch.Generator().manual_seed(config.seed)
         self.generators = [network(level, 3, drawn) for level in range(MAX_LEVELS)]
         self.critics = [network(level, 1, drawn) for level in range(MAX_LEVELS)]
@@ -102,18 +103,18 @@ class GeometricTask:
         self._start = None
 
     def preview(self, step: int) -> np.ndarray:
-        """The training mesh of the level, its reconstruction, and two random samples."""
+        """The reference, the training mesh of the level, its reconstruction, and two random samples."""
         level = self.level(step - 1)
         faces = self.hierarchy.graphs[level].faces.numpy()
         drawn = torch.Generator().manual_seed(self.config.seed)
         with torch.no_grad():
             *_, rebuilt = self._grown(level, [self.fixed])
             samples = [self._sample(level, drawn) for _ in range(2)]
-        meshes = (self.meshes[level], rebuilt, *samples)
-        return np.hstack([portrait(vertices.numpy(), faces) for vertices in meshes])
+        shown = [portrait(v.numpy(), faces) for v in (self.meshes[level], rebuilt, *samples)]
+        return np.hstack([portrait(self.reference.vertices, self.reference.faces), *shown])
 
     def metadata(self) -> dict[str, str]:
-        return {"method": "geometric", "reference": self.name}
+        return {"method": "geometric", "reference": self.reference.name}
 
     def _critic_turns(self, step: int) -> int:
         """How many steps of the critic come before a step of the generator: they are spread evenly."""

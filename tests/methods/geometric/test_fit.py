@@ -1,6 +1,8 @@
 """A small real training, its model, and growing it on other meshes."""
 
 from dataclasses import replace
+from functools import partial
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from mitex.methods import geometric
 from mitex.methods.geometric import files
 from mitex.methods.geometric.config import PRESETS, GeometricConfig
 from mitex.methods.geometric.hierarchy import Hierarchy
+from mitex.methods.geometric.pictures import portrait
 from mitex.methods.geometric.references import find_reference
 from mitex.methods.geometric.report import report
 from mitex.methods.geometric.task import GeometricTask, learning_rate
@@ -53,7 +56,7 @@ def small_task(**changes) -> GeometricTask:
         torch.from_numpy(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=drawn)
         for k, mesh in enumerate(hierarchy.meshes)
     ]
-    return GeometricTask(config, hierarchy, torch.from_numpy(ball.vertices), meshes, "ball")
+    return GeometricTask(config, hierarchy, torch.from_numpy(ball.vertices), meshes, bumpy())
 
 
 def test_the_run_folder(made):
@@ -266,9 +269,17 @@ def test_settings():
         GeometricConfig(steps=42_001)
 
 
-def test_previews(made):
-    task = small_task()
-    assert task.preview(9).shape == (256, 4 * 256, 3)
+def test_previews(monkeypatch):
+    """The reference itself, the training mesh of the level, the reconstruction and two samples."""
+    small = partial(portrait, resolution=64, spp=4)
+    monkeypatch.setattr("mitex.methods.geometric.task.portrait", small)
+    task, reference = small_task(), bumpy()
+    tiles = np.split(task.preview(6), 5, axis=1)
+    level = task.meshes[1].numpy(), task.hierarchy.meshes[1].faces
+    assert np.allclose(tiles[0], small(reference.vertices, reference.faces), atol=0.01)
+    assert np.allclose(tiles[1], small(*level), atol=0.01)
+    for a, b in combinations(tiles, 2):
+        assert np.abs(a - b).mean() > 0.01
 
 
 @pytest.mark.parametrize("name", ["spikes", "scales"])
