@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -89,7 +89,6 @@ def render(
     for target, tensor in zip(targets, tensors, strict=True):
         target.check(tensor)
 
-    @dr.wrap(source="torch", target="drjit")
     def attached(*arrays: Any) -> Any:
         try:
             for target, array in zip(targets, arrays, strict=True):
@@ -100,8 +99,22 @@ def render(
             for target, array in zip(targets, arrays, strict=True):
                 target.assign(dr.detach(array))
 
+    return call(attached, *tensors)
+
+
+def call(function: Callable[..., Any], *tensors: torch.Tensor) -> Any:
+    """The result of a pure Dr.Jit function of tensors, attached to those that need a gradient.
+
+    Args:
+        function: of `mi.TensorXf` (float32) or other Dr.Jit tensors, one for each of `tensors`; returns such
+            a tensor or a tuple of them.
+        tensors: on the CPU.
+
+    Returns:
+        The same as torch tensors; no second derivatives.
+    """
     # Dr.Jit does not convert an nn.Parameter, a view of it is a plain tensor with the same gradient.
-    return attached(*(tensor.view_as(tensor) for tensor in tensors))
+    return dr.wrap(source="torch", target="drjit")(function)(*(tensor.view_as(tensor) for tensor in tensors))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,219 @@
+"""Marching rays through occupied cells of the scene cube, and what they gather (all in Dr.Jit)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from mitex.runtime import load_mitsuba
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+
+DIAGONAL = 2 * math.sqrt(3)  # of the scene cube [-1, 1]^3
+WINDOW = 48  # steps that are taken before the rays that have come to an end are dropped
+OPAQUE = 1e-3  # what passes of a ray that has come to an end
+
+
+@dataclass
+class Samples:
+    """M places on R rays, ordered by ray and then by distance.
+
+    Attributes:
+        ray: (M,) `mi.UInt32`, which ray.
+        t: (M,) `mi.Float` distance along it [scene units].
+        step: what each of them stands for [scene units].
+        rays: R.
+    """
+
+    ray: Any
+    t: Any
+    step: float
+    rays: int
+
+    def __len__(self) -> int:
+        return dr.width(self.ray) if self.rays else 0
+
+    def kept(self, index: Any) -> Samples:
+        """Those with these indices, ascending `mi.UInt32`."""
+        ray, t = dr.gather(mi.UInt32, self.ray, index), dr.gather(mi.Float, self.t, index)
+        return Samples(ray, t, self.step, self.rays)
+
+    def points(self, origin: Any, direction: Any) -> Any:
+        """(M,) `mi.Point3f` on rays of R origins and directions."""
+        start, along = (dr.gather(type(v), v, self.ray) for v in (origin, direction))
+        return mi.Point3f(start + along * self.t)
+
+
+class RadianceField(Protocol):
+    """What can be marched through.
+
+    Attributes:
+        mask: (G, G, G) `mi.TensorXu8` of 0 and 1, the occupied cells of [-1, 1]^3, x slowest.
+        step: between samples [scene units].
+    """
+
+    mask: Any
+    step: float
+
+    def evaluate(self, points: Any, view: Any) -> tuple[Any, Any, Any]:
+        """Of N points, and the unit directions in which they are seen: ascending indices of those that have
+        matter (M,), their density [1 / scene units] and colour `mi.Color3f`."""
+        ...
+
+
+@dataclass
+class Traversed:
+    """What R rays gathered.
+
+    Attributes:
+        colour: `mi.Color3f`, of what was met, times its opacity.
+        through: what passes, in [0, 1].
+        depth: mean distance of what was met, times its opacity [scene units].
+    """
+
+    colour: Any
+    through: Any
+    depth: Any
+
+
+def traverse(
+    field: RadianceField, origin: Any, direction: Any, jitter: Any, far: Any = math.inf
+) -> Traversed:
+    """Marches through a field from the front, until the rays are opaque.
+
+    Args:
+        field: what is marched through; derivatives to its parameters are kept if AD is on.
+        origin, direction, jitter: R rays as in `march`.
+        far: where they end, a number or (R,) [scene units].
+    """
+    count = dr.width(origin)
+    result = Traversed(dr.zeros(mi.Color3f, count), dr.ones(mi.Float, count), dr.zeros(mi.Float, count))
+    near, leave = _box(origin, direction)
+    leave = dr.minimum(leave, far)
+    alive: Any = dr.compress(near < leave)
+    while dr.width(alive):
+        o, d, j, first, last = (
+            dr.gather(type(v), v, alive) for v in (origin, direction, jitter, near, leave)
+        )
+        end = first + WINDOW * field.step
+        samples = march(o, d, field.mask, field.step, j, first, dr.minimum(last, end))
+        if len(samples):
+            _gather(field, samples, o, d, alive, result)
+        dr.scatter(near, end, alive)
+        passing = dr.gather(mi.Float, dr.detach(result.through), alive)
+        alive = dr.gather(mi.UInt32, alive, dr.compress((passing > OPAQUE) & (end < last)))
+    return result
+
+
+def _gather(
+    field: RadianceField, samples: Samples, origin: Any, direction: Any, rays: Any, to: Traversed
+) -> None:
+    """Adds one window's samples to the results of the `rays` that they lie on."""
+    along = dr.gather(mi.Vector3f, direction, samples.ray)
+    index, density, colour = field.evaluate(samples.points(origin, direction), along)
+    if not dr.width(index):
+        return
+    dr.eval(density, colour)
+    samples = samples.kept(index)
+    weights, passing = weights_of(density, samples)
+    before = dr.gather(mi.Float, to.through, rays)
+    weights *= dr.gather(mi.Float, before, samples.ray)
+    ray = dr.gather(mi.UInt32, rays, samples.ray)
+    dr.scatter_add(to.colour, colour * weights, ray)
+    dr.scatter_add(to.depth, dr.detach(samples.t * weights), ray)
+    dr.scatter(to.through, before * passing, rays)
+    dr.eval(to.colour, to.depth, to.through)
+
+
+def march(
+    origin: Any, direction: Any, grid: Any, step: float, jitter: Any, near: Any = 0.0, far: Any = math.inf
+) -> Samples:
+    """Samples at even steps, where the ray is in an occupied cell.
+
+    Args:
+        origin, direction: R rays, `mi.Point3f` and unit `mi.Vector3f` [scene units].
+        grid: (G, G, G) `mi.TensorXu8` of 0 and 1, the occupied cells of [-1, 1]^3, x slowest.
+        step: between samples [scene units].
+        jitter: (R,) in [0, 1): where in its first step a ray begins.
+        near, far: the part of the rays that counts, numbers or (R,) [scene units].
+    """
+    count, side = dr.width(origin), grid.shape[0]
+    enter, leave = _box(origin, direction)
+    enter, leave = dr.maximum(enter, near), dr.minimum(leave, far)
+    longest = dr.max(leave - enter)[0] if count else 0.0
+    if not longest > 0:
+        return Samples(mi.UInt32(), mi.Float(), step, count)
+    steps = math.ceil(longest / step) + 1
+    index = dr.arange(mi.UInt32, count * steps)
+    # Opaque: a number that changes with every call would make a new kernel each time.
+    ray = index // dr.opaque(mi.UInt32, steps)
+    t = (
+        dr.gather(mi.Float, enter, ray)
+        + (mi.Float(index - ray * dr.opaque(mi.UInt32, steps)) + dr.gather(mi.Float, jitter, ray)) * step
+    )
+    inside = t < dr.gather(mi.Float, leave, ray)
+    candidates = Samples(ray, t, step, count)
+    cell = cells_of(candidates.points(origin, direction), side)
+    found = dr.compress(inside & (dr.gather(mi.UInt8, grid.array, cell, inside) != 0))
+    return candidates.kept(found)
+
+
+def cells_of(points: Any, side: int) -> Any:
+    """Index of the cell of the scene cube, x slowest, for `mi.Point3f` inside."""
+    x, y, z = (mi.UInt32(dr.clip((p + 1) * (0.5 * side), 0, side - 1)) for p in points)
+    return (x * side + y) * side + z
+
+
+def weights_of(density: Any, samples: Samples) -> tuple[Any, Any]:
+    """Share of each sample in its ray's colour (M,), and what passes the whole ray (R,).
+
+    Args:
+        density: (M,) [1 / scene units], attached or not.
+        samples: their places.
+    """
+    depth = mi.Float64(density * samples.step)
+    weights = dr.exp(-dr.custom(_Before, depth, samples)) * (1 - dr.exp(-depth))
+    return mi.Float(weights), mi.Float(dr.exp(-accumulated(depth, samples)))
+
+
+class _Before(dr.CustomOp):
+    """For each sample the sum over those before it on its ray, `mi.Float64`.
+
+    Its own derivative: that of Dr.Jit's prefix sum needs a new kernel for each M.
+    """
+
+    def eval(self, values: Any, samples: Samples) -> Any:
+        self.samples = samples
+        return self._sum(values)
+
+    def forward(self) -> None:
+        self.set_grad_out(self._sum(self.grad_in("values")))
+
+    def backward(self) -> None:
+        grad = self.grad_out()
+        total = dr.gather(mi.Float64, accumulated(grad, self.samples), self.samples.ray)
+        self.set_grad_in("values", total - self._sum(grad) - grad)
+
+    def _sum(self, values: Any) -> Any:
+        # In double precision: the sum runs over all rays, and differences of it must keep their digits.
+        sums = dr.prefix_sum(values)
+        index = dr.arange(mi.UInt32, dr.width(values))
+        start = dr.full(mi.UInt32, 0xFFFFFFFF, self.samples.rays)
+        dr.scatter_reduce(dr.ReduceOp.Min, start, index, self.samples.ray)
+        return sums - dr.gather(mi.Float64, sums, dr.gather(mi.UInt32, start, self.samples.ray))
+
+
+def accumulated(values: Any, samples: Samples) -> Any:
+    """Sums over each ray (R,) of values (M,), `mi.Float` or an array of them."""
+    total = dr.zeros(type(values), samples.rays)
+    dr.scatter_add(total, values, samples.ray)
+    return total
+
+
+def _box(origin: Any, direction: Any) -> tuple[Any, Any]:
+    """Where rays enter and leave the scene cube; the entry is behind the exit where they miss it."""
+    inverse = 1 / dr.select(direction == 0, 1e-12, direction)
+    a, b = (-1 - origin) * inverse, (1 - origin) * inverse
+    return dr.maximum(dr.max(dr.minimum(a, b)), 0), dr.min(dr.maximum(a, b))

@@ -1,0 +1,105 @@
+"""`AppliedTexture`: a radiance-field texture on a mesh of the user's (section 3.2.4)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+
+from mitex.atlas import unwrap, usable_uv
+from mitex.errors import ConfigError, MeshError
+from mitex.integrators.march import DIAGONAL
+from mitex.mesh import Mesh, Similarity
+from mitex.methods.nerf.base_shape import face_frames
+from mitex.methods.nerf.maps import LatentMaps, MappedLatents
+from mitex.methods.nerf.occupancy import Occupancy
+from mitex.methods.nerf.projection import Projection
+from mitex.methods.nerf.shell import Shell, shell_cells
+from mitex.runtime import load_mitsuba
+
+if TYPE_CHECKING:
+    from mitex.methods.nerf.texture import NerfTexture
+
+mi: Any = load_mitsuba(needs_llvm=False)
+
+EXTENT = 1 / 1.2  # of the mesh in the scene cube
+NEIGHBOURS = 5  # vertices that make the coarse normal of a target
+LOOKS = 6  # at each cell, to find which ones are occupied
+FINEST = 2048  # steps across the scene cube, at most
+UNWRAPPED = 1024  # texels that the distances of charts are made for
+
+
+class AppliedTexture(Shell):
+    """A texture in the shell around a mesh, in the scene cube.
+
+    Attributes:
+        mesh: the target, as it was given but for its UVs.
+        similarity: the mesh's space -> scene cube.
+
+    Args:
+        texture, maps, repeat, density, light: as of `NerfTexture.apply`.
+    """
+
+    def __init__(
+        self, texture: NerfTexture, mesh: Mesh, maps: LatentMaps, *, repeat: float, density: float, light: Any
+    ) -> None:
+        if not 0.01 <= repeat <= 1000 or not 0 < density <= 1000:
+            raise ConfigError(
+                f"a texture repeated {repeat} times of {density} times the density", "use 0.01 to 1000"
+            )
+        self.mesh = with_uv(mesh)
+        placed, self.similarity = centred(self.mesh)
+        uv = np.asarray(placed.uv) * repeat
+        scale = stretch(placed, uv) / (maps.size[1] * maps.gap)
+        thickness = texture.model.base.thickness * scale
+        projection = Projection(placed, neighbours=NEIGHBOURS, pull=None, reach=thickness)
+        cells = texture.model.config.occupancy
+        step = max(scale * DIAGONAL / texture.model.config.cells, DIAGONAL / FINEST)
+        occupancy = Occupancy(cells, shell_cells(projection, thickness, cells))
+        latents = MappedLatents(maps, uv, face_frames(placed))
+        super().__init__(
+            projection,
+            latents,
+            texture.decoder,
+            light,
+            thickness,
+            mask=occupancy.mask,
+            step=step,
+            scale=scale,
+            strength=density,
+        )
+        drawn = torch.Generator().manual_seed(0)
+        for _ in range(LOOKS):
+            occupancy.refresh(self.density, drawn)
+        self.mask = occupancy.mask
+
+
+def with_uv(mesh: Mesh) -> Mesh:
+    """The mesh with UVs in which nothing overlaps: its own, or new ones."""
+    if mesh.uv is not None and usable_uv(mesh, mesh.uv):
+        return mesh
+    return replace(mesh, uv=unwrap(mesh, UNWRAPPED, 8))
+
+
+def centred(mesh: Mesh) -> tuple[Mesh, Similarity]:
+    """The mesh in the scene cube, with a margin for the shell, and how it got there."""
+    low, high = mesh.vertices.min(0), mesh.vertices.max(0)
+    half = float((high - low).max()) / 2
+    if half == 0:
+        raise MeshError(f"all vertices of {mesh.name} are at one point", "check how it was exported")
+    similarity = Similarity((low + high) / 2, half / EXTENT)
+    return mesh.with_vertices(similarity.apply(mesh.vertices)), similarity
+
+
+def stretch(mesh: Mesh, uv: np.ndarray) -> float:
+    """How long a unit of the UVs is on the mesh: mean edge there by mean edge here."""
+
+    def edges(corners: np.ndarray) -> float:
+        return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
+
+    flat = edges(uv)
+    if flat == 0:
+        raise MeshError(f"the UVs of {mesh.name} have no area", "unwrap it again, or leave them out")
+    return edges(mesh.vertices[mesh.faces]) / flat

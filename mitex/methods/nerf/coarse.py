@@ -1,0 +1,148 @@
+"""From photos to the base shape: a coarse density, what is solid in it, and how thick the shell must be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mitex.cache import cached, content_key
+from mitex.integrators.march import traverse
+from mitex.mesh import Mesh
+from mitex.methods.nerf.base_shape import base_shape, given_base, shell_thickness
+from mitex.methods.nerf.capture import Capture
+from mitex.methods.nerf.config import NerfConfig
+from mitex.methods.nerf.pixels import Pixels
+from mitex.methods.nerf.plain import PlainTask
+from mitex.methods.nerf.projection import Projection
+from mitex.methods.nerf.radiance import BETAS, EPSILON, rays_of
+from mitex.paths import cache_dir
+from mitex.runtime import load_mitsuba
+from mitex.training import checkpoint, train
+from mitex.training.optim import Adam
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+
+GRID = 256  # samples of the density along a side of the scene cube
+VIEWS = 16  # that the surface is scanned from
+SCAN_SIDE = 200  # pixels of a scan along its longest side
+SOLID = 0.95  # opacity of a ray that has met the surface
+VOXEL = 0.01  # the scan keeps one point in each [scene units]
+
+
+@dataclass(frozen=True, eq=False)
+class BaseShape:
+    """What the texture lies on.
+
+    Attributes:
+        mesh: in the scene cube.
+        scan: (M, 3) float32 points of the captured surface.
+        thickness: h, half of the shell's [scene units].
+    """
+
+    mesh: Mesh
+    scan: np.ndarray
+    thickness: float
+
+
+def find_base(
+    capture: Capture, config: NerfConfig, given: Mesh | None = None, quiet: bool = True
+) -> BaseShape:
+    """Trains a coarse field on a capture and takes the base shape from it; kept in the user's cache folder.
+
+    Args:
+        capture: the views to learn from.
+        config: settings.
+        given: a base shape of the user's in the capture's world, or None.
+        quiet: show no progress.
+
+    Raises:
+        MeshError: there is nothing dense, or the given mesh cannot be used.
+    """
+    coarse = replace(
+        config, steps=config.base_steps, lr_steps=config.base_steps, table=min(config.table, 17), cells=384,
+        rays=2048, one_view=False, preview_every=0, refine_cameras=False,
+    )  # fmt: skip
+    arrays = (*capture.images, capture.poses, capture.intrinsics, capture.distortion)
+    mesh = () if given is None else (given.vertices, given.faces)
+    settings = (coarse.seed, coarse.steps, coarse.table, coarse.distortion, coarse.lr, config.concavity)
+    place = cache_dir() / "nerf" / content_key(1, *arrays, *mesh, *settings, config.pull, config.neighbours)
+
+    def find() -> BaseShape:
+        task = _trained(capture, coarse, place.with_suffix(".run"), quiet)
+        base = (
+            base_shape(density_grid(task), concavity=config.concavity) if given is None else given_base(given)
+        )
+        scan = scanned(task)
+        projection = Projection(base, neighbours=config.neighbours, pull=config.pull)
+        return BaseShape(base, scan, shell_thickness(scan, projection))
+
+    return cached(place, find, _read, _write)
+
+
+def density_grid(task: PlainTask, side: int = GRID) -> np.ndarray:
+    """(side, side, side) density at the centres of cells of the scene cube, x slowest."""
+    centres = (np.arange(side, dtype=np.float32) + 0.5) * (2 / side) - 1
+    y, z = (a.ravel() for a in np.meshgrid(centres, centres, indexing="ij"))
+    field = task.field(task.mean)
+    slabs = [field.density_at(np.stack([np.full_like(y, x), y, z], 1)) for x in centres]
+    return np.stack(slabs).reshape(side, side, side)
+
+
+def scanned(task: PlainTask) -> np.ndarray:
+    """(M, 3) float32 points where rays of views from all around become solid."""
+    capture, field = task.pixels.capture, task.field(task.mean)
+    found = []
+    for view in _farthest(capture.poses[:, :, 3], VIEWS):
+        batch, _ = Pixels(capture).image(int(view), SCAN_SIDE)
+        origin, direction = rays_of(batch)
+        seen = traverse(field, origin, direction, dr.full(mi.Float, 0.5, dr.width(origin)))
+        opacity = 1 - np.array(seen.through)
+        solid = opacity > SOLID
+        depth = (np.array(seen.depth)[solid] / opacity[solid])[:, None]
+        found.append(batch.origins[solid] + batch.directions[solid] * depth)
+    points = np.concatenate(found)
+    _, first = np.unique(np.floor(points / VOXEL).astype(np.int64), axis=0, return_index=True)
+    return points[np.sort(first)].astype(np.float32)
+
+
+def _trained(capture: Capture, config: NerfConfig, folder: Path, quiet: bool) -> PlainTask:
+    """A coarse field; its run folder lets an interrupted one go on."""
+    task = PlainTask(config, capture, (capture, 0))
+    resume = (folder / checkpoint.NAME).exists()
+    optimizer = partial(Adam, betas=BETAS, eps=EPSILON)
+    lr = partial(learning_rate, config)
+    train(task, config, folder, lr=lr, optimizer=optimizer, resume=resume, quiet=quiet)
+    return task
+
+
+def learning_rate(config: NerfConfig, step: int) -> float:
+    """Of a step, from 0 on."""
+    return config.lr * 0.1 ** (step / config.lr_steps)
+
+
+def _farthest(points: np.ndarray, count: int) -> np.ndarray:
+    """Indices of `count` points, each as far as can be from those before it."""
+    chosen = [0]
+    distance = np.linalg.norm(points - points[0], axis=1)
+    for _ in range(min(count, len(points)) - 1):
+        chosen.append(int(distance.argmax()))
+        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
+    return np.array(chosen)
+
+
+def _read(place: Path) -> BaseShape:
+    with np.load(place / "base.npz", allow_pickle=False) as file:
+        mesh = Mesh(file["vertices"], file["faces"], name="base")
+        return BaseShape(mesh, file["scan"], float(file["thickness"]))
+
+
+def _write(folder: Path, base: BaseShape) -> None:
+    mesh, thickness = base.mesh, np.float64(base.thickness)
+    np.savez(
+        folder / "base.npz", vertices=mesh.vertices, faces=mesh.faces, scan=base.scan, thickness=thickness
+    )

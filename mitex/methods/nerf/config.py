@@ -1,0 +1,110 @@
+"""Settings of the radiance-field texture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from mitex.errors import ConfigError
+from mitex.training.config import check_ranges
+
+
+@dataclass(frozen=True)
+class NerfConfig:
+    """Settings of a fit; keys as in `--set key=value`.
+
+    Attributes:
+        preset: its name.
+        steps: of the training.
+        seed: of all randomness.
+        rays: in a step.
+        one_view: all rays of a step from one picture, as published; else from all pictures.
+        cells: along the diagonal of the scene cube that a ray's steps divide.
+        table: binary logarithm of the entries of a level's hash table.
+        coarsest, finest: resolution of the first and the last level of features [per scene cube].
+        lr: learning rate, times 0.1 after `lr_steps`.
+        lr_steps: as said.
+        average: decay of the running mean of the parameters, the model that is kept, per 16 steps.
+        clustering, distortion, normals: weights of the losses.
+        cluster_entries: entries of a level that a step clusters, drawn by chance; 0 for all, as published.
+        normal_rays: share of the rays whose normals are compared.
+        pull: pseudo-distance of the direction away from the nearest vertex, beside those of the normals.
+        neighbours: vertices whose normals make the coarse normal.
+        occupancy: cells of the occupancy grid along a side.
+        refine_cameras: optimize the poses too.
+        base_steps: of the coarse field that the base shape is taken from.
+        concavity: how far the base shape may be from convex pieces (CoACD's threshold).
+        checkpoint_every, preview_every: steps between them.
+    """
+
+    preset: str = "fast"
+    steps: int = 40_000
+    seed: int = 0
+    rays: int = 4096
+    one_view: bool = True
+    cells: int = 1024
+    table: int = 19
+    coarsest: int = 512
+    finest: int = 1024
+    lr: float = 1e-2
+    lr_steps: int = 40_000
+    average: float = 0.95
+    clustering: float = 1e-5
+    distortion: float = 1e-2
+    normals: float = 1.0
+    cluster_entries: int = 0
+    normal_rays: float = 1.0
+    pull: float = 0.01
+    neighbours: int = 8
+    occupancy: int = 128
+    refine_cameras: bool = False
+    base_steps: int = 2_000
+    concavity: float = 0.1
+    checkpoint_every: int = 500
+    preview_every: int = 1_000
+
+    def __post_init__(self) -> None:
+        check_ranges(
+            self,
+            steps=(1, None),
+            seed=(0, 2**32 - 1),
+            rays=(1, 1 << 20),
+            cells=(16, 8192),
+            table=(8, 24),
+            coarsest=(2, 8192),
+            finest=(2, 8192),
+            lr=(0, 1),
+            lr_steps=(1, None),
+            average=(0, 0.9999),
+            clustering=(0, None),
+            distortion=(0, None),
+            normals=(0, None),
+            cluster_entries=(0, None),
+            normal_rays=(0, 1),
+            pull=(1e-6, None),
+            neighbours=(1, 64),
+            occupancy=(8, 512),
+            base_steps=(1, None),
+            concavity=(0.01, 1),
+            checkpoint_every=(1, None),
+            preview_every=(0, None),
+        )
+        if self.finest < self.coarsest:
+            raise ConfigError(f"finest = {self.finest} is coarser than {self.coarsest}", "raise finest")
+
+
+PAPER = NerfConfig(preset="paper")
+PRESETS = {
+    "fast": replace(
+        PAPER,
+        preset="fast",
+        steps=5_000,
+        lr_steps=5_000,
+        one_view=False,
+        cells=512,
+        table=17,
+        cluster_entries=1 << 14,
+        normal_rays=0.25,
+        pull=0.05,
+    ),
+    "paper": PAPER,
+}

@@ -1,0 +1,103 @@
+"""Model files: features, networks and light of a texture, and the base shape that they were learned on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from mitex.mesh import Mesh
+from mitex.methods.nerf.coarse import BaseShape
+from mitex.methods.nerf.config import NerfConfig
+from mitex.methods.nerf.field import Encoding, weight_shapes
+from mitex.methods.nerf.lighting import COEFFICIENTS
+from mitex.training import model_file
+
+NAME = "texture.safetensors"
+KIND = "nerf"
+SETTINGS = ("table", "coarsest", "finest", "cells", "occupancy", "pull", "neighbours")
+
+
+@dataclass
+class Model:
+    """What is stored.
+
+    Attributes:
+        base: base shape, scan and thickness.
+        frames: (F, 3, 3) rows t, b, n of its faces.
+        tables: of f and f-hat, flat.
+        weights: matrices of the networks, in the order of `field.LAYERS`.
+        light: (16,) spherical harmonics.
+        occupied: (G, G, G) uint8, cells of the scene cube with matter.
+        about: JSON values: name, preset, steps, `SETTINGS`, and how the capture was placed.
+    """
+
+    base: BaseShape
+    frames: np.ndarray
+    tables: list[torch.Tensor]
+    weights: list[torch.Tensor]
+    light: torch.Tensor
+    occupied: np.ndarray
+    about: dict[str, Any]
+
+    @property
+    def config(self) -> NerfConfig:
+        """As far as the model depends on it."""
+        return NerfConfig(**{key: self.about[key] for key in SETTINGS})
+
+
+def save(path: Path, model: Model) -> Path:
+    """Writes a model.
+
+    Raises:
+        OutputError: the place is not writable.
+    """
+    base = model.base
+    tensors = {
+        "vertices": torch.from_numpy(base.mesh.vertices),
+        "faces": torch.from_numpy(base.mesh.faces),
+        "scan": torch.from_numpy(base.scan),
+        "frames": torch.from_numpy(model.frames),
+        "tables/f": model.tables[0],
+        "tables/phase": model.tables[1],
+        "light": model.light,
+        "occupied": torch.from_numpy(np.packbits(model.occupied)),
+    }
+    tensors |= {f"weights/{k}": value for k, value in enumerate(model.weights)}
+    return model_file.save(path, tensors, KIND, model.about | {"thickness": base.thickness})
+
+
+def load(source: str | Path) -> Model:
+    """Reads a model by file or run folder.
+
+    Raises:
+        CheckpointError: there is none, or it is damaged.
+    """
+    with model_file.opened(source, KIND, NAME) as (tensors, about):
+        if not all(tensor.isfinite().all() for tensor in tensors.values()):
+            raise ValueError("values that are not finite")
+        mesh = Mesh(tensors["vertices"].numpy(), tensors["faces"].numpy(), name=f"{about['name']} base")
+        base = BaseShape(mesh, tensors["scan"].numpy(), float(about["thickness"]))
+        weights = [tensors[f"weights/{k}"] for k in range(len(weight_shapes()))]
+        tables = [tensors["tables/f"], tensors["tables/phase"]]
+        side = int(about["occupancy"])
+        occupied = np.unpackbits(tensors["occupied"].numpy(), count=side**3).reshape((side,) * 3)
+        model = Model(base, tensors["frames"].numpy(), tables, weights, tensors["light"], occupied, about)
+        _check(model)
+        return model
+
+
+def _check(model: Model) -> None:
+    shapes: Mapping[str, tuple[Any, Any]] = {
+        "weights": ([tuple(w.shape) for w in model.weights], weight_shapes()),
+        "tables": ([len(t) for t in model.tables], Encoding(model.config).sizes),
+        "frames": (model.frames.shape, (len(model.base.mesh.faces), 3, 3)),
+        "light": (tuple(model.light.shape), (COEFFICIENTS,)),
+    }
+    for name, (found, wanted) in shapes.items():
+        if found != wanted:
+            raise ValueError(f"{name} of another shape")

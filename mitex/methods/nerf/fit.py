@@ -1,0 +1,95 @@
+"""Capturing a texture: from photos to a model file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from mitex.mesh import Mesh
+from mitex.methods.nerf import files
+from mitex.methods.nerf.base_shape import face_frames
+from mitex.methods.nerf.capture import Capture, load_capture
+from mitex.methods.nerf.coarse import find_base, learning_rate
+from mitex.methods.nerf.config import PRESETS
+from mitex.methods.nerf.projection import Projection
+from mitex.methods.nerf.radiance import BETAS, EPSILON
+from mitex.methods.nerf.task import TextureTask
+from mitex.methods.nerf.texture import NerfTexture
+from mitex.runtime import keep_freed_memory
+from mitex.training import run, train
+from mitex.training.optim import Adam
+
+
+def fit(
+    capture: Capture | str | Path,
+    out: str | Path,
+    *,
+    base_mesh: Mesh | str | Path | None = None,
+    preset: str | None = None,
+    config: Path | None = None,
+    overrides: Sequence[str] = (),
+    resume: bool = False,
+    quiet: bool = False,
+) -> NerfTexture:
+    """Learns a surface with its meso-structure from photos; writes a run folder with the model in it.
+
+    Every eighth view is held out; previews show the first of these. The base shape is found first and kept in
+    the user's cache folder.
+
+    Args:
+        capture: photos with masks and cameras, or the folder that `load_capture` takes.
+        out: run folder; must be new or empty, or hold a run to `resume`.
+        base_mesh: the shape without its texture, in the capture's world; None finds it.
+        preset: "fast" (default) or "paper".
+        config: TOML file with any of `NerfConfig`'s keys.
+        overrides: `key=value`, for any key.
+        resume: go on from the run's checkpoint, with its config as far as no other is given.
+        quiet: show no progress.
+
+    Returns:
+        The texture, also saved as `texture.safetensors` in `out`.
+
+    Raises:
+        MitexError: bad input of any kind; nothing has been written then.
+        Interrupted: a checkpoint has been saved.
+    """
+    out = Path(out).expanduser()
+    settings = run.settings(PRESETS, out, preset, config, overrides, resume)
+    photos = capture if isinstance(capture, Capture) else load_capture(capture)
+    given = Mesh.load(base_mesh) if isinstance(base_mesh, str | Path) else base_mesh
+    if given is not None:
+        given = given.with_vertices(photos.similarity.apply(given.vertices))
+    keep_freed_memory()
+    learned, held = photos.split()
+    base = find_base(learned, settings, given, quiet)
+    frames = face_frames(base.mesh)
+    projection = Projection(
+        base.mesh, neighbours=settings.neighbours, pull=settings.pull, reach=base.thickness
+    )
+    task = TextureTask(settings, learned, (held, 0), projection, frames, base.thickness)
+    result = train(
+        task,
+        settings,
+        out,
+        lr=partial(learning_rate, settings),
+        optimizer=partial(Adam, betas=BETAS, eps=EPSILON),
+        resume=resume,
+        quiet=quiet,
+    )
+    about = result.about(photos.name, settings.preset)
+    about |= {key: getattr(settings, key) for key in files.SETTINGS}
+    about |= {"centre": photos.similarity.center.tolist(), "scale": float(photos.similarity.scale)}
+    kept = task.mean
+    model = files.Model(
+        base,
+        frames,
+        [kept["tables/f"], kept["tables/phase"]],
+        [value for name, value in kept.items() if name.startswith("weights/")],
+        kept["light"],
+        task.occupancy.occupied,
+        about,
+    )
+    texture = NerfTexture(model)
+    texture.save(out / files.NAME)
+    return texture

@@ -1,0 +1,136 @@
+"""A plain hash-grid radiance field (Mueller et al. 2022): the coarse density that the base shape comes from,
+and what the paper compares view synthesis with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+
+from mitex.bridge import call
+from mitex.integrators.march import Samples, accumulated, weights_of
+from mitex.methods.nerf.capture import Capture
+from mitex.methods.nerf.config import NerfConfig
+from mitex.methods.nerf.field import HIGHEST, network, network_rows, sigmoid, weight_bound
+from mitex.methods.nerf.occupancy import Occupancy
+from mitex.methods.nerf.pixels import Batch
+from mitex.methods.nerf.radiance import RadianceTask, Rendered, rays_of
+from mitex.methods.nerf.tensors import channels, tensor
+from mitex.runtime import load_mitsuba
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+import drjit.nn as nn  # noqa: E402
+from drjit.hashgrid import HashGridEncoding  # noqa: E402
+
+LEVELS, COARSEST, FINEST = 16, 16, 2048
+CODE = 15
+DENSITY, COLOUR = (2 * LEVELS, 64, CODE + 1), (CODE + 16, 64, 64, 3)
+
+
+class PlainField:
+    """Density and colour of points in the scene cube, by a hash grid and two networks.
+
+    Args:
+        table: values of the hash grid, flat.
+        weights: matrices of the networks.
+        size: binary logarithm of the entries of a level.
+        mask, step: as `RadianceField` has them.
+        packed: evaluate as cooperative vectors, fast forwards.
+    """
+
+    def __init__(
+        self,
+        table: Any,
+        weights: Sequence[Any],
+        size: int,
+        mask: Any = None,
+        step: float = 0.0,
+        packed: bool = False,
+    ) -> None:
+        self.grid = hash_grid(size)
+        self.grid.data = table
+        given = iter(weights)
+        nets = [network(widths, given) for widths in (DENSITY, COLOUR)]
+        self._nets = nn.pack(*nets) if packed else nets
+        self._packed = packed
+        self.mask, self.step = mask, step
+
+    def density(self, points: Any) -> tuple[Any, list[Any]]:
+        """Density [1 / scene units] of `mi.Point3f`, and a code for the colour."""
+        inside = dr.clip(points * 0.5 + 0.5, 0, 1)
+        exponent, *code = network_rows(self._nets[0], list(self.grid(inside)), self._packed)
+        return dr.exp(dr.minimum(exponent, HIGHEST)), code
+
+    def density_at(self, points: np.ndarray) -> np.ndarray:
+        """The same of points (N, 3) in memory, (N,)."""
+        return np.array(self.density(channels(mi.Point3f, points))[0])
+
+    def colour(self, code: list[Any], view: Any) -> Any:
+        """`mi.Color3f` in display values, seen in the unit directions `view`."""
+        rows = network_rows(self._nets[1], [*code, *dr.sh_eval(view, 3)], self._packed)
+        return mi.Color3f(*(sigmoid(row) for row in rows))
+
+    def evaluate(self, points: Any, view: Any) -> tuple[Any, Any, Any]:
+        density, code = self.density(points)
+        return dr.arange(mi.UInt32, dr.width(points)), density, self.colour(code, view)
+
+
+class PlainTask(RadianceTask):
+    """Trains a plain field; arguments as of `RadianceTask`."""
+
+    def __init__(self, config: NerfConfig, capture: Capture, shown: tuple[Capture, int]) -> None:
+        drawn = torch.Generator().manual_seed(config.seed)
+        table = torch.empty(hash_grid(config.table).n_params).uniform_(-1e-4, 1e-4, generator=drawn)
+        parameters = {"table": table}
+        for k, shape in enumerate(_shapes()):
+            bound = weight_bound(shape)
+            parameters[f"weights/{k}"] = torch.empty(shape).uniform_(-bound, bound, generator=drawn)
+        for value in parameters.values():
+            value.requires_grad_()
+        super().__init__(config, capture, shown, Occupancy(config.occupancy), parameters)
+
+    def metadata(self) -> dict[str, str]:
+        return {"method": "plain", "capture": self.pixels.capture.name}
+
+    def render(self, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
+        origin, direction = rays_of(batch)
+
+        def run(table: Any, *weights: Any) -> Any:
+            field = PlainField(table.array, weights, self.config.table)
+            along = dr.gather(mi.Vector3f, direction, samples.ray)
+            _, density, colour = field.evaluate(samples.points(origin, direction), along)
+            shares, through = weights_of(density, samples)
+            return tensor(accumulated(colour * shares, samples)), tensor(through), tensor(shares)
+
+        colour, through, weights = call(run, *self.named.values())
+        return Rendered(colour, through, weights, samples)
+
+    def field(self, parameters: dict[str, torch.Tensor], packed: bool = True) -> PlainField:
+        table, *weights = (mi.TensorXf(value.detach().numpy()) for value in parameters.values())
+        mask, step = self.occupancy.mask, self.step_length
+        return PlainField(table.array, weights, self.config.table, mask, step, packed)
+
+    def density(self, points: np.ndarray) -> np.ndarray:
+        return self.field(self.named).density_at(points)
+
+
+def hash_grid(size: int) -> Any:
+    """The published grid: 16 levels of 2 features from 16 to 2048 cells, 2^size entries each, at zero."""
+    return HashGridEncoding(
+        mi.Float,
+        3,
+        n_levels=LEVELS,
+        n_features_per_level=2,
+        hashmap_size=2**size,
+        base_resolution=COARSEST,
+        per_level_scale=(FINEST / COARSEST) ** (1 / (LEVELS - 1)),
+        align_corners=True,
+        init_scale=0.0,
+    )
+
+
+def _shapes() -> list[tuple[int, int]]:
+    return [(o, i) for w in (DENSITY, COLOUR) for i, o in zip(w[:-1], w[1:], strict=True)]

@@ -1,0 +1,184 @@
+"""Training the textured shell: latent features on the base shape, and the networks (section 3.3)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+
+from mitex.bridge import call
+from mitex.integrators.march import Samples, accumulated, weights_of
+from mitex.methods.nerf.capture import Capture
+from mitex.methods.nerf.config import NerfConfig
+from mitex.methods.nerf.field import Decoder, Encoding, weight_bound, weight_shapes
+from mitex.methods.nerf.lighting import initial_light
+from mitex.methods.nerf.losses import clustering, normal_agreement
+from mitex.methods.nerf.occupancy import Occupancy
+from mitex.methods.nerf.pixels import Batch
+from mitex.methods.nerf.projection import Feet, Projection, attach
+from mitex.methods.nerf.radiance import RadianceTask, Rendered, rays_of
+from mitex.methods.nerf.shell import CapturedLatents, Located, Shell, appearance, shell_cells, within
+from mitex.methods.nerf.tensors import rows, tensor
+from mitex.runtime import load_mitsuba
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+
+CLUSTERS = 4  # centres in each level
+OUTWARDS = 0.1  # share of the coarse normal in what the fine one is compared with
+LEAST = 1e-3  # opacity of rays whose normals are compared
+POSE = 1e-2  # unit of the cameras' corrections [rad, scene units]
+
+
+class TextureTask(RadianceTask):
+    """Features, networks, light and cluster centres, trained on a capture around a base shape.
+
+    Args:
+        config: settings.
+        capture, shown: as of `RadianceTask`.
+        projection: onto the base shape.
+        frames: (F, 3, 3) of its faces.
+        thickness: h, half of the shell's [scene units].
+    """
+
+    def __init__(
+        self,
+        config: NerfConfig,
+        capture: Capture,
+        shown: tuple[Capture, int],
+        projection: Projection,
+        frames: np.ndarray,
+        thickness: float,
+    ) -> None:
+        self.projection, self.frames, self.thickness = projection, frames, thickness
+        self.encoding = Encoding(config)
+        parameters = _start(config, self.encoding, len(capture))
+        possible = shell_cells(projection, thickness, config.occupancy)
+        super().__init__(config, capture, shown, Occupancy(config.occupancy, possible), parameters)
+
+    def metadata(self) -> dict[str, str]:
+        return {"method": "nerf", "capture": self.pixels.capture.name}
+
+    def render(self, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
+        origin, direction = rays_of(batch)
+        index, feet = within(self.projection(rows(samples.points(origin, direction))), self.thickness)
+        samples = samples.kept(mi.UInt32(index.astype(np.uint32)))
+        foot, distance, along = self._attached(batch, samples, feet)
+        compared = int(self.config.normal_rays * samples.rays) if self.config.normals else 0
+
+        def run(foot: Any, distance: Any, along: Any, light: Any, *arrays: Any) -> Any:
+            located = Located.of(feet)
+            located.foot, located.distance = dr.unravel(mi.Point3f, foot.array), distance.array
+            latents, decoder = self._model(arrays)
+            view = dr.unravel(mi.Vector3f, along.array)
+            density, colour, normal = appearance(latents, decoder, light, located, view)
+            shares, through = weights_of(density, samples)
+            rgb = accumulated(colour * shares, samples)
+            fine, wanted = self._normals(arrays, located, normal, shares, samples, compared)
+            return tensor(rgb), tensor(through), tensor(shares), tensor(fine), tensor(wanted)
+
+        networks = [v for name, v in self.named.items() if name.startswith(("tables/", "weights/"))]
+        results = call(run, foot, distance, along, self.named["light"], *networks)
+        colour, through, weights, fine, wanted = results
+        made = Rendered(colour, through, weights, samples)
+        seen = wanted.norm(dim=1) > LEAST
+        if seen.any():
+            made.terms["normals"] = self.config.normals * normal_agreement(fine[seen], wanted[seen])
+        if self.config.clustering:
+            made.terms["clusters"] = self.config.clustering * self._clusters(generator)
+        return made
+
+    def field(self, parameters: dict[str, torch.Tensor]) -> Shell:
+        model = self.model(parameters, packed=True)
+        return Shell(self.projection, *model, self.thickness, mask=self.occupancy.mask, step=self.step_length)
+
+    def density(self, points: np.ndarray) -> np.ndarray:
+        return self.field(self.named).density(points)
+
+    def model(
+        self, parameters: dict[str, torch.Tensor], packed: bool
+    ) -> tuple[CapturedLatents, Decoder, Any]:
+        """Latents, networks and light with given parameters, constant."""
+        arrays = [mi.TensorXf(v.detach().numpy()) for k, v in parameters.items() if "/" in k and k[0] in "tw"]
+        latents, decoder = self._model(arrays, packed)
+        return latents, decoder, mi.TensorXf(parameters["light"].detach().numpy())
+
+    def _model(self, arrays: Any, packed: bool = False) -> tuple[CapturedLatents, Decoder]:
+        tables, weights = [a.array for a in arrays[:2]], arrays[2:]
+        return CapturedLatents(self.encoding, tables, self.frames), Decoder(weights, packed)
+
+    def _attached(
+        self, batch: Batch, samples: Samples, feet: Feet
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Foot points, distances and directions of samples, attached to the cameras if these are refined."""
+        ray = torch.from_numpy(np.array(samples.ray).astype(np.int64))
+        directions = torch.from_numpy(batch.directions)
+        if not self.config.refine_cameras:
+            return torch.from_numpy(feet.point), torch.from_numpy(feet.distance), directions[ray]
+        turn, shift = (POSE * self.named["poses"][batch.view]).split(3, dim=1)
+        directions = directions + torch.linalg.cross(turn, directions)  # to first order: turns are small
+        directions = directions / directions.norm(dim=1, keepdim=True)
+        t = torch.from_numpy(np.array(samples.t))
+        points = (torch.from_numpy(batch.origins) + shift)[ray] + directions[ray] * t[:, None]
+        return *attach(points, feet), directions[ray]
+
+    def _normals(
+        self, arrays: Any, located: Located, normal: Any, shares: Any, samples: Samples, rays: int
+    ) -> tuple[Any, Any]:
+        """Fine normals and those that the density's slope asks for, gathered along the first `rays` rays."""
+        compared = samples.ray < rays
+        chosen: Any = dr.compress(compared)
+        share = dr.detach(shares)
+        fine = accumulated(normal * dr.select(compared, share, 0), samples)
+        if not dr.width(chosen):
+            return fine, dr.zeros(mi.Vector3f, samples.rays)
+        part = Located(*(dr.gather(type(v), dr.detach(v), chosen) for v in vars(located).values()))
+        slope = self._slope([dr.detach(a) for a in arrays], part)
+        target = dr.normalize((1 - OUTWARDS) * slope + OUTWARDS * part.normal)
+        share = dr.gather(mi.Float, share, chosen)
+        return fine, accumulated(target * share, samples.kept(chosen))
+
+    def _slope(self, arrays: Any, located: Located) -> Any:
+        """The direction in which the density falls, by equation 2 from its slopes in foot and distance."""
+        latents, decoder = self._model(arrays)
+        located = Located(**vars(located))
+        foot, distance = mi.Point3f(located.foot), mi.Float(located.distance)
+        with dr.resume_grad():
+            dr.enable_grad(foot, distance)
+            located.foot, located.distance = foot, distance
+            dr.backward(decoder.exponent(latents.features(located), distance))
+        along, n = dr.grad(foot), located.normal
+        slope = along - n * dr.dot(along, n) + n * dr.grad(distance)
+        return dr.normalize(-slope)
+
+    def _clusters(self, generator: torch.Generator) -> torch.Tensor:
+        """The clustering loss of one level of f, drawn by chance."""
+        levels = self.encoding.levels(0)
+        level = int(torch.randint(len(levels), (), generator=generator))
+        entries = self.named["tables/f"][levels[level]].view(-1, 2)
+        if 0 < self.config.cluster_entries < len(entries):
+            entries = entries[
+                torch.randint(len(entries), (self.config.cluster_entries,), generator=generator)
+            ]
+        return clustering(entries, self.named["centres"][level])
+
+
+def _start(config: NerfConfig, encoding: Encoding, views: int) -> dict[str, torch.Tensor]:
+    """Parameters to start from, by name."""
+    drawn = torch.Generator().manual_seed(config.seed)
+
+    def uniform(shape: int | tuple[int, ...], low: float, high: float) -> torch.Tensor:
+        return torch.empty(shape).uniform_(low, high, generator=drawn)
+
+    f, phase = encoding.sizes
+    parameters = {"tables/f": uniform(f, -1e-4, 1e-4), "tables/phase": uniform(phase, 0.0, 1e-3)}
+    for k, shape in enumerate(weight_shapes()):
+        parameters[f"weights/{k}"] = uniform(shape, -weight_bound(shape), weight_bound(shape))
+    parameters["light"] = torch.from_numpy(initial_light())
+    parameters["centres"] = uniform((len(encoding.levels(0)), CLUSTERS, 2), -1e-4, 1e-4)
+    if config.refine_cameras:
+        parameters["poses"] = torch.zeros(views, 6)
+    for value in parameters.values():
+        value.requires_grad_()
+    return parameters

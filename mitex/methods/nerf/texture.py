@@ -1,0 +1,186 @@
+"""`NerfTexture`: a captured texture, to look at, to synthesize more of, and to put on other shapes."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mitex.integrators.march import DIAGONAL
+from mitex.mesh import Mesh
+from mitex.methods.nerf import files
+from mitex.methods.nerf.applied import AppliedTexture
+from mitex.methods.nerf.field import Decoder, Encoding
+from mitex.methods.nerf.guide import Guide
+from mitex.methods.nerf.maps import LatentMaps
+from mitex.methods.nerf.patches import FeatureSource, Patches, extract_patches, mirrored_frames
+from mitex.methods.nerf.projection import Projection
+from mitex.methods.nerf.quilting import Quilt, quilt
+from mitex.methods.nerf.shell import CapturedLatents, Shell
+from mitex.methods.nerf.tensors import channels
+from mitex.runtime import load_mitsuba
+
+mi: Any = load_mitsuba(needs_llvm=False)
+
+SIZE = 2048  # texels of a synthesized texture
+GOOD_RATE = 1 / 8  # gap between texels, of the mean edge of the base shape
+
+
+class NerfTexture:
+    """A texture with meso-structure, as `fit` captured it.
+
+    Attributes:
+        model: features, networks, light and base shape.
+    """
+
+    def __init__(self, model: files.Model) -> None:
+        self.model = model
+
+    @staticmethod
+    def load(source: str | Path) -> NerfTexture:
+        """Reads a run folder or a model file.
+
+        Raises:
+            CheckpointError: there is none, or it is damaged.
+        """
+        return NerfTexture(files.load(source))
+
+    def save(self, path: str | Path) -> Path:
+        """Writes the model file.
+
+        Raises:
+            OutputError: the place is not writable.
+        """
+        return files.save(Path(path), self.model)
+
+    @cached_property
+    def shell(self) -> Shell:
+        """The texture on the shape that it was captured on, in the scene cube, ready to be marched."""
+        model, config = self.model, self.model.config
+        projection = Projection(
+            model.base.mesh, neighbours=config.neighbours, pull=config.pull, reach=model.base.thickness
+        )
+        return Shell(
+            projection,
+            self.latents,
+            self.decoder,
+            self.light,
+            model.base.thickness,
+            mask=mi.TensorXu8(model.occupied),
+            step=DIAGONAL / config.cells,
+        )
+
+    @cached_property
+    def latents(self) -> CapturedLatents:
+        """Features on the captured base shape."""
+        tables = [mi.Float(table.numpy()) for table in self.model.tables]
+        return CapturedLatents(Encoding(self.model.config), tables, self.model.frames)
+
+    @cached_property
+    def decoder(self) -> Decoder:
+        """The networks, packed."""
+        return Decoder([mi.TensorXf(weight.numpy()) for weight in self.model.weights], packed=True)
+
+    @property
+    def light(self) -> Any:
+        """`mi.TensorXf` (16,), learned with the texture."""
+        return mi.TensorXf(self.model.light.numpy())
+
+    def synthesize(
+        self,
+        size: int | tuple[int, int] = SIZE,
+        seed: int = 0,
+        *,
+        patches: int = 2000,
+        pattern_rate: float = GOOD_RATE,
+        flips: bool = False,
+        tileable: bool = False,
+        guide: Guide | None = None,
+    ) -> LatentMaps:
+        """More of the texture, in the plane (section 3.2.2).
+
+        Args:
+            size: height and width [texels].
+            seed: of the patches' places and of all choices.
+            patches: how many are taken from the base shape, at most.
+            pattern_rate: gap between texels, of the mean edge of the base shape; 1/16 for fine textures.
+            flips: use mirrored patches too.
+            tileable: the texture continues over its borders.
+            guide: a picture that it shall resemble.
+
+        Raises:
+            ConfigError: a number is out of range, or no patch fits on the base shape.
+        """
+        rng = np.random.default_rng(seed)
+        found = self.patches(rng, patches, pattern_rate)
+        source = FeatureSource(found, self.features, len(self.latents.encoding.levels(0)) * 2)
+        shape = (size, size) if isinstance(size, int) else size
+        made = quilt(source, shape, rng, flips=flips, tileable=tileable, guide=guide)
+        return self.maps(found, made)
+
+    def patches(
+        self, rng: np.random.Generator, count: int = 2000, pattern_rate: float = GOOD_RATE
+    ) -> Patches:
+        """Squares of the base shape (section 3.2.1); arguments as of `synthesize`."""
+        base = self.model.base
+        return extract_patches(
+            base.mesh, rng, count=count, pattern_rate=pattern_rate, scan=base.scan, thickness=base.thickness
+        )
+
+    def features(self, points: np.ndarray) -> np.ndarray:
+        """f and f-hat, (N, 24), at points (N, 3) of the base shape."""
+        place = channels(mi.Point3f, points)
+        encoding, tables = self.latents.encoding, self.latents.tables
+        values = [row for k in range(2) for row in encoding(k, place, tables[k])]
+        return np.stack([np.array(value) for value in values], axis=1)
+
+    def maps(self, patches: Patches, made: Quilt) -> LatentMaps:
+        """Latent maps of a quilt: the frames of equation 4 are found once for each patch and face."""
+        face = made.look_up(patches.faces).astype(np.int64)
+        faces = len(self.model.frames)
+        code = (made.patch.astype(np.int64) * 4 + made.flip) * faces + face
+        unique, frame = np.unique(code, return_inverse=True)
+        sampling, face = unique // faces, unique % faces
+        turned = mirrored_frames(patches.frames[sampling // 4], (sampling % 4).astype(np.uint8))
+        frames = np.einsum("kij,klj->kil", turned, self.model.frames[face])
+        return LatentMaps(
+            made.features,
+            frame.reshape(made.patch.shape).astype(np.int32),
+            frames.astype(np.float32),
+            patches.gap,
+        )
+
+    def apply(
+        self,
+        mesh: Mesh,
+        maps: LatentMaps | None = None,
+        *,
+        size: int = SIZE,
+        seed: int = 0,
+        repeat: float = 1.0,
+        density: float = 1.0,
+        light: np.ndarray | None = None,
+    ) -> AppliedTexture:
+        """Puts the texture on any mesh (section 3.2.4).
+
+        Args:
+            mesh: with UVs in which nothing overlaps, or it is unwrapped.
+            maps: a synthesized texture; None synthesizes one of `size` texels with `seed`.
+            size, seed: as of `synthesize`.
+            repeat: how often the texture goes into one unit of the UVs: larger numbers make it finer.
+            density: factor of the density.
+            light: (16,) or (16, 3) spherical harmonics instead of the learned light.
+
+        Raises:
+            MeshError: the mesh has no area.
+            ConfigError: a number is out of range.
+        """
+        given = self.synthesize(size, seed) if maps is None else maps
+        shone = self.light if light is None else mi.TensorXf(np.asarray(light, np.float32))
+        return AppliedTexture(self, mesh, given, repeat=repeat, density=density, light=shone)
+
+    def __repr__(self) -> str:
+        about = self.model.about
+        return f"NerfTexture({about['name']}, {about['steps']} steps)"
