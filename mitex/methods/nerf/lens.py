@@ -18,16 +18,19 @@ def distort(points: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
     Returns:
         (..., 2) float64.
     """
-    radial, tangential = _terms(np.asarray(points, np.float64), np.asarray(coefficients, np.float64))
+    points, coefficients = np.asarray(points, np.float64), np.asarray(coefficients, np.float64)
+    if not coefficients.any():
+        return points
+    radial, tangential = _terms(points, coefficients)
     return points * radial + tangential
 
 
 def undistort(points: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
     """The inverse of `distort` by fixed-point iteration; not meaningful where the lens folds the image."""
     points, coefficients = np.asarray(points, np.float64), np.asarray(coefficients, np.float64)
-    ideal = points
     if not coefficients.any():
-        return ideal
+        return points
+    ideal = points
     for _ in range(ITERATIONS):
         radial, tangential = _terms(ideal, coefficients)
         last, ideal = ideal, (points - tangential) / np.maximum(radial, 0.1)
