@@ -149,9 +149,8 @@ class _Canvas:
         error = _difference(old, new, self.source.matched)
         mask = new_part(*overlap_paths(error, width, left=column > 0, top=row > 0))
         weights = feathered(mask)
-        weights[width * (row > 0) :, width * (column > 0) :] = (
-            1.0  # nothing of the old is meant to stay there
-        )
+        # Beyond the strips, nothing of what is there is meant to stay.
+        weights[width * (row > 0) :, width * (column > 0) :] = 1.0
         _lay(old, new, mask, weights)
         self.placed[row, column] = index
 

@@ -135,6 +135,16 @@ def test_steep_walls_make_no_patch(rng: np.random.Generator):
         assert crossing.any() == kept
 
 
+def test_balls_bend_away_from_large_squares(rng: np.random.Generator):
+    """The corners of a square of side a are r - sqrt(r^2 - a^2 / 2) below its middle: 0.08, or 0.17."""
+    mesh = icosphere(24)
+    mesh = mesh.with_vertices(0.8 * mesh.vertices)
+    rate = 1.0 / extract_patches(mesh, rng, count=9, size=32, pattern_rate=0.1).length * 0.1
+    assert len(extract_patches(mesh, rng, count=30, size=32, pattern_rate=0.5 * rate)) > 20
+    with pytest.raises(ConfigError, match=r"on icosphere24: \d+ bend or fold; use"):
+        extract_patches(mesh, rng, count=30, size=32, pattern_rate=0.7 * rate)
+
+
 def test_only_captured_places(rng: np.random.Generator):
     u, v = np.meshgrid(np.linspace(-0.8, 0.0, 60), np.linspace(-0.8, 0.8, 120))
     scan = np.stack([u.ravel(), v.ravel(), np.full(u.size, 0.01)], 1)

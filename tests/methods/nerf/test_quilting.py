@@ -221,6 +221,32 @@ def test_tileable_puts_a_periodic_image_together(rng: np.random.Generator):
     assert np.abs(made.features - expected).max() < 1e-5
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_last_patches_lead_back_to_the_first(axis: int, rng: np.random.Generator):
+    """Ramps between any two values: only a ramp that ends where the first one begins leaves no step."""
+    ends = rng.random((2000, 2, 1, 1, 1))
+    place = (np.arange(SIDE) / (SIDE - 1)).reshape((-1, 1, 1) if axis == 0 else (1, -1, 1))
+    ramps = (ends[:, 0] + (ends[:, 1] - ends[:, 0]) * place) + np.zeros((1, SIDE, SIDE, 1))
+    source = ArraySource(ramps.astype(np.float32), rng.random((2000, 2)) * 1e4, float(SIDE))
+    size = (75, 32) if axis == 0 else (32, 75)
+    steps = []
+    for _ in range(4):
+        made = quilt(source, size, rng, tileable=True, nearest=4).features
+        steps.append(np.abs(made - np.roll(made, 1, axis)).max())
+    assert np.mean(steps) < 0.08
+
+
+def test_wrapped_seam_is_closed(rng: np.random.Generator):
+    """Down to where a column shows the last row's patches changes by one at most, around the border too."""
+    source = noise_source(60, 1)
+    for _ in range(8):
+        made = quilt(source, (64, 90), rng, tileable=True)
+        first = made.texel[:12, :, 0] == np.arange(12)[:, None]  # patches of the first row begin there
+        depth = (~first).sum(0)
+        assert np.ptp(depth) > 3
+        assert np.abs(depth - np.roll(depth, 1)).max() <= 1
+
+
 @pytest.mark.parametrize("size", [(1, 1), (12, 33), (32, 32), (33, 32), (71, 52)])
 def test_any_size(size: tuple[int, int], rng: np.random.Generator):
     made = quilt(noise_source(), size, rng)
