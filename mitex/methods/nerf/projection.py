@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 import torch
-from scipy.spatial import KDTree
 
 from mitex.errors import ConfigError, MeshError
 from mitex.mesh import Mesh
+from mitex.methods.nerf.nearest import NearestVertices
 from mitex.runtime import init, load_mitsuba
 from mitex.scenes.stage import mesh_shape
 
@@ -65,8 +65,8 @@ class Projection:
         neighbours: vertices that the normal is interpolated from.
         pull: the smaller, the more the normal points away from the nearest vertices, so that it meets the
             mesh from afar (0.01 in the paper); None for the vertex normals alone [mesh units].
-        reach: points whose foot would be farther than this are missed, which takes a third of the time for
-            those that are far from the mesh; None for no limit [mesh units].
+        reach: points whose foot would be farther than this are missed, the sooner the farther they are from
+            the mesh; None for no limit [mesh units].
 
     Raises:
         ConfigError: a number is out of range.
@@ -84,13 +84,15 @@ class Projection:
             raise MeshError(f"{mesh.name} has no faces to project onto", "give a surface")
         init()
         self.mesh, self.pull, self.reach = mesh, pull, reach
+        # A point of a triangle with edges up to L is within L / sqrt(3) of a corner: the limit loses no foot.
+        edges = _edge_lengths(mesh)
+        limit = math.inf if reach is None else reach + float(edges.max()) / math.sqrt(3.0)
         used = np.unique(mesh.faces)
-        self.neighbours = min(neighbours, len(used))
-        self._tree = KDTree(mesh.vertices[used])
+        self._count = min(neighbours, len(used))
+        self._nearest = NearestVertices(mesh.vertices[used], self._count, float(edges.mean()), limit)
         self._vertices = mi.Float(mesh.vertices[used].ravel())
         self._normals = mi.Float(mesh.normals[used].ravel())
         self._back = BACK * float(np.ptp(mesh.vertices, axis=0).max())
-        self._near = math.inf if reach is None else reach + _longest_edge(mesh) / math.sqrt(3.0)
         # Only these intersections are watertight: rays through a vertex would slip through otherwise.
         scene = {"type": "scene", "embree_use_robust_intersections": True, "mesh": mesh_shape(mesh)}
         self._scene = mi.load_dict(scene)
@@ -99,7 +101,7 @@ class Projection:
         """The feet of points (N, 3), finite [mesh units]."""
         points = np.ascontiguousarray(points, np.float32)
         chosen, index = self._nearest(points)
-        if chosen is None:
+        if 0 < len(chosen) == len(points):
             return self._cast(points, index)
         feet = _missed(points)
         if len(chosen):
@@ -107,22 +109,6 @@ class Projection:
             for name, values in vars(feet).items():
                 values[chosen] = getattr(found, name)
         return feet
-
-    def _nearest(self, points: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
-        """Indices of the points that may be within reach, None for all, and their nearest vertices (M, K).
-
-        A point of a triangle with edges up to L is within L / sqrt(3) of a corner, so that no point within
-        reach of a face is left out.
-        """
-        near = None
-        if math.isfinite(self._near):
-            distance, _ = self._tree.query(points, k=1, distance_upper_bound=self._near, workers=-1)
-            near = np.flatnonzero(np.isfinite(distance))
-            points = points[near]
-        elif not len(points):
-            near = np.zeros(0, np.int64)
-        _, index = self._tree.query(points, k=self.neighbours, workers=-1)
-        return near, np.ascontiguousarray(index, np.uint32)
 
     def _cast(self, points: np.ndarray, index: np.ndarray) -> Feet:
         """The feet of points (M, 3) with their nearest vertices (M, K): one kernel, both ways."""
@@ -132,8 +118,7 @@ class Projection:
             ahead, behind = self._first(x, normal), self._first(x, -normal)
             inside = dr.abs(ahead[1]) < dr.abs(behind[1])
             found, t = (dr.select(inside, a, b) for a, b in zip(ahead, behind, strict=True))
-            hit = t < (mi.Float(math.inf) if self.reach is None else dr.opaque(mi.Float, self.reach))
-            face, distance = mi.Int32(found.prim_index), dr.select(inside, -t, t)
+            hit, face, distance = found.is_valid(), mi.Int32(found.prim_index), dr.select(inside, -t, t)
             results = [
                 x - dr.select(hit, distance, 0.0) * normal,
                 dr.select(hit, distance, MISSED),
@@ -150,10 +135,10 @@ class Projection:
 
     def _coarse_normal(self, x: Any, index: Any) -> Any:
         """Equation 1 at points x, given the flat indices of their nearest vertices."""
-        first = dr.arange(mi.UInt32, dr.width(x)) * self.neighbours
+        first = dr.arange(mi.UInt32, dr.width(x)) * self._count
         total, away, weights = mi.Vector3f(0.0), mi.Vector3f(0.0), mi.Float(0.0)
         nearest = mi.Vector3f(0.0)
-        for k in range(self.neighbours):
+        for k in range(self._count):
             vertex = dr.gather(mi.UInt32, index, first + k)
             normal = dr.gather(mi.Vector3f, self._normals, vertex)
             offset = x - dr.gather(mi.Point3f, self._vertices, vertex)
@@ -172,6 +157,8 @@ class Projection:
         """The first intersection from x, and how far along the direction it is; slightly behind counts."""
         back = dr.opaque(mi.Float, self._back)
         ray = mi.Ray3f(x - back * direction, direction)
+        if self.reach is not None:
+            ray.maxt = dr.opaque(mi.Float, self.reach + self._back)
         found = self._scene.ray_intersect_preliminary(ray, coherent=False)
         return found, found.t - back
 
@@ -217,6 +204,7 @@ def _missed(points: np.ndarray) -> Feet:
     )
 
 
-def _longest_edge(mesh: Mesh) -> float:
+def _edge_lengths(mesh: Mesh) -> np.ndarray:
+    """(F, 3)"""
     corners = mesh.vertices[mesh.faces]
-    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())
+    return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
