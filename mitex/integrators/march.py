@@ -103,7 +103,8 @@ def traverse(
             _gather(field, samples, o, d, alive, result)
         dr.scatter(near, end, alive)
         passing = dr.gather(mi.Float, dr.detach(result.through), alive)
-        alive = dr.gather(mi.UInt32, alive, dr.compress((passing > OPAQUE) & (end < last)))
+        going: Any = dr.compress((passing > OPAQUE) & (end < last))
+        alive = dr.gather(mi.UInt32, alive, going)
     return result
 
 

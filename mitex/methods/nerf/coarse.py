@@ -18,7 +18,7 @@ from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.pixels import Pixels
 from mitex.methods.nerf.plain import PlainTask
 from mitex.methods.nerf.projection import Projection
-from mitex.methods.nerf.radiance import BETAS, EPSILON, rays_of
+from mitex.methods.nerf.radiance import BETAS, CHUNK, EPSILON, rays_of
 from mitex.paths import cache_dir
 from mitex.runtime import load_mitsuba
 from mitex.training import checkpoint, train
@@ -27,6 +27,18 @@ from mitex.training.optim import Adam
 mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
+VERSION = 1  # of the base shapes in the cache
+COARSE = dict(  # what the coarse field needs less of
+    table=15,
+    cells=256,
+    rays=1024,
+    occupancy=64,
+    one_view=False,
+    distortion=1e-2,
+    average=0.8,
+    preview_every=0,
+    refine_cameras=False,
+)
 GRID = 256  # samples of the density along a side of the scene cube
 VIEWS = 16  # that the surface is scanned from
 SCAN_SIDE = 200  # pixels of a scan along its longest side
@@ -63,14 +75,12 @@ def find_base(
     Raises:
         MeshError: there is nothing dense, or the given mesh cannot be used.
     """
-    coarse = replace(
-        config, steps=config.base_steps, lr_steps=config.base_steps, table=min(config.table, 17), cells=384,
-        rays=2048, one_view=False, preview_every=0, refine_cameras=False,
-    )  # fmt: skip
+    steps = config.base_steps
+    coarse = replace(config, **COARSE, steps=steps, lr_steps=steps)
     arrays = (*capture.images, capture.poses, capture.intrinsics, capture.distortion)
     mesh = () if given is None else (given.vertices, given.faces)
-    settings = (coarse.seed, coarse.steps, coarse.table, coarse.distortion, coarse.lr, config.concavity)
-    place = cache_dir() / "nerf" / content_key(1, *arrays, *mesh, *settings, config.pull, config.neighbours)
+    settings = (config.seed, steps, config.lr, config.concavity, config.pull, config.neighbours)
+    place = cache_dir() / "nerf" / content_key(VERSION, *arrays, *mesh, *settings)
 
     def find() -> BaseShape:
         task = _trained(capture, coarse, place.with_suffix(".run"), quiet)
@@ -85,12 +95,19 @@ def find_base(
 
 
 def density_grid(task: PlainTask, side: int = GRID) -> np.ndarray:
-    """(side, side, side) density at the centres of cells of the scene cube, x slowest."""
-    centres = (np.arange(side, dtype=np.float32) + 0.5) * (2 / side) - 1
-    y, z = (a.ravel() for a in np.meshgrid(centres, centres, indexing="ij"))
-    field = task.field(task.mean)
-    slabs = [field.density_at(np.stack([np.full_like(y, x), y, z], 1)) for x in centres]
-    return np.stack(slabs).reshape(side, side, side)
+    """(side, side, side) density at the centres of cells of the scene cube, x slowest; 0 where unoccupied.
+
+    `side` is a multiple of that of the occupancy grid.
+    """
+    cells = len(task.occupancy.occupied)
+    fine = np.repeat(np.arange(cells), side // cells)  # which cell a sample is in
+    occupied = task.occupancy.occupied[np.ix_(fine, fine, fine)].astype(bool)
+    field, grid = task.field(task.mean), np.zeros((side,) * 3, np.float32)
+    index = np.argwhere(occupied)
+    for start in range(0, len(index), CHUNK):
+        part = index[start : start + CHUNK]
+        grid[tuple(part.T)] = field.density_at(((part + 0.5) * (2 / side) - 1).astype(np.float32))
+    return grid
 
 
 def scanned(task: PlainTask) -> np.ndarray:

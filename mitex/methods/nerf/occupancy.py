@@ -7,14 +7,30 @@ from typing import Any
 
 import numpy as np
 import torch
+from scipy import ndimage
 
+from mitex.methods.nerf.capture import Capture
+from mitex.methods.nerf.visual_hull import View, visual_hull
 from mitex.runtime import load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
 
 WARMUP = 16  # refreshes of all cells, before it is half of them
 DECAY = 0.95
+OPAQUE = 128  # alpha of the object in a mask
 CEILING = 10.0  # of the threshold [1 / scene units]
+
+
+def hull_cells(capture: Capture, side: int) -> np.ndarray:
+    """(side, side, side) bool, cells of the scene cube that the masks leave, and their neighbours."""
+    lenses = zip(capture.images, capture.poses, capture.intrinsics, capture.distortion, strict=True)
+    hull = visual_hull([View(image[..., 3] >= OPAQUE, *camera) for image, *camera in lenses])
+    if hull is None:
+        return np.ones((side,) * 3, bool)
+    centres = (np.arange(side) + 0.5) * (2 / side) - 1
+    grid = np.stack(np.meshgrid(centres, centres, centres, indexing="ij"), axis=-1)
+    inside = hull.contains(grid.reshape(-1, 3)).reshape((side,) * 3)
+    return ndimage.binary_dilation(inside, iterations=2)
 
 
 class Occupancy:

@@ -14,7 +14,7 @@ from mitex.integrators.march import Samples, accumulated, weights_of
 from mitex.methods.nerf.capture import Capture
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field import HIGHEST, network, network_rows, sigmoid, weight_bound
-from mitex.methods.nerf.occupancy import Occupancy
+from mitex.methods.nerf.occupancy import Occupancy, hull_cells
 from mitex.methods.nerf.pixels import Batch
 from mitex.methods.nerf.radiance import RadianceTask, Rendered, rays_of
 from mitex.methods.nerf.tensors import channels, tensor
@@ -90,7 +90,8 @@ class PlainTask(RadianceTask):
             parameters[f"weights/{k}"] = torch.empty(shape).uniform_(-bound, bound, generator=drawn)
         for value in parameters.values():
             value.requires_grad_()
-        super().__init__(config, capture, shown, Occupancy(config.occupancy), parameters)
+        occupancy = Occupancy(config.occupancy, hull_cells(capture, config.occupancy))
+        super().__init__(config, capture, shown, occupancy, parameters)
 
     def metadata(self) -> dict[str, str]:
         return {"method": "plain", "capture": self.pixels.capture.name}

@@ -14,7 +14,7 @@ from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field import Decoder, Encoding, weight_bound, weight_shapes
 from mitex.methods.nerf.lighting import initial_light
 from mitex.methods.nerf.losses import clustering, normal_agreement
-from mitex.methods.nerf.occupancy import Occupancy
+from mitex.methods.nerf.occupancy import Occupancy, hull_cells
 from mitex.methods.nerf.pixels import Batch
 from mitex.methods.nerf.projection import Feet, Projection, attach
 from mitex.methods.nerf.radiance import RadianceTask, Rendered, rays_of
@@ -55,6 +55,7 @@ class TextureTask(RadianceTask):
         self.encoding = Encoding(config)
         parameters = _start(config, self.encoding, len(capture))
         possible = shell_cells(projection, thickness, config.occupancy)
+        possible &= hull_cells(capture, config.occupancy)
         super().__init__(config, capture, shown, Occupancy(config.occupancy, possible), parameters)
 
     def metadata(self) -> dict[str, str]:

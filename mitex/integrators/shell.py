@@ -1,0 +1,138 @@
+"""`shell`: a path tracer for scenes with a radiance field in a shell around a mesh."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mitex.runtime import load_mitsuba
+from mitex.textures.variant import for_variant
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+
+TOE, SLOPE = 0.04045, 12.92  # of the sRGB curve
+
+
+class ShellMethods:
+    """Ordinary geometry by path tracing, with a radiance field composited by depth on every segment.
+
+    A field gives what it emits towards the viewer under its own light and hides what is behind: paths that
+    go on behind it, shadow rays too, keep what passes. So it is seen in mirrors and through glass, covers
+    what is behind, is covered by what is in front, and casts shadows. Light of the scene does not fall on it.
+
+    .. pluginparameters::
+
+     * - field
+       - |volume|
+       - A `shell_field`.
+     * - max_depth
+       - |int|
+       - Longest path in the scene [segments]. (Default: 6)
+     * - hide_emitters
+       - |bool|
+       - Show nothing where the camera sees light sources directly. (Default: no)
+
+    Images are differentiable in the field's parameters.
+    """
+
+    def __init__(self, props: Any) -> None:
+        mi.SamplingIntegrator.__init__(self, props)
+        if not mi.variant().startswith(("llvm", "cuda")) or mi.is_spectral or mi.is_polarized:
+            raise RuntimeError(f"shell: variant '{mi.variant()}' is not supported; use llvm_ad_rgb")
+        self.field = props.get("field")
+        if not hasattr(self.field, "march"):
+            raise RuntimeError(
+                "shell: 'field' is not a shell_field; see mitex.textures.shell_field"
+            )
+        self.max_depth = int(props.get("max_depth", 6))
+        if self.max_depth < 1:
+            raise RuntimeError(f"shell: 'max_depth' is {self.max_depth}; use 1 or more")
+        self.hidden = bool(props.get("hide_emitters", False))
+
+    def traverse(self, callback: Any) -> None:
+        callback.put("field", self.field, mi.ParamFlags.Differentiable)
+
+    def aov_names(self) -> list[str]:
+        return []
+
+    def to_string(self) -> str:
+        nested = str(self.field).replace("\n", "\n  ")
+        return f"ShellIntegrator[\n  field = {nested},\n  max_depth = {self.max_depth}\n]"
+
+    def sample(
+        self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True
+    ) -> tuple[Any, Any, list[Any]]:
+        """Radiance along rays, as one wavefront: the march cannot be recorded into a symbolic loop."""
+        count = dr.width(ray.o)
+        ray = mi.Ray3f(ray)
+        active = mi.Bool(active) & dr.full(mi.Bool, True, count)
+        radiance, throughput = dr.zeros(mi.Spectrum, count), dr.ones(mi.Spectrum, count)
+        valid = dr.zeros(mi.Bool, count)
+        context = mi.BSDFContext()
+        # The density with which the last direction was drawn; light sources hit after a mirror count fully.
+        drawn, delta, start = mi.Float(1), mi.Bool(True), dr.zeros(mi.Interaction3f, count)
+        for depth in range(self.max_depth):
+            si = scene.ray_intersect(ray, active)
+            segment = mi.Ray3f(ray)
+            segment.maxt = dr.select(si.is_valid(), si.t, dr.inf)
+            met = self.field.march(segment, sampler.next_1d(active), active)
+            radiance += throughput * _linear(met.colour, 1 - met.through)
+            throughput *= met.through
+            valid |= active & (si.is_valid() | (met.through < 0.5))
+            emitted = self._emitted(
+                scene, si, start, drawn, delta, active & mi.Bool(depth or not self.hidden)
+            )
+            radiance += throughput * emitted
+            active &= si.is_valid() & (dr.max(dr.detach(throughput)) > 0)
+            if depth + 1 == self.max_depth or not dr.any(active)[0]:
+                break
+            bsdf = si.bsdf(ray)
+            radiance += throughput * self._direct(scene, sampler, context, bsdf, si, active)
+            scattered, weight = bsdf.sample(
+                context, si, sampler.next_1d(active), sampler.next_2d(active), active
+            )
+            throughput *= dr.select(active, weight, 0)
+            start, drawn = mi.Interaction3f(si), scattered.pdf
+            delta = mi.has_flag(scattered.sampled_type, mi.BSDFFlags.Delta)
+            ray = si.spawn_ray(si.to_world(scattered.wo))
+            active &= dr.max(dr.detach(throughput)) > 0
+            dr.eval(ray, radiance, throughput, active, start, drawn, delta, valid)
+        return radiance, valid, []
+
+    def _direct(self, scene: Any, sampler: Any, context: Any, bsdf: Any, si: Any, active: Any) -> Any:
+        """Light from a sampled source, weighted against the BSDF's own sampling; the field casts shadows."""
+        wanted = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        ds, weight = scene.sample_emitter_direction(si, sampler.next_2d(wanted), True, wanted)
+        wanted &= ds.pdf > 0
+        local = si.to_local(ds.d)
+        value, density = bsdf.eval_pdf(context, si, local, wanted)
+        share = dr.select(ds.delta, 1, _heuristic(ds.pdf, density))
+        through = self.field.march(si.spawn_ray_to(ds.p), sampler.next_1d(wanted), wanted).through
+        return dr.select(wanted, value * weight * share * through, 0)
+
+    def _emitted(self, scene: Any, si: Any, start: Any, drawn: Any, delta: Any, active: Any) -> Any:
+        """What a light source that was hit adds."""
+        emitter = si.emitter(scene)
+        ds = mi.DirectionSample3f(scene, si, start)
+        other = scene.pdf_emitter_direction(start, ds, active & ~delta)
+        share = dr.select(delta, 1, _heuristic(drawn, other))
+        return dr.select(active, emitter.eval(si, active) * share, 0)
+
+
+def _heuristic(a: Any, b: Any) -> Any:
+    """The power heuristic of multiple importance sampling (Veach 1997)."""
+    return dr.select(a > 0, a * a / (a * a + b * b), 0)
+
+
+def _linear(display: Any, opacity: Any) -> Any:
+    """Linear radiance, times opacity, of display values times opacity: fields blend in display values."""
+    safe = dr.maximum(opacity, 1e-6)
+    value = dr.clip(display / safe, 0, 1)
+    line, power = value / SLOPE, ((dr.maximum(value, TOE) + 0.055) / 1.055) ** 2.4
+    return mi.Spectrum(dr.select(value <= TOE, line, power) * safe)
+
+
+def register() -> None:
+    """Registers the integrator for the current variant."""
+    cls = for_variant("ShellIntegrator", mi.SamplingIntegrator, ShellMethods)
+    mi.register_integrator("shell", lambda props: cls(props))
