@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from mitex.errors import ImageError, OutputError
-from mitex.images import read_image, resize, write_image
+from mitex.images import read_bytes, read_image, resize, write_image
 
 
 def pixels(height=5, width=7, channels=3, seed=0):
@@ -100,6 +100,28 @@ class TestReads:
     def test_content_counts_not_the_name(self, tmp_path):
         Image.fromarray(pixels()).save(tmp_path / "a.jpg", format="PNG")
         assert read_image(tmp_path / "a.jpg").shape == (5, 7, 3)
+
+
+class TestBytes:
+    def test_as_stored_with_and_without_alpha(self, tmp_path):
+        for channels in (3, 4):
+            data = pixels(channels=channels)
+            Image.fromarray(data).save(tmp_path / "a.png")
+            found = read_bytes(tmp_path / "a.png")
+            assert found.dtype == np.uint8 and np.array_equal(found, data)
+
+    def test_grey_and_16_bit_grey(self, tmp_path):
+        grey = pixels(channels=1)[:, :, 0]
+        for stored in (grey, grey.astype(np.uint16) * 257):
+            Image.fromarray(stored).save(tmp_path / "a.png")
+            assert np.array_equal(read_bytes(tmp_path / "a.png"), grey[:, :, None].repeat(3, axis=2))
+
+    def test_damaged(self, tmp_path):
+        path = tmp_path / "a.png"
+        Image.fromarray(pixels(40, 40)).save(path)
+        path.write_bytes(path.read_bytes()[:-600])
+        with pytest.raises(ImageError, match="damaged or cut short"):
+            read_bytes(path)
 
 
 class TestRefuses:

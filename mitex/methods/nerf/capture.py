@@ -212,7 +212,8 @@ def _scene_cube(frames: Sequence[Frame], views: Sequence[View]) -> Similarity:
     hull = visual_hull(views)
     if hull is None:
         raise CaptureError(
-            "the masks agree on no object", "check that poses and masks belong to the images, in one world"
+            "the masks agree on no object",
+            "check that the poses belong to the images, and that all cameras look at the object",
         )
     _check_outside(frames, hull)
     low, high = hull.bounds()

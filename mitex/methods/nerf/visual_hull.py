@@ -104,7 +104,7 @@ def project(
 
 
 def _looked_at(poses: np.ndarray) -> np.ndarray:
-    """The point nearest to all optical axes, in least squares; also for parallel axes."""
+    """The point nearest to all optical axes, in least squares; among the cameras if the axes are parallel."""
     origin, axis = poses[:, :, 3], -poses[:, :, 2]
     across = np.eye(3) - axis[:, :, None] * axis[:, None, :]
     centre = origin.mean(axis=0)
