@@ -1,6 +1,7 @@
 """Grows geometric textures on meshes and renders them, the reference beside them.
 
 usage: python tools/make_geometric_gallery.py RUNS MESHES SHEET REFERENCE[:map][,...] MESH~FACES ...
+       python tools/make_geometric_gallery.py RUNS MESHES SHEET REFERENCE:levels MESH~FACES ...
 
 RUNS holds a finished run of `mitex fit geometric` for each reference, MESHES is a folder; meshes are named as
 for make_surface_gallery.py, so that they are remeshed first. Each one is displaced from level 2 on, and
@@ -8,6 +9,11 @@ rendered: docs/gallery/SHEET.jpg has a row for each reference, which stands firs
 alone. For every pair the Wasserstein-1 distances between the local statistics of result and reference are
 printed, and those of the mesh itself, remeshed to as many vertices as the result has. REFERENCE:map makes a
 row of displacement maps.
+
+REFERENCE:levels makes a sheet of start levels: a row for the reference and each mesh, which stand first, then
+what grows from levels 0, 1, 2 and 3 on: on the meshes, and, for the reference, on its own template, whose
+lower levels are rebuilt. FACES are those to begin level 2 with; lower levels begin with a quarter as many for
+each level, so that all end alike.
 """
 
 from __future__ import annotations
@@ -32,6 +38,7 @@ from mitex.render import sheet, still, tone
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 CELL = 224  # side of a picture [px]
+LEVELS = range(4)  # to start at, on a sheet of them
 AZIMUTH = math.radians(20)
 
 
@@ -48,8 +55,31 @@ def displaced(texture: GeometricTexture, reference: Mesh, mesh: Mesh, mapped: bo
     return DisplacementMap.bake(reference).apply(mesh, size, texture.levels - 1 - START).mesh
 
 
+def level_sheet(texture: GeometricTexture, reference: str, meshes: Path, wanted: list[str]) -> np.ndarray:
+    """The sheet of start levels."""
+    learned = texture.generate(start_level=texture.levels)
+    shown = [find_reference(reference), *(texture.generate(start_level=k) for k in LEVELS)]
+    for word in wanted:
+        name, faces = word.split("~")
+        shown.append(find_mesh(name, meshes))
+        for k in LEVELS:
+            coarse = find_mesh(f"{name}~{int(4.0 ** (k - START) * int(faces))}", meshes)
+            shown.append(texture.apply(coarse, start_level=k).mesh)
+            told = ", ".join(f"{key} {d:.3f}" for key, d in statistic_distances(shown[-1], learned).items())
+            counts = f"{len(coarse.vertices):,} to {len(shown[-1].vertices):,} vertices"
+            print(f"{reference} on {name} from level {k}, {counts}: {told}", flush=True)
+    names = [reference, *(word.split("~")[0] for word in wanted)]
+    labels = [text for name in names for text in (name, *(f"from level {k}" for k in LEVELS))]
+    return sheet([picture(mesh) for mesh in shown], columns=1 + len(LEVELS), labels=labels, cell=CELL)
+
+
 def main() -> None:
     runs, meshes, name, references, *wanted = sys.argv[1:]
+    if references.endswith(":levels"):
+        reference = references.removesuffix(":levels")
+        made = level_sheet(GeometricTexture.load(Path(runs) / reference), reference, Path(meshes), wanted)
+        write_image(GALLERY / f"{name}.jpg", made)
+        return
     found = [find_mesh(word.split("~")[0], Path(meshes)) for word in wanted]
     coarse = [find_mesh(word, Path(meshes)) for word in wanted]
     fine: dict[tuple[str, int], Mesh] = {}
