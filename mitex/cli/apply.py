@@ -15,13 +15,16 @@ from mitex.errors import ConfigError
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
+    from mitex.methods.nerf.applied import AppliedTexture
 
 SUFFIXES = (".glb", ".obj", ".ply", ".exr")
+PICTURES = (".png", ".jpg", ".jpeg")  # of radiance fields
 RESOLUTION = 1024
 OPTIONS = {  # those that mean something, by method
     "nca": ("seed", "steps", "subdivide", "orientation", "scale", "resolution", "vertex_colors"),
     "surface": (),
     "geometric": ("seed", "start_level", "end_level", "remesh"),
+    "nerf": ("seed", "scale", "size", "density"),
 }
 
 
@@ -30,7 +33,7 @@ class Apply(Displacing):
     """Put a learned texture on a mesh and write the result.
 
     The suffix of --out chooses the format: .glb (PBR textures), .obj (with .mtl and PNG maps),
-    .ply (vertex colours), .exr (the maps as layers).
+    .ply (vertex colours), .exr (the maps as layers); for radiance fields also .png or .jpg, a picture.
 
     examples:
       mitex apply runs/pebbles --mesh bunny.obj --out bunny.glb
@@ -38,6 +41,7 @@ class Apply(Displacing):
       mitex apply pebbles --mesh scan.ply --out scan.glb --vertex-colors --seed 7 --orientation 45
       mitex apply runs/bunny --mesh bunny.obj --out bunny.glb   (of mitex fit surface: same mesh, no options)
       mitex apply runs/spikes --mesh bunny.obj --out bunny.glb --remesh 2000   (of mitex fit geometric)
+      mitex apply runs/durian --mesh bunny.obj --out bunny.png   (of mitex fit nerf; .glb for a mesh)
     """
 
     model: Annotated[Positional[str], arg(metavar="RUN|MODEL")]
@@ -68,6 +72,12 @@ class Apply(Displacing):
     resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 1024)")] = None
     """Side of the baked textures [pixels]."""
 
+    size: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 2048)")] = None
+    """Radiance fields: side of the synthesized texture [texels]."""
+
+    density: Annotated[float, arg(metavar="X")] = 1.0
+    """Radiance fields: factor of the density; more makes thin parts solid."""
+
     vertex_colors: Annotated[bool, arg(help_behavior_hint="")] = False
     """Write colours at the vertices instead of textures."""
 
@@ -80,17 +90,21 @@ class Apply(Displacing):
         in_range("--resolution", self.resolution, 64, 8192)
         self.check_displacing()
         not_both("--resolution", "--vertex-colors", self.resolution is not None and self.vertex_colors)
+        in_range("--size", self.size, 128, 8192)
+        in_range("--density", self.density, 0.001, 1000.0)
         from mitex.paths import prepare_output
 
-        out = prepare_output(self.out, SUFFIXES)
+        method = self._method()
+        out = prepare_output(self.out, SUFFIXES + PICTURES * (method == "nerf"))
         suffix = out.suffix.lower()
+        if suffix in PICTURES:
+            self._captured().render(out)
+            print(self.out)
+            return
         needless("--vertex-colors", out, self.vertex_colors and suffix in (".obj", ".exr"))
         needless("--resolution", out, self.resolution is not None and suffix == ".ply")
-        method = self._method()
-        if method == "nca":
-            asset = self._grown(suffix)
-        else:
-            asset = self._synthesized() if method == "surface" else self._displaced()
+        makers = {"surface": self._synthesized, "geometric": self._displaced, "nerf": self._extracted}
+        asset = self._grown(suffix) if method == "nca" else makers[method]()
         asset.export(out)
         print(self.out)
 
@@ -144,6 +158,19 @@ class Apply(Displacing):
         made = texture.apply(mesh, seed=self.seed, start_level=self.start_level, end_level=self.end_level)
         self.advise(texture, mesh)
         return made
+
+    def _captured(self) -> AppliedTexture:
+        """A radiance field in the shell of any mesh."""
+        from mitex.mesh import Mesh
+        from mitex.methods.nerf import NerfTexture
+        from mitex.methods.nerf.texture import SIZE
+
+        options = {"size": self.size or SIZE, "seed": self.seed, "scale": self.scale, "density": self.density}
+        return NerfTexture.load(self.model).apply(Mesh.load(self.mesh), **options)
+
+    def _extracted(self) -> Asset:
+        """What is solid of it, as a mesh."""
+        return self._captured().extract()
 
     def _subdivide(self) -> int | str:
         if self.subdivide == "auto":

@@ -24,6 +24,7 @@ COMMANDS = {
     "fit nca": ("fit_nca:FitNca", "learn a living texture from an image or PBR maps (MeshNCA)"),
     "fit surface": ("fit_surface:FitSurface", "synthesize a texture on one mesh (tangent-space CNN)"),
     "fit geometric": ("fit_geometric:FitGeometric", "learn the relief of a mesh (face-convolution GAN)"),
+    "fit nerf": ("fit_nerf:FitNerf", "capture a texture with its meso-structure from photos (NeRF-Texture)"),
     "apply": ("apply:Apply", "put a learned texture on a mesh"),
     "animate": ("animate:Animate", "film how a geometric texture grows or changes"),
     "render": ("render:Render", "path-trace an asset: a still or a turntable"),

@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import Any
 
-NAMES = ("nca", "surface", "geometric")
+NAMES = ("nca", "surface", "geometric", "nerf")
 
 
 def __getattr__(name: str) -> Any:

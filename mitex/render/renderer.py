@@ -114,14 +114,7 @@ class OrbitRenderer:
         if not 1 <= spp <= 65536:
             raise ConfigError(f"{spp} samples per pixel are not possible", "use 1 to 65536")
         self._turn(azimuth, view)
-        import mitsuba as mi
-
-        level = mi.log_level()
-        mi.set_log_level(mi.LogLevel.Error)  # the sampler warns each time it rounds its count up
-        try:
-            return self._accumulate(spp, seed)
-        finally:
-            mi.set_log_level(level)
+        return accumulated(self._scene, self.resolution, spp, seed)
 
     def _build(self, asset: Asset, mesh: Mesh, ao: bool) -> tuple[Any, Any]:
         from mitex.runtime import init
@@ -131,18 +124,12 @@ class OrbitRenderer:
         scene = {
             "type": "scene",
             "integrator": {"type": "path", "max_depth": MAX_DEPTH, "rr_depth": 99, "hide_emitters": True},
-            "sensor": _sensor(mi, self.resolution),
-            "object": _shape(mi, "object", mesh, {"type": "twosided", "bsdf": bsdf}, normals=True),
+            "sensor": sensor(mi, self.resolution),
+            "object": shape(mi, "object", mesh, {"type": "twosided", "bsdf": bsdf}, normals=True),
             **lights(),
         }
         if self._on_backdrop:
-            paper = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [GREY] * 3}}
-            scene["backdrop"] = _shape(
-                mi,
-                "backdrop",
-                backdrop(self._floor),
-                {"type": "twosided", "bsdf": paper},
-            )
+            scene["backdrop"] = paper_sweep(mi, self._floor)
         loaded = mi.load_dict(scene)
         return loaded, mi.traverse(loaded)
 
@@ -161,19 +148,24 @@ class OrbitRenderer:
         )
         self._params.update()
 
-    def _accumulate(self, spp: int, seed: int) -> np.ndarray:
-        import mitsuba as mi
 
-        per_pass = max(1, min(spp, SAMPLES_PER_PASS // self.resolution**2))
-        passes = math.ceil(spp / per_pass)
-        total = np.zeros((self.resolution, self.resolution, 4), np.float64)
+def accumulated(scene: Any, resolution: int, spp: int, seed: int) -> np.ndarray:
+    """(N, N, 3) linear radiance of a scene with a film of `sensor`, over white where it is transparent."""
+    import mitsuba as mi
+
+    level = mi.log_level()
+    mi.set_log_level(mi.LogLevel.Error)  # the sampler warns each time it rounds its count up
+    per_pass = max(1, min(spp, SAMPLES_PER_PASS // resolution**2))
+    passes = math.ceil(spp / per_pass)
+    total = np.zeros((resolution, resolution, 4), np.float64)
+    try:
         for k in range(passes):
-            total += np.array(
-                mi.render(self._scene, spp=math.ceil(spp / passes), seed=mi.UInt32(seed * 4096 + k))
-            )
-        colour, alpha = total[..., :3] / passes, total[..., 3:] / passes
-        # Without the backdrop: over white.
-        return (colour + (1.0 - alpha.clip(0.0, 1.0))).astype(np.float32)
+            picture = mi.render(scene, spp=math.ceil(spp / passes), seed=mi.UInt32(seed * 4096 + k))
+            total += np.array(picture)
+    finally:
+        mi.set_log_level(level)
+    colour, alpha = total[..., :3] / passes, total[..., 3:] / passes
+    return (colour + (1.0 - alpha.clip(0.0, 1.0))).astype(np.float32)
 
 
 def _surface(
@@ -243,7 +235,14 @@ def _facing(detail: np.ndarray, normals: np.ndarray, to_camera: np.ndarray) -> n
     return unit(detail + np.maximum(VIEW_MARGIN - cosine, 0.0) * side * to_camera)
 
 
-def _shape(mi: Any, name: str, mesh: Mesh, bsdf: dict[str, Any], normals: bool = False) -> Any:
+def paper_sweep(mi: Any, floor: float) -> Any:
+    """The backdrop at height `floor` as a Mitsuba shape."""
+    paper = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [GREY] * 3}}
+    return shape(mi, "backdrop", backdrop(floor), {"type": "twosided", "bsdf": paper})
+
+
+def shape(mi: Any, name: str, mesh: Mesh, bsdf: dict[str, Any], normals: bool = False) -> Any:
+    """A Mitsuba mesh, with UVs if the mesh has a vertex for each."""
     props = mi.Properties()
     props["bsdf"] = mi.load_dict(bsdf)
     counts = len(mesh.vertices), len(mesh.faces)
@@ -260,7 +259,8 @@ def _shape(mi: Any, name: str, mesh: Mesh, bsdf: dict[str, Any], normals: bool =
     return shape
 
 
-def _sensor(mi: Any, resolution: int) -> dict[str, Any]:
+def sensor(mi: Any, resolution: int) -> dict[str, Any]:
+    """A scene's entry for the camera of all pictures: square, with a portrait lens."""
     return {
         "type": "perspective",
         "fov": math.degrees(FOV),

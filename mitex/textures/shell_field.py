@@ -28,16 +28,19 @@ class ShellFieldMethods:
     Args:
         field: in its own cube [-1, 1]^3.
         similarity: world -> cube.
+        turn: (3, 3) rotation of the field in the world, about the origin; None for none.
     """
 
-    def __init__(self, field: RadianceField, similarity: Similarity) -> None:
+    def __init__(self, field: RadianceField, similarity: Similarity, turn: np.ndarray | None = None) -> None:
         mi.Volume.__init__(self, mi.Properties("shell_field"))
         self.field, self.similarity = field, similarity
+        self.turn = np.eye(3) if turn is None else turn
 
     def bbox(self) -> Any:
         """Of the cube, in the world."""
-        centre, half = self.similarity.center, self.similarity.scale
-        return mi.ScalarBoundingBox3f((centre - half).tolist(), (centre + half).tolist())
+        corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+        corners = (corners * self.similarity.scale + self.similarity.center) @ self.turn.T
+        return mi.ScalarBoundingBox3f(corners.min(0).tolist(), corners.max(0).tolist())
 
     def max_value(self) -> float:
         """No bound is known."""
@@ -54,14 +57,15 @@ class ShellFieldMethods:
         """
         scale = float(self.similarity.scale)
         centre = mi.Vector3f(np.asarray(self.similarity.center, np.float32).tolist())
+        back = mi.Matrix3f(self.turn.T.tolist())
         chosen: Any = dr.compress(active)
         count = max(dr.width(ray.o), dr.width(active), dr.width(jitter))
         total = Traversed(dr.zeros(mi.Color3f, count), dr.ones(mi.Float, count), dr.zeros(mi.Float, count))
         for start in range(0, dr.width(chosen), CHUNK):
             part = dr.arange(mi.UInt32, start, min(start + CHUNK, dr.width(chosen)))
             index = dr.gather(mi.UInt32, chosen, part)
-            origin = mi.Point3f((dr.gather(mi.Point3f, ray.o, index) - centre) / scale)
-            direction = dr.gather(mi.Vector3f, ray.d, index)
+            origin = mi.Point3f((back @ dr.gather(mi.Point3f, ray.o, index) - centre) / scale)
+            direction = mi.Vector3f(back @ dr.gather(mi.Vector3f, ray.d, index))
             far = dr.gather(mi.Float, ray.maxt, index) / scale
             found = traverse(self.field, origin, direction, dr.gather(mi.Float, jitter, index), far)
             dr.scatter(total.colour, found.colour, index)
@@ -78,6 +82,6 @@ class ShellFieldMethods:
         return f"ShellField[\n  bbox = {self.bbox()},\n  step = {self.field.step}\n]"
 
 
-def shell_field(field: RadianceField, similarity: Similarity) -> Any:
+def shell_field(field: RadianceField, similarity: Similarity, turn: np.ndarray | None = None) -> Any:
     """An `mi.Volume` of the current variant that carries a radiance field; see `ShellFieldMethods`."""
-    return for_variant("ShellField", mi.Volume, ShellFieldMethods)(field, similarity)
+    return for_variant("ShellField", mi.Volume, ShellFieldMethods)(field, similarity, turn)

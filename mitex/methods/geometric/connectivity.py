@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from mitex.errors import MeshError
+from mitex.mesh import Mesh
 from mitex.mesh.topology import face_edges
 
 
@@ -47,6 +49,17 @@ class FaceGraph:
 
     def __len__(self) -> int:
         return len(self.faces)
+
+
+def check_corners(mesh: Mesh) -> None:
+    """Sides have neighbours only if they have two ends.
+
+    Raises:
+        MeshError: a face names a vertex twice; `Mesh.load` drops such faces.
+    """
+    twice = int((mesh.faces == np.roll(mesh.faces, 1, axis=1)).any(axis=1).sum())
+    if twice:
+        raise MeshError(f"{mesh.name} has faces that name a vertex twice: {twice:,}", "leave them out")
 
 
 def _across(faces: np.ndarray, vertices: int) -> np.ndarray:

@@ -8,7 +8,7 @@ import torch
 
 from mitex.mesh import Mesh, subdivide_midpoint
 from mitex.mesh.topology import face_edges
-from mitex.methods.geometric.connectivity import FaceGraph
+from mitex.methods.geometric.connectivity import FaceGraph, check_corners
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,12 @@ class Hierarchy:
 
     @staticmethod
     def of(mesh: Mesh, levels: int) -> Hierarchy:
-        """The hierarchy of a mesh, `levels` >= 1 of them with its own."""
+        """The hierarchy of a mesh, `levels` >= 1 of them with its own.
+
+        Raises:
+            MeshError: a face names a vertex twice.
+        """
+        check_corners(mesh)
         meshes = [mesh]
         for _ in range(levels - 1):
             meshes.append(subdivide_midpoint(meshes[-1]))

@@ -10,7 +10,7 @@ import torch
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, icosphere, quality, torus
 from mitex.mesh.topology import boundary_loops
-from mitex.methods.geometric.connectivity import FaceGraph
+from mitex.methods.geometric.connectivity import FaceGraph, check_corners
 from mitex.methods.geometric.hierarchy import mean_edge
 
 SIDES = 5  # around the tube of a torus
@@ -52,7 +52,9 @@ def topology(mesh: Mesh) -> tuple[int, int, int]:
 
     Raises:
         ConfigError: the mesh is not a surface with two sides.
+        MeshError: a face names a vertex twice.
     """
+    check_corners(mesh)
     report = quality(mesh)
     if report.genus is None:
         raise ConfigError(

@@ -75,6 +75,7 @@ class GeometricTexture:
 
         Raises:
             ConfigError: levels out of range, or too many faces.
+            MeshError: a face names a vertex twice.
         """
         course = self.course(mesh, start_level, end_level)
         *_, last = course.run(course.noise(seed))
@@ -148,6 +149,7 @@ class GeometricTexture:
 
         Raises:
             ConfigError: levels out of range, or too many faces.
+            MeshError: a face names a vertex twice.
         """
         last = self.levels - 1
         end = last if end_level is None else end_level

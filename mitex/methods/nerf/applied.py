@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +12,7 @@ import torch
 
 from mitex.atlas import unwrap, usable_uv
 from mitex.errors import ConfigError, MeshError
+from mitex.images import write_image
 from mitex.integrators.march import DIAGONAL
 from mitex.mesh import Mesh, Similarity
 from mitex.methods.nerf.base_shape import face_frames
@@ -17,13 +20,16 @@ from mitex.methods.nerf.maps import LatentMaps, MappedLatents
 from mitex.methods.nerf.occupancy import Occupancy
 from mitex.methods.nerf.projection import Projection
 from mitex.methods.nerf.shell import Shell, shell_cells
+from mitex.paths import prepare_output
 from mitex.runtime import load_mitsuba
 
 if TYPE_CHECKING:
+    from mitex.asset import Asset
     from mitex.methods.nerf.texture import NerfTexture
 
 mi: Any = load_mitsuba(needs_llvm=False)
 
+PICTURES = (".png", ".jpg", ".jpeg")
 EXTENT = 1 / 1.2  # of the mesh in the scene cube
 NEIGHBOURS = 5  # vertices that make the coarse normal of a target
 LOOKS = 6  # at each cell, to find which ones are occupied
@@ -39,20 +45,21 @@ class AppliedTexture(Shell):
         similarity: the mesh's space -> scene cube.
 
     Args:
-        texture, maps, repeat, density, light: as of `NerfTexture.apply`.
+        texture, maps, scale, density, light: as of `NerfTexture.apply`.
     """
 
     def __init__(
-        self, texture: NerfTexture, mesh: Mesh, maps: LatentMaps, *, repeat: float, density: float, light: Any
+        self, texture: NerfTexture, mesh: Mesh, maps: LatentMaps, *, scale: float, density: float, light: Any
     ) -> None:
-        if not 0.01 <= repeat <= 1000 or not 0 < density <= 1000:
+        if not 0.05 <= scale <= 20 or not 0 < density <= 1000:
             raise ConfigError(
-                f"a texture repeated {repeat} times of {density} times the density", "use 0.01 to 1000"
+                f"a texture of {scale} times the size and {density} times the density is not possible",
+                "use sizes from 0.05 to 20 and densities up to 1000",
             )
         self.mesh = with_uv(mesh)
         placed, self.similarity = centred(self.mesh)
-        uv = np.asarray(placed.uv) * repeat
-        scale = stretch(placed, uv) / (maps.size[1] * maps.gap)
+        # One unit of the UVs shows so many textures that their elements have the size that is wanted.
+        uv = np.asarray(placed.uv) * (stretch(placed) / (maps.size[1] * maps.gap * scale))
         thickness = texture.model.base.thickness * scale
         projection = Projection(placed, neighbours=NEIGHBOURS, pull=None, reach=thickness)
         cells = texture.model.config.occupancy
@@ -75,6 +82,32 @@ class AppliedTexture(Shell):
             occupancy.refresh(self.density, drawn)
         self.mask = occupancy.mask
 
+    def render(self, path: str | os.PathLike[str], *, exposure: float = 0.0, **options: Any) -> Path:
+        """Path-traces the texture in the studio: PNG or JPEG; options as of `shell_still`.
+
+        Raises:
+            OutputError: unknown suffix or unwritable place.
+        """
+        from mitex.render import tone
+        from mitex.render.shell import shell_still
+
+        target = prepare_output(path, PICTURES)
+        return write_image(
+            target, tone(shell_still(self, self.similarity, self.outline, **options), exposure)
+        )
+
+    def extract(self, cells: int = 384) -> Asset:
+        """A coloured mesh of what is solid; see `extract.extracted`."""
+        from mitex.methods.nerf.extract import extracted
+
+        return extracted(self, cells)
+
+    @property
+    def outline(self) -> np.ndarray:
+        """(2 V, 3) points of the mesh's space that the shell lies between."""
+        reach = self.thickness * self.similarity.scale * self.mesh.normals
+        return np.concatenate([self.mesh.vertices - reach, self.mesh.vertices + reach])
+
 
 def with_uv(mesh: Mesh) -> Mesh:
     """The mesh with UVs in which nothing overlaps: its own, or new ones."""
@@ -93,13 +126,13 @@ def centred(mesh: Mesh) -> tuple[Mesh, Similarity]:
     return mesh.with_vertices(similarity.apply(mesh.vertices)), similarity
 
 
-def stretch(mesh: Mesh, uv: np.ndarray) -> float:
-    """How long a unit of the UVs is on the mesh: mean edge there by mean edge here."""
+def stretch(mesh: Mesh) -> float:
+    """How long a unit of the UVs is on the mesh: mean edge here by mean edge there."""
 
     def edges(corners: np.ndarray) -> float:
         return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
 
-    flat = edges(uv)
+    flat = edges(np.asarray(mesh.uv))
     if flat == 0:
         raise MeshError(f"the UVs of {mesh.name} have no area", "unwrap it again, or leave them out")
     return edges(mesh.vertices[mesh.faces]) / flat

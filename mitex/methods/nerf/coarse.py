@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -15,10 +16,11 @@ from mitex.mesh import Mesh
 from mitex.methods.nerf.base_shape import base_shape, given_base, shell_thickness
 from mitex.methods.nerf.capture import Capture
 from mitex.methods.nerf.config import NerfConfig
+from mitex.methods.nerf.occupancy import gridded
 from mitex.methods.nerf.pixels import Pixels
 from mitex.methods.nerf.plain import PlainTask
 from mitex.methods.nerf.projection import Projection
-from mitex.methods.nerf.radiance import BETAS, CHUNK, EPSILON, rays_of
+from mitex.methods.nerf.radiance import BETAS, EPSILON, rays_of
 from mitex.paths import cache_dir
 from mitex.runtime import load_mitsuba
 from mitex.training import checkpoint, train
@@ -84,30 +86,26 @@ def find_base(
 
     def find() -> BaseShape:
         task = _trained(capture, coarse, place.with_suffix(".run"), quiet)
-        base = (
-            base_shape(density_grid(task), concavity=config.concavity) if given is None else given_base(given)
-        )
+        _say("cutting the base shape out of the coarse field, about a minute", quiet)
+        base = _shape_of(task, config) if given is None else given_base(given)
         scan = scanned(task)
         projection = Projection(base, neighbours=config.neighbours, pull=config.pull)
         return BaseShape(base, scan, shell_thickness(scan, projection))
 
-    return cached(place, find, _read, _write)
+    found = cached(place, find, _read, _write)
+    _say(f"base shape of {len(found.mesh.faces):,} faces, shell of +-{found.thickness:.3f}", quiet)
+    return found
 
 
-def density_grid(task: PlainTask, side: int = GRID) -> np.ndarray:
-    """(side, side, side) density at the centres of cells of the scene cube, x slowest; 0 where unoccupied.
+def _shape_of(task: PlainTask, config: NerfConfig) -> Mesh:
+    occupied = task.occupancy.occupied.astype(bool)
+    density = gridded(task.field(task.mean).density_at, occupied, GRID)
+    return base_shape(density, concavity=config.concavity)
 
-    `side` is a multiple of that of the occupancy grid.
-    """
-    cells = len(task.occupancy.occupied)
-    fine = np.repeat(np.arange(cells), side // cells)  # which cell a sample is in
-    occupied = task.occupancy.occupied[np.ix_(fine, fine, fine)].astype(bool)
-    field, grid = task.field(task.mean), np.zeros((side,) * 3, np.float32)
-    index = np.argwhere(occupied)
-    for start in range(0, len(index), CHUNK):
-        part = index[start : start + CHUNK]
-        grid[tuple(part.T)] = field.density_at(((part + 0.5) * (2 / side) - 1).astype(np.float32))
-    return grid
+
+def _say(line: str, quiet: bool) -> None:
+    if not quiet:
+        print(line, file=sys.stderr, flush=True)
 
 
 def scanned(task: PlainTask) -> np.ndarray:

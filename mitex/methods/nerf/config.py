@@ -32,7 +32,8 @@ class NerfConfig:
         occupancy: cells of the occupancy grid along a side.
         refine_cameras: optimize the poses too.
         base_steps: of the coarse field that the base shape is taken from.
-        concavity: how far the base shape may be from convex pieces (CoACD's threshold).
+        concavity: how far the base shape may be from convex pieces (CoACD's threshold); more than the height of
+            the meso-structure beside the object, or its rows are cut apart.
         checkpoint_every, preview_every: steps between them.
     """
 
@@ -58,7 +59,7 @@ class NerfConfig:
     occupancy: int = 128
     refine_cameras: bool = False
     base_steps: int = 2_000
-    concavity: float = 0.1
+    concavity: float = 0.3
     checkpoint_every: int = 500
     preview_every: int = 1_000
 

@@ -33,6 +33,24 @@ def hull_cells(capture: Capture, side: int) -> np.ndarray:
     return ndimage.binary_dilation(inside, iterations=2)
 
 
+def gridded(density: Callable[[np.ndarray], np.ndarray], occupied: np.ndarray, side: int) -> np.ndarray:
+    """(side, side, side) density at the centres of cells of the scene cube, x slowest; 0 where unoccupied.
+
+    Args:
+        density: of points (N, 3), (N,).
+        occupied: (G, G, G) bool; `side` is a multiple of G.
+        side: of the grid.
+    """
+    cell = np.repeat(np.arange(len(occupied)), side // len(occupied))  # that a sample is in
+    grid = np.zeros((side,) * 3, np.float32)
+    for x in range(side):  # in slabs, to save memory
+        index = np.argwhere(occupied[cell[x]][np.ix_(cell, cell)])
+        if len(index):
+            place = np.insert(index, 0, x, axis=1)
+            grid[x][tuple(index.T)] = density(((place + 0.5) * (2 / side) - 1).astype(np.float32))
+    return grid
+
+
 class Occupancy:
     """A running maximum of the density in each cell, and where it is above the threshold.
 

@@ -159,7 +159,7 @@ class NerfTexture:
         *,
         size: int = SIZE,
         seed: int = 0,
-        repeat: float = 1.0,
+        scale: float = 1.0,
         density: float = 1.0,
         light: np.ndarray | None = None,
     ) -> AppliedTexture:
@@ -167,9 +167,9 @@ class NerfTexture:
 
         Args:
             mesh: with UVs in which nothing overlaps, or it is unwrapped.
-            maps: a synthesized texture; None synthesizes one of `size` texels with `seed`.
+            maps: a synthesized texture; None synthesizes a tileable one of `size` texels with `seed`.
             size, seed: as of `synthesize`.
-            repeat: how often the texture goes into one unit of the UVs: larger numbers make it finer.
+            scale: size of the texture's elements beside the whole mesh, against that on the captured object.
             density: factor of the density.
             light: (16,) or (16, 3) spherical harmonics instead of the learned light.
 
@@ -177,9 +177,9 @@ class NerfTexture:
             MeshError: the mesh has no area.
             ConfigError: a number is out of range.
         """
-        given = self.synthesize(size, seed) if maps is None else maps
+        given = self.synthesize(size, seed, tileable=True) if maps is None else maps
         shone = self.light if light is None else mi.TensorXf(np.asarray(light, np.float32))
-        return AppliedTexture(self, mesh, given, repeat=repeat, density=density, light=shone)
+        return AppliedTexture(self, mesh, given, scale=scale, density=density, light=shone)
 
     def __repr__(self) -> str:
         about = self.model.about
