@@ -1,5 +1,7 @@
 """Small meshes by formula that are no sound surfaces."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from mitex.mesh import Mesh
@@ -17,6 +19,26 @@ def moebius(pieces: int = 20) -> Mesh:
     c[-1], d[-1] = d[-1], c[-1]
     faces = np.concatenate([np.stack([a, a + 1, c], 1), np.stack([a + 1, d, c], 1)])
     return Mesh(np.stack(sides, 1).reshape(-1, 3), faces, name="strip")
+
+
+def turned(mesh: Mesh) -> Mesh:
+    """A mesh, one face of which has its back outside."""
+    faces = mesh.faces.copy()
+    faces[0] = faces[0, ::-1]
+    return replace(mesh, faces=faces, uv=None, name="turned")
+
+
+def collapsed(mesh: Mesh) -> Mesh:
+    """A mesh, one side of which has no length, and the faces there no area."""
+    vertices = mesh.vertices.copy()
+    vertices[mesh.faces[0, 0]] = vertices[mesh.faces[0, 1]]
+    return replace(mesh, vertices=vertices, name="collapsed")
+
+
+def pair(mesh: Mesh) -> Mesh:
+    """Two copies side by side."""
+    vertices = np.concatenate([mesh.vertices, mesh.vertices + [3.0, 0, 0]])
+    return Mesh(vertices, np.concatenate([mesh.faces, mesh.faces + len(mesh.vertices)]), name="pair")
 
 
 def fan() -> Mesh:

@@ -1,13 +1,18 @@
 """`mitex fit geometric`, and `mitex apply` of what it makes."""
 
+from dataclasses import replace
+from pathlib import Path
+from shutil import copytree
+
 import imageio.v3 as iio
 import numpy as np
 import pytest
 
 from mitex.cli import main
-from mitex.mesh import Mesh, icosphere
+from mitex.mesh import Mesh, grid, icosphere, quality
 from tests.cli import bad_files as bad
 from tests.cli.refusals import check_refused
+from tests.shapes import collapsed, fan, pair, turned
 
 pytestmark = pytest.mark.usefixtures("own_cache")
 QUICK = "--quiet --set steps=4 level_steps=2 fit_steps=20 fit_samples=200 checkpoint_every=2 preview_every=0"
@@ -17,18 +22,26 @@ def fit(words=QUICK, reference="good.obj", out="out/run"):
     return f"fit geometric --reference {reference} --out {out} {words}".split()
 
 
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory, own_cache):
+    folder = tmp_path_factory.mktemp("trained")
+    bad.text(folder / "good.obj", bad.CUBE)
+    assert main(fit(reference=folder / "good.obj", out=folder / "run")) == 0
+    return folder / "run"
+
+
 @pytest.fixture
-def run(files, capsys):
-    assert main(fit()) == 0
-    assert capsys.readouterr().out.strip() == "out/run"
-    return files / "out" / "run"
+def run(files, trained):
+    return Path(copytree(trained, files / "out" / "run"))
 
 
 def apply(words="", mesh="good.obj"):
     return f"apply out/run --mesh {mesh} --out out/a.ply {words}".split()
 
 
-def test_fit_apply_render(files, run):
+def test_fit_apply_render(files, capsys):
+    assert main(fit()) == 0
+    assert capsys.readouterr().out.strip() == "out/run"
     assert main(apply("--start-level 0 --end-level 1 --seed 3")) == 0
     assert len(Mesh.load(files / "out" / "a.ply").faces) == 4 * 12
     assert main(["render", "out/a.ply", "--out", "out/a.png", "--size", "32", "--spp", "1"]) == 0
@@ -103,6 +116,44 @@ def test_bad_films(files, run, name, capsys):
     check_refused(files, words, message, capsys)
 
 
+def write(path, mesh):
+    lines = [f"v {x} {y} {z}" for x, y, z in mesh.vertices] + [f"f {a} {b} {c}" for a, b, c in mesh.faces + 1]
+    bad.text(path, "\n".join(lines))
+
+
+BALL = icosphere(3)
+SLIVERS = replace(BALL, faces=np.concatenate([BALL.faces, [[0, 0, 1], [2, 2, 2]]]))
+UNSOUND = {
+    "open": (grid(5, 4), 160),
+    "non-manifold": (fan(), 12),
+    "two components": (pair(BALL), 8 * len(BALL.faces)),
+    "inconsistent winding": (turned(BALL), 4 * len(BALL.faces)),
+    "faces without area": (SLIVERS, 4 * len(BALL.faces)),
+    "a side without length": (collapsed(BALL), 4 * (len(BALL.faces) - 2)),
+}
+
+
+@pytest.mark.filterwarnings("ignore::mitex.errors.MeshWarning")
+@pytest.mark.parametrize("name", UNSOUND)
+def test_open_and_unsound_meshes_are_displaced(files, run, name):
+    mesh, faces = UNSOUND[name]
+    write(files / "mesh.obj", mesh)
+    assert main(apply("--start-level 0", mesh="mesh.obj")) == 0
+    assert len(Mesh.load(files / "out" / "a.ply").faces) == faces
+
+
+@pytest.mark.filterwarnings("ignore::mitex.errors.MeshWarning")
+@pytest.mark.parametrize("name", ["open", "two components", "faces without area"])
+def test_references_that_are_learned(files, name):
+    pytest.importorskip("pymeshlab")
+    mesh, _ = UNSOUND[name]
+    write(files / "mesh.obj", mesh)
+    assert main(fit(reference="mesh.obj")) == 0
+    assert main(apply(mesh="template")) == 0
+    made = quality(Mesh.load(files / "out" / "a.ply"))
+    assert (made.components, made.boundary_edges > 0) == (1 + (name == "two components"), name == "open")
+
+
 BAD_FITS = {
     "no options": ("fit geometric", "--reference is missing"),
     "missing reference": (fit(reference="none.obj"), "none.obj"),
@@ -155,11 +206,9 @@ def test_options_of_geometric_textures_mean_nothing_to_others(files, capsys):
     check_refused(files, words, "--start-level means nothing for textures of nca", capsys)
 
 
-def test_too_many_faces(files, run, capsys):
-    ball = icosphere(250)
-    lines = [f"v {x} {y} {z}" for x, y, z in ball.vertices] + [f"f {a} {b} {c}" for a, b, c in ball.faces + 1]
-    bad.text(files / "fine.obj", "\n".join(lines))
-    check_refused(files, apply("--start-level 0", mesh="fine.obj"), "remesh it more coarsely", capsys)
+def test_too_many_faces(files, run, capsys, monkeypatch):
+    monkeypatch.setattr("mitex.methods.geometric.texture.MOST_FACES", 47)
+    check_refused(files, apply("--start-level 0"), "remesh it more coarsely", capsys)
 
 
 def test_an_unfinished_run(files, run, capsys):

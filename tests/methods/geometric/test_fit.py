@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from mitex.errors import CheckpointError, ConfigError
+from mitex.errors import CheckpointError, ConfigError, MeshError
 from mitex.mesh import Mesh, grid, icosphere, subdivide_midpoint, torus
 from mitex.methods import geometric
 from mitex.methods.geometric import files
@@ -18,11 +18,11 @@ from mitex.methods.geometric.pictures import portrait
 from mitex.methods.geometric.references import find_reference
 from mitex.methods.geometric.report import report
 from mitex.methods.geometric.task import GeometricTask, learning_rate
-from mitex.methods.geometric.template import normalised
+from mitex.methods.geometric.template import normalised, topology
 from mitex.methods.geometric.texture import GeometricTexture, slerp
 from mitex.methods.kind import kind
 from mitex.training import checkpoint
-from tests.shapes import fan, moebius
+from tests.shapes import collapsed, fan, moebius, pair, turned
 
 pytestmark = pytest.mark.usefixtures("own_cache")
 SMALL = [
@@ -39,6 +39,12 @@ def bumpy() -> Mesh:
     ball = icosphere(12)
     height = 1 + 0.15 * np.sin(7 * ball.vertices).prod(1, keepdims=True)
     return replace(ball.with_vertices(ball.vertices * height), name="bumpy")
+
+
+def hill() -> Mesh:
+    flat = grid(16, 16)
+    x, y, _ = flat.vertices.T
+    return replace(flat.with_vertices(np.stack([x, y, 0.2 * np.cos(2 * x) * np.cos(2 * y)], 1)), name="hill")
 
 
 @pytest.fixture(scope="module")
@@ -121,22 +127,51 @@ def test_uvs_are_interpolated(made):
     assert asset.mesh.uv is not None and expected is not None and np.array_equal(asset.mesh.uv, expected)
 
 
-@pytest.mark.parametrize("mesh", [grid(5, 4), moebius(), fan(), torus(8, 4)])
+UNSOUND = [grid(5, 4), moebius(), fan(), turned(icosphere(3)), collapsed(icosphere(3)), pair(icosphere(3))]
+
+
+@pytest.mark.parametrize("mesh", [torus(8, 4), *UNSOUND], ids=lambda mesh: mesh.name)
 def test_open_and_unsound_meshes_are_displaced(made, mesh):
     moved = made[1].apply(mesh, start_level=1).mesh
     assert np.isfinite(moved.vertices).all()
-    assert not np.allclose(moved.vertices, subdivide_midpoint(mesh).vertices)
+    far = np.linalg.norm(moved.vertices - subdivide_midpoint(mesh).vertices, axis=1)
+    assert (far > 1e-3).mean() > 0.9 and far.max() < 2 * np.ptp(mesh.vertices, axis=0).max()
+
+
+def test_faces_that_name_a_vertex_twice_are_refused(made, tmp_path):
+    ball = bumpy()
+    mesh = replace(ball, faces=np.concatenate([ball.faces, [[0, 0, 1]]]))
+    with pytest.raises(MeshError, match="bumpy has faces that name a vertex twice: 1"):
+        made[1].apply(mesh)
+    with pytest.raises(MeshError, match="bumpy has faces that name a vertex twice: 1"):
+        geometric.fit(mesh, tmp_path / "run", overrides=SMALL, quiet=True)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("mesh", [moebius(), fan(), turned(bumpy())], ids=lambda mesh: mesh.name)
+def test_references_without_two_sides_are_refused(tmp_path, mesh):
+    with pytest.raises(ConfigError, match="not a surface with two sides"):
+        geometric.fit(mesh, tmp_path / "run", overrides=SMALL, quiet=True)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("mesh", "template"),
+    [(hill(), grid(2, 2)), (pair(bumpy()), pair(icosphere(1))), (collapsed(bumpy()), None)],
+    ids=["open", "two components", "faces without area"],
+)
+def test_references_that_are_learned(tmp_path, mesh, template):
+    """Their training meshes come near (templates are 0.04 to 0.12 away) and keep pieces and boundaries."""
+    texture = geometric.fit(mesh, tmp_path / "run", template=template, overrides=SMALL, quiet=True)
+    assert texture.about["fit"][-1]["chamfer"] < 0.025
+    assert topology(texture.generate(seed=1)) == topology(mesh)
 
 
 def test_two_components_are_displaced_alike(made):
     """Without noise: the instance norm is taken over both."""
-    ball = bumpy()
-    two = Mesh(
-        np.concatenate([ball.vertices, ball.vertices + [3.0, 0, 0]]),
-        np.concatenate([ball.faces, ball.faces + len(ball.vertices)]),
-    )
+    two = pair(bumpy())
     moved = replace_about(made[1], noise=0.0).apply(two, start_level=2).mesh.vertices
-    count = len(ball.vertices)
+    count = len(two.vertices) // 2
     assert np.allclose(moved[:count] + [3.0, 0, 0], moved[count:], atol=1e-3)
     assert not np.allclose(moved, two.vertices, atol=1e-2)
 
