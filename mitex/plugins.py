@@ -14,7 +14,12 @@ from importlib import import_module
 from mitex.runtime import load_mitsuba
 
 # Each has a function register(), which builds its class for the current variant and registers it.
-MODULES = ("mitex.textures.vertex_field", "mitex.textures.texel_field", "mitex.integrators.feature", "mitex.integrators.shell")
+MODULES = (
+    "mitex.textures.vertex_field",
+    "mitex.textures.texel_field",
+    "mitex.integrators.feature",
+    "mitex.integrators.shell",
+)
 
 mi = load_mitsuba(needs_llvm=False)
 

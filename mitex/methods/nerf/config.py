@@ -32,8 +32,8 @@ class NerfConfig:
         occupancy: cells of the occupancy grid along a side.
         refine_cameras: optimize the poses too.
         base_steps: of the coarse field that the base shape is taken from.
-        concavity: how far the base shape may be from convex pieces (CoACD's threshold); more than the height of
-            the meso-structure beside the object, or its rows are cut apart.
+        concavity: how far the base shape may be from convex pieces (CoACD's threshold); more than the
+            height of the meso-structure beside the object, or its rows are cut apart.
         checkpoint_every, preview_every: steps between them.
     """
 

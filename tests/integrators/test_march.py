@@ -1,0 +1,159 @@
+"""Marching: analytic slabs and balls, derivatives, and what is skipped."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from mitex.integrators.march import Samples, accumulated, march, traverse, weights_of
+from mitex.runtime import init
+
+mi = init()
+import drjit as dr  # noqa: E402
+
+
+class Slab:
+    """Density and colour between x = -0.5 and 0.5."""
+
+    def __init__(self, density: float, step: float, side: int = 16, colour=(0.2, 0.5, 0.8)) -> None:
+        self.density, self.colour, self.step = mi.Float(density), mi.Color3f(*colour), step
+        where = np.abs((np.arange(side) + 0.5) * 2 / side - 1) < 0.5
+        self.mask = mi.TensorXu8(np.broadcast_to(where[:, None, None], (side,) * 3).astype(np.uint8))
+        self.evaluated = 0
+
+    def evaluate(self, points, view):
+        self.evaluated += dr.width(points)
+        index = dr.compress(dr.abs(points.x) < 0.5)
+        width = dr.width(index)
+        return index, self.density + dr.zeros(mi.Float, width), self.colour + dr.zeros(mi.Color3f, width)
+
+
+def rays(count: int, slope: float = 0.0):
+    """From x = -2 on, through the cube."""
+    y = np.linspace(-0.3, 0.3, count)
+    direction = np.array([1.0, slope, 0.0]) / math.hypot(1, slope)
+    origin = mi.Point3f(np.stack([np.full(count, -2.0), y, np.zeros(count)]).astype(np.float32))
+    return (
+        origin,
+        mi.Vector3f(*direction.tolist()) + dr.zeros(mi.Vector3f, count),
+        dr.full(mi.Float, 0.5, count),
+    )
+
+
+@pytest.mark.parametrize("density, slope", [(0.7, 0.0), (3.0, 0.2), (40.0, 0.1)])
+def test_a_slab_lets_pass_what_beer_says(density, slope):
+    slab = Slab(density, step=1 / 512)
+    found = traverse(slab, *rays(5, slope))
+    passes = math.exp(-density * math.hypot(1, slope))
+    np.testing.assert_allclose(np.array(found.through), passes, atol=2e-3)
+    expected = np.outer((1 - passes) * np.ones(5), [0.2, 0.5, 0.8])
+    np.testing.assert_allclose(np.array(found.colour).T, expected, atol=2e-3)
+
+
+def test_the_depth_is_that_of_what_was_met():
+    found = traverse(Slab(500.0, step=1 / 1024), *rays(3))
+    np.testing.assert_allclose(np.array(found.depth), 1.5, atol=5e-3)
+
+
+def test_what_is_behind_the_end_of_a_ray_does_not_count():
+    found = traverse(Slab(2.0, step=1 / 512), *rays(3), far=mi.Float(1.0, 1.75, 9.0))
+    np.testing.assert_allclose(np.array(found.through), np.exp([0, -0.5, -2.0]), atol=3e-3)
+
+
+def test_opaque_rays_end_early():
+    clear, dense = Slab(0.01, step=1 / 256), Slab(1000.0, step=1 / 256)
+    for slab in (clear, dense):
+        traverse(slab, *rays(4))
+    assert dense.evaluated < 0.5 * clear.evaluated
+
+
+def test_a_coarse_march_agrees_with_a_fine_one():
+    """A smooth field, the step as a preset has it against a sixteenth of that."""
+
+    class Ball:
+        mask = mi.TensorXu8(np.ones((8, 8, 8), np.uint8))
+
+        def __init__(self, step):
+            self.step = step
+
+        def evaluate(self, points, view):
+            near = dr.exp(-8 * dr.squared_norm(points))
+            return dr.arange(mi.UInt32, dr.width(points)), 12 * near, mi.Color3f(near, points.y + 0.5, 0.3)
+
+    coarse, fine = (traverse(Ball(step), *rays(32, 0.15)) for step in (1 / 148, 1 / 2368))
+    for name in ("through", "colour"):
+        difference = np.abs(np.array(getattr(coarse, name)) - np.array(getattr(fine, name)))
+        assert difference.max() < 1e-3
+
+
+def test_samples_are_where_cells_are_occupied():
+    grid = np.zeros((4, 4, 4), np.uint8)
+    grid[1, 2, 2] = grid[3, 2, 2] = 1
+    origin, direction, jitter = rays(1)
+    origin = mi.Point3f(-2.0, 0.1, 0.1)
+    found = march(origin, direction, mi.TensorXu8(grid), 0.01, jitter)
+    x = np.array(found.t) - 2
+    assert ((np.abs(x + 0.25) <= 0.25) | (np.abs(x - 0.75) <= 0.25)).all()
+    assert abs(len(found) - 100) <= 2
+    np.testing.assert_allclose(np.diff(np.sort(x))[:40], 0.01, atol=1e-5)
+
+
+def test_rays_that_miss_the_cube_have_no_samples():
+    _, direction, jitter = rays(2)
+    origin = mi.Point3f(np.array([[-2, 3], [5, 0], [0, 0]], np.float32))
+    mask = mi.TensorXu8(np.ones((4, 4, 4), np.uint8))
+    assert len(march(origin, direction, mask, 0.1, jitter)) == 0
+    found = traverse(Slab(1.0, 0.1), origin, direction, jitter)
+    np.testing.assert_array_equal(np.array(found.through), 1)
+
+
+def test_weights_and_their_derivative_agree_with_loops():
+    rng = np.random.default_rng(0)
+    ray = np.sort(rng.integers(0, 6, 40)).astype(np.uint32)
+    density = rng.uniform(0, 30, 40)
+    samples = Samples(mi.UInt32(ray), mi.Float(np.arange(40)), 0.05, 6)
+    share, end = rng.normal(size=40), rng.normal(size=6)
+
+    def by_loops(density):
+        weights, through = np.zeros(40), np.ones(6)
+        for k in range(40):
+            alpha = 1 - math.exp(-0.05 * density[k])
+            weights[k] = through[ray[k]] * alpha
+            through[ray[k]] *= 1 - alpha
+        return weights, through
+
+    attached = mi.Float(density)
+    dr.enable_grad(attached)
+    weights, through = weights_of(attached, samples)
+    for found, expected in zip((weights, through), by_loops(density), strict=True):
+        np.testing.assert_allclose(np.array(found), expected, atol=1e-6)
+    dr.backward(dr.sum(weights * mi.Float(share)) + dr.sum(through * mi.Float(end)))
+
+    def total(density):
+        weights, through = by_loops(density)
+        return weights @ share + through @ end
+
+    numeric = [(total(density + e) - total(density - e)) / 2e-5 for e in 1e-5 * np.eye(40)]
+    np.testing.assert_allclose(np.array(dr.grad(attached)), numeric, atol=2e-6)
+
+
+def test_weights_of_a_long_batch_keep_their_digits():
+    """Sums over a hundred thousand dense samples must not drown the last ray."""
+    count = 100_000
+    ray = np.arange(count, dtype=np.uint32) // 10
+    samples = Samples(mi.UInt32(ray), mi.Float(np.zeros(count)), 0.01, count // 10)
+    density = np.full(count, 1000.0)
+    density[-10:] = 1.0
+    weights, through = weights_of(mi.Float(density), samples)
+    np.testing.assert_allclose(np.array(through)[-1], math.exp(-0.1), rtol=1e-5)
+    np.testing.assert_allclose(np.array(accumulated(weights, samples)) + np.array(through), 1, atol=1e-5)
+
+
+def test_a_traversal_is_differentiable():
+    slab = Slab(1.5, step=1 / 256)
+    dr.enable_grad(slab.density)
+    found = traverse(slab, *rays(1))
+    dr.backward(dr.sum(found.through))
+    np.testing.assert_allclose(np.array(dr.grad(slab.density)), -math.exp(-1.5), rtol=1e-2)
