@@ -14,6 +14,7 @@ from mitex.errors import CaptureError, CaptureWarning
 from mitex.images import read_bytes, read_image
 from mitex.mesh import Similarity
 from mitex.methods.nerf.capture_files import Frame, read_frames, transforms_files
+from mitex.methods.nerf.colmap import photo_frames
 from mitex.methods.nerf.lens import folds, undistort
 from mitex.methods.nerf.visual_hull import Hull, View, project, visual_hull
 
@@ -93,6 +94,7 @@ class Capture:
 def load_capture(folder: str | Path) -> Capture:
     """Loads a folder with `transforms.json` (instant-ngp) or `transforms_train.json` (NeRF-synthetic).
 
+    Without one the cameras of the photos in it are found by COLMAP, which takes minutes the first time.
     Masks are the images' alpha, files named by `mask_path`, or `masks/NAME.png`. The scene cube is chosen
     such that the bounding box of the visual hull is centred in it, its largest half extent 0.75. A view that
     is there twice is dropped with a warning.
@@ -105,11 +107,7 @@ def load_capture(folder: str | Path) -> Capture:
     if not folder.is_dir():
         raise CaptureError(f"{folder} is not a folder", "give the folder of a capture")
     files = transforms_files(folder)
-    if not files:
-        raise CaptureError(
-            f"{folder} has no transforms.json", "make one with COLMAP or instant-ngp's colmap2nerf"
-        )
-    frames = [frame for path in files for frame in read_frames(path)]
+    frames = [frame for path in files for frame in read_frames(path)] if files else photo_frames(folder)
     return assemble(frames, folder.resolve().name)
 
 

@@ -97,10 +97,19 @@ def read_frames(path: Path) -> list[Frame]:
     except (OSError, ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
         raise CaptureError(f"{path} cannot be read ({reason})", "write it again") from error
+    return parse_frames(tree, path.parent, path.name)
+
+
+def parse_frames(tree: Any, folder: Path, source: str) -> list[Frame]:
+    """The frames of such a file's content; paths are relative to `folder`, `source` is for messages.
+
+    Raises:
+        CaptureError: as `read_frames`.
+    """
     frames = tree.get("frames") if isinstance(tree, dict) else None
     if not isinstance(frames, list) or not frames:
-        raise CaptureError(f"{path} has no list of frames", "give one frame for every image")
-    return [_frame(path.parent, tree, frame, f"{path.name}: frame {k}") for k, frame in enumerate(frames)]
+        raise CaptureError(f"{source} has no list of frames", "give one frame for every image")
+    return [_frame(folder, tree, frame, f"{source}: frame {k}") for k, frame in enumerate(frames)]
 
 
 def _frame(folder: Path, tree: dict[str, Any], frame: Any, where: str) -> Frame:

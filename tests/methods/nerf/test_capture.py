@@ -300,7 +300,7 @@ class TestRefuses:
 
     def test_missing_folder_and_file(self, tmp_path):
         assert_refused(tmp_path / "none", "is not a folder")
-        assert_refused(tmp_path, "no transforms.json")
+        assert_refused(tmp_path, "has no transforms.json, and 0 photos; give 8 or more")
 
     @pytest.mark.parametrize("text", ["", "{", '{"frames": 3}', "[]", "[" * 100_000])
     def test_damaged_json(self, tmp_path, text):
