@@ -13,7 +13,7 @@ import numpy as np
 from mitex.errors import CaptureError, CaptureWarning
 from mitex.images import read_bytes, read_image
 from mitex.mesh import Similarity
-from mitex.methods.nerf.capture_files import Frame, read_frames, transforms_files
+from mitex.methods.nerf.capture_files import Frame, no_mask, read_frames, transforms_files
 from mitex.methods.nerf.colmap import photo_frames
 from mitex.methods.nerf.lens import folds, undistort
 from mitex.methods.nerf.visual_hull import Hull, View, project, visual_hull
@@ -165,10 +165,7 @@ def _rgba(frame: Frame) -> np.ndarray:
     image = read_bytes(frame.image)
     if frame.mask is None:
         if image.shape[2] == 3:
-            raise CaptureError(
-                f"{frame.name} has neither alpha nor a mask",
-                f"save it with alpha, or a mask as masks/{frame.image.stem}.png (object white)",
-            )
+            raise no_mask(frame.image)
         return image
     mask = np.round(read_image(frame.mask, "L") * 255.0).astype(np.uint8)
     if mask.shape[:2] != image.shape[:2]:

@@ -142,16 +142,28 @@ def _inside(folder: Path, given: str, where: str) -> Path:
     return path
 
 
-def _mask(folder: Path, image: Path, given: Any, where: str) -> Path | None:
-    """The mask that the frame names, or the one in `masks/`."""
-    if given is not None:
-        if not isinstance(given, str):
-            raise CaptureError(f"{where} has a mask_path that is no text", "name the mask")
-        return _find(folder, given, where)
+def find_mask(folder: Path, image: Path) -> Path | None:
+    """The mask of an image in `masks/`, if there is one."""
     for name in (f"{image.stem}.png", f"{image.name}.png"):
         if (path := folder / "masks" / name).is_file():
             return path
     return None
+
+
+def no_mask(image: Path) -> CaptureError:
+    """What to tell of an image without alpha for which there is no mask."""
+    return CaptureError(
+        f"{image.name} has neither alpha nor a mask",
+        f"save it with alpha, or a mask as masks/{image.stem}.png (object white)",
+    )
+
+
+def _mask(folder: Path, image: Path, given: Any, where: str) -> Path | None:
+    if given is None:
+        return find_mask(folder, image)
+    if not isinstance(given, str):
+        raise CaptureError(f"{where} has a mask_path that is no text", "name the mask")
+    return _find(folder, given, where)
 
 
 def _pose(matrix: Any, name: str) -> np.ndarray:

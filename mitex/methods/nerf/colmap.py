@@ -16,7 +16,7 @@ from PIL import Image
 from mitex.cache import cached, content_key
 from mitex.errors import CaptureError, CaptureWarning
 from mitex.images import SUFFIXES, read_bytes
-from mitex.methods.nerf.capture_files import ONE_FILE, Frame, parse_frames
+from mitex.methods.nerf.capture_files import ONE_FILE, Frame, find_mask, no_mask, parse_frames
 from mitex.paths import cache_dir
 
 MIN_PHOTOS = 8
@@ -35,14 +35,17 @@ def photo_frames(folder: Path) -> list[Frame]:
         CaptureError: too few photos, too few of them overlap, or pycolmap is not installed.
         ImageError: a photo is damaged.
     """
-    photos = _photos(folder)
+    try:
+        photos = _photos(folder)
+        contents = [hashlib.sha256(path.read_bytes()).hexdigest() for path in photos]
+    except OSError as error:
+        raise CaptureError(f"{folder} cannot be read ({error.strerror})", "check its permissions") from error
     if len(photos) < MIN_PHOTOS:
         raise CaptureError(
             f"{folder} has no transforms.json, and {len(photos)} photos",
             f"give {MIN_PHOTOS} or more PNG or JPEG files that overlap, or the cameras in a transforms.json",
         )
     names = [path.relative_to(folder).as_posix() for path in photos]
-    contents = [hashlib.sha256(path.read_bytes()).hexdigest() for path in photos]
     place = cache_dir() / "captures" / content_key(VERSION, LONGER_SIDE, names, contents)
     tree = cached(place, lambda: _reconstruct(folder, names), _read, _write)
     missing = len(names) - len(tree["frames"])
@@ -63,9 +66,8 @@ def _reconstruct(folder: Path, names: Sequence[str]) -> dict[str, Any]:
         work = Path(temporary)
         (work / "images").mkdir()
         # COLMAP sees copies: upright as `read_bytes` gives them, and no larger than it needs.
-        sizes = {
-            f"{k:05}.png": _copy(folder / n, work / "images" / f"{k:05}.png") for k, n in enumerate(names)
-        }
+        copies = {f"{k:05}.png": name for k, name in enumerate(names)}
+        sizes = {copy: _copy(folder, name, work / "images" / copy) for copy, name in copies.items()}
         model = _largest(work, one_camera=len(set(sizes.values())) == 1)
         placed = {} if model is None else {i.name: i for i in model.images.values() if i.has_pose}
         if len(placed) < max(MIN_PHOTOS, PLACED * len(names)):
@@ -73,14 +75,16 @@ def _reconstruct(folder: Path, names: Sequence[str]) -> dict[str, Any]:
                 f"only {len(placed)} of {len(names)} photos in {folder} could be placed",
                 "take sharp, overlapping photos all around a textured object, before a still background",
             )
-        copies = dict(zip(sizes, names, strict=True))
         frames = [_frame(copies[name], placed[name], sizes[name]) for name in sorted(placed)]
         return {"camera_model": "OPENCV", "frames": frames}
 
 
-def _copy(source: Path, target: Path) -> tuple[int, int]:
+def _copy(folder: Path, name: str, target: Path) -> tuple[int, int]:
     """Writes a photo without alpha, scaled down where it is large; gives its own width and height."""
-    image = Image.fromarray(np.ascontiguousarray(read_bytes(source)[..., :3]))
+    pixels = read_bytes(folder / name)
+    if pixels.shape[2] == 3 and find_mask(folder, folder / name) is None:
+        raise no_mask(folder / name)  # before it takes minutes
+    image = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
     size = image.size
     image.thumbnail((LONGER_SIDE, LONGER_SIDE), Image.Resampling.LANCZOS)
     image.save(target, compress_level=1)

@@ -317,7 +317,9 @@ class TestRefuses:
         write(tmp_path, count=8)
         path = tmp_path / "images" / "004.png"
         Image.open(path).convert("RGB").save(path)
-        assert_refused(tmp_path, "images/004.png has neither alpha nor a mask; save it with alpha")
+        assert_refused(
+            tmp_path, "004.png has neither alpha nor a mask; save it with alpha, or a mask as masks/004.png"
+        )
 
     def test_mask_of_another_size(self, tmp_path):
         write(tmp_path, count=8)

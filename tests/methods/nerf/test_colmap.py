@@ -151,6 +151,33 @@ def test_too_few_photos(tmp_path):
     assert_refused(tmp_path, "has no transforms.json, and 1 photos")
 
 
+def test_photos_without_masks_are_refused_at_once(photos, tmp_path, monkeypatch):
+    monkeypatch.setattr(colmap, "_largest", None)
+    for path in photos.iterdir():
+        Image.open(path).convert("RGB").save(tmp_path / path.name)
+    assert_refused(tmp_path, "p00.png has neither alpha nor a mask")
+
+
+def test_masks_beside_photos_count(photos, tmp_path, monkeypatch):
+    """With masks for all but one, that one is named."""
+    monkeypatch.setattr(colmap, "_largest", None)
+    (tmp_path / "images").mkdir()
+    (tmp_path / "masks").mkdir()
+    for path in photos.iterdir():
+        Image.open(path).convert("RGB").save(tmp_path / "images" / path.name)
+        if path.stem != "p07":
+            Image.open(path).getchannel("A").save(tmp_path / "masks" / path.name)
+    assert_refused(tmp_path, "p07.png has neither alpha nor a mask")
+
+
+def test_a_folder_that_cannot_be_read(photos, monkeypatch):
+    def denied(folder):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(colmap, "_photos", denied)
+    assert_refused(photos, "cannot be read (Permission denied)")
+
+
 def test_without_pycolmap(photos, monkeypatch):
     monkeypatch.setattr(colmap, "VERSION", "not installed")
     monkeypatch.setitem(sys.modules, "pycolmap", None)
