@@ -58,7 +58,7 @@ class NerfConfig:
     neighbours: int = 8
     occupancy: int = 128
     refine_cameras: bool = False
-    base_steps: int = 2_000
+    base_steps: int = 1_000
     concavity: float = 0.3
     checkpoint_every: int = 500
     preview_every: int = 1_000

@@ -15,6 +15,7 @@ from mitex.methods.nerf.coarse import BaseShape
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field import Encoding, weight_shapes
 from mitex.methods.nerf.lighting import COEFFICIENTS
+from mitex.runtime import init
 from mitex.training import model_file
 
 NAME = "texture.safetensors"
@@ -77,6 +78,7 @@ def load(source: str | Path) -> Model:
     Raises:
         CheckpointError: there is none, or it is damaged.
     """
+    init()
     with model_file.opened(source, KIND, NAME) as (tensors, about):
         if not all(tensor.isfinite().all() for tensor in tensors.values()):
             raise ValueError("values that are not finite")

@@ -16,7 +16,7 @@ from mitex.methods.nerf.projection import Projection
 from mitex.methods.nerf.radiance import BETAS, EPSILON
 from mitex.methods.nerf.task import TextureTask
 from mitex.methods.nerf.texture import NerfTexture
-from mitex.runtime import keep_freed_memory
+from mitex.runtime import init, keep_freed_memory
 from mitex.training import run, train
 from mitex.training.optim import Adam
 
@@ -60,6 +60,7 @@ def fit(
     given = Mesh.load(base_mesh) if isinstance(base_mesh, str | Path) else base_mesh
     if given is not None:
         given = given.with_vertices(photos.similarity.apply(given.vertices))
+    init()
     keep_freed_memory()
     learned, held = photos.split()
     base = find_base(learned, settings, given, quiet)

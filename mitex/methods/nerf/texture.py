@@ -20,7 +20,7 @@ from mitex.methods.nerf.projection import Projection
 from mitex.methods.nerf.quilting import Quilt, quilt
 from mitex.methods.nerf.shell import CapturedLatents, Shell
 from mitex.methods.nerf.tensors import channels
-from mitex.runtime import load_mitsuba
+from mitex.runtime import init, load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
 
@@ -36,6 +36,7 @@ class NerfTexture:
     """
 
     def __init__(self, model: files.Model) -> None:
+        init()
         self.model = model
 
     @staticmethod

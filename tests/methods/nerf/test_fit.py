@@ -1,0 +1,196 @@
+"""A small real fit, and what is done with its result."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from mitex.asset import Asset
+from mitex.errors import CheckpointError, ConfigError, MeshError, OutputError
+from mitex.mesh import Mesh, icosphere
+from mitex.methods.nerf import NerfTexture, files, fit
+from mitex.methods.nerf.maps import LatentMaps
+from mitex.methods.nerf.pixels import Pixels
+from mitex.methods.nerf.radiance import look
+from mitex.metrics import psnr
+from tests.methods.nerf.tiny import tiny_capture
+
+SETTINGS = (
+    "steps=160",
+    "lr_steps=160",
+    "base_steps=80",
+    "rays=1024",
+    "cells=192",
+    "table=13",
+    "coarsest=32",
+    "finest=128",
+    "occupancy=48",
+    "average=0.5",
+    "preview_every=160",
+    "checkpoint_every=80",
+)
+
+
+@pytest.fixture(scope="module")
+def base() -> Mesh:
+    ball = icosphere(36)
+    return Mesh(0.55 * ball.vertices, ball.faces, name="ball")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory, base) -> Path:
+    folder = tmp_path_factory.mktemp("nerf")
+    patch = pytest.MonkeyPatch()
+    patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+    fit(tiny_capture(), folder / "run", base_mesh=base, overrides=SETTINGS, quiet=True)
+    patch.undo()
+    return folder / "run"
+
+
+@pytest.fixture(scope="module")
+def texture(run) -> NerfTexture:
+    return NerfTexture.load(run)
+
+
+@pytest.fixture(scope="module")
+def maps(texture) -> LatentMaps:
+    return texture.synthesize(256, seed=1, patches=60, tileable=True)
+
+
+def test_the_loss_falls_and_the_run_folder_is_whole(run):
+    lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
+    colour = [line["colour"] for line in lines]
+    assert len(lines) == 160 and np.mean(colour[-20:]) < 0.5 * np.mean(colour[:20])
+    assert {"normals", "clusters", "samples"} <= lines[-1].keys()
+    assert (run / files.NAME).is_file() and len(list((run / "previews").glob("*.png"))) == 1
+
+
+def test_a_held_out_view_looks_like_its_photo(texture):
+    _, held = tiny_capture().split()
+    batch, shape = Pixels(held).image(0, 48)
+    photo = (batch.colours * batch.alpha + 1 - batch.alpha).numpy()
+    found = look(texture.shell, batch)
+    quality = psnr(found.reshape(*shape, 3), photo.reshape(*shape, 3))
+    assert quality > 17
+    assert quality > 3 + psnr(np.ones_like(photo).reshape(*shape, 3), photo.reshape(*shape, 3))
+
+
+def test_the_shell_is_as_thick_as_the_bumps(texture):
+    assert 0.05 < texture.model.base.thickness < 0.25
+
+
+def test_the_file_goes_round(texture, tmp_path):
+    again = NerfTexture.load(texture.save(tmp_path / "copy.safetensors"))
+    points = 0.56 * icosphere(4).vertices
+    np.testing.assert_array_equal(again.features(points), texture.features(points))
+    np.testing.assert_array_equal(again.model.occupied, texture.model.occupied)
+    assert again.model.about == texture.model.about
+
+
+@pytest.mark.parametrize("missing", ["frames", "weights/3", "tables/f"])
+def test_damaged_files_are_refused(texture, tmp_path, missing, monkeypatch):
+    kept = files.model_file.save
+
+    def save(path, tensors, *rest, **more):
+        return kept(path, {k: v for k, v in tensors.items() if k != missing}, *rest, **more)
+
+    monkeypatch.setattr(files.model_file, "save", save)
+    path = texture.save(tmp_path / "damaged.safetensors")
+    with pytest.raises(CheckpointError, match="not a nerf texture"):
+        NerfTexture.load(path)
+
+
+def test_a_used_folder_is_refused(run, base):
+    with pytest.raises(OutputError):
+        fit(tiny_capture(), run, base_mesh=base, overrides=SETTINGS, quiet=True)
+
+
+def test_maps_repeat_patches_of_the_base_shape(texture, maps):
+    """Away from seams, features and frames are those of the patch that the texel is from."""
+    assert maps.features.shape == (256, 256, 24) and maps.frame.shape == (256, 256)
+    turned = np.einsum("kij,klj->kil", maps.frames, maps.frames)
+    np.testing.assert_allclose(turned, np.broadcast_to(np.eye(3), turned.shape), atol=1e-4)
+    spread = texture.features(texture.model.base.mesh.vertices)
+    low, high = spread.min(0) - 1e-3, spread.max(0) + 1e-3
+    assert ((maps.features >= low) & (maps.features <= high)).mean() > 0.95
+
+
+def test_the_same_seed_gives_the_same_texture(texture, maps):
+    again = texture.synthesize(256, seed=1, patches=60, tileable=True)
+    np.testing.assert_array_equal(again.features, maps.features)
+    other = texture.synthesize(256, seed=2, patches=60, tileable=True)
+    assert np.abs(other.features - maps.features).mean() > 0.1 * maps.features.std()
+
+
+def test_a_texture_on_another_mesh_is_near_its_surface(texture, maps):
+    applied = texture.apply(icosphere(12), maps)
+    radius = np.linspace(0.3, 1.0, 400)
+    points = np.stack([np.zeros(400), radius, np.zeros(400)], 1).astype(np.float32)
+    density = applied.density(points)
+    surface = 1 / 1.2
+    far = np.abs(radius - surface) > applied.thickness * 1.02
+    assert (density[far] == 0).all() and density.max() > 1
+    np.testing.assert_allclose(applied.similarity.scale, 1.2, rtol=1e-2)
+    assert applied.thickness == pytest.approx(texture.model.base.thickness)
+
+
+def test_scale_and_density_do_what_they_say(texture, maps):
+    mesh = icosphere(12)
+    plain, dense = texture.apply(mesh, maps), texture.apply(mesh, maps, density=3.0)
+    points = (0.84 * mesh.vertices[:200]).astype(np.float32)
+    np.testing.assert_allclose(dense.density(points), 3 * plain.density(points), rtol=1e-4)
+    large = texture.apply(mesh, maps, scale=2.0)
+    assert large.thickness == pytest.approx(2 * plain.thickness)
+
+
+def test_a_picture_and_a_mesh_come_out(texture, maps, tmp_path):
+    applied = texture.apply(icosphere(12), maps, density=20.0)
+    picture = applied.render(tmp_path / "ball.png", resolution=48, spp=1)
+    assert picture.stat().st_size > 1000
+    asset = applied.extract(cells=96)
+    distance = np.linalg.norm(asset.mesh.vertices, axis=1)
+    reach = applied.thickness * applied.similarity.scale * 1.1
+    assert np.abs(distance - 1).max() < reach
+    assert isinstance(Asset.load(asset.export(tmp_path / "ball.glb")), Asset)
+
+
+def test_bad_requests_are_refused(texture, maps):
+    mesh = icosphere(4)
+    flat = Mesh(mesh.vertices * 0 + 1, mesh.faces)
+    with pytest.raises(ConfigError):
+        texture.apply(mesh, maps, scale=0.0)
+    with pytest.raises(ConfigError):
+        texture.apply(mesh, maps, density=-1.0)
+    with pytest.raises(MeshError):
+        texture.apply(flat, maps)
+    with pytest.raises(ConfigError):
+        texture.apply(mesh, maps).extract(cells=50)
+
+
+def test_a_resumed_run_continues_as_if_it_had_not_stopped(tmp_path, base, monkeypatch):
+    from mitex.runtime import threads
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    few = [s for s in SETTINGS if not s.startswith(("steps", "preview", "checkpoint"))]
+    few += ["preview_every=0", "checkpoint_every=4", "rays=128"]
+    before = torch.get_num_threads()
+    threads(1)
+    try:
+        whole = fit(tiny_capture(), tmp_path / "a", base_mesh=base, overrides=[*few, "steps=8"], quiet=True)
+        fit(tiny_capture(), tmp_path / "b", base_mesh=base, overrides=[*few, "steps=4"], quiet=True)
+        parts = fit(
+            tiny_capture(),
+            tmp_path / "b",
+            base_mesh=base,
+            overrides=["steps=8"],
+            resume=True,
+            quiet=True,
+        )
+    finally:
+        threads(before)
+    for a, b in zip(whole.model.weights, parts.model.weights, strict=True):
+        torch.testing.assert_close(a, b, rtol=0, atol=1e-6)
