@@ -1,0 +1,82 @@
+"""Shows captured textures: views, what is synthesized, and other shapes that wear them.
+
+usage: python tools/make_nerf_gallery.py RUNS CAPTURES MESHES SHEET NAME[,NAME...] MESH ...
+
+RUNS holds a finished run of `mitex fit nerf` for each NAME, CAPTURES its photos, MESHES is a folder; meshes
+are named as for make_surface_gallery.py. docs/gallery/SHEET.jpg has a row for each texture: a photo that was
+held out, the same view of the field, the synthesized texture as a plane at three elevations, and the meshes.
+The quality of all held-out views is printed.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from make_surface_gallery import find_mesh
+
+from mitex.images import write_image
+from mitex.mesh import Mesh
+from mitex.mesh.shapes import grid
+from mitex.methods.nerf import NerfTexture, load_capture
+from mitex.methods.nerf.applied import AppliedTexture
+from mitex.methods.nerf.evaluation import view_pair, view_quality
+from mitex.render import sheet, tone
+from mitex.render.shell import shell_still
+
+GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
+CELL = 256  # side of a picture [px]
+SPP = 16
+ELEVATIONS = (80, 45, 15)  # of the camera above the plane [degrees]
+
+
+def plane(side: int = 64) -> Mesh:
+    """A square with its UVs, lying on the floor."""
+    flat = grid(side, side)
+    return flat.with_vertices(flat.vertices[:, [0, 2, 1]] * np.array([1.0, 1.0, -1.0]))
+
+
+def picture(applied: AppliedTexture, elevation: float) -> np.ndarray:
+    """In the studio."""
+    return tone(
+        shell_still(
+            applied,
+            applied.similarity,
+            applied.outline,
+            resolution=CELL,
+            spp=SPP,
+            elevation=math.radians(elevation),
+        )
+    )
+
+
+def main() -> None:
+    runs, captures, meshes, name, textures, *wanted = sys.argv[1:]
+    cells, labels = [], []
+    for word in textures.split(","):
+        texture = NerfTexture.load(Path(runs) / word)
+        _, held = load_capture(Path(captures) / word).split()
+        print(f"{word}: {view_quality(texture.shell, held)}", flush=True)
+        seen, photo = view_pair(texture.shell, held, 0)
+        begun = time.perf_counter()
+        maps = texture.synthesize(1024, seed=0, tileable=True)
+        print(f"{word}: synthesized in {time.perf_counter() - begun:.0f} s", flush=True)
+        cells += [photo, seen]
+        labels += [f"{word}, held out", "seen"]
+        flat = texture.apply(plane(), maps)
+        cells += [picture(flat, elevation) for elevation in ELEVATIONS]
+        labels += [f"from {elevation} degrees" for elevation in ELEVATIONS]
+        for mesh in wanted:
+            begun = time.perf_counter()
+            cells.append(picture(texture.apply(find_mesh(mesh, Path(meshes)), maps), 18))
+            labels.append(mesh.split("~")[0])
+            print(f"{word} on {mesh}: {time.perf_counter() - begun:.0f} s", flush=True)
+    columns = 2 + len(ELEVATIONS) + len(wanted)
+    write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=columns, labels=labels, cell=CELL))
+
+
+if __name__ == "__main__":
+    main()
