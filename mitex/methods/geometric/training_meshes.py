@@ -34,11 +34,18 @@ def fit_level(
     generator = torch.Generator().manual_seed(config.seed + level)
     target = torch.from_numpy(reference.vertices) * 2**level
     faces = torch.from_numpy(reference.faces).long()
-    return _Fitting(graph, target, faces, config, config.fit_samples * (level + 1)).run(vertices, generator)
+    return Fitting(graph, target, faces, config, config.fit_samples * (level + 1)).run(vertices, generator)
 
 
-class _Fitting:
-    """The optimisation of one level."""
+class Fitting:
+    """The optimisation of one level.
+
+    Args:
+        graph: of the faces of the mesh that is fitted.
+        target, target_faces: the reference, (V, 3) and (F, 3).
+        config: settings.
+        samples: points on each of the two in every step.
+    """
 
     def __init__(
         self,
@@ -53,23 +60,26 @@ class _Fitting:
         self.ring = _ring(graph)
 
     def run(self, vertices: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
+        """The vertices (V, 3), fitted."""
         vertices = vertices.clone().requires_grad_()
         optimizer, config = Adam([vertices]), self.config
         unit = float(mean_edge(vertices.detach(), self.graph))
         for step in range(config.fit_steps):
             optimizer.clear()
-            (self._distance(vertices, generator) + self._regularity(vertices)).backward()
+            (self.distance(vertices, generator) + self.regularity(vertices)).backward()
             optimizer.step(config.fit_lr * unit * LAST ** (step / config.fit_steps))
         return vertices.detach()
 
-    def _distance(self, vertices: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
+    def distance(self, vertices: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
+        """How far the two are from each other, and their normals."""
         ours = sample_surface(vertices, self.graph.faces, self.samples, generator)
         theirs = sample_surface(self.target, self.target_faces, self.samples, generator)
         to, back, normals_to, normals_back = chamfer(ours, theirs)
         normals = self.config.fit_normals * (normals_to + normals_back)
         return TO_REFERENCE * to + TO_TEMPLATE * back + normals
 
-    def _regularity(self, vertices: torch.Tensor) -> torch.Tensor:
+    def regularity(self, vertices: torch.Tensor) -> torch.Tensor:
+        """How uneven the edges are, and how rough the surface."""
         corners = vertices[self.graph.faces]
         lengths = (corners.roll(-1, 1) - corners).norm(dim=2)
         share = (lengths / lengths.sum(1, keepdim=True)).clamp_min(1e-9)

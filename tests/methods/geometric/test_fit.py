@@ -13,6 +13,7 @@ from mitex.mesh import Mesh, grid, icosphere, subdivide_midpoint, torus
 from mitex.methods import geometric
 from mitex.methods.geometric import files
 from mitex.methods.geometric.config import PRESETS, GeometricConfig
+from mitex.methods.geometric.features import displaced, face_features
 from mitex.methods.geometric.hierarchy import Hierarchy
 from mitex.methods.geometric.pictures import portrait
 from mitex.methods.geometric.references import find_reference
@@ -22,6 +23,7 @@ from mitex.methods.geometric.template import normalised, topology
 from mitex.methods.geometric.texture import GeometricTexture, slerp
 from mitex.methods.kind import kind
 from mitex.training import checkpoint
+from mitex.training.optim import Adam
 from tests.shapes import collapsed, fan, moebius, pair, turned
 
 pytestmark = pytest.mark.usefixtures("own_cache")
@@ -229,7 +231,7 @@ def test_resuming_changes_nothing(tmp_path):
     torch.set_num_threads(1)
     try:
         whole = geometric.fit(bumpy(), tmp_path / "whole", overrides=SMALL, quiet=True)
-        part = [*SMALL, "steps=4"]
+        part = [*SMALL, "steps=5"]  # between two steps of one critic, whose optimizer must go on too
         # As many levels from the start: what is trained must not depend on where a run was cut.
         geometric.fit(bumpy(), tmp_path / "part", overrides=part, quiet=True)
         more = geometric.fit(bumpy(), tmp_path / "part", overrides=["steps=9"], resume=True, quiet=True)
@@ -250,6 +252,22 @@ def test_each_step_trains_the_generator_of_its_level():
         assert record["level"] == level
         for k, generator in enumerate(task.generators):
             assert all((p.grad is not None) == (k == level) for p in generator.parameters)
+
+
+def test_the_loss_by_hand():
+    """The critic's score of a random mesh, and the distance of the one from the fixed noise (section 3.3)."""
+    task = small_task(reconstruction=7.0)
+    found, record = task.loss(0, torch.Generator().manual_seed(1))
+    graph, drawn = task.hierarchy.graphs[0], torch.Generator().manual_seed(1)
+    made = []
+    for noise in (task.config.noise * torch.randn(task.template.shape, generator=drawn), task.fixed):
+        offsets = task.generators[0](face_features(task.template + noise, graph), graph)
+        made.append(displaced(task.template, graph, offsets))
+    score = task.critics[0](face_features(made[0], graph), graph).mean()
+    error = ((made[1] - task.meshes[0]) ** 2).mean()
+    assert "critic" not in record  # it would have drawn first
+    assert error > 0.01 and score.abs() > 1e-3
+    assert torch.allclose(found, 7 * error - score, rtol=1e-5)
 
 
 def test_critics_take_turns():
@@ -278,8 +296,6 @@ def test_weights_are_carried_up():
 def test_the_reconstruction_comes_near():
     """Without a critic's pull the generator learns the one mesh from the fixed noise."""
     task = small_task(steps=300, level_steps=300, reconstruction=100.0, lr=5e-3)
-    from mitex.training.optim import Adam
-
     optimizer, drawn = Adam(task.parameters), torch.Generator().manual_seed(0)
     errors = []
     for step in range(120):
@@ -295,6 +311,15 @@ def test_the_learning_rate_is_halved_on_each_level():
     config = GeometricConfig(steps=30, level_steps=8, lr=1.0)
     rates = [learning_rate(config, step) for step in range(10)]
     assert rates == [1, 1, 0.5, 0.5, 0.25, 0.25, 0.125, 0.125, 1, 1]
+
+
+def test_critics_learn_at_that_rate(monkeypatch):
+    rates = []
+    monkeypatch.setattr(Adam, "step", lambda self, rate: rates.append(rate))
+    task, drawn = small_task(steps=8, level_steps=8, critic_steps=1, generator_steps=1), torch.Generator()
+    for step in range(8):
+        task.loss(step, drawn)
+    assert rates == [learning_rate(task.config, step) for step in range(8)] and len(set(rates)) == 4
 
 
 def test_settings():
