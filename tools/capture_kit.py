@@ -116,9 +116,9 @@ def cells(points: np.ndarray, frames: np.ndarray, angles: np.ndarray, softness: 
     cosine = (offset / (2.0 * half)) @ np.stack([np.cos(angles), np.sin(angles)])
     reach = half / np.maximum(cosine, 1e-3)
     nearest = reach.min(axis=1, keepdims=True)
-    return (nearest[:, 0]) - softness * nearest[:, 0] * np.log(
-        np.exp(-(reach / nearest - 1.0) / softness).sum(axis=1)
-    )
+    # A soft minimum.
+    crowding = np.exp(-(reach / nearest - 1.0) / softness).sum(axis=1)
+    return nearest[:, 0] * (1.0 - softness * np.log(crowding))
 
 
 def lattice(rows: int, columns: int, closed: bool) -> np.ndarray:

@@ -21,39 +21,36 @@ from exemplar_kit import mix, ramp, step
 from mitex.mesh import Mesh, icosphere
 
 OUT = Path(__file__).parents[1] / "out" / "captures"
+ROCKS = (
+    ("4b4e53", "77797a", "a9a59d"),  # granite
+    ("2b3036", "454d55", "6d757b"),  # basalt
+    ("6b5237", "9a7a52", "cdb58a"),  # sandstone
+    ("54302a", "82503f", "b08468"),  # porphyry
+)
 
 
 def durian(rng: np.random.Generator) -> tuple[Base, Part]:
     """A fruit with pointed spikes, each on its own foot, that lean a little."""
     base = Base(lambda d: _lumpy(d, (0.78, 0.80, 0.92), 0.03))
-    spacing = 0.118
+    spacing, rings, sides = 0.118, 18, 30
     points = base.spread(rng, spacing)
     count = len(points)
     frames = base.frames(points)
-    angles = np.linspace(0.0, 2.0 * np.pi, 30, endpoint=False)
-    reach = cells(points, frames, angles, 0.05)[:, None]
-    t = np.linspace(0.0, 1.0, 18)[None, :, None] ** 1.2  # from the foot to the tip
+    angles = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
+    t = np.linspace(0.0, 1.0, rings)[None, :, None] ** 1.2  # from the foot to the tip
     q = 1.05 * (1.0 - t)
 
-    round_reach = reach.mean(axis=2, keepdims=True)
-    shape = reach + (round_reach - reach) * step(0.0, 0.9, t) * 0.75
-    ribs = 1.0 + 0.05 * np.sin(7.0 * angles + rng.uniform(0, 6.3, (count, 1, 1))) * step(0.1, 0.5, t) * (
-        1 - t
-    )
-    radius = shape * q * ribs
-    height = spacing * rng.uniform(0.88, 1.16, (count, 1, 1)) * np.maximum(1.0 - q, 0.0) ** 1.5 - 0.02 * (
-        q > 1.0
-    )
+    foot = cells(points, frames, angles, 0.05)[:, None]
+    outline = foot + 0.75 * step(0.0, 0.9, t) * (foot.mean(axis=2, keepdims=True) - foot)  # rounder above
+    waves = np.sin(7.0 * angles + rng.uniform(0, 6.3, (count, 1, 1)))
+    radius = outline * q * (1.0 + 0.05 * waves * step(0.1, 0.5, t) * (1 - t))
+    tall = spacing * rng.uniform(0.88, 1.16, (count, 1, 1))
+    height = tall * np.maximum(1.0 - q, 0.0) ** 1.5 - 0.02 * (q > 1.0)
     lean = 0.16 * spacing * rng.normal(size=(count, 2))
-    local = np.stack(
-        [
-            radius * np.cos(angles) + lean[:, :1, None] * t**1.5,
-            radius * np.sin(angles) + lean[:, 1:, None] * t**1.5,
-            height + 0.0 * radius,
-        ],
-        axis=-1,
-    )
-    mesh = repeated(base.lift(points, frames, local).reshape(count, -1, 3), lattice(18, 30, closed=True))
+    x = radius * np.cos(angles) + lean[:, :1, None] * t**1.5
+    y = radius * np.sin(angles) + lean[:, 1:, None] * t**1.5
+    lifted = base.lift(points, frames, np.stack([x, y, np.broadcast_to(height, x.shape)], axis=-1))
+    mesh = repeated(lifted.reshape(count, -1, 3), lattice(rings, sides, closed=True))
 
     along = np.broadcast_to(t, radius.shape).reshape(-1)
     around = np.broadcast_to(angles, radius.shape).reshape(-1)
@@ -73,11 +70,9 @@ def grass(rng: np.random.Generator) -> tuple[Base, Part]:
     base = Base(lambda d: _lumpy(d, (0.86, 0.80, 0.68), 0.05))
     roots = base.scatter(rng, 20_000)
     count, rings = len(roots), 8
-    tufts = noise(rng, roots, 0.4), noise(rng, roots, 0.4)
-    wind = np.arctan2(*tufts) + 1.4 * rng.normal(size=count)
-    frames = base.frames(roots)
-    lean = np.stack([np.cos(wind), np.sin(wind)], axis=1)
-    frames = base.frames(roots, np.einsum("nk,nkd->nd", lean, frames[:, :2]))
+    wind = np.arctan2(noise(rng, roots, 0.4), noise(rng, roots, 0.4)) + 1.4 * rng.normal(size=count)
+    towards = np.stack([np.cos(wind), np.sin(wind)], axis=1)
+    frames = base.frames(roots, np.einsum("nk,nkd->nd", towards, base.frames(roots)[:, :2]))
 
     t = np.linspace(0.0, 1.0, rings)
     bend = rng.uniform(0.0, 0.5, (count, 1)) + rng.gamma(2.2, 0.35, (count, 1)) * t**1.5  # from upright [rad]
@@ -85,10 +80,10 @@ def grass(rng: np.random.Generator) -> tuple[Base, Part]:
     reach, height = _along(np.sin(bend), length), _along(np.cos(bend), length) - 0.008
     half = 0.0075 * rng.uniform(0.75, 1.3, (count, 1)) * (1.0 - t**2.5) * (0.7 + 0.6 * np.sqrt(t))
     # Two sheets, each from edge to edge over the fold: the lower side and, back again, the upper one.
-    across = half[:, None, :, None] * np.array([[-1.0, 0.0, 1.0], [1.0, 0.0, -1.0]])[:, None]
-    sunk = half[:, None, :, None] * np.array([[0.0, 0.75, 0.0], [0.0, 0.55, 0.0]])[:, None]
-    blade = lambda values: values[:, None, :, None]  # noqa: E731
-    x, z = blade(reach) + sunk * blade(np.cos(bend)), blade(height) - sunk * blade(np.sin(bend))
+    half, bend, reach, height = (values[:, None, :, None] for values in (half, bend, reach, height))
+    across = half * np.array([[-1.0, 0.0, 1.0], [1.0, 0.0, -1.0]])[:, None]
+    sunk = half * np.array([[0.0, 0.75, 0.0], [0.0, 0.55, 0.0]])[:, None]
+    x, z = reach + sunk * np.cos(bend), height - sunk * np.sin(bend)
     sheet = lattice(rings, 3, closed=False)
     lifted = base.lift(roots, frames, np.stack([x, across, z], axis=-1))
     mesh = repeated(lifted.reshape(count, -1, 3), np.concatenate([sheet, sheet + 3 * rings]))
@@ -134,19 +129,10 @@ def cobbles(rng: np.random.Generator) -> tuple[Base, Part]:
 
     stone = np.repeat(np.arange(count), x[0].size)
     mottled = 0.5 + 0.26 * rng.normal(size=count)[stone] + 0.13 * noise(rng, mesh.vertices, 0.03)
-    mottled = np.clip(mottled, 0.0, 1.0)
-    rocks = np.stack(
-        [
-            ramp(mottled, "4b4e53", "77797a", "a9a59d"),  # granite
-            ramp(mottled, "2b3036", "454d55", "6d757b"),  # basalt
-            ramp(mottled, "6b5237", "9a7a52", "cdb58a"),  # sandstone
-            ramp(mottled, "54302a", "82503f", "b08468"),  # porphyry
-        ]
-    )
-    kind = rng.choice(4, count, p=[0.4, 0.22, 0.25, 0.13])
+    rocks = np.stack([ramp(np.clip(mottled, 0.0, 1.0), *rock) for rock in ROCKS])
+    kind = rng.choice(len(ROCKS), count, p=[0.4, 0.22, 0.25, 0.13])
     colours = rocks[kind[stone], np.arange(len(stone))]
-    speckles = noise(rng, mesh.vertices, 0.008)
-    colours *= (1.0 + 0.11 * speckles)[:, None]
+    colours *= (1.0 + 0.11 * noise(rng, mesh.vertices, 0.008))[:, None]
     veins = step(0.1, 0.02, np.abs(noise(rng, mesh.vertices, 0.09))) * (rng.random(count) < 0.2)[stone]
     colours = mix(colours, np.array([0.62, 0.60, 0.56]), 0.7 * veins)
     rough = rng.choice([0.32, 0.55, 0.8], count, p=[0.35, 0.4, 0.25])[stone]
@@ -157,35 +143,34 @@ def cobbles(rng: np.random.Generator) -> tuple[Base, Part]:
 def woven(rng: np.random.Generator) -> tuple[Base, Part]:
     """A closed barrel of rattan: upright strands, and rings that pass over and under them."""
     base = Base(lambda d: _barrel(d, 0.74, 0.92))
-    pitch, strands = 0.098, 48
-    profile = base.onto(np.stack([np.sin(s := np.linspace(0, np.pi, 2000)), 0 * s, np.cos(s)], axis=1))
+    pitch, strands, lift = 0.098, 48, 0.019
+    polar = np.linspace(0, np.pi, 2000)
+    profile = base.onto(np.stack([np.sin(polar), 0 * polar, np.cos(polar)], axis=1))
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(profile, axis=0), axis=1))])
     rows = int(arc[-1] / pitch) - 1
     start = 0.5 * (arc[-1] - (rows - 1) * pitch)
+
+    def at(row: np.ndarray | float, angle: np.ndarray | float) -> np.ndarray:
+        radius, z = (np.interp(start + pitch * row, arc, profile[:, c]) for c in (0, 2))
+        return np.stack([radius * np.cos(angle), radius * np.sin(angle), z + 0.0 * angle], axis=1)
 
     # Towards the ends every second strand dives below, so that the others keep their distance.
     width = 2.0 * np.pi * np.interp(start + pitch * np.arange(rows), arc, profile[:, 0]) / strands
     level = np.clip(np.ceil(np.log2(0.62 * pitch / width)), 0, 3).astype(int)
     k = np.arange(strands)
     over = np.where((k[:, None] // 2**level + np.arange(rows)) % 2 == 0, 1.0, -1.0)  # ring over strand
-    lift = 0.019
     parts = []
     for row in range(rows):
         used = k[:: 2 ** level[row]]
         turn = np.linspace(0.0, 2.0 * np.pi, 12 * len(used), endpoint=False)
         height = lift * _waves(turn * len(used) / (2.0 * np.pi), np.append(over[used, row], over[0, row]))
-        z, rho = (np.interp(start + row * pitch, arc, profile[:, c]) for c in (2, 0))
-        foot = np.stack([rho * np.cos(turn), rho * np.sin(turn), np.full_like(turn, z)], axis=1)
-        parts.append(_strand(base, rng, foot, height, 0.46 * pitch, closed=True))
+        parts.append(_strand(base, rng, at(row, turn), height, 0.46 * pitch, closed=True))
     for strand in k:
         kept = np.flatnonzero(strand % 2**level == 0)
-        s = np.linspace(kept[0] - 0.5, kept[-1] + 0.5, 10 * len(kept))
-        height = -lift * _waves(s, over[strand])
-        ends = np.minimum(s - s[0], s[-1] - s) * pitch
-        height -= 0.03 * step(0.05, 0.0, ends) * (strand % 8 != 0)
-        angle = 2.0 * np.pi * strand / strands
-        z, rho = (np.interp(start + s * pitch, arc, profile[:, c]) for c in (2, 0))
-        foot = np.stack([rho * np.cos(angle), rho * np.sin(angle), z], axis=1)
+        row = np.linspace(kept[0] - 0.5, kept[-1] + 0.5, 10 * len(kept))
+        ends = pitch * np.minimum(row - row[0], row[-1] - row)
+        height = -lift * _waves(row, over[strand]) - 0.03 * step(0.05, 0.0, ends) * (strand % 8 != 0)
+        foot = at(row, 2.0 * np.pi * strand / strands)
         parts.append(_strand(base, rng, foot, height, 0.40 * pitch, closed=False))
     parts += [_knob(rng, side * profile[0, 2], start + 0.02) for side in (-1.0, 1.0)]
     inner = base.mesh(96)
@@ -268,18 +253,16 @@ SEEDS = {name: 100 + k for k, name in enumerate(KINDS)}
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument(
-        "names", nargs="*", metavar="NAME", help=f"all of {', '.join(KINDS)} if none is given"
-    )
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(KINDS)}; all if none is given")
     parser.add_argument("--out", type=Path, default=OUT)
     parser.add_argument("--views", type=int, default=80)
     parser.add_argument("--resolution", type=int, default=400, help="height and width [pixels]")
     parser.add_argument("--spp", type=int, default=48, help="samples per pixel")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
+    if unknown := set(options.names) - set(KINDS):
+        parser.error(f"no such capture: {', '.join(sorted(unknown))}")
     for name in options.names or KINDS:
         base, part = KINDS[name](np.random.default_rng([options.seed, SEEDS[name]]))
         write_capture(

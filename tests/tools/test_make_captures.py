@@ -129,6 +129,13 @@ def test_photos_are_made_again(script, made, folder, capture):
     assert np.abs(again.astype(int) - capture.images[3]).max() <= 1
 
 
+def test_unknown_names_are_refused(script, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["make_captures.py", "moss"])
+    with pytest.raises(SystemExit) as caught:
+        script.main()
+    assert caught.value.code == 2 and "no such capture: moss" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     "name", [QUICK, *(pytest.param(n, marks=pytest.mark.slow) for n in ("durian", "grass", "cobbles"))]
 )
