@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from mitex.integrators.march import Samples, accumulated, march, traverse, weights_of
 from mitex.runtime import init
 
-mi = init()
+mi: Any = init()
 import drjit as dr  # noqa: E402
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from mitex.colour import srgb_to_linear
 from mitex.mesh import Similarity
 from mitex.runtime import init
 
-mi = init()
+mi: Any = init()
 import drjit as dr  # noqa: E402
 
 from mitex.textures.shell_field import shell_field  # noqa: E402
@@ -41,7 +42,7 @@ class Ball:
         return index, self.density + zero, mi.Color3f(*self.colour) + zero
 
 
-def picture(field, *, spp=16, turn=None, place=None, side=33, seed=0, **entries):
+def picture(field, *, spp=16, turn=None, place=None, side=33, seed=0, **entries: Any):
     place = place or Similarity(np.zeros(3), 1.0)
     scene = {
         "type": "scene",
@@ -84,7 +85,7 @@ def test_a_wall_through_the_middle_leaves_the_front_half():
 
 def test_the_field_casts_its_shadow():
     """A lamp above a floor, the field between: below it the direct light is what it lets pass."""
-    entries = {
+    entries: dict[str, Any] = {
         "lamp": {"type": "point", "position": [0, 3, 0], "intensity": {"type": "rgb", "value": 20.0}},
         "floor": {
             "type": "rectangle",
@@ -97,7 +98,9 @@ def test_the_field_casts_its_shadow():
             "film": {"type": "hdrfilm", "width": 33, "height": 33, "rfilter": {"type": "box"}},
         },
     }
-    clear, thin, dense = (picture(Ball(d, (0, 0, 0)), spp=256, **entries)[16, 16].mean() for d in (1e-6, 1.0, 1000.0))
+    clear, thin, dense = (
+        picture(Ball(d, (0, 0, 0)), spp=256, **entries)[16, 16].mean() for d in (1e-6, 1.0, 1000.0)
+    )
     assert clear > 0.1
     np.testing.assert_allclose(thin / clear, math.exp(-1.0), rtol=5e-2)
     assert dense < 1e-3 * clear
@@ -119,7 +122,7 @@ def test_a_field_can_be_moved_scaled_and_turned():
 
 
 def test_without_matter_it_is_a_path_tracer():
-    entries = {
+    entries: dict[str, Any] = {
         "floor": {"type": "sphere", "bsdf": {"type": "roughconductor", "alpha": 0.3}},
         "box": {"type": "cube", "to_world": mi.ScalarTransform4f().translate([1.2, -0.5, 0]).scale(0.5)},
         "sky": {"type": "constant", "radiance": 0.4},

@@ -64,7 +64,7 @@ class AppliedTexture(Shell):
         projection = Projection(placed, neighbours=NEIGHBOURS, pull=None, reach=thickness)
         cells = texture.model.config.occupancy
         step = max(scale * DIAGONAL / texture.model.config.cells, DIAGONAL / FINEST)
-        occupancy = Occupancy(cells, shell_cells(projection, thickness, cells))
+        occupancy = Occupancy(cells, shell_cells(projection, thickness, np.ones((cells,) * 3, bool)))
         latents = MappedLatents(maps, uv, face_frames(placed))
         super().__init__(
             projection,

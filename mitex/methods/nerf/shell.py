@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
+from scipy import ndimage
 
 from mitex.methods.nerf.field import HIGHEST, Decoder, Encoding
 from mitex.methods.nerf.lighting import shade, to_display
+from mitex.methods.nerf.occupancy import gridded
 from mitex.methods.nerf.projection import Feet, Projection
 from mitex.methods.nerf.tensors import channels, rows
 from mitex.runtime import load_mitsuba
@@ -179,13 +181,16 @@ def within(feet: Feet, thickness: float) -> tuple[np.ndarray, Feet]:
     return index, Feet(*(values[index] for values in vars(feet).values()))
 
 
-def shell_cells(projection: Projection, thickness: float, side: int) -> np.ndarray:
-    """(side, side, side) bool, cells of the scene cube that the shell may reach; in slabs, to save memory."""
-    centres = (np.arange(side, dtype=np.float32) + 0.5) * (2 / side) - 1
-    margin = np.sqrt(3) / side
-    slabs = []
-    for x in centres:
-        y, z = (a.ravel() for a in np.meshgrid(centres, centres, indexing="ij"))
-        feet = projection(np.stack([np.full_like(y, x), y, z], 1))
-        slabs.append((np.abs(feet.distance) < thickness + margin).reshape(side, side))
-    return np.stack(slabs)
+def shell_cells(projection: Projection, thickness: float, possible: np.ndarray) -> np.ndarray:
+    """Cells of the scene cube whose centres are in the shell, and their neighbours.
+
+    Args:
+        projection: onto the mesh.
+        thickness: h [scene units].
+        possible: (G, G, G) bool, the cells that are looked at.
+    """
+
+    def inside(points: np.ndarray) -> np.ndarray:
+        return np.abs(projection(points).distance) < thickness
+
+    return ndimage.binary_dilation(gridded(inside, possible, len(possible)) > 0)

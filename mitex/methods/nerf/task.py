@@ -54,8 +54,7 @@ class TextureTask(RadianceTask):
         self.projection, self.frames, self.thickness = projection, frames, thickness
         self.encoding = Encoding(config)
         parameters = _start(config, self.encoding, len(capture))
-        possible = shell_cells(projection, thickness, config.occupancy)
-        possible &= hull_cells(capture, config.occupancy)
+        possible = shell_cells(projection, thickness, hull_cells(capture, config.occupancy))
         super().__init__(config, capture, shown, Occupancy(config.occupancy, possible), parameters)
 
     def metadata(self) -> dict[str, str]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
+from benchmarks import torch_field
 from mitex.bridge import call
 from mitex.methods.nerf import field as networks
 from mitex.methods.nerf.config import NerfConfig
@@ -15,7 +16,7 @@ from mitex.methods.nerf.field import Decoder, Encoding, embedded, weight_bound, 
 from mitex.methods.nerf.tensors import channels, rows, tensor
 from mitex.runtime import init
 
-mi = init()
+mi: Any = init()
 import drjit as dr  # noqa: E402
 
 SMALL = NerfConfig(table=10, coarsest=8, finest=16)
@@ -35,32 +36,9 @@ def inputs(seed: int = 0) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     return f, phase, 0.1 * torch.randn(POINTS, generator=drawn)
 
 
-def oracle(f, phase, distance, matrices):
-    """The networks in plain torch: density, k_d, k_s, g, theta, phi as (N, 8)."""
-    waves = [distance[:, None]]
-    for octave in range(12):
-        waves += [torch.sin(distance * 2**octave)[:, None], torch.cos(distance * 2**octave)[:, None]]
-    fine = torch.cat(waves, 1)
-    given = iter(matrices)
-
-    def run(count, x):
-        for k in range(count):
-            x = x @ next(given).T
-            x = torch.relu(x) if k < count - 1 else x
-        return x
-
-    density = run(2, torch.cat([f, fine], 1))
-    reflection = run(3, density[:, 1:])
-    theta = run(3, torch.cat([f, fine[:, :12]], 1))
-    phi = run(3, torch.cat([phase, fine[:, :12]], 1))
-    gloss = torch.nn.functional.softplus(reflection[:, 4:]) + 1
-    return torch.cat([density[:, :1].exp(), reflection[:, :4].sigmoid(), gloss, theta, phi], 1)
-
-
 def decoded(f, phase, distance, *matrices, packed=False):
     def run(f, phase, distance, *matrices):
-        split = [_columns(x) for x in (f, phase)]
-        found = Decoder(matrices, packed)(*split, distance.array)
+        found = Decoder(matrices, packed)(_columns(f), _columns(phase), distance.array)
         values = [found.density, *found.diffuse, found.specular, found.glossiness, found.theta, found.phi]
         return tensor(mi.ArrayXf(*values))
 
@@ -75,7 +53,7 @@ def _columns(x):
 @pytest.mark.parametrize("packed", [False, True])
 def test_the_networks_agree_with_torch(packed):
     given = (*inputs(), *weights())
-    expected = oracle(*given[:3], given[3:])
+    expected = torch_field.decoded(*inputs(), weights())
     np.testing.assert_allclose(decoded(*given, packed=packed), expected, rtol=2e-4, atol=2e-5)
 
 
@@ -83,34 +61,12 @@ def test_gradients_of_the_networks_agree_with_torch():
     ours, theirs = ([x.clone().requires_grad_() for x in (*inputs(), *weights())] for _ in range(2))
     share = torch.randn(POINTS, 8, generator=torch.Generator().manual_seed(3))
     (decoded(*ours) * share).sum().backward()
-    (oracle(*theirs[:3], theirs[3:]) * share).sum().backward()
+    f, phase, distance, *matrices = theirs
+    (torch_field.decoded(f, phase, distance, matrices) * share).sum().backward()
     for a, b in zip(ours, theirs, strict=True):
-        np.testing.assert_allclose(a.grad, b.grad, rtol=1e-3, atol=1e-3 * float(b.grad.abs().max()))
-
-
-def looked_up(config: NerfConfig, table: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """f by loops over levels and corners, with the hash of Mueller et al. 2022."""
-    encoding = Encoding(config)
-    ratio = (config.finest / config.coarsest) ** (1 / 7)
-    columns = []
-    for level, part in enumerate(encoding.levels(0)):
-        entries = table[part].reshape(-1, 2)
-        scale = config.coarsest * ratio**level - 1
-        side = int(np.ceil(scale)) + 1
-        place = (points.astype(np.float64) * 0.5 + 0.5) * scale
-        low = np.floor(place).astype(np.int64)
-        share = place - low
-        total = np.zeros((len(points), 2))
-        for corner in itertools.product((0, 1), repeat=3):
-            at = low + corner
-            weight = np.where(corner, share, 1 - share).prod(1)
-            if side**3 > len(entries):
-                index = np.bitwise_xor.reduce((at * [1, 2654435761, 805459861]) & 0xFFFFFFFF, axis=1)
-            else:
-                index = at @ [1, side, side**2]
-            total += weight[:, None] * entries[index % len(entries)]
-        columns.append(total)
-    return np.concatenate(columns, 1)
+        assert a.grad is not None and b.grad is not None
+        largest = float(b.grad.abs().max())
+        np.testing.assert_allclose(a.grad.numpy(), b.grad.numpy(), rtol=1e-3, atol=1e-3 * largest)
 
 
 def stacked(found) -> np.ndarray:
@@ -123,7 +79,8 @@ def test_features_agree_with_a_hash_grid_by_loops():
     table = rng.normal(size=encoding.sizes[0]).astype(np.float32)
     points = rng.uniform(-0.99, 0.99, (200, 3)).astype(np.float32)
     found = encoding(0, channels(mi.Point3f, points), mi.Float(table))
-    np.testing.assert_allclose(stacked(found), looked_up(SMALL, table, points), atol=2e-4)
+    expected = torch_field.encoded(encoding, 0, torch.from_numpy(points), torch.from_numpy(table))
+    np.testing.assert_allclose(stacked(found), expected, atol=2e-4)
 
 
 def test_points_beyond_the_cube_get_features_of_its_border():

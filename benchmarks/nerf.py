@@ -1,0 +1,118 @@
+"""How fast the field of a radiance texture is evaluated and trained.
+
+usage: python -m benchmarks.nerf [--quick]
+
+Points per second through hash grids and networks, forwards, and forwards and backwards to tables and weights,
+by `drjit.nn` and by plain torch in the same run; and forwards as it is packed for pictures.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import torch
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks import torch_field
+from mitex.bridge import call
+from mitex.methods.nerf.config import PRESETS, NerfConfig
+from mitex.methods.nerf.field import Decoder, Encoding, weight_bound, weight_shapes
+from mitex.methods.nerf.tensors import tensor
+from mitex.runtime import init
+
+mi = init()
+import drjit as dr  # noqa: E402
+
+ENOUGH = 2.0  # seconds that are timed
+TABLE = 17
+
+
+def rate(points: int, work: Callable[[], object]) -> float:
+    """Points per second of `work`, once it is warm."""
+    work()
+    begun, rounds = time.perf_counter(), 0
+    while not rounds or time.perf_counter() - begun < ENOUGH:
+        work()
+        rounds += 1
+    return points * rounds / (time.perf_counter() - begun)
+
+
+def parameters(encoding: Encoding) -> list[torch.Tensor]:
+    """Tables and weights, attached."""
+    drawn = torch.Generator().manual_seed(0)
+    tables = [torch.empty(size).uniform_(-0.1, 0.1, generator=drawn) for size in encoding.sizes]
+    weights = [
+        torch.empty(shape).uniform_(-weight_bound(shape), weight_bound(shape), generator=drawn)
+        for shape in weight_shapes()
+    ]
+    return [value.requires_grad_() for value in tables + weights]
+
+
+def ours(
+    encoding: Encoding, points: torch.Tensor, distance: torch.Tensor, given: list[torch.Tensor], packed: bool
+):
+    """All outputs of the field, (N, 8), by Dr.Jit."""
+
+    def run(points, distance, f, phase, *weights):
+        foot = dr.unravel(mi.Point3f, points.array)
+        features, phases = (encoding(k, foot, table.array) for k, table in enumerate((f, phase)))
+        found = Decoder(weights, packed)(features, phases, distance.array)
+        values = [found.density, *found.diffuse, found.specular, found.glossiness, found.theta, found.phi]
+        return tensor(mi.ArrayXf(*values))
+
+    return call(run, points, distance, *given)
+
+
+def theirs(
+    encoding: Encoding, points: torch.Tensor, distance: torch.Tensor, given: list[torch.Tensor]
+) -> torch.Tensor:
+    """The same by torch."""
+    features, phases = (torch_field.encoded(encoding, k, points, given[k]) for k in range(2))
+    return torch_field.decoded(features, phases, distance, given[2:])
+
+
+def trained(result: torch.Tensor, given: list[torch.Tensor]) -> None:
+    """Backwards to tables and weights."""
+    torch.autograd.grad(result.sum(), given)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="fewer points")
+    count = 1 << (14 if parser.parse_args().quick else 16)
+    dr.set_expand_threshold(2**26)
+    drawn = torch.Generator().manual_seed(1)
+    points = torch.empty(count, 3).uniform_(-0.9, 0.9, generator=drawn)
+    distance = torch.empty(count).uniform_(-0.1, 0.1, generator=drawn)
+    table = Table(title=f"{count:,} points, tables of 2^{TABLE} entries [million points a second]")
+    for name in ("", "forwards", "packed", "and backwards"):
+        table.add_column(name)
+    for preset in ("fast", "paper"):
+        config: NerfConfig = replace(PRESETS[preset], table=TABLE)
+        encoding = Encoding(config)
+        given = parameters(encoding)
+        fixed = [value.detach() for value in given]
+        scene = encoding, points, distance
+        torch_rates = [
+            rate(count, lambda s=scene, f=fixed: theirs(*s, f)),
+            rate(count, lambda s=scene, g=given: trained(theirs(*s, g), g)),
+        ]
+        our_rates = [
+            rate(count, lambda s=scene, f=fixed: ours(*s, f, False)),
+            rate(count, lambda s=scene, f=fixed: ours(*s, f, True)),
+            rate(count, lambda s=scene, g=given: trained(ours(*s, g, False), g)),
+        ]
+        table.add_row(f"{preset}, torch", f"{torch_rates[0] / 1e6:.2f}", "", f"{torch_rates[1] / 1e6:.3f}")
+        table.add_row(f"{preset}, drjit.nn", *(f"{r / 1e6:.2f}" for r in our_rates))
+        against = (torch_rates[0], torch_rates[0], torch_rates[1])
+        ratios = [f"{a / b:.1f} x" for a, b in zip(our_rates, against, strict=True)]
+        table.add_row("", *ratios, end_section=True)
+    Console(width=100).print(table)
+
+
+if __name__ == "__main__":
+    main()
