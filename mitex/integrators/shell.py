@@ -41,9 +41,7 @@ class ShellMethods:
             raise RuntimeError(f"shell: variant '{mi.variant()}' is not supported; use llvm_ad_rgb")
         self.field = props.get("field")
         if not hasattr(self.field, "march"):
-            raise RuntimeError(
-                "shell: 'field' is not a shell_field; see mitex.textures.shell_field"
-            )
+            raise RuntimeError("shell: 'field' is not a shell_field; see mitex.textures.shell_field")
         self.max_depth = int(props.get("max_depth", 6))
         if self.max_depth < 1:
             raise RuntimeError(f"shell: 'max_depth' is {self.max_depth}; use 1 or more")

@@ -94,7 +94,7 @@ def test_the_embedding_is_the_distance_and_its_waves():
     values = [np.array(v) for v in embedded(mi.Float(0.3, -0.1))]
     assert len(values) == networks.FINE == 25
     np.testing.assert_allclose(values[0], [0.3, -0.1], rtol=1e-6)
-    np.testing.assert_allclose(values[23], np.sin(2**11 * np.float32([0.3, -0.1])), atol=2e-4)
+    np.testing.assert_allclose(values[23], np.sin(2**11 * np.array([0.3, -0.1], np.float32)), atol=2e-4)
 
 
 def test_the_normal_of_equation_4():

@@ -63,7 +63,7 @@ def test_the_state_goes_round_and_must_fit():
 def test_a_grid_is_the_density_where_cells_are_occupied():
     occupied = np.zeros((4, 4, 4), bool)
     occupied[1:3, 1:3, 2] = True
-    found = gridded(lambda p: p @ np.float32([1, 10, 100]) + 200, occupied, 8)
+    found = gridded(lambda p: p @ np.array([1, 10, 100], np.float32) + 200, occupied, 8)
     axis = (np.arange(8) + 0.5) / 4 - 1
     x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
     inside = occupied.repeat(2, 0).repeat(2, 1).repeat(2, 2)
