@@ -42,7 +42,7 @@ class Located:
         """Of feet that all hit; `scale` divides the distances."""
         return Located(
             channels(mi.Point3f, feet.point),
-            mi.Float(feet.distance) / scale,
+            mi.Float(feet.distance / np.float32(scale)),
             mi.UInt32(feet.face.astype(np.uint32)),
             channels(mi.Point2f, feet.barycentric),
             channels(mi.Vector3f, feet.normal),
