@@ -16,6 +16,8 @@ from mitex.images import SUFFIXES
 
 ONE_FILE = "transforms.json"
 SPLIT_FILES = ("transforms_train.json", "transforms_val.json", "transforms_test.json")
+FOCAL = (0.02, 1e4)  # focal lengths that a lens may have [image sizes]
+FARTHEST = 1e9  # coordinate of a camera that float64 can work with
 ASPECT = 0.01  # singular values of a rotation may differ by this ratio
 
 
@@ -68,8 +70,10 @@ class Frame:
             if not 0.0 < angle < math.pi:
                 raise CaptureError(f"{self.name} has camera_angle_{axis} {angle:g}", "give radians below pi")
             focal = size / (2.0 * math.tan(0.5 * angle))
-        if not 0.0 < focal < math.inf:
-            raise CaptureError(f"{self.name} has fl_{axis} {focal:g}", "give a focal length in pixels")
+        if not FOCAL[0] < focal / size < FOCAL[1]:
+            raise CaptureError(
+                f"{self.name} is {size} pixels, its fl_{axis} {focal:g}", "give the focal length in pixels"
+            )
         return focal
 
     def _number(self, key: str, default: Any) -> Any:
@@ -174,8 +178,8 @@ def _pose(matrix: Any, name: str) -> np.ndarray:
         pose = np.zeros(0)
     if pose.shape not in ((4, 4), (3, 4)):
         raise CaptureError(f"{name} has no 4 x 4 transform_matrix", "give camera to world, row by row")
-    if not np.isfinite(pose).all():
-        raise CaptureError(f"{name} has a pose that is not finite", "drop the frame or repair its pose")
+    if not np.abs(pose).max() < FARTHEST:
+        raise CaptureError(f"{name} has a pose with NaN or huge numbers", "drop the frame or repair its pose")
     left, sizes, right = np.linalg.svd(pose[:3, :3])
     if not sizes[2] > (1.0 - ASPECT) * sizes[0]:
         raise CaptureError(f"{name} has a pose that is no rotation", "drop the frame or repair its pose")

@@ -41,8 +41,9 @@ def undistort(points: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
 
 def folds(points: np.ndarray, coefficients: np.ndarray) -> bool:
     """Whether some of the distorted points (..., 2) have no ideal point that is found."""
-    again = distort(undistort(points, coefficients), coefficients)
-    return bool(np.abs(again - points).max(initial=0.0) > 1e-6)
+    with np.errstate(all="ignore"):
+        again = distort(undistort(points, coefficients), coefficients)
+        return not np.abs(again - points).max(initial=0.0) <= 1e-6  # NaN counts as folded
 
 
 def _terms(points: np.ndarray, coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
