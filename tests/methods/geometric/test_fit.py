@@ -85,7 +85,7 @@ def test_models_round_trip(made):
         assert np.array_equal(a, b)
 
 
-@pytest.mark.parametrize("damage", ["cut", "foreign", "nan", "missing"])
+@pytest.mark.parametrize("damage", ["cut", "foreign", "nan", "noise", "missing"])
 def test_what_is_no_model_is_refused(made, tmp_path, damage):
     from safetensors.torch import load_file, save_file
 
@@ -101,16 +101,19 @@ def test_what_is_no_model_is_refused(made, tmp_path, damage):
             texture.generators[0].parameters[0][0, 0] = torch.nan
         texture.save(path)
         assert load_file(path)
+    elif damage == "noise":
+        texture = GeometricTexture.load(source)
+        replace(texture, fixed=texture.fixed[1:]).save(path)
     with pytest.raises(CheckpointError, match="geometric texture"):
         GeometricTexture.load(tmp_path)
 
 
 def test_the_mesh_is_split_on_every_level_but_the_first(made):
     mesh = torus(12, 6)
-    for start, end, factor in ((0, 2, 16), (1, 2, 4), (2, 2, 1), (0, 0, 1)):
+    for start, end, splits in ((0, 2, 2), (1, 2, 1), (2, 2, 0), (0, 0, 0), (None, None, 0)):
         asset = made[1].apply(mesh, start_level=start, end_level=end)
-        assert len(asset.mesh.faces) == factor * len(mesh.faces)
-        assert np.array_equal(asset.mesh.faces, subdivide_midpoint(mesh, end - start).faces)
+        assert len(asset.mesh.faces) == 4**splits * len(mesh.faces)
+        assert np.array_equal(asset.mesh.faces, subdivide_midpoint(mesh, splits).faces)
 
 
 def test_results_keep_place_and_size(made):
@@ -178,6 +181,14 @@ def test_two_components_are_displaced_alike(made):
     assert not np.allclose(moved, two.vertices, atol=1e-2)
 
 
+def test_edges_are_measured_again_if_wanted(made):
+    """On the first level that changes nothing: the mesh's mean edge is 1 there."""
+    mesh, again = bumpy(), replace_about(made[1], remeasure=True)
+    for start, alike in ((2, True), (1, False)):
+        a, b = (texture.apply(mesh, start_level=start).mesh.vertices for texture in (made[1], again))
+        assert np.allclose(a, b, atol=1e-5) == alike
+
+
 def replace_about(texture: GeometricTexture, **changes) -> GeometricTexture:
     return replace(texture, about={**texture.about, **changes})
 
@@ -198,6 +209,7 @@ def test_growth_starts_at_the_mesh_and_ends_at_the_result(made):
     shown = list(made[1].growth(mesh, frames=4, seed=2, start_level=1))
     assert [len(m.faces) for m in shown] == [180] * 5 + [720] * 4
     assert np.array_equal(shown[0].vertices, mesh.vertices)
+    assert np.allclose(shown[2].vertices, (shown[0].vertices + shown[4].vertices) / 2, atol=1e-6)
     assert np.allclose(shown[-1].vertices, made[1].apply(mesh, seed=2, start_level=1).mesh.vertices)
 
 
@@ -282,15 +294,29 @@ def test_critics_take_turns():
     assert not torch.equal(before, often.critics[0].parameters[0])
 
 
+def test_critics_prefer_the_training_mesh():
+    """After 40 steps the training mesh has the higher score: more is real, and the generator wants more."""
+
+    def lead(**changes) -> float:
+        task = small_task(lr=5e-3, **changes)
+        _, record = task.loss(0, torch.Generator().manual_seed(0))
+        graph = task.hierarchy.graphs[0]
+        score = task.critics[0](face_features(task.meshes[0], graph), graph).detach().mean()
+        return float(score) + record["adversarial"]
+
+    assert lead() < 0 and lead(critic_steps=40, generator_steps=1) > 0.05
+
+
 def test_weights_are_carried_up():
     task = small_task(steps=5, level_steps=1, carried=3)
     drawn = torch.Generator().manual_seed(0)
     second = [p.detach().clone() for p in task.generators[2].parameters]
     task.loss(2, drawn)
     assert all(torch.equal(p, q) for p, q in zip(task.generators[2].parameters, second, strict=True))
-    task.loss(3, drawn)
-    for p, q in zip(task.generators[3].parameters, task.generators[2].parameters, strict=True):
-        assert torch.equal(p, q)
+    assert "critic" not in task.loss(3, drawn)[1]  # trained, it would be another one
+    for networks in (task.generators, task.critics):
+        for p, q in zip(networks[3].parameters, networks[2].parameters, strict=True):
+            assert torch.equal(p, q)
 
 
 def test_the_reconstruction_comes_near():
