@@ -59,7 +59,7 @@ def toy(levels: int) -> GeometricTask:
         torch.from_numpy(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=drawn)
         for k, mesh in enumerate(hierarchy.meshes)
     ]
-    return GeometricTask(config, hierarchy, torch.from_numpy(ball.vertices), meshes, "toy")
+    return GeometricTask(config, hierarchy, torch.from_numpy(ball.vertices), meshes, ball)
 
 
 def main() -> None:
