@@ -133,7 +133,9 @@ def _carve(
     count = len(views)
     # Neighbours in a video carve the same voxels: views in random order leave fewer to be looked at.
     for done, k in enumerate(np.random.default_rng(0).permutation(count), start=1):
-        framed, background = _judged(views[k], *distances[k], centres[alive], 0.5 * np.sqrt(3.0) * edge)
+        distance, stride = distances[k]
+        reach = 0.5 * np.sqrt(3.0) * edge
+        framed, background = _judged(views[k], distance, stride, centres[alive], reach)
         seen[alive] += framed
         against[alive] += background
         possible = seen[alive] + count - done >= SEEN * count

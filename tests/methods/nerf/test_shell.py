@@ -104,7 +104,7 @@ def test_density_is_zero_outside_and_evaluated_inside():
     points = np.stack([np.zeros(6), radius, np.zeros(6)], 1).astype(np.float32)
     density = one.density(points)
     assert (density[[0, 4, 5]] == 0).all() and (density[1:4] > 0).all()
-    view = channels(mi.Vector3f, np.broadcast_to(np.float32([0, -1, 0]), (6, 3)))
+    view = channels(mi.Vector3f, np.tile([0.0, -1.0, 0.0], (6, 1)))
     index, found, colour = one.evaluate(channels(mi.Point3f, points), view)
     np.testing.assert_array_equal(np.array(index), [1, 2, 3])
     np.testing.assert_allclose(np.array(found), density[1:4], rtol=1e-4)
