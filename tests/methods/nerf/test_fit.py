@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,13 @@ import torch
 from mitex.asset import Asset
 from mitex.errors import CheckpointError, ConfigError, MeshError, OutputError
 from mitex.mesh import Mesh, icosphere
-from mitex.methods.nerf import NerfTexture, files, fit
+from mitex.methods.nerf import PRESETS, NerfTexture, files, fit
+from mitex.methods.nerf.base_shape import face_frames
 from mitex.methods.nerf.maps import LatentMaps
 from mitex.methods.nerf.pixels import Pixels
+from mitex.methods.nerf.projection import Projection
 from mitex.methods.nerf.radiance import look
+from mitex.methods.nerf.task import TextureTask
 from mitex.metrics import psnr
 from tests.methods.nerf.tiny import tiny_capture
 
@@ -194,3 +198,15 @@ def test_a_resumed_run_continues_as_if_it_had_not_stopped(run, tmp_path, base, m
         threads(before)
     for a, b in zip(whole.model.weights, parts.model.weights, strict=True):
         torch.testing.assert_close(a, b, rtol=0, atol=1e-6)
+
+
+def test_refined_cameras_get_the_gradient_of_the_loss(base):
+    small = dict(rays=512, table=12, coarsest=8, finest=16, occupancy=32, cells=128)
+    settings = replace(PRESETS["fast"], refine_cameras=True, **small)
+    capture = tiny_capture()
+    task = TextureTask(settings, capture, (capture, 0), Projection(base, reach=0.12), face_frames(base), 0.12)
+    loss, _ = task.loss(0, torch.Generator().manual_seed(0))
+    loss.backward()
+    gradient = task.named["poses"].grad
+    assert gradient is not None and gradient.shape == (len(capture), 6)
+    assert gradient.isfinite().all() and (gradient.abs().sum(1) > 0).float().mean() > 0.9
