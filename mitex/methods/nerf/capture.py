@@ -80,6 +80,12 @@ class Capture:
         held = np.arange(len(self)) % every == 0
         return self._chosen(np.flatnonzero(~held)), self._chosen(np.flatnonzero(held))
 
+    def within(self, similarity: Similarity) -> Capture:
+        """The same photos in another scene cube, such as the one that a texture was learned in."""
+        poses = self.poses.astype(np.float64)
+        poses[:, :, 3] = similarity.apply(self.similarity.inverse(poses[:, :, 3]))
+        return replace(self, poses=poses.astype(np.float32), similarity=similarity)
+
     def _chosen(self, index: np.ndarray) -> Capture:
         return replace(
             self,

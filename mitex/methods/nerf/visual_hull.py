@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import ndimage
@@ -13,7 +14,7 @@ from mitex.methods.nerf.lens import distort, undistort
 RESOLUTION = 64
 ROUNDS = 2
 DISSENT = 0.05  # part of the views that may call a voxel background: their masks may be wrong
-SEEN = 0.5  # part of the views that must have a voxel in the frame
+SEEN = 0.5  # part of the views that must tell of a voxel
 MASK_SIZE = 256  # longer side of the masks that carve [pixels]
 
 
@@ -32,6 +33,11 @@ class View:
     pose: np.ndarray
     intrinsics: np.ndarray
     distortion: np.ndarray
+
+    @cached_property
+    def whole(self) -> bool:
+        """Whether the frame cuts nothing off: all of the object is in it."""
+        return not any(side.any() for side in (self.mask[[0, -1]], self.mask[:, [0, -1]]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +69,9 @@ class Hull:
 def visual_hull(views: Sequence[View]) -> Hull | None:
     """What the masks leave of the space around the point that the cameras look at.
 
-    A voxel stays while it may touch the object in all views that have it in their frame, but for a few, and
-    if enough views have it. The first grid reaches to the farthest camera, the second covers what is left.
+    A voxel stays while it may touch the object in all views but for a few. Views whose frame cuts the object
+    off say nothing about what is outside; enough views must say something. The first grid reaches to the
+    farthest camera, the second covers what is left.
 
     Returns:
         The hull, which contains the object; None if nothing is left.
@@ -148,7 +155,7 @@ def _carve(
 def _judged(
     view: View, away: np.ndarray, block: int, points: np.ndarray, radius: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which points are in the frame, and around which of those a ball shows background only, (N,) each."""
+    """Which points the view tells of, and around which of those a ball shows background only, (N,) each."""
     height, width = view.mask.shape
     pixels, depth = project(points, view.pose, view.intrinsics, view.distortion)
     framed = (depth > 0.0) & (pixels >= 0.0).all(axis=1) & (pixels < (width, height)).all(axis=1)
@@ -156,9 +163,9 @@ def _judged(
         framed &= _off_axis(view, points) <= _widest(view)
     column, row = (pixels[framed] // block).astype(np.int64).T
     blurred = radius * view.intrinsics[:2].max() / depth[framed]
-    background = np.zeros(len(points), bool)
+    background = np.full(len(points), view.whole)
     background[framed] = away[row, column] > blurred
-    return framed, background
+    return framed | view.whole, background
 
 
 def _off_axis(view: View, points: np.ndarray) -> np.ndarray:

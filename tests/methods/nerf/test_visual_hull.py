@@ -39,6 +39,23 @@ def test_hull_contains_the_ball_and_little_else():
     assert (high > RADIUS).all() and (high < 1.2 * RADIUS).all()
 
 
+def test_what_is_outside_of_a_frame_is_carved():
+    """The frames end just beyond the ball: side views must carve what stands above it all the same."""
+    tight = [view(looking(back), 64, 180.0) for back in AROUND]
+    assert all(v.whole for v in tight)
+    hull = visual_hull(tight)
+    assert hull is not None
+    low, high = hull.bounds()
+    assert (low > -1.2 * RADIUS).all() and (high < 1.2 * RADIUS).all()
+
+
+def test_frames_that_cut_the_ball_carve_nothing_beyond():
+    close = [view(looking(back), 64, 300.0) for back in AROUND[:2]]
+    assert not any(v.whole for v in close)
+    hull = visual_hull([view(looking(back)) for back in AROUND] + close)
+    assert hull is not None and hull.contains(0.99 * RADIUS * np.eye(3)).all()
+
+
 def test_large_masks_are_carved_as_small_ones():
     small = visual_hull([view(looking(back)) for back in AROUND])
     large = visual_hull([view(looking(back), 600, 900.0) for back in AROUND])
