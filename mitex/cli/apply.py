@@ -24,7 +24,7 @@ OPTIONS = {  # those that mean something, by method
     "nca": ("seed", "steps", "subdivide", "orientation", "scale", "resolution", "vertex_colors"),
     "surface": (),
     "geometric": ("seed", "start_level", "end_level", "remesh"),
-    "nerf": ("seed", "scale", "size", "density"),
+    "nerf": ("seed", "scale", "size", "density", "lift", "guide"),
 }
 
 
@@ -78,6 +78,12 @@ class Apply(Displacing):
     density: Annotated[float, arg(metavar="X")] = 1.0
     """Radiance fields: factor of the density; more makes thin parts solid."""
 
+    lift: Annotated[float, arg(metavar="X")] = 0.0
+    """Radiance fields: 0 carves the texture into the mesh as it was captured, 1 stands it on the mesh."""
+
+    guide: Annotated[Path | None, arg(metavar="IMAGE", help_behavior_hint="")] = None
+    """Radiance fields: a picture that the synthesized texture resembles from afar."""
+
     vertex_colors: Annotated[bool, arg(help_behavior_hint="")] = False
     """Write colours at the vertices instead of textures."""
 
@@ -92,6 +98,7 @@ class Apply(Displacing):
         not_both("--resolution", "--vertex-colors", self.resolution is not None and self.vertex_colors)
         in_range("--size", self.size, 128, 8192)
         in_range("--density", self.density, 0.001, 1000.0)
+        in_range("--lift", self.lift, 0.0, 1.0)
         from mitex.paths import prepare_output
 
         method = self._method()
@@ -161,12 +168,15 @@ class Apply(Displacing):
 
     def _captured(self) -> AppliedTexture:
         """A radiance field in the shell of any mesh."""
+        from mitex.images import read_image
         from mitex.mesh import Mesh
         from mitex.methods.nerf import NerfTexture
         from mitex.methods.nerf.texture import SIZE
 
-        options = {"size": self.size or SIZE, "seed": self.seed, "scale": self.scale, "density": self.density}
-        return NerfTexture.load(self.model).apply(Mesh.load(self.mesh), **options)
+        mesh, texture = Mesh.load(self.mesh), NerfTexture.load(self.model)
+        guide = None if self.guide is None else read_image(self.guide)
+        maps = texture.synthesize(self.size or SIZE, self.seed, tileable=True, guide=guide)
+        return texture.apply(mesh, maps, scale=self.scale, density=self.density, lift=self.lift)
 
     def _extracted(self) -> Asset:
         """What is solid of it, as a mesh."""

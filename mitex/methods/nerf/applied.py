@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
 
-from mitex.atlas import unwrap, usable_uv
+from mitex.atlas import laid_out
 from mitex.errors import ConfigError, MeshError
 from mitex.images import write_image
 from mitex.integrators.march import DIAGONAL
 from mitex.mesh import Mesh, Similarity
-from mitex.methods.nerf.base_shape import face_frames
-from mitex.methods.nerf.maps import LatentMaps, MappedLatents
+from mitex.methods.nerf.maps import LatentMaps, MappedLatents, uv_frames
 from mitex.methods.nerf.occupancy import Occupancy
 from mitex.methods.nerf.projection import Projection
 from mitex.methods.nerf.shell import Shell, shell_cells
@@ -45,27 +43,37 @@ class AppliedTexture(Shell):
         similarity: the mesh's space -> scene cube.
 
     Args:
-        texture, maps, scale, density, light: as of `NerfTexture.apply`.
+        texture, maps, scale, density, lift, light: as of `NerfTexture.apply`.
     """
 
     def __init__(
-        self, texture: NerfTexture, mesh: Mesh, maps: LatentMaps, *, scale: float, density: float, light: Any
+        self,
+        texture: NerfTexture,
+        mesh: Mesh,
+        maps: LatentMaps,
+        *,
+        scale: float,
+        density: float,
+        lift: float,
+        light: Any,
     ) -> None:
-        if not 0.05 <= scale <= 20 or not 0 < density <= 1000:
+        if not 0.05 <= scale <= 20 or not 0 < density <= 1000 or not 0 <= lift <= 1:
             raise ConfigError(
-                f"a texture of {scale} times the size and {density} times the density is not possible",
-                "use sizes from 0.05 to 20 and densities up to 1000",
+                f"a texture of {scale} times the size, {density} times the density and lifted by {lift}",
+                "use sizes from 0.05 to 20, densities up to 1000 and lifts from 0 to 1",
             )
-        self.mesh = with_uv(mesh)
+        self.mesh = laid_out(mesh, UNWRAPPED)
         placed, self.similarity = centred(self.mesh)
         # One unit of the UVs shows so many textures that their elements have the size that is wanted.
         uv = np.asarray(placed.uv) * (stretch(placed) / (maps.size[1] * maps.gap * scale))
         thickness = texture.model.base.thickness * scale
-        projection = Projection(placed, neighbours=NEIGHBOURS, pull=None, reach=thickness)
+        raised = lift * scale * max(-texture.ground, 0.0)
+        projection = Projection(placed, neighbours=NEIGHBOURS, pull=None, reach=thickness + raised)
         cells = texture.model.config.occupancy
         step = max(scale * DIAGONAL / texture.model.config.cells, DIAGONAL / FINEST)
-        occupancy = Occupancy(cells, shell_cells(projection, thickness, np.ones((cells,) * 3, bool)))
-        latents = MappedLatents(maps, uv, face_frames(placed))
+        possible = shell_cells(projection, thickness, np.ones((cells,) * 3, bool), raised)
+        occupancy = Occupancy(cells, possible)
+        latents = MappedLatents(maps, uv, uv_frames(placed))
         super().__init__(
             projection,
             latents,
@@ -76,6 +84,7 @@ class AppliedTexture(Shell):
             step=step,
             scale=scale,
             strength=density,
+            lift=raised,
         )
         drawn = torch.Generator().manual_seed(0)
         for _ in range(LOOKS):
@@ -105,15 +114,8 @@ class AppliedTexture(Shell):
     @property
     def outline(self) -> np.ndarray:
         """(2 V, 3) points of the mesh's space that the shell lies between."""
-        reach = self.thickness * self.similarity.scale * self.mesh.normals
-        return np.concatenate([self.mesh.vertices - reach, self.mesh.vertices + reach])
-
-
-def with_uv(mesh: Mesh) -> Mesh:
-    """The mesh with UVs in which nothing overlaps: its own, or new ones."""
-    if mesh.uv is not None and usable_uv(mesh, mesh.uv):
-        return mesh
-    return replace(mesh, uv=unwrap(mesh, UNWRAPPED, 8))
+        ends = self.similarity.scale * np.array([self.lift - self.thickness, self.lift + self.thickness])
+        return np.concatenate([self.mesh.vertices + end * self.mesh.normals for end in ends])
 
 
 def centred(mesh: Mesh) -> tuple[Mesh, Similarity]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +17,11 @@ from mitex.methods.nerf.capture import Capture
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.occupancy import gridded
 from mitex.methods.nerf.pixels import Pixels
-from mitex.methods.nerf.plain import PlainTask
+from mitex.methods.nerf.plain import PlainTask, trained
 from mitex.methods.nerf.projection import Projection
-from mitex.methods.nerf.radiance import BETAS, EPSILON, rays_of
+from mitex.methods.nerf.radiance import rays_of
 from mitex.paths import cache_dir
 from mitex.runtime import load_mitsuba
-from mitex.training import checkpoint, train
-from mitex.training.optim import Adam
 
 mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
@@ -85,7 +82,7 @@ def find_base(
     place = cache_dir() / "nerf" / content_key(VERSION, *arrays, *mesh, *settings)
 
     def find() -> BaseShape:
-        task = _trained(capture, coarse, place.with_suffix(".run"), quiet)
+        task = trained(coarse, capture, (capture, 0), place.with_suffix(".run"), quiet)
         _say("cutting the base shape out of the coarse field, about a minute", quiet)
         base = _shape_of(task, config) if given is None else given_base(given)
         scan = scanned(task)
@@ -123,21 +120,6 @@ def scanned(task: PlainTask) -> np.ndarray:
     points = np.concatenate(found)
     _, first = np.unique(np.floor(points / VOXEL).astype(np.int64), axis=0, return_index=True)
     return points[np.sort(first)].astype(np.float32)
-
-
-def _trained(capture: Capture, config: NerfConfig, folder: Path, quiet: bool) -> PlainTask:
-    """A coarse field; its run folder lets an interrupted one go on."""
-    task = PlainTask(config, capture, (capture, 0))
-    resume = (folder / checkpoint.NAME).exists()
-    optimizer = partial(Adam, betas=BETAS, eps=EPSILON)
-    lr = partial(learning_rate, config)
-    train(task, config, folder, lr=lr, optimizer=optimizer, resume=resume, quiet=quiet)
-    return task
-
-
-def learning_rate(config: NerfConfig, step: int) -> float:
-    """Of a step, from 0 on."""
-    return config.lr * 0.1 ** (step / config.lr_steps)
 
 
 def _farthest(points: np.ndarray, count: int) -> np.ndarray:

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 
 from mitex.mesh import Mesh
 from mitex.methods.nerf import files
 from mitex.methods.nerf.base_shape import face_frames
 from mitex.methods.nerf.capture import Capture, load_capture
-from mitex.methods.nerf.coarse import find_base, learning_rate
+from mitex.methods.nerf.coarse import find_base
 from mitex.methods.nerf.config import PRESETS
 from mitex.methods.nerf.projection import Projection
-from mitex.methods.nerf.radiance import BETAS, EPSILON
+from mitex.methods.nerf.radiance import learn
 from mitex.methods.nerf.task import TextureTask
 from mitex.methods.nerf.texture import NerfTexture
 from mitex.runtime import init, keep_freed_memory
-from mitex.training import run, train
-from mitex.training.optim import Adam
+from mitex.training import run
 
 
 def fit(
@@ -69,15 +67,7 @@ def fit(
         base.mesh, neighbours=settings.neighbours, pull=settings.pull, reach=base.thickness
     )
     task = TextureTask(settings, learned, (held, 0), projection, frames, base.thickness)
-    result = train(
-        task,
-        settings,
-        out,
-        lr=partial(learning_rate, settings),
-        optimizer=partial(Adam, betas=BETAS, eps=EPSILON),
-        resume=resume,
-        quiet=quiet,
-    )
+    result = learn(task, settings, out, resume=resume, quiet=quiet)
     about = result.about(photos.name, settings.preset)
     about |= {key: getattr(settings, key) for key in files.SETTINGS}
     about |= {"centre": photos.similarity.center.tolist(), "scale": float(photos.similarity.scale)}

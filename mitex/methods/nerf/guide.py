@@ -11,6 +11,8 @@ from mitex.errors import ConfigError
 from mitex.images import resize
 from mitex.methods.nerf.matching import mirrored
 
+WEIGHT = 5.0
+
 
 @dataclass(frozen=True, eq=False)
 class Guide:
@@ -27,7 +29,7 @@ class Guide:
 
     image: np.ndarray
     colours: np.ndarray
-    weight: float = 5.0
+    weight: float = WEIGHT
 
     def __post_init__(self) -> None:
         image, colours = (np.asarray(a, np.float32) for a in (self.image, self.colours))

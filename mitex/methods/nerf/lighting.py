@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from mitex.errors import ImageError
+from mitex.methods.nerf.tensors import channels
 from mitex.runtime import load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
@@ -97,6 +98,25 @@ def project_environment(image: np.ndarray) -> np.ndarray:
     basis = dr.sh_eval(mi.Vector3f(*(_flat(axis) for axis in towards)), 3)
     light = [[dr.sum(y * _flat(weighted[..., c]))[0] for c in range(channels)] for y in basis]
     return np.array(light, np.float32)
+
+
+def rotated(light: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """A light that is turned.
+
+    Args:
+        light: (16,) or (16, C) spherical harmonics.
+        turn: (3, 3) rotation.
+
+    Returns:
+        As `light`, float32: what it was in direction d, it is in direction turn d.
+    """
+    ways = np.random.default_rng(0).normal(size=(8 * COEFFICIENTS, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    now, before = (  # the first harmonic is one number
+        np.stack([np.broadcast_to(y, len(ways)) for y in dr.sh_eval(channels(mi.Vector3f, v), 3)], axis=1)
+        for v in (ways, ways @ turn)
+    )
+    return np.linalg.lstsq(now, before @ light, rcond=None)[0].astype(np.float32)
 
 
 def _coefficients(light: Any, bands: int, count: int) -> list[Any]:

@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from mitex.atlas import twice_area
+from mitex.mesh import Mesh
+from mitex.methods.nerf.base_shape import face_frames
 from mitex.methods.nerf.field import FEATURES, PHASES
 from mitex.methods.nerf.shell import Located
 from mitex.runtime import load_mitsuba
@@ -113,6 +116,14 @@ class MappedLatents:
     def _index(column: Any, row: Any, height: int, width: int) -> Any:
         """Of texels, repeated beyond the borders."""
         return mi.UInt32(_wrapped(row, height) * width + _wrapped(column, width))
+
+
+def uv_frames(mesh: Mesh) -> np.ndarray:
+    """T~ of equation 4: `face_frames` whose second row is dP/dv, so left-handed in mirrored charts."""
+    frames = face_frames(mesh)
+    mirrored = twice_area(np.asarray(mesh.uv)) < 0
+    frames[mirrored, 1] *= -1
+    return frames
 
 
 def _wrapped(index: Any, size: int) -> Any:

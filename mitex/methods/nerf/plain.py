@@ -4,6 +4,7 @@ and what the paper compares view synthesis with."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,10 @@ from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field import HIGHEST, network, network_rows, sigmoid, weight_bound
 from mitex.methods.nerf.occupancy import Occupancy, hull_cells
 from mitex.methods.nerf.pixels import Batch
-from mitex.methods.nerf.radiance import RadianceTask, Rendered, rays_of
+from mitex.methods.nerf.radiance import RadianceTask, Rendered, learn, rays_of
 from mitex.methods.nerf.tensors import channels, tensor
 from mitex.runtime import load_mitsuba
+from mitex.training import checkpoint
 
 mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
@@ -116,6 +118,16 @@ class PlainTask(RadianceTask):
 
     def density(self, points: np.ndarray) -> np.ndarray:
         return self.field(self.named).density_at(points)
+
+
+def trained(
+    config: NerfConfig, capture: Capture, shown: tuple[Capture, int], folder: str | Path, quiet: bool
+) -> PlainTask:
+    """A field after its training in a run folder, which lets an interrupted one go on; arguments as above."""
+    folder = Path(folder)
+    task = PlainTask(config, capture, shown)
+    learn(task, config, folder, resume=(folder / checkpoint.NAME).exists(), quiet=quiet)
+    return task
 
 
 def hash_grid(size: int) -> Any:

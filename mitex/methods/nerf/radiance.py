@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +20,8 @@ from mitex.methods.nerf.occupancy import Occupancy
 from mitex.methods.nerf.pixels import Batch, Pixels
 from mitex.methods.nerf.tensors import channels, rows
 from mitex.runtime import load_mitsuba
+from mitex.training import TrainResult, train
+from mitex.training.optim import Adam
 
 mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
@@ -54,6 +59,10 @@ class RadianceTask(ABC):
         self.step_length = DIAGONAL / config.cells
         self._commits = 0
         dr.set_expand_threshold(2**26)  # by default gradients of large tables are 2.5 times slower
+
+    @abstractmethod
+    def metadata(self) -> dict[str, str]:
+        """What checkpoints tell."""
 
     @abstractmethod
     def render(self, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
@@ -125,6 +134,19 @@ class RadianceTask(ABC):
         return look(self.field(self.mean), batch)
 
 
+def learn(task: RadianceTask, config: NerfConfig, folder: Path, *, resume: bool, quiet: bool) -> TrainResult:
+    """Trains by Adam with a learning rate that falls to a tenth in `lr_steps`; raises as `train`."""
+    return train(
+        task,
+        config,
+        folder,
+        lr=lambda step: config.lr * 0.1 ** (step / config.lr_steps),
+        optimizer=partial(Adam, betas=BETAS, eps=EPSILON),
+        resume=resume,
+        quiet=quiet,
+    )
+
+
 class Rendered:
     """What a batch of R rays gathered from M samples, as tensors.
 
@@ -157,11 +179,28 @@ def rays_of(batch: Batch) -> tuple[Any, Any]:
 
 def look(field: RadianceField, batch: Batch) -> np.ndarray:
     """Colours (R, 3) of the batch's rays through a field, on white, display values in [0, 1]."""
-    parts = []
-    for start in range(0, len(batch.view), CHUNK):
+    colour, through = seen(field, batch.origins, batch.directions)
+    return np.clip(colour + through[:, None], 0, 1)
+
+
+def seen(
+    field: RadianceField, origins: np.ndarray, directions: np.ndarray, far: float = math.inf
+) -> tuple[np.ndarray, np.ndarray]:
+    """What R rays meet in a field.
+
+    Args:
+        field: in its cube.
+        origins, directions: (R, 3), directions of length 1.
+        far: where they end [scene units].
+
+    Returns:
+        Colours (R, 3) times opacity, and what passes (R,).
+    """
+    colours, through = [np.zeros((0, 3), np.float32)], [np.zeros(0, np.float32)]
+    for start in range(0, len(origins), CHUNK):
         part = slice(start, start + CHUNK)
-        origin = channels(mi.Point3f, batch.origins[part])
-        direction = channels(mi.Vector3f, batch.directions[part])
-        found = traverse(field, origin, direction, dr.full(mi.Float, 0.5, dr.width(origin)))
-        parts.append(rows(found.colour + found.through))
-    return np.clip(np.concatenate(parts), 0, 1)
+        origin, direction = channels(mi.Point3f, origins[part]), channels(mi.Vector3f, directions[part])
+        found = traverse(field, origin, direction, dr.full(mi.Float, 0.5, dr.width(origin)), far)
+        colours.append(rows(found.colour))
+        through.append(np.array(found.through))
+    return np.concatenate(colours), np.concatenate(through)

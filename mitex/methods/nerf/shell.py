@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -125,6 +125,7 @@ class Shell:
         step: of rays through it [scene units].
         scale: size of the texture beside that of the capture.
         strength: factor of the density.
+        lift: of the shell's middle above the mesh [scene units].
     """
 
     def __init__(
@@ -138,19 +139,20 @@ class Shell:
         step: float,
         scale: float = 1.0,
         strength: float = 1.0,
+        lift: float = 0.0,
     ) -> None:
         self.projection, self.latents, self.decoder = projection, latents, decoder
         self.light, self.thickness, self.scale = light, thickness, scale
-        self.mask, self.step, self.strength = mask, step, strength
+        self.mask, self.step, self.strength, self.lift = mask, step, strength, lift
 
     def locate(self, points: Any) -> tuple[Any, Located]:
         """Which of the points, `mi.Point3f`, are in the shell, as ascending `mi.UInt32`, and where."""
-        index, feet = within(self.projection(rows(points)), self.thickness)
+        index, feet = within(self.projection(rows(points)), self.thickness, self.lift)
         return mi.UInt32(index.astype(np.uint32)), Located.of(feet, self.scale)
 
     def density(self, points: np.ndarray) -> np.ndarray:
         """Density [1 / scene units] of points (N, 3), (N,); 0 outside of the shell."""
-        index, feet = within(self.projection(points), self.thickness)
+        index, feet = within(self.projection(points), self.thickness, self.lift)
         result = np.zeros(len(points), np.float32)
         if len(index):
             located = Located.of(feet, self.scale)
@@ -175,22 +177,27 @@ class Shell:
         return index, density * (self.strength / self.scale), colour
 
 
-def within(feet: Feet, thickness: float) -> tuple[np.ndarray, Feet]:
-    """Indices of the points that are in the shell, |s| < h, and their feet."""
-    index = np.flatnonzero(np.abs(feet.distance) < thickness)
-    return index, Feet(*(values[index] for values in vars(feet).values()))
+def within(feet: Feet, thickness: float, lift: float = 0.0) -> tuple[np.ndarray, Feet]:
+    """Indices of the points that are in the shell, |s| < h, and their feet; s counts from the lift on."""
+    distance = feet.distance - np.float32(lift)
+    index = np.flatnonzero(np.abs(distance) < thickness)
+    chosen = Feet(*(values[index] for values in vars(feet).values()))
+    return index, replace(chosen, distance=distance[index])
 
 
-def shell_cells(projection: Projection, thickness: float, possible: np.ndarray) -> np.ndarray:
+def shell_cells(
+    projection: Projection, thickness: float, possible: np.ndarray, lift: float = 0.0
+) -> np.ndarray:
     """Cells of the scene cube whose centres are in the shell, and their neighbours.
 
     Args:
         projection: onto the mesh.
         thickness: h [scene units].
         possible: (G, G, G) bool, the cells that are looked at.
+        lift: of the shell's middle above the mesh [scene units].
     """
 
     def inside(points: np.ndarray) -> np.ndarray:
-        return np.abs(projection(points).distance) < thickness
+        return np.abs(projection(points).distance - lift) < thickness
 
     return ndimage.binary_dilation(gridded(inside, possible, len(possible)) > 0)

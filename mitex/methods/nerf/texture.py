@@ -9,13 +9,16 @@ from typing import Any
 import numpy as np
 
 from mitex.integrators.march import DIAGONAL
-from mitex.mesh import Mesh
+from mitex.mesh import Mesh, Similarity
 from mitex.methods.nerf import files
-from mitex.methods.nerf.applied import AppliedTexture
+from mitex.methods.nerf.applied import EXTENT, AppliedTexture
 from mitex.methods.nerf.field import Decoder, Encoding
-from mitex.methods.nerf.guide import Guide
+from mitex.methods.nerf.guide import WEIGHT, Guide
+from mitex.methods.nerf.itself import own_maps
 from mitex.methods.nerf.maps import LatentMaps
+from mitex.methods.nerf.patches import SIZE as PATCH
 from mitex.methods.nerf.patches import FeatureSource, Patches, extract_patches, mirrored_frames
+from mitex.methods.nerf.pictures import pictured
 from mitex.methods.nerf.projection import Projection
 from mitex.methods.nerf.quilting import Quilt, quilt
 from mitex.methods.nerf.shell import CapturedLatents, Shell
@@ -26,6 +29,8 @@ mi: Any = load_mitsuba(needs_llvm=False)
 
 SIZE = 2048  # texels of a synthesized texture
 GOOD_RATE = 1 / 8  # gap between texels, of the mean edge of the base shape
+BLOCK = PATCH // 16  # a guide is compared with patches in 16 x 16 blocks
+DEEPEST = 2.0  # percentile of the scan's distances
 
 
 class NerfTexture:
@@ -89,6 +94,12 @@ class NerfTexture:
         """`mi.TensorXf` (16,), learned with the texture."""
         return mi.TensorXf(self.model.light.numpy())
 
+    @property
+    def similarity(self) -> Similarity:
+        """The capture's world -> scene cube."""
+        about = self.model.about
+        return Similarity(np.array(about["centre"]), about["scale"])
+
     def synthesize(
         self,
         size: int | tuple[int, int] = SIZE,
@@ -98,7 +109,8 @@ class NerfTexture:
         pattern_rate: float = GOOD_RATE,
         flips: bool = False,
         tileable: bool = False,
-        guide: Guide | None = None,
+        guide: np.ndarray | None = None,
+        guide_weight: float = WEIGHT,
     ) -> LatentMaps:
         """More of the texture, in the plane (section 3.2.2).
 
@@ -109,16 +121,18 @@ class NerfTexture:
             pattern_rate: gap between texels, of the mean edge of the base shape; 1/16 for fine textures.
             flips: use mirrored patches too.
             tileable: the texture continues over its borders.
-            guide: a picture that it shall resemble.
+            guide: a picture that it shall resemble from afar, (H, W, 3) sRGB in [0, 1], stretched over it.
+            guide_weight: a colour difference of 1 counts as much as this times the mean distance of patches.
 
         Raises:
-            ConfigError: a number is out of range, or no patch fits on the base shape.
+            ConfigError: a number is out of range, the guide is no picture, or no patch fits.
         """
         rng = np.random.default_rng(seed)
         found = self.patches(rng, patches, pattern_rate)
         source = FeatureSource(found, self.features, len(self.latents.encoding.levels(0)) * 2)
         shape = (size, size) if isinstance(size, int) else size
-        made = quilt(source, shape, rng, flips=flips, tileable=tileable, guide=guide)
+        wanted = None if guide is None else Guide(guide, pictured(self.shell, found, BLOCK), guide_weight)
+        made = quilt(source, shape, rng, flips=flips, tileable=tileable, guide=wanted)
         return self.maps(found, made)
 
     def patches(
@@ -153,6 +167,19 @@ class NerfTexture:
             patches.gap,
         )
 
+    def itself(self, size: int = SIZE) -> AppliedTexture:
+        """The captured texture on its own base shape, by maps of `size` texels: in the scene cube."""
+        mesh, maps = own_maps(self.model.base.mesh, self.model.frames, self.features, size)
+        low, high = mesh.vertices.min(0), mesh.vertices.max(0)
+        return self.apply(mesh, maps, scale=2 * EXTENT / float((high - low).max()))
+
+    @cached_property
+    def ground(self) -> float:
+        """How far the deepest parts of the captured surface are from the base shape, negative inside [scene
+        units]."""
+        feet = self.shell.projection(self.model.base.scan)
+        return float(np.percentile(feet.distance[feet.hit], DEEPEST))
+
     def apply(
         self,
         mesh: Mesh,
@@ -162,6 +189,7 @@ class NerfTexture:
         seed: int = 0,
         scale: float = 1.0,
         density: float = 1.0,
+        lift: float = 0.0,
         light: np.ndarray | None = None,
     ) -> AppliedTexture:
         """Puts the texture on any mesh (section 3.2.4).
@@ -172,6 +200,8 @@ class NerfTexture:
             size, seed: as of `synthesize`.
             scale: size of the texture's elements beside the whole mesh, against that on the captured object.
             density: factor of the density.
+            lift: 0 puts the mesh where the base shape was, 1 under the texture's ground; needed where the
+                mesh is thinner than the texture.
             light: (16,) or (16, 3) spherical harmonics instead of the learned light.
 
         Raises:
@@ -180,7 +210,7 @@ class NerfTexture:
         """
         given = self.synthesize(size, seed, tileable=True) if maps is None else maps
         shone = self.light if light is None else mi.TensorXf(np.asarray(light, np.float32))
-        return AppliedTexture(self, mesh, given, scale=scale, density=density, light=shone)
+        return AppliedTexture(self, mesh, given, scale=scale, density=density, lift=lift, light=shone)
 
     def __repr__(self) -> str:
         about = self.model.about

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,54 +14,12 @@ from mitex.errors import CheckpointError, ConfigError, MeshError, OutputError
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nerf import PRESETS, NerfTexture, files, fit
 from mitex.methods.nerf.base_shape import face_frames
-from mitex.methods.nerf.maps import LatentMaps
 from mitex.methods.nerf.pixels import Pixels
 from mitex.methods.nerf.projection import Projection
 from mitex.methods.nerf.radiance import look
 from mitex.methods.nerf.task import TextureTask
 from mitex.metrics import psnr
-from tests.methods.nerf.tiny import tiny_capture
-
-SETTINGS = (
-    "steps=160",
-    "lr_steps=160",
-    "base_steps=260",
-    "rays=1024",
-    "cells=192",
-    "table=13",
-    "coarsest=32",
-    "finest=128",
-    "occupancy=48",
-    "average=0.5",
-    "preview_every=160",
-    "checkpoint_every=80",
-)
-
-
-@pytest.fixture(scope="module")
-def base() -> Mesh:
-    ball = icosphere(44)  # even enough not to be remeshed
-    return Mesh(0.55 * ball.vertices, ball.faces, name="ball")
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory, base) -> Path:
-    folder = tmp_path_factory.mktemp("nerf")
-    patch = pytest.MonkeyPatch()
-    patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
-    fit(tiny_capture(), folder / "run", base_mesh=base, overrides=SETTINGS, quiet=True)
-    patch.undo()
-    return folder / "run"
-
-
-@pytest.fixture(scope="module")
-def texture(run) -> NerfTexture:
-    return NerfTexture.load(run)
-
-
-@pytest.fixture(scope="module")
-def maps(texture) -> LatentMaps:
-    return texture.synthesize(256, seed=1, patches=60, tileable=True)
+from tests.methods.nerf.tiny import SETTINGS, tiny_capture
 
 
 def test_the_loss_falls_and_the_run_folder_is_whole(run):

@@ -14,6 +14,7 @@ from mitex.methods.nerf.lighting import (
     TOE,
     initial_light,
     project_environment,
+    rotated,
     shade,
     to_display,
 )
@@ -329,3 +330,16 @@ def test_environments_that_are_not_finite_are_refused():
     image[1, 2, 0] = np.inf
     with pytest.raises(ImageError, match="NaN or infinite"):
         project_environment(image)
+
+
+def test_a_turned_light_shines_from_the_turned_side(rng):
+    light = rng.normal(size=(16, 3)).astype(np.float32)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    ways = rng.normal(size=(50, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    before, now = _harmonics(ways) @ light, _harmonics(ways @ turn.T) @ rotated(light, turn)
+    np.testing.assert_allclose(now, before, atol=1e-4)
+    flat = rotated(light[:, 0], turn)
+    assert flat.shape == (16,)
+    np.testing.assert_allclose(flat, rotated(light, turn)[:, 0], atol=1e-5)

@@ -14,6 +14,20 @@ from mitex.scenes.stage import mesh_shape
 
 FOV = 40.0
 DISTANCE = 2.2
+SETTINGS = (  # of a small real fit
+    "steps=160",
+    "lr_steps=160",
+    "base_steps=260",
+    "rays=1024",
+    "cells=192",
+    "table=13",
+    "coarsest=32",
+    "finest=128",
+    "occupancy=48",
+    "average=0.5",
+    "preview_every=160",
+    "checkpoint_every=80",
+)
 
 
 def bumpy(amplitude: float = 0.08, frequency: int = 24) -> Mesh:

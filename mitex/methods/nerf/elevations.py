@@ -1,0 +1,235 @@
+"""Synthesized textures seen ever flatter, beside photos of the surface (section 4.3, table 2).
+
+A photo's pixels that see the base shape under some angle are the truth. The same camera then sees a plane
+that touches the base shape there, with the radiance-field texture or with a quilted picture on it. So scale,
+light and perspective are those of the photo; only what the texture shows differs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mitex.frames import orthonormal
+from mitex.mesh import Mesh, grid
+from mitex.methods.baselines.quilted import quilted_albedo
+from mitex.methods.nerf.applied import EXTENT
+from mitex.methods.nerf.capture import Capture
+from mitex.methods.nerf.lighting import rotated
+from mitex.methods.nerf.patches import principal_direction
+from mitex.methods.nerf.pictures import pictured
+from mitex.methods.nerf.radiance import seen
+from mitex.methods.nerf.tensors import channels, rows
+from mitex.methods.nerf.texture import NerfTexture
+from mitex.metrics import single_image_frechet
+from mitex.runtime import init, load_mitsuba
+from mitex.scenes.stage import mesh_shape
+
+mi: Any = load_mitsuba(needs_llvm=False)
+
+ELEVATIONS = (0, 20, 40, 60, 80)
+NEAR = 10.0  # pixels count whose angle is so near to the wanted one [degrees]
+WINDOW = 96  # side of what is cut out of a photo [pixels]
+PLACES = 12  # for each angle
+LEAST = 100  # pixels that count, or a place is left out
+HALF = 0.5  # half the side of the plane [scene units]
+SOLID = 0.5  # opacity of pixels that count
+
+
+@dataclass(frozen=True, eq=False)
+class Elevation:
+    """Textures seen under one angle; all distances are `single_image_frechet` from photos.
+
+    Attributes:
+        angle: between the view and the normal [degrees].
+        ours: of the radiance-field texture.
+        flat: of the quilted picture.
+        photos: of other photos under this angle: what is the least to be expected.
+        picture: (3 S, K S, 3) windows of K photos, below them ours, below these the flat ones.
+    """
+
+    angle: float
+    ours: float
+    flat: float
+    photos: float
+    picture: np.ndarray
+
+
+def compare_elevations(
+    texture: NerfTexture,
+    capture: Capture,
+    *,
+    size: int = 1024,
+    patches: int = 300,
+    seed: int = 0,
+    window: int = WINDOW,
+    places: int = PLACES,
+) -> list[Elevation]:
+    """Table 2 for a texture and its photos; angles without enough pixels are left out.
+
+    Args:
+        texture: of `capture`.
+        capture: photos.
+        size: of both synthesized textures [texels].
+        patches: that both are made of, at most.
+        seed: of all choices.
+        window: side of what is cut out of the photos [pixels].
+        places: photos for each angle.
+    """
+    capture = capture.within(texture.similarity)
+    rng = np.random.default_rng(seed)
+    pair = _Pair(texture, size, patches, seed)
+    sights = [_sight(texture.model.base.mesh, capture, view) for view in range(len(capture))]
+    table = []
+    for angle in ELEVATIONS:
+        found = []
+        for view in rng.permutation(len(capture)).tolist():
+            place = _place(capture, view, sights[view], angle, window, rng)
+            found += [] if place is None else [place]
+        if len(found) >= 2:
+            table.append(_compared(found[: 2 * places], angle, pair))
+    return table
+
+
+@dataclass(frozen=True, eq=False)
+class _Sight:
+    """What the pixels (H, W) of a view see of the base shape.
+
+    Attributes:
+        angle: to its normal, 180 where it is missed [degrees].
+        points, normals: (H, W, 3).
+    """
+
+    angle: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """A window of a photo around a pixel that sees the base shape under an angle.
+
+    Attributes:
+        photo: (S, S, 3) on white.
+        mask: (S, S) bool, pixels that count.
+        origins, directions: (S * S, 3) of its rays.
+        point, normal: (3,) where the middle one meets the base shape, and its normal there.
+    """
+
+    photo: np.ndarray
+    mask: np.ndarray
+    origins: np.ndarray
+    directions: np.ndarray
+    point: np.ndarray
+    normal: np.ndarray
+
+
+Strip = tuple[np.ndarray, np.ndarray]  # a picture, and which of its pixels count
+
+
+def _compared(found: list[_Place], angle: float, pair: _Pair) -> Elevation:
+    """The first half of the places is shown on planes, the other one tells how much photos differ."""
+    half = (len(found) + 1) // 2
+    shown, others = found[:half], found[half:]
+    photo, mask = _strip([(place.photo, place.mask) for place in shown])
+    strips = [_strip(list(map(look, shown))) for look in (pair.ours, pair.flat)]
+    strips.append(_strip([(place.photo, place.mask) for place in others]))
+    ours, flat, photos = (single_image_frechet(a, photo, mask_a=on, mask_b=mask) for a, on in strips)
+    return Elevation(angle, ours, flat, photos, np.concatenate([photo, strips[0][0], strips[1][0]]))
+
+
+def _strip(windows: list[Strip]) -> Strip:
+    """Side by side."""
+    images, masks = zip(*windows, strict=True)
+    return np.concatenate(images, axis=1), np.concatenate(masks, axis=1)
+
+
+def _place(
+    capture: Capture, view: int, sight: _Sight, angle: float, side: int, rng: np.random.Generator
+) -> _Place | None:
+    """Somewhere in a view, or None if too little is seen under the angle."""
+    image = capture.images[view].astype(np.float32) / 255
+    half = side // 2
+    near = (np.abs(sight.angle - angle) < NEAR) & (image[..., 3] > SOLID)
+    inner = (np.abs(sight.angle - angle) < NEAR / 2) & near
+    rows, columns = np.nonzero(inner[half : -half or None, half : -half or None])
+    if not len(rows):
+        return None
+    chosen = rng.integers(len(rows))
+    top, left = int(rows[chosen]), int(columns[chosen])
+    window = slice(top, top + side), slice(left, left + side)
+    mask = near[window]
+    if mask.shape != (side, side) or mask.sum() < LEAST:
+        return None
+    colour, alpha = image[window][..., :3], image[window][..., 3:]
+    y, x = np.mgrid[window]
+    pixels = np.stack([x.ravel(), y.ravel()], axis=1) + 0.5
+    origins, directions = capture.rays(np.full(len(pixels), view), pixels)
+    point, normal = (values[top + half, left + half] for values in (sight.points, sight.normals))
+    return _Place(colour * alpha + 1 - alpha, mask, origins, directions, point, normal)
+
+
+class _Pair:
+    """The two textures on a plane, seen by the cameras of photos."""
+
+    def __init__(self, texture: NerfTexture, size: int, patches: int, seed: int) -> None:
+        self.light = np.array(texture.light)
+        self.along = principal_direction(texture.model.base.mesh)
+        found = texture.patches(np.random.default_rng(seed), patches)
+        maps = texture.synthesize(size, seed, patches=patches, tileable=True)
+        self.gap = maps.gap
+        self.image = quilted_albedo(
+            found,
+            lambda squares: pictured(texture.shell, squares),
+            (size, size),
+            np.random.default_rng(seed),
+            tileable=True,
+        )
+        plane = grid(64, 64)
+        scale = EXTENT / HALF
+        self.field = texture.apply(plane.with_vertices(HALF * plane.vertices), maps, scale=scale)
+
+    def ours(self, place: _Place) -> Strip:
+        """The field's picture and which pixels count."""
+        turn, origins, directions = self._local(place)
+        self.field.light = mi.TensorXf(rotated(self.light, turn))
+        origins = self.field.similarity.apply(origins)
+        colour, through = seen(self.field, origins.astype(np.float32), directions.astype(np.float32))
+        return self._window(place, colour + through[:, None], 1 - through > SOLID)
+
+    def flat(self, place: _Place) -> Strip:
+        """The quilted picture's and which pixels count."""
+        _, origins, directions = self._local(place)
+        met = origins[:, :2] - directions[:, :2] * (origins[:, 2:] / directions[:, 2:])
+        size = len(self.image)
+        column, row = (np.floor(v / self.gap).astype(int) % size for v in (met[:, 0], -met[:, 1]))
+        on = (np.abs(met).max(1) < HALF) & (directions[:, 2] < 0)
+        return self._window(place, np.where(on[:, None], self.image[row, column], 1.0), on)
+
+    def _local(self, place: _Place) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The scene's axes to the plane's, and the rays in the latter; the place is the origin."""
+        n = place.normal[None].astype(np.float32)
+        t = orthonormal(self.along[None].astype(np.float32), n)
+        turn = np.concatenate([t, np.cross(n, t), n]).astype(np.float64)
+        return turn, (place.origins - place.point) @ turn.T, place.directions @ turn.T
+
+    @staticmethod
+    def _window(place: _Place, colours: np.ndarray, mask: np.ndarray) -> Strip:
+        shape = place.mask.shape
+        return colours.clip(0, 1).astype(np.float32).reshape(*shape, 3), mask.reshape(shape)
+
+
+def _sight(mesh: Mesh, capture: Capture, view: int) -> _Sight:
+    init()
+    height, width = capture.images[view].shape[:2]
+    y, x = np.mgrid[:height, :width]
+    pixels = np.stack([x.ravel(), y.ravel()], axis=1) + 0.5
+    origins, directions = capture.rays(np.full(len(pixels), view), pixels)
+    scene = mi.load_dict({"type": "scene", "mesh": mesh_shape(mesh, smooth=True)})
+    met = scene.ray_intersect(mi.Ray3f(channels(mi.Point3f, origins), channels(mi.Vector3f, directions)))
+    points, normals = rows(met.p), rows(met.sh_frame.n)
+    angle = np.degrees(np.arccos(np.clip(-(normals * directions).sum(1), -1, 1)))
+    angle[~np.array(met.is_valid()).astype(bool)] = 180.0
+    return _Sight(*(values.reshape(height, width, *values.shape[1:]) for values in (angle, points, normals)))

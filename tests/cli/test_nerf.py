@@ -1,0 +1,192 @@
+"""`mitex fit nerf`, and `mitex apply` of what it makes."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from shutil import copytree
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+from PIL import Image
+
+from mitex.cli import main
+from mitex.mesh import Mesh, icosphere
+from tests.cli import bad_files as bad
+from tests.cli.refusals import check_refused
+from tests.methods.nerf.test_capture import CENTRE, RADII, rgba, set_alpha, write
+
+pytestmark = pytest.mark.usefixtures("own_cache")
+SMALL = "base_steps=150 rays=512 cells=96 table=11 coarsest=8 finest=32 occupancy=32"
+QUICK = f"--quiet --set steps=4 checkpoint_every=2 preview_every=0 {SMALL}"
+
+
+def fit(words=QUICK, base="base.obj", out="out/run"):
+    return f"fit nerf --capture photos --base-mesh {base} --out {out} {words}".split()
+
+
+def apply(words="--size 128", mesh="ball.obj", out="out/a.ply"):
+    return f"apply out/run --mesh {mesh} --out {out} {words}".split()
+
+
+def ellipsoid(scale=0.9):
+    ball = icosphere(8)
+    return Mesh(CENTRE + scale * RADII * ball.vertices, ball.faces, name="ellipsoid")
+
+
+def save(mesh, path):
+    lines = [f"v {x} {y} {z}" for x, y, z in mesh.vertices.tolist()]
+    if mesh.uv is not None:
+        lines += [f"vt {u} {v}" for u, v in mesh.uv.reshape(-1, 2).tolist()]
+    for k, face in enumerate(mesh.faces + 1):
+        uv = ("" if mesh.uv is None else f"/{3 * k + c + 1}" for c in range(3))
+        lines.append("f " + " ".join(f"{v}{t}" for v, t in zip(face, uv, strict=True)))
+    bad.text(path, "\n".join(lines) + "\n")
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory, own_cache):
+    """A run whose base mesh has a hole."""
+    folder = tmp_path_factory.mktemp("trained")
+    mesh = ellipsoid()
+    holed = Mesh(mesh.vertices, mesh.faces[mesh.vertices[mesh.faces].mean(1)[:, 2] < CENTRE[2] + 0.3])
+    save(holed, folder / "holed.obj")
+    patch = pytest.MonkeyPatch()
+    write(folder / "photos", 16)
+    patch.chdir(folder)
+    assert main(fit(base="holed.obj", out="run")) == 0
+    patch.undo()
+    return folder / "run"
+
+
+@pytest.fixture
+def photos(files):
+    save(ellipsoid(), files / "base.obj")
+    return write(files / "photos", 16)
+
+
+@pytest.fixture
+def run(files, trained):
+    save(icosphere(6), files / "ball.obj")
+    return Path(copytree(trained, files / "out" / "run"))
+
+
+def test_a_base_mesh_with_holes_is_fitted(trained):
+    assert (trained / "texture.safetensors").is_file() and (trained / "metrics.jsonl").is_file()
+
+
+def test_views_given_twice_are_left_out(photos, capsys):
+    path = photos / "transforms.json"
+    tree = json.loads(path.read_text())
+    tree["frames"].append(tree["frames"][3])
+    path.write_text(json.dumps(tree))
+    assert main(fit()) == 0
+    assert "is the view" in capsys.readouterr().err
+
+
+def shorten(folder):
+    bad.cut(folder / "images" / "004.png")
+
+
+def resize(folder):
+    image = folder / "images" / "004.png"
+    Image.open(image).resize((30, 20)).save(image)
+
+
+def opaque(folder):
+    for image in (folder / "images").iterdir():
+        Image.open(image).convert("RGB").save(image)
+
+
+def empty_masks(folder):
+    for image in (folder / "images").iterdir():
+        Image.fromarray(rgba(np.zeros((48, 48), bool))).save(image)
+
+
+def with_pose(value):
+    def change(folder):
+        path = folder / "transforms.json"
+        tree = json.loads(path.read_text())
+        tree["frames"][4]["transform_matrix"][0][3] = value
+        path.write_text(json.dumps(tree))
+
+    return change
+
+
+def inside(folder):
+    path = folder / "transforms.json"
+    tree = json.loads(path.read_text())
+    for row in range(3):
+        tree["frames"][4]["transform_matrix"][row][3] = CENTRE[row]
+    path.write_text(json.dumps(tree))
+
+
+CAPTURES = {
+    "missing image": (lambda d: (d / "images" / "004.png").unlink(), "which does not exist"),
+    "truncated image": (shorten, "damaged or cut short"),
+    "wrong size": (resize, "004.png"),
+    "no alpha": (opaque, "mask"),
+    "empty masks": (empty_masks, "all masks are empty"),
+    "one empty mask": (lambda d: set_alpha(d, [4], 0), "is empty"),
+    "NaN": (with_pose(float("nan")), "pose"),
+    "camera inside": (inside, "inside the object"),
+    "no photos": (lambda d: [p.unlink() for p in d.rglob("*") if p.is_file()], "photos"),
+}
+
+
+@pytest.mark.parametrize("name", CAPTURES)
+def test_bad_captures(files, photos, capsys, name):
+    breaking, message = CAPTURES[name]
+    breaking(photos)
+    check_refused(files, fit(), message, capsys)
+
+
+FITS = {
+    "missing base": ("base", "no.obj", "no.obj"),
+    "base elsewhere": ("base", "good.obj", "reaches out of the scene cube"),
+    "setting": ("words", "--set neighbours=0", "neighbours"),
+}
+
+
+@pytest.mark.parametrize("name", FITS)
+def test_bad_fits(files, photos, capsys, name):
+    key, value, message = FITS[name]
+    check_refused(files, fit(**{key: value}), message, capsys)
+
+
+def test_a_target_with_overlapping_uvs_gets_new_ones(files, run):
+    ball = icosphere(6)
+    overlapping = np.tile([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], (len(ball.faces), 1, 1))
+    save(replace(ball, uv=overlapping.astype(np.float32)), files / "overlapping.obj")
+    names = ("ball", "overlapping")
+    for name in names:
+        words = "--size 128 --density 50"
+        assert main(apply(words, mesh=f"{name}.obj", out=f"out/{name}.png")) == 0
+    one, other = (iio.imread(files / "out" / f"{name}.png").astype(float) for name in names)
+    assert one.std() > 5 and np.abs(one - other).mean() < 3
+
+
+def test_a_guide_and_a_lift(files, run):
+    bad.image(files / "guide.png")
+    assert main(apply("--size 128 --guide guide.png --lift 1 --density 50 --seed 2")) == 0
+    assert len(Mesh.load(files / "out" / "a.ply").faces) > 100
+
+
+APPLIED = {
+    "lift": ("--lift 2", "--lift"),
+    "size": ("--size 10", "--size"),
+    "density": ("--density 0", "--density"),
+    "guide": ("--guide no.png", "no.png"),
+    "steps": ("--steps 10", "--steps means nothing"),
+}
+
+
+@pytest.mark.parametrize("name", APPLIED)
+def test_bad_uses(files, run, capsys, name):
+    words, message = APPLIED[name]
+    check_refused(files, apply(words), message, capsys)
+
+
+def test_lifts_are_for_radiance_fields(files, capsys):
+    words = ["apply", "cobblestone", "--mesh", "good.obj", "--out", "out/a.glb", "--lift", "1"]
+    check_refused(files, words, "--lift means nothing", capsys)

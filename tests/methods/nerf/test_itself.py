@@ -1,0 +1,120 @@
+"""A captured texture as maps on its own base shape, pictures of patches, and the texture on planes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mitex.mesh import grid, icosphere
+from mitex.methods.nerf.applied import EXTENT
+from mitex.methods.nerf.elevations import compare_elevations
+from mitex.methods.nerf.maps import LatentMaps, MappedLatents, uv_frames
+from mitex.methods.nerf.pictures import pictured
+from mitex.methods.nerf.pixels import Pixels
+from mitex.methods.nerf.radiance import look, seen
+from mitex.metrics import psnr
+from tests.methods.nerf.test_shell import at, mi, rows, shell
+from tests.methods.nerf.tiny import tiny_capture
+
+
+def test_on_its_own_base_shape_it_gives_the_training_views_back(texture):
+    """The promise is 1 dB less than the fit."""
+    learned, _ = tiny_capture().split()
+    again = texture.itself(512)
+    thickness = again.thickness * again.similarity.scale
+    np.testing.assert_allclose(thickness, texture.model.base.thickness, rtol=1e-5)
+    losses = []
+    for view in range(0, len(learned), 4):
+        batch, shape = Pixels(learned).image(view, 48)
+        photo = (batch.colours * batch.alpha + 1 - batch.alpha).numpy()
+        moved = replace(batch, origins=again.similarity.apply(batch.origins).astype(np.float32))
+        found = [look(field, rays) for field, rays in ((texture.shell, batch), (again, moved))]
+        qualities = [psnr(image.reshape(*shape, 3), photo.reshape(*shape, 3)) for image in found]
+        losses.append(qualities[0] - qualities[1])
+        assert psnr(*(image.reshape(*shape, 3) for image in found)) > 24
+    assert np.mean(losses) < 1.0
+
+
+def test_mirrored_charts_mirror_the_normals():
+    """A texture's bump leans to where v grows, whichever way round a chart is."""
+    turns = np.eye(3, dtype=np.float32)[None]
+    maps = LatentMaps(np.zeros((4, 4, 24), np.float32), np.zeros((4, 4), np.int32), turns, 0.1)
+    plain = grid(1, 1)
+    uv = np.asarray(plain.uv).copy()
+    uv[..., 1] = 1 - uv[..., 1]
+    place = at([(0.3, 0.2)])
+    axes = [
+        np.concatenate(
+            [rows(v) for v in MappedLatents(maps, np.asarray(mesh.uv), uv_frames(mesh)).frame(place)]
+        )
+        for mesh in (plain, replace(plain, uv=uv))
+    ]
+    np.testing.assert_allclose(axes[0], np.eye(3), atol=1e-6)
+    np.testing.assert_allclose(axes[1], np.diag([1, -1, 1]), atol=1e-6)
+
+
+def test_pictures_of_patches_are_what_is_seen_from_above(texture):
+    patches = texture.patches(np.random.default_rng(0), 20)
+    whole = pictured(texture.shell, patches)
+    assert whole.shape == (*patches.faces.shape, 3) and whole.min() >= 0 and whole.max() <= 1
+    thin = pictured(texture.shell, patches, every=4)
+    np.testing.assert_allclose(thin, whole[:, 2::4, 2::4], atol=1e-5)
+    z, reach = patches.frames[3, 2], texture.model.base.thickness
+    foot = patches.points[3, 40, 50]
+    colour, through = seen(texture.shell, (foot + 2 * reach * z)[None], -z[None], far=4 * reach)
+    np.testing.assert_allclose(whole[3, 40, 50], (colour / (1 - through))[0].clip(0, 1), atol=1e-4)
+
+
+def test_a_guide_decides_where_it_is_bright(texture):
+    """Dark on the left and bright on the right, or the other way round."""
+    guide = np.zeros((2, 2, 3), np.float32)
+    guide[:, 1] = 1.0
+    x, y = (np.linspace(-0.8, 0.8, 33)[i].ravel() for i in np.mgrid[:33, :33])
+    origins = np.stack([x, y, np.full(len(x), 0.9)], 1).astype(np.float32)
+    down = np.broadcast_to(np.array([0, 0, -1], np.float32), origins.shape)
+    differences = []
+    for picture in (guide, 1 - guide):
+        maps = texture.synthesize(336, seed=3, patches=80, guide=picture, guide_weight=100.0)
+        whole = 2 * EXTENT / (336 * maps.gap)  # the plane shows the texture once
+        field = texture.apply(grid(24, 24), maps, scale=whole, density=20.0)
+        colour, _ = seen(field, origins, down)
+        differences.append(colour[x > 0.1].mean() - colour[x < -0.1].mean())
+    assert differences[0] > 0.03 and differences[1] < -0.03
+
+
+def test_a_lifted_shell_lies_higher():
+    high = shell()
+    high.lift = 0.05
+    radius = np.linspace(0.45, 0.8, 60)
+    points = np.stack([np.zeros(60), radius, np.zeros(60)], 1).astype(np.float32)
+    height = high.projection(points).distance - 0.05
+    inside = np.flatnonzero(np.abs(height) < high.thickness)
+    assert radius[inside].min() > 0.54 and radius[inside].max() > 0.74
+    index, located = high.locate(mi.Point3f(points.T.copy()))
+    np.testing.assert_array_equal(np.array(index), inside)
+    np.testing.assert_allclose(np.array(located.distance), height[inside], atol=1e-6)
+    np.testing.assert_array_equal(np.flatnonzero(high.density(points)), inside)
+
+
+def test_lifted_by_one_the_ground_is_on_the_mesh(texture, maps):
+    assert -texture.model.base.thickness < texture.ground < 0
+    mesh = icosphere(12)
+    flat, lifted = (texture.apply(mesh, maps, lift=lift) for lift in (0.0, 1.0))
+    assert flat.lift == 0 and abs(lifted.lift + texture.ground) < 1e-6
+    size = [np.linalg.norm(field.outline, axis=1).max() for field in (flat, lifted)]
+    assert np.isclose(size[1] - size[0], lifted.lift * lifted.similarity.scale, rtol=1e-4)
+
+
+def test_elevations_compare_what_photos_show(texture):
+    photos = tiny_capture(side=160, spp=4)
+    table = compare_elevations(texture, photos, size=256, patches=40, window=48, places=3)
+    assert [row.angle for row in table][:3] == [0, 20, 40]
+    for row in table:
+        assert 0 < row.ours < np.inf and 0 < row.flat < np.inf and 0 <= row.photos < np.inf
+        assert row.picture.shape[0] == 3 * 48 and row.picture.shape[1] % 48 == 0
+    # Seen from above, a plane fills its windows; seen flat, there is white above its horizon.
+    white = [[(part == 1).all(2).mean() for part in np.split(row.picture, 3)] for row in table]
+    assert white[0][2] == 0 and white[-1][2] > 0.3
+    above = np.split(table[0].picture, 3)
+    np.testing.assert_allclose(above[1].mean((0, 1)), above[2].mean((0, 1)), atol=0.2)

@@ -1,0 +1,67 @@
+"""Compares captured textures with what the paper compares them with: tables, and sheets of pictures.
+
+usage: python tools/compare_nerf.py RUNS CAPTURES NAME ...
+
+RUNS holds a finished run of `mitex fit nerf` for each NAME, CAPTURES its photos. Held-out views are compared
+with those of a plain field, trained for the same time into RUNS/plain-NAME (docs/gallery/nerf-views.jpg), and
+textures on planes with quilted pictures, seen ever flatter (table 2; docs/gallery/nerf-elevations-NAME.jpg).
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from mitex.images import write_image
+from mitex.methods.baselines.plain_field import fit_plain
+from mitex.methods.nerf import PRESETS, NerfTexture, load_capture
+from mitex.methods.nerf.elevations import compare_elevations
+from mitex.methods.nerf.evaluation import view_pair, view_quality
+from mitex.render import sheet
+
+GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
+CELL = 320  # side of a picture [px]
+
+
+def main() -> None:
+    runs, captures, *names = sys.argv[1:]
+    cells, labels = [], []
+    for name in names:
+        texture = NerfTexture.load(Path(runs) / name)
+        capture = load_capture(Path(captures) / name).within(texture.similarity)
+        elevations(name, texture, capture)
+        learned, held = capture.split()
+        about = texture.model.about
+        plain = fit_plain(
+            learned,
+            Path(runs) / f"plain-{name}",
+            PRESETS[about["preset"]],
+            about["seconds"],
+            (held, 0),
+            quiet=False,
+        )
+        fields = {"ours": texture.shell, "plain": plain.field(plain.mean)}
+        for word, field in fields.items():
+            print(f"{name}, {word}: {view_quality(field, held)}", flush=True)
+        pairs = [view_pair(field, held, 0) for field in fields.values()]
+        cells += [pairs[0][1], pairs[0][0], pairs[1][0]]
+        labels += [f"{name}, held out", "NeRF-Texture", "plain, equal time"]
+    write_image(GALLERY / "nerf-views.jpg", sheet(cells, columns=3, labels=labels, cell=CELL))
+
+
+def elevations(name: str, texture: NerfTexture, capture) -> None:
+    """Table 2, and its windows from top to bottom: photo, ours, flat."""
+    table = compare_elevations(texture, capture)
+    print(f"{name}: angle, ours, 2D, photos")
+    for row in table:
+        print(f"{row.angle:4.0f}  {row.ours:.3f}  {row.flat:.3f}  {row.photos:.3f}", flush=True)
+    ratio = np.mean([row.ours for row in table]) / np.mean([row.flat for row in table])
+    print(f"{name}: ratio of the means {ratio:.2f}", flush=True)
+    picture = np.concatenate([row.picture[:, : 6 * row.picture.shape[0] // 3] for row in table])
+    write_image(GALLERY / f"nerf-elevations-{name}.jpg", picture)
+
+
+if __name__ == "__main__":
+    main()
