@@ -1,17 +1,20 @@
 """How fast the field of a radiance texture is evaluated and trained.
 
-usage: python -m benchmarks.nerf [--quick]
+usage: python -m benchmarks.nerf [--quick] [--run RUN]
 
 Points per second through hash grids and networks, forwards, and forwards and backwards to tables and weights,
-by `drjit.nn` and by plain torch in the same run; and forwards as it is packed for pictures.
+by `drjit.nn` and by plain torch in the same run; and forwards as it is packed for pictures. RUN, a finished
+run of `mitex fit nerf`, adds what is done with it: a texture is quilted, put on a mesh, and looked at.
 """
 
 from __future__ import annotations
 
 import argparse
+import resource
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import torch
 from rich.console import Console
@@ -19,9 +22,12 @@ from rich.table import Table
 
 from benchmarks import torch_field
 from mitex.bridge import call
+from mitex.mesh import embedded
+from mitex.methods.nerf import NerfTexture
 from mitex.methods.nerf.config import PRESETS, NerfConfig
 from mitex.methods.nerf.field import Decoder, Encoding, weight_bound, weight_shapes
 from mitex.methods.nerf.tensors import tensor
+from mitex.render.shell import shell_still
 from mitex.runtime import init
 
 mi = init()
@@ -83,7 +89,39 @@ def trained(result: torch.Tensor, given: list[torch.Tensor]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="fewer points")
-    count = 1 << (14 if parser.parse_args().quick else 16)
+    parser.add_argument("--run", metavar="RUN", help="a captured texture")
+    given = parser.parse_args()
+    Console(width=100).print(rates(1 << (14 if given.quick else 16)))
+    if given.run:
+        Console(width=100).print(uses(NerfTexture.load(given.run)))
+
+
+def uses(texture: NerfTexture) -> Table:
+    """Seconds for 1024 x 1024 texels, and for pictures of 512 x 512 rays with them on a mesh."""
+    table = Table("seconds", "", title=f"{texture}")
+    maps = timed(table, "1024 x 1024 texels quilted", lambda: texture.synthesize(1024, tileable=True))
+    applied = timed(table, "put on the vase", lambda: texture.apply(embedded("vase"), maps))
+
+    def frame():
+        return shell_still(applied, applied.similarity, applied.outline, resolution=512, spp=1)
+
+    timed(table, "first path-traced frame, with its kernels", frame)
+    timed(table, "another one", frame)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    table.add_row(f"{peak:.1f}", "GiB of memory at most")
+    return table
+
+
+def timed(table: Table, what: str, work: Callable[[], Any]) -> Any:
+    """The result of `work`; a row tells how long it took."""
+    begun = time.perf_counter()
+    result = work()
+    table.add_row(f"{time.perf_counter() - begun:.1f}", what)
+    return result
+
+
+def rates(count: int) -> Table:
+    """Points per second."""
     dr.set_expand_threshold(2**26)
     drawn = torch.Generator().manual_seed(1)
     points = torch.empty(count, 3).uniform_(-0.9, 0.9, generator=drawn)
@@ -111,7 +149,7 @@ def main() -> None:
         against = (torch_rates[0], torch_rates[0], torch_rates[1])
         ratios = [f"{a / b:.1f} x" for a, b in zip(our_rates, against, strict=True)]
         table.add_row("", *ratios, end_section=True)
-    Console(width=100).print(table)
+    return table
 
 
 if __name__ == "__main__":

@@ -20,11 +20,12 @@ if TYPE_CHECKING:
 SUFFIXES = (".glb", ".obj", ".ply", ".exr")
 PICTURES = (".png", ".jpg", ".jpeg")  # of radiance fields
 RESOLUTION = 1024
+PICTURE = 512  # side of a picture [pixels]
 OPTIONS = {  # those that mean something, by method
     "nca": ("seed", "steps", "subdivide", "orientation", "scale", "resolution", "vertex_colors"),
     "surface": (),
     "geometric": ("seed", "start_level", "end_level", "remesh"),
-    "nerf": ("seed", "scale", "size", "density", "lift", "guide"),
+    "nerf": ("seed", "scale", "size", "density", "lift", "guide", "resolution"),
 }
 
 
@@ -69,8 +70,10 @@ class Apply(Displacing):
     scale: Annotated[float, arg(metavar="X")] = 1.0
     """Size of the pattern."""
 
-    resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 1024)")] = None
-    """Side of the baked textures [pixels]."""
+    resolution: Annotated[
+        int | None, arg(metavar="N", help_behavior_hint="(default: 1024; of a picture 512)")
+    ] = None
+    """Side of the baked textures, or of the picture [pixels]."""
 
     size: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 2048)")] = None
     """Radiance fields: side of the synthesized texture [texels]."""
@@ -78,8 +81,8 @@ class Apply(Displacing):
     density: Annotated[float, arg(metavar="X")] = 1.0
     """Radiance fields: factor of the density; more makes thin parts solid."""
 
-    lift: Annotated[float, arg(metavar="X")] = 0.0
-    """Radiance fields: 0 carves the texture into the mesh as it was captured, 1 stands it on the mesh."""
+    lift: Annotated[float, arg(metavar="X")] = 1.0
+    """Radiance fields: 1 stands the texture on the mesh, 0 carves it in, as it was captured."""
 
     guide: Annotated[Path | None, arg(metavar="IMAGE", help_behavior_hint="")] = None
     """Radiance fields: a picture that the synthesized texture resembles from afar."""
@@ -105,11 +108,12 @@ class Apply(Displacing):
         out = prepare_output(self.out, SUFFIXES + PICTURES * (method == "nerf"))
         suffix = out.suffix.lower()
         if suffix in PICTURES:
-            self._captured().render(out)
+            self._captured().render(out, resolution=self.resolution or PICTURE)
             print(self.out)
             return
         needless("--vertex-colors", out, self.vertex_colors and suffix in (".obj", ".exr"))
-        needless("--resolution", out, self.resolution is not None and suffix == ".ply")
+        bare = suffix == ".ply" or method == "nerf"  # colours at the vertices
+        needless("--resolution", out, self.resolution is not None and bare)
         makers = {"surface": self._synthesized, "geometric": self._displaced, "nerf": self._extracted}
         asset = self._grown(suffix) if method == "nca" else makers[method]()
         asset.export(out)

@@ -105,7 +105,7 @@ class AppliedTexture(Shell):
             target, tone(shell_still(self, self.similarity, self.outline, **options), exposure)
         )
 
-    def extract(self, cells: int = 384) -> Asset:
+    def extract(self, cells: int | None = None) -> Asset:
         """A coloured mesh of what is solid; see `extract.extracted`."""
         from mitex.methods.nerf.extract import extracted
 

@@ -189,7 +189,7 @@ class _Pair:
         )
         plane = grid(64, 64)
         scale = EXTENT / HALF
-        self.field = texture.apply(plane.with_vertices(HALF * plane.vertices), maps, scale=scale)
+        self.field = texture.apply(plane.with_vertices(HALF * plane.vertices), maps, scale=scale, lift=0.0)
 
     def ours(self, place: _Place) -> Strip:
         """The field's picture and which pixels count."""

@@ -21,17 +21,18 @@ from mitex.runtime import load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
 
-CELLS = 384  # of the grid along a side of the scene cube
+CELLS = 3  # of the grid along a side of a cell of the occupancy grid
 FLOOR = -4.0  # logarithm of densities below [of the level]
 CHUNK = 1 << 17
 
 
-def extracted(applied: AppliedTexture, cells: int = CELLS) -> Asset:
+def extracted(applied: AppliedTexture, cells: int | None = None) -> Asset:
     """The surface where the density takes half of the light within a cell, with albedo and normals.
 
     Args:
         applied: a texture on a mesh.
-        cells: of the grid along a side of the scene cube, a multiple of the occupancy grid's.
+        cells: of the grid along a side of the scene cube, a multiple of the occupancy grid's; None for three
+            times as many.
 
     Returns:
         An asset in the space of the textured mesh; colours are those under an even light, without gloss.
@@ -40,15 +41,16 @@ def extracted(applied: AppliedTexture, cells: int = CELLS) -> Asset:
         MeshError: nothing is so dense.
     """
     side = applied.mask.shape[0]
-    if cells % side or not side <= cells <= 8 * side:
-        raise ConfigError(f"a grid of {cells} cells", f"use a multiple of {side}, up to {8 * side}")
-    level = math.log(2) * cells / 2
-    density = gridded(applied.density, np.array(applied.mask).astype(bool), cells)
+    count = CELLS * side if cells is None else cells
+    if count % side or not side <= count <= 8 * side:
+        raise ConfigError(f"a grid of {count} cells", f"use a multiple of {side}, up to {8 * side}")
+    level = math.log(2) * count / 2
+    density = gridded(applied.density, np.array(applied.mask).astype(bool), count)
     if not (density > level).any():
         raise MeshError("nothing in the shell is solid", "raise the density, or train the texture for longer")
     # In logarithms, so that the surface lies well between samples whose densities differ by orders.
     values = np.maximum(np.log(np.maximum(density, 1e-6) / level), FLOOR)
-    cell = 2 / cells
+    cell = 2 / count
     mesh = isosurface(values, 0.0, low=np.full(3, 0.5 * cell - 1), cell=cell, name=applied.mesh.name)
     albedo, normals = _looks(applied, mesh)
     placed = mesh.with_vertices(mesh.vertices * applied.similarity.scale + applied.similarity.center)

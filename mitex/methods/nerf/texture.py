@@ -171,7 +171,7 @@ class NerfTexture:
         """The captured texture on its own base shape, by maps of `size` texels: in the scene cube."""
         mesh, maps = own_maps(self.model.base.mesh, self.model.frames, self.features, size)
         low, high = mesh.vertices.min(0), mesh.vertices.max(0)
-        return self.apply(mesh, maps, scale=2 * EXTENT / float((high - low).max()))
+        return self.apply(mesh, maps, scale=2 * EXTENT / float((high - low).max()), lift=0.0)
 
     @cached_property
     def ground(self) -> float:
@@ -189,7 +189,7 @@ class NerfTexture:
         seed: int = 0,
         scale: float = 1.0,
         density: float = 1.0,
-        lift: float = 0.0,
+        lift: float = 1.0,
         light: np.ndarray | None = None,
     ) -> AppliedTexture:
         """Puts the texture on any mesh (section 3.2.4).
@@ -200,8 +200,8 @@ class NerfTexture:
             size, seed: as of `synthesize`.
             scale: size of the texture's elements beside the whole mesh, against that on the captured object.
             density: factor of the density.
-            lift: 0 puts the mesh where the base shape was, 1 under the texture's ground; needed where the
-                mesh is thinner than the texture.
+            lift: 1 puts the mesh under the texture's ground, 0 where the base shape was, as published: there
+                the texture is carved into the mesh, and thin parts of this leave no room for its ground.
             light: (16,) or (16, 3) spherical harmonics instead of the learned light.
 
         Raises:

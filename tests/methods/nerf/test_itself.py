@@ -118,3 +118,14 @@ def test_elevations_compare_what_photos_show(texture):
     assert white[0][2] == 0 and white[-1][2] > 0.3
     above = np.split(table[0].picture, 3)
     np.testing.assert_allclose(above[1].mean((0, 1)), above[2].mean((0, 1)), atol=0.2)
+
+
+def test_overlapping_uvs_are_replaced(texture, maps):
+    ball = icosphere(12)
+    overlapping = np.tile(np.array([[0, 0], [1, 0], [0, 1]], np.float32), (len(ball.faces), 1, 1))
+    points = (0.85 * ball.vertices[::3]).astype(np.float32)
+    plain, other = (texture.apply(mesh, maps) for mesh in (ball, replace(ball, uv=overlapping)))
+    np.testing.assert_array_equal(np.asarray(other.mesh.uv), np.asarray(plain.mesh.uv))
+    np.testing.assert_array_equal(other.density(points), plain.density(points))
+    own = replace(ball, uv=plain.mesh.uv)
+    assert texture.apply(own, maps).mesh.uv is own.uv

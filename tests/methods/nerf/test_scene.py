@@ -1,0 +1,28 @@
+"""The example script with a captured texture, an automaton's mesh and a ball of glass."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mitex.images import read_image
+
+SCRIPT = Path(__file__).parents[3] / "scenes" / "shell_texture.py"
+
+
+@pytest.mark.usefixtures("own_cache")
+def test_all_three_are_in_the_picture(run, tmp_path):
+    spec = importlib.util.spec_from_file_location("shell_texture_script", SCRIPT)
+    assert spec is not None and spec.loader is not None
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    script.main(str(run), str(tmp_path / "shell.png"), size=128, resolution=64, spp=2)
+    picture = read_image(tmp_path / "shell.png")
+    assert picture.shape == (64, 96, 3)
+    texture, glass, mesh = picture[20:44, 8:36], picture[40:56, 44:60], picture[16:48, 62:88]
+    floor = picture[-6:].mean((0, 1))
+    for part in (texture, glass, mesh):
+        assert part.std() > 0.05 and np.abs(part.mean((0, 1)) - floor).max() > 0.03
