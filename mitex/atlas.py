@@ -17,6 +17,7 @@ LARGE = 40_000  # meshes of more faces are unwrapped in pieces
 SMOOTHINGS = 8
 ROUGHNESS = 0.03  # [edge lengths]
 CHUNK = 4_000_000  # candidate texels that are looked at together; bounds the memory at about 300 MB
+FULL = 1.001  # area of the unit square, and rounding
 RING = 1.0  # [texel] how far outside a triangle its own plane is still continued, see `_rasterize`
 
 
@@ -220,6 +221,8 @@ def usable_uv(mesh: Mesh, uv: np.ndarray, resolution: int = 512) -> bool:
         return False
     flat = np.abs(twice_area(uv)) < 1e-12
     if mesh.face_areas[flat].sum() > 1e-3 * mesh.face_areas.sum():
+        return False
+    if np.abs(twice_area(uv)).sum() > 2 * FULL:  # more than fits side by side: no need to look
         return False
     count = np.zeros(resolution * resolution, np.int32)
     for _, texel, barycentric in _candidates(uv, resolution):
