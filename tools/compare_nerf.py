@@ -23,6 +23,7 @@ from mitex.render import sheet
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 CELL = 320  # side of a picture [px]
+SHOWN = 8  # windows of each angle
 
 
 def main() -> None:
@@ -52,14 +53,15 @@ def main() -> None:
 
 
 def elevations(name: str, texture: NerfTexture, capture) -> None:
-    """Table 2, and its windows from top to bottom: photo, ours, flat."""
+    """Table 2, and its windows from top to bottom: photo, captured, ours, flat."""
     table = compare_elevations(texture, capture)
-    print(f"{name}: angle, ours, 2D, photos")
+    print(f"{name}: angle, captured, ours, 2D, photos")
     for row in table:
-        print(f"{row.angle:4.0f}  {row.ours:.3f}  {row.flat:.3f}  {row.photos:.3f}", flush=True)
+        distances = row.captured, row.ours, row.flat, row.photos
+        print(f"{row.angle:4.0f}  " + "  ".join(f"{d:.3f}" for d in distances), flush=True)
     ratio = np.mean([row.ours for row in table]) / np.mean([row.flat for row in table])
     print(f"{name}: ratio of the means {ratio:.2f}", flush=True)
-    picture = np.concatenate([row.picture[:, : 6 * row.picture.shape[0] // 3] for row in table])
+    picture = np.concatenate([row.picture[:, : SHOWN * row.picture.shape[0] // 4] for row in table])
     write_image(GALLERY / f"nerf-elevations-{name}.jpg", picture)
 
 

@@ -32,9 +32,10 @@ mi: Any = load_mitsuba(needs_llvm=False)
 ELEVATIONS = (0, 20, 40, 60, 80)
 NEAR = 10.0  # pixels count whose angle is so near to the wanted one [degrees]
 WINDOW = 96  # side of what is cut out of a photo [pixels]
-PLACES = 12  # for each angle
+PLACES = 24  # for each angle
 LEAST = 100  # pixels that count, or a place is left out
-HALF = 0.5  # half the side of the plane [scene units]
+HALF = 1.0  # half the side of the plane [scene units]
+SHIFT = 0.5  # of the place on the plane, at most, so that each sees another part of the texture
 SOLID = 0.5  # opacity of pixels that count
 
 
@@ -44,13 +45,15 @@ class Elevation:
 
     Attributes:
         angle: between the view and the normal [degrees].
-        ours: of the radiance-field texture.
+        captured: of the radiance field where it was captured, seen as in the photos: the fit's own distance.
+        ours: of the synthesized radiance-field texture.
         flat: of the quilted picture.
         photos: of other photos under this angle: what is the least to be expected.
-        picture: (3 S, K S, 3) windows of K photos, below them ours, below these the flat ones.
+        picture: (4 S, K S, 3) windows of K photos, below them captured, ours, and flat ones.
     """
 
     angle: float
+    captured: float
     ours: float
     flat: float
     photos: float
@@ -112,18 +115,22 @@ class _Place:
     """A window of a photo around a pixel that sees the base shape under an angle.
 
     Attributes:
-        photo: (S, S, 3) on white.
+        photo: (S, S, 3) on its background.
+        background: (3,) mean colour of what is opaque, lest the border of the object count as texture.
         mask: (S, S) bool, pixels that count.
         origins, directions: (S * S, 3) of its rays.
         point, normal: (3,) where the middle one meets the base shape, and its normal there.
+        shift: (2,) where on the plane that is.
     """
 
     photo: np.ndarray
+    background: np.ndarray
     mask: np.ndarray
     origins: np.ndarray
     directions: np.ndarray
     point: np.ndarray
     normal: np.ndarray
+    shift: np.ndarray
 
 
 Strip = tuple[np.ndarray, np.ndarray]  # a picture, and which of its pixels count
@@ -134,10 +141,12 @@ def _compared(found: list[_Place], angle: float, pair: _Pair) -> Elevation:
     half = (len(found) + 1) // 2
     shown, others = found[:half], found[half:]
     photo, mask = _strip([(place.photo, place.mask) for place in shown])
-    strips = [_strip(list(map(look, shown))) for look in (pair.ours, pair.flat)]
+    strips = [_strip(list(map(look, shown))) for look in (pair.captured, pair.ours, pair.flat)]
     strips.append(_strip([(place.photo, place.mask) for place in others]))
-    ours, flat, photos = (single_image_frechet(a, photo, mask_a=on, mask_b=mask) for a, on in strips)
-    return Elevation(angle, ours, flat, photos, np.concatenate([photo, strips[0][0], strips[1][0]]))
+    distances = [single_image_frechet(image, photo, mask_a=on, mask_b=mask) for image, on in strips]
+    captured, ours, flat, photos = distances
+    picture = np.concatenate([photo, *(image for image, _ in strips[:3])])
+    return Elevation(angle, captured, ours, flat, photos, picture)
 
 
 def _strip(windows: list[Strip]) -> Strip:
@@ -168,13 +177,17 @@ def _place(
     pixels = np.stack([x.ravel(), y.ravel()], axis=1) + 0.5
     origins, directions = capture.rays(np.full(len(pixels), view), pixels)
     point, normal = (values[top + half, left + half] for values in (sight.points, sight.normals))
-    return _Place(colour * alpha + 1 - alpha, mask, origins, directions, point, normal)
+    shift = rng.uniform(-SHIFT, SHIFT, 2)
+    background = (colour * alpha).sum((0, 1)) / alpha.sum()
+    photo = colour * alpha + background * (1 - alpha)
+    return _Place(photo, background, mask, origins, directions, point, normal, shift)
 
 
 class _Pair:
     """The two textures on a plane, seen by the cameras of photos."""
 
     def __init__(self, texture: NerfTexture, size: int, patches: int, seed: int) -> None:
+        self.texture = texture
         self.light = np.array(texture.light)
         self.along = principal_direction(texture.model.base.mesh)
         found = texture.patches(np.random.default_rng(seed), patches)
@@ -187,9 +200,14 @@ class _Pair:
             np.random.default_rng(seed),
             tileable=True,
         )
-        plane = grid(64, 64)
+        plane = grid(96, 96)
         scale = EXTENT / HALF
         self.field = texture.apply(plane.with_vertices(HALF * plane.vertices), maps, scale=scale, lift=0.0)
+
+    def captured(self, place: _Place) -> Strip:
+        """What was captured, and the pixels that count in the photo."""
+        colour, through = seen(self.texture.shell, place.origins, place.directions)
+        return self._window(place, colour + through[:, None] * place.background, place.mask.ravel())
 
     def ours(self, place: _Place) -> Strip:
         """The field's picture and which pixels count."""
@@ -197,7 +215,7 @@ class _Pair:
         self.field.light = mi.TensorXf(rotated(self.light, turn))
         origins = self.field.similarity.apply(origins)
         colour, through = seen(self.field, origins.astype(np.float32), directions.astype(np.float32))
-        return self._window(place, colour + through[:, None], 1 - through > SOLID)
+        return self._window(place, colour + through[:, None] * place.background, 1 - through > SOLID)
 
     def flat(self, place: _Place) -> Strip:
         """The quilted picture's and which pixels count."""
@@ -206,14 +224,16 @@ class _Pair:
         size = len(self.image)
         column, row = (np.floor(v / self.gap).astype(int) % size for v in (met[:, 0], -met[:, 1]))
         on = (np.abs(met).max(1) < HALF) & (directions[:, 2] < 0)
-        return self._window(place, np.where(on[:, None], self.image[row, column], 1.0), on)
+        return self._window(place, np.where(on[:, None], self.image[row, column], place.background), on)
 
     def _local(self, place: _Place) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The scene's axes to the plane's, and the rays in the latter; the place is the origin."""
+        """The scene's axes to the plane's, and the rays in the latter."""
         n = place.normal[None].astype(np.float32)
         t = orthonormal(self.along[None].astype(np.float32), n)
         turn = np.concatenate([t, np.cross(n, t), n]).astype(np.float64)
-        return turn, (place.origins - place.point) @ turn.T, place.directions @ turn.T
+        origins = (place.origins - place.point) @ turn.T
+        origins[:, :2] += place.shift
+        return turn, origins, place.directions @ turn.T
 
     @staticmethod
     def _window(place: _Place, colours: np.ndarray, mask: np.ndarray) -> Strip:
