@@ -58,7 +58,7 @@ def main() -> None:
     cells, labels = [], []
     for word in textures.split(","):
         texture = NerfTexture.load(Path(runs) / word)
-        _, held = load_capture(Path(captures) / word).split()
+        _, held = load_capture(Path(captures) / word).within(texture.similarity).split()
         print(f"{word}: {view_quality(texture.shell, held)}", flush=True)
         seen, photo = view_pair(texture.shell, held, 0)
         begun = time.perf_counter()
