@@ -36,7 +36,7 @@ def main(run: str, out: str = "shell.png", size: int = 1024, resolution: int = 3
         "integrator": {"type": "shell", "field": field, "max_depth": 8},
         "sensor": {
             "type": "perspective",
-            "fov": 32,
+            "fov": 46,
             "to_world": mi.ScalarTransform4f().look_at([0.3, 1.1, 5.2], [0.05, -0.2, 0], [0, 1, 0]),
             "film": {"type": "hdrfilm", "width": int(1.5 * resolution), "height": resolution},
         },

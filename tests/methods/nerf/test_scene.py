@@ -22,7 +22,8 @@ def test_all_three_are_in_the_picture(run, tmp_path):
     script.main(str(run), str(tmp_path / "shell.png"), size=128, resolution=64, spp=2)
     picture = read_image(tmp_path / "shell.png")
     assert picture.shape == (64, 96, 3)
-    texture, glass, mesh = picture[20:44, 8:36], picture[40:56, 44:60], picture[16:48, 62:88]
+    texture, glass, mesh = picture[22:42, 16:34], picture[42:54, 44:58], picture[22:42, 62:82]
     floor = picture[-6:].mean((0, 1))
-    for part in (texture, glass, mesh):
-        assert part.std() > 0.05 and np.abs(part.mean((0, 1)) - floor).max() > 0.03
+    for part in (texture, mesh):
+        assert part.std() > 0.05 and np.abs(part.mean((0, 1)) - floor).max() > 0.1
+    assert glass.std() > 0.05
