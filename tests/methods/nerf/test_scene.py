@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from mitex.images import read_image
-
-SCRIPT = Path(__file__).parents[3] / "scenes" / "shell_texture.py"
+from tests.scenes.test_scripts import load
 
 
 @pytest.mark.usefixtures("own_cache")
 def test_all_three_are_in_the_picture(run, tmp_path):
-    spec = importlib.util.spec_from_file_location("shell_texture_script", SCRIPT)
-    assert spec is not None and spec.loader is not None
-    script = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(script)
-    script.main(str(run), str(tmp_path / "shell.png"), size=128, resolution=64, spp=2)
+    load("shell_texture").main(str(run), str(tmp_path / "shell.png"), size=128, resolution=64, spp=2)
     picture = read_image(tmp_path / "shell.png")
     assert picture.shape == (64, 96, 3)
     texture, glass, mesh = picture[22:42, 16:34], picture[42:54, 44:58], picture[22:42, 62:82]
