@@ -30,7 +30,7 @@ def fit_plain(
 
     Args:
         capture: views to learn from.
-        out: run folder, new or empty.
+        out: run folder, new or empty; an interrupted training in it goes on.
         config: settings; those of the texture make the two alike in rays, steps along them, and table size.
         seconds: that the training may take.
         shown: a view for previews, as (capture, index).

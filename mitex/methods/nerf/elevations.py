@@ -79,7 +79,7 @@ def compare_elevations(
         patches: that both are made of, at most.
         seed: of all choices.
         window: side of what is cut out of the photos [pixels].
-        places: photos for each angle.
+        places: photos for each angle that are shown; as many again tell how much photos differ.
     """
     capture = capture.within(texture.similarity)
     rng = np.random.default_rng(seed)
@@ -173,9 +173,7 @@ def _place(
     if mask.shape != (side, side) or mask.sum() < LEAST:
         return None
     colour, alpha = image[window][..., :3], image[window][..., 3:]
-    y, x = np.mgrid[window]
-    pixels = np.stack([x.ravel(), y.ravel()], axis=1) + 0.5
-    origins, directions = capture.rays(np.full(len(pixels), view), pixels)
+    origins, directions = _rays(capture, view, window)
     point, normal = (values[top + half, left + half] for values in (sight.points, sight.normals))
     shift = rng.uniform(-SHIFT, SHIFT, 2)
     background = (colour * alpha).sum((0, 1)) / alpha.sum()
@@ -244,12 +242,17 @@ class _Pair:
 def _sight(mesh: Mesh, capture: Capture, view: int) -> _Sight:
     init()
     height, width = capture.images[view].shape[:2]
-    y, x = np.mgrid[:height, :width]
-    pixels = np.stack([x.ravel(), y.ravel()], axis=1) + 0.5
-    origins, directions = capture.rays(np.full(len(pixels), view), pixels)
+    origins, directions = _rays(capture, view, (slice(height), slice(width)))
     scene = mi.load_dict({"type": "scene", "mesh": mesh_shape(mesh, smooth=True)})
     met = scene.ray_intersect(mi.Ray3f(channels(mi.Point3f, origins), channels(mi.Vector3f, directions)))
     points, normals = rows(met.p), rows(met.sh_frame.n)
     angle = np.degrees(np.arccos(np.clip(-(normals * directions).sum(1), -1, 1)))
     angle[~np.array(met.is_valid()).astype(bool)] = 180.0
     return _Sight(*(values.reshape(height, width, *values.shape[1:]) for values in (angle, points, normals)))
+
+
+def _rays(capture: Capture, view: int, window: tuple[slice, slice]) -> tuple[np.ndarray, np.ndarray]:
+    """Origins and directions (N, 3) of the pixels of a window, row by row."""
+    y, x = np.mgrid[window]
+    pixels = np.stack([x.ravel(), y.ravel()], axis=1) + 0.5
+    return capture.rays(np.full(len(pixels), view), pixels)
