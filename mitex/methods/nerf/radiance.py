@@ -64,6 +64,10 @@ class RadianceTask(ABC):
     def metadata(self) -> dict[str, str]:
         """What checkpoints tell."""
 
+    def aimed(self, batch: Batch) -> Batch:
+        """The batch with its cameras as they are now known."""
+        return batch
+
     @abstractmethod
     def render(self, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
         """What the rays of a batch gather from their samples, attached to the parameters."""
@@ -84,7 +88,7 @@ class RadianceTask(ABC):
         """L1 of colours before a random background, and the field's own terms."""
         if step % REFRESH == 0:
             self.occupancy.refresh(self.density, generator)
-        batch = self.pixels.draw(self.config.rays, self.config.one_view, generator)
+        batch = self.aimed(self.pixels.draw(self.config.rays, self.config.one_view, generator))
         jitter = torch.rand(len(batch.view), generator=generator)
         samples = march(*rays_of(batch), self.occupancy.mask, self.step_length, mi.Float(jitter.numpy()))
         background = torch.rand(batch.colours.shape, generator=generator)

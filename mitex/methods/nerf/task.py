@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,13 @@ class TextureTask(RadianceTask):
     def metadata(self) -> dict[str, str]:
         return {"method": "nerf", "capture": self.pixels.capture.name}
 
+    def aimed(self, batch: Batch) -> Batch:
+        if not self.config.refine_cameras:
+            return batch
+        turn, shift = (POSE * self.named["poses"].detach()[batch.view]).split(3, dim=1)
+        directions = _turned(torch.from_numpy(batch.directions), turn).numpy()
+        return replace(batch, origins=batch.origins + shift.numpy(), directions=directions)
+
     def render(self, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
         origin, direction = rays_of(batch)
         index, feet = within(self.projection(rows(samples.points(origin, direction))), self.thickness)
@@ -116,9 +124,9 @@ class TextureTask(RadianceTask):
         directions = torch.from_numpy(batch.directions)
         if not self.config.refine_cameras:
             return torch.from_numpy(feet.point), torch.from_numpy(feet.distance), directions[ray]
-        turn, shift = (POSE * self.named["poses"][batch.view]).split(3, dim=1)
-        directions = directions + torch.linalg.cross(turn, directions)  # to first order: turns are small
-        directions = directions / directions.norm(dim=1, keepdim=True)
+        correction = POSE * self.named["poses"][batch.view]
+        turn, shift = (correction - correction.detach()).split(3, dim=1)  # `aimed` has its value
+        directions = _turned(directions, turn)
         t = torch.from_numpy(np.array(samples.t))
         points = (torch.from_numpy(batch.origins) + shift)[ray] + directions[ray] * t[:, None]
         return *attach(points, feet), directions[ray]
@@ -162,6 +170,12 @@ class TextureTask(RadianceTask):
                 torch.randint(len(entries), (self.config.cluster_entries,), generator=generator)
             ]
         return clustering(entries, self.named["centres"][level])
+
+
+def _turned(directions: torch.Tensor, turn: torch.Tensor) -> torch.Tensor:
+    """Unit vectors (N, 3), turned by small rotation vectors (N, 3) [rad]."""
+    directions = directions + torch.linalg.cross(turn, directions)
+    return directions / directions.norm(dim=1, keepdim=True)
 
 
 def _start(config: NerfConfig, encoding: Encoding, views: int) -> dict[str, torch.Tensor]:
