@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mitex.methods.nerf.config import NerfConfig
+from mitex.methods.nerf.product import Linear
 from mitex.runtime import load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
@@ -167,7 +168,7 @@ def network(widths: Sequence[int], weights: Iterator[Any]) -> Any:
     """A network of linear layers without biases and ReLUs in between; takes its matrices from `weights`."""
     layers: list[Any] = []
     for i, o in zip(widths[:-1], widths[1:], strict=True):
-        linear: Any = nn.Linear(i, o, bias=False)
+        linear: Any = Linear(i, o, bias=False)
         linear.weights = next(weights)
         layers += [linear, nn.ReLU()]
     return nn.Sequential(*layers[:-1])
