@@ -54,7 +54,7 @@ class TextureTask(RadianceTask):
     ) -> None:
         self.projection, self.frames, self.thickness = projection, frames, thickness
         self.encoding = Encoding(config)
-        parameters = _start(config, self.encoding, len(capture))
+        parameters = _start(config, self.encoding, capture)
         possible = shell_cells(projection, thickness, hull_cells(capture, config.occupancy))
         super().__init__(config, capture, shown, Occupancy(config.occupancy, possible), parameters)
 
@@ -178,7 +178,7 @@ def _turned(directions: torch.Tensor, turn: torch.Tensor) -> torch.Tensor:
     return directions / directions.norm(dim=1, keepdim=True)
 
 
-def _start(config: NerfConfig, encoding: Encoding, views: int) -> dict[str, torch.Tensor]:
+def _start(config: NerfConfig, encoding: Encoding, capture: Capture) -> dict[str, torch.Tensor]:
     """Parameters to start from, by name."""
     drawn = torch.Generator().manual_seed(config.seed)
 
@@ -189,10 +189,10 @@ def _start(config: NerfConfig, encoding: Encoding, views: int) -> dict[str, torc
     parameters = {"tables/f": uniform(f, -1e-4, 1e-4), "tables/phase": uniform(phase, 0.0, 1e-3)}
     for k, shape in enumerate(weight_shapes()):
         parameters[f"weights/{k}"] = uniform(shape, -weight_bound(shape), weight_bound(shape))
-    parameters["light"] = torch.from_numpy(initial_light())
+    parameters["light"] = torch.from_numpy(initial_light(capture.images))
     parameters["centres"] = uniform((len(encoding.levels(0)), CLUSTERS, 2), -1e-4, 1e-4)
     if config.refine_cameras:
-        parameters["poses"] = torch.zeros(views, 6)
+        parameters["poses"] = torch.zeros(len(capture), 6)
     for value in parameters.values():
         value.requires_grad_()
     return parameters

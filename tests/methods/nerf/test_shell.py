@@ -59,7 +59,7 @@ def shell(strength: float = 1.0, scale: float = 1.0) -> Shell:
     frames = np.broadcast_to(np.eye(3), (len(mesh.faces), 3, 3))
     latents = MappedLatents(square(1e-3), uv, frames)
     mask = mi.TensorXu8(np.ones((8, 8, 8), np.uint8))
-    light = mi.TensorXf(initial_light())
+    light = mi.TensorXf(initial_light([np.full((8, 8, 4), 150, np.uint8)]))
     return Shell(
         Projection(mesh), latents, Decoder(weights, packed=True), light, 0.1, mask, 0.02, scale, strength
     )
