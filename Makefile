@@ -33,7 +33,7 @@ bench: $(STAMP)
 	$(VENV)/bin/python -m benchmarks.nca
 	$(VENV)/bin/python -m benchmarks.surface
 	$(VENV)/bin/python -m benchmarks.geometric
-	$(VENV)/bin/python -m benchmarks.nerf
+	OMP_WAIT_POLICY=PASSIVE $(VENV)/bin/python -m benchmarks.nerf
 
 clean:
 	rm -rf $(VENV) out

@@ -1,1 +1,0 @@
-import mitex  # noqa: F401  (before torch, whose threads then wait as Mitex asks)

@@ -3,14 +3,10 @@
 Names are resolved on first use, so that `import mitex` stays quick and loads neither torch nor Mitsuba.
 """
 
-import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
-
-# By default torch's idle threads spin on the cores that Dr.Jit works on. Heeded if torch is imported later.
-os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 __all__ = ["Asset", "Exemplar", "Mesh", "__version__", "init", "methods"]
 

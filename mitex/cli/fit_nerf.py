@@ -9,6 +9,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from mitex.cli.fitting import Fitting
+from mitex.runtime import yield_cores
 
 
 @dataclass(kw_only=True)
@@ -38,6 +39,7 @@ class FitNerf(Fitting):
 
     def run(self) -> None:
         shared = self.shared()
+        yield_cores()
         from mitex.methods import nerf
 
         capture = nerf.load_capture(self.capture)
