@@ -156,3 +156,23 @@ def test_threads_reach_torch_and_drjit(mi):
 def test_threads_chosen_before_the_start_are_kept():
     code = "import mitex.runtime as r; r.threads(1); r.init(); import drjit as dr; print(dr.thread_count())"
     assert run(code).stdout.strip() == "1"
+
+
+def test_torch_yields_cores_unless_the_user_says_otherwise(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("OMP_WAIT_POLICY", "ACTIVE")
+    mitex.runtime.yield_cores()
+    assert os.environ["OMP_WAIT_POLICY"] == "ACTIVE"
+    monkeypatch.delenv("OMP_WAIT_POLICY")
+    mitex.runtime.yield_cores()
+    assert os.environ["OMP_WAIT_POLICY"] == "PASSIVE"
+
+
+def test_fitting_radiance_fields_asks_torch_to_yield_before_it_is_loaded():
+    code = (
+        "import os, sys, mitex.cli.fit_nerf as c\n"
+        "from pathlib import Path\n"
+        "assert 'torch' not in sys.modules\n"
+        "try:\n    c.FitNerf(capture=Path('nowhere')).run()\nexcept Exception:\n    pass\n"
+        "print(os.environ['OMP_WAIT_POLICY'])"
+    )
+    assert run(code).stdout.strip() == "PASSIVE"
