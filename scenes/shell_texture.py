@@ -22,6 +22,8 @@ from mitex.scenes.stage import mesh_shape
 
 mi = mitex.init()
 
+FLOOR = -1.0  # its height
+
 
 def main(run: str, out: str = "shell.png", size: int = 1024, resolution: int = 384, spp: int = 32) -> None:
     """Mitsuba's own dictionaries, with the field given to the integrator as an object."""
@@ -48,7 +50,7 @@ def main(run: str, out: str = "shell.png", size: int = 1024, resolution: int = 3
         },
         "floor": {
             "type": "rectangle",
-            "to_world": mi.ScalarTransform4f().translate([0, -1, 0]).rotate([1, 0, 0], -90).scale(8),
+            "to_world": mi.ScalarTransform4f().translate([0, FLOOR, 0]).rotate([1, 0, 0], -90).scale(8),
         },
         "glass": {
             "type": "sphere",
@@ -56,18 +58,20 @@ def main(run: str, out: str = "shell.png", size: int = 1024, resolution: int = 3
             "radius": 0.4,
             "bsdf": {"type": "dielectric"},
         },
-        "mesh": textured(grown, [1.0, -0.15, 0.1]),
+        "mesh": textured(grown, [1.0, 0.1]),
     }
     picture = np.array(mi.render(mi.load_dict(scene), spp=spp))[..., :3]
     print(write_image(out, tone(picture)))
 
 
 def textured(asset, place):
-    """An asset's mesh, of radius 0.85 at a place, with its base colour at the vertices."""
+    """An asset's mesh, of radius 0.85 and standing on the floor at (x, z), with its base colour at the vertices."""
     mesh = asset.mesh.normalised()[0]
+    vertices = 0.85 * mesh.vertices
+    vertices += np.array([place[0], FLOOR - vertices[:, 1].min(), place[1]])
     colour = {"type": "mesh_attribute", "name": "vertex_color"}
     matte = mi.load_dict({"type": "diffuse", "reflectance": colour})
-    shape = mesh_shape(mesh.with_vertices(0.85 * mesh.vertices + place), matte, smooth=True)
+    shape = mesh_shape(mesh.with_vertices(vertices), matte, smooth=True)
     shape.add_attribute("vertex_color", 3, srgb_to_linear(asset.vertex_maps["albedo"]).ravel())
     return shape
 
