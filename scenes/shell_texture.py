@@ -65,7 +65,7 @@ def main(run: str, out: str = "shell.png", size: int = 1024, resolution: int = 3
 
 
 def textured(asset, place):
-    """An asset's mesh, of radius 0.85 and standing on the floor at (x, z), with its base colour at the vertices."""
+    """An asset's mesh, radius 0.85, on the floor at (x, z), with its base colour at the vertices."""
     mesh = asset.mesh.normalised()[0]
     vertices = 0.85 * mesh.vertices
     vertices += np.array([place[0], FLOOR - vertices[:, 1].min(), place[1]])
