@@ -110,8 +110,8 @@ def yield_cores() -> None:
     """Lets torch's idle threads sleep, where they would spin on cores that Dr.Jit works on.
 
     For what goes to and fro between the two, as `nerf` does: its training takes three quarters of the time.
-    Work that is mostly torch's gets slower by a fifth. To be called before torch is imported, later it has
-    no effect; OMP_WAIT_POLICY in the environment has precedence.
+    Work that is mostly torch's gets slower: `nca` by a tenth to a fifth, `surface` by a fifth or far more.
+    To be called before torch is imported, later it has no effect; OMP_WAIT_POLICY has precedence.
     """
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 

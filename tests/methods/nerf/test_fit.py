@@ -160,6 +160,37 @@ def test_a_resumed_run_continues_as_if_it_had_not_stopped(run, tmp_path, base, m
         torch.testing.assert_close(a, b, rtol=0, atol=1e-6)
 
 
+def test_refined_cameras_get_the_gradient_of_the_loss(base):
+    small = dict(rays=512, table=12, coarsest=8, finest=16, occupancy=32, cells=128)
+    settings = replace(PRESETS["fast"], refine_cameras=True, **small)
+    capture = tiny_capture()
+    task = TextureTask(settings, capture, (capture, 0), Projection(base, reach=0.12), face_frames(base), 0.12)
+    loss, _ = task.loss(0, torch.Generator().manual_seed(0))
+    loss.backward()
+    gradient = task.named["poses"].grad
+    assert gradient is not None and gradient.shape == (len(capture), 6)
+    assert gradient.isfinite().all() and (gradient.abs().sum(1) > 0).float().mean() > 0.9
+
+
+@pytest.mark.slow
+def test_refined_cameras_make_up_for_wrong_ones(base, tmp_path, own_cache):
+    """Poses that are a degree off cost accuracy; refined ones win most of it back."""
+    capture, rng = tiny_capture(), np.random.default_rng(0)
+    turns = Rotation.from_rotvec(np.radians(1.0) * rng.normal(size=(len(capture), 3)) / np.sqrt(3))
+    poses = capture.poses.copy()
+    poses[:, :, :3] = turns.as_matrix() @ poses[:, :, :3]
+    wrong = replace(capture, poses=poses.astype(np.float32))
+    more = [s for s in SETTINGS if not s.startswith(("steps", "lr_steps", "preview"))]
+    more += ["steps=400", "lr_steps=400", "preview_every=0"]
+    errors = {}
+    for name, photos, refined in (("right", capture, 0), ("wrong", wrong, 0), ("refined", wrong, 1)):
+        settings = [*more, f"refine_cameras={'true' if refined else 'false'}"]
+        fit(photos, tmp_path / name, base_mesh=base, overrides=settings, quiet=True)
+        lines = (tmp_path / name / "metrics.jsonl").read_text().splitlines()[-50:]
+        errors[name] = np.mean([json.loads(line)["colour"] for line in lines])
+    assert errors["refined"] < 0.5 * (errors["right"] + errors["wrong"]), errors
+
+
 def test_wrong_cameras_find_back(run, base):
     """In a field that is right, cameras turned by half a degree turn back, or move so that it is the same."""
     capture, rng = tiny_capture(), np.random.default_rng(0)
@@ -175,7 +206,7 @@ def test_wrong_cameras_find_back(run, base):
         for name, value in task.named.items():
             value.copy_(state.get(f"parameters/{name}", value))
     generator, optimizer = torch.Generator().manual_seed(0), torch.optim.Adam([task.named["poses"]], lr=0.03)
-    for step in range(90):
+    for step in range(150):
         loss, _ = task.loss(step, generator)
         (task.named["poses"].grad,) = torch.autograd.grad(loss, [task.named["poses"]])
         optimizer.step()
@@ -188,4 +219,4 @@ def test_wrong_cameras_find_back(run, base):
         axis = centres / np.linalg.norm(centres, axis=1, keepdims=True)
         return np.linalg.norm(off - axis * (off * axis).sum(1, keepdims=True), axis=1).mean()
 
-    assert miss(turns + found[:, :3], found[:, 3:]) < 0.5 * miss(turns, 0)
+    assert miss(turns + found[:, :3], found[:, 3:]) < 0.4 * miss(turns, 0)

@@ -195,8 +195,8 @@ def test_under_the_initial_light_half_white_is_twice_as_bright_as_the_photos(mi,
     photo[4:] = (255, 255, 255, 0)  # what is transparent does not count
     light = initial_light([photo, photo])
     assert light.shape == (16,) and light.dtype == np.float32
-    found = _shade(mi, unit(10), light, kd=0.5, ks=0.0, glossiness=3.0)
-    np.testing.assert_allclose(found, 2 * (value / 255) ** 2.4, rtol=1e-5)
+    found = _shade(mi, unit(10), light, kd=0.5, ks=0.25, glossiness=3.0)
+    np.testing.assert_allclose(found, (2 + 1) * (value / 255) ** 2.4, rtol=1e-5)  # k_s adds half of k_d's
 
 
 def test_the_initial_light_of_black_photos_is_not_black():
