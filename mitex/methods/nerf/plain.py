@@ -14,7 +14,7 @@ from mitex.bridge import call
 from mitex.integrators.march import Samples, accumulated, weights_of
 from mitex.methods.nerf.capture import Capture
 from mitex.methods.nerf.config import NerfConfig
-from mitex.methods.nerf.field import HIGHEST, network, network_rows, sigmoid, weight_bound
+from mitex.methods.nerf.field import HIGHEST, network_rows, packed_networks, sigmoid, weight_bound
 from mitex.methods.nerf.occupancy import Occupancy, hull_cells
 from mitex.methods.nerf.pixels import Batch
 from mitex.methods.nerf.radiance import RadianceTask, Rendered, learn, rays_of
@@ -24,7 +24,6 @@ from mitex.training import checkpoint
 
 mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
-import drjit.nn as nn  # noqa: E402
 from drjit.hashgrid import HashGridEncoding  # noqa: E402
 
 LEVELS, COARSEST, FINEST = 16, 16, 2048
@@ -55,15 +54,14 @@ class PlainField:
         self.grid = hash_grid(size)
         self.grid.data = table
         given = iter(weights)
-        nets = [network(widths, given) for widths in (DENSITY, COLOUR)]
-        self._nets = nn.pack(*nets) if packed else nets
-        self._packed = packed
+        nets = [[next(given) for _ in widths[1:]] for widths in (DENSITY, COLOUR)]
+        self._nets = packed_networks(*nets) if packed else nets
         self.mask, self.step = mask, step
 
     def density(self, points: Any) -> tuple[Any, list[Any]]:
         """Density [1 / scene units] of `mi.Point3f`, and a code for the colour."""
         inside = dr.clip(points * 0.5 + 0.5, 0, 1)
-        exponent, *code = network_rows(self._nets[0], list(self.grid(inside)), self._packed)
+        exponent, *code = network_rows(self._nets[0], list(self.grid(inside)))
         return dr.exp(dr.minimum(exponent, HIGHEST)), code
 
     def density_at(self, points: np.ndarray) -> np.ndarray:
@@ -72,7 +70,7 @@ class PlainField:
 
     def colour(self, code: list[Any], view: Any) -> Any:
         """`mi.Color3f` in display values, seen in the unit directions `view`."""
-        rows = network_rows(self._nets[1], [*code, *dr.sh_eval(view, 3)], self._packed)
+        rows = network_rows(self._nets[1], [*code, *dr.sh_eval(view, 3)])
         return mi.Color3f(*(sigmoid(row) for row in rows))
 
     def evaluate(self, points: Any, view: Any) -> tuple[Any, Any, Any]:
