@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import resource
+import statistics
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -33,18 +34,19 @@ from mitex.runtime import init, keep_freed_memory
 mi = init()
 import drjit as dr  # noqa: E402
 
-ENOUGH = 2.0  # seconds that are timed
+ENOUGH = 3.0  # seconds that are timed
 TABLE = 17
 
 
 def rate(points: int, work: Callable[[], object]) -> float:
-    """Points per second of `work`, once it is warm."""
+    """Points per second of `work`, once it is warm; the median, since other work disturbs some rounds."""
     work()
-    begun, rounds = time.perf_counter(), 0
-    while not rounds or time.perf_counter() - begun < ENOUGH:
+    begun, times = time.perf_counter(), []
+    while not times or time.perf_counter() - begun < ENOUGH:
+        started = time.perf_counter()
         work()
-        rounds += 1
-    return points * rounds / (time.perf_counter() - begun)
+        times.append(time.perf_counter() - started)
+    return points / statistics.median(times)
 
 
 def parameters(encoding: Encoding) -> list[torch.Tensor]:

@@ -33,6 +33,7 @@ LAYERS = {  # widths, without biases
     "theta": (FEATURES + COARSE, 16, 16, 1),
     "phi": (PHASES + COARSE, 16, 16, 1),
 }
+ELEVATION = 7  # which matrix makes theta of what is before it
 HIGHEST = 15.0  # exponent of the density
 
 

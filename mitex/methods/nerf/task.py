@@ -12,7 +12,7 @@ from mitex.bridge import call
 from mitex.integrators.march import Samples, accumulated, weights_of
 from mitex.methods.nerf.capture import Capture
 from mitex.methods.nerf.config import NerfConfig
-from mitex.methods.nerf.field import Decoder, Encoding, weight_bound, weight_shapes
+from mitex.methods.nerf.field import ELEVATION, Decoder, Encoding, weight_bound, weight_shapes
 from mitex.methods.nerf.lighting import initial_light
 from mitex.methods.nerf.losses import clustering, normal_agreement
 from mitex.methods.nerf.occupancy import Occupancy, hull_cells
@@ -29,6 +29,9 @@ import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit o
 CLUSTERS = 4  # centres in each level
 OUTWARDS = 0.1  # share of the coarse normal in what the fine one is compared with
 LEAST = 1e-3  # opacity of rays whose normals are compared
+# Fine normals start near those of the faces, so that the light can be learned from the first steps on. From
+# random ones it stays even: its shades are told by k_d before the normals are good.
+FLAT = 1e-2
 POSE = 1e-2  # unit of the cameras' corrections [rad, scene units]
 
 
@@ -188,7 +191,8 @@ def _start(config: NerfConfig, encoding: Encoding, capture: Capture) -> dict[str
     f, phase = encoding.sizes
     parameters = {"tables/f": uniform(f, -1e-4, 1e-4), "tables/phase": uniform(phase, 0.0, 1e-3)}
     for k, shape in enumerate(weight_shapes()):
-        parameters[f"weights/{k}"] = uniform(shape, -weight_bound(shape), weight_bound(shape))
+        bound = weight_bound(shape) * (FLAT if k == ELEVATION else 1)
+        parameters[f"weights/{k}"] = uniform(shape, -bound, bound)
     parameters["light"] = torch.from_numpy(initial_light(capture.images))
     parameters["centres"] = uniform((len(encoding.levels(0)), CLUSTERS, 2), -1e-4, 1e-4)
     if config.refine_cameras:

@@ -18,7 +18,9 @@ from mitex.methods.nerf.base_shape import face_frames
 from mitex.methods.nerf.pixels import Pixels
 from mitex.methods.nerf.projection import Projection
 from mitex.methods.nerf.radiance import look
+from mitex.methods.nerf.shell import Located
 from mitex.methods.nerf.task import POSE, TextureTask
+from mitex.methods.nerf.tensors import rows
 from mitex.metrics import psnr
 from mitex.training import checkpoint
 from mitex.training.config import resolve
@@ -160,11 +162,27 @@ def test_a_resumed_run_continues_as_if_it_had_not_stopped(run, tmp_path, base, m
         torch.testing.assert_close(a, b, rtol=0, atol=1e-6)
 
 
-def test_refined_cameras_get_the_gradient_of_the_loss(base):
+def small_task(base: Mesh, **more) -> TextureTask:
     small = dict(rays=512, table=12, coarsest=8, finest=16, occupancy=32, cells=128)
-    settings = replace(PRESETS["fast"], refine_cameras=True, **small)
+    settings = replace(PRESETS["fast"], **small, **more)
     capture = tiny_capture()
-    task = TextureTask(settings, capture, (capture, 0), Projection(base, reach=0.12), face_frames(base), 0.12)
+    return TextureTask(settings, capture, (capture, 0), Projection(base, reach=0.12), face_frames(base), 0.12)
+
+
+def test_fine_normals_start_near_those_of_the_faces(base):
+    """Else the light stays even, and its shades become part of k_d."""
+    task = small_task(base)
+    latents, decoder, _ = task.model(task.named, packed=True)
+    points = (base.vertices[base.faces].mean(1) * 1.02).astype(np.float32)
+    located = Located.of(task.projection(points))
+    normal = decoder(*latents(located), located.distance).normal(*latents.frame(located))
+    cosine = (rows(normal) * base.face_normals[np.array(located.face)]).sum(1)
+    assert cosine.min() > np.cos(np.radians(3.0))
+
+
+def test_refined_cameras_get_the_gradient_of_the_loss(base):
+    task = small_task(base, refine_cameras=True)
+    capture = task.pixels.capture
     loss, _ = task.loss(0, torch.Generator().manual_seed(0))
     loss.backward()
     gradient = task.named["poses"].grad
