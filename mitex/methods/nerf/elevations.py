@@ -65,7 +65,7 @@ def compare_elevations(
     capture: Capture,
     *,
     size: int = 1024,
-    patches: int = 300,
+    patches: int = 2000,
     seed: int = 0,
     window: int = WINDOW,
     places: int = PLACES,
