@@ -33,7 +33,9 @@ LAYERS = {  # widths, without biases
     "theta": (FEATURES + COARSE, 16, 16, 1),
     "phi": (PHASES + COARSE, 16, 16, 1),
 }
-ELEVATION = 7  # which matrix makes theta of what is before it
+ELEVATION = (
+    sum(len(LAYERS[name]) - 1 for name in ("density", "reflection", "theta")) - 1
+)  # the last of theta's
 HIGHEST = 15.0  # exponent of the density
 
 
@@ -173,7 +175,7 @@ class _Networks(dr.CustomOp):
 
     def backward(self) -> None:
         gradient: Any = self.grad_out()
-        exponent, *rest = gradient.torch().split((1, 5, 1, 1))
+        exponent, *rest = gradient.torch().split([1, *(widths[-1] for widths in list(LAYERS.values())[1:])])
         of_rest = [self._back(k, g) for k, g in enumerate(rest, 1)]
         (of_reflection, code), (of_theta, angle), (of_phi, phases) = of_rest
         of_density, values = self._back(0, torch.cat([exponent, code]))
