@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -14,6 +15,7 @@ import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit o
 DIAGONAL = 2 * math.sqrt(3)  # of the scene cube [-1, 1]^3
 WINDOW = 48  # steps that are taken before the rays that have come to an end are dropped
 OPAQUE = 1e-3  # what passes of a ray that has come to an end
+FRONT = 12  # samples of a ray that are looked at first: most rays end in them
 
 
 @dataclass
@@ -161,6 +163,28 @@ def march(
     return candidates.kept(found)
 
 
+def visible(samples: Samples, origin: Any, direction: Any, density: Callable[[Any], Any]) -> Samples:
+    """The samples that are seen: those before which the ray has not come to an end.
+
+    In an opaque scene these are few, and only they are worth colours and derivatives.
+
+    Args:
+        samples: of R rays.
+        origin, direction: of the rays.
+        density: of points `mi.Point3f`, `mi.Float` without derivatives [1 / scene units].
+    """
+    depth = dr.zeros(mi.Float, len(samples))
+    rank = dr.arange(mi.UInt32, len(samples)) - _first(samples)
+    for part in (rank < FRONT, rank >= FRONT):
+        passing = dr.exp(-accumulated(depth, samples))
+        index = dr.compress(part & (dr.gather(mi.Float, passing, samples.ray) > OPAQUE))
+        if dr.width(index):
+            points = samples.kept(index).points(origin, direction)
+            dr.scatter(depth, density(points) * samples.step, index)
+    before = _sum_before(mi.Float64(depth), samples)
+    return samples.kept(dr.compress(dr.exp(-before) > OPAQUE))
+
+
 def cells_of(points: Any, side: int) -> Any:
     """Index of the cell of the scene cube, x slowest, for `mi.Point3f` inside."""
     x, y, z = (mi.UInt32(dr.clip((p + 1) * (0.5 * side), 0, side - 1)) for p in points)
@@ -187,23 +211,29 @@ class _Before(dr.CustomOp):
 
     def eval(self, values: Any, samples: Samples) -> Any:
         self.samples = samples
-        return self._sum(values)
+        return _sum_before(values, samples)
 
     def forward(self) -> None:
-        self.set_grad_out(self._sum(self.grad_in("values")))
+        self.set_grad_out(_sum_before(self.grad_in("values"), self.samples))
 
     def backward(self) -> None:
         grad = self.grad_out()
         total = dr.gather(mi.Float64, accumulated(grad, self.samples), self.samples.ray)
-        self.set_grad_in("values", total - self._sum(grad) - grad)
+        self.set_grad_in("values", total - _sum_before(grad, self.samples) - grad)
 
-    def _sum(self, values: Any) -> Any:
-        # In double precision: the sum runs over all rays, and differences of it must keep their digits.
-        sums = dr.prefix_sum(values)
-        index = dr.arange(mi.UInt32, dr.width(values))
-        start = dr.full(mi.UInt32, 0xFFFFFFFF, self.samples.rays)
-        dr.scatter_reduce(dr.ReduceOp.Min, start, index, self.samples.ray)
-        return sums - dr.gather(mi.Float64, sums, dr.gather(mi.UInt32, start, self.samples.ray))
+
+def _sum_before(values: Any, samples: Samples) -> Any:
+    # In double precision: the sum runs over all rays, and differences of it must keep their digits.
+    sums = dr.prefix_sum(values)
+    return sums - dr.gather(mi.Float64, sums, _first(samples))
+
+
+def _first(samples: Samples) -> Any:
+    """Index of the first sample of each sample's ray."""
+    index = dr.arange(mi.UInt32, len(samples))
+    start = dr.full(mi.UInt32, 0xFFFFFFFF, samples.rays)
+    dr.scatter_reduce(dr.ReduceOp.Min, start, index, samples.ray)
+    return dr.gather(mi.UInt32, start, samples.ray)
 
 
 def accumulated(values: Any, samples: Samples) -> Any:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mitex.integrators.march import Samples, accumulated, march, traverse, weights_of
+from mitex.integrators.march import OPAQUE, Samples, accumulated, march, traverse, visible, weights_of
 from mitex.runtime import init
 
 mi: Any = init()
@@ -150,6 +150,50 @@ def test_weights_of_a_long_batch_keep_their_digits():
     weights, through = weights_of(mi.Float(density), samples)
     np.testing.assert_allclose(np.array(through)[-1], math.exp(-0.1), rtol=1e-5)
     np.testing.assert_allclose(np.array(accumulated(weights, samples)) + np.array(through), 1, atol=1e-5)
+
+
+def test_what_is_behind_an_opaque_surface_is_not_visible():
+    """Rays that end in their first samples, far behind these, or never; against loops."""
+    origin, direction, jitter = rays(3)
+    full = mi.TensorXu8(np.ones((8, 8, 8), np.uint8))
+    samples = march(origin, direction, full, 1 / 32, jitter)
+    looked_at = []
+
+    def dense(points):
+        looked_at.append(dr.width(points))
+        starts = dr.select(points.y < -0.1, -0.9, dr.select(points.y < 0.1, 0.4, 9.0))
+        return dr.select(points.x > starts, 60.0, 0.5)
+
+    kept = visible(samples, origin, direction, dense)
+    ray, t = np.array(samples.ray), np.array(samples.t)
+    density = np.array(dense(samples.points(origin, direction)))
+    through, expected = np.ones(3), []
+    for k in range(len(ray)):
+        if through[ray[k]] > OPAQUE:
+            expected.append((ray[k], t[k]))
+        through[ray[k]] *= math.exp(-density[k] / 32)
+    found = np.stack([np.array(kept.ray), np.array(kept.t)], axis=1)
+    np.testing.assert_array_equal(found, np.array(expected, np.float32))
+    assert len(found) < 0.7 * len(ray)
+    assert sum(looked_at[:-1]) < 0.75 * len(ray)  # the first ray's end is not looked at
+
+
+def test_rays_gather_the_same_of_what_is_visible():
+    origin, direction, jitter = rays(4)
+    full = mi.TensorXu8(np.ones((8, 8, 8), np.uint8))
+    samples = march(origin, direction, full, 1 / 64, jitter)
+
+    def dense(points):
+        return 80 * dr.maximum(points.x + points.y, 0)
+
+    def gathered(samples):
+        weights, through = weights_of(dense(samples.points(origin, direction)), samples)
+        return np.array(accumulated(weights * samples.t, samples)), np.array(through)
+
+    kept = visible(samples, origin, direction, dense)
+    assert len(kept) < 0.9 * len(samples)
+    for found, expected in zip(gathered(kept), gathered(samples), strict=True):
+        np.testing.assert_allclose(found, expected, atol=3 * OPAQUE)
 
 
 def test_a_traversal_is_differentiable():

@@ -102,7 +102,6 @@ PRESETS = {
         preset="fast",
         steps=6_000,
         lr_steps=6_000,
-        rays=2048,
         one_view=False,
         cells=512,
         table=17,

@@ -33,9 +33,8 @@ LAYERS = {  # widths, without biases
     "theta": (FEATURES + COARSE, 16, 16, 1),
     "phi": (PHASES + COARSE, 16, 16, 1),
 }
-ELEVATION = (
-    sum(len(LAYERS[name]) - 1 for name in ("density", "reflection", "theta")) - 1
-)  # the last of theta's
+# Which matrix is the last of theta's.
+ELEVATION = sum(len(LAYERS[name]) - 1 for name in ("density", "reflection", "theta")) - 1
 HIGHEST = 15.0  # exponent of the density
 
 

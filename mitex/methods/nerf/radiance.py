@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from mitex.integrators.march import DIAGONAL, RadianceField, Samples, march, traverse
+from mitex.integrators.march import DIAGONAL, RadianceField, Samples, march, traverse, visible
 from mitex.methods.nerf.capture import Capture
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.losses import distortion
@@ -90,11 +90,13 @@ class RadianceTask(ABC):
             self.occupancy.refresh(self.density, generator)
         batch = self.aimed(self.pixels.draw(self.config.rays, self.config.one_view, generator))
         jitter = torch.rand(len(batch.view), generator=generator)
-        samples = march(*rays_of(batch), self.occupancy.mask, self.step_length, mi.Float(jitter.numpy()))
+        rays = rays_of(batch)
+        samples = march(*rays, self.occupancy.mask, self.step_length, mi.Float(jitter.numpy()))
         background = torch.rand(batch.colours.shape, generator=generator)
         wanted = batch.colours * batch.alpha + background * (1 - batch.alpha)
         if not len(samples):
             raise ValueError("no ray meets an occupied cell")
+        samples = visible(samples, *rays, lambda points: mi.Float(self.density(rows(points))))
         made = self.render(batch, samples, generator)
         picture = made.colour + made.through[:, None] * background
         error = (picture - wanted).abs().mean()
