@@ -24,6 +24,8 @@ class NerfConfig:
         lr: learning rate, times 0.1 after `lr_steps`.
         lr_steps: as said.
         average: decay of the running mean of the parameters, the model that is kept, per 16 steps.
+        learn_light: the light is learned with the field, as published; else it stays as the photos and the
+            base shape tell it.
         clustering, distortion, normals: weights of the losses.
         cluster_entries: entries of a level that a step clusters, drawn by chance; 0 for all, as published.
         normal_rays: share of the rays whose normals are compared.
@@ -49,6 +51,7 @@ class NerfConfig:
     lr: float = 1e-2
     lr_steps: int = 40_000
     average: float = 0.95
+    learn_light: bool = True
     clustering: float = 1e-5
     distortion: float = 1e-2
     normals: float = 1.0
@@ -107,6 +110,7 @@ PRESETS = {
         table=17,
         coarsest=64,
         finest=512,
+        learn_light=False,
         cluster_entries=1 << 14,
         normals=0.05,
         normal_rays=0.25,

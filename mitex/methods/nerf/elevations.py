@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mitex.frames import orthonormal
-from mitex.mesh import Mesh, grid
+from mitex.mesh import grid
 from mitex.methods.baselines.quilted import quilted_albedo
 from mitex.methods.nerf.applied import EXTENT
 from mitex.methods.nerf.capture import Capture
@@ -21,11 +21,10 @@ from mitex.methods.nerf.lighting import rotated
 from mitex.methods.nerf.patches import principal_direction
 from mitex.methods.nerf.pictures import pictured
 from mitex.methods.nerf.radiance import seen
-from mitex.methods.nerf.tensors import channels, rows
+from mitex.methods.nerf.sights import Sight, Sights, window_rays
 from mitex.methods.nerf.texture import NerfTexture
 from mitex.metrics import single_image_frechet
-from mitex.runtime import init, load_mitsuba
-from mitex.scenes.stage import mesh_shape
+from mitex.runtime import load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
 
@@ -84,7 +83,8 @@ def compare_elevations(
     capture = capture.within(texture.similarity)
     rng = np.random.default_rng(seed)
     pair = _Pair(texture, size, patches, seed)
-    sights = [_sight(texture.model.base.mesh, capture, view) for view in range(len(capture))]
+    look = Sights(texture.model.base.mesh, capture)
+    sights = [look(view) for view in range(len(capture))]
     table = []
     for angle in ELEVATIONS:
         found = []
@@ -94,20 +94,6 @@ def compare_elevations(
         if len(found) >= 2:
             table.append(_compared(found[: 2 * places], angle, pair))
     return table
-
-
-@dataclass(frozen=True, eq=False)
-class _Sight:
-    """What the pixels (H, W) of a view see of the base shape.
-
-    Attributes:
-        angle: to its normal, 180 where it is missed [degrees].
-        points, normals: (H, W, 3).
-    """
-
-    angle: np.ndarray
-    points: np.ndarray
-    normals: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +142,7 @@ def _strip(windows: list[Strip]) -> Strip:
 
 
 def _place(
-    capture: Capture, view: int, sight: _Sight, angle: float, side: int, rng: np.random.Generator
+    capture: Capture, view: int, sight: Sight, angle: float, side: int, rng: np.random.Generator
 ) -> _Place | None:
     """Somewhere in a view, or None if too little is seen under the angle."""
     image = capture.images[view].astype(np.float32) / 255
@@ -173,7 +159,7 @@ def _place(
     if mask.shape != (side, side) or mask.sum() < LEAST:
         return None
     colour, alpha = image[window][..., :3], image[window][..., 3:]
-    origins, directions = _rays(capture, view, window)
+    origins, directions = window_rays(capture, view, window)
     point, normal = (values[top + half, left + half] for values in (sight.points, sight.normals))
     shift = rng.uniform(-SHIFT, SHIFT, 2)
     background = (colour * alpha).sum((0, 1)) / alpha.sum()
@@ -237,22 +223,3 @@ class _Pair:
     def _window(place: _Place, colours: np.ndarray, mask: np.ndarray) -> Strip:
         shape = place.mask.shape
         return colours.clip(0, 1).astype(np.float32).reshape(*shape, 3), mask.reshape(shape)
-
-
-def _sight(mesh: Mesh, capture: Capture, view: int) -> _Sight:
-    init()
-    height, width = capture.images[view].shape[:2]
-    origins, directions = _rays(capture, view, (slice(height), slice(width)))
-    scene = mi.load_dict({"type": "scene", "mesh": mesh_shape(mesh, smooth=True)})
-    met = scene.ray_intersect(mi.Ray3f(channels(mi.Point3f, origins), channels(mi.Vector3f, directions)))
-    points, normals = rows(met.p), rows(met.sh_frame.n)
-    angle = np.degrees(np.arccos(np.clip(-(normals * directions).sum(1), -1, 1)))
-    angle[~np.array(met.is_valid()).astype(bool)] = 180.0
-    return _Sight(*(values.reshape(height, width, *values.shape[1:]) for values in (angle, points, normals)))
-
-
-def _rays(capture: Capture, view: int, window: tuple[slice, slice]) -> tuple[np.ndarray, np.ndarray]:
-    """Origins and directions (N, 3) of the pixels of a window, row by row."""
-    y, x = np.mgrid[window]
-    pixels = np.stack([x.ravel(), y.ravel()], axis=1) + 0.5
-    return capture.rays(np.full(len(pixels), view), pixels)

@@ -24,27 +24,7 @@ COEFFICIENTS = 16
 BANDS = 3  # of l that are rendered
 COSINE = (1.0, 2 / 3, 1 / 4, 0.0)  # of max(cos, 0) / pi, by l
 POWER = 1 / 2.4
-DARKEST = 0.01  # mean radiance of photos that a light is made for, at least
 TOE = 1e-4  # radiance below which the display curve is a line, of slope 215
-
-
-def initial_light(images: Sequence[np.ndarray]) -> np.ndarray:
-    """The light that training starts from, even: a k_d of a half looks twice as bright as the photos.
-
-    That is about the published start, L_00 = 3, for photos of usual brightness. Dark ones (grass) must not
-    start from it: all colours are driven to black together then, where the gradient vanishes.
-
-    Args:
-        images: (H, W, 4) uint8 each, straight display values and alpha.
-
-    Returns:
-        (16,) float32.
-    """
-    thin = np.concatenate([image[::4, ::4].reshape(-1, 4) for image in images]).astype(np.float64) / 255
-    bright = (thin[:, :3] ** (1 / POWER)).mean(1) @ thin[:, 3] / max(thin[:, 3].sum(), 1.0)
-    light = np.zeros(COEFFICIENTS, np.float32)
-    light[0] = 4 * max(bright, DARKEST) * math.sqrt(4 * math.pi)
-    return light
 
 
 def shade(normal: Any, view: Any, kd: Any, ks: Any, glossiness: Any, light: Any, bands: int = BANDS) -> Any:

@@ -10,10 +10,11 @@ import torch
 
 from mitex.bridge import call
 from mitex.integrators.march import Samples, accumulated, weights_of
+from mitex.mesh import Mesh
 from mitex.methods.nerf.capture import Capture
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field import ELEVATION, Decoder, Encoding, weight_bound, weight_shapes
-from mitex.methods.nerf.lighting import initial_light
+from mitex.methods.nerf.light_estimate import estimated_light
 from mitex.methods.nerf.losses import clustering, normal_agreement
 from mitex.methods.nerf.occupancy import Occupancy, hull_cells
 from mitex.methods.nerf.pixels import Batch
@@ -57,7 +58,7 @@ class TextureTask(RadianceTask):
     ) -> None:
         self.projection, self.frames, self.thickness = projection, frames, thickness
         self.encoding = Encoding(config)
-        parameters = _start(config, self.encoding, capture)
+        parameters = _start(config, self.encoding, capture, projection.mesh)
         possible = shell_cells(projection, thickness, hull_cells(capture, config.occupancy))
         super().__init__(config, capture, shown, Occupancy(config.occupancy, possible), parameters)
 
@@ -181,7 +182,7 @@ def _turned(directions: torch.Tensor, turn: torch.Tensor) -> torch.Tensor:
     return directions / directions.norm(dim=1, keepdim=True)
 
 
-def _start(config: NerfConfig, encoding: Encoding, capture: Capture) -> dict[str, torch.Tensor]:
+def _start(config: NerfConfig, encoding: Encoding, capture: Capture, base: Mesh) -> dict[str, torch.Tensor]:
     """Parameters to start from, by name."""
     drawn = torch.Generator().manual_seed(config.seed)
 
@@ -193,10 +194,10 @@ def _start(config: NerfConfig, encoding: Encoding, capture: Capture) -> dict[str
     for k, shape in enumerate(weight_shapes()):
         bound = weight_bound(shape) * (FLAT if k == ELEVATION else 1)
         parameters[f"weights/{k}"] = uniform(shape, -bound, bound)
-    parameters["light"] = torch.from_numpy(initial_light(capture.images))
+    parameters["light"] = torch.from_numpy(estimated_light(base, capture))
     parameters["centres"] = uniform((len(encoding.levels(0)), CLUSTERS, 2), -1e-4, 1e-4)
     if config.refine_cameras:
         parameters["poses"] = torch.zeros(len(capture), 6)
-    for value in parameters.values():
-        value.requires_grad_()
+    for name, value in parameters.items():
+        value.requires_grad_(config.learn_light or name != "light")
     return parameters

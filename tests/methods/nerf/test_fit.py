@@ -15,6 +15,7 @@ from mitex.errors import CheckpointError, ConfigError, MeshError, OutputError
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nerf import PRESETS, NerfTexture, files, fit
 from mitex.methods.nerf.base_shape import face_frames
+from mitex.methods.nerf.light_estimate import estimated_light
 from mitex.methods.nerf.pixels import Pixels
 from mitex.methods.nerf.projection import Projection
 from mitex.methods.nerf.radiance import look
@@ -178,6 +179,17 @@ def test_fine_normals_start_near_those_of_the_faces(base):
     normal = decoder(*latents(located), located.distance).normal(*latents.frame(located))
     cosine = (rows(normal) * base.face_normals[np.array(located.face)]).sum(1)
     assert cosine.min() > np.cos(np.radians(3.0))
+
+
+def test_the_light_is_that_of_the_photos_unless_it_is_learned(base):
+    for learned in (False, True):
+        task = small_task(base, learn_light=learned)
+        estimate = estimated_light(base, task.pixels.capture)
+        np.testing.assert_allclose(task.named["light"].detach(), estimate, rtol=1e-5, atol=1e-6)
+        loss, _ = task.loss(0, torch.Generator().manual_seed(0))
+        loss.backward()
+        gradient = task.named["light"].grad
+        assert (gradient is not None and gradient.abs().max() > 0) == learned
 
 
 def test_refined_cameras_get_the_gradient_of_the_loss(base):

@@ -12,7 +12,6 @@ from mitex.methods.nerf.lighting import (
     COEFFICIENTS,
     COSINE,
     TOE,
-    initial_light,
     project_environment,
     rotated,
     shade,
@@ -187,21 +186,6 @@ def test_light_of_one_channel_is_that_of_three_equal_ones(mi, unit, bright):
     flat = _shade(mi, normals, grey, **options)
     np.testing.assert_array_equal(flat, _shade(mi, normals, grey[:, None], **options))
     np.testing.assert_allclose(flat, _shade(mi, normals, np.stack([grey] * 3, axis=1), **options), rtol=1e-6)
-
-
-@pytest.mark.parametrize("value", [64, 160])
-def test_under_the_initial_light_half_white_is_twice_as_bright_as_the_photos(mi, unit, value):
-    photo = np.full((8, 8, 4), value, np.uint8)
-    photo[4:] = (255, 255, 255, 0)  # what is transparent does not count
-    light = initial_light([photo, photo])
-    assert light.shape == (16,) and light.dtype == np.float32
-    found = _shade(mi, unit(10), light, kd=0.5, ks=0.25, glossiness=3.0)
-    np.testing.assert_allclose(found, (2 + 1) * (value / 255) ** 2.4, rtol=1e-5)  # k_s adds half of k_d's
-
-
-def test_the_initial_light_of_black_photos_is_not_black():
-    photo = np.zeros((8, 8, 4), np.uint8)
-    assert 0 < initial_light([photo])[0] < 1
 
 
 def test_negative_radiance_is_clamped(mi):

@@ -8,7 +8,6 @@ import numpy as np
 
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nerf.field import Decoder, weight_bound, weight_shapes
-from mitex.methods.nerf.lighting import initial_light
 from mitex.methods.nerf.maps import LatentMaps, MappedLatents
 from mitex.methods.nerf.projection import Projection
 from mitex.methods.nerf.shell import Located, Shell, shell_cells
@@ -59,7 +58,7 @@ def shell(strength: float = 1.0, scale: float = 1.0) -> Shell:
     frames = np.broadcast_to(np.eye(3), (len(mesh.faces), 3, 3))
     latents = MappedLatents(square(1e-3), uv, frames)
     mask = mi.TensorXu8(np.ones((8, 8, 8), np.uint8))
-    light = mi.TensorXf(initial_light([np.full((8, 8, 4), 150, np.uint8)]))
+    light = mi.TensorXf(np.array([4.0, *[0.0] * 15], np.float32))  # even
     return Shell(
         Projection(mesh), latents, Decoder(weights, packed=True), light, 0.1, mask, 0.02, scale, strength
     )
