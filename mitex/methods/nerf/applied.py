@@ -17,6 +17,7 @@ from mitex.mesh import Mesh, Similarity
 from mitex.methods.nerf.maps import LatentMaps, MappedLatents, uv_frames
 from mitex.methods.nerf.occupancy import Occupancy
 from mitex.methods.nerf.projection import Projection
+from mitex.methods.nerf.radiance import look_step
 from mitex.methods.nerf.shell import Shell, shell_cells
 from mitex.paths import prepare_output
 from mitex.runtime import load_mitsuba
@@ -70,7 +71,7 @@ class AppliedTexture(Shell):
         raised = lift * scale * max(-texture.ground, 0.0)
         projection = Projection(placed, neighbours=NEIGHBOURS, pull=None, reach=thickness + raised)
         cells = texture.model.config.occupancy
-        step = max(scale * DIAGONAL / texture.model.config.cells, DIAGONAL / FINEST)
+        step = max(scale * look_step(texture.model.config), DIAGONAL / FINEST)
         possible = shell_cells(projection, thickness, np.ones((cells,) * 3, bool), raised)
         occupancy = Occupancy(cells, possible)
         latents = MappedLatents(maps, uv, uv_frames(placed))

@@ -17,7 +17,7 @@ from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field import HIGHEST, network_rows, packed_networks, sigmoid, weight_bound
 from mitex.methods.nerf.occupancy import Occupancy, hull_cells
 from mitex.methods.nerf.pixels import Batch
-from mitex.methods.nerf.radiance import RadianceTask, Rendered, learn, rays_of
+from mitex.methods.nerf.radiance import RadianceTask, Rendered, learn, look_step, rays_of
 from mitex.methods.nerf.tensors import channels, tensor
 from mitex.runtime import load_mitsuba
 from mitex.training import checkpoint
@@ -111,7 +111,7 @@ class PlainTask(RadianceTask):
 
     def field(self, parameters: dict[str, torch.Tensor], packed: bool = True) -> PlainField:
         table, *weights = (mi.TensorXf(value.detach().numpy()) for value in parameters.values())
-        mask, step = self.occupancy.mask, self.step_length
+        mask, step = self.occupancy.mask, look_step(self.config)
         return PlainField(table.array, weights, self.config.table, mask, step, packed)
 
     def density(self, points: np.ndarray) -> np.ndarray:

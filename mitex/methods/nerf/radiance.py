@@ -30,6 +30,12 @@ REFRESH = 16  # steps between looks at the occupancy, and between updates of the
 BETAS, EPSILON = (0.9, 0.99), 1e-15  # of Adam
 PREVIEW = 160  # pixels along the longest side
 CHUNK = 1 << 16  # rays marched at a time
+FINER = 2  # steps of a look for one of the training; the durian gains 0.4 dB by it, and none by training so
+
+
+def look_step(config: NerfConfig) -> float:
+    """Length of the steps in which a trained field is looked at [scene units]."""
+    return DIAGONAL / (FINER * config.cells)
 
 
 class RadianceTask(ABC):

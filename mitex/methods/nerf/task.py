@@ -19,7 +19,7 @@ from mitex.methods.nerf.losses import clustering, normal_agreement
 from mitex.methods.nerf.occupancy import Occupancy, hull_cells
 from mitex.methods.nerf.pixels import Batch
 from mitex.methods.nerf.projection import Feet, Projection, attach
-from mitex.methods.nerf.radiance import RadianceTask, Rendered, rays_of
+from mitex.methods.nerf.radiance import RadianceTask, Rendered, look_step, rays_of
 from mitex.methods.nerf.shell import CapturedLatents, Located, Shell, appearance, shell_cells, within
 from mitex.methods.nerf.tensors import rows, tensor
 from mitex.runtime import load_mitsuba
@@ -30,8 +30,7 @@ import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit o
 CLUSTERS = 4  # centres in each level
 OUTWARDS = 0.1  # share of the coarse normal in what the fine one is compared with
 LEAST = 1e-3  # opacity of rays whose normals are compared
-# Fine normals start near those of the faces, so that the light can be learned from the first steps on. From
-# random ones it stays even: its shades are told by k_d before the normals are good.
+# Fine normals start near those of the faces: under random ones k_d tells the shades before the normals are good.
 FLAT = 1e-2
 POSE = 1e-2  # unit of the cameras' corrections [rad, scene units]
 
@@ -103,7 +102,8 @@ class TextureTask(RadianceTask):
 
     def field(self, parameters: dict[str, torch.Tensor]) -> Shell:
         model = self.model(parameters, packed=True)
-        return Shell(self.projection, *model, self.thickness, mask=self.occupancy.mask, step=self.step_length)
+        mask, step = self.occupancy.mask, look_step(self.config)
+        return Shell(self.projection, *model, self.thickness, mask=mask, step=step)
 
     def density(self, points: np.ndarray) -> np.ndarray:
         return self.field(self.named).density(points)

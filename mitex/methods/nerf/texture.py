@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from mitex.integrators.march import DIAGONAL
 from mitex.mesh import Mesh, Similarity
 from mitex.methods.nerf import files
 from mitex.methods.nerf.applied import EXTENT, AppliedTexture
@@ -21,6 +20,7 @@ from mitex.methods.nerf.patches import FeatureSource, Patches, extract_patches, 
 from mitex.methods.nerf.pictures import pictured
 from mitex.methods.nerf.projection import Projection
 from mitex.methods.nerf.quilting import Quilt, quilt
+from mitex.methods.nerf.radiance import look_step
 from mitex.methods.nerf.shell import CapturedLatents, Shell
 from mitex.methods.nerf.tensors import channels
 from mitex.runtime import init, load_mitsuba
@@ -75,7 +75,7 @@ class NerfTexture:
             self.light,
             model.base.thickness,
             mask=mi.TensorXu8(model.occupied),
-            step=DIAGONAL / config.cells,
+            step=look_step(config),
         )
 
     @cached_property
