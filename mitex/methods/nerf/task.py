@@ -30,7 +30,7 @@ import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit o
 CLUSTERS = 4  # centres in each level
 OUTWARDS = 0.1  # share of the coarse normal in what the fine one is compared with
 LEAST = 1e-3  # opacity of rays whose normals are compared
-# Fine normals start near those of the faces: under random ones k_d tells the shades before the normals are good.
+# Fine normals start near those of the faces: under random ones k_d learns the shades first.
 FLAT = 1e-2
 POSE = 1e-2  # unit of the cameras' corrections [rad, scene units]
 
