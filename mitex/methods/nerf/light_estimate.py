@@ -24,6 +24,7 @@ mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 STRIDE = 4  # pixels
+SOLID = 0.5  # alpha of pixels that count
 STEEP = 75.0  # angle to the normal of pixels that count, at most [degrees]
 ALBEDO = 0.25  # mean of k_d: what is four times as bright can still be told
 UNKNOWN = 1e-3  # pull towards even light, beside the pixels
@@ -41,29 +42,34 @@ def estimated_light(mesh: Mesh, capture: Capture) -> np.ndarray:
 
     Returns:
         (16,) float32 spherical harmonics, see `lighting`; zero above l = 2. No side is darker than a quarter
-        of the mean. Even light as bright as the photos, where these do not see the mesh.
+        of the mean. Dim even light where the photos are black or do not see the mesh.
     """
     sights = Sights(mesh, capture)
     count = BANDS**2
-    normal, bright = np.zeros((count, count)), np.zeros(count)
+    gram, bright = np.zeros((count, count)), np.zeros(count)
     for view in range(len(capture)):
         sight = sights(view, STRIDE)
         image = capture.images[view][::STRIDE, ::STRIDE].astype(np.float64) / 255
-        seen = (sight.angle < STEEP) & (image[..., 3] == 1)
+        seen = (sight.angle < STEEP) & (image[..., 3] > SOLID)
         if seen.any():
             basis = _irradiance(sight.normals[seen])
-            normal += basis.T @ basis
+            gram += basis.T @ basis
             bright += basis.T @ (image[seen][:, :3] ** (1 / POWER)).mean(1)
-    pull = UNKNOWN * normal[0, 0] * np.diag(np.arange(count) > 0)
     light = np.zeros(COEFFICIENTS)
-    if normal[0, 0]:
-        light[:count] = np.linalg.solve(normal + pull, bright) / ALBEDO
+    if gram[0, 0]:
+        pull = UNKNOWN * gram[0, 0] * np.diag(np.arange(count) > 0)
+        light[:count] = np.linalg.solve(gram + pull, bright) / ALBEDO
     light[0] = max(light[0], DARKEST / ALBEDO * math.sqrt(4 * math.pi))
+    return _softened(light).astype(np.float32)
+
+
+def _softened(light: np.ndarray) -> np.ndarray:
+    """The light, nearer to an even one if it leaves a side too dark."""
     ways = np.random.default_rng(0).normal(size=(WAYS, 3))
-    shades = _irradiance(ways / np.linalg.norm(ways, axis=1, keepdims=True)) @ light[:count]
+    shades = _irradiance(ways / np.linalg.norm(ways, axis=1, keepdims=True)) @ light[: BANDS**2]
     mean = light[0] / math.sqrt(4 * math.pi)
-    light[1:] *= min(1.0, (1 - SHADE) * mean / max(mean - shades.min(), 1e-12))
-    return light.astype(np.float32)
+    share = min(1.0, (1 - SHADE) * mean / max(mean - shades.min(), 1e-12))
+    return light * np.where(np.arange(COEFFICIENTS) > 0, share, 1.0)
 
 
 def _irradiance(normals: np.ndarray) -> np.ndarray:
