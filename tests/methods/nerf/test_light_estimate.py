@@ -74,8 +74,8 @@ def test_no_side_is_darker_than_a_quarter_of_the_mean(ball):
         -math.sqrt(15 / (4 * math.pi)) * x * z,
         math.sqrt(15 / (16 * math.pi)) * (x * x - y * y),
     ]
-    cosine = [1.0, *[2 / 3] * 3, *[1 / 4] * 5]
-    shades = sum(c * light * h for c, light, h in zip(cosine, found[:9], harmonics, strict=True))
+    cosine = np.array([1.0, *[2 / 3] * 3, *[1 / 4] * 5])
+    shades = (cosine * found[:9]) @ np.stack(harmonics)
     assert found[2] > 0.2 * found[0]
     assert shades.min() == pytest.approx(0.25 * shades.mean(), rel=0.02)
 
