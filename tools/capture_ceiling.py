@@ -1,0 +1,71 @@
+"""How well the held-out views of a synthetic capture could be told at best by someone who knows its geometry.
+
+usage: python tools/capture_ceiling.py CAPTURE ...
+
+Every pixel of a held-out view is given the mean colour of what the other views have nearest to the true
+point that it sees: of `NEAR` pixels, and of the `ALIKE` of `POOL` near ones that were seen from the most
+similar side. A field has to find the geometry besides; it can exceed this a little, as it knows what a pixel
+sees besides its middle.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from capture_studio import pixel_rays
+from PIL import Image
+from scipy.spatial import KDTree
+
+NEAR, POOL, ALIKE = 16, 64, 8
+EVERY = 8  # as `Capture.split` has it
+DRAWN = 8000  # pixels of a held-out view
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """The P pixels of views that see the object: points, colours in [0, 1], unit rays, (P, 3) each."""
+
+    points: np.ndarray
+    colours: np.ndarray
+    rays: np.ndarray
+
+
+def seen(folder: Path, frames: list[dict]) -> tuple[Seen, float]:
+    """What frames see, and the share of their pixels that see it."""
+    found, share = [], []
+    for frame in frames:
+        path, pose = folder / frame["file_path"], np.array(frame["transform_matrix"])
+        depth = np.load(folder / "truth" / f"{path.stem}.npz")["depth"]
+        hit = np.isfinite(depth)
+        rays = pixel_rays(pose, len(depth))[hit]
+        image = np.asarray(Image.open(path), np.float32)[hit, :3] / 255
+        found.append((pose[:3, 3] + rays * depth[hit, None], image, rays))
+        share.append(hit.mean())
+    return Seen(*(np.concatenate(values) for values in zip(*found, strict=True))), float(np.mean(share))
+
+
+def ceilings(folder: Path, rng: np.random.Generator) -> tuple[float, float]:
+    """PSNR of whole pictures from near pixels, and from near pixels seen from a similar side [dB]."""
+    frames = json.loads((folder / "transforms.json").read_text())["frames"]
+    known, _ = seen(folder, [frame for k, frame in enumerate(frames) if k % EVERY])
+    held, share = seen(folder, frames[::EVERY])
+    some = rng.choice(len(held.points), DRAWN * len(frames[::EVERY]))
+    near = np.asarray(KDTree(known.points).query(held.points[some], POOL, workers=-1)[1])
+    alike = np.einsum("pkd,pd->pk", known.rays[near], held.rays[some]).argsort(1)[:, -ALIKE:]
+    chosen = near[:, :NEAR], np.take_along_axis(near, alike, 1)
+    errors = [((known.colours[k].mean(1) - held.colours[some]) ** 2).mean() * share for k in chosen]
+    return -10 * float(np.log10(errors[0])), -10 * float(np.log10(errors[1]))
+
+
+def main() -> None:
+    for folder in map(Path, sys.argv[1:]):
+        near, alike = ceilings(folder, np.random.default_rng(0))
+        print(f"{folder.name}: {near:.1f} dB from near pixels, {alike:.1f} dB from alike views", flush=True)
+
+
+if __name__ == "__main__":
+    main()
