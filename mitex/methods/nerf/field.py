@@ -132,9 +132,8 @@ class Decoder:
 
     def __call__(self, f: Sequence[Any], phase: Sequence[Any], distance: Any) -> Reflection:
         """Density and reflection for features f (16 arrays), f-hat (8) and signed distance [scene units]."""
-        fine = embedded(distance)
         run = self._cooperative if self._packed else self._together
-        exponent, *diffuse, specular, glossiness, theta, phi = run([*f, *fine], [*phase, *fine[:COARSE]])
+        exponent, *diffuse, specular, glossiness, theta, phi = run([*f], [*phase], embedded(distance))
         return Reflection(
             exponent,
             mi.Color3f(*(sigmoid(k) for k in diffuse)),
@@ -144,49 +143,60 @@ class Decoder:
             phi,
         )
 
-    def _cooperative(self, values: list[Any], phases: list[Any]) -> list[Any]:
-        exponent, *code = network_rows(self._packed["density"], values)
+    def _cooperative(self, f: list[Any], phase: list[Any], fine: list[Any]) -> list[Any]:
+        exponent, *code = network_rows(self._packed["density"], f + fine)
         reflection = network_rows(self._packed["reflection"], code)
-        theta = network_rows(self._packed["theta"], values[: FEATURES + COARSE])
-        return [exponent, *reflection, *theta, *network_rows(self._packed["phi"], phases)]
+        theta = network_rows(self._packed["theta"], f + fine[:COARSE])
+        return [exponent, *reflection, *theta, *network_rows(self._packed["phi"], phase + fine[:COARSE])]
 
-    def _together(self, values: list[Any], phases: list[Any]) -> list[Any]:
+    def _together(self, f: list[Any], phase: list[Any], fine: list[Any]) -> list[Any]:
         nets = list(self.weights.values())
-        learning = any(map(dr.grad_enabled, nets))
-        return _rows(dr.custom(_Networks, _stacked(values), _stacked(phases), nets, learning))
+        learning, moving = any(map(dr.grad_enabled, nets)), dr.grad_enabled(fine)
+        given = _stacked(f), _stacked(phase), _stacked(fine)
+        return _rows(dr.custom(_Networks, *given, nets, learning, moving))
 
     def _net(self, name: str) -> Any:
         return self._packed.get(name, self.weights[name])
 
 
 class _Networks(dr.CustomOp):
-    """All four on N points: (41, N) f and distance, (20, N) f-hat and distance -> the 8 outputs, (8, N)."""
+    """All four on N points: f (16, N), f-hat (8, N), the embedded distance (25, N) -> the 8 outputs, (8, N).
 
-    def eval(self, values: Any, phases: Any, nets: list[list[Any]], learning: bool) -> Any:
-        self.nets, self.learning = [[weight.torch() for weight in net] for net in nets], learning
-        density, reflection, theta, phi = self.nets
-        x = values.torch()
-        first = mlp.forwards(density, x)
-        code, angle = first[-1][1:], x[: FEATURES + COARSE]
-        rest = mlp.forwards(reflection, code), mlp.forwards(theta, angle), mlp.forwards(phi, phases.torch())
+    Only where points move (`moving`) does the distance get a gradient.
+    """
+
+    def eval(self, f: Any, phase: Any, fine: Any, nets: list[list[Any]], learning: bool, moving: bool) -> Any:
+        self.nets, self.learning, self.moving = [[w.torch() for w in net] for net in nets], learning, moving
+        values = torch.cat([f.torch(), fine.torch()])
+        phases = torch.cat([phase.torch(), values[FEATURES : FEATURES + COARSE]])
+        first = mlp.forwards(self.nets[0], values)
+        read = first[-1][1:], values[: FEATURES + COARSE], phases
+        rest = [mlp.forwards(net, x) for net, x in zip(self.nets[1:], read, strict=True)]
         self.layers = [first, *rest]
         return mi.TensorXf(torch.cat([first[-1][:1], *(layers[-1] for layers in rest)]))
 
     def backward(self) -> None:
         gradient: Any = self.grad_out()
         exponent, *rest = gradient.torch().split([1, *(widths[-1] for widths in list(LAYERS.values())[1:])])
-        of_rest = [self._back(k, g) for k, g in enumerate(rest, 1)]
-        (of_reflection, code), (of_theta, angle), (of_phi, phases) = of_rest
-        of_density, values = self._back(0, torch.cat([exponent, code]))
-        values[: FEATURES + COARSE] += angle
-        self.set_grad_in("values", mi.TensorXf(values))
-        self.set_grad_in("phases", mi.TensorXf(phases))
+        known = (None, None) if self.moving else (FEATURES, PHASES)
+        of_reflection, code = self._back(1, rest[0], None)
+        of_theta, angle = self._back(2, rest[1], known[0])
+        of_phi, phases = self._back(3, rest[2], known[1])
+        of_density, values = self._back(0, torch.cat([exponent, code]), known[0])
+        values[: len(angle)] += angle
+        self.set_grad_in("f", mi.TensorXf(values[:FEATURES]))
+        self.set_grad_in("phase", mi.TensorXf(phases[:PHASES]))
+        if self.moving:
+            values[FEATURES : FEATURES + COARSE] += phases[PHASES:]
+            self.set_grad_in("fine", mi.TensorXf(values[FEATURES:]))
         if self.learning:
             found = of_density, of_reflection, of_theta, of_phi
             self.set_grad_in("nets", [[mi.TensorXf(weight) for weight in net] for net in found])
 
-    def _back(self, net: int, gradient: torch.Tensor) -> tuple[list[torch.Tensor], torch.Tensor]:
-        return mlp.backwards(self.nets[net], self.layers[net], gradient, self.learning)
+    def _back(
+        self, net: int, gradient: torch.Tensor, inputs: int | None
+    ) -> tuple[list[torch.Tensor], torch.Tensor]:
+        return mlp.backwards(self.nets[net], self.layers[net], gradient, self.learning, inputs)
 
     def name(self) -> str:
         return "networks"
