@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import json
 import tempfile
+from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +15,7 @@ from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.plain import PlainTask, trained
 from mitex.training import run
 
-WARM, PROBED = 100, 300  # steps before and after which the clock is read
+PROBED, LAST = 1000, 200  # steps of the training that tells the pace, and of those the ones that tell it
 
 
 def fit_plain(
@@ -26,7 +28,8 @@ def fit_plain(
 ) -> PlainTask:
     """Trains a plain field for a time; its model is `field(task.mean)`.
 
-    How many steps that is, is found by a short training before; the learning rate falls over all of them.
+    How many steps that is, is found by a short training before; the learning rate falls over all of them. The
+    first steps are slow, since nothing hides anything yet.
 
     Args:
         capture: views to learn from.
@@ -44,7 +47,20 @@ def fit_plain(
         short = replace(config, steps=PROBED, preview_every=0, checkpoint_every=PROBED, refine_cameras=False)
         trained(short, capture, view, Path(probe) / "run", quiet=True)
         lines = (Path(probe) / "run" / run.METRICS).read_text().splitlines()
-    before, after = (json.loads(lines[k - 1])["seconds"] for k in (WARM, PROBED))
-    steps = max(1, round(seconds * (PROBED - WARM) / (after - before)))
+    steps = steps_within(seconds, [json.loads(line)["seconds"] for line in lines])
     whole = replace(short, steps=steps, lr_steps=steps, checkpoint_every=500)
     return trained(whole, capture, view, out, quiet)
+
+
+def steps_within(seconds: float, clock: Sequence[float]) -> int:
+    """How many steps a time is enough for, at least one.
+
+    Args:
+        seconds: that there are.
+        clock: seconds that had passed after each of the first steps, increasing; the last 200 tell the pace
+            of those that follow.
+    """
+    if seconds <= clock[-1]:
+        return max(1, bisect_right(clock, seconds))
+    last = min(LAST, len(clock) - 1)
+    return len(clock) + int((seconds - clock[-1]) * last / (clock[-1] - clock[-1 - last]))
