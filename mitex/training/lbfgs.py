@@ -13,16 +13,16 @@ class Lbfgs:
     For losses without randomness: the curvature comes from the differences of successive gradients.
 
     Args:
-        parameters: Tensors to update, in an order that stays the same between runs.
+        parameters: Tensors to update, of one type, in an order that stays the same between runs.
         memory: Pairs of steps and changes of the gradient that are kept.
     """
 
     def __init__(self, parameters: Sequence[torch.Tensor], memory: int = 10):
         self.parameters = list(parameters)
         self.memory = memory
-        size = sum(p.numel() for p in self.parameters)
-        self.point, self.gradient = torch.zeros(size), torch.zeros(size)
-        self.steps, self.changes = torch.zeros(memory, size), torch.zeros(memory, size)
+        self.point = torch.cat([torch.zeros_like(p).flatten() for p in self.parameters]).detach()
+        self.gradient = torch.zeros_like(self.point)
+        self.steps, self.changes = (self.point.repeat(memory, 1) for _ in range(2))
         self.counts = [0, 0]  # steps done, pairs kept so far
 
     @torch.no_grad()
