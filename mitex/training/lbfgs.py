@@ -20,7 +20,7 @@ class Lbfgs:
     def __init__(self, parameters: Sequence[torch.Tensor], memory: int = 10):
         self.parameters = list(parameters)
         self.memory = memory
-        self.point = torch.cat([torch.zeros_like(p).flatten() for p in self.parameters]).detach()
+        self.point = torch.cat([torch.zeros_like(p).flatten() for p in self.parameters])
         self.gradient = torch.zeros_like(self.point)
         self.steps, self.changes = (self.point.repeat(memory, 1) for _ in range(2))
         self.counts = [0, 0]  # steps done, pairs kept so far
