@@ -32,12 +32,11 @@ def decoded(
 
 def encoded(encoding: Encoding, which: int, points: torch.Tensor, table: torch.Tensor) -> torch.Tensor:
     """Features (N, 2 L) of points (N, 3) in the cube, level by level and corner by corner."""
-    levels = encoding.levels(which)
     grid = encoding.grids[which]
     columns = []
-    for level, part in enumerate(levels):
+    for part, cells in zip(grid.levels, grid.cells, strict=True):
         entries = table[part].view(-1, 2)
-        scale = grid.base_resolution * grid.per_level_scale**level - 1
+        scale = cells - 1
         side = int(-(-scale // 1)) + 1
         place = (points * 0.5 + 0.5) * scale
         low = place.floor().long()

@@ -3,7 +3,7 @@
 from mitex.runtime.health import Check, doctor
 from mitex.runtime.memory import available_memory, keep_freed_memory
 from mitex.runtime.precision import bfloat16_is_fast
-from mitex.runtime.session import init, load_mitsuba, seed_everything, threads, yield_cores
+from mitex.runtime.session import init, load_mitsuba, seed_everything, threads, torch_alone, yield_cores
 
 __all__ = [
     "Check",
@@ -15,5 +15,6 @@ __all__ = [
     "load_mitsuba",
     "seed_everything",
     "threads",
+    "torch_alone",
     "yield_cores",
 ]

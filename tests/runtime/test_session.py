@@ -153,6 +153,23 @@ def test_threads_reach_torch_and_drjit(mi):
         mitex.runtime.threads(0)
 
 
+def test_while_torch_is_alone_drjit_has_no_workers_and_then_as_many_as_before(mi):
+    import drjit as dr
+
+    mitex.runtime.threads(3)
+    with pytest.raises(ZeroDivisionError), mitex.runtime.torch_alone():
+        assert dr.thread_count() == 1
+        with mitex.runtime.torch_alone():
+            assert dr.thread_count() == 1
+        assert dr.thread_count() == 1
+        raise ZeroDivisionError
+    assert dr.thread_count() == 3
+
+
+def test_torch_is_alone_anyway_without_drjit():
+    run("import sys, mitex.runtime as r\nwith r.torch_alone():\n    assert 'drjit' not in sys.modules")
+
+
 def test_threads_chosen_before_the_start_are_kept():
     code = "import mitex.runtime as r; r.threads(1); r.init(); import drjit as dr; print(dr.thread_count())"
     assert run(code).stdout.strip() == "1"

@@ -12,15 +12,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import torch
+from torch.nn import functional as F
 
 from mitex.methods.nerf import mlp
 from mitex.methods.nerf.config import NerfConfig
-from mitex.runtime import load_mitsuba
+from mitex.methods.nerf.hash_grid import HashGrid
+from mitex.methods.nerf.tensors import stacked, unstacked
+from mitex.runtime import load_mitsuba, torch_alone
 
 mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 import drjit.nn as nn  # noqa: E402
-from drjit.hashgrid import HashGridEncoding  # noqa: E402
 
 OCTAVES = 12  # of the signed distance
 FINE = 2 * OCTAVES + 1
@@ -76,39 +78,21 @@ class Encoding:
     """
 
     def __init__(self, config: NerfConfig) -> None:
-        ratio = (config.finest / config.coarsest) ** (1 / (FEATURES // 2 - 1))
-        phase_ratio = (config.finest / config.coarsest) ** (1 / (PHASES // 2 - 1))
-        self.grids: list[Any] = [
-            HashGridEncoding(
-                mi.Float,
-                3,
-                n_levels=channels // 2,
-                n_features_per_level=2,
-                hashmap_size=2**config.table,
-                base_resolution=config.coarsest,
-                per_level_scale=scale,
-                align_corners=True,
-                init_scale=0.0,
-            )
-            for channels, scale in ((FEATURES, ratio), (PHASES, phase_ratio))
-        ]
+        extent = config.coarsest, config.finest, config.table
+        self.grids = [HashGrid(channels // 2, *extent) for channels in (FEATURES, PHASES)]
 
     @property
     def sizes(self) -> list[int]:
         """Lengths of the tables of f and f-hat."""
-        return [grid.n_params for grid in self.grids]
+        return [grid.size for grid in self.grids]
 
     def levels(self, which: int) -> list[slice]:
         """Where the levels lie in a table, 0 of f or 1 of f-hat."""
-        grid = self.grids[which]
-        ends = [2 * grid.level_offset(level) for level in range(grid.n_levels + 1)]
-        return [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        return self.grids[which].levels
 
     def __call__(self, which: int, foot: Any, table: Any) -> list[Any]:
         """Features at foot points, `mi.Point3f` in the cube: 0 for f (16 channels), 1 for f-hat (8)."""
-        grid = self.grids[which]
-        grid.data = table
-        return list(grid(dr.clip(foot * 0.5 + 0.5, 0, 1)))  # beyond its unit cube the grid returns garbage
+        return self.grids[which](foot, table)
 
 
 class Decoder:
@@ -152,51 +136,69 @@ class Decoder:
     def _together(self, f: list[Any], phase: list[Any], fine: list[Any]) -> list[Any]:
         nets = list(self.weights.values())
         learning, moving = any(map(dr.grad_enabled, nets)), dr.grad_enabled(fine)
-        given = _stacked(f), _stacked(phase), _stacked(fine)
-        return _rows(dr.custom(_Networks, *given, nets, learning, moving))
+        values = stacked(fine[COARSE:] + f + fine[:COARSE] + phase)
+        return unstacked(dr.custom(_Networks, values, nets, learning, moving))
 
     def _net(self, name: str) -> Any:
         return self._packed.get(name, self.weights[name])
 
 
+# The networks' inputs, in an order in which what each reads is side by side: the fine part of the embedded
+# distance, f, its coarse part, f-hat.
+BEYOND = FINE - COARSE
+READS = {
+    "density": slice(0, BEYOND + FEATURES + COARSE),
+    "theta": slice(BEYOND, BEYOND + FEATURES + COARSE),
+    "phi": slice(BEYOND + FEATURES, BEYOND + FEATURES + COARSE + PHASES),
+}
+TURNED = {"density": BEYOND, "phi": COARSE}  # how far the first matrix's columns are turned for that
+LEARNED = {"density": slice(BEYOND, BEYOND + FEATURES), "theta": slice(FEATURES), "phi": slice(COARSE, None)}
+
+
 class _Networks(dr.CustomOp):
-    """All four on N points: f (16, N), f-hat (8, N), the embedded distance (25, N) -> the 8 outputs, (8, N).
+    """All four on N points: inputs (49, N) as above -> the 8 outputs, (8, N).
 
     Only where points move (`moving`) does the distance get a gradient.
     """
 
-    def eval(self, f: Any, phase: Any, fine: Any, nets: list[list[Any]], learning: bool, moving: bool) -> Any:
-        self.nets, self.learning, self.moving = [[w.torch() for w in net] for net in nets], learning, moving
-        values = torch.cat([f.torch(), fine.torch()])
-        phases = torch.cat([phase.torch(), values[FEATURES : FEATURES + COARSE]])
-        first = mlp.forwards(self.nets[0], values)
-        read = first[-1][1:], values[: FEATURES + COARSE], phases
-        rest = [mlp.forwards(net, x) for net, x in zip(self.nets[1:], read, strict=True)]
-        self.layers = [first, *rest]
-        return mi.TensorXf(torch.cat([first[-1][:1], *(layers[-1] for layers in rest)]))
+    def eval(self, values: Any, nets: list[list[Any]], learning: bool, moving: bool) -> Any:
+        self.learning, self.moving, self.values = learning, moving, values.torch()
+        self.nets = {k: [w.torch() for w in net] for k, net in zip(LAYERS, nets, strict=True)}
+        with torch_alone():
+            for name, columns in TURNED.items():
+                self.nets[name][0] = self.nets[name][0].roll(columns, 1)
+            # With a column of zeros for the exponent, 16 in all: products with 15 take three times as long.
+            self.nets["reflection"][0] = F.pad(self.nets["reflection"][0], (1, 0))
+            layers = {k: mlp.forwards(self.nets[k], self.values[rows]) for k, rows in READS.items()}
+            layers["reflection"] = mlp.forwards(self.nets["reflection"], layers["density"][-1])
+            self.layers = layers
+            found = torch.cat([layers["density"][-1][:1], *(layers[k][-1] for k in list(LAYERS)[1:])])
+        return mi.TensorXf(found)
 
     def backward(self) -> None:
         gradient: Any = self.grad_out()
-        exponent, *rest = gradient.torch().split([1, *(widths[-1] for widths in list(LAYERS.values())[1:])])
-        known = (None, None) if self.moving else (FEATURES, PHASES)
-        of_reflection, code = self._back(1, rest[0], None)
-        of_theta, angle = self._back(2, rest[1], known[0])
-        of_phi, phases = self._back(3, rest[2], known[1])
-        of_density, values = self._back(0, torch.cat([exponent, code]), known[0])
-        values[: len(angle)] += angle
-        self.set_grad_in("f", mi.TensorXf(values[:FEATURES]))
-        self.set_grad_in("phase", mi.TensorXf(phases[:PHASES]))
-        if self.moving:
-            values[FEATURES : FEATURES + COARSE] += phases[PHASES:]
-            self.set_grad_in("fine", mi.TensorXf(values[FEATURES:]))
+        given = gradient.torch()
+        with torch_alone():
+            exponent, *rest = given.split([1, *(widths[-1] for widths in list(LAYERS.values())[1:])])
+            of = dict(zip(list(LAYERS)[1:], rest, strict=True))
+            of["density"] = torch.cat([exponent, torch.zeros(CODE, exponent.shape[1])])
+            found = {"reflection": self._back("reflection", of["reflection"], of["density"])}
+            of_values = torch.zeros_like(self.values)
+            for name, rows in READS.items():
+                learned = slice(None) if self.moving else LEARNED[name]
+                found[name] = self._back(name, of[name], of_values[rows][learned], learned)
+            if self.learning:
+                for name, columns in TURNED.items():
+                    found[name][0] = found[name][0].roll(-columns, 1)
+                found["reflection"][0] = found["reflection"][0][:, 1:].contiguous()
+        self.set_grad_in("values", mi.TensorXf(of_values))
         if self.learning:
-            found = of_density, of_reflection, of_theta, of_phi
-            self.set_grad_in("nets", [[mi.TensorXf(weight) for weight in net] for net in found])
+            self.set_grad_in("nets", [[mi.TensorXf(weight) for weight in found[k]] for k in LAYERS])
 
     def _back(
-        self, net: int, gradient: torch.Tensor, inputs: int | None
-    ) -> tuple[list[torch.Tensor], torch.Tensor]:
-        return mlp.backwards(self.nets[net], self.layers[net], gradient, self.learning, inputs)
+        self, name: str, gradient: torch.Tensor, into: torch.Tensor, inputs: slice = slice(None)
+    ) -> list[torch.Tensor]:
+        return mlp.backwards(self.nets[name], self.layers[name], gradient, self.learning, into, inputs)
 
     def name(self) -> str:
         return "networks"
@@ -242,27 +244,7 @@ def network_rows(net: Any, values: list[Any]) -> list[Any]:
     """
     if isinstance(net, nn.Module):
         return list(net(nn.CoopVec(*values)))
-    return _rows(mlp.evaluate(net, _stacked(values)))
-
-
-# Slices of tensors would have N as a literal, and so would need new kernels for each N. An opaque N does not.
-def _stacked(values: list[Any]) -> Any:
-    count = max(dr.width(value) for value in values)
-    flat = dr.zeros(mi.Float, count * len(values))
-    for k, value in enumerate(values):
-        wide = value if dr.width(value) == count else mi.Float(value) + dr.zeros(mi.Float, count)
-        dr.scatter(flat, wide, _places(k, count), mode=dr.ReduceMode.Permute)
-    return mi.TensorXf(flat, (len(values), count))
-
-
-def _rows(tensor: Any) -> list[Any]:
-    rows, count = tensor.shape
-    places = [_places(k, count) for k in range(rows)]
-    return [dr.gather(mi.Float, tensor.array, place, mode=dr.ReduceMode.Permute) for place in places]
-
-
-def _places(k: int, count: int) -> Any:
-    return dr.arange(mi.UInt32, count) + dr.opaque(mi.UInt32, k * count)
+    return unstacked(mlp.evaluate(net, stacked(values)))
 
 
 def sigmoid(x: Any) -> Any:

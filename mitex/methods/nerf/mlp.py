@@ -8,16 +8,20 @@ faster.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import torch
 
-from mitex.runtime import load_mitsuba
+from mitex.runtime import load_mitsuba, torch_alone
 
 mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 Weights = Sequence[torch.Tensor]
+CHUNK = 4096  # points whose values stay in a core's cache on their way back
+_THREADS = torch.get_num_threads()
+_pool = ThreadPoolExecutor(_THREADS, initializer=torch.set_num_threads, initargs=(1,))
 _relu_backward = torch.ops.aten.threshold_backward.grad_input
 
 
@@ -33,26 +37,39 @@ def backwards(
     weights: Weights,
     layers: Weights,
     gradient: torch.Tensor,
-    learning: bool = True,
-    inputs: int | None = None,
-) -> tuple[list[torch.Tensor], torch.Tensor]:
-    """Gradients of weights and inputs.
+    learning: bool,
+    of_inputs: torch.Tensor,
+    inputs: slice = slice(None),
+) -> list[torch.Tensor]:
+    """Gradients of the weights.
 
     Args:
         weights: (out, in) of each layer.
         layers: of `forwards`.
         gradient: of the outputs.
-        learning: False leaves the weights' out.
-        inputs: how many of them need a gradient, from the first on; all if left out.
+        learning: False leaves the weights out.
+        of_inputs: that of the inputs is added to it.
+        inputs: which of them it has.
     """
-    found = []
-    for k in reversed(range(len(weights))):
-        if learning:
-            found.append(gradient @ layers[k].T)
-        if k:
-            gradient = _product(weights[k].T, gradient)
-            _relu_backward(gradient, layers[k], 0, grad_input=gradient)
-    return found[::-1], weights[0].T[:inputs] @ gradient
+    count = layers[0].shape[1]
+
+    def work(starts: range) -> list[torch.Tensor]:
+        found = [torch.zeros_like(weight) for weight in weights]
+        for start in starts:
+            part = slice(start, start + CHUNK)
+            flow = gradient[:, part]
+            for k in reversed(range(len(weights))):
+                if learning:
+                    found[k].addmm_(flow, layers[k][:, part].T)
+                if k:
+                    flow = _product(weights[k].T, flow)
+                    _relu_backward(flow, layers[k][:, part], 0, grad_input=flow)
+            of_inputs[:, part].addmm_(weights[0].T[inputs], flow)
+        return found
+
+    shares = [range(k * CHUNK, count, _THREADS * CHUNK) for k in range(_THREADS)]
+    found = list(_pool.map(work, shares))
+    return [torch.stack(parts).sum(0) for parts in zip(*found, strict=True)] if learning else []
 
 
 def _product(matrix: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
@@ -68,12 +85,18 @@ def evaluate(weights: Sequence[Any], values: Any) -> Any:
 class _Network(dr.CustomOp):
     def eval(self, values: Any, weights: list[Any], learning: bool) -> Any:
         self.weights, self.learning = [weight.torch() for weight in weights], learning
-        self.layers = forwards(self.weights, values.torch())
-        return mi.TensorXf(self.layers[-1].contiguous())
+        given = values.torch()
+        with torch_alone():
+            self.layers = forwards(self.weights, given)
+            found = self.layers[-1].contiguous()
+        return mi.TensorXf(found)
 
     def backward(self) -> None:
         gradient: Any = self.grad_out()
-        found, of_values = backwards(self.weights, self.layers, gradient.torch(), self.learning)
+        given = gradient.torch()
+        with torch_alone():
+            of_values = torch.zeros(self.layers[0].shape)
+            found = backwards(self.weights, self.layers, given, self.learning, of_values)
         self.set_grad_in("values", mi.TensorXf(of_values))
         if self.learning:
             self.set_grad_in("weights", [mi.TensorXf(f) for f in found])

@@ -4,6 +4,7 @@ and what the paper compares view synthesis with."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from mitex.integrators.march import Samples, accumulated, weights_of
 from mitex.methods.nerf.capture import Capture
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field import HIGHEST, network_rows, packed_networks, sigmoid, weight_bound
+from mitex.methods.nerf.hash_grid import HashGrid
 from mitex.methods.nerf.occupancy import Occupancy, hull_cells
 from mitex.methods.nerf.pixels import Batch
 from mitex.methods.nerf.radiance import RadianceTask, Rendered, learn, look_step, rays_of
@@ -24,7 +26,6 @@ from mitex.training import checkpoint
 
 mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
-from drjit.hashgrid import HashGridEncoding  # noqa: E402
 
 LEVELS, COARSEST, FINEST = 16, 16, 2048
 CODE = 15
@@ -51,8 +52,7 @@ class PlainField:
         step: float = 0.0,
         packed: bool = False,
     ) -> None:
-        self.grid = hash_grid(size)
-        self.grid.data = table
+        self.grid, self.table = hash_grid(size), table
         given = iter(weights)
         nets = [[next(given) for _ in widths[1:]] for widths in (DENSITY, COLOUR)]
         self._nets = packed_networks(*nets) if packed else nets
@@ -60,8 +60,7 @@ class PlainField:
 
     def density(self, points: Any) -> tuple[Any, list[Any]]:
         """Density [1 / scene units] of `mi.Point3f`, and a code for the colour."""
-        inside = dr.clip(points * 0.5 + 0.5, 0, 1)
-        exponent, *code = network_rows(self._nets[0], list(self.grid(inside)))
+        exponent, *code = network_rows(self._nets[0], self.grid(points, self.table))
         return dr.exp(dr.minimum(exponent, HIGHEST)), code
 
     def density_at(self, points: np.ndarray) -> np.ndarray:
@@ -83,7 +82,7 @@ class PlainTask(RadianceTask):
 
     def __init__(self, config: NerfConfig, capture: Capture, shown: tuple[Capture, int]) -> None:
         drawn = torch.Generator().manual_seed(config.seed)
-        table = torch.empty(hash_grid(config.table).n_params).uniform_(-1e-4, 1e-4, generator=drawn)
+        table = torch.empty(hash_grid(config.table).size).uniform_(-1e-4, 1e-4, generator=drawn)
         parameters = {"table": table}
         for k, shape in enumerate(_shapes()):
             bound = weight_bound(shape)
@@ -128,19 +127,10 @@ def trained(
     return task
 
 
-def hash_grid(size: int) -> Any:
-    """The published grid: 16 levels of 2 features from 16 to 2048 cells, 2^size entries each, at zero."""
-    return HashGridEncoding(
-        mi.Float,
-        3,
-        n_levels=LEVELS,
-        n_features_per_level=2,
-        hashmap_size=2**size,
-        base_resolution=COARSEST,
-        per_level_scale=(FINEST / COARSEST) ** (1 / (LEVELS - 1)),
-        align_corners=True,
-        init_scale=0.0,
-    )
+@cache
+def hash_grid(size: int) -> HashGrid:
+    """The published grid: 16 levels of 2 features from 16 to 2048 cells, 2^size entries each."""
+    return HashGrid(LEVELS, COARSEST, FINEST, size)
 
 
 def _shapes() -> list[tuple[int, int]]:

@@ -19,7 +19,7 @@ from mitex.methods.nerf.losses import distortion
 from mitex.methods.nerf.occupancy import Occupancy
 from mitex.methods.nerf.pixels import Batch, Pixels
 from mitex.methods.nerf.tensors import channels, rows
-from mitex.runtime import load_mitsuba
+from mitex.runtime import load_mitsuba, torch_alone
 from mitex.training import TrainResult, train
 from mitex.training.optim import Adam
 
@@ -104,13 +104,14 @@ class RadianceTask(ABC):
             raise ValueError("no ray meets an occupied cell")
         samples = visible(samples, *rays, lambda points: mi.Float(self.density(rows(points))))
         made = self.render(batch, samples, generator)
-        picture = made.colour + made.through[:, None] * background
-        error = (picture - wanted).abs().mean()
-        total = error + sum(made.terms.values())
-        if self.config.distortion:
-            widths = torch.full_like(made.t, self.step_length)
-            spread = distortion(made.weights, made.t, widths, made.ray)
-            total = total + self.config.distortion * spread
+        with torch_alone():
+            picture = made.colour + made.through[:, None] * background
+            error = (picture - wanted).abs().mean()
+            total = error + sum(made.terms.values())
+            if self.config.distortion:
+                widths = torch.full_like(made.t, self.step_length)
+                spread = distortion(made.weights, made.t, widths, made.ray)
+                total = total + self.config.distortion * spread
         record = {"colour": error.item(), "samples": float(len(made.t)), "occupied": self.occupancy.share}
         return total, record | {name: value.item() for name, value in made.terms.items()}
 

@@ -12,8 +12,8 @@ from benchmarks import torch_field
 from mitex.bridge import call
 from mitex.methods.nerf import field as networks
 from mitex.methods.nerf.config import NerfConfig
-from mitex.methods.nerf.field import Decoder, Encoding, embedded, weight_bound, weight_shapes
-from mitex.methods.nerf.tensors import channels, rows, tensor
+from mitex.methods.nerf.field import Decoder, embedded, weight_bound, weight_shapes
+from mitex.methods.nerf.tensors import rows, tensor
 from mitex.runtime import init
 
 mi: Any = init()
@@ -71,27 +71,6 @@ def test_gradients_of_the_networks_agree_with_torch(moving):
         assert a.grad is not None and b.grad is not None
         largest = float(b.grad.abs().max())
         np.testing.assert_allclose(a.grad.numpy(), b.grad.numpy(), rtol=1e-3, atol=1e-3 * largest)
-
-
-def stacked(found) -> np.ndarray:
-    return np.stack([np.array(v) for v in found], 1)
-
-
-def test_features_agree_with_a_hash_grid_by_loops():
-    rng = np.random.default_rng(0)
-    encoding = Encoding(SMALL)
-    table = rng.normal(size=encoding.sizes[0]).astype(np.float32)
-    points = rng.uniform(-0.99, 0.99, (200, 3)).astype(np.float32)
-    found = encoding(0, channels(mi.Point3f, points), mi.Float(table))
-    expected = torch_field.encoded(encoding, 0, torch.from_numpy(points), torch.from_numpy(table))
-    np.testing.assert_allclose(stacked(found), expected, atol=2e-4)
-
-
-def test_points_beyond_the_cube_get_features_of_its_border():
-    encoding = Encoding(SMALL)
-    table = mi.Float(np.random.default_rng(0).normal(size=encoding.sizes[0]).astype(np.float32))
-    far, near = (channels(mi.Point3f, np.array([[x, 0.2, 0.3]])) for x in (3.0, 1.0))
-    np.testing.assert_array_equal(stacked(encoding(0, far, table)), stacked(encoding(0, near, table)))
 
 
 def test_the_embedding_is_the_distance_and_its_waves():

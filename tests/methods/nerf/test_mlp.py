@@ -23,8 +23,10 @@ def given() -> list[torch.Tensor]:
     return [torch.randn(shape, generator=drawn, requires_grad=True) for shape in shapes]
 
 
+@pytest.mark.parametrize("chunk", [mlp.CHUNK, 16, 7])
 @pytest.mark.parametrize("learning", [True, False])
-def test_values_and_gradients_are_those_of_autograd(given, learning):
+def test_values_and_gradients_are_those_of_autograd(given, learning, chunk, monkeypatch):
+    monkeypatch.setattr(mlp, "CHUNK", chunk)
     values, *weights = given
     x = values
     for weight in weights[:-1]:
