@@ -48,7 +48,7 @@ class HashGrid:
         self._side, self._first = mi.UInt32(sides), mi.UInt32(self._firsts[:-1])
         sizes = [b - a for a, b in itertools.pairwise(self._firsts)]
         self._dense = mi.Bool([side**3 <= size for side, size in zip(sides, sizes, strict=True)])
-        self._last = 2**size - 1
+        self._mask = 2**size - 1
 
     @property
     def size(self) -> int:
@@ -90,7 +90,7 @@ class HashGrid:
         found = mi.Vector2f(0)
         for corner in itertools.product((0, 1), repeat=3):
             x, y, z = (low[k] + corner[k] for k in range(3))
-            hashed = (x ^ y * PRIMES[0] ^ z * PRIMES[1]) & self._last
+            hashed = (x ^ y * PRIMES[0] ^ z * PRIMES[1]) & self._mask
             entry = first + dr.select(dense, x + side * (y + side * z), hashed)
             weight = math.prod(share[k] if corner[k] else 1 - share[k] for k in range(3))
             found = dr.fma(dr.gather(mi.Vector2f, table, entry), weight, found)

@@ -7,6 +7,7 @@ faster.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -20,8 +21,7 @@ import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit o
 
 Weights = Sequence[torch.Tensor]
 CHUNK = 4096  # points whose values stay in a core's cache on their way back
-_THREADS = torch.get_num_threads()
-_pool = ThreadPoolExecutor(_THREADS, initializer=torch.set_num_threads, initargs=(1,))
+_pool = ThreadPoolExecutor(os.cpu_count(), initializer=torch.set_num_threads, initargs=(1,))
 _relu_backward = torch.ops.aten.threshold_backward.grad_input
 
 
@@ -67,7 +67,8 @@ def backwards(
             of_inputs[:, part].addmm_(weights[0].T[inputs], flow)
         return found
 
-    shares = [range(k * CHUNK, count, _THREADS * CHUNK) for k in range(_THREADS)]
+    threads = torch.get_num_threads()
+    shares = [range(k * CHUNK, count, threads * CHUNK) for k in range(threads)]
     found = list(_pool.map(work, shares))
     return [torch.stack(parts).sum(0) for parts in zip(*found, strict=True)] if learning else []
 

@@ -4,7 +4,6 @@ and what the paper compares view synthesis with."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -36,23 +35,23 @@ class PlainField:
     """Density and colour of points in the scene cube, by a hash grid and two networks.
 
     Args:
-        table: values of the hash grid, flat.
+        grid: of features.
+        table: its values, flat.
         weights: matrices of the networks.
-        size: binary logarithm of the entries of a level.
         mask, step: as `RadianceField` has them.
         packed: evaluate as cooperative vectors, fast forwards.
     """
 
     def __init__(
         self,
+        grid: HashGrid,
         table: Any,
         weights: Sequence[Any],
-        size: int,
         mask: Any = None,
         step: float = 0.0,
         packed: bool = False,
     ) -> None:
-        self.grid, self.table = hash_grid(size), table
+        self.grid, self.table = grid, table
         given = iter(weights)
         nets = [[next(given) for _ in widths[1:]] for widths in (DENSITY, COLOUR)]
         self._nets = packed_networks(*nets) if packed else nets
@@ -82,7 +81,8 @@ class PlainTask(RadianceTask):
 
     def __init__(self, config: NerfConfig, capture: Capture, shown: tuple[Capture, int]) -> None:
         drawn = torch.Generator().manual_seed(config.seed)
-        table = torch.empty(hash_grid(config.table).size).uniform_(-1e-4, 1e-4, generator=drawn)
+        self.grid = HashGrid(LEVELS, COARSEST, FINEST, config.table)  # as published
+        table = torch.empty(self.grid.size).uniform_(-1e-4, 1e-4, generator=drawn)
         parameters = {"table": table}
         for k, shape in enumerate(_shapes()):
             bound = weight_bound(shape)
@@ -99,7 +99,7 @@ class PlainTask(RadianceTask):
         origin, direction = rays_of(batch)
 
         def run(table: Any, *weights: Any) -> Any:
-            field = PlainField(table.array, weights, self.config.table)
+            field = PlainField(self.grid, table.array, weights)
             along = dr.gather(mi.Vector3f, direction, samples.ray)
             _, density, colour = field.evaluate(samples.points(origin, direction), along)
             shares, through = weights_of(density, samples)
@@ -111,7 +111,7 @@ class PlainTask(RadianceTask):
     def field(self, parameters: dict[str, torch.Tensor], packed: bool = True) -> PlainField:
         table, *weights = (mi.TensorXf(value.detach().numpy()) for value in parameters.values())
         mask, step = self.occupancy.mask, look_step(self.config)
-        return PlainField(table.array, weights, self.config.table, mask, step, packed)
+        return PlainField(self.grid, table.array, weights, mask, step, packed)
 
     def density(self, points: np.ndarray) -> np.ndarray:
         return self.field(self.named).density_at(points)
@@ -125,12 +125,6 @@ def trained(
     task = PlainTask(config, capture, shown)
     learn(task, config, folder, resume=(folder / checkpoint.NAME).exists(), quiet=quiet)
     return task
-
-
-@cache
-def hash_grid(size: int) -> HashGrid:
-    """The published grid: 16 levels of 2 features from 16 to 2048 cells, 2^size entries each."""
-    return HashGrid(LEVELS, COARSEST, FINEST, size)
 
 
 def _shapes() -> list[tuple[int, int]]:

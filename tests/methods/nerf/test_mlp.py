@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from mitex.methods.nerf import mlp
-from mitex.runtime import init
+from mitex.runtime import init, threads
 
 mi = init()
 import drjit as dr  # noqa: E402
@@ -23,10 +23,11 @@ def given() -> list[torch.Tensor]:
     return [torch.randn(shape, generator=drawn, requires_grad=True) for shape in shapes]
 
 
-@pytest.mark.parametrize("chunk", [mlp.CHUNK, 16, 7])
+@pytest.mark.parametrize(("chunk", "cores"), [(mlp.CHUNK, 2), (16, 1), (7, 3)])
 @pytest.mark.parametrize("learning", [True, False])
-def test_values_and_gradients_are_those_of_autograd(given, learning, chunk, monkeypatch):
+def test_values_and_gradients_are_those_of_autograd(given, learning, chunk, cores, monkeypatch):
     monkeypatch.setattr(mlp, "CHUNK", chunk)
+    threads(cores)
     values, *weights = given
     x = values
     for weight in weights[:-1]:
