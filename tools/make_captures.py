@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -66,27 +67,82 @@ def durian(rng: np.random.Generator) -> tuple[Base, Part]:
 
 
 def grass(rng: np.random.Generator) -> tuple[Base, Part]:
-    """Bent blades on a mound: each is folded along its middle, they lean in tufts, some are dry."""
-    base = Base(lambda d: _lumpy(d, (0.86, 0.80, 0.68), 0.05))
-    roots = base.scatter(rng, 20_000)
-    count, rings = len(roots), 8
+    """Short, thick blades, seen from near: they stand upright, and the soil shows between them."""
+    base = _mound()
+    turn = np.linspace(0.0, 2.0 * np.pi, 10, endpoint=False)
+    blades = Blades(
+        length=0.11,
+        half_width=(0.0208, 0.0325),
+        lean=0.2,
+        bend=0.1136,
+        depth=0.012,
+        rings=10,
+        across=np.cos(turn)[None],
+        sunk=-0.4 * np.sin(turn)[None],
+    )
+    return _turf(base, rng, base.spread(rng, 0.07057, rounds=1), blades)
+
+
+def lawn(rng: np.random.Generator) -> tuple[Base, Part]:
+    """Many bent blades, seen from far: each is folded along its middle, they lean in tufts, some are dry."""
+    base = _mound()
+    # Two sheets, each from edge to edge over the fold: the lower side and, back again, the upper one.
+    blades = Blades(
+        length=0.135,
+        half_width=(0.005625, 0.00975),
+        lean=0.5,
+        bend=0.35,
+        depth=0.008,
+        rings=8,
+        across=np.array([[-1.0, 0.0, 1.0], [1.0, 0.0, -1.0]]),
+        sunk=np.array([[0.0, 0.75, 0.0], [0.0, 0.55, 0.0]]),
+    )
+    return _turf(base, rng, base.scatter(rng, 20_000), blades)
+
+
+@dataclass(frozen=True)
+class Blades:
+    """How blades of grass are.
+
+    Attributes:
+        length: of most.
+        half_width: smallest and largest.
+        lean: largest angle from upright at the root [rad].
+        bend: by how much it grows towards the tip, the scale of a gamma distribution [rad].
+        depth: of the root in the soil.
+        rings: across a blade, from root to tip.
+        across, sunk: (S, K) section as S strips of K points, in half widths; a lone strip is closed.
+    """
+
+    length: float
+    half_width: tuple[float, float]
+    lean: float
+    bend: float
+    depth: float
+    rings: int
+    across: np.ndarray
+    sunk: np.ndarray
+
+
+def _turf(base: Base, rng: np.random.Generator, roots: np.ndarray, blades: Blades) -> tuple[Base, Part]:
+    """Blades of grass at roots (N, 3) on soil."""
+    count, (strips, points) = len(roots), blades.across.shape
     wind = np.arctan2(noise(rng, roots, 0.4), noise(rng, roots, 0.4)) + 1.4 * rng.normal(size=count)
     towards = np.stack([np.cos(wind), np.sin(wind)], axis=1)
     frames = base.frames(roots, np.einsum("nk,nkd->nd", towards, base.frames(roots)[:, :2]))
 
-    t = np.linspace(0.0, 1.0, rings)
-    bend = rng.uniform(0.0, 0.5, (count, 1)) + rng.gamma(2.2, 0.35, (count, 1)) * t**1.5  # from upright [rad]
-    length = 0.135 * np.exp(0.16 * rng.normal(size=count) + 0.12 * noise(rng, roots, 0.3))
-    reach, height = _along(np.sin(bend), length), _along(np.cos(bend), length) - 0.008
-    half = 0.0075 * rng.uniform(0.75, 1.3, (count, 1)) * (1.0 - t**2.5) * (0.7 + 0.6 * np.sqrt(t))
-    # Two sheets, each from edge to edge over the fold: the lower side and, back again, the upper one.
+    t = np.linspace(0.0, 1.0, blades.rings)
+    bend = rng.uniform(0.0, blades.lean, (count, 1)) + rng.gamma(2.2, blades.bend, (count, 1)) * t**1.5
+    length = blades.length * np.exp(0.16 * rng.normal(size=count) + 0.12 * noise(rng, roots, 0.3))
+    reach, height = _along(np.sin(bend), length), _along(np.cos(bend), length) - blades.depth
+    half = rng.uniform(*blades.half_width, (count, 1)) * (1.0 - t**2.5) * (0.7 + 0.6 * np.sqrt(t))
     half, bend, reach, height = (values[:, None, :, None] for values in (half, bend, reach, height))
-    across = half * np.array([[-1.0, 0.0, 1.0], [1.0, 0.0, -1.0]])[:, None]
-    sunk = half * np.array([[0.0, 0.75, 0.0], [0.0, 0.55, 0.0]])[:, None]
+    across, sunk = half * blades.across[:, None], half * blades.sunk[:, None]
     x, z = reach + sunk * np.cos(bend), height - sunk * np.sin(bend)
-    sheet = lattice(rings, 3, closed=False)
+    strip = lattice(blades.rings, points, closed=strips == 1)
     lifted = base.lift(roots, frames, np.stack([x, across, z], axis=-1))
-    mesh = repeated(lifted.reshape(count, -1, 3), np.concatenate([sheet, sheet + 3 * rings]))
+    faces = np.concatenate([strip + k * blades.rings * points for k in range(strips)])
+    mesh = repeated(lifted.reshape(count, -1, 3), faces)
 
     up = np.broadcast_to(t[:, None], x.shape).reshape(-1)
     owner = np.repeat(np.arange(count), x[0].size)
@@ -95,8 +151,12 @@ def grass(rng: np.random.Generator) -> tuple[Base, Part]:
     dry = ramp(up, "5d4f22", "a58f4c", "d2c083")
     colours = mix(green, dry, np.where(rng.random(count) < 0.10, rng.uniform(0.5, 1.0, count), 0.0)[owner])
     colours *= rng.normal(1.0, 0.12, count).clip(0.6, 1.4)[owner, None]
-    blades = Part(mesh, colours.clip(0.0, 1.0), np.full(len(colours), 0.42))
-    return base, joined([blades, _ground(base, rng, 0.05, 0.006, "1a1809", "2d2a14", "3d3a1c")])
+    part = Part(mesh, colours.clip(0.0, 1.0), np.full(len(colours), 0.42))
+    return base, joined([part, _ground(base, rng, 0.05, 0.006, "1a1809", "2d2a14", "3d3a1c")])
+
+
+def _mound() -> Base:
+    return Base(lambda d: _lumpy(d, (0.86, 0.80, 0.68), 0.05))
 
 
 def _along(slope: np.ndarray, length: np.ndarray) -> np.ndarray:
@@ -248,8 +308,9 @@ KINDS: dict[str, Callable[[np.random.Generator], tuple[Base, Part]]] = {
     "grass": grass,
     "woven": woven,
     "cobbles": cobbles,
+    "lawn": lawn,
 }
-SEEDS = {name: 100 + k for k, name in enumerate(KINDS)}
+SEEDS = {"durian": 100, "grass": 101, "woven": 102, "cobbles": 103, "lawn": 101}
 
 
 def main() -> None:
