@@ -310,6 +310,7 @@ KINDS: dict[str, Callable[[np.random.Generator], tuple[Base, Part]]] = {
     "cobbles": cobbles,
     "lawn": lawn,
 }
+# Grass and lawn share one: the lawn keeps the blades that its measurements are of.
 SEEDS = {"durian": 100, "grass": 101, "woven": 102, "cobbles": 103, "lawn": 101}
 
 

@@ -167,7 +167,8 @@ def test_while_torch_is_alone_drjit_has_no_workers_and_then_as_many_as_before(mi
 
 
 def test_torch_is_alone_anyway_without_drjit():
-    run("import sys, mitex.runtime as r\nwith r.torch_alone():\n    assert 'drjit' not in sys.modules")
+    code = "import sys, mitex.runtime as r\nwith r.torch_alone():\n    print('drjit' in sys.modules)"
+    assert run(code).stdout.strip() == "False"
 
 
 def test_threads_chosen_before_the_start_are_kept():

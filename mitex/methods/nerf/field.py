@@ -181,7 +181,7 @@ class _Networks(dr.CustomOp):
         with torch_alone():
             exponent, *rest = given.split([1, *(widths[-1] for widths in list(LAYERS.values())[1:])])
             of = dict(zip(list(LAYERS)[1:], rest, strict=True))
-            of["density"] = torch.cat([exponent, torch.zeros(CODE, exponent.shape[1])])
+            of["density"] = torch.cat([exponent, exponent.new_zeros(CODE, exponent.shape[1])])
             found = {"reflection": self._back("reflection", of["reflection"], of["density"])}
             of_values = torch.zeros_like(self.values)
             for name, rows in READS.items():

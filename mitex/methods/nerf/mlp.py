@@ -96,7 +96,7 @@ class _Network(dr.CustomOp):
         gradient: Any = self.grad_out()
         given = gradient.torch()
         with torch_alone():
-            of_values = torch.zeros(self.layers[0].shape)
+            of_values = torch.zeros_like(self.layers[0])
             found = backwards(self.weights, self.layers, given, self.learning, of_values)
         self.set_grad_in("values", mi.TensorXf(of_values))
         if self.learning:
