@@ -55,7 +55,7 @@ def parameters(encoding: Encoding) -> list[torch.Tensor]:
     tables = [torch.empty(size).uniform_(-0.1, 0.1, generator=drawn) for size in encoding.sizes]
     weights = [
         torch.empty(shape).uniform_(-weight_bound(shape), weight_bound(shape), generator=drawn)
-        for shape in weight_shapes()
+        for shape in weight_shapes(fresnel=True)
     ]
     return [value.requires_grad_() for value in tables + weights]
 
@@ -63,13 +63,14 @@ def parameters(encoding: Encoding) -> list[torch.Tensor]:
 def ours(
     encoding: Encoding, points: torch.Tensor, distance: torch.Tensor, given: list[torch.Tensor], packed: bool
 ):
-    """All outputs of the field, (N, 8), by Dr.Jit."""
+    """All outputs of the field, (N, 9), by Dr.Jit."""
 
     def run(points, distance, f, phase, *weights):
         foot = dr.unravel(mi.Point3f, points.array)
         features, phases = (encoding(k, foot, table.array) for k, table in enumerate((f, phase)))
         found = Decoder(weights, packed)(features, phases, distance.array)
-        values = [found.density, *found.diffuse, found.specular, found.glossiness, found.theta, found.phi]
+        ends = found.specular, found.grazing
+        values = [found.density, *found.diffuse, *ends, found.glossiness, found.theta, found.phi]
         return tensor(mi.ArrayXf(*values))
 
     return call(run, points, distance, *given)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import torch
 from torch.nn import functional as F
 
-from mitex.methods.nerf.field import COARSE, Encoding
+from mitex.methods.nerf.field import COARSE, DULL, Encoding
 
 PRIMES = (1, 2654435761, 805459861)
 
@@ -16,7 +16,10 @@ PRIMES = (1, 2654435761, 805459861)
 def decoded(
     f: torch.Tensor, phase: torch.Tensor, distance: torch.Tensor, weights: Sequence[torch.Tensor]
 ) -> torch.Tensor:
-    """Density, k_d (3), k_s, g, theta and phi, (N, 8), of f (N, 16), f-hat (N, 8) and distances (N,)."""
+    """Density, k_d (3), k_s facing and grazing, g, theta and phi, (N, 9).
+
+    Of f (N, 16), f-hat (N, 8) and distances (N,).
+    """
     waves = [distance[:, None]]
     for octave in range(12):
         angle = distance[:, None] * 2**octave
@@ -26,8 +29,10 @@ def decoded(
     reflection = _network(3, density[:, 1:], given)
     theta = _network(3, torch.cat([f, fine[:, :COARSE]], 1), given)
     phi = _network(3, torch.cat([phase, fine[:, :COARSE]], 1), given)
-    gloss = F.softplus(reflection[:, 4:]) + 1
-    return torch.cat([density[:, :1].exp(), reflection[:, :4].sigmoid(), gloss, theta, phi], 1)
+    gloss = F.softplus(reflection[:, 4:5]) + 1
+    facing = reflection[:, :4].sigmoid()
+    grazing = (reflection[:, 5:] - DULL).sigmoid() if reflection.shape[1] > 5 else facing[:, 3:]
+    return torch.cat([density[:, :1].exp(), facing, grazing, gloss, theta, phi], 1)
 
 
 def encoded(encoding: Encoding, which: int, points: torch.Tensor, table: torch.Tensor) -> torch.Tensor:

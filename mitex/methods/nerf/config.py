@@ -26,6 +26,8 @@ class NerfConfig:
         average: decay of the running mean of the parameters, the model that is kept, per 16 steps.
         learn_light: the light is learned with the field, as published; else it stays as the photos and the
             base shape tell it.
+        fresnel: surfaces mirror more or less at grazing angles; else as much from all sides, as published.
+        detach_normals: fine normals learn from the density alone, as published; else from colours too.
         clustering, distortion, normals: weights of the losses.
         cluster_entries: entries of a level that a step clusters, drawn by chance; 0 for all, as published.
         normal_rays: share of the rays whose normals are compared.
@@ -52,6 +54,8 @@ class NerfConfig:
     lr_steps: int = 40_000
     average: float = 0.95
     learn_light: bool = True
+    fresnel: bool = False
+    detach_normals: bool = True
     clustering: float = 1e-5
     distortion: float = 1e-2
     normals: float = 1.0
@@ -111,6 +115,8 @@ PRESETS = {
         coarsest=64,
         finest=512,
         learn_light=False,
+        fresnel=True,
+        detach_normals=False,
         cluster_entries=1 << 14,
         normals=0.05,
         normal_rays=0.25,

@@ -29,15 +29,17 @@ FINE = 2 * OCTAVES + 1
 COARSE = 12  # of those, what the angles see
 FEATURES, PHASES = 16, 8  # channels of f and of f-hat
 CODE = 15  # what the density network tells that of the reflection
+REFLECTION = 5  # what that says as published: k_d, k_s, g; the sixth is k_s at grazing angles
 LAYERS = {  # widths, without biases
     "density": (FEATURES + FINE, 32, CODE + 1),
-    "reflection": (CODE, 64, 64, 5),
+    "reflection": (CODE, 64, 64, REFLECTION + 1),
     "theta": (FEATURES + COARSE, 16, 16, 1),
     "phi": (PHASES + COARSE, 16, 16, 1),
 }
 # Which matrix is the last of theta's.
 ELEVATION = sum(len(LAYERS[name]) - 1 for name in ("density", "reflection", "theta")) - 1
 HIGHEST = 15.0  # exponent of the density
+DULL = 3.0  # taken from the logit of k_s at grazing angles: surfaces start dull there
 
 
 @dataclass
@@ -47,7 +49,8 @@ class Reflection:
     Attributes:
         exponent: natural logarithm of the density [1 / scene units].
         diffuse: k_d, `mi.Color3f` in [0, 1].
-        specular: k_s in [0, 1].
+        specular: k_s in [0, 1], where the surface faces the viewer.
+        grazing: the same at grazing angles; k_s again as published.
         glossiness: g, at least 1.
         theta, phi: elevation and azimuth of the fine normal in the frame of the face [rad], unbounded.
     """
@@ -55,6 +58,7 @@ class Reflection:
     exponent: Any
     diffuse: Any
     specular: Any
+    grazing: Any
     glossiness: Any
     theta: Any
     phi: Any
@@ -62,6 +66,10 @@ class Reflection:
     @property
     def density(self) -> Any:
         return dr.exp(dr.minimum(self.exponent, HIGHEST))
+
+    def mirrored(self, cosine: Any) -> Any:
+        """k_s under an angle to the normal, by Schlick's law with both ends learned (Hoffman 2019)."""
+        return self.specular + (self.grazing - self.specular) * (1 - cosine) ** 5
 
     def normal(self, tangent: Any, bitangent: Any, normal: Any) -> Any:
         """R(theta, phi) of equation 4 in a frame of `mi.Vector3f`s."""
@@ -99,7 +107,7 @@ class Decoder:
     """The networks from features and signed distance to density and reflection.
 
     Args:
-        weights: matrices (out, in) in the order of `LAYERS`, each a `mi.TensorXf`.
+        weights: matrices (out, in) as of `weight_shapes`, each a `mi.TensorXf`.
         packed: evaluate as cooperative vectors: fast forwards, slow backwards.
     """
 
@@ -117,11 +125,14 @@ class Decoder:
     def __call__(self, f: Sequence[Any], phase: Sequence[Any], distance: Any) -> Reflection:
         """Density and reflection for features f (16 arrays), f-hat (8) and signed distance [scene units]."""
         run = self._cooperative if self._packed else self._together
-        exponent, *diffuse, specular, glossiness, theta, phi = run([*f], [*phase], embedded(distance))
+        exponent, *reflection, theta, phi = run([*f], [*phase], embedded(distance))
+        *diffuse, specular, glossiness = reflection[:REFLECTION]
+        specular, grazing = sigmoid(specular), reflection[REFLECTION:]
         return Reflection(
             exponent,
             mi.Color3f(*(sigmoid(k) for k in diffuse)),
-            sigmoid(specular),
+            specular,
+            sigmoid(grazing[0] - DULL) if grazing else specular,
             _softplus(glossiness) + 1,
             theta,
             phi,
@@ -156,7 +167,7 @@ LEARNED = {"density": slice(BEYOND, BEYOND + FEATURES), "theta": slice(FEATURES)
 
 
 class _Networks(dr.CustomOp):
-    """All four on N points: inputs (49, N) as above -> the 8 outputs, (8, N).
+    """All four on N points: inputs (49, N) as above -> the outputs, (9, N) or, as published, (8, N).
 
     Only where points move (`moving`) does the distance get a gradient.
     """
@@ -179,7 +190,7 @@ class _Networks(dr.CustomOp):
         gradient: Any = self.grad_out()
         given = gradient.torch()
         with torch_alone():
-            exponent, *rest = given.split([1, *(widths[-1] for widths in list(LAYERS.values())[1:])])
+            exponent, *rest = given.split([1, *(len(self.nets[k][-1]) for k in list(LAYERS)[1:])])
             of = dict(zip(list(LAYERS)[1:], rest, strict=True))
             of["density"] = torch.cat([exponent, exponent.new_zeros(CODE, exponent.shape[1])])
             found = {"reflection": self._back("reflection", of["reflection"], of["density"])}
@@ -212,9 +223,10 @@ def embedded(distance: Any) -> list[Any]:
     return values
 
 
-def weight_shapes() -> list[tuple[int, int]]:
-    """(out, in) of each matrix, in the order of `LAYERS`."""
-    return [(o, i) for widths in LAYERS.values() for i, o in zip(widths[:-1], widths[1:], strict=True)]
+def weight_shapes(fresnel: bool) -> list[tuple[int, int]]:
+    """(out, in) of each matrix, in the order of `LAYERS`; `fresnel` as of `NerfConfig`."""
+    layers = LAYERS if fresnel else LAYERS | {"reflection": (*LAYERS["reflection"][:-1], REFLECTION)}
+    return [(o, i) for widths in layers.values() for i, o in zip(widths[:-1], widths[1:], strict=True)]
 
 
 def weight_bound(shape: tuple[int, int]) -> float:

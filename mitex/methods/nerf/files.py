@@ -20,7 +20,7 @@ from mitex.training import model_file
 
 NAME = "texture.safetensors"
 KIND = "nerf"
-SETTINGS = ("table", "coarsest", "finest", "cells", "occupancy", "pull", "neighbours")
+SETTINGS = ("table", "coarsest", "finest", "cells", "occupancy", "pull", "neighbours", "fresnel")
 
 
 @dataclass
@@ -31,7 +31,7 @@ class Model:
         base: base shape, scan and thickness.
         frames: (F, 3, 3) rows t, b, n of its faces.
         tables: of f and f-hat, flat.
-        weights: matrices of the networks, in the order of `field.LAYERS`.
+        weights: matrices of the networks, as of `field.weight_shapes`.
         light: (16,) spherical harmonics.
         occupied: (G, G, G) uint8, cells of the scene cube with matter.
         about: JSON values: name, preset, steps, `SETTINGS`, and how the capture was placed.
@@ -84,7 +84,7 @@ def load(source: str | Path) -> Model:
             raise ValueError("values that are not finite")
         mesh = Mesh(tensors["vertices"].numpy(), tensors["faces"].numpy(), name=f"{about['name']} base")
         base = BaseShape(mesh, tensors["scan"].numpy(), float(about["thickness"]))
-        weights = [tensors[f"weights/{k}"] for k in range(len(weight_shapes()))]
+        weights = [tensors[f"weights/{k}"] for k in range(len(weight_shapes(about["fresnel"])))]
         tables = [tensors["tables/f"], tensors["tables/phase"]]
         side = int(about["occupancy"])
         occupied = np.unpackbits(tensors["occupied"].numpy(), count=side**3).reshape((side,) * 3)
@@ -95,7 +95,7 @@ def load(source: str | Path) -> Model:
 
 def _check(model: Model) -> None:
     shapes: Mapping[str, tuple[Any, Any]] = {
-        "weights": ([tuple(w.shape) for w in model.weights], weight_shapes()),
+        "weights": ([tuple(w.shape) for w in model.weights], weight_shapes(model.config.fresnel)),
         "tables": ([len(t) for t in model.tables], Encoding(model.config).sizes),
         "frames": (model.frames.shape, (len(model.base.mesh.faces), 3, 3)),
         "light": (tuple(model.light.shape), (COEFFICIENTS,)),

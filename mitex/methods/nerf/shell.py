@@ -90,7 +90,7 @@ class CapturedLatents:
 
 
 def appearance(
-    latents: Latents, decoder: Decoder, light: Any, located: Located, view: Any
+    latents: Latents, decoder: Decoder, light: Any, located: Located, view: Any, detach: bool = False
 ) -> tuple[Any, Any, Any]:
     """Density, colour and fine normal of points in the shell (section 3.1.5).
 
@@ -99,17 +99,17 @@ def appearance(
         light: spherical harmonics, see `lighting`.
         located: N points.
         view: `mi.Vector3f`, the unit directions in which the rays travel.
+        detach: the colour has no derivative to the normal.
 
     Returns:
-        Density [1 / scene units of the texture], colour `mi.Color3f` in display values, and unit normal. The
-        colour has no derivative to the normal, which the normals' own loss teaches.
+        Density [1 / scene units of the texture], colour `mi.Color3f` in display values, and unit normal.
     """
     f, phase = latents(located)
     reflection = decoder(f, phase, located.distance)
     normal = reflection.normal(*latents.frame(located))
-    shaded = shade(
-        dr.detach(normal), view, reflection.diffuse, reflection.specular, reflection.glossiness, light
-    )
+    facing = dr.detach(normal) if detach else normal
+    specular = reflection.mirrored(dr.clip(-dr.dot(facing, view), 0, 1))
+    shaded = shade(facing, view, reflection.diffuse, specular, reflection.glossiness, light)
     return reflection.density, to_display(shaded), normal
 
 

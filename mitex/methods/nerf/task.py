@@ -83,7 +83,8 @@ class TextureTask(RadianceTask):
             located.foot, located.distance = dr.unravel(mi.Point3f, foot.array), distance.array
             latents, decoder = self._model(arrays)
             view = dr.unravel(mi.Vector3f, along.array)
-            density, colour, normal = appearance(latents, decoder, light, located, view)
+            detach = self.config.detach_normals
+            density, colour, normal = appearance(latents, decoder, light, located, view, detach)
             shares, through = weights_of(density, samples)
             rgb = accumulated(colour * shares, samples)
             fine, wanted = self._normals(arrays, located, normal, shares, samples, compared)
@@ -191,7 +192,7 @@ def _start(config: NerfConfig, encoding: Encoding, capture: Capture, base: Mesh)
 
     f, phase = encoding.sizes
     parameters = {"tables/f": uniform(f, -1e-4, 1e-4), "tables/phase": uniform(phase, 0.0, 1e-3)}
-    for k, shape in enumerate(weight_shapes()):
+    for k, shape in enumerate(weight_shapes(config.fresnel)):
         bound = weight_bound(shape) * (FLAT if k == ELEVATION else 1)
         parameters[f"weights/{k}"] = uniform(shape, -bound, bound)
     parameters["light"] = torch.from_numpy(estimated_light(base, capture))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from benchmarks import torch_field
 from mitex.bridge import call
 from mitex.methods.nerf import field as networks
 from mitex.methods.nerf.config import NerfConfig
-from mitex.methods.nerf.field import Decoder, embedded, weight_bound, weight_shapes
+from mitex.methods.nerf.field import Decoder, Reflection, embedded, weight_bound, weight_shapes
 from mitex.methods.nerf.tensors import rows, tensor
 from mitex.runtime import init
 
@@ -23,10 +24,11 @@ SMALL = NerfConfig(table=10, coarsest=8, finest=16)
 POINTS = 300
 
 
-def weights(seed: int = 0) -> list[torch.Tensor]:
+def weights(fresnel: bool, seed: int = 0) -> list[torch.Tensor]:
     drawn = torch.Generator().manual_seed(seed)
     return [
-        torch.empty(s).uniform_(-weight_bound(s), weight_bound(s), generator=drawn) for s in weight_shapes()
+        torch.empty(s).uniform_(-weight_bound(s), weight_bound(s), generator=drawn)
+        for s in weight_shapes(fresnel)
     ]
 
 
@@ -39,7 +41,8 @@ def inputs(seed: int = 0) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
 def decoded(f, phase, distance, *matrices, packed=False):
     def run(f, phase, distance, *matrices):
         found = Decoder(matrices, packed)(_columns(f), _columns(phase), distance.array)
-        values = [found.density, *found.diffuse, found.specular, found.glossiness, found.theta, found.phi]
+        ends = found.specular, found.grazing
+        values = [found.density, *found.diffuse, *ends, found.glossiness, found.theta, found.phi]
         return tensor(mi.ArrayXf(*values))
 
     return call(run, f, phase, distance, *matrices)
@@ -50,18 +53,25 @@ def _columns(x):
     return [dr.gather(mi.Float, x.array, index + k) for k in range(x.shape[1])]
 
 
+def said(**values: Any) -> Reflection:
+    """A reflection of which no more is known."""
+    return Reflection(**dict.fromkeys(f.name for f in fields(Reflection)) | values)
+
+
+@pytest.mark.parametrize("fresnel", [False, True])
 @pytest.mark.parametrize("packed", [False, True])
-def test_the_networks_agree_with_torch(packed):
-    given = (*inputs(), *weights())
-    expected = torch_field.decoded(*inputs(), weights())
+def test_the_networks_agree_with_torch(packed, fresnel):
+    given = (*inputs(), *weights(fresnel))
+    expected = torch_field.decoded(*inputs(), weights(fresnel))
     np.testing.assert_allclose(decoded(*given, packed=packed), expected, rtol=2e-4, atol=2e-5)
 
 
+@pytest.mark.parametrize("fresnel", [False, True])
 @pytest.mark.parametrize("moving", [True, False])
-def test_gradients_of_the_networks_agree_with_torch(moving):
-    ours, theirs = ([x.clone().requires_grad_() for x in (*inputs(), *weights())] for _ in range(2))
+def test_gradients_of_the_networks_agree_with_torch(moving, fresnel):
+    ours, theirs = ([x.clone().requires_grad_() for x in (*inputs(), *weights(fresnel))] for _ in range(2))
     ours[2].requires_grad_(moving)
-    share = torch.randn(POINTS, 8, generator=torch.Generator().manual_seed(3))
+    share = torch.randn(POINTS, 9, generator=torch.Generator().manual_seed(3))
     (decoded(*ours) * share).sum().backward()
     f, phase, distance, *matrices = theirs
     (torch_field.decoded(f, phase, distance, matrices) * share).sum().backward()
@@ -81,13 +91,27 @@ def test_the_embedding_is_the_distance_and_its_waves():
 
 
 def test_the_normal_of_equation_4():
-    found = networks.Reflection(None, None, None, None, mi.Float(0.3), mi.Float(1.1))
+    found = said(theta=mi.Float(0.3), phi=mi.Float(1.1))
     axes = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
     normal = found.normal(*(mi.Vector3f(*row.tolist()) for row in axes))
     local = [np.sin(0.3) * np.cos(1.1), np.sin(0.3) * np.sin(1.1), np.cos(0.3)]
     np.testing.assert_allclose(rows(normal)[0], local @ axes, atol=1e-6)
 
 
+def test_surfaces_mirror_more_at_grazing_angles():
+    found = said(specular=mi.Float(0.04), grazing=mi.Float(0.6))
+    np.testing.assert_allclose(np.array(found.mirrored(mi.Float([1.0, 0.5, 0.0]))), [0.04, 0.0575, 0.6])
+
+
+def test_as_published_they_mirror_as_much_from_all_sides():
+    f, phase, distance = inputs()
+    decoder = Decoder([mi.TensorXf(w.numpy()) for w in weights(fresnel=False)])
+    f, phase = (_columns(mi.TensorXf(x.numpy())) for x in (f, phase))
+    found = decoder(f, phase, mi.Float(distance.numpy()))
+    for cosine in (0.0, 0.3, 1.0):
+        np.testing.assert_array_equal(np.array(found.mirrored(cosine)), np.array(found.specular))
+
+
 def test_densities_stay_finite():
-    found = networks.Reflection(mi.Float(1e4), None, None, None, None, None)
+    found = said(exponent=mi.Float(1e4))
     assert np.isfinite(np.array(found.density)).all()

@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 
 from mitex.mesh import Mesh, icosphere
-from mitex.methods.nerf.field import Decoder, weight_bound, weight_shapes
+from mitex.methods.nerf.field import Decoder, Reflection, weight_bound, weight_shapes
+from mitex.methods.nerf.lighting import to_display
 from mitex.methods.nerf.maps import LatentMaps, MappedLatents
 from mitex.methods.nerf.projection import Projection
-from mitex.methods.nerf.shell import Located, Shell, shell_cells
+from mitex.methods.nerf.shell import Located, Shell, appearance, shell_cells
 from mitex.methods.nerf.tensors import channels, rows
 from mitex.runtime import init
 
 mi: Any = init()
+import drjit as dr  # noqa: E402
 
 
 def ball(frequency: int = 12) -> Mesh:
@@ -51,7 +53,8 @@ def at(barycentric) -> Located:
 def shell(strength: float = 1.0, scale: float = 1.0) -> Shell:
     drawn = np.random.default_rng(0)
     weights = [
-        mi.TensorXf(drawn.uniform(-1, 1, s).astype(np.float32) * weight_bound(s)) for s in weight_shapes()
+        mi.TensorXf(drawn.uniform(-1, 1, s).astype(np.float32) * weight_bound(s))
+        for s in weight_shapes(fresnel=True)
     ]
     mesh = ball()
     uv = np.random.default_rng(2).uniform(size=(len(mesh.faces), 3, 2))
@@ -108,6 +111,44 @@ def test_density_is_zero_outside_and_evaluated_inside():
     np.testing.assert_array_equal(np.array(index), [1, 2, 3])
     np.testing.assert_allclose(np.array(found), density[1:4], rtol=1e-4)
     assert rows(colour).shape == (3, 3) and (rows(colour) >= 0).all()
+
+
+def seen(view, light, theta=0.0, detach: bool = False) -> tuple[Any, Any]:
+    """Colour and normal of a surface of k_d = 0.2, k_s from 0.1 to 0.7 and this theta."""
+
+    def surface(f, phase, distance):
+        reflected = map(mi.Float, (0.1, 0.7, 5.0, theta, 0.4))
+        return Reflection(mi.Float(0), mi.Color3f(0.2), *reflected)  # pyright: ignore[reportCallIssue]
+
+    latents = MappedLatents(square(), np.zeros((1, 3, 2), np.float32), np.eye(3)[None])
+    decoder: Any = surface
+    light = mi.TensorXf(np.array(light, np.float32))
+    return appearance(latents, decoder, light, at([(0.2, 0.2)]), view, detach)[1:]
+
+
+def test_a_surface_shines_more_at_grazing_angles():
+    """Seen at 60 degrees to its normal, Schlick's law says that 0.1 + 0.6 / 32 is mirrored."""
+    light = [4.0, *[0.0] * 15]
+    up = rows(seen(mi.Vector3f(0, 0, -1), light)[1])[0]
+    across = np.cross(up, (1.0, 0.0, 0.0))
+    across /= np.linalg.norm(across)
+    for angle, mirrored in ((0, 0.1), (60, 0.1 + 0.6 / 32), (90, 0.7), (120, 0.7)):
+        turned = -np.cos(np.radians(angle)) * up + np.sin(np.radians(angle)) * across
+        colour = seen(mi.Vector3f(*turned.tolist()), light)[0]
+        expected = to_display(mi.Float(4.0 * (0.2 + mirrored) / np.sqrt(4 * np.pi)))
+        np.testing.assert_allclose(rows(colour)[0], np.array(expected)[0], rtol=1e-4)
+
+
+def test_colours_teach_normals_unless_these_are_detached():
+    light = [4.0, 0.9, -0.7, 0.8, *[0.2] * 12]
+    view = dr.normalize(mi.Vector3f(0.5, 0.3, -0.8))
+    theta = mi.Float(0.3)
+    dr.enable_grad(theta)
+    assert not dr.grad_enabled(seen(view, light, theta, detach=True)[0])
+    dr.backward(dr.sum(seen(view, light, theta)[0]))
+    more, less = (rows(seen(view, light, value)[0]).sum() for value in (0.31, 0.29))
+    assert abs(more - less) > 5e-3
+    np.testing.assert_allclose(np.array(dr.grad(theta)), (more - less) / 0.02, rtol=1e-2)
 
 
 def test_a_larger_texture_is_as_opaque_in_all():
