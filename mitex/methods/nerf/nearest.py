@@ -19,6 +19,7 @@ LENGTH = 5  # of a list, at most, in vertices looked up at a corner
 MARGIN = 0.25  # the grid goes beyond the vertices by this [diagonals of their bounding box]
 SIDE = 192  # cells along a side, at most
 CELLS = 1 << 19  # with a list, at most: 100 MB for 8 neighbours
+MANY = 2000  # points that the tree is asked for in threads, which take milliseconds to begin
 CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
 
 UNLISTED, FAR, NEW = -1, -2, -3
@@ -91,10 +92,11 @@ class NearestVertices:
     def _from_tree(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """As `__call__`, by the tree."""
         near = np.arange(len(points))
+        workers = -1 if len(points) >= MANY else 1
         if math.isfinite(self.limit):
-            distance, _ = self._tree.query(points, k=1, distance_upper_bound=self.limit, workers=-1)
+            distance, _ = self._tree.query(points, k=1, distance_upper_bound=self.limit, workers=workers)
             near = np.flatnonzero(np.isfinite(distance))
-        _, index = self._tree.query(points[near], k=self.count, workers=-1)
+        _, index = self._tree.query(points[near], k=self.count, workers=workers)
         return near, index.reshape(-1, self.count).astype(np.uint32)
 
     def _from_lists(self, points: np.ndarray, slots: np.ndarray) -> np.ndarray:
