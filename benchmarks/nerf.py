@@ -49,13 +49,13 @@ def rate(points: int, work: Callable[[], object]) -> float:
     return points / statistics.median(times)
 
 
-def parameters(encoding: Encoding) -> list[torch.Tensor]:
+def parameters(config: NerfConfig, encoding: Encoding) -> list[torch.Tensor]:
     """Tables and weights, attached."""
     drawn = torch.Generator().manual_seed(0)
     tables = [torch.empty(size).uniform_(-0.1, 0.1, generator=drawn) for size in encoding.sizes]
     weights = [
         torch.empty(shape).uniform_(-weight_bound(shape), weight_bound(shape), generator=drawn)
-        for shape in weight_shapes(fresnel=True)
+        for shape in weight_shapes(config)
     ]
     return [value.requires_grad_() for value in tables + weights]
 
@@ -136,7 +136,7 @@ def rates(count: int) -> Table:
     for preset in ("fast", "paper"):
         config: NerfConfig = replace(PRESETS[preset], table=TABLE)
         encoding = Encoding(config)
-        given = parameters(encoding)
+        given = parameters(config, encoding)
         fixed = [value.detach() for value in given]
         scene = encoding, points, distance
         torch_rates = [

@@ -21,6 +21,7 @@ class NerfConfig:
         cells: along the diagonal of the scene cube that a ray's steps divide.
         table: binary logarithm of the entries of a level's hash table.
         coarsest, finest: resolution of the first and the last level of features [per scene cube].
+        density_width: channels of the density network's hidden layer.
         lr: learning rate, times 0.1 after `lr_steps`.
         lr_steps: as said.
         average: decay of the running mean of the parameters, the model that is kept, per 16 steps.
@@ -50,6 +51,7 @@ class NerfConfig:
     table: int = 19
     coarsest: int = 512
     finest: int = 1024
+    density_width: int = 32
     lr: float = 1e-2
     lr_steps: int = 40_000
     average: float = 0.95
@@ -80,6 +82,7 @@ class NerfConfig:
             table=(8, 24),
             coarsest=(2, 8192),
             finest=(2, 8192),
+            density_width=(1, 1024),
             lr=(0, 1),
             lr_steps=(1, None),
             average=(0, 0.9999),
@@ -114,6 +117,7 @@ PRESETS = {
         table=17,
         coarsest=64,
         finest=512,
+        density_width=64,
         learn_light=False,
         fresnel=True,
         detach_normals=False,

@@ -30,13 +30,14 @@ COARSE = 12  # of those, what the angles see
 FEATURES, PHASES = 16, 8  # channels of f and of f-hat
 CODE = 15  # what the density network tells that of the reflection
 REFLECTION = 5  # what that says as published: k_d, k_s, g; the sixth is k_s at grazing angles
-LAYERS = {  # widths, without biases
+LAYERS = {  # widths as published but for the sixth of the reflection, without biases
     "density": (FEATURES + FINE, 32, CODE + 1),
     "reflection": (CODE, 64, 64, REFLECTION + 1),
     "theta": (FEATURES + COARSE, 16, 16, 1),
     "phi": (PHASES + COARSE, 16, 16, 1),
 }
-# Which matrix is the last of theta's.
+MATRICES = sum(len(widths) - 1 for widths in LAYERS.values())
+# Which of them is the last of theta's.
 ELEVATION = sum(len(LAYERS[name]) - 1 for name in ("density", "reflection", "theta")) - 1
 HIGHEST = 15.0  # exponent of the density
 DULL = 3.0  # taken from the logit of k_s at grazing angles: surfaces start dull there
@@ -223,9 +224,11 @@ def embedded(distance: Any) -> list[Any]:
     return values
 
 
-def weight_shapes(fresnel: bool) -> list[tuple[int, int]]:
-    """(out, in) of each matrix, in the order of `LAYERS`; `fresnel` as of `NerfConfig`."""
-    layers = LAYERS if fresnel else LAYERS | {"reflection": (*LAYERS["reflection"][:-1], REFLECTION)}
+def weight_shapes(config: NerfConfig) -> list[tuple[int, int]]:
+    """(out, in) of each matrix, in the order of `LAYERS`; settings say the density's width and `fresnel`."""
+    layers = LAYERS | {"density": (FEATURES + FINE, config.density_width, CODE + 1)}
+    if not config.fresnel:
+        layers["reflection"] = (*LAYERS["reflection"][:-1], REFLECTION)
     return [(o, i) for widths in layers.values() for i, o in zip(widths[:-1], widths[1:], strict=True)]
 
 

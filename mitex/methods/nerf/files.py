@@ -13,14 +13,17 @@ import torch
 from mitex.mesh import Mesh
 from mitex.methods.nerf.coarse import BaseShape
 from mitex.methods.nerf.config import NerfConfig
-from mitex.methods.nerf.field import Encoding, weight_shapes
+from mitex.methods.nerf.field import MATRICES, Encoding, weight_shapes
 from mitex.methods.nerf.lighting import COEFFICIENTS
 from mitex.runtime import init
 from mitex.training import model_file
 
 NAME = "texture.safetensors"
 KIND = "nerf"
-SETTINGS = ("table", "coarsest", "finest", "cells", "occupancy", "pull", "neighbours", "fresnel")
+SETTINGS = (
+    *("table", "coarsest", "finest", "density_width", "fresnel"),
+    *("cells", "occupancy", "pull", "neighbours"),
+)
 
 
 @dataclass
@@ -84,7 +87,7 @@ def load(source: str | Path) -> Model:
             raise ValueError("values that are not finite")
         mesh = Mesh(tensors["vertices"].numpy(), tensors["faces"].numpy(), name=f"{about['name']} base")
         base = BaseShape(mesh, tensors["scan"].numpy(), float(about["thickness"]))
-        weights = [tensors[f"weights/{k}"] for k in range(len(weight_shapes(about["fresnel"])))]
+        weights = [tensors[f"weights/{k}"] for k in range(MATRICES)]
         tables = [tensors["tables/f"], tensors["tables/phase"]]
         side = int(about["occupancy"])
         occupied = np.unpackbits(tensors["occupied"].numpy(), count=side**3).reshape((side,) * 3)
@@ -95,7 +98,7 @@ def load(source: str | Path) -> Model:
 
 def _check(model: Model) -> None:
     shapes: Mapping[str, tuple[Any, Any]] = {
-        "weights": ([tuple(w.shape) for w in model.weights], weight_shapes(model.config.fresnel)),
+        "weights": ([tuple(w.shape) for w in model.weights], weight_shapes(model.config)),
         "tables": ([len(t) for t in model.tables], Encoding(model.config).sizes),
         "frames": (model.frames.shape, (len(model.base.mesh.faces), 3, 3)),
         "light": (tuple(model.light.shape), (COEFFICIENTS,)),

@@ -192,7 +192,7 @@ def _start(config: NerfConfig, encoding: Encoding, capture: Capture, base: Mesh)
 
     f, phase = encoding.sizes
     parameters = {"tables/f": uniform(f, -1e-4, 1e-4), "tables/phase": uniform(phase, 0.0, 1e-3)}
-    for k, shape in enumerate(weight_shapes(config.fresnel)):
+    for k, shape in enumerate(weight_shapes(config)):
         bound = weight_bound(shape) * (FLAT if k == ELEVATION else 1)
         parameters[f"weights/{k}"] = uniform(shape, -bound, bound)
     parameters["light"] = torch.from_numpy(estimated_light(base, capture))

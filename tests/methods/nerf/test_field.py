@@ -12,7 +12,7 @@ import torch
 from benchmarks import torch_field
 from mitex.bridge import call
 from mitex.methods.nerf import field as networks
-from mitex.methods.nerf.config import NerfConfig
+from mitex.methods.nerf.config import PRESETS, NerfConfig
 from mitex.methods.nerf.field import Decoder, Reflection, embedded, weight_bound, weight_shapes
 from mitex.methods.nerf.tensors import rows, tensor
 from mitex.runtime import init
@@ -24,11 +24,11 @@ SMALL = NerfConfig(table=10, coarsest=8, finest=16)
 POINTS = 300
 
 
-def weights(fresnel: bool, seed: int = 0) -> list[torch.Tensor]:
+def weights(preset: str, seed: int = 0) -> list[torch.Tensor]:
     drawn = torch.Generator().manual_seed(seed)
     return [
         torch.empty(s).uniform_(-weight_bound(s), weight_bound(s), generator=drawn)
-        for s in weight_shapes(fresnel)
+        for s in weight_shapes(PRESETS[preset])
     ]
 
 
@@ -58,18 +58,18 @@ def said(**values: Any) -> Reflection:
     return Reflection(**dict.fromkeys(f.name for f in fields(Reflection)) | values)
 
 
-@pytest.mark.parametrize("fresnel", [False, True])
+@pytest.mark.parametrize("preset", PRESETS)
 @pytest.mark.parametrize("packed", [False, True])
-def test_the_networks_agree_with_torch(packed, fresnel):
-    given = (*inputs(), *weights(fresnel))
-    expected = torch_field.decoded(*inputs(), weights(fresnel))
+def test_the_networks_agree_with_torch(packed, preset):
+    given = (*inputs(), *weights(preset))
+    expected = torch_field.decoded(*inputs(), weights(preset))
     np.testing.assert_allclose(decoded(*given, packed=packed), expected, rtol=2e-4, atol=2e-5)
 
 
-@pytest.mark.parametrize("fresnel", [False, True])
+@pytest.mark.parametrize("preset", PRESETS)
 @pytest.mark.parametrize("moving", [True, False])
-def test_gradients_of_the_networks_agree_with_torch(moving, fresnel):
-    ours, theirs = ([x.clone().requires_grad_() for x in (*inputs(), *weights(fresnel))] for _ in range(2))
+def test_gradients_of_the_networks_agree_with_torch(moving, preset):
+    ours, theirs = ([x.clone().requires_grad_() for x in (*inputs(), *weights(preset))] for _ in range(2))
     ours[2].requires_grad_(moving)
     share = torch.randn(POINTS, 9, generator=torch.Generator().manual_seed(3))
     (decoded(*ours) * share).sum().backward()
@@ -105,7 +105,7 @@ def test_surfaces_mirror_more_at_grazing_angles():
 
 def test_as_published_they_mirror_as_much_from_all_sides():
     f, phase, distance = inputs()
-    decoder = Decoder([mi.TensorXf(w.numpy()) for w in weights(fresnel=False)])
+    decoder = Decoder([mi.TensorXf(w.numpy()) for w in weights("paper")])
     f, phase = (_columns(mi.TensorXf(x.numpy())) for x in (f, phase))
     found = decoder(f, phase, mi.Float(distance.numpy()))
     for cosine in (0.0, 0.3, 1.0):

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from mitex.mesh import Mesh, icosphere
+from mitex.methods.nerf.config import PRESETS
 from mitex.methods.nerf.field import Decoder, Reflection, weight_bound, weight_shapes
 from mitex.methods.nerf.lighting import to_display
 from mitex.methods.nerf.maps import LatentMaps, MappedLatents
@@ -54,7 +55,7 @@ def shell(strength: float = 1.0, scale: float = 1.0) -> Shell:
     drawn = np.random.default_rng(0)
     weights = [
         mi.TensorXf(drawn.uniform(-1, 1, s).astype(np.float32) * weight_bound(s))
-        for s in weight_shapes(fresnel=True)
+        for s in weight_shapes(PRESETS["fast"])
     ]
     mesh = ball()
     uv = np.random.default_rng(2).uniform(size=(len(mesh.faces), 3, 2))
