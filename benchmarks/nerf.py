@@ -69,9 +69,7 @@ def ours(
         foot = dr.unravel(mi.Point3f, points.array)
         features, phases = (encoding(k, foot, table.array) for k, table in enumerate((f, phase)))
         found = Decoder(weights, packed)(features, phases, distance.array)
-        ends = found.specular, found.grazing
-        values = [found.density, *found.diffuse, *ends, found.glossiness, found.theta, found.phi]
-        return tensor(mi.ArrayXf(*values))
+        return tensor(mi.ArrayXf(*torch_field.outputs(found)))
 
     return call(run, points, distance, *given)
 

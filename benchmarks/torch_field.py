@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import torch
 from torch.nn import functional as F
 
-from mitex.methods.nerf.field import COARSE, DULL, Encoding
+from mitex.methods.nerf.field import COARSE, DULL, Encoding, Reflection
 
 PRIMES = (1, 2654435761, 805459861)
 
@@ -33,6 +34,12 @@ def decoded(
     facing = reflection[:, :4].sigmoid()
     grazing = (reflection[:, 5:] - DULL).sigmoid() if reflection.shape[1] > 5 else facing[:, 3:]
     return torch.cat([density[:, :1].exp(), facing, grazing, gloss, theta, phi], 1)
+
+
+def outputs(found: Reflection) -> list[Any]:
+    """The same nine of the field's own networks."""
+    ends = found.specular, found.grazing
+    return [found.density, *found.diffuse, *ends, found.glossiness, found.theta, found.phi]
 
 
 def encoded(encoding: Encoding, which: int, points: torch.Tensor, table: torch.Tensor) -> torch.Tensor:

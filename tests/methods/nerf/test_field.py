@@ -41,9 +41,7 @@ def inputs(seed: int = 0) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
 def decoded(f, phase, distance, *matrices, packed=False):
     def run(f, phase, distance, *matrices):
         found = Decoder(matrices, packed)(_columns(f), _columns(phase), distance.array)
-        ends = found.specular, found.grazing
-        values = [found.density, *found.diffuse, *ends, found.glossiness, found.theta, found.phi]
-        return tensor(mi.ArrayXf(*values))
+        return tensor(mi.ArrayXf(*torch_field.outputs(found)))
 
     return call(run, f, phase, distance, *matrices)
 
