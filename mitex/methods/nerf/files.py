@@ -21,8 +21,15 @@ from mitex.training import model_file
 NAME = "texture.safetensors"
 KIND = "nerf"
 SETTINGS = (
-    *("table", "coarsest", "finest", "density_width", "fresnel"),
-    *("cells", "occupancy", "pull", "neighbours"),
+    "table",
+    "coarsest",
+    "finest",
+    "density_width",
+    "fresnel",
+    "cells",
+    "occupancy",
+    "pull",
+    "neighbours",
 )
 
 
