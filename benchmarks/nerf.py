@@ -29,7 +29,7 @@ from mitex.methods.nerf.config import PRESETS, NerfConfig
 from mitex.methods.nerf.field import Decoder, Encoding, weight_bound, weight_shapes
 from mitex.methods.nerf.tensors import tensor
 from mitex.render.shell import shell_still
-from mitex.runtime import init, keep_freed_memory
+from mitex.runtime import init, keep_freed_memory, modest_workers
 
 mi = init()
 import drjit as dr  # noqa: E402
@@ -92,7 +92,8 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="fewer points")
     parser.add_argument("--run", metavar="RUN", help="a captured texture")
     given = parser.parse_args()
-    keep_freed_memory()  # as a fit does
+    keep_freed_memory()  # these two as in a fit
+    modest_workers()
     Console(width=100).print(rates(1 << (14 if given.quick else 16)))
     if given.run:
         Console(width=100).print(uses(NerfTexture.load(given.run)))

@@ -38,7 +38,9 @@ def _set_torch(count: int) -> None:
 
 
 def _set_drjit(count: int) -> None:
-    sys.modules["drjit"].set_thread_count(count)
+    from mitex.runtime import set_workers
+
+    set_workers(count)
 
 
 def _set_variant(variant: str) -> None:

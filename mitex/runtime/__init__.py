@@ -3,7 +3,15 @@
 from mitex.runtime.health import Check, doctor
 from mitex.runtime.memory import available_memory, keep_freed_memory
 from mitex.runtime.precision import bfloat16_is_fast
-from mitex.runtime.session import init, load_mitsuba, seed_everything, threads, torch_alone, yield_cores
+from mitex.runtime.session import (
+    init,
+    load_mitsuba,
+    modest_workers,
+    seed_everything,
+    set_workers,
+    threads,
+    yield_cores,
+)
 
 __all__ = [
     "Check",
@@ -13,8 +21,9 @@ __all__ = [
     "init",
     "keep_freed_memory",
     "load_mitsuba",
+    "modest_workers",
     "seed_everything",
+    "set_workers",
     "threads",
-    "torch_alone",
     "yield_cores",
 ]

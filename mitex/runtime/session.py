@@ -3,9 +3,10 @@
 import os
 import random
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+import time
+from contextlib import suppress
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mitex.errors import ConfigError, RuntimeUnavailable
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
     import torch
 
 DEFAULT_VARIANT = "llvm_ad_rgb"
+WORKER = "nt ["  # what Dr.Jit calls its worker threads, with a number
+MODEST = 10  # their niceness beside torch
+RESTED = 0.05  # after which they rest [s]
 
 _threads: int | None = None
 
@@ -74,7 +78,7 @@ def load_mitsuba(needs_llvm: bool = True) -> Any:
     if needs_llvm:
         _check_loaded_llvm(dr)
     if _threads not in (None, dr.thread_count()):
-        dr.set_thread_count(_threads)
+        set_workers(_threads)
     return mi
 
 
@@ -105,7 +109,7 @@ def threads(count: int) -> None:
     _threads = count
     import_module("torch").set_num_threads(count)
     if "drjit" in sys.modules:
-        sys.modules["drjit"].set_thread_count(count)
+        set_workers(count)
 
 
 def yield_cores() -> None:
@@ -118,23 +122,32 @@ def yield_cores() -> None:
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 
-@contextmanager
-def torch_alone() -> Iterator[None]:
-    """Dr.Jit's worker threads are gone while torch works; without Dr.Jit there is nothing to do.
+def modest_workers() -> None:
+    """Lets torch go before Dr.Jit's workers where both want a core (on Linux; elsewhere nothing happens).
 
-    They spin for 20 ms after each kernel, on cores that torch needs; to end and to begin them takes less than
-    0.1 ms. Nothing of Dr.Jit may be begun inside: what it plans for one thread must not run on several.
+    They spin for 20 ms after each kernel, and torch's products on two cores take half as long again. At a
+    lower priority they take what is free. For work in which torch's idle threads sleep (`yield_cores`):
+    beside threads that spin kernels would starve. To end workers while torch works is as fast, but see
+    `set_workers`.
     """
-    drjit = sys.modules.get("drjit")
-    if drjit is None:
-        yield
-        return
-    count = drjit.thread_count()
-    drjit.set_thread_count(1)
-    try:
-        yield
-    finally:
-        drjit.set_thread_count(count)
+    drjit = import_module("drjit")
+    drjit.set_thread_count(drjit.thread_count())  # begins them if no kernel has run yet
+    for name in Path("/proc/self/task").glob("*/comm"):
+        with suppress(OSError):  # a thread that ends meanwhile
+            if name.read_text().startswith(WORKER):
+                os.setpriority(os.PRIO_PROCESS, int(name.parent.name), MODEST)
+
+
+def set_workers(count: int) -> None:
+    """Lets Dr.Jit use `count` threads.
+
+    A worker that is told to end just as it goes to rest may miss that, and is waited for forever (nanothread
+    of Dr.Jit 1.5). New ones rest at once, others 20 ms after a kernel: they have done so before any is ended.
+    """
+    drjit = import_module("drjit")
+    if count < drjit.thread_count():
+        time.sleep(RESTED)
+    drjit.set_thread_count(count)
 
 
 def seed_everything(seed: int) -> "torch.Generator":

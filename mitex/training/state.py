@@ -8,7 +8,6 @@ from typing import Any
 import torch
 
 from mitex.errors import CheckpointError
-from mitex.runtime import torch_alone
 from mitex.training import optim
 from mitex.training.checkpoint import Checkpoint
 from mitex.training.run import as_json
@@ -80,13 +79,12 @@ class TrainState:
         return record | ({"skipped": fault} if fault else {})
 
     def _update(self, loss: float) -> str | None:
-        with torch_alone():
-            norms = optim.gradient_norms(self.optimizer.parameters)
-            if not norms.isfinite().all():
-                return "gradient"
-            if self.normalise:
-                optim.normalise_gradients(self.optimizer.parameters, norms)
-            self.optimizer.step(self.schedule(self.step))
+        norms = optim.gradient_norms(self.optimizer.parameters)
+        if not norms.isfinite().all():
+            return "gradient"
+        if self.normalise:
+            optim.normalise_gradients(self.optimizer.parameters, norms)
+        self.optimizer.step(self.schedule(self.step))
         self.task.commit()
         mean = loss if math.isnan(self.loss) else self.loss
         self.loss = mean + (loss - mean) / min(self.step + 1, SMOOTHING)

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -153,22 +154,33 @@ def test_threads_reach_torch_and_drjit(mi):
         mitex.runtime.threads(0)
 
 
-def test_while_torch_is_alone_drjit_has_no_workers_and_then_as_many_as_before(mi):
+@pytest.mark.skipif(sys.platform != "linux", reason="threads have priorities of their own on Linux")
+def test_modest_workers_go_after_torch_and_the_main_thread_does_not():
+    code = """
+import os, mitex.runtime as r
+from pathlib import Path
+r.threads(3)
+r.init()
+r.modest_workers()
+for task in sorted(Path("/proc/self/task").iterdir()):
+    name = (task / "comm").read_text().strip()
+    if name.startswith("nt") or int(task.name) == os.getpid():
+        print(name[:2], os.getpriority(os.PRIO_PROCESS, int(task.name)) - os.nice(0))
+"""
+    assert sorted(run(code).stdout.splitlines()) == ["nt 10", "nt 10", "py 0"]
+
+
+def test_workers_rest_before_any_is_ended(mi, monkeypatch: pytest.MonkeyPatch):
     import drjit as dr
 
-    mitex.runtime.threads(3)
-    with pytest.raises(ZeroDivisionError), mitex.runtime.torch_alone():
-        assert dr.thread_count() == 1
-        with mitex.runtime.torch_alone():
-            assert dr.thread_count() == 1
-        assert dr.thread_count() == 1
-        raise ZeroDivisionError
-    assert dr.thread_count() == 3
-
-
-def test_torch_is_alone_anyway_without_drjit():
-    code = "import sys, mitex.runtime as r\nwith r.torch_alone():\n    print('drjit' in sys.modules)"
-    assert run(code).stdout.strip() == "False"
+    seen = []
+    mitex.runtime.set_workers(1)
+    monkeypatch.setattr(time, "sleep", lambda seconds: seen.append((seconds, dr.thread_count())))
+    for count in (3, 3, 4, 2):
+        mitex.runtime.set_workers(count)
+        assert dr.thread_count() == count
+    before = seen.pop()
+    assert not seen and before[0] > 0.02 and before[1] == 4
 
 
 def test_threads_chosen_before_the_start_are_kept():

@@ -18,7 +18,7 @@ from mitex.methods.nerf import mlp
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.hash_grid import HashGrid
 from mitex.methods.nerf.tensors import stacked, unstacked
-from mitex.runtime import load_mitsuba, torch_alone
+from mitex.runtime import load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
@@ -176,33 +176,31 @@ class _Networks(dr.CustomOp):
     def eval(self, values: Any, nets: list[list[Any]], learning: bool, moving: bool) -> Any:
         self.learning, self.moving, self.values = learning, moving, values.torch()
         self.nets = {k: [w.torch() for w in net] for k, net in zip(LAYERS, nets, strict=True)}
-        with torch_alone():
-            for name, columns in TURNED.items():
-                self.nets[name][0] = self.nets[name][0].roll(columns, 1)
-            # With a column of zeros for the exponent, 16 in all: products with 15 take three times as long.
-            self.nets["reflection"][0] = F.pad(self.nets["reflection"][0], (1, 0))
-            layers = {k: mlp.forwards(self.nets[k], self.values[rows]) for k, rows in READS.items()}
-            layers["reflection"] = mlp.forwards(self.nets["reflection"], layers["density"][-1])
-            self.layers = layers
-            found = torch.cat([layers["density"][-1][:1], *(layers[k][-1] for k in list(LAYERS)[1:])])
+        for name, columns in TURNED.items():
+            self.nets[name][0] = self.nets[name][0].roll(columns, 1)
+        # With a column of zeros for the exponent, 16 in all: products with 15 take three times as long.
+        self.nets["reflection"][0] = F.pad(self.nets["reflection"][0], (1, 0))
+        layers = {k: mlp.forwards(self.nets[k], self.values[rows]) for k, rows in READS.items()}
+        layers["reflection"] = mlp.forwards(self.nets["reflection"], layers["density"][-1])
+        self.layers = layers
+        found = torch.cat([layers["density"][-1][:1], *(layers[k][-1] for k in list(LAYERS)[1:])])
         return mi.TensorXf(found)
 
     def backward(self) -> None:
         gradient: Any = self.grad_out()
         given = gradient.torch()
-        with torch_alone():
-            exponent, *rest = given.split([1, *(len(self.nets[k][-1]) for k in list(LAYERS)[1:])])
-            of = dict(zip(list(LAYERS)[1:], rest, strict=True))
-            of["density"] = torch.cat([exponent, exponent.new_zeros(CODE, exponent.shape[1])])
-            found = {"reflection": self._back("reflection", of["reflection"], of["density"])}
-            of_values = torch.zeros_like(self.values)
-            for name, rows in READS.items():
-                learned = slice(None) if self.moving else LEARNED[name]
-                found[name] = self._back(name, of[name], of_values[rows][learned], learned)
-            if self.learning:
-                for name, columns in TURNED.items():
-                    found[name][0] = found[name][0].roll(-columns, 1)
-                found["reflection"][0] = found["reflection"][0][:, 1:].contiguous()
+        exponent, *rest = given.split([1, *(len(self.nets[k][-1]) for k in list(LAYERS)[1:])])
+        of = dict(zip(list(LAYERS)[1:], rest, strict=True))
+        of["density"] = torch.cat([exponent, exponent.new_zeros(CODE, exponent.shape[1])])
+        found = {"reflection": self._back("reflection", of["reflection"], of["density"])}
+        of_values = torch.zeros_like(self.values)
+        for name, rows in READS.items():
+            learned = slice(None) if self.moving else LEARNED[name]
+            found[name] = self._back(name, of[name], of_values[rows][learned], learned)
+        if self.learning:
+            for name, columns in TURNED.items():
+                found[name][0] = found[name][0].roll(-columns, 1)
+            found["reflection"][0] = found["reflection"][0][:, 1:].contiguous()
         self.set_grad_in("values", mi.TensorXf(of_values))
         if self.learning:
             self.set_grad_in("nets", [[mi.TensorXf(weight) for weight in found[k]] for k in LAYERS])

@@ -14,7 +14,7 @@ from typing import Any
 
 import torch
 
-from mitex.runtime import load_mitsuba, torch_alone
+from mitex.runtime import load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
@@ -87,17 +87,15 @@ class _Network(dr.CustomOp):
     def eval(self, values: Any, weights: list[Any], learning: bool) -> Any:
         self.weights, self.learning = [weight.torch() for weight in weights], learning
         given = values.torch()
-        with torch_alone():
-            self.layers = forwards(self.weights, given)
-            found = self.layers[-1].contiguous()
+        self.layers = forwards(self.weights, given)
+        found = self.layers[-1].contiguous()
         return mi.TensorXf(found)
 
     def backward(self) -> None:
         gradient: Any = self.grad_out()
         given = gradient.torch()
-        with torch_alone():
-            of_values = torch.zeros_like(self.layers[0])
-            found = backwards(self.weights, self.layers, given, self.learning, of_values)
+        of_values = torch.zeros_like(self.layers[0])
+        found = backwards(self.weights, self.layers, given, self.learning, of_values)
         self.set_grad_in("values", mi.TensorXf(of_values))
         if self.learning:
             self.set_grad_in("weights", [mi.TensorXf(f) for f in found])

@@ -19,7 +19,7 @@ from mitex.methods.nerf.losses import distortion
 from mitex.methods.nerf.occupancy import Occupancy
 from mitex.methods.nerf.pixels import Batch, Pixels
 from mitex.methods.nerf.tensors import channels, rows
-from mitex.runtime import load_mitsuba, torch_alone
+from mitex.runtime import load_mitsuba, modest_workers
 from mitex.training import TrainResult, train
 from mitex.training.optim import Adam
 
@@ -65,6 +65,7 @@ class RadianceTask(ABC):
         self.step_length = DIAGONAL / config.cells
         self._commits = 0
         dr.set_expand_threshold(2**26)  # by default gradients of large tables are 2.5 times slower
+        modest_workers()
 
     @abstractmethod
     def metadata(self) -> dict[str, str]:
@@ -104,14 +105,13 @@ class RadianceTask(ABC):
             raise ValueError("no ray meets an occupied cell")
         samples = visible(samples, *rays, lambda points: mi.Float(self.density(rows(points))))
         made = self.render(batch, samples, generator)
-        with torch_alone():
-            picture = made.colour + made.through[:, None] * background
-            error = (picture - wanted).abs().mean()
-            total = error + sum(made.terms.values())
-            if self.config.distortion:
-                widths = torch.full_like(made.t, self.step_length)
-                spread = distortion(made.weights, made.t, widths, made.ray)
-                total = total + self.config.distortion * spread
+        picture = made.colour + made.through[:, None] * background
+        error = (picture - wanted).abs().mean()
+        total = error + sum(made.terms.values())
+        if self.config.distortion:
+            widths = torch.full_like(made.t, self.step_length)
+            spread = distortion(made.weights, made.t, widths, made.ray)
+            total = total + self.config.distortion * spread
         record = {"colour": error.item(), "samples": float(len(made.t)), "occupied": self.occupancy.share}
         return total, record | {name: value.item() for name, value in made.terms.items()}
 
