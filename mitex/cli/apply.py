@@ -85,7 +85,8 @@ class Apply(Displacing):
     """Radiance fields: 1 stands the texture on the mesh, 0 carves it in, as it was captured."""
 
     guide: Annotated[Path | None, arg(metavar="IMAGE", help_behavior_hint="")] = None
-    """Radiance fields: a picture that the synthesized texture resembles from afar."""
+    """Radiance fields: a picture over the mesh's UVs that the texture resembles from afar; --scale says how
+    small the texture's elements are, and so how fine the picture."""
 
     vertex_colors: Annotated[bool, arg(help_behavior_hint="")] = False
     """Write colours at the vertices instead of textures."""
@@ -99,6 +100,7 @@ class Apply(Displacing):
         in_range("--resolution", self.resolution, 64, 8192)
         self.check_displacing()
         not_both("--resolution", "--vertex-colors", self.resolution is not None and self.vertex_colors)
+        not_both("--size", "--guide", self.size is not None and self.guide is not None)
         in_range("--size", self.size, 128, 8192)
         in_range("--density", self.density, 0.001, 1000.0)
         in_range("--lift", self.lift, 0.0, 1.0)
@@ -179,7 +181,8 @@ class Apply(Displacing):
 
         mesh, texture = Mesh.load(self.mesh), NerfTexture.load(self.model)
         guide = None if self.guide is None else read_image(self.guide)
-        maps = texture.synthesize(self.size or SIZE, self.seed, tileable=True, guide=guide)
+        size = (self.size or SIZE) if guide is None else texture.covering(mesh, self.scale)
+        maps = texture.synthesize(size, self.seed, tileable=True, guide=guide)
         return texture.apply(mesh, maps, scale=self.scale, density=self.density, lift=self.lift)
 
     def _extracted(self) -> Asset:

@@ -154,7 +154,7 @@ def test_bad_fits(files, photos, capsys, name):
 def test_a_guide_and_a_lift(files, run, monkeypatch):
     monkeypatch.setattr(texture, "extract_patches", partial(few, texture.extract_patches))
     bad.image(files / "guide.png")
-    words = "--size 128 --guide guide.png --lift 0.5 --density 50 --seed 2"
+    words = "--scale 16 --guide guide.png --lift 0.5 --density 1000 --seed 2"
     assert main(apply(words)) == 0
     assert len(Mesh.load(files / "out" / "a.ply").faces) > 100
     assert main(apply(f"{words} --resolution 64", out="out/a.png")) == 0
@@ -169,6 +169,8 @@ def few(extract, mesh, rng, *, count, **options):
 APPLIED = {
     "lift": ("--lift 2", "--lift"),
     "size": ("--size 10", "--size"),
+    "size and guide": ("--size 128 --guide no.png", "--size and --guide"),
+    "scale and guide": ("--scale 0.05 --guide guide.png", "use larger scales"),
     "density": ("--density 0", "--density"),
     "guide": ("--guide no.png", "no.png"),
     "resolution": ("--resolution 64", "--resolution means nothing for .ply"),
@@ -179,6 +181,7 @@ APPLIED = {
 @pytest.mark.parametrize("name", APPLIED)
 def test_bad_uses(files, run, capsys, name):
     words, message = APPLIED[name]
+    bad.image(files / "guide.png")
     check_refused(files, apply(words), message, capsys)
 
 

@@ -130,9 +130,7 @@ def extract_patches(
     along = principal_direction(mesh) if direction is None else _checked_direction(direction)
     x = orthonormal(np.broadcast_to(along, z.shape).astype(np.float32), z)
     frames = np.stack([x, np.cross(z, x), z], 1).astype(np.float32)
-    pairs, _ = mesh_edges(mesh.faces, len(mesh.vertices))
-    edges = np.linalg.norm(np.subtract(*mesh.vertices[pairs].swapaxes(0, 1)), axis=1)
-    gap = float(edges.mean()) * pattern_rate
+    gap = texel_gap(mesh, pattern_rate)
     tree = None if scan is None else KDTree(np.asarray(scan, np.float32).reshape(-1, 3))
     caster = _Caster(mesh, gap, size, tree, min(LIFT, 3.0 * thickness))
     # Pages of the arrays that no patch is written to take no memory.
@@ -153,6 +151,13 @@ def extract_patches(
         )
     index = np.concatenate(kept)
     return Patches(points[:filled], faces[:filled], frames[index], centres[index], gap)
+
+
+def texel_gap(mesh: Mesh, pattern_rate: float) -> float:
+    """Between texels of patches of a base shape [scene units]; arguments as of `extract_patches`."""
+    pairs, _ = mesh_edges(mesh.faces, len(mesh.vertices))
+    edges = np.linalg.norm(np.subtract(*mesh.vertices[pairs].swapaxes(0, 1)), axis=1)
+    return float(edges.mean()) * pattern_rate
 
 
 def mirrored_frames(frames: np.ndarray, flip: np.ndarray) -> np.ndarray:

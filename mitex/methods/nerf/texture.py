@@ -8,15 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from mitex.atlas import laid_out
+from mitex.errors import ConfigError
 from mitex.mesh import Mesh, Similarity
 from mitex.methods.nerf import files
-from mitex.methods.nerf.applied import EXTENT, AppliedTexture
+from mitex.methods.nerf.applied import EXTENT, UNWRAPPED, AppliedTexture, centred, stretch
 from mitex.methods.nerf.field import Decoder, Encoding
 from mitex.methods.nerf.guide import WEIGHT, Guide
 from mitex.methods.nerf.itself import own_maps
 from mitex.methods.nerf.maps import LatentMaps
 from mitex.methods.nerf.patches import SIZE as PATCH
-from mitex.methods.nerf.patches import FeatureSource, Patches, extract_patches, mirrored_frames
+from mitex.methods.nerf.patches import FeatureSource, Patches, extract_patches, mirrored_frames, texel_gap
 from mitex.methods.nerf.pictures import pictured
 from mitex.methods.nerf.projection import Projection
 from mitex.methods.nerf.quilting import Quilt, quilt
@@ -28,6 +30,7 @@ from mitex.runtime import init, load_mitsuba
 mi: Any = load_mitsuba(needs_llvm=False)
 
 SIZE = 2048  # texels of a synthesized texture
+LARGEST = 8192  # that is quilted for a guide [texels]
 GOOD_RATE = 1 / 8  # gap between texels, of the mean edge of the base shape
 BLOCK = PATCH // 16  # a guide is compared with patches in 16 x 16 blocks
 DEEPEST = 2.0  # percentile of the scan's distances
@@ -134,6 +137,26 @@ class NerfTexture:
         wanted = None if guide is None else Guide(guide, pictured(self.shell, found, BLOCK), guide_weight)
         made = quilt(source, shape, rng, flips=flips, tileable=tileable, guide=wanted)
         return self.maps(found, made)
+
+    def covering(self, mesh: Mesh, scale: float = 1.0, pattern_rate: float = GOOD_RATE) -> int:
+        """Side of the texture that the unit square of a mesh's UVs shows once, as a guide asks for [texels].
+
+        Args:
+            mesh, scale: as of `apply`.
+            pattern_rate: as of `synthesize`.
+
+        Raises:
+            MeshError: the mesh has no area.
+            ConfigError: no such texture can be made.
+        """
+        gap = texel_gap(self.model.base.mesh, pattern_rate) * scale
+        texels = round(stretch(centred(laid_out(mesh, UNWRAPPED))[0]) / gap)
+        if not PATCH <= texels <= LARGEST:
+            raise ConfigError(
+                f"a guide over {texels} x {texels} texels",
+                f"use {'smaller' if texels < PATCH else 'larger'} scales: it takes {PATCH} to {LARGEST}",
+            )
+        return texels
 
     def patches(
         self, rng: np.random.Generator, count: int = 2000, pattern_rate: float = GOOD_RATE

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from mitex.errors import ConfigError
 from mitex.mesh import grid, icosphere
 from mitex.methods.nerf.applied import EXTENT
 from mitex.methods.nerf.elevations import compare_elevations
@@ -79,10 +81,17 @@ def test_a_guide_decides_where_it_is_bright(texture):
     for picture in (guide, 1 - guide):
         maps = texture.synthesize(336, seed=3, patches=80, guide=picture, guide_weight=100.0)
         whole = 2 * EXTENT / (336 * maps.gap)  # the plane shows the texture once
+        assert texture.covering(grid(24, 24), whole) == 336
         field = texture.apply(grid(24, 24), maps, scale=whole, density=20.0)
         colour, _ = seen(field, origins, down)
         differences.append(colour[x > 0.1].mean() - colour[x < -0.1].mean())
     assert differences[0] > 0.03 and differences[1] < -0.03
+
+
+@pytest.mark.parametrize(("scale", "advice"), [(20.0, "smaller scales"), (1e-3, "larger scales")])
+def test_guides_over_too_few_or_too_many_texels(texture, scale, advice):
+    with pytest.raises(ConfigError, match=advice):
+        texture.covering(grid(2, 2), scale)
 
 
 def test_a_lifted_shell_lies_higher():
