@@ -57,13 +57,14 @@ class ShellFieldMethods:
         """
         scale = float(self.similarity.scale)
         centre = mi.Vector3f(np.asarray(self.similarity.center, np.float32).tolist())
-        back = mi.Matrix3f(self.turn.T.tolist())
         chosen: Any = dr.compress(active)
         count = max(dr.width(ray.o), dr.width(active), dr.width(jitter))
         total = Traversed(dr.zeros(mi.Color3f, count), dr.ones(mi.Float, count), dr.zeros(mi.Float, count))
         for start in range(0, dr.width(chosen), CHUNK):
             part = dr.arange(mi.UInt32, start, min(start + CHUNK, dr.width(chosen)))
             index = dr.gather(mi.UInt32, chosen, part)
+            # Anew for each part: a zero in it can become as wide as what it was multiplied with.
+            back = mi.Matrix3f(self.turn.T.tolist())
             origin = mi.Point3f((back @ dr.gather(mi.Point3f, ray.o, index) - centre) / scale)
             direction = mi.Vector3f(back @ dr.gather(mi.Vector3f, ray.d, index))
             far = dr.gather(mi.Float, ray.maxt, index) / scale

@@ -15,6 +15,8 @@ from mitex.runtime import init
 mi: Any = init()
 import drjit as dr  # noqa: E402
 
+from mitex.render.framing import rotation  # noqa: E402
+from mitex.textures import shell_field as module  # noqa: E402
 from mitex.textures.shell_field import shell_field  # noqa: E402
 
 COLOUR = (0.2, 0.6, 0.4)
@@ -120,6 +122,15 @@ def test_a_field_can_be_moved_scaled_and_turned():
     large = picture(Ball(), wall=wall(-1, **BRIGHT))
     covered = [(image[..., 1] > 0.2).mean() for image in (small, large)]
     np.testing.assert_allclose(covered[1] / covered[0], 4, rtol=0.25)
+
+
+def test_parts_of_unequal_size_are_seen_as_a_whole(monkeypatch: pytest.MonkeyPatch):
+    turn = rotation(0.0)  # has a zero with a sign
+    whole = picture(Ball(), turn=turn, wall=wall(-1, **BRIGHT))
+    monkeypatch.setattr(module, "CHUNK", 700)
+    np.testing.assert_allclose(
+        picture(Ball(), turn=turn, wall=wall(-1, **BRIGHT)), whole, rtol=1e-5, atol=1e-6
+    )
 
 
 def test_without_matter_it_is_a_path_tracer():
