@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 DEFAULT_VARIANT = "llvm_ad_rgb"
 WORKER = "nt ["  # what Dr.Jit calls its worker threads, with a number
-MODEST = 10  # their niceness beside torch
+MODEST = 10  # how much nicer they are than torch
 RESTED = 0.05  # after which they rest [s]
 
 _threads: int | None = None
@@ -135,7 +135,7 @@ def modest_workers() -> None:
     for name in Path("/proc/self/task").glob("*/comm"):
         with suppress(OSError):  # a thread that ends meanwhile
             if name.read_text().startswith(WORKER):
-                os.setpriority(os.PRIO_PROCESS, int(name.parent.name), MODEST)
+                os.setpriority(os.PRIO_PROCESS, int(name.parent.name), os.nice(0) + MODEST)
 
 
 def set_workers(count: int) -> None:
