@@ -181,9 +181,15 @@ class Apply(Displacing):
 
         mesh, texture = Mesh.load(self.mesh), NerfTexture.load(self.model)
         guide = None if self.guide is None else read_image(self.guide)
-        size = (self.size or SIZE) if guide is None else texture.covering(mesh, self.scale)
-        maps = texture.synthesize(size, self.seed, tileable=True, guide=guide)
-        return texture.apply(mesh, maps, scale=self.scale, density=self.density, lift=self.lift)
+        return texture.apply(
+            mesh,
+            size=self.size or SIZE,
+            seed=self.seed,
+            scale=self.scale,
+            density=self.density,
+            lift=self.lift,
+            guide=guide,
+        )
 
     def _extracted(self) -> Asset:
         """What is solid of it, as a mesh."""

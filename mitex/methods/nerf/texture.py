@@ -214,6 +214,7 @@ class NerfTexture:
         density: float = 1.0,
         lift: float = 1.0,
         light: np.ndarray | None = None,
+        guide: np.ndarray | None = None,
     ) -> AppliedTexture:
         """Puts the texture on any mesh (section 3.2.4).
 
@@ -226,14 +227,19 @@ class NerfTexture:
             lift: 1 puts the mesh under the texture's ground, 0 where the base shape was, as published: there
                 the texture is carved into the mesh, and thin parts of this leave no room for its ground.
             light: (16,) or (16, 3) spherical harmonics instead of the learned light.
+            guide: without `maps`, a picture that lies once over the unit square of the mesh's UVs, as of
+                `synthesize`; `size` is then as the mesh and `scale` ask.
 
         Raises:
             MeshError: the mesh has no area.
             ConfigError: a number is out of range.
         """
-        given = self.synthesize(size, seed, tileable=True) if maps is None else maps
+        mesh = laid_out(mesh, UNWRAPPED)
+        if maps is None:
+            side = size if guide is None else self.covering(mesh, scale)
+            maps = self.synthesize(side, seed, tileable=True, guide=guide)
         shone = self.light if light is None else mi.TensorXf(np.asarray(light, np.float32))
-        return AppliedTexture(self, mesh, given, scale=scale, density=density, lift=lift, light=shone)
+        return AppliedTexture(self, mesh, maps, scale=scale, density=density, lift=lift, light=shone)
 
     def __repr__(self) -> str:
         about = self.model.about
