@@ -26,7 +26,9 @@ from mitex.bridge import call
 from mitex.mesh import embedded
 from mitex.methods.nerf import NerfTexture
 from mitex.methods.nerf.config import PRESETS, NerfConfig
-from mitex.methods.nerf.field import Decoder, Encoding, weight_bound, weight_shapes
+from mitex.methods.nerf.field import Decoder, Encoding
+from mitex.methods.nerf.mlp import weight_bound
+from mitex.methods.nerf.networks import weight_shapes
 from mitex.methods.nerf.tensors import tensor
 from mitex.render.shell import shell_still
 from mitex.runtime import init, keep_freed_memory, modest_workers

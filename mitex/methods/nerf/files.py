@@ -13,8 +13,9 @@ import torch
 from mitex.mesh import Mesh
 from mitex.methods.nerf.coarse import BaseShape
 from mitex.methods.nerf.config import NerfConfig
-from mitex.methods.nerf.field import MATRICES, Encoding, weight_shapes
+from mitex.methods.nerf.field import Encoding
 from mitex.methods.nerf.lighting import COEFFICIENTS
+from mitex.methods.nerf.networks import MATRICES, weight_shapes
 from mitex.runtime import init
 from mitex.training import model_file
 

@@ -10,7 +10,7 @@ import numpy as np
 from mitex.atlas import twice_area
 from mitex.mesh import Mesh
 from mitex.methods.nerf.base_shape import face_frames
-from mitex.methods.nerf.field import FEATURES, PHASES
+from mitex.methods.nerf.networks import FEATURES, PHASES
 from mitex.methods.nerf.shell import Located
 from mitex.runtime import load_mitsuba
 

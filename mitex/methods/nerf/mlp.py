@@ -2,80 +2,117 @@
 
 Inside Dr.Jit they are run by torch: on a CPU several times as fast as the products of `drjit.nn`. What is
 between two layers has the channels of a point side by side in memory, where narrow matrices are multiplied
-faster.
+faster; and a part of the points goes through all layers while it is in a core's cache.
 """
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, TypeVar
 
 import torch
 
+from mitex.methods.nerf.tensors import stacked, unstacked
 from mitex.runtime import load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+import drjit.nn as nn  # noqa: E402
 
+T = TypeVar("T")
 Weights = Sequence[torch.Tensor]
-CHUNK = 4096  # points whose values stay in a core's cache on their way back
+CHUNK = 4096  # points of a part
 _pool = ThreadPoolExecutor(os.cpu_count(), initializer=torch.set_num_threads, initargs=(1,))
 _relu_backward = torch.ops.aten.threshold_backward.grad_input
 
 
-def forwards(weights: Weights, values: torch.Tensor) -> list[torch.Tensor]:
-    """What the layers read, and last the outputs, for inputs (K, N)."""
-    layers = [values]
-    for weight in weights[:-1]:
-        layers.append(_product(weight, layers[-1]).relu_())
-    return [*layers, _product(weights[-1], layers[-1])]
+def on_threads(count: int, work: Callable[[Iterator[slice]], T]) -> list[T]:
+    """What `work` finds on each of torch's threads, which share the parts of `count` points.
+
+    A thread that the machine holds up takes fewer of them.
+    """
+    threads = torch.get_num_threads()  # torch first counts them here: in the pool it would find one
+    parts = iter([slice(start, start + CHUNK) for start in range(0, count, CHUNK)])
+    return list(_pool.map(work, [parts] * threads))
+
+
+def room(weights: Weights, count: int) -> list[torch.Tensor]:
+    """Where `forwards` puts what it finds between the layers, of `count` points."""
+    return [torch.empty(count, len(weight)).T for weight in weights[:-1]]
+
+
+def forwards(
+    weights: Weights, values: torch.Tensor, between: Weights, part: slice, out: torch.Tensor
+) -> None:
+    """Runs a network on a part of the points.
+
+    Args:
+        weights: (out, in) of each layer.
+        values: inputs of the part.
+        between: a `room` for all points.
+        part: which of them.
+        out: where the outputs of the part go.
+    """
+    for weight, room in zip(weights[:-1], between, strict=True):
+        torch.mm(values.T, weight.T, out=room[:, part].T)
+        values = room[:, part].relu_()
+    torch.mm(weights[-1], values, out=out)
 
 
 def backwards(
     weights: Weights,
-    layers: Weights,
+    values: torch.Tensor,
+    between: Weights,
+    part: slice,
     gradient: torch.Tensor,
-    learning: bool,
-    of_inputs: torch.Tensor,
-    inputs: slice = slice(None),
-) -> list[torch.Tensor]:
-    """Gradients of the weights.
+    found: Weights,
+) -> torch.Tensor:
+    """The gradient of what the first layer makes, from that of the outputs; arguments as of `forwards`.
 
     Args:
-        weights: (out, in) of each layer.
-        layers: of `forwards`.
-        gradient: of the outputs.
-        learning: False leaves the weights out.
-        of_inputs: that of the inputs is added to it.
-        inputs: which of them it has.
+        found: those of the weights are added to it; none if empty.
     """
-    count = layers[0].shape[1]
-
-    def work(starts: range) -> list[torch.Tensor]:
-        found = [torch.zeros_like(weight) for weight in weights]
-        for start in starts:
-            part = slice(start, start + CHUNK)
-            flow = gradient[:, part]
-            for k in reversed(range(len(weights))):
-                if learning:
-                    found[k].addmm_(flow, layers[k][:, part].T)
-                if k:
-                    flow = _product(weights[k].T, flow)
-                    _relu_backward(flow, layers[k][:, part], 0, grad_input=flow)
-            of_inputs[:, part].addmm_(weights[0].T[inputs], flow)
-        return found
-
-    threads = torch.get_num_threads()
-    shares = [range(k * CHUNK, count, threads * CHUNK) for k in range(threads)]
-    found = list(_pool.map(work, shares))
-    return [torch.stack(parts).sum(0) for parts in zip(*found, strict=True)] if learning else []
+    for k in reversed(range(len(weights))):
+        given = between[k - 1][:, part] if k else values
+        if found:
+            found[k].addmm_(gradient, given.T)
+        if k:
+            gradient = (gradient.T @ weights[k]).T  # the same as weights[k].T @ gradient, but by points
+            _relu_backward(gradient, given, 0, grad_input=gradient)
+    return gradient
 
 
-def _product(matrix: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
-    """The same as `matrix @ values`, (M, N), but point by point in memory."""
-    return (values.T @ matrix.T).T
+def weight_bound(shape: tuple[int, int]) -> float:
+    """Of the uniform distribution that weights start from (Glorot and Bengio 2010)."""
+    return math.sqrt(6 / sum(shape))
+
+
+def packed_networks(*nets: Sequence[Any]) -> list[Any]:
+    """Networks for cooperative vectors, of the matrices (out, in) of each."""
+    made = []
+    for weights in nets:
+        layers: list[Any] = []
+        for weight in weights:
+            linear: Any = nn.Linear(weight.shape[1], weight.shape[0], bias=False)
+            linear.weights = weight
+            layers += [linear, nn.ReLU()]
+        made.append(nn.Sequential(*layers[:-1]))
+    return list(nn.pack(*made))
+
+
+def network_rows(net: Any, values: list[Any]) -> list[Any]:
+    """Evaluates a network on N points: from its input channels, (N,) each, to its output channels.
+
+    Args:
+        net: its matrices (out, in), or one of `packed_networks`.
+        values: input channels.
+    """
+    if isinstance(net, nn.Module):
+        return list(net(nn.CoopVec(*values)))
+    return unstacked(evaluate(net, stacked(values)))
 
 
 def evaluate(weights: Sequence[Any], values: Any) -> Any:
@@ -86,19 +123,40 @@ def evaluate(weights: Sequence[Any], values: Any) -> Any:
 class _Network(dr.CustomOp):
     def eval(self, values: Any, weights: list[Any], learning: bool) -> Any:
         self.weights, self.learning = [weight.torch() for weight in weights], learning
-        given = values.torch()
-        self.layers = forwards(self.weights, given)
-        found = self.layers[-1].contiguous()
+        self.values = values.torch()
+        count = self.values.shape[1]
+        self.between = room(self.weights, count)
+        found = torch.empty(len(self.weights[-1]), count)
+
+        def work(parts: Iterator[slice]) -> None:
+            for part in parts:
+                forwards(self.weights, self.values[:, part], self.between, part, found[:, part])
+
+        on_threads(count, work)
         return mi.TensorXf(found)
 
     def backward(self) -> None:
         gradient: Any = self.grad_out()
         given = gradient.torch()
-        of_values = torch.zeros_like(self.layers[0])
-        found = backwards(self.weights, self.layers, given, self.learning, of_values)
+        of_values = torch.empty_like(self.values)
+
+        def work(parts: Iterator[slice]) -> Weights:
+            found = [torch.zeros_like(weight) for weight in self.weights if self.learning]
+            for part in parts:
+                values = self.values[:, part]
+                flow = backwards(self.weights, values, self.between, part, given[:, part], found)
+                torch.mm(self.weights[0].T, flow, out=of_values[:, part])
+            return found
+
+        found = on_threads(given.shape[1], work)
         self.set_grad_in("values", mi.TensorXf(of_values))
         if self.learning:
-            self.set_grad_in("weights", [mi.TensorXf(f) for f in found])
+            self.set_grad_in("weights", [mi.TensorXf(f) for f in summed(found)])
 
     def name(self) -> str:
         return "network"
+
+
+def summed(found: Sequence[Weights]) -> list[torch.Tensor]:
+    """Over threads, what each of them found."""
+    return [torch.stack(parts).sum(0) for parts in zip(*found, strict=True)]

@@ -14,8 +14,9 @@ from mitex.bridge import call
 from mitex.integrators.march import Samples, accumulated, weights_of
 from mitex.methods.nerf.capture import Capture
 from mitex.methods.nerf.config import NerfConfig
-from mitex.methods.nerf.field import HIGHEST, network_rows, packed_networks, sigmoid, weight_bound
+from mitex.methods.nerf.field import HIGHEST, sigmoid
 from mitex.methods.nerf.hash_grid import HashGrid
+from mitex.methods.nerf.mlp import network_rows, packed_networks, weight_bound
 from mitex.methods.nerf.occupancy import Occupancy, hull_cells
 from mitex.methods.nerf.pixels import Batch
 from mitex.methods.nerf.radiance import RadianceTask, Rendered, learn, look_step, rays_of

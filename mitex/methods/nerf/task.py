@@ -13,9 +13,11 @@ from mitex.integrators.march import Samples, accumulated, weights_of
 from mitex.mesh import Mesh
 from mitex.methods.nerf.capture import Capture
 from mitex.methods.nerf.config import NerfConfig
-from mitex.methods.nerf.field import ELEVATION, Decoder, Encoding, weight_bound, weight_shapes
+from mitex.methods.nerf.field import Decoder, Encoding
 from mitex.methods.nerf.light_estimate import estimated_light
 from mitex.methods.nerf.losses import clustering, normal_agreement
+from mitex.methods.nerf.mlp import weight_bound
+from mitex.methods.nerf.networks import ELEVATION, weight_shapes
 from mitex.methods.nerf.occupancy import Occupancy, hull_cells
 from mitex.methods.nerf.pixels import Batch
 from mitex.methods.nerf.projection import Feet, Projection, attach

@@ -11,9 +11,10 @@ import torch
 
 from benchmarks import torch_field
 from mitex.bridge import call
-from mitex.methods.nerf import field as networks
 from mitex.methods.nerf.config import PRESETS, NerfConfig
-from mitex.methods.nerf.field import Decoder, Reflection, embedded, weight_bound, weight_shapes
+from mitex.methods.nerf.field import Decoder, Reflection, embedded
+from mitex.methods.nerf.mlp import weight_bound
+from mitex.methods.nerf.networks import FINE, weight_shapes
 from mitex.methods.nerf.tensors import rows, tensor
 from mitex.runtime import init
 
@@ -83,7 +84,7 @@ def test_gradients_of_the_networks_agree_with_torch(moving, preset):
 
 def test_the_embedding_is_the_distance_and_its_waves():
     values = [np.array(v) for v in embedded(mi.Float(0.3, -0.1))]
-    assert len(values) == networks.FINE == 25
+    assert len(values) == FINE == 25
     np.testing.assert_allclose(values[0], [0.3, -0.1], rtol=1e-6)
     np.testing.assert_allclose(values[23], np.sin(2**11 * np.array([0.3, -0.1], np.float32)), atol=2e-4)
 

@@ -8,9 +8,11 @@ import numpy as np
 
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nerf.config import PRESETS
-from mitex.methods.nerf.field import Decoder, Reflection, weight_bound, weight_shapes
+from mitex.methods.nerf.field import Decoder, Reflection
 from mitex.methods.nerf.lighting import to_display
 from mitex.methods.nerf.maps import LatentMaps, MappedLatents
+from mitex.methods.nerf.mlp import weight_bound
+from mitex.methods.nerf.networks import weight_shapes
 from mitex.methods.nerf.projection import Projection
 from mitex.methods.nerf.shell import Located, Shell, appearance, shell_cells
 from mitex.methods.nerf.tensors import channels, rows

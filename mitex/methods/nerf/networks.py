@@ -1,0 +1,148 @@
+"""The networks from features and signed distance to density and reflection, as one operation run by torch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import torch
+from torch.nn import functional as F
+
+from mitex.methods.nerf import mlp
+from mitex.methods.nerf.config import NerfConfig
+from mitex.runtime import load_mitsuba
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+
+OCTAVES = 12  # of the signed distance
+FINE = 2 * OCTAVES + 1
+COARSE = 12  # of those, what the angles see
+FEATURES, PHASES = 16, 8  # channels of f and of f-hat
+CODE = 15  # what the density network tells that of the reflection
+REFLECTION = 5  # what that says as published: k_d, k_s, g; the sixth is k_s at grazing angles
+LAYERS = {  # widths as published but for the sixth of the reflection, without biases
+    "density": (FEATURES + FINE, 32, CODE + 1),
+    "reflection": (CODE, 64, 64, REFLECTION + 1),
+    "theta": (FEATURES + COARSE, 16, 16, 1),
+    "phi": (PHASES + COARSE, 16, 16, 1),
+}
+MATRICES = sum(len(widths) - 1 for widths in LAYERS.values())
+# Which of them is the last of theta's.
+ELEVATION = sum(len(LAYERS[name]) - 1 for name in ("density", "reflection", "theta")) - 1
+
+# All inputs, in an order in which what a network reads is side by side: the octaves of the distance that the
+# density alone sees, the others, f, f-hat.
+BEYOND = FINE - COARSE
+INPUTS = FINE + FEATURES + PHASES
+READS = {"density": slice(0, INPUTS - PHASES), "angles": slice(BEYOND, INPUTS)}
+PLACES = {  # in what is read, of a network's own inputs
+    "density": [*range(FINE, FINE + FEATURES), *range(BEYOND, FINE), *range(BEYOND)],
+    "theta": [*range(COARSE, COARSE + FEATURES), *range(COARSE)],
+    "phi": [*range(COARSE + FEATURES, COARSE + FEATURES + PHASES), *range(COARSE)],
+}
+Sums = dict[str, list[torch.Tensor]]
+
+
+def weight_shapes(config: NerfConfig) -> list[tuple[int, int]]:
+    """(out, in) of each matrix, in the order of `LAYERS`; settings say the density's width and `fresnel`."""
+    layers = LAYERS | {"density": (FEATURES + FINE, config.density_width, CODE + 1)}
+    if not config.fresnel:
+        layers["reflection"] = (*LAYERS["reflection"][:-1], REFLECTION)
+    return [(o, i) for widths in layers.values() for i, o in zip(widths[:-1], widths[1:], strict=True)]
+
+
+class Networks(dr.CustomOp):
+    """All four on N points: inputs (49, N) as above -> the outputs, (9, N) or, as published, (8, N).
+
+    Those of theta and phi are run as one, "angles", with blocks of zeros: wider matrices are multiplied
+    faster. Only where points move (`moving`) does the distance get a gradient.
+    """
+
+    def eval(self, values: Any, nets: list[list[Any]], learning: bool, moving: bool) -> Any:
+        self.learning, self.values = learning, values.torch()
+        self.unlearned = 0 if moving else FINE
+        self.nets = _joined(*([weight.torch() for weight in net] for net in nets))
+        count = self.values.shape[1]
+        self.between = {name: mlp.room(weights, count) for name, weights in self.nets.items()}
+        self.code = torch.empty(CODE + 1, count)
+        found = torch.empty(sum(self._parted), count)
+
+        def work(parts: Iterator[slice]) -> None:
+            for part in parts:
+                exponent, *outputs = found[:, part].split(self._parted)
+                for name, out in zip(self.nets, [self.code[:, part], *outputs], strict=True):
+                    mlp.forwards(self.nets[name], self._inputs(name, part), self.between[name], part, out)
+                exponent.copy_(self.code[:1, part])
+
+        mlp.on_threads(count, work)
+        return mi.TensorXf(found)
+
+    def backward(self) -> None:
+        gradient: Any = self.grad_out()
+        given = gradient.torch()
+        of_values = torch.zeros_like(self.values)
+
+        def work(parts: Iterator[slice]) -> list[list[torch.Tensor]]:
+            sums = {k: [torch.zeros_like(w) for w in net if self.learning] for k, net in self.nets.items()}
+            for part in parts:
+                exponent, reflection, angles = given[:, part].split(self._parted)
+                of_code = self.nets["reflection"][0].T @ self._back("reflection", part, reflection, sums)
+                of_code[:1] = exponent
+                for name, outputs in (("density", of_code), ("angles", angles)):
+                    first, end = max(READS[name].start, self.unlearned), READS[name].stop
+                    weight = self.nets[name][0][:, first - READS[name].start :]
+                    of_values[first:end, part].addmm_(weight.T, self._back(name, part, outputs, sums))
+            return [*sums.values()]
+
+        found = mlp.on_threads(given.shape[1], work)
+        self.set_grad_in("values", mi.TensorXf(of_values))
+        if self.learning:
+            apart = _apart(*map(mlp.summed, zip(*found, strict=True)))
+            self.set_grad_in("nets", [[mi.TensorXf(w.contiguous()) for w in net] for net in apart])
+
+    @property
+    def _parted(self) -> list[int]:
+        """How many of the outputs are the exponent, the reflection, the angles."""
+        return [1, len(self.nets["reflection"][-1]), len(self.nets["angles"][-1])]
+
+    def _inputs(self, name: str, part: slice) -> torch.Tensor:
+        return self.code[:, part] if name == "reflection" else self.values[READS[name], part]
+
+    def _back(self, name: str, part: slice, gradient: torch.Tensor, sums: Sums) -> torch.Tensor:
+        inputs, between = self._inputs(name, part), self.between[name]
+        return mlp.backwards(self.nets[name], inputs, between, part, gradient, sums[name])
+
+    def name(self) -> str:
+        return "networks"
+
+
+def _joined(
+    density: mlp.Weights, reflection: mlp.Weights, theta: mlp.Weights, phi: mlp.Weights
+) -> dict[str, mlp.Weights]:
+    """The networks for inputs as above, each after those that it reads."""
+    angles = torch.cat([_placed(theta[0], "theta", "angles"), _placed(phi[0], "phi", "angles")])
+    return {
+        "density": [_placed(density[0], "density", "density"), *density[1:]],
+        # With a column of zeros for the exponent, 16 in all: products with 15 take three times as long.
+        "reflection": [F.pad(reflection[0], (1, 0)), *reflection[1:]],
+        "angles": [angles, *map(torch.block_diag, theta[1:], phi[1:])],
+    }
+
+
+def _placed(weight: torch.Tensor, name: str, reader: str) -> torch.Tensor:
+    """A first matrix with its columns at the places of the inputs."""
+    wide = weight.new_zeros(len(weight), READS[reader].stop - READS[reader].start)
+    wide[:, PLACES[name]] = weight
+    return wide
+
+
+def _apart(density: mlp.Weights, reflection: mlp.Weights, angles: mlp.Weights) -> list[mlp.Weights]:
+    """The four again, of what is joined."""
+    (theta, phi), *blocks = (weights.chunk(2) for weights in angles)
+    return [
+        [density[0][:, PLACES["density"]], *density[1:]],
+        [reflection[0][:, 1:], *reflection[1:]],
+        [theta[:, PLACES["theta"]], *(upper.chunk(2, 1)[0] for upper, _ in blocks)],
+        [phi[:, PLACES["phi"]], *(lower.chunk(2, 1)[1] for _, lower in blocks)],
+    ]
