@@ -30,6 +30,8 @@ class NerfConfig:
         fresnel: surfaces mirror more or less at grazing angles; else as much from all sides, as published.
         detach_normals: fine normals learn from the density alone, as published; else from colours too.
         clustering, distortion, normals: weights of the losses.
+        inside: weight of the one that, in the second half of the steps, gives what is hidden inside the looks
+            of the surface above it; as published there is none, and where a shell is cut any colour shows.
         cluster_entries: entries of a level that a step clusters, drawn by chance; 0 for all, as published.
         normal_rays: share of the rays whose normals are compared.
         pull: pseudo-distance of the direction away from the nearest vertex, beside those of the normals.
@@ -61,6 +63,7 @@ class NerfConfig:
     clustering: float = 1e-5
     distortion: float = 1e-2
     normals: float = 1.0
+    inside: float = 0.0
     cluster_entries: int = 0
     normal_rays: float = 1.0
     pull: float = 0.01
@@ -89,6 +92,7 @@ class NerfConfig:
             clustering=(0, None),
             distortion=(0, None),
             normals=(0, None),
+            inside=(0, None),
             cluster_entries=(0, None),
             normal_rays=(0, 1),
             pull=(1e-6, None),
@@ -123,6 +127,7 @@ PRESETS = {
         detach_normals=False,
         cluster_entries=1 << 14,
         normals=0.05,
+        inside=0.01,
         normal_rays=0.25,
         pull=0.05,
     ),

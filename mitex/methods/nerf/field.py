@@ -49,6 +49,11 @@ class Reflection:
     def density(self) -> Any:
         return dr.exp(dr.minimum(self.exponent, HIGHEST))
 
+    @property
+    def looks(self) -> list[Any]:
+        """What is in [0, 1]: k_d, and k_s from both sides."""
+        return [*self.diffuse, self.specular, self.grazing]
+
     def mirrored(self, cosine: Any) -> Any:
         """k_s under an angle to the normal, by Schlick's law with both ends learned (Hoffman 2019)."""
         return self.specular + (self.grazing - self.specular) * (1 - cosine) ** 5

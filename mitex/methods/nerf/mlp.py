@@ -24,7 +24,7 @@ import drjit.nn as nn  # noqa: E402
 
 T = TypeVar("T")
 Weights = Sequence[torch.Tensor]
-CHUNK = 4096  # points of a part
+CHUNK = 2560  # points of a part
 _pool = ThreadPoolExecutor(os.cpu_count(), initializer=torch.set_num_threads, initargs=(1,))
 _relu_backward = torch.ops.aten.threshold_backward.grad_input
 

@@ -96,7 +96,7 @@ class PlainTask(RadianceTask):
     def metadata(self) -> dict[str, str]:
         return {"method": "plain", "capture": self.pixels.capture.name}
 
-    def render(self, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
+    def render(self, step: int, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
         origin, direction = rays_of(batch)
 
         def run(table: Any, *weights: Any) -> Any:

@@ -76,7 +76,7 @@ class RadianceTask(ABC):
         return batch
 
     @abstractmethod
-    def render(self, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
+    def render(self, step: int, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
         """What the rays of a batch gather from their samples, attached to the parameters."""
 
     @abstractmethod
@@ -104,7 +104,7 @@ class RadianceTask(ABC):
         if not len(samples):
             raise ValueError("no ray meets an occupied cell")
         samples = visible(samples, *rays, lambda points: mi.Float(self.density(rows(points))))
-        made = self.render(batch, samples, generator)
+        made = self.render(step, batch, samples, generator)
         picture = made.colour + made.through[:, None] * background
         error = (picture - wanted).abs().mean()
         total = error + sum(made.terms.values())

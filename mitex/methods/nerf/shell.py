@@ -48,6 +48,10 @@ class Located:
             channels(mi.Vector3f, feet.normal),
         )
 
+    def part(self, index: Any) -> Located:
+        """Those at `index`, detached."""
+        return Located(*(dr.gather(type(v), dr.detach(v), index) for v in vars(self).values()))
+
 
 class Latents(Protocol):
     """Where features come from: hash grids on the captured shape, or synthesized maps on another one."""

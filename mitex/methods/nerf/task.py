@@ -31,6 +31,8 @@ import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit o
 
 CLUSTERS = 4  # centres in each level
 OUTWARDS = 0.1  # share of the coarse normal in what the fine one is compared with
+SURFACE = 0.5  # share of its ray from which on a sample is what one sees
+HIDDEN_RAYS = 0.25  # share of the rays below whose surface the inside is looked at
 LEAST = 1e-3  # opacity of rays whose normals are compared
 # Fine normals start near those of the faces: under random ones k_d learns the shades first.
 FLAT = 1e-2
@@ -73,12 +75,14 @@ class TextureTask(RadianceTask):
         directions = _turned(torch.from_numpy(batch.directions), turn).numpy()
         return replace(batch, origins=batch.origins + shift.numpy(), directions=directions)
 
-    def render(self, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
+    def render(self, step: int, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
         origin, direction = rays_of(batch)
         index, feet = within(self.projection(rows(samples.points(origin, direction))), self.thickness)
         samples = samples.kept(mi.UInt32(index.astype(np.uint32)))
         foot, distance, along = self._attached(batch, samples, feet)
         compared = int(self.config.normal_rays * samples.rays) if self.config.normals else 0
+        hidden = int(HIDDEN_RAYS * samples.rays) if self._knows_inside(step) else 0
+        depths = torch.rand(len(samples), generator=generator).numpy()
 
         def run(foot: Any, distance: Any, along: Any, light: Any, *arrays: Any) -> Any:
             located = Located.of(feet)
@@ -90,15 +94,19 @@ class TextureTask(RadianceTask):
             shares, through = weights_of(density, samples)
             rgb = accumulated(colour * shares, samples)
             fine, wanted = self._normals(arrays, located, normal, shares, samples, compared)
-            return tensor(rgb), tensor(through), tensor(shares), tensor(fine), tensor(wanted)
+            strange = self._inside(arrays, located, shares, samples, hidden, mi.Float(depths))
+            results = rgb, through, shares, fine, wanted, strange
+            return tuple(tensor(result) for result in results)
 
         networks = [v for name, v in self.named.items() if name.startswith(("tables/", "weights/"))]
         results = call(run, foot, distance, along, self.named["light"], *networks)
-        colour, through, weights, fine, wanted = results
+        colour, through, weights, fine, wanted, strange = results
         made = Rendered(colour, through, weights, samples)
         seen = wanted.norm(dim=1) > LEAST
         if seen.any():
             made.terms["normals"] = self.config.normals * normal_agreement(fine[seen], wanted[seen])
+        if len(strange):
+            made.terms["inside"] = self.config.inside * strange.mean()
         if self.config.clustering:
             made.terms["clusters"] = self.config.clustering * self._clusters(generator)
         return made
@@ -148,11 +156,35 @@ class TextureTask(RadianceTask):
         fine = accumulated(normal * dr.select(compared, share, 0), samples)
         if not dr.width(chosen):
             return fine, dr.zeros(mi.Vector3f, samples.rays)
-        part = Located(*(dr.gather(type(v), dr.detach(v), chosen) for v in vars(located).values()))
+        part = located.part(chosen)
         slope = self._slope([dr.detach(a) for a in arrays], part)
         target = dr.normalize((1 - OUTWARDS) * slope + OUTWARDS * part.normal)
         share = dr.gather(mi.Float, share, chosen)
         return fine, accumulated(target * share, samples.kept(chosen))
+
+    def _inside(
+        self, arrays: Any, located: Located, shares: Any, samples: Samples, rays: int, depths: Any
+    ) -> Any:
+        """How strange the looks of what is solid are, below the ends of the first `rays` rays: L1 of them.
+
+        Each place is a share of the way, of `depths`, from a sample down to the shell's bottom.
+        """
+        chosen: Any = dr.compress((samples.ray < rays) & (dr.detach(shares) > SURFACE))
+        if not dr.width(chosen):
+            return mi.Float()
+        latents, decoder = self._model([*map(dr.detach, arrays[:2]), *arrays[2:]])
+        part = located.part(chosen)
+        features = latents(part)
+        with dr.suspend_grad():
+            above = decoder(*features, part.distance)
+        depth = dr.gather(mi.Float, depths, chosen)
+        below = decoder(*features, part.distance - depth * (part.distance + self.thickness))
+        solid = 1 - dr.exp(-dr.detach(below.density) * self.step_length)
+        return solid * sum(dr.abs(a - b) for a, b in zip(below.looks, above.looks, strict=True))
+
+    def _knows_inside(self, step: int) -> bool:
+        """Only late: colours learn slower beside a loss that wants them the same at all depths."""
+        return self.config.inside > 0 and 2 * step >= self.config.steps
 
     def _slope(self, arrays: Any, located: Located) -> Any:
         """The direction in which the density falls, by equation 2 from its slopes in foot and distance."""

@@ -32,7 +32,7 @@ def test_the_loss_falls_and_the_run_folder_is_whole(run):
     lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
     colour = [line["colour"] for line in lines]
     assert len(lines) == 160 and np.mean(colour[-20:]) < 0.5 * np.mean(colour[:20])
-    assert {"normals", "clusters", "samples"} <= lines[-1].keys()
+    assert {"normals", "clusters", "inside", "samples"} <= lines[-1].keys()
     assert (run / files.NAME).is_file() and len(list((run / "previews").glob("*.png"))) == 1
 
 
@@ -221,6 +221,40 @@ def test_refined_cameras_make_up_for_wrong_ones(base, tmp_path, own_cache):
     assert errors["refined"] < 0.5 * (errors["right"] + errors["wrong"]), errors
 
 
+def trained_task(run, base: Mesh, capture, setting: str) -> TextureTask:
+    """After the small fit, with a setting of its own and the same or other photos."""
+    settings = resolve(PRESETS, "fast", overrides=[*SETTINGS, setting])
+    task = TextureTask(settings, capture, (capture, 0), Projection(base, reach=0.12), face_frames(base), 0.12)
+    state = checkpoint.load(run).task
+    with torch.no_grad():
+        for name, value in task.named.items():
+            value.copy_(state.get(f"parameters/{name}", value))
+    return task
+
+
+def test_the_inside_learns_from_the_surface_and_not_the_surface_from_it(run, base):
+    gradients = []
+    for weight in (0.0, 1.0):
+        task = trained_task(run, base, tiny_capture(), f"inside={weight}")
+        loss, record = task.loss(task.config.steps, torch.Generator().manual_seed(0))
+        assert record.get("inside", 0.0) > 0 or not weight
+        gradients.append(torch.autograd.grad(loss, [task.named["tables/f"], task.named["weights/4"]]))
+    (features, reflection), (features_too, reflection_too) = gradients
+    scale = float(features.abs().max())
+    np.testing.assert_allclose(features, features_too, rtol=1e-3, atol=1e-4 * scale)
+    assert (reflection - reflection_too).abs().max() > 0.01 * reflection.abs().max()
+
+
+def test_an_inside_that_looks_as_the_surface_costs_nothing(run, base):
+    task = trained_task(run, base, tiny_capture(), "inside=1.0")
+    with torch.no_grad():
+        task.named["weights/4"].zero_()  # the last of the reflection's: all is grey
+    _, record = task.loss(task.config.steps, torch.Generator().manual_seed(0))
+    assert record["inside"] == 0
+    _, early = task.loss(0, torch.Generator().manual_seed(0))
+    assert "inside" not in early
+
+
 def test_wrong_cameras_find_back(run, base):
     """In a field that is right, cameras turned by half a degree turn back, or move so that it is the same."""
     capture, rng = tiny_capture(), np.random.default_rng(0)
@@ -229,12 +263,7 @@ def test_wrong_cameras_find_back(run, base):
     poses = learned.poses.copy()
     poses[:, :, :3] = Rotation.from_rotvec(turns).as_matrix() @ poses[:, :, :3]
     wrong = replace(learned, poses=poses.astype(np.float32))
-    settings = resolve(PRESETS, "fast", overrides=[*SETTINGS, "refine_cameras=true"])
-    task = TextureTask(settings, wrong, (capture, 0), Projection(base, reach=0.12), face_frames(base), 0.12)
-    state = checkpoint.load(run).task
-    with torch.no_grad():
-        for name, value in task.named.items():
-            value.copy_(state.get(f"parameters/{name}", value))
+    task = trained_task(run, base, wrong, "refine_cameras=true")
     generator, optimizer = torch.Generator().manual_seed(0), torch.optim.Adam([task.named["poses"]], lr=0.03)
     for step in range(150):
         loss, _ = task.loss(step, generator)
