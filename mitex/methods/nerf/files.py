@@ -42,7 +42,7 @@ class Model:
         base: base shape, scan and thickness.
         frames: (F, 3, 3) rows t, b, n of its faces.
         tables: of f and f-hat, flat.
-        weights: matrices of the networks, as of `field.weight_shapes`.
+        weights: matrices of the networks, as of `networks.weight_shapes`.
         light: (16,) spherical harmonics.
         occupied: (G, G, G) uint8, cells of the scene cube with matter.
         about: JSON values: name, preset, steps, `SETTINGS`, and how the capture was placed.

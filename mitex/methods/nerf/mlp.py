@@ -56,9 +56,9 @@ def forwards(
         part: which of them.
         out: where the outputs of the part go.
     """
-    for weight, room in zip(weights[:-1], between, strict=True):
-        torch.mm(values.T, weight.T, out=room[:, part].T)
-        values = room[:, part].relu_()
+    for weight, made in zip(weights[:-1], between, strict=True):
+        torch.mm(values.T, weight.T, out=made[:, part].T)
+        values = made[:, part].relu_()
     torch.mm(weights[-1], values, out=out)
 
 
