@@ -13,7 +13,7 @@ import argparse
 import resource
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -36,19 +36,25 @@ from mitex.runtime import init, keep_freed_memory, modest_workers
 mi = init()
 import drjit as dr  # noqa: E402
 
-ENOUGH = 3.0  # seconds that are timed
+TURNS, TURN = 6, 0.6  # of each that is timed, and their length [s]
 TABLE = 17
 
 
-def rate(points: int, work: Callable[[], object]) -> float:
-    """Points per second of `work`, once it is warm; the median, since other work disturbs some rounds."""
-    work()
-    begun, times = time.perf_counter(), []
-    while not times or time.perf_counter() - begun < ENOUGH:
-        started = time.perf_counter()
+def rates_of(points: int, works: Sequence[Callable[[], object]]) -> list[float]:
+    """Points per second of each, once it is warm; medians, since other work disturbs some rounds.
+
+    They take turns: the machine's own speed changes within seconds, and their ratios would with it.
+    """
+    times = [[] for _ in works]
+    for work in works:
         work()
-        times.append(time.perf_counter() - started)
-    return points / statistics.median(times)
+    for _ in range(TURNS):
+        for work, own in zip(works, times, strict=True):
+            begun = time.perf_counter()
+            while (started := time.perf_counter()) < begun + TURN:
+                work()
+                own.append(time.perf_counter() - started)
+    return [points / statistics.median(own) for own in times]
 
 
 def parameters(config: NerfConfig, encoding: Encoding) -> list[torch.Tensor]:
@@ -140,18 +146,19 @@ def rates(count: int) -> Table:
         given = parameters(config, encoding)
         fixed = [value.detach() for value in given]
         scene = encoding, points, distance
-        torch_rates = [
-            rate(count, lambda s=scene, f=fixed: theirs(*s, f)),
-            rate(count, lambda s=scene, g=given: trained(theirs(*s, g), g)),
-        ]
-        our_rates = [
-            rate(count, lambda s=scene, f=fixed: ours(*s, f, False)),
-            rate(count, lambda s=scene, f=fixed: ours(*s, f, True)),
-            rate(count, lambda s=scene, g=given: trained(ours(*s, g, False), g)),
-        ]
-        table.add_row(f"{preset}, torch", f"{torch_rates[0] / 1e6:.2f}", "", f"{torch_rates[1] / 1e6:.3f}")
+        forwards, backwards, *our_rates = rates_of(
+            count,
+            [
+                lambda s=scene, f=fixed: theirs(*s, f),
+                lambda s=scene, g=given: trained(theirs(*s, g), g),
+                lambda s=scene, f=fixed: ours(*s, f, False),
+                lambda s=scene, f=fixed: ours(*s, f, True),
+                lambda s=scene, g=given: trained(ours(*s, g, False), g),
+            ],
+        )
+        table.add_row(f"{preset}, torch", f"{forwards / 1e6:.2f}", "", f"{backwards / 1e6:.3f}")
         table.add_row(f"{preset}, drjit.nn", *(f"{r / 1e6:.2f}" for r in our_rates))
-        against = (torch_rates[0], torch_rates[0], torch_rates[1])
+        against = (forwards, forwards, backwards)
         ratios = [f"{a / b:.1f} x" for a, b in zip(our_rates, against, strict=True)]
         table.add_row("", *ratios, end_section=True)
     return table
