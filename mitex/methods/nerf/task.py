@@ -82,7 +82,7 @@ class TextureTask(RadianceTask):
         foot, distance, along = self._attached(batch, samples, feet)
         compared = int(self.config.normal_rays * samples.rays) if self.config.normals else 0
         hidden = int(HIDDEN_RAYS * samples.rays) if self._knows_inside(step) else 0
-        depths = torch.rand(len(samples), generator=generator).numpy()
+        depths = torch.rand(hidden, generator=generator).numpy()
 
         def run(foot: Any, distance: Any, along: Any, light: Any, *arrays: Any) -> Any:
             located = Located.of(feet)
@@ -94,7 +94,7 @@ class TextureTask(RadianceTask):
             shares, through = weights_of(density, samples)
             rgb = accumulated(colour * shares, samples)
             fine, wanted = self._normals(arrays, located, normal, shares, samples, compared)
-            strange = self._inside(arrays, located, shares, samples, hidden, mi.Float(depths))
+            strange = self._inside(arrays, located, shares, samples, mi.Float(depths))
             results = rgb, through, shares, fine, wanted, strange
             return tuple(tensor(result) for result in results)
 
@@ -162,14 +162,12 @@ class TextureTask(RadianceTask):
         share = dr.gather(mi.Float, share, chosen)
         return fine, accumulated(target * share, samples.kept(chosen))
 
-    def _inside(
-        self, arrays: Any, located: Located, shares: Any, samples: Samples, rays: int, depths: Any
-    ) -> Any:
-        """How strange the looks of what is solid are, below the ends of the first `rays` rays: L1 of them.
+    def _inside(self, arrays: Any, located: Located, shares: Any, samples: Samples, depths: Any) -> Any:
+        """How strange the looks of what is solid are, below the ends of the first rays: L1 of them.
 
-        Each place is a share of the way, of `depths`, from a sample down to the shell's bottom.
+        `depths` says for each of these rays which share of the way down to the shell's bottom that is.
         """
-        chosen: Any = dr.compress((samples.ray < rays) & (dr.detach(shares) > SURFACE))
+        chosen: Any = dr.compress((samples.ray < dr.width(depths)) & (dr.detach(shares) > SURFACE))
         if not dr.width(chosen):
             return mi.Float()
         latents, decoder = self._model([*map(dr.detach, arrays[:2]), *arrays[2:]])
@@ -177,7 +175,7 @@ class TextureTask(RadianceTask):
         features = latents(part)
         with dr.suspend_grad():
             above = decoder(*features, part.distance)
-        depth = dr.gather(mi.Float, depths, chosen)
+        depth = dr.gather(mi.Float, depths, dr.gather(mi.UInt32, samples.ray, chosen))
         below = decoder(*features, part.distance - depth * (part.distance + self.thickness))
         solid = 1 - dr.exp(-dr.detach(below.density) * self.step_length)
         return solid * sum(dr.abs(a - b) for a, b in zip(below.looks, above.looks, strict=True))
