@@ -11,6 +11,7 @@ import torch
 
 from benchmarks import torch_field
 from mitex.bridge import call
+from mitex.methods.nerf import mlp
 from mitex.methods.nerf.config import PRESETS, NerfConfig
 from mitex.methods.nerf.field import Decoder, Reflection, embedded
 from mitex.methods.nerf.mlp import weight_bound
@@ -66,8 +67,10 @@ def test_the_networks_agree_with_torch(packed, preset):
 
 
 @pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("chunk", [mlp.CHUNK, 70])
 @pytest.mark.parametrize("moving", [True, False])
-def test_gradients_of_the_networks_agree_with_torch(moving, preset):
+def test_gradients_of_the_networks_agree_with_torch(moving, preset, chunk, monkeypatch):
+    monkeypatch.setattr(mlp, "CHUNK", chunk)
     ours, theirs = ([x.clone().requires_grad_() for x in (*inputs(), *weights(preset))] for _ in range(2))
     ours[2].requires_grad_(moving)
     share = torch.randn(POINTS, 9, generator=torch.Generator().manual_seed(3))
