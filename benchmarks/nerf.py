@@ -31,7 +31,7 @@ from mitex.methods.nerf.mlp import weight_bound
 from mitex.methods.nerf.networks import weight_shapes
 from mitex.methods.nerf.tensors import tensor
 from mitex.render.shell import shell_still
-from mitex.runtime import init, keep_freed_memory, modest_workers
+from mitex.runtime import bfloat16_is_fast, init, keep_freed_memory, modest_workers
 
 mi = init()
 import drjit as dr  # noqa: E402
@@ -76,7 +76,7 @@ def ours(
     def run(points, distance, f, phase, *weights):
         foot = dr.unravel(mi.Point3f, points.array)
         features, phases = (encoding(k, foot, table.array) for k, table in enumerate((f, phase)))
-        found = Decoder(weights, packed)(features, phases, distance.array)
+        found = Decoder(weights, packed, bfloat16_is_fast())(features, phases, distance.array)
         return tensor(mi.ArrayXf(*torch_field.outputs(found)))
 
     return call(run, points, distance, *given)

@@ -96,9 +96,11 @@ class Decoder:
     Args:
         weights: matrices (out, in) as of `weight_shapes`, each a `mi.TensorXf`.
         packed: evaluate as cooperative vectors: fast forwards, slow backwards.
+        low_precision: gradients in bfloat16 where points stay; what is evaluated is the same.
     """
 
-    def __init__(self, weights: Sequence[Any], packed: bool = False) -> None:
+    def __init__(self, weights: Sequence[Any], packed: bool = False, low_precision: bool = False) -> None:
+        self._low_precision = low_precision
         given = iter(weights)
         self.weights = {name: [next(given) for _ in widths[1:]] for name, widths in LAYERS.items()}
         self._packed = (
@@ -135,7 +137,7 @@ class Decoder:
         nets = list(self.weights.values())
         learning, moving = any(map(dr.grad_enabled, nets)), dr.grad_enabled(fine)
         values = stacked(fine[COARSE:] + fine[:COARSE] + f + phase)
-        return unstacked(dr.custom(Networks, values, nets, learning, moving))
+        return unstacked(dr.custom(Networks, values, nets, learning, moving, self._low_precision))
 
     def _net(self, name: str) -> Any:
         return self._packed.get(name, self.weights[name])

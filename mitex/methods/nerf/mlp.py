@@ -25,23 +25,28 @@ import drjit.nn as nn  # noqa: E402
 T = TypeVar("T")
 Weights = Sequence[torch.Tensor]
 CHUNK = 2560  # points of a part
+LONG = 8192  # the same in bfloat16, where products are short work beside the calls that ask for them
 _pool = ThreadPoolExecutor(os.cpu_count(), initializer=torch.set_num_threads, initargs=(1,))
 _relu_backward = torch.ops.aten.threshold_backward.grad_input
 
 
-def on_threads(count: int, work: Callable[[Iterator[slice]], T]) -> list[T]:
+def on_threads(
+    count: int, work: Callable[[Iterator[slice]], T], kind: torch.dtype = torch.float32
+) -> list[T]:
     """What `work` finds on each of torch's threads, which share the parts of `count` points.
 
-    A thread that the machine holds up takes fewer of them.
+    Parts are equal, and each thread could take as many; one that the machine holds up takes fewer.
     """
     threads = torch.get_num_threads()  # torch first counts them here: in the pool it would find one
-    parts = iter([slice(start, start + CHUNK) for start in range(0, count, CHUNK)])
+    rounds = math.ceil(count / threads / (CHUNK if kind == torch.float32 else LONG))
+    size = math.ceil(count / threads / max(rounds, 1))
+    parts = iter([slice(start, start + size) for start in range(0, count, max(size, 1))])
     return list(_pool.map(work, [parts] * threads))
 
 
-def room(weights: Weights, count: int) -> list[torch.Tensor]:
+def room(weights: Weights, count: int, kind: torch.dtype = torch.float32) -> list[torch.Tensor]:
     """Where `forwards` puts what it finds between the layers, of `count` points."""
-    return [torch.empty(count, len(weight)).T for weight in weights[:-1]]
+    return [torch.empty(count, len(weight), dtype=kind).T for weight in weights[:-1]]
 
 
 def forwards(
@@ -52,13 +57,17 @@ def forwards(
     Args:
         weights: (out, in) of each layer.
         values: inputs of the part.
-        between: a `room` for all points.
+        between: a `room` for all points; in bfloat16 it keeps, for gradients, what is exact here.
         part: which of them.
         out: where the outputs of the part go.
     """
     for weight, made in zip(weights[:-1], between, strict=True):
-        torch.mm(values.T, weight.T, out=made[:, part].T)
-        values = made[:, part].relu_()
+        kept = made[:, part]
+        if kept.dtype == values.dtype:
+            values = torch.mm(values.T, weight.T, out=kept.T).T.relu_()
+        else:
+            values = (values.T @ weight.T).T.relu_()
+            kept.copy_(values)
     torch.mm(weights[-1], values, out=out)
 
 
@@ -70,15 +79,17 @@ def backwards(
     gradient: torch.Tensor,
     found: Weights,
 ) -> torch.Tensor:
-    """The gradient of what the first layer makes, from that of the outputs; arguments as of `forwards`.
+    """The gradient of what the first layer makes, from that of the outputs.
 
     Args:
-        found: those of the weights are added to it; none if empty.
+        weights, values, between, part: as of `forwards`, all of the gradient's type.
+        gradient: of the outputs of the part.
+        found: those of the weights are added to it, float32; none if empty.
     """
     for k in reversed(range(len(weights))):
         given = between[k - 1][:, part] if k else values
         if found:
-            found[k].addmm_(gradient, given.T)
+            found[k].add_(gradient @ given.T)
         if k:
             gradient = (gradient.T @ weights[k]).T  # the same as weights[k].T @ gradient, but by points
             _relu_backward(gradient, given, 0, grad_input=gradient)

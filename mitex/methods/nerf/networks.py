@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import torch
@@ -41,7 +41,6 @@ PLACES = {  # in what is read, of a network's own inputs
     "theta": [*range(COARSE, COARSE + FEATURES), *range(COARSE)],
     "phi": [*range(COARSE + FEATURES, COARSE + FEATURES + PHASES), *range(COARSE)],
 }
-Sums = dict[str, list[torch.Tensor]]
 
 
 def weight_shapes(config: NerfConfig) -> list[tuple[int, int]]:
@@ -56,15 +55,19 @@ class Networks(dr.CustomOp):
     """All four on N points: inputs (49, N) as above -> the outputs, (9, N) or, as published, (8, N).
 
     Those of theta and phi are run as one, "angles", with blocks of zeros: wider matrices are multiplied
-    faster. Only where points move (`moving`) does the distance get a gradient.
+    faster. Only where points move (`moving`) does the distance get a gradient. With `low_precision` and
+    points that stay, gradients are multiplied in bfloat16 and summed in float32; outputs are exact.
     """
 
-    def eval(self, values: Any, nets: list[list[Any]], learning: bool, moving: bool) -> Any:
+    def eval(
+        self, values: Any, nets: list[list[Any]], learning: bool, moving: bool, low_precision: bool
+    ) -> Any:
         self.learning, self.values = learning, values.torch()
-        self.unlearned = 0 if moving else FINE
+        self.first = 0 if moving else FINE  # of the inputs that get a gradient
+        self.kind = torch.bfloat16 if low_precision and not moving else torch.float32
         self.nets = _joined(*([weight.torch() for weight in net] for net in nets))
         count = self.values.shape[1]
-        self.between = {name: mlp.room(weights, count) for name, weights in self.nets.items()}
+        self.between = {name: mlp.room(weights, count, self.kind) for name, weights in self.nets.items()}
         self.code = torch.empty(CODE + 1, count)
         found = torch.empty(sum(self._parted), count)
 
@@ -72,30 +75,38 @@ class Networks(dr.CustomOp):
             for part in parts:
                 exponent, *outputs = found[:, part].split(self._parted)
                 for name, out in zip(self.nets, [self.code[:, part], *outputs], strict=True):
-                    mlp.forwards(self.nets[name], self._inputs(name, part), self.between[name], part, out)
+                    values = self._inputs(name, self.values[:, part], part)
+                    mlp.forwards(self.nets[name], values, self.between[name], part, out)
                 exponent.copy_(self.code[:1, part])
 
-        mlp.on_threads(count, work)
+        mlp.on_threads(count, work, self.kind)
         return mi.TensorXf(found)
 
     def backward(self) -> None:
         gradient: Any = self.grad_out()
         given = gradient.torch()
-        of_values = torch.zeros_like(self.values)
+        of_values = torch.empty_like(self.values)
+        of_values[: self.first] = 0
+        nets = {name: [weight.to(self.kind) for weight in net] for name, net in self.nets.items()}
+        firsts = _firsts(nets)[:, self.first :]
 
         def work(parts: Iterator[slice]) -> list[list[torch.Tensor]]:
             sums = {k: [torch.zeros_like(w) for w in net if self.learning] for k, net in self.nets.items()}
             for part in parts:
-                exponent, reflection, angles = given[:, part].split(self._parted)
-                of_code = self.nets["reflection"][0].T @ self._back("reflection", part, reflection, sums)
+                values = self.values[:, part].to(self.kind)
+
+                def back(name: str, gradient: torch.Tensor, values=values, part=part) -> torch.Tensor:
+                    inputs, between = self._inputs(name, values, part), self.between[name]
+                    return mlp.backwards(nets[name], inputs, between, part, gradient, sums[name])
+
+                exponent, reflection, angles = given[:, part].to(self.kind).split(self._parted)
+                of_code = nets["reflection"][0].T @ back("reflection", reflection)
                 of_code[:1] = exponent
-                for name, outputs in (("density", of_code), ("angles", angles)):
-                    first, end = max(READS[name].start, self.unlearned), READS[name].stop
-                    weight = self.nets[name][0][:, first - READS[name].start :]
-                    of_values[first:end, part].addmm_(weight.T, self._back(name, part, outputs, sums))
+                flows = torch.cat([back("density", of_code).T, back("angles", angles).T], 1)
+                of_values[self.first :, part] = firsts.T @ flows.T
             return [*sums.values()]
 
-        found = mlp.on_threads(given.shape[1], work)
+        found = mlp.on_threads(given.shape[1], work, self.kind)
         self.set_grad_in("values", mi.TensorXf(of_values))
         if self.learning:
             apart = _apart(*map(mlp.summed, zip(*found, strict=True)))
@@ -106,12 +117,8 @@ class Networks(dr.CustomOp):
         """How many of the outputs are the exponent, the reflection, the angles."""
         return [1, len(self.nets["reflection"][-1]), len(self.nets["angles"][-1])]
 
-    def _inputs(self, name: str, part: slice) -> torch.Tensor:
-        return self.code[:, part] if name == "reflection" else self.values[READS[name], part]
-
-    def _back(self, name: str, part: slice, gradient: torch.Tensor, sums: Sums) -> torch.Tensor:
-        inputs, between = self._inputs(name, part), self.between[name]
-        return mlp.backwards(self.nets[name], inputs, between, part, gradient, sums[name])
+    def _inputs(self, name: str, values: torch.Tensor, part: slice) -> torch.Tensor:
+        return self.code[:, part].to(values.dtype) if name == "reflection" else values[READS[name]]
 
     def name(self) -> str:
         return "networks"
@@ -128,6 +135,11 @@ def _joined(
         "reflection": [F.pad(reflection[0], (1, 0)), *reflection[1:]],
         "angles": [angles, *map(torch.block_diag, theta[1:], phi[1:])],
     }
+
+
+def _firsts(nets: Mapping[str, mlp.Weights]) -> torch.Tensor:
+    """The first matrices of those that read the inputs, of all inputs: one upon the other."""
+    return torch.cat([F.pad(nets[name][0], (at.start, INPUTS - at.stop)) for name, at in READS.items()])
 
 
 def _placed(weight: torch.Tensor, name: str, reader: str) -> torch.Tensor:

@@ -24,7 +24,7 @@ from mitex.methods.nerf.projection import Feet, Projection, attach
 from mitex.methods.nerf.radiance import RadianceTask, Rendered, look_step, rays_of
 from mitex.methods.nerf.shell import CapturedLatents, Located, Shell, appearance, shell_cells, within
 from mitex.methods.nerf.tensors import rows, tensor
-from mitex.runtime import load_mitsuba
+from mitex.runtime import bfloat16_is_fast, load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
@@ -129,7 +129,9 @@ class TextureTask(RadianceTask):
 
     def _model(self, arrays: Any, packed: bool = False) -> tuple[CapturedLatents, Decoder]:
         tables, weights = [a.array for a in arrays[:2]], arrays[2:]
-        return CapturedLatents(self.encoding, tables, self.frames), Decoder(weights, packed)
+        return CapturedLatents(self.encoding, tables, self.frames), Decoder(
+            weights, packed, bfloat16_is_fast()
+        )
 
     def _attached(
         self, batch: Batch, samples: Samples, feet: Feet

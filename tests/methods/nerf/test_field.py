@@ -40,9 +40,9 @@ def inputs(seed: int = 0) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     return f, phase, 0.1 * torch.randn(POINTS, generator=drawn)
 
 
-def decoded(f, phase, distance, *matrices, packed=False):
+def decoded(f, phase, distance, *matrices, packed=False, low_precision=False):
     def run(f, phase, distance, *matrices):
-        found = Decoder(matrices, packed)(_columns(f), _columns(phase), distance.array)
+        found = Decoder(matrices, packed, low_precision)(_columns(f), _columns(phase), distance.array)
         return tensor(mi.ArrayXf(*torch_field.outputs(found)))
 
     return call(run, f, phase, distance, *matrices)
@@ -83,6 +83,32 @@ def test_gradients_of_the_networks_agree_with_torch(moving, preset, chunk, monke
         assert a.grad is not None and b.grad is not None
         largest = float(b.grad.abs().max())
         np.testing.assert_allclose(a.grad.numpy(), b.grad.numpy(), rtol=1e-3, atol=1e-3 * largest)
+
+
+@pytest.mark.parametrize("chunk", [mlp.LONG, 70])
+def test_gradients_of_low_precision_are_near_and_values_the_same(chunk, monkeypatch):
+    monkeypatch.setattr(mlp, "LONG", chunk)
+    found = []
+    for low_precision in (False, True):
+        given = [x.clone().requires_grad_() for x in (*inputs(), *weights("fast"))]
+        given[2].requires_grad_(False)
+        result = decoded(*given, low_precision=low_precision)
+        result.square().sum().backward()
+        found.append((result.detach().numpy(), [x.grad for x in given if x.requires_grad]))
+    (value, exact), (same, near) = found
+    np.testing.assert_allclose(value, same, rtol=1e-5, atol=1e-6)
+    for a, b in zip(exact, near, strict=True):
+        assert 0 < (a - b).norm() < 0.01 * a.norm()
+
+
+def test_gradients_of_points_that_move_are_exact():
+    def of_distance(low_precision):
+        given = [x.clone().requires_grad_() for x in (*inputs(), *weights("fast"))]
+        decoded(*given, low_precision=low_precision).square().sum().backward()
+        return given[2].grad
+
+    exact = of_distance(False)
+    np.testing.assert_allclose(of_distance(True), exact, rtol=1e-4, atol=1e-5 * float(exact.abs().max()))
 
 
 def test_the_embedding_is_the_distance_and_its_waves():
