@@ -7,6 +7,7 @@ faster; and a part of the points goes through all layers while it is in a core's
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -25,7 +26,9 @@ import drjit.nn as nn  # noqa: E402
 T = TypeVar("T")
 Weights = Sequence[torch.Tensor]
 CHUNK = 2560  # points of a part
-LONG = 8192  # the same in bfloat16, where products are short work beside the calls that ask for them
+# In bfloat16 products are short work beside the calls that ask for them, and each new number of points costs
+# as much as several products: oneDNN compiles for it.
+LONG, GRAIN = 8192, 512  # points of a part there, and what their number is a multiple of
 _pool = ThreadPoolExecutor(os.cpu_count(), initializer=torch.set_num_threads, initargs=(1,))
 _relu_backward = torch.ops.aten.threshold_backward.grad_input
 
@@ -35,13 +38,21 @@ def on_threads(
 ) -> list[T]:
     """What `work` finds on each of torch's threads, which share the parts of `count` points.
 
-    Parts are equal, and each thread could take as many; one that the machine holds up takes fewer.
+    Each thread could take as many of them; one that the machine holds up takes fewer.
     """
     threads = torch.get_num_threads()  # torch first counts them here: in the pool it would find one
-    rounds = math.ceil(count / threads / (CHUNK if kind == torch.float32 else LONG))
-    size = math.ceil(count / threads / max(rounds, 1))
-    parts = iter([slice(start, start + size) for start in range(0, count, max(size, 1))])
+    most, grain = (CHUNK, 1) if kind == torch.float32 else (LONG, GRAIN)
+    whole = count - count % grain
+    shares = threads * max(math.ceil(whole / threads / most), 1)
+    size = max(math.ceil(whole / shares / grain), 1) * grain
+    starts = [*range(0, whole, size), whole, count]
+    parts = iter([slice(start, end) for start, end in itertools.pairwise(starts) if end > start])
     return list(_pool.map(work, [parts] * threads))
+
+
+def kind_of(part: slice, kind: torch.dtype) -> torch.dtype:
+    """What a part is multiplied in: `kind`, but for the rest that is no multiple of `GRAIN`."""
+    return torch.float32 if (part.stop - part.start) % GRAIN else kind
 
 
 def room(weights: Weights, count: int, kind: torch.dtype = torch.float32) -> list[torch.Tensor]:
@@ -82,12 +93,12 @@ def backwards(
     """The gradient of what the first layer makes, from that of the outputs.
 
     Args:
-        weights, values, between, part: as of `forwards`, all of the gradient's type.
+        weights, values, between, part: as of `forwards`; the first two of the gradient's type.
         gradient: of the outputs of the part.
         found: those of the weights are added to it, float32; none if empty.
     """
     for k in reversed(range(len(weights))):
-        given = between[k - 1][:, part] if k else values
+        given = between[k - 1][:, part].to(gradient.dtype) if k else values
         if found:
             found[k].add_(gradient @ given.T)
         if k:

@@ -87,23 +87,24 @@ class Networks(dr.CustomOp):
         given = gradient.torch()
         of_values = torch.empty_like(self.values)
         of_values[: self.first] = 0
-        nets = {name: [weight.to(self.kind) for weight in net] for name, net in self.nets.items()}
-        firsts = _firsts(nets)[:, self.first :]
+        kinds = {kind: self._of_kind(kind) for kind in (self.kind, torch.float32)}
 
         def work(parts: Iterator[slice]) -> list[list[torch.Tensor]]:
             sums = {k: [torch.zeros_like(w) for w in net if self.learning] for k, net in self.nets.items()}
             for part in parts:
-                values = self.values[:, part].to(self.kind)
+                kind = mlp.kind_of(part, self.kind)
+                nets, firsts = kinds[kind]
+                values = self.values[:, part].to(kind)
 
-                def back(name: str, gradient: torch.Tensor, values=values, part=part) -> torch.Tensor:
+                def back(name: str, gradient: torch.Tensor, nets=nets, values=values, part=part):
                     inputs, between = self._inputs(name, values, part), self.between[name]
                     return mlp.backwards(nets[name], inputs, between, part, gradient, sums[name])
 
-                exponent, reflection, angles = given[:, part].to(self.kind).split(self._parted)
+                exponent, reflection, angles = given[:, part].to(kind).split(self._parted)
                 of_code = nets["reflection"][0].T @ back("reflection", reflection)
                 of_code[:1] = exponent
                 flows = torch.cat([back("density", of_code).T, back("angles", angles).T], 1)
-                of_values[self.first :, part] = firsts.T @ flows.T
+                of_values[self.first :, part] = firsts @ flows.T
             return [*sums.values()]
 
         found = mlp.on_threads(given.shape[1], work, self.kind)
@@ -116,6 +117,11 @@ class Networks(dr.CustomOp):
     def _parted(self) -> list[int]:
         """How many of the outputs are the exponent, the reflection, the angles."""
         return [1, len(self.nets["reflection"][-1]), len(self.nets["angles"][-1])]
+
+    def _of_kind(self, kind: torch.dtype) -> tuple[dict[str, list[torch.Tensor]], torch.Tensor]:
+        """The networks, and their first matrices transposed for the gradient of the inputs that get one."""
+        nets = {name: [weight.to(kind) for weight in net] for name, net in self.nets.items()}
+        return nets, _firsts(nets)[:, self.first :].T
 
     def _inputs(self, name: str, values: torch.Tensor, part: slice) -> torch.Tensor:
         return self.code[:, part].to(values.dtype) if name == "reflection" else values[READS[name]]
