@@ -10,7 +10,9 @@ VARIABLE = "MITEX_BF16"
 
 
 def bfloat16_is_fast() -> bool:
-    """Whether frozen networks should run in bfloat16: the CPU has AMX or AVX-512 instructions for it.
+    """Whether frozen networks, and gradients of small ones, should be multiplied in bfloat16.
+
+    That is where the CPU has AMX or AVX-512 instructions for it.
 
     `MITEX_BF16=0` or `1` decides instead.
 

@@ -41,6 +41,7 @@ PLACES = {  # in what is read, of a network's own inputs
     "theta": [*range(COARSE, COARSE + FEATURES), *range(COARSE)],
     "phi": [*range(COARSE + FEATURES, COARSE + FEATURES + PHASES), *range(COARSE)],
 }
+Nets = Mapping[str, mlp.Weights]
 
 
 def weight_shapes(config: NerfConfig) -> list[tuple[int, int]]:
@@ -93,18 +94,7 @@ class Networks(dr.CustomOp):
             sums = {k: [torch.zeros_like(w) for w in net if self.learning] for k, net in self.nets.items()}
             for part in parts:
                 kind = mlp.kind_of(part, self.kind)
-                nets, firsts = kinds[kind]
-                values = self.values[:, part].to(kind)
-
-                def back(name: str, gradient: torch.Tensor, nets=nets, values=values, part=part):
-                    inputs, between = self._inputs(name, values, part), self.between[name]
-                    return mlp.backwards(nets[name], inputs, between, part, gradient, sums[name])
-
-                exponent, reflection, angles = given[:, part].to(kind).split(self._parted)
-                of_code = nets["reflection"][0].T @ back("reflection", reflection)
-                of_code[:1] = exponent
-                flows = torch.cat([back("density", of_code).T, back("angles", angles).T], 1)
-                of_values[self.first :, part] = firsts @ flows.T
+                of_values[self.first :, part] = self._flow(part, given[:, part].to(kind), *kinds[kind], sums)
             return [*sums.values()]
 
         found = mlp.on_threads(given.shape[1], work, self.kind)
@@ -113,12 +103,28 @@ class Networks(dr.CustomOp):
             apart = _apart(*map(mlp.summed, zip(*found, strict=True)))
             self.set_grad_in("nets", [[mi.TensorXf(w.contiguous()) for w in net] for net in apart])
 
+    def _flow(
+        self, part: slice, gradient: torch.Tensor, nets: Nets, firsts: torch.Tensor, sums: Nets
+    ) -> torch.Tensor:
+        """The gradient of a part's inputs, from that of its outputs; those of the weights are added up."""
+        values = self.values[:, part].to(gradient.dtype)
+
+        def back(name: str, gradient: torch.Tensor) -> torch.Tensor:
+            inputs, between = self._inputs(name, values, part), self.between[name]
+            return mlp.backwards(nets[name], inputs, between, part, gradient, sums[name])
+
+        exponent, reflection, angles = gradient.split(self._parted)
+        of_code = nets["reflection"][0].T @ back("reflection", reflection)
+        of_code[:1] = exponent
+        flows = torch.cat([back("density", of_code).T, back("angles", angles).T], 1)
+        return firsts @ flows.T
+
     @property
     def _parted(self) -> list[int]:
         """How many of the outputs are the exponent, the reflection, the angles."""
         return [1, len(self.nets["reflection"][-1]), len(self.nets["angles"][-1])]
 
-    def _of_kind(self, kind: torch.dtype) -> tuple[dict[str, list[torch.Tensor]], torch.Tensor]:
+    def _of_kind(self, kind: torch.dtype) -> tuple[Nets, torch.Tensor]:
         """The networks, and their first matrices transposed for the gradient of the inputs that get one."""
         nets = {name: [weight.to(kind) for weight in net] for name, net in self.nets.items()}
         return nets, _firsts(nets)[:, self.first :].T
@@ -130,9 +136,7 @@ class Networks(dr.CustomOp):
         return "networks"
 
 
-def _joined(
-    density: mlp.Weights, reflection: mlp.Weights, theta: mlp.Weights, phi: mlp.Weights
-) -> dict[str, mlp.Weights]:
+def _joined(density: mlp.Weights, reflection: mlp.Weights, theta: mlp.Weights, phi: mlp.Weights) -> Nets:
     """The networks for inputs as above, each after those that it reads."""
     angles = torch.cat([_placed(theta[0], "theta", "angles"), _placed(phi[0], "phi", "angles")])
     return {
@@ -143,7 +147,7 @@ def _joined(
     }
 
 
-def _firsts(nets: Mapping[str, mlp.Weights]) -> torch.Tensor:
+def _firsts(nets: Nets) -> torch.Tensor:
     """The first matrices of those that read the inputs, of all inputs: one upon the other."""
     return torch.cat([F.pad(nets[name][0], (at.start, INPUTS - at.stop)) for name, at in READS.items()])
 
