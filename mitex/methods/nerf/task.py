@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -33,6 +34,8 @@ CLUSTERS = 4  # centres in each level
 OUTWARDS = 0.1  # share of the coarse normal in what the fine one is compared with
 SURFACE = 0.5  # share of its ray from which on a sample is what one sees
 HIDDEN_RAYS = 0.25  # share of the rays below whose surface the inside is looked at
+BURIED = 0.25  # of the shell's thickness on one side: what has so much matter around it, no photo sees
+AROUND = (0, 0, 0), (0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)  # where that is looked for
 LEAST = 1e-3  # opacity of rays whose normals are compared
 # Fine normals start near those of the faces: under random ones k_d learns the shades first.
 FLAT = 1e-2
@@ -165,9 +168,10 @@ class TextureTask(RadianceTask):
         return fine, accumulated(target * share, samples.kept(chosen))
 
     def _inside(self, arrays: Any, located: Located, shares: Any, samples: Samples, depths: Any) -> Any:
-        """How strange the looks of what is solid are, below the ends of the first rays: L1 of them.
+        """How strange the looks of what is buried are, below the ends of the first rays: L1 of them.
 
-        `depths` says for each of these rays which share of the way down to the shell's bottom that is.
+        `depths` says for each of these rays which share of the way down to the shell's bottom that is. Places
+        near a surface are no part of it: photos may see them from elsewhere.
         """
         chosen: Any = dr.compress((samples.ray < dr.width(depths)) & (dr.detach(shares) > SURFACE))
         if not dr.width(chosen):
@@ -175,12 +179,25 @@ class TextureTask(RadianceTask):
         latents, decoder = self._model([*map(dr.detach, arrays[:2]), *arrays[2:]])
         part = located.part(chosen)
         features = latents(part)
+        depth = dr.gather(mi.Float, depths, dr.gather(mi.UInt32, samples.ray, chosen))
         with dr.suspend_grad():
             above = decoder(*features, part.distance)
-        depth = dr.gather(mi.Float, depths, dr.gather(mi.UInt32, samples.ray, chosen))
-        below = decoder(*features, part.distance - depth * (part.distance + self.thickness))
-        solid = 1 - dr.exp(-dr.detach(below.density) * self.step_length)
-        return solid * sum(dr.abs(a - b) for a, b in zip(below.looks, above.looks, strict=True))
+            part.distance -= depth * (part.distance + self.thickness)
+            buried = self._buried(latents, decoder, part)
+        below = decoder(*features, part.distance)
+        return buried * sum(dr.abs(a - b) for a, b in zip(below.looks, above.looks, strict=True))
+
+    def _buried(self, latents: CapturedLatents, decoder: Decoder, located: Located) -> Any:
+        """The least opacity of a step at places, a bit above them, and a bit to four sides of them."""
+        across, along = mi.coordinate_system(located.normal)
+        reach = BURIED * self.thickness
+        lowest = mi.Float(math.inf)
+        for x, y, z in AROUND:
+            moved = Located(**vars(located))
+            moved.foot = located.foot + reach * (x * across + y * along)
+            moved.distance = located.distance + reach * z
+            lowest = dr.minimum(lowest, decoder.exponent(latents.features(moved), moved.distance))
+        return 1 - dr.exp(-dr.exp(lowest) * self.step_length)
 
     def _knows_inside(self, step: int) -> bool:
         """Only late: colours learn slower beside a loss that wants them the same at all depths."""

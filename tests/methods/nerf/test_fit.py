@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,12 +22,16 @@ from mitex.methods.nerf.pixels import Pixels
 from mitex.methods.nerf.projection import Projection
 from mitex.methods.nerf.radiance import look
 from mitex.methods.nerf.shell import Located
-from mitex.methods.nerf.task import POSE, TextureTask
+from mitex.methods.nerf.task import BURIED, POSE, TextureTask
 from mitex.methods.nerf.tensors import rows
 from mitex.metrics import psnr
+from mitex.runtime import init
 from mitex.training import checkpoint
 from mitex.training.config import resolve
 from tests.methods.nerf.tiny import SETTINGS, tiny_capture
+
+mi: Any = init()
+import drjit as dr  # noqa: E402
 
 
 def test_the_loss_falls_and_the_run_folder_is_whole(run):
@@ -253,6 +259,23 @@ def test_an_inside_that_looks_as_the_surface_costs_nothing(run, base):
     assert record["inside"] == 0
     _, early = task.loss(0, torch.Generator().manual_seed(0))
     assert "inside" not in early
+
+
+def test_buried_is_what_has_matter_above_and_beside_it(run, base):
+    """In matter that ends at the base shape and at x = 0.1: near either of them a photo may see it."""
+    task = trained_task(run, base, tiny_capture(), "inside=1.0")
+    reach = BURIED * task.thickness
+    x, distance = [0, 0, 0, 0.1 - 0.9 * reach, 0.1 - 1.5 * reach], [0.5, -0.9, -1.1, -1.1, -1.1]
+    up = mi.Vector3f(0, 0, mi.Float([1] * 5))
+    here = Located(mi.Point3f(mi.Float(x), 0, 0), reach * mi.Float(distance), mi.UInt32(0), mi.Point2f(0), up)
+
+    def exponent(f, distance):
+        return dr.select((f[0] < 0.1) & (distance < 0), 12.0, -12.0)
+
+    latents: Any = SimpleNamespace(features=lambda located: [located.foot.x])
+    decoder: Any = SimpleNamespace(exponent=exponent)
+    buried = np.array(task._buried(latents, decoder, here))
+    np.testing.assert_allclose(buried, [0, 0, 1, 0, 1], atol=1e-3)
 
 
 def test_wrong_cameras_find_back(run, base):
