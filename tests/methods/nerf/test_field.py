@@ -85,6 +85,11 @@ def test_gradients_of_the_networks_agree_with_torch(moving, preset, chunk, monke
         np.testing.assert_allclose(a.grad.numpy(), b.grad.numpy(), rtol=1e-3, atol=1e-3 * largest)
 
 
+def gradient(x: torch.Tensor) -> torch.Tensor:
+    assert x.grad is not None
+    return x.grad
+
+
 @pytest.mark.parametrize("chunk", [mlp.LONG, 64])
 def test_gradients_of_low_precision_are_near_and_values_the_same(chunk, monkeypatch):
     monkeypatch.setattr(mlp, "LONG", chunk)
@@ -95,7 +100,7 @@ def test_gradients_of_low_precision_are_near_and_values_the_same(chunk, monkeypa
         given[2].requires_grad_(False)
         result = decoded(*given, low_precision=low_precision)
         result.square().sum().backward()
-        found.append((result.detach().numpy(), [x.grad for x in given if x.requires_grad]))
+        found.append((result.detach().numpy(), [gradient(x) for x in given if x.requires_grad]))
     (value, exact), (same, near) = found
     np.testing.assert_allclose(value, same, rtol=1e-5, atol=1e-6)
     for a, b in zip(exact, near, strict=True):
@@ -106,7 +111,7 @@ def test_gradients_of_points_that_move_are_exact():
     def of_distance(low_precision):
         given = [x.clone().requires_grad_() for x in (*inputs(), *weights("fast"))]
         decoded(*given, low_precision=low_precision).square().sum().backward()
-        return given[2].grad
+        return gradient(given[2])
 
     exact = of_distance(False)
     np.testing.assert_allclose(of_distance(True), exact, rtol=1e-4, atol=1e-5 * float(exact.abs().max()))
