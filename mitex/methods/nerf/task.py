@@ -132,9 +132,8 @@ class TextureTask(RadianceTask):
 
     def _model(self, arrays: Any, packed: bool = False) -> tuple[CapturedLatents, Decoder]:
         tables, weights = [a.array for a in arrays[:2]], arrays[2:]
-        return CapturedLatents(self.encoding, tables, self.frames), Decoder(
-            weights, packed, bfloat16_is_fast()
-        )
+        decoder = Decoder(weights, packed, low_precision=bfloat16_is_fast())
+        return CapturedLatents(self.encoding, tables, self.frames), decoder
 
     def _attached(
         self, batch: Batch, samples: Samples, feet: Feet
@@ -193,9 +192,8 @@ class TextureTask(RadianceTask):
         reach = BURIED * self.thickness
         lowest = mi.Float(math.inf)
         for x, y, z in AROUND:
-            moved = Located(**vars(located))
-            moved.foot = located.foot + reach * (x * across + y * along)
-            moved.distance = located.distance + reach * z
+            foot = located.foot + reach * (x * across + y * along)
+            moved = replace(located, foot=foot, distance=located.distance + reach * z)
             lowest = dr.minimum(lowest, decoder.exponent(latents.features(moved), moved.distance))
         return 1 - dr.exp(-dr.exp(lowest) * self.step_length)
 
