@@ -19,7 +19,7 @@ def quilted_albedo(
     rng: np.random.Generator,
     tileable: bool = False,
 ) -> np.ndarray:
-    """An image that is quilted as latent features are, with colours in their place.
+    """An image quilted as latent features are, as published (no evenness), with colours in their place.
 
     Args:
         patches: P squares on the base shape.
@@ -39,4 +39,4 @@ def quilted_albedo(
     if pictures.shape != expected:
         raise ConfigError(f"pictures of patches of shape {pictures.shape}", f"render {expected}")
     source = ArraySource(pictures, patches.centres, patches.length)
-    return np.clip(quilt(source, size, rng, tileable=tileable).features, 0.0, 1.0)
+    return np.clip(quilt(source, size, rng, tileable=tileable, evenness=0.0).features, 0.0, 1.0)

@@ -7,7 +7,8 @@ light and perspective are those of the photo; only what the texture shows differ
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from mitex.methods.baselines.quilted import quilted_albedo
 from mitex.methods.nerf.applied import EXTENT
 from mitex.methods.nerf.capture import Capture
 from mitex.methods.nerf.lighting import rotated
+from mitex.methods.nerf.maps import LatentMaps
 from mitex.methods.nerf.patches import principal_direction
 from mitex.methods.nerf.pictures import pictured
 from mitex.methods.nerf.radiance import seen
@@ -33,6 +35,7 @@ NEAR = 10.0  # pixels count whose angle is so near to the wanted one [degrees]
 WINDOW = 96  # side of what is cut out of a photo [pixels]
 PLACES = 24  # for each angle
 LEAST = 100  # pixels that count, or a place is left out
+SYNTHESES = 3
 HALF = 1.0  # half the side of the plane [scene units]
 SHIFT = 0.5  # of the place on the plane, at most, so that each sees another part of the texture
 SOLID = 0.5  # opacity of pixels that count
@@ -41,6 +44,8 @@ SOLID = 0.5  # opacity of pixels that count
 @dataclass(frozen=True, eq=False)
 class Elevation:
     """Textures seen under one angle; all distances are `single_image_frechet` from photos.
+
+    Those of `ours` and `flat` are means of several syntheses, and the picture is of the first.
 
     Attributes:
         angle: between the view and the normal [degrees].
@@ -68,6 +73,7 @@ def compare_elevations(
     seed: int = 0,
     window: int = WINDOW,
     places: int = PLACES,
+    syntheses: int = SYNTHESES,
 ) -> list[Elevation]:
     """Table 2 for a texture and its photos; angles without enough pixels are left out.
 
@@ -79,21 +85,30 @@ def compare_elevations(
         seed: of all choices.
         window: side of what is cut out of the photos [pixels].
         places: photos for each angle that are shown; as many again tell how much photos differ.
+        syntheses: of each texture, by seeds from `seed` on: chance counts for a lot in a single one.
     """
     capture = capture.within(texture.similarity)
     rng = np.random.default_rng(seed)
-    pair = _Pair(texture, size, patches, seed)
     look = Sights(texture.model.base.mesh, capture)
     sights = [look(view) for view in range(len(capture))]
-    table = []
+    shown: dict[float, list[_Place]] = {}
     for angle in ELEVATIONS:
         found = []
         for view in rng.permutation(len(capture)).tolist():
             place = _place(capture, view, sights[view], angle, window, rng)
             found += [] if place is None else [place]
         if len(found) >= 2:
-            table.append(_compared(found[: 2 * places], angle, pair))
-    return table
+            shown[angle] = found[: 2 * places]
+    squares = texture.patches(np.random.default_rng(seed), patches)
+    pictures = pictured(texture.shell, squares)  # which takes longer than all else
+    tables = []
+    for each in range(seed, seed + syntheses):
+        maps = texture.synthesize(size, each, patches=patches, tileable=True)
+        drawn = np.random.default_rng(each)
+        flat = quilted_albedo(squares, lambda _: pictures, (size, size), drawn, tileable=True)
+        pair = _Pair(texture, maps, flat)
+        tables.append([_compared(found, angle, pair) for angle, found in shown.items()])
+    return [_mean(rows) for rows in zip(*tables, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +150,12 @@ def _compared(found: list[_Place], angle: float, pair: _Pair) -> Elevation:
     return Elevation(angle, captured, ours, flat, photos, picture)
 
 
+def _mean(rows: Sequence[Elevation]) -> Elevation:
+    """Of several syntheses."""
+    ours, flat = (float(np.mean([getattr(row, name) for row in rows])) for name in ("ours", "flat"))
+    return replace(rows[0], ours=ours, flat=flat)
+
+
 def _strip(windows: list[Strip]) -> Strip:
     """Side by side."""
     images, masks = zip(*windows, strict=True)
@@ -170,20 +191,11 @@ def _place(
 class _Pair:
     """The two textures on a plane, seen by the cameras of photos."""
 
-    def __init__(self, texture: NerfTexture, size: int, patches: int, seed: int) -> None:
+    def __init__(self, texture: NerfTexture, maps: LatentMaps, image: np.ndarray) -> None:
         self.texture = texture
         self.light = np.array(texture.light)
         self.along = principal_direction(texture.model.base.mesh)
-        found = texture.patches(np.random.default_rng(seed), patches)
-        maps = texture.synthesize(size, seed, patches=patches, tileable=True)
-        self.gap = maps.gap
-        self.image = quilted_albedo(
-            found,
-            lambda squares: pictured(texture.shell, squares),
-            (size, size),
-            np.random.default_rng(seed),
-            tileable=True,
-        )
+        self.gap, self.image = maps.gap, image
         plane = grid(96, 96)
         scale = EXTENT / HALF
         self.field = texture.apply(plane.with_vertices(HALF * plane.vertices), maps, scale=scale, lift=0.0)

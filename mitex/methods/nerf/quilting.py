@@ -15,6 +15,7 @@ from mitex.errors import ConfigError
 from mitex.methods.nerf.cuts import cheapest_path, feathered, new_part, overlap_paths
 from mitex.methods.nerf.guide import Guide, Likeness
 from mitex.methods.nerf.matching import FLIPS, SIDES, Matcher, Source, mirrored, overlap, strip
+from mitex.methods.nerf.usage import EVENNESS, Usage
 
 NEAREST = 16  # candidates for a place
 Maps = dict[str, np.ndarray]  # the fields of `Quilt`
@@ -50,6 +51,7 @@ def quilt(
     tileable: bool = False,
     guide: Guide | None = None,
     nearest: int = NEAREST,
+    evenness: float = EVENNESS,
 ) -> Quilt:
     """Synthesizes a texture.
 
@@ -61,6 +63,7 @@ def quilt(
         tileable: the last column and row also continue in the first.
         guide: a picture that the texture shall resemble.
         nearest: candidates for a place, among which chance decides; doubled until one is allowed.
+        evenness: how much what was used before is avoided, see `Usage`; 0 as published.
 
     Raises:
         ConfigError: a number is out of range, the guide does not fit, or the patches cannot be used.
@@ -69,6 +72,7 @@ def quilt(
         raise ConfigError(f"a texture of {size} texels with {nearest} candidates", "use 1 or more of each")
     matcher = Matcher(source, FLIPS if flips else (0,), SIDES if tileable else ("left", "top"))
     canvas = _Canvas(source, size, matcher.shape, tileable)
+    usage = Usage(matcher.centres, source.length, evenness)
     likeness = None
     if guide is not None:
         likeness = Likeness(guide, len(matcher.centres), size, canvas.side, tileable)
@@ -77,10 +81,14 @@ def quilt(
             strips = canvas.strips(row, column)
             costs = matcher.distances(strips)
             among = nearest if strips or likeness else costs.size
+            wishes = usage.penalties()
             if likeness is not None:
-                costs = costs + (costs.mean() or 1.0) * likeness.differences(top, left, matcher.flips)
+                wishes = wishes + likeness.differences(top, left, matcher.flips)
+            costs = costs + (costs.mean() or 1.0) * wishes
             allowed = matcher.allowed(canvas.neighbours(row, column))
-            canvas.paste(row, column, *matcher.choose(costs, allowed, rng, among))
+            index, flip = matcher.choose(costs, allowed, rng, among)
+            canvas.paste(row, column, index, flip)
+            usage.add(index)
     return canvas.finished()
 
 

@@ -25,6 +25,7 @@ from mitex.methods.nerf.quilting import Quilt, quilt
 from mitex.methods.nerf.radiance import look_step
 from mitex.methods.nerf.shell import CapturedLatents, Shell
 from mitex.methods.nerf.tensors import channels
+from mitex.methods.nerf.usage import EVENNESS
 from mitex.runtime import init, load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
@@ -114,6 +115,7 @@ class NerfTexture:
         tileable: bool = False,
         guide: np.ndarray | None = None,
         guide_weight: float = WEIGHT,
+        evenness: float = EVENNESS,
     ) -> LatentMaps:
         """More of the texture, in the plane (section 3.2.2).
 
@@ -126,6 +128,7 @@ class NerfTexture:
             tileable: the texture continues over its borders.
             guide: a picture that it shall resemble from afar, (H, W, 3) sRGB in [0, 1], stretched over it.
             guide_weight: a colour difference of 1 counts as much as this times the mean distance of patches.
+            evenness: how much patches are avoided that were used before, see `Usage`; 0 as published.
 
         Raises:
             ConfigError: a number is out of range, the guide is no picture, or no patch fits.
@@ -135,7 +138,7 @@ class NerfTexture:
         source = FeatureSource(found, self.features, len(self.latents.encoding.levels(0)) * 2)
         shape = (size, size) if isinstance(size, int) else size
         wanted = None if guide is None else Guide(guide, pictured(self.shell, found, BLOCK), guide_weight)
-        made = quilt(source, shape, rng, flips=flips, tileable=tileable, guide=wanted)
+        made = quilt(source, shape, rng, flips=flips, tileable=tileable, guide=wanted, evenness=evenness)
         return self.maps(found, made)
 
     def covering(self, mesh: Mesh, scale: float = 1.0, pattern_rate: float = GOOD_RATE) -> int:

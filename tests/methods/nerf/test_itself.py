@@ -119,13 +119,19 @@ def test_lifted_by_one_the_ground_is_on_the_mesh(texture, maps):
 
 def test_elevations_compare_what_photos_show(texture):
     photos = tiny_capture(side=160, spp=4)
-    table = compare_elevations(texture, photos, size=256, patches=40, window=48, places=3)
+    table = compare_elevations(texture, photos, size=256, patches=40, window=48, places=3, syntheses=2)
     assert [row.angle for row in table][:3] == [0, 20, 40]
     for row in table:
         distances = row.captured, row.ours, row.flat, row.photos
         assert np.isfinite(distances).all() and min(distances) > 0
         assert row.captured < row.ours or row.angle > 40
         assert row.picture.shape[0] == 4 * 48 and row.picture.shape[1] % 48 == 0
+    # A second synthesis changes the means, and nothing else.
+    single = compare_elevations(texture, photos, size=256, patches=40, window=48, places=3, syntheses=1)
+    for row, one in zip(table, single, strict=True):
+        assert np.allclose((row.captured, row.photos), (one.captured, one.photos), rtol=1e-3)
+        assert np.abs(row.picture - one.picture).mean() < 1e-3
+        assert abs(row.ours - one.ours) > 1e-2 * one.ours
     # Seen from above, a plane fills its windows; seen flat, there is but one colour above its horizon.
     flat = [np.diff(np.split(row.picture, 4)[3], axis=0) for row in table]
     even = [(change == 0).all(2).mean() for change in flat]
