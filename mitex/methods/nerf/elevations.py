@@ -2,7 +2,8 @@
 
 A photo's pixels that see the base shape under some angle are the truth. The same camera then sees a plane
 that touches the base shape there, with the radiance-field texture or with a quilted picture on it. So scale,
-light and perspective are those of the photo; only what the texture shows differs.
+light and perspective are those of the photo; only what the texture shows differs. The same pixels count in
+all, or windows of which few pixels see the angle, and their light, would weigh more on planes than in photos.
 """
 
 from __future__ import annotations
@@ -201,9 +202,9 @@ class _Pair:
         self.field = texture.apply(plane.with_vertices(HALF * plane.vertices), maps, scale=scale, lift=0.0)
 
     def captured(self, place: _Place) -> Strip:
-        """What was captured, and the pixels that count in the photo."""
+        """What was captured, and which pixels count."""
         colour, through = seen(self.texture.shell, place.origins, place.directions)
-        return self._window(place, colour + through[:, None] * place.background, place.mask.ravel())
+        return self._window(place, colour + through[:, None] * place.background)
 
     def ours(self, place: _Place) -> Strip:
         """The field's picture and which pixels count."""
@@ -232,6 +233,8 @@ class _Pair:
         return turn, origins, place.directions @ turn.T
 
     @staticmethod
-    def _window(place: _Place, colours: np.ndarray, mask: np.ndarray) -> Strip:
+    def _window(place: _Place, colours: np.ndarray, on: np.ndarray | None = None) -> Strip:
+        """Of the photo's pixels those count that are on the plane."""
         shape = place.mask.shape
-        return colours.clip(0, 1).astype(np.float32).reshape(*shape, 3), mask.reshape(shape)
+        mask = place.mask if on is None else place.mask & on.reshape(shape)
+        return colours.clip(0, 1).astype(np.float32).reshape(*shape, 3), mask

@@ -9,6 +9,7 @@ import pytest
 
 from mitex.errors import ConfigError
 from mitex.mesh import grid, icosphere
+from mitex.methods.nerf import elevations
 from mitex.methods.nerf.applied import EXTENT
 from mitex.methods.nerf.elevations import compare_elevations
 from mitex.methods.nerf.maps import LatentMaps, MappedLatents, uv_frames
@@ -17,7 +18,7 @@ from mitex.methods.nerf.pictures import pictured
 from mitex.methods.nerf.pixels import Pixels
 from mitex.methods.nerf.quilting import Quilt
 from mitex.methods.nerf.radiance import look, seen
-from mitex.metrics import psnr
+from mitex.metrics import psnr, single_image_frechet
 from tests.methods.nerf.test_shell import at, mi, rows, shell
 from tests.methods.nerf.tiny import tiny_capture
 
@@ -117,7 +118,7 @@ def test_lifted_by_one_the_ground_is_on_the_mesh(texture, maps):
     assert np.isclose(size[1] - size[0], lifted.lift * lifted.similarity.scale, rtol=1e-4)
 
 
-def test_elevations_compare_what_photos_show(texture):
+def test_elevations_compare_what_photos_show(texture, monkeypatch):
     photos = tiny_capture(side=160, spp=4)
     table = compare_elevations(texture, photos, size=256, patches=40, window=48, places=3, syntheses=2)
     assert [row.angle for row in table][:3] == [0, 20, 40]
@@ -126,12 +127,22 @@ def test_elevations_compare_what_photos_show(texture):
         assert np.isfinite(distances).all() and min(distances) > 0
         assert row.captured < row.ours or row.angle > 40
         assert row.picture.shape[0] == 4 * 48 and row.picture.shape[1] % 48 == 0
+    masks = []
+
+    def distance(image, photo, mask_a, mask_b):
+        masks.append((mask_a, mask_b))
+        return single_image_frechet(image, photo, mask_a=mask_a, mask_b=mask_b)
+
+    monkeypatch.setattr(elevations, "single_image_frechet", distance)
     # A second synthesis changes the means, and nothing else.
     single = compare_elevations(texture, photos, size=256, patches=40, window=48, places=3, syntheses=1)
     for row, one in zip(table, single, strict=True):
         assert np.allclose((row.captured, row.photos), (one.captured, one.photos), rtol=1e-3)
         assert np.abs(row.picture - one.picture).mean() < 1e-3
         assert abs(row.ours - one.ours) > 1e-2 * one.ours
+    for textures in (masks[k : k + 3] for k in range(0, len(masks), 4)):  # the fourth are other photos
+        for mask, photo in textures:  # only pixels that count in the photo
+            assert mask.any() and not (mask & ~photo).any()
     # Seen from above, a plane fills its windows; seen flat, there is but one colour above its horizon.
     flat = [np.diff(np.split(row.picture, 4)[3], axis=0) for row in table]
     even = [(change == 0).all(2).mean() for change in flat]
