@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from mitex.errors import ConfigError
@@ -14,7 +12,7 @@ from mitex.methods.nerf.quilting import quilt
 
 def quilted_albedo(
     patches: Patches,
-    render: Callable[[Patches], np.ndarray],
+    pictures: np.ndarray,
     size: tuple[int, int],
     rng: np.random.Generator,
     tileable: bool = False,
@@ -23,7 +21,7 @@ def quilted_albedo(
 
     Args:
         patches: P squares on the base shape.
-        render: what they look like from above, (P, S, S, 3) sRGB in [0, 1], in the order of their texels.
+        pictures: what they look like from above, (P, S, S, 3) sRGB in [0, 1], in the order of their texels.
         size: height and width [texels].
         rng: of all choices.
         tileable: the image can be repeated.
@@ -34,7 +32,7 @@ def quilted_albedo(
     Raises:
         ConfigError: the pictures do not fit the patches or are not finite, or the size is out of range.
     """
-    pictures = np.asarray(render(patches), np.float32)
+    pictures = np.asarray(pictures, np.float32)
     expected = (*patches.faces.shape, 3)
     if pictures.shape != expected:
         raise ConfigError(f"pictures of patches of shape {pictures.shape}", f"render {expected}")

@@ -106,7 +106,7 @@ def compare_elevations(
     for each in range(seed, seed + syntheses):
         maps = texture.synthesize(size, each, patches=patches, tileable=True)
         drawn = np.random.default_rng(each)
-        flat = quilted_albedo(squares, lambda _: pictures, (size, size), drawn, tileable=True)
+        flat = quilted_albedo(squares, pictures, (size, size), drawn, tileable=True)
         pair = _Pair(texture, maps, flat)
         tables.append([_compared(found, angle, pair) for angle, found in shown.items()])
     return [_mean(rows) for rows in zip(*tables, strict=True)]

@@ -24,7 +24,7 @@ def patches() -> Patches:
 
 def test_colours_go_on(patches: Patches):
     """The waves stay in step, to the precision that the patches' places allow."""
-    image = quilted_albedo(patches, checks, (130, 170), np.random.default_rng(2))
+    image = quilted_albedo(patches, checks(patches), (130, 170), np.random.default_rng(2))
     assert image.shape == (130, 170, 3) and image.dtype == np.float32
     assert image.min() >= 0.0 and image.max() <= 1.0
     assert np.abs(image[..., 1] - 0.5 * (image[..., 0] + image[..., 2])).max() < 1e-5
@@ -37,7 +37,7 @@ def test_colours_go_on(patches: Patches):
 
 
 def test_tileable(patches: Patches):
-    image = quilted_albedo(patches, checks, (96, 64), np.random.default_rng(2), tileable=True)
+    image = quilted_albedo(patches, checks(patches), (96, 64), np.random.default_rng(2), tileable=True)
     for axis in (0, 1):
         steps = np.square(np.diff(image, axis=axis)).mean((1 - axis, 2))
         across = np.square(image.take(0, axis) - image.take(-1, axis)).mean()
@@ -45,13 +45,13 @@ def test_tileable(patches: Patches):
 
 
 def test_same_seed_same_image(patches: Patches):
-    a, b = (quilted_albedo(patches, checks, (40, 40), np.random.default_rng(3)) for _ in range(2))
+    a, b = (quilted_albedo(patches, checks(patches), (40, 40), np.random.default_rng(3)) for _ in range(2))
     assert (a == b).all()
 
 
 def test_refusals(patches: Patches):
     rng = np.random.default_rng(0)
     with pytest.raises(ConfigError, match="pictures of patches of shape"):
-        quilted_albedo(patches, lambda p: checks(p)[1:], (40, 40), rng)
+        quilted_albedo(patches, checks(patches)[1:], (40, 40), rng)
     with pytest.raises(ConfigError, match="NaN"):
-        quilted_albedo(patches, lambda p: checks(p) * np.nan, (40, 40), rng)
+        quilted_albedo(patches, checks(patches) * np.nan, (40, 40), rng)
