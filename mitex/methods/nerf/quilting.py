@@ -51,7 +51,7 @@ def quilt(
     tileable: bool = False,
     guide: Guide | None = None,
     nearest: int = NEAREST,
-    evenness: float = EVENNESS,
+    evenness: float | None = None,
 ) -> Quilt:
     """Synthesizes a texture.
 
@@ -63,7 +63,8 @@ def quilt(
         tileable: the last column and row also continue in the first.
         guide: a picture that the texture shall resemble.
         nearest: candidates for a place, among which chance decides; doubled until one is allowed.
-        evenness: how much what was used before is avoided, see `Usage`; 0 as published.
+        evenness: how much what was used before is avoided, see `Usage`; 0 as published. By default 0 with a
+            guide, which may ask for a few patches all over, else `EVENNESS`.
 
     Raises:
         ConfigError: a number is out of range, the guide does not fit, or the patches cannot be used.
@@ -72,6 +73,8 @@ def quilt(
         raise ConfigError(f"a texture of {size} texels with {nearest} candidates", "use 1 or more of each")
     matcher = Matcher(source, FLIPS if flips else (0,), SIDES if tileable else ("left", "top"))
     canvas = _Canvas(source, size, matcher.shape, tileable)
+    if evenness is None:
+        evenness = EVENNESS if guide is None else 0.0
     usage = Usage(matcher.centres, source.length, evenness)
     likeness = None
     if guide is not None:

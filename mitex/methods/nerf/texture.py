@@ -25,7 +25,6 @@ from mitex.methods.nerf.quilting import Quilt, quilt
 from mitex.methods.nerf.radiance import look_step
 from mitex.methods.nerf.shell import CapturedLatents, Shell
 from mitex.methods.nerf.tensors import channels
-from mitex.methods.nerf.usage import EVENNESS
 from mitex.runtime import init, load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
@@ -115,7 +114,7 @@ class NerfTexture:
         tileable: bool = False,
         guide: np.ndarray | None = None,
         guide_weight: float = WEIGHT,
-        evenness: float = EVENNESS,
+        evenness: float | None = None,
     ) -> LatentMaps:
         """More of the texture, in the plane (section 3.2.2).
 
@@ -128,7 +127,7 @@ class NerfTexture:
             tileable: the texture continues over its borders.
             guide: a picture that it shall resemble from afar, (H, W, 3) sRGB in [0, 1], stretched over it.
             guide_weight: a colour difference of 1 counts as much as this times the mean distance of patches.
-            evenness: how much patches are avoided that were used before, see `Usage`; 0 as published.
+            evenness: how much patches are avoided that were used before; as of `quilt`.
 
         Raises:
             ConfigError: a number is out of range, the guide is no picture, or no patch fits.

@@ -27,7 +27,7 @@ class Usage:
         ConfigError: `evenness` is negative or not finite.
     """
 
-    def __init__(self, centres: np.ndarray, length: float, evenness: float = EVENNESS) -> None:
+    def __init__(self, centres: np.ndarray, length: float, evenness: float) -> None:
         if not 0.0 <= evenness < np.inf:
             raise ConfigError(f"an evenness of {evenness}", "use 0 or more")
         self.centres, self.reach, self.evenness = centres, REACH * length, evenness

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mitex.errors import ConfigError
+from mitex.methods.nerf.guide import Guide
 from mitex.methods.nerf.matching import ArraySource
 from mitex.methods.nerf.quilting import Quilt, quilt
 from mitex.methods.nerf.usage import REACH, Usage
@@ -55,3 +56,16 @@ def test_rare_patches_are_there_and_none_is_all_over(rng: np.random.Generator):
     assert even.max() <= 6 and plain.max() > 2 * even.max()
     assert abs(even[bright].sum() - 40) < abs(plain[bright].sum() - 40)
     assert (even == 0).sum() < (plain == 0).sum() / 2
+
+
+def test_what_a_guide_asks_for_is_not_avoided(rng: np.random.Generator):
+    """It wants those all over that are a little brighter, 20 for 400 places: by default, they are there."""
+    source = two_kinds(rng)
+    bright = np.arange(200) % 10 == 0
+    colours = np.broadcast_to(0.2 * bright[:, None, None, None], (200, 2, 2, 3))
+    guide = Guide(np.full((4, 4, 3), 0.2), colours)
+    size = 20 * STRIDE + 12, 20 * STRIDE + 12
+    given, avoided = (
+        uses(quilt(source, size, np.random.default_rng(3), guide=guide, evenness=e)) for e in (None, 0.1)
+    )
+    assert given[bright].sum() >= 390 and avoided[bright].sum() < 360
