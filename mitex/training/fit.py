@@ -1,0 +1,83 @@
+"""One fit of whichever method: its settings, its run folder, its training, and the texture that it leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, Protocol, TypeVar, Unpack
+
+from mitex.training import run
+from mitex.training.config import resolve
+from mitex.training.locate import NAME
+from mitex.training.loop import train
+from mitex.training.settings import FitConfig, RunOptions
+from mitex.training.task import Task
+
+Config = TypeVar("Config", bound=FitConfig)
+
+
+class Saved(Protocol):
+    """A texture, as far as a fit cares."""
+
+    def save(self, path: str | Path) -> Path: ...
+
+
+Learned = TypeVar("Learned", bound=Saved)
+
+
+@dataclass(frozen=True)
+class Run(Generic[Config]):
+    """A fit that may begin.
+
+    Attributes:
+        folder: The run folder.
+        config: Its resolved settings.
+        resume: Whether it goes on from the folder's checkpoint.
+        quiet: Whether no progress is shown.
+    """
+
+    folder: Path
+    config: Config
+    resume: bool
+    quiet: bool
+
+    @staticmethod
+    def of(presets: Mapping[str, Config], out: str | Path, **options: Unpack[RunOptions]) -> Run[Config]:
+        """Checks the folder and resolves the settings, before any long work; writes nothing.
+
+        Args:
+            presets: Of the method; the first one is the default.
+            out: Run folder: new, empty, or one with a run to `resume`.
+            options: As of `RunOptions`.
+
+        Raises:
+            OutputError, CheckpointError: As `run.check`.
+            ConfigError: As `resolve`.
+        """
+        folder, resume = Path(out).expanduser(), options.get("resume", False)
+        run.check(folder, resume)
+        own, file = folder / run.CONFIG, options.get("config")
+        if resume and file is None and own.is_file():
+            file = own
+        config = resolve(presets, options.get("preset"), file, options.get("overrides", ()))
+        return Run(folder, config, resume, options.get("quiet", False))
+
+    def fit(
+        self, task: Task, name: str, texture: Callable[[dict[str, Any]], Learned], **training: Any
+    ) -> Learned:
+        """Trains, and saves the texture as `texture.safetensors` in the run folder.
+
+        Args:
+            task: The method's part of the training.
+            name: Of what is learned.
+            texture: Makes the texture, given what a model file tells of its training.
+            training: Options of `train`: learning rate, schedule, optimizer.
+
+        Raises:
+            MitexError, Interrupted: As `train`.
+        """
+        result = train(task, self.config, self.folder, resume=self.resume, quiet=self.quiet, **training)
+        made = texture(result.about(name, self.config.preset))
+        made.save(self.folder / NAME)
+        return made
