@@ -41,14 +41,8 @@ class FitOptions:
     settings: Annotated[bool, arg(help_behavior_hint="")] = False
     """List the settings with their meaning, values in the preset and ranges, and do nothing else."""
 
-    resume: Annotated[bool, arg(help_behavior_hint="")] = False
-    """Go on from the run's checkpoint."""
-
     seed: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the preset's)")] = None
     """Random seed."""
-
-    steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the preset's)")] = None
-    """Training steps."""
 
     quiet: Annotated[bool, arg(help_behavior_hint="")] = False
     """Show no progress."""
@@ -58,14 +52,12 @@ class FitOptions:
         raise NotImplementedError
 
     def run_options(self, **flags: object) -> RunOptions:
-        """Checks seed and steps; what every `fit` takes, with these and further `flags` as settings."""
+        """Checks the seed; what every `fit` takes, with further `flags` as settings."""
         in_range("--seed", self.seed, *SEEDS)
-        in_range("--steps", self.steps, 1)
         return RunOptions(
             preset=self.preset,
             config=self.config,
-            overrides=merged_settings(self.set, seed=self.seed, steps=self.steps, **flags),
-            resume=self.resume,
+            overrides=merged_settings(self.set, seed=self.seed, **flags),
             quiet=self.quiet,
         )
 
@@ -75,7 +67,22 @@ class FitOptions:
 
 
 @dataclass(kw_only=True)
-class ExemplarOptions(FitOptions):
+class TrainingOptions(FitOptions):
+    """Options of the methods that train step by step."""
+
+    resume: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Go on from the run's checkpoint."""
+
+    steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the preset's)")] = None
+    """Training steps."""
+
+    def run_options(self, **flags: object) -> RunOptions:
+        in_range("--steps", self.steps, 1)
+        return {**super().run_options(steps=self.steps, **flags), "resume": self.resume}
+
+
+@dataclass(kw_only=True)
+class ExemplarOptions(TrainingOptions):
     """Options of the methods that learn from images."""
 
     exemplar: Annotated[str, arg(metavar="IMAGE|DIR|NAME")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -63,7 +64,7 @@ class Run(Generic[Config]):
         config = resolve(presets, options.get("preset"), file, options.get("overrides", ()))
         return Run(folder, config, resume, options.get("quiet", False))
 
-    def fit(
+    def train(
         self, task: Task, name: str, texture: Callable[[dict[str, Any]], Learned], **training: Any
     ) -> Learned:
         """Trains, and saves the texture as `texture.safetensors` in the run folder.
@@ -78,6 +79,30 @@ class Run(Generic[Config]):
             MitexError, Interrupted: As `train`.
         """
         result = train(task, self.config, self.folder, resume=self.resume, quiet=self.quiet, **training)
-        made = texture(result.about(name, self.config.preset))
-        made.save(self.folder / NAME)
-        return made
+        learned = texture(result.about(name, self.config.preset))
+        learned.save(self.folder / NAME)
+        return learned
+
+    def compute(
+        self, method: str, name: str, texture: Callable[[dict[str, Any]], Learned], **metadata: str
+    ) -> Learned:
+        """Saves a texture that needs no training in the run folder, with the settings beside it.
+
+        Args:
+            method: By its name.
+            name: Of what the texture shows.
+            texture: Makes the texture, given what a model file tells of it.
+            metadata: Further lines of config.toml's table `run`.
+
+        Raises:
+            OutputError: The folder cannot be used or written.
+        """
+        began = time.monotonic()
+        with run.opened(self.folder, self.resume) as (folder, metrics):
+            run.prepare(folder, self.config, {"method": method, **metadata})
+            about = {"name": name, "preset": self.config.preset}
+            computed = texture(about)
+            seconds = round(time.monotonic() - began, 1)
+            metrics.write({"step": 0, "seconds": seconds})
+            computed.save(folder / NAME)
+        return computed

@@ -55,10 +55,7 @@ class FitConfig:
     """
 
     preset: str = key("default", "the preset that the settings started from")
-    steps: int = key(1000, "training steps", 1)
     seed: int = key(0, "of all randomness", 0, MOST_SEEDS)
-    checkpoint_every: int = key(100, "steps between two checkpoints", 1)
-    preview_every: int = key(100, "steps between two previews; 0 makes none", 0)
 
     def __post_init__(self) -> None:
         kinds = typing.get_type_hints(type(self))
@@ -66,6 +63,15 @@ class FitConfig:
             value = getattr(self, one.name)
             _check_choice(one.name, value, kinds[one.name])
             _check_range(one.name, value, *bounds(type(self), one))
+
+
+@dataclass(frozen=True)
+class TrainingConfig(FitConfig):
+    """What the configs of methods have that train step by step."""
+
+    steps: int = key(1000, "training steps", 1)
+    checkpoint_every: int = key(100, "steps between two checkpoints", 1)
+    preview_every: int = key(100, "steps between two previews; 0 makes none", 0)
 
 
 def meaning(config: type[FitConfig], one: Field) -> str:

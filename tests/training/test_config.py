@@ -8,12 +8,12 @@ import pytest
 
 from mitex.errors import ConfigError
 from mitex.training.config import resolve
-from mitex.training.settings import FitConfig, bounds, key, meaning, table
+from mitex.training.settings import TrainingConfig, bounds, key, meaning, table
 from mitex.training.toml import to_toml
 
 
 @dataclass(frozen=True)
-class Config(FitConfig):
+class Config(TrainingConfig):
     preset: str = "patch"
     steps: int = 100
     lr: float = key(1e-3, "learning rate", 0, 1)
@@ -119,7 +119,7 @@ def test_wrong_values_name_key_value_and_what_is_wanted(setting):
     ("setting", "message"),
     [
         ("stepps=3", "there is no key 'stepps'; use 'steps'"),
-        ("zzz=3", "there is no key 'zzz'; use one of preset, steps, seed, checkpoint_every"),
+        ("zzz=3", "there is no key 'zzz'; use one of preset, seed, steps, checkpoint_every"),
         ("steps", "'steps' is not a setting; write key=value"),
         ("=3", "'=3' is not a setting; write key=value"),
         ("preset=papr", "there is no preset 'papr'; use 'paper'"),
@@ -220,7 +220,7 @@ class TestKeys:
 
     def test_a_key_without_a_meaning_is_a_mistake_in_the_class(self):
         @dataclass(frozen=True)
-        class Bare(FitConfig):
+        class Bare(TrainingConfig):
             width: int = 3
 
         with pytest.raises(TypeError, match="Bare.width is not declared"):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import arg
 
 from mitex.methods.checks import SEEDS, in_range
-from mitex.methods.options import FitOptions, MeshOptions
+from mitex.methods.options import MeshOptions, TrainingOptions
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
@@ -21,7 +21,7 @@ TEMPLATE = "template"  # as a mesh: the one that the texture's training started 
 
 
 @dataclass(kw_only=True)
-class Fit(FitOptions):
+class Fit(TrainingOptions):
     """Learn the geometric texture of one mesh with a hierarchy of face-convolution GANs.
 
     The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the texture;

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from mitex.errors import ConfigError
-from mitex.training.settings import FitConfig, key
+from mitex.training.settings import TrainingConfig, key
 
 MAX_LEVELS = 7  # 0 to 6
 
 
 @dataclass(frozen=True)
-class GeometricConfig(FitConfig):
+class GeometricConfig(TrainingConfig):
     """Settings of a fit; every key can be set from a TOML file or with `--set`."""
 
     preset: str = "fast"

@@ -64,7 +64,7 @@ def fit(
     task = GeometricTask(config, hierarchy, torch.from_numpy(start.vertices), meshes, shape)
     origin = {key: getattr(config, key) for key in ("levels", "noise", "remeasure")}
     origin["fit"] = [vars(r) for r in reports]
-    return run.fit(
+    return run.train(
         task,
         shape.name,
         lambda about: GeometricTexture(task.generators[: config.levels], start, task.fixed, about | origin),

@@ -7,11 +7,11 @@ from typing import Literal
 
 from mitex.errors import ConfigError
 from mitex.features.layers import LAYERS
-from mitex.training.settings import FitConfig, key
+from mitex.training.settings import TrainingConfig, key
 
 
 @dataclass(frozen=True)
-class NcaConfig(FitConfig):
+class NcaConfig(TrainingConfig):
     """Everything that shapes a training; every key can be set from a TOML file or with `--set`."""
 
     preset: str = "patch"

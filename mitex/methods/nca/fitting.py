@@ -47,7 +47,7 @@ def fit(
         parent, about = _parent(init, config)
         origin["parent"] = str(about["name"])
     task = NcaTask(config, maps, parent)
-    return run.fit(
+    return run.train(
         task,
         maps.name,
         lambda about: NcaTexture(task.model, tuple(task.maps), about | origin),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import arg
 
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
-from mitex.methods.options import PICTURES, FitOptions, MeshOptions
+from mitex.methods.options import PICTURES, MeshOptions, TrainingOptions
 
 if TYPE_CHECKING:
     from mitex.methods.nerf.applied import AppliedTexture
@@ -19,7 +19,7 @@ RESOLUTION = 512  # of a picture [pixels]
 
 
 @dataclass(kw_only=True)
-class Fit(FitOptions):
+class Fit(TrainingOptions):
     """Capture a texture with its meso-structure from photos (NeRF-Texture).
 
     The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the texture;

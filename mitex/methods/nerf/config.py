@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from mitex.errors import ConfigError
-from mitex.training.settings import FitConfig, key
+from mitex.training.settings import TrainingConfig, key
 
 
 @dataclass(frozen=True)
-class NerfConfig(FitConfig):
+class NerfConfig(TrainingConfig):
     """Settings of a fit; every key can be set from a TOML file or with `--set`."""
 
     preset: str = "fast"

@@ -62,7 +62,7 @@ def fit(
     task = TextureTask(config, learned, (held_out, 0), projection, frames, base.thickness)
     origin: dict[str, Any] = {key: getattr(config, key) for key in files.SETTINGS}
     origin |= {"centre": photos.similarity.center.tolist(), "scale": float(photos.similarity.scale)}
-    return run.fit(
+    return run.train(
         task,
         photos.name,
         lambda about: NerfTexture(_model(base, frames, task, about | origin)),

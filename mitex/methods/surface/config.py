@@ -7,11 +7,11 @@ from typing import Literal
 
 from mitex.errors import ConfigError
 from mitex.features.layers import LAYERS, LAYERS_19, with_poolings
-from mitex.training.settings import FitConfig, key
+from mitex.training.settings import TrainingConfig, key
 
 
 @dataclass(frozen=True)
-class SurfaceConfig(FitConfig):
+class SurfaceConfig(TrainingConfig):
     """Everything that shapes a synthesis; every key can be set from a TOML file or with `--set`."""
 
     preset: str = "fast"

@@ -84,7 +84,7 @@ def fit(
     known = {"content": content_key(start), "orientation": content_key(field)}
     task = SurfaceTask(settings, shown, surface, texels, levels, start, known)
     origin: dict[str, Any] = {key: getattr(settings, key) for key in ("resolution", "frames", "angle")}
-    return run.fit(
+    return run.train(
         task,
         shown.name,
         lambda about: SurfaceTexture(
