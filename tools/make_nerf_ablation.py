@@ -19,7 +19,7 @@ from make_nerf_gallery import CELL, GALLERY, picture, plane
 from mitex.images import write_image
 from mitex.methods.nerf import NerfTexture, load_capture
 from mitex.methods.nerf.elevations import compare_elevations
-from mitex.methods.nerf.networks import FEATURES
+from mitex.methods.nerf.field.networks import FEATURES
 from mitex.render import sheet
 
 SIZE = 512  # of the maps that are shown [texels]

@@ -22,8 +22,8 @@ from mitex.images import write_image
 from mitex.mesh import Mesh
 from mitex.mesh.shapes import grid
 from mitex.methods.nerf import NerfTexture, load_capture
-from mitex.methods.nerf.applied import AppliedTexture
 from mitex.methods.nerf.evaluation import view_pair, view_quality
+from mitex.methods.nerf.use.applied import AppliedTexture
 from mitex.render import sheet, tone
 from mitex.render.shell import shell_still
 

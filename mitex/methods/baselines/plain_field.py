@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from mitex.methods.nerf.capture import Capture
+from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.config import NerfConfig
-from mitex.methods.nerf.plain import PlainTask, trained
+from mitex.methods.nerf.training.plain import PlainTask, trained
 from mitex.training import run
 
 PROBED, LAST = 1000, 200  # steps of the training that tells the pace, and of those the ones that tell it

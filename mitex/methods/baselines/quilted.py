@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from mitex.errors import ConfigError
-from mitex.methods.nerf.matching import ArraySource
-from mitex.methods.nerf.patches import Patches
-from mitex.methods.nerf.quilting import quilt
+from mitex.methods.nerf.synthesis.matching import ArraySource
+from mitex.methods.nerf.synthesis.patches import Patches
+from mitex.methods.nerf.synthesis.quilting import quilt
 
 
 def quilted_albedo(

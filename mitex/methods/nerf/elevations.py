@@ -14,19 +14,19 @@ from typing import Any
 
 import numpy as np
 
+from mitex.evaluation.metrics import single_image_frechet
 from mitex.frames import orthonormal
 from mitex.mesh import grid
 from mitex.methods.baselines.quilted import quilted_albedo
-from mitex.methods.nerf.applied import EXTENT
-from mitex.methods.nerf.capture import Capture
-from mitex.methods.nerf.lighting import rotated
-from mitex.methods.nerf.maps import LatentMaps
-from mitex.methods.nerf.patches import principal_direction
-from mitex.methods.nerf.pictures import pictured
-from mitex.methods.nerf.radiance import seen
-from mitex.methods.nerf.sights import Sight, Sights, window_rays
+from mitex.methods.nerf.capture.capture import Capture
+from mitex.methods.nerf.field.lighting import rotated
+from mitex.methods.nerf.field.raycast import Sight, Sights, window_rays
+from mitex.methods.nerf.synthesis.maps import LatentMaps
+from mitex.methods.nerf.synthesis.patch_images import pictured
+from mitex.methods.nerf.synthesis.patches import principal_direction
 from mitex.methods.nerf.texture import NerfTexture
-from mitex.metrics import single_image_frechet
+from mitex.methods.nerf.training.radiance import seen
+from mitex.methods.nerf.use.applied import EXTENT
 from mitex.runtime import load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)

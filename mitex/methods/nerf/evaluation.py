@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mitex.evaluation.metrics import psnr, ssim, vgg_distance
 from mitex.integrators.march import RadianceField
-from mitex.methods.nerf.capture import Capture
-from mitex.methods.nerf.pixels import Pixels
-from mitex.methods.nerf.radiance import look
-from mitex.metrics import psnr, ssim, vgg_distance
+from mitex.methods.nerf.capture.capture import Capture
+from mitex.methods.nerf.capture.pixels import Pixels
+from mitex.methods.nerf.training.radiance import look
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class ViewQuality:
     Attributes:
         psnr: [dB].
         ssim: structural similarity.
-        vgg: `mitex.metrics.vgg_distance`, which takes the place of LPIPS.
+        vgg: `mitex.evaluation.metrics.vgg_distance`, which takes the place of LPIPS.
     """
 
     psnr: float

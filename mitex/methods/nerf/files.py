@@ -11,11 +11,11 @@ import numpy as np
 import torch
 
 from mitex.mesh import Mesh
-from mitex.methods.nerf.coarse import BaseShape
+from mitex.methods.nerf.base.coarse import BaseShape
 from mitex.methods.nerf.config import NerfConfig
-from mitex.methods.nerf.field import Encoding
-from mitex.methods.nerf.lighting import COEFFICIENTS
-from mitex.methods.nerf.networks import MATRICES, weight_shapes
+from mitex.methods.nerf.field.decoder import Encoding
+from mitex.methods.nerf.field.lighting import COEFFICIENTS
+from mitex.methods.nerf.field.networks import MATRICES, weight_shapes
 from mitex.runtime import init
 from mitex.training import model_file
 

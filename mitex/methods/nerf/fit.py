@@ -7,14 +7,14 @@ from pathlib import Path
 
 from mitex.mesh import Mesh
 from mitex.methods.nerf import files
-from mitex.methods.nerf.base_shape import face_frames
-from mitex.methods.nerf.capture import Capture, load_capture
-from mitex.methods.nerf.coarse import find_base
+from mitex.methods.nerf.base.base_shape import face_frames
+from mitex.methods.nerf.base.coarse import find_base
+from mitex.methods.nerf.capture.capture import Capture, load_capture
 from mitex.methods.nerf.config import PRESETS
-from mitex.methods.nerf.projection import Projection
-from mitex.methods.nerf.radiance import learn
-from mitex.methods.nerf.task import TextureTask
+from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.texture import NerfTexture
+from mitex.methods.nerf.training.radiance import learn
+from mitex.methods.nerf.training.task import TextureTask
 from mitex.runtime import init, keep_freed_memory
 from mitex.training import run
 

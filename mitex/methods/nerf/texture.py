@@ -12,19 +12,25 @@ from mitex.atlas import laid_out
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, Similarity
 from mitex.methods.nerf import files
-from mitex.methods.nerf.applied import EXTENT, UNWRAPPED, AppliedTexture, centred, stretch
-from mitex.methods.nerf.field import Decoder, Encoding
-from mitex.methods.nerf.guide import WEIGHT, Guide
-from mitex.methods.nerf.itself import own_maps
-from mitex.methods.nerf.maps import LatentMaps
-from mitex.methods.nerf.patches import SIZE as PATCH
-from mitex.methods.nerf.patches import FeatureSource, Patches, extract_patches, mirrored_frames, texel_gap
-from mitex.methods.nerf.pictures import pictured
-from mitex.methods.nerf.projection import Projection
-from mitex.methods.nerf.quilting import Quilt, quilt
-from mitex.methods.nerf.radiance import look_step
-from mitex.methods.nerf.shell import CapturedLatents, Shell
-from mitex.methods.nerf.tensors import channels
+from mitex.methods.nerf.field.decoder import Decoder, Encoding
+from mitex.methods.nerf.field.projection import Projection
+from mitex.methods.nerf.field.shell import CapturedLatents, Shell
+from mitex.methods.nerf.field.tensors import channels
+from mitex.methods.nerf.synthesis.guide import WEIGHT, Guide
+from mitex.methods.nerf.synthesis.maps import LatentMaps
+from mitex.methods.nerf.synthesis.patch_images import pictured
+from mitex.methods.nerf.synthesis.patches import SIZE as PATCH
+from mitex.methods.nerf.synthesis.patches import (
+    FeatureSource,
+    Patches,
+    extract_patches,
+    mirrored_frames,
+    texel_gap,
+)
+from mitex.methods.nerf.synthesis.quilting import Quilt, quilt
+from mitex.methods.nerf.training.radiance import look_step
+from mitex.methods.nerf.use.applied import EXTENT, UNWRAPPED, AppliedTexture, centred, stretch
+from mitex.methods.nerf.use.self_maps import own_maps
 from mitex.runtime import init, load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)

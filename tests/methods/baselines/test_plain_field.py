@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mitex.evaluation.metrics import psnr
 from mitex.methods.baselines import plain_field
 from mitex.methods.nerf.config import PRESETS
 from mitex.methods.nerf.evaluation import view_pair
-from mitex.metrics import psnr
 from mitex.training import run
 from tests.methods.nerf.tiny import tiny_capture
 

@@ -14,17 +14,17 @@ from scipy.spatial.transform import Rotation
 
 from mitex.asset import Asset
 from mitex.errors import CheckpointError, ConfigError, MeshError, OutputError
+from mitex.evaluation.metrics import psnr
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nerf import PRESETS, NerfTexture, files, fit
-from mitex.methods.nerf.base_shape import face_frames
-from mitex.methods.nerf.light_estimate import estimated_light
-from mitex.methods.nerf.pixels import Pixels
-from mitex.methods.nerf.projection import Projection
-from mitex.methods.nerf.radiance import look
-from mitex.methods.nerf.shell import Located
-from mitex.methods.nerf.task import BURIED, POSE, TextureTask
-from mitex.methods.nerf.tensors import rows
-from mitex.metrics import psnr
+from mitex.methods.nerf.base.base_shape import face_frames
+from mitex.methods.nerf.capture.pixels import Pixels
+from mitex.methods.nerf.field.projection import Projection
+from mitex.methods.nerf.field.shell import Located
+from mitex.methods.nerf.field.tensors import rows
+from mitex.methods.nerf.training.light_estimate import estimated_light
+from mitex.methods.nerf.training.radiance import look
+from mitex.methods.nerf.training.task import BURIED, POSE, TextureTask
 from mitex.runtime import init
 from mitex.training import checkpoint
 from mitex.training.config import resolve

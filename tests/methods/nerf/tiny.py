@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from mitex.mesh import Mesh, Similarity, icosphere
-from mitex.methods.nerf.capture import Capture
+from mitex.methods.nerf.capture.capture import Capture
 from mitex.runtime import init
 from mitex.scenes.stage import mesh_shape
 
