@@ -9,7 +9,8 @@ from typing import Any
 import torch
 from torch.nn import functional as F
 
-from mitex.methods.nerf.field.decoder import DULL, Encoding, Reflection
+from mitex.methods.nerf.field.decoder import DULL, Reflection
+from mitex.methods.nerf.field.encoding import Encoding
 from mitex.methods.nerf.field.networks import COARSE
 
 PRIMES = (1, 2654435761, 805459861)

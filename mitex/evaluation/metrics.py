@@ -32,7 +32,7 @@ def psnr(a: np.ndarray, b: np.ndarray, mask: np.ndarray | None = None) -> float:
     """
     _check_pair(a, b)
     squares = np.square(a.astype(np.float64) - b)
-    error = float(_chosen(squares, mask).mean())
+    error = float(_masked(squares, mask).mean())
     return math.inf if error == 0 else -10 * math.log10(error)
 
 
@@ -66,7 +66,7 @@ def ssim(a: np.ndarray, b: np.ndarray, mask: np.ndarray | None = None) -> float:
     if mask is not None:
         _check_mask(a, mask)
         mask = mask[inner, inner]
-    return float(_chosen(maps[1][inner, inner], mask).mean())
+    return float(_masked(maps[1][inner, inner], mask).mean())
 
 
 def vgg_distance(
@@ -99,7 +99,7 @@ def vgg_distance(
     for layer, maps in _features(np.stack((a, b)), layers).items():
         one, other = F.normalize(maps.double(), dim=3)
         squares = (one - other).square().sum(2).numpy()
-        total += float(_chosen(squares, _cells(a, mask, layer)).mean())
+        total += float(_masked(squares, _cells(a, mask, layer)).mean())
     return total
 
 
@@ -174,7 +174,7 @@ def _vectors(image: np.ndarray, layer: str, mask: np.ndarray | None) -> torch.Te
     """Features of the positions that count, (n, C) float64."""
     _check(image)
     (maps,) = _features(image[None], [layer])[layer].double().numpy()
-    return torch.from_numpy(_chosen(maps, _cells(image, mask, layer)))
+    return torch.from_numpy(_masked(maps, _cells(image, mask, layer)))
 
 
 def _cells(image: np.ndarray, mask: np.ndarray | None, layer: str) -> np.ndarray | None:
@@ -188,7 +188,7 @@ def _cells(image: np.ndarray, mask: np.ndarray | None, layer: str) -> np.ndarray
     return np.asarray(whole.all((1, 3)))
 
 
-def _chosen(values: np.ndarray, mask: np.ndarray | None) -> np.ndarray:
+def _masked(values: np.ndarray, mask: np.ndarray | None) -> np.ndarray:
     """Values (H, W) or (H, W, C) at the places of a mask (H, W), in a row; all without one."""
     if mask is None:
         return values.reshape(-1, *values.shape[2:])

@@ -21,7 +21,7 @@ def quilted_albedo(
 
     Args:
         patches: P squares on the base shape.
-        pictures: what they look like from above, (P, S, S, 3) sRGB in [0, 1], in the order of their texels.
+        pictures: (P, S, S, 3) sRGB in [0, 1], as of `render_patches`, in the order of the patches' texels.
         size: height and width [texels].
         rng: of all choices.
         tileable: the image can be repeated.

@@ -32,7 +32,7 @@ def fit(
 ) -> NerfTexture:
     """Learns a surface with its meso-structure from photos; writes a run folder with the model in it.
 
-    Every eighth view is held out; previews show the first of these. The base shape is found first and kept in
+    Every eighth view is held out; previews show the first of these. The base shape is found first and mean in
     the user's cache folder.
 
     Args:
@@ -60,24 +60,24 @@ def fit(
         given = given.with_vertices(photos.similarity.apply(given.vertices))
     init()
     keep_freed_memory()
-    learned, held = photos.split()
-    base = find_base(learned, settings, given, quiet)
+    training, held_out = photos.split()
+    base = find_base(training, settings, given, quiet)
     frames = face_frames(base.mesh)
     projection = Projection(
-        base.mesh, neighbours=settings.neighbours, pull=settings.pull, reach=base.thickness
+        base.mesh, neighbours=settings.neighbours, repulsion=settings.repulsion, reach=base.thickness
     )
-    task = TextureTask(settings, learned, (held, 0), projection, frames, base.thickness)
+    task = TextureTask(settings, training, (held_out, 0), projection, frames, base.thickness)
     result = learn(task, settings, out, resume=resume, quiet=quiet)
     about = result.about(photos.name, settings.preset)
     about |= {key: getattr(settings, key) for key in files.SETTINGS}
     about |= {"centre": photos.similarity.center.tolist(), "scale": float(photos.similarity.scale)}
-    kept = task.mean
+    mean = task.mean
     model = files.Model(
         base,
         frames,
-        [kept["tables/f"], kept["tables/phase"]],
-        [value for name, value in kept.items() if name.startswith("weights/")],
-        kept["light"],
+        [mean["tables/f"], mean["tables/phase"]],
+        [value for name, value in mean.items() if name.startswith("weights/")],
+        mean["light"],
         task.occupancy.occupied,
         about,
     )

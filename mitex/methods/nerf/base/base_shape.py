@@ -17,7 +17,7 @@ from mitex.frames import orthonormal
 from mitex.mesh import Mesh, remesh
 from mitex.mesh.remesh import simplified
 from mitex.mesh.topology import boundary_edges, components
-from mitex.methods.nerf.base.convex_parts import convex_pieces, union
+from mitex.methods.nerf.base.convex_parts import convex_parts, union
 from mitex.methods.nerf.base.isosurface import isosurface, without_cavities
 from mitex.methods.nerf.field.projection import Projection
 
@@ -25,7 +25,7 @@ EDGE = 0.005  # of the bounding box's diagonal
 SMALL = 0.2  # of the largest component's faces: smaller components are dropped
 FACES = 5_000  # of the mesh that is cut into convex pieces
 CELLS = 2.0  # edges of the base shape that make a cell of the grid on which the pieces are united
-FINE = 2.0  # edges may be so many times longer than wanted, or a given base mesh is remeshed
+FINE = 2.0  # edges may be so many times longer than asked for, or a given base mesh is remeshed
 PERCENTILE = 70.0
 CUBE = 1.001  # the scene cube with a little room for rounding
 
@@ -67,8 +67,8 @@ def base_shape(
     dense = isosurface(without_cavities(clipped, threshold), threshold, low=low, cell=cell, name="base")
     dense = _large_components(dense)
     length = edge * _diagonal(dense)
-    pieces = convex_pieces(simplified(dense, FACES) if len(dense.faces) > FACES else dense, concavity)
-    rough = replace(union(pieces, CELLS * length), name=dense.name)
+    parts = convex_parts(simplified(dense, FACES) if len(dense.faces) > FACES else dense, concavity)
+    rough = replace(union(parts, CELLS * length), name=dense.name)
     return _even(_into_box(_laplacian(rough, smooth), dense), length)
 
 
@@ -79,7 +79,7 @@ def given_base(mesh: Mesh, edge: float = EDGE) -> Mesh:
 
     Args:
         mesh: in the scene cube.
-        edge: wanted length of the edges [diagonals of the bounding box].
+        edge: length of the edges [diagonals of the bounding box].
 
     Raises:
         MeshError: it is not in the scene cube.
@@ -128,17 +128,17 @@ def shell_thickness(points: np.ndarray, projection: Projection) -> float:
     Raises:
         MeshError: no point has a foot.
     """
-    feet = projection(points)
-    if not feet.hit.any():
+    projections = projection(points)
+    if not projections.hit.any():
         raise MeshError("no point of the scan projects onto the base shape", "check the base mesh's place")
-    return 2.0 * float(np.percentile(np.abs(feet.distance[feet.hit]), PERCENTILE))
+    return 2.0 * float(np.percentile(np.abs(projections.distance[projections.hit]), PERCENTILE))
 
 
 def _large_components(mesh: Mesh) -> Mesh:
     label = components(mesh.edges)[1][mesh.faces[:, 0]]
     size = np.bincount(label)
-    kept = mesh.faces[(size >= SMALL * size.max())[label]]
-    used, faces = np.unique(kept, return_inverse=True)
+    large = mesh.faces[(size >= SMALL * size.max())[label]]
+    used, faces = np.unique(large, return_inverse=True)
     return Mesh(mesh.vertices[used], faces.reshape(-1, 3), name=mesh.name)
 
 
@@ -156,9 +156,9 @@ def _laplacian(mesh: Mesh, rounds: int) -> Mesh:
 def _into_box(mesh: Mesh, other: Mesh) -> Mesh:
     """The mesh stretched along the axes to another's bounding box."""
     low, high = mesh.vertices.min(0), mesh.vertices.max(0)
-    wanted_low, wanted_high = other.vertices.min(0), other.vertices.max(0)
+    target_low, target_high = other.vertices.min(0), other.vertices.max(0)
     return mesh.with_vertices(
-        wanted_low + (mesh.vertices - low) * ((wanted_high - wanted_low) / (high - low))
+        target_low + (mesh.vertices - low) * ((target_high - target_low) / (high - low))
     )
 
 

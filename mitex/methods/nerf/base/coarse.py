@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 
 from mitex.cache import cached, content_key
-from mitex.integrators.march import traverse
+from mitex.integrators.march import composite
 from mitex.mesh import Mesh
 from mitex.methods.nerf.base.base_shape import base_shape, given_base, shell_thickness
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.pixels import Pixels
 from mitex.methods.nerf.config import NerfConfig
-from mitex.methods.nerf.field.occupancy import gridded
+from mitex.methods.nerf.field.occupancy import sample_grid
 from mitex.methods.nerf.field.projection import Projection
-from mitex.methods.nerf.training.plain import PlainTask, trained
-from mitex.methods.nerf.training.radiance import rays_of
+from mitex.methods.nerf.field.rendering import batch_rays
+from mitex.methods.nerf.training.plain import PlainTask, train_plain_field
 from mitex.paths import cache_dir
 from mitex.runtime import load_mitsuba
 
@@ -29,7 +29,7 @@ import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit o
 VERSION = 1  # of the base shapes in the cache
 COARSE = dict(  # what the coarse field needs less of
     table=15,
-    cells=256,
+    ray_steps=256,
     rays=1024,
     occupancy=64,
     one_view=False,
@@ -78,25 +78,25 @@ def find_base(
     coarse = replace(config, **COARSE, steps=steps, lr_steps=steps)
     arrays = (*capture.images, capture.poses, capture.intrinsics, capture.distortion)
     mesh = () if given is None else (given.vertices, given.faces)
-    settings = (config.seed, steps, config.lr, config.concavity, config.pull, config.neighbours)
+    settings = (config.seed, steps, config.lr, config.concavity, config.repulsion, config.neighbours)
     place = cache_dir() / "nerf" / content_key(VERSION, *arrays, *mesh, *settings)
 
-    def find() -> BaseShape:
-        task = trained(coarse, capture, (capture, 0), place.with_suffix(".run"), quiet)
+    def compute() -> BaseShape:
+        task = train_plain_field(coarse, capture, (capture, 0), place.with_suffix(".run"), quiet)
         _say("cutting the base shape out of the coarse field, about a minute", quiet)
         base = _shape_of(task, config) if given is None else given_base(given)
-        scan = scanned(task)
-        projection = Projection(base, neighbours=config.neighbours, pull=config.pull)
+        scan = scan_surface(task)
+        projection = Projection(base, neighbours=config.neighbours, repulsion=config.repulsion)
         return BaseShape(base, scan, shell_thickness(scan, projection))
 
-    found = cached(place, find, _read, _write)
-    _say(f"base shape of {len(found.mesh.faces):,} faces, shell of +-{found.thickness:.3f}", quiet)
-    return found
+    base = cached(place, compute, _read, _write)
+    _say(f"base shape of {len(base.mesh.faces):,} faces, shell of +-{base.thickness:.3f}", quiet)
+    return base
 
 
 def _shape_of(task: PlainTask, config: NerfConfig) -> Mesh:
     occupied = task.occupancy.occupied.astype(bool)
-    density = gridded(task.field(task.mean).density_at, occupied, GRID)
+    density = sample_grid(task.field(task.mean).density_at, occupied, GRID)
     return base_shape(density, concavity=config.concavity)
 
 
@@ -105,31 +105,31 @@ def _say(line: str, quiet: bool) -> None:
         print(line, file=sys.stderr, flush=True)
 
 
-def scanned(task: PlainTask) -> np.ndarray:
+def scan_surface(task: PlainTask) -> np.ndarray:
     """(M, 3) float32 points where rays of views from all around become solid."""
     capture, field = task.pixels.capture, task.field(task.mean)
-    found = []
+    points = []
     for view in _farthest(capture.poses[:, :, 3], VIEWS):
         batch, _ = Pixels(capture).image(int(view), SCAN_SIDE)
-        origin, direction = rays_of(batch)
-        seen = traverse(field, origin, direction, dr.full(mi.Float, 0.5, dr.width(origin)))
-        opacity = 1 - np.array(seen.through)
+        origin, direction = batch_rays(batch)
+        pixels = composite(field, origin, direction, dr.full(mi.Float, 0.5, dr.width(origin)))
+        opacity = 1 - np.array(pixels.transmittance)
         solid = opacity > SOLID
-        depth = (np.array(seen.depth)[solid] / opacity[solid])[:, None]
-        found.append(batch.origins[solid] + batch.directions[solid] * depth)
-    points = np.concatenate(found)
+        depth = (np.array(pixels.depth)[solid] / opacity[solid])[:, None]
+        points.append(batch.origins[solid] + batch.directions[solid] * depth)
+    points = np.concatenate(points)
     _, first = np.unique(np.floor(points / VOXEL).astype(np.int64), axis=0, return_index=True)
     return points[np.sort(first)].astype(np.float32)
 
 
 def _farthest(points: np.ndarray, count: int) -> np.ndarray:
     """Indices of `count` points, each as far as can be from those before it."""
-    chosen = [0]
+    index = [0]
     distance = np.linalg.norm(points - points[0], axis=1)
     for _ in range(min(count, len(points)) - 1):
-        chosen.append(int(distance.argmax()))
-        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
-    return np.array(chosen)
+        index.append(int(distance.argmax()))
+        distance = np.minimum(distance, np.linalg.norm(points - points[index[-1]], axis=1))
+    return np.array(index)
 
 
 def _read(place: Path) -> BaseShape:

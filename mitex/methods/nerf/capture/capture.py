@@ -77,8 +77,8 @@ class Capture:
 
     def split(self, every: int = 8) -> tuple[Capture, Capture]:
         """Views to learn from, and every `every`-th, which is held out."""
-        held = np.arange(len(self)) % every == 0
-        return self._chosen(np.flatnonzero(~held)), self._chosen(np.flatnonzero(held))
+        test = np.arange(len(self)) % every == 0
+        return self._subset(np.flatnonzero(~test)), self._subset(np.flatnonzero(test))
 
     def within(self, similarity: Similarity) -> Capture:
         """The same photos in another scene cube, such as the one that a texture was learned in."""
@@ -86,7 +86,7 @@ class Capture:
         poses[:, :, 3] = similarity.apply(self.similarity.inverse(poses[:, :, 3]))
         return replace(self, poses=poses.astype(np.float32), similarity=similarity)
 
-    def _chosen(self, index: np.ndarray) -> Capture:
+    def _subset(self, index: np.ndarray) -> Capture:
         return replace(
             self,
             images=tuple(self.images[k] for k in index),
@@ -145,17 +145,17 @@ def assemble(frames: Sequence[Frame], name: str) -> Capture:
 
 def _read_images(frames: Sequence[Frame]) -> tuple[list[Frame], list[np.ndarray]]:
     """All images as RGBA, without views that were there before."""
-    kept, images, total = [], [], 0
-    seen: dict[bytes, str] = {}
+    unique, images, total = [], [], 0
+    names_by_key: dict[bytes, str] = {}
     for frame in frames:
         image = _rgba(frame)
         key = hashlib.sha256(frame.pose.tobytes() + image.tobytes()).digest()
-        if key in seen:
-            text = f"{frame.name} is the view {seen[key]} again; it is left out"
+        if key in names_by_key:
+            text = f"{frame.name} is the view {names_by_key[key]} again; it is left out"
             warnings.warn(text, CaptureWarning, stacklevel=2)
             continue
-        seen[key] = frame.name
-        kept.append(frame)
+        names_by_key[key] = frame.name
+        unique.append(frame)
         images.append(image)
         total += image.shape[0] * image.shape[1]
         if total > MAX_PIXELS:
@@ -163,7 +163,7 @@ def _read_images(frames: Sequence[Frame]) -> tuple[list[Frame], list[np.ndarray]
                 f"the images up to {frame.name} have over {MAX_PIXELS // 10**6} megapixels",
                 "scale them down, and w, h, fl_x, fl_y, cx, cy with them",
             )
-    return kept, images
+    return unique, images
 
 
 def _rgba(frame: Frame) -> np.ndarray:

@@ -14,7 +14,7 @@ from mitex.methods.nerf.capture.distortion import distort, undistort
 RESOLUTION = 64
 ROUNDS = 2
 DISSENT = 0.05  # part of the views that may call a voxel background: their masks may be wrong
-SEEN = 0.5  # part of the views that must tell of a voxel
+COVERAGE = 0.5  # part of the views that must tell of a voxel
 MASK_SIZE = 256  # longer side of the masks that carve [pixels]
 
 
@@ -135,21 +135,21 @@ def _carve(
     index = np.indices((RESOLUTION,) * 3).reshape(3, -1).T
     centres = low + (index + 0.5) * edge
     alive = np.arange(len(centres))
-    seen = np.zeros(len(centres), np.int32)
-    against = np.zeros(len(centres), np.int32)
+    coverage = np.zeros(len(centres), np.int32)
+    background_votes = np.zeros(len(centres), np.int32)
     count = len(views)
     # Neighbours in a video carve the same voxels: views in random order leave fewer to be looked at.
     for done, k in enumerate(np.random.default_rng(0).permutation(count), start=1):
         distance, stride = distances[k]
         reach = 0.5 * np.sqrt(3.0) * edge
         framed, background = _judged(views[k], distance, stride, centres[alive], reach)
-        seen[alive] += framed
-        against[alive] += background
-        possible = seen[alive] + count - done >= SEEN * count
-        alive = alive[possible & (against[alive] <= DISSENT * count)]
-    inside = np.zeros(len(centres), bool)
-    inside[alive] = True
-    return Hull(inside.reshape((RESOLUTION,) * 3), low, edge)
+        coverage[alive] += framed
+        background_votes[alive] += background
+        possible = coverage[alive] + count - done >= COVERAGE * count
+        alive = alive[possible & (background_votes[alive] <= DISSENT * count)]
+    occupied = np.zeros(len(centres), bool)
+    occupied[alive] = True
+    return Hull(occupied.reshape((RESOLUTION,) * 3), low, edge)
 
 
 def _judged(

@@ -1,7 +1,6 @@
-"""The field: latent features on the base shape, and the networks that read them (section 3.1.4).
+"""The networks that read the features of a point: density and reflection (section 3.1.4).
 
-Everything here is Dr.Jit. The parameters belong to whoever trains them, and come in with each call: hash
-tables as flat arrays, weights as matrices.
+The weights belong to whoever trains them, and come in with each call.
 """
 
 from __future__ import annotations
@@ -10,11 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mitex.methods.nerf.config import NerfConfig
-from mitex.methods.nerf.field.hash_grid import HashGrid
 from mitex.methods.nerf.field.mlp import network_rows, packed_networks
-from mitex.methods.nerf.field.networks import COARSE, FEATURES, LAYERS, OCTAVES, PHASES, REFLECTION, Networks
-from mitex.methods.nerf.field.tensors import stacked, unstacked
+from mitex.methods.nerf.field.networks import COARSE, LAYERS, OCTAVES, REFLECTION, Networks
+from mitex.methods.nerf.field.tensors import stack_rows, unstack_rows
 from mitex.runtime import load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
@@ -26,7 +23,7 @@ DULL = 3.0  # taken from the logit of k_s at grazing angles: surfaces start dull
 
 @dataclass
 class Reflection:
-    """What the networks say of a point.
+    """What the networks predict at a point.
 
     Attributes:
         exponent: natural logarithm of the density [1 / scene units].
@@ -50,11 +47,11 @@ class Reflection:
         return dr.exp(dr.minimum(self.exponent, HIGHEST))
 
     @property
-    def looks(self) -> list[Any]:
-        """What is in [0, 1]: k_d, and k_s from both sides."""
+    def reflectances(self) -> list[Any]:
+        """k_d (3) and k_s at both ends of its range, all in [0, 1]."""
         return [*self.diffuse, self.specular, self.grazing]
 
-    def mirrored(self, cosine: Any) -> Any:
+    def specular_at(self, cosine: Any) -> Any:
         """k_s under an angle to the normal, by Schlick's law with both ends learned (Hoffman 2019)."""
         return self.specular + (self.grazing - self.specular) * (1 - cosine) ** 5
 
@@ -63,31 +60,6 @@ class Reflection:
         sin_theta, cos_theta = dr.sincos(self.theta)
         sin_phi, cos_phi = dr.sincos(self.phi)
         return tangent * (sin_theta * cos_phi) + bitangent * (sin_theta * sin_phi) + normal * cos_theta
-
-
-class Encoding:
-    """Hash grids of f and f-hat over the scene cube [-1, 1]^3, looked up at foot points.
-
-    Args:
-        config: number, resolution and size of the levels.
-    """
-
-    def __init__(self, config: NerfConfig) -> None:
-        extent = config.coarsest, config.finest, config.table
-        self.grids = [HashGrid(channels // 2, *extent) for channels in (FEATURES, PHASES)]
-
-    @property
-    def sizes(self) -> list[int]:
-        """Lengths of the tables of f and f-hat."""
-        return [grid.size for grid in self.grids]
-
-    def levels(self, which: int) -> list[slice]:
-        """Where the levels lie in a table, 0 of f or 1 of f-hat."""
-        return self.grids[which].levels
-
-    def __call__(self, which: int, foot: Any, table: Any) -> list[Any]:
-        """Features at foot points, `mi.Point3f` in the cube: 0 for f (16 channels), 1 for f-hat (8)."""
-        return self.grids[which](foot, table)
 
 
 class Decoder:
@@ -101,20 +73,20 @@ class Decoder:
 
     def __init__(self, weights: Sequence[Any], packed: bool = False, low_precision: bool = False) -> None:
         self._low_precision = low_precision
-        given = iter(weights)
-        self.weights = {name: [next(given) for _ in widths[1:]] for name, widths in LAYERS.items()}
+        remaining = iter(weights)
+        self.weights = {name: [next(remaining) for _ in widths[1:]] for name, widths in LAYERS.items()}
         self._packed = (
             dict(zip(LAYERS, packed_networks(*self.weights.values()), strict=True)) if packed else {}
         )
 
     def exponent(self, f: Sequence[Any], distance: Any) -> Any:
         """Only the logarithm of the density."""
-        return network_rows(self._net("density"), [*f, *embedded(distance)])[0]
+        return network_rows(self._net("density"), [*f, *frequency_encoding(distance)])[0]
 
     def __call__(self, f: Sequence[Any], phase: Sequence[Any], distance: Any) -> Reflection:
         """Density and reflection for features f (16 arrays), f-hat (8) and signed distance [scene units]."""
         run = self._cooperative if self._packed else self._together
-        exponent, *reflection, theta, phi = run([*f], [*phase], embedded(distance))
+        exponent, *reflection, theta, phi = run([*f], [*phase], frequency_encoding(distance))
         *diffuse, specular, glossiness = reflection[:REFLECTION]
         specular, grazing = sigmoid(specular), reflection[REFLECTION:]
         return Reflection(
@@ -136,14 +108,14 @@ class Decoder:
     def _together(self, f: list[Any], phase: list[Any], fine: list[Any]) -> list[Any]:
         nets = list(self.weights.values())
         learning, moving = any(map(dr.grad_enabled, nets)), dr.grad_enabled(fine)
-        values = stacked(fine[COARSE:] + fine[:COARSE] + f + phase)
-        return unstacked(dr.custom(Networks, values, nets, learning, moving, self._low_precision))
+        values = stack_rows(fine[COARSE:] + fine[:COARSE] + f + phase)
+        return unstack_rows(dr.custom(Networks, values, nets, learning, moving, self._low_precision))
 
     def _net(self, name: str) -> Any:
         return self._packed.get(name, self.weights[name])
 
 
-def embedded(distance: Any) -> list[Any]:
+def frequency_encoding(distance: Any) -> list[Any]:
     """The signed distance itself, then its sine and cosine at 12 octaves from 1 rad per scene unit on."""
     values = [distance]
     for octave in range(OCTAVES):

@@ -66,13 +66,13 @@ class HashGrid:
 
     def __call__(self, points: Any, table: Any) -> list[Any]:
         """Features at `mi.Point3f`s, two arrays for each level; a flat `mi.Float` is the table."""
-        inside = dr.clip(points * 0.5 + 0.5, 0, 1)  # beyond its unit cube the grid returns garbage
+        place = dr.clip(points * 0.5 + 0.5, 0, 1)  # beyond its unit cube the grid returns garbage
         if dr.grad_enabled(table):
-            return self._level_by_level(inside, table)
+            return self._level_by_level(place, table)
         self._grid.data = table
-        found = list(self._grid(inside))
+        features = list(self._grid(place))
         self._grid.data = None
-        return found
+        return features
 
     def _level_by_level(self, points: Any, table: Any) -> list[Any]:
         """The same in one array over levels and points: the entries of a level stay in the cache.
@@ -87,13 +87,13 @@ class HashGrid:
         dense = dr.gather(mi.Bool, self._dense, level)
         low = mi.Point3u(dr.floor(place))
         share = place - low
-        found = mi.Vector2f(0)
+        features = mi.Vector2f(0)
         for corner in itertools.product((0, 1), repeat=3):
             x, y, z = (low[k] + corner[k] for k in range(3))
             hashed = (x ^ y * PRIMES[0] ^ z * PRIMES[1]) & self._mask
             entry = first + dr.select(dense, x + side * (y + side * z), hashed)
             weight = math.prod(share[k] if corner[k] else 1 - share[k] for k in range(3))
-            found = dr.fma(dr.gather(mi.Vector2f, table, entry), weight, found)
-        dr.eval(found)  # at once, or each channel would be looked up alone
+            features = dr.fma(dr.gather(mi.Vector2f, table, entry), weight, features)
+        dr.eval(features)  # at once, or each channel would be looked up alone
         rows = [(k, row_places(level, count)) for level in range(levels) for k in range(CHANNELS)]
-        return [dr.gather(mi.Float, found[k], row, mode=dr.ReduceMode.Permute) for k, row in rows]
+        return [dr.gather(mi.Float, features[k], row, mode=dr.ReduceMode.Permute) for k, row in rows]

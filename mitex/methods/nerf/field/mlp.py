@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 
 import torch
 
-from mitex.methods.nerf.field.tensors import stacked, unstacked
+from mitex.methods.nerf.field.tensors import stack_rows, unstack_rows
 from mitex.runtime import load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
@@ -36,15 +36,15 @@ _relu_backward = torch.ops.aten.threshold_backward.grad_input
 def on_threads(
     count: int, work: Callable[[Iterator[slice]], T], kind: torch.dtype = torch.float32
 ) -> list[T]:
-    """What `work` finds on each of torch's threads, which share the parts of `count` points.
+    """Results of `work` on each of torch's threads, which share the parts of `count` points.
 
     Each thread could take as many of them; one that the machine holds up takes fewer.
     """
     threads = torch.get_num_threads()  # torch first counts them here: in the pool it would find one
     most, grain = (CHUNK, 1) if kind == torch.float32 else (LONG, GRAIN)
     whole = count - count % grain
-    shares = threads * max(math.ceil(whole / threads / most), 1)
-    size = max(math.ceil(whole / shares / grain), 1) * grain
+    part_count = threads * max(math.ceil(whole / threads / most), 1)
+    size = max(math.ceil(whole / part_count / grain), 1) * grain
     starts = [*range(0, whole, size), whole, count]
     parts = iter([slice(start, end) for start, end in itertools.pairwise(starts) if end > start])
     return list(_pool.map(work, [parts] * threads))
@@ -56,7 +56,7 @@ def kind_of(part: slice, kind: torch.dtype) -> torch.dtype:
 
 
 def room(weights: Weights, count: int, kind: torch.dtype = torch.float32) -> list[torch.Tensor]:
-    """Where `forwards` puts what it finds between the layers, of `count` points."""
+    """Memory for what `forwards` computes between the layers, of `count` points."""
     return [torch.empty(count, len(weight), dtype=kind).T for weight in weights[:-1]]
 
 
@@ -72,13 +72,13 @@ def forwards(
         part: which of them.
         out: where the outputs of the part go.
     """
-    for weight, made in zip(weights[:-1], between, strict=True):
-        kept = made[:, part]
-        if kept.dtype == values.dtype:
-            values = torch.mm(values.T, weight.T, out=kept.T).T.relu_()
+    for weight, layer_room in zip(weights[:-1], between, strict=True):
+        outputs = layer_room[:, part]
+        if outputs.dtype == values.dtype:
+            values = torch.mm(values.T, weight.T, out=outputs.T).T.relu_()
         else:
             values = (values.T @ weight.T).T.relu_()
-            kept.copy_(values)
+            outputs.copy_(values)
     torch.mm(weights[-1], values, out=out)
 
 
@@ -88,22 +88,22 @@ def backwards(
     between: Weights,
     part: slice,
     gradient: torch.Tensor,
-    found: Weights,
+    sums: Weights,
 ) -> torch.Tensor:
     """The gradient of what the first layer makes, from that of the outputs.
 
     Args:
         weights, values, between, part: as of `forwards`; the first two of the gradient's type.
         gradient: of the outputs of the part.
-        found: those of the weights are added to it, float32; none if empty.
+        sums: gradients of the weights are added to it, float32; none if empty.
     """
     for k in reversed(range(len(weights))):
-        given = between[k - 1][:, part].to(gradient.dtype) if k else values
-        if found:
-            found[k].add_(gradient @ given.T)
+        inputs = between[k - 1][:, part].to(gradient.dtype) if k else values
+        if sums:
+            sums[k].add_(gradient @ inputs.T)
         if k:
             gradient = (gradient.T @ weights[k]).T  # the same as weights[k].T @ gradient, but by points
-            _relu_backward(gradient, given, 0, grad_input=gradient)
+            _relu_backward(gradient, inputs, 0, grad_input=gradient)
     return gradient
 
 
@@ -114,15 +114,15 @@ def weight_bound(shape: tuple[int, int]) -> float:
 
 def packed_networks(*nets: Sequence[Any]) -> list[Any]:
     """Networks for cooperative vectors, of the matrices (out, in) of each."""
-    made = []
+    modules = []
     for weights in nets:
         layers: list[Any] = []
         for weight in weights:
             linear: Any = nn.Linear(weight.shape[1], weight.shape[0], bias=False)
             linear.weights = weight
             layers += [linear, nn.ReLU()]
-        made.append(nn.Sequential(*layers[:-1]))
-    return list(nn.pack(*made))
+        modules.append(nn.Sequential(*layers[:-1]))
+    return list(nn.pack(*modules))
 
 
 def network_rows(net: Any, values: list[Any]) -> list[Any]:
@@ -134,7 +134,7 @@ def network_rows(net: Any, values: list[Any]) -> list[Any]:
     """
     if isinstance(net, nn.Module):
         return list(net(nn.CoopVec(*values)))
-    return unstacked(evaluate(net, stacked(values)))
+    return unstack_rows(evaluate(net, stack_rows(values)))
 
 
 def evaluate(weights: Sequence[Any], values: Any) -> Any:
@@ -148,37 +148,37 @@ class _Network(dr.CustomOp):
         self.values = values.torch()
         count = self.values.shape[1]
         self.between = room(self.weights, count)
-        found = torch.empty(len(self.weights[-1]), count)
+        outputs = torch.empty(len(self.weights[-1]), count)
 
         def work(parts: Iterator[slice]) -> None:
             for part in parts:
-                forwards(self.weights, self.values[:, part], self.between, part, found[:, part])
+                forwards(self.weights, self.values[:, part], self.between, part, outputs[:, part])
 
         on_threads(count, work)
-        return mi.TensorXf(found)
+        return mi.TensorXf(outputs)
 
     def backward(self) -> None:
         gradient: Any = self.grad_out()
-        given = gradient.torch()
+        of_outputs = gradient.torch()
         of_values = torch.empty_like(self.values)
 
         def work(parts: Iterator[slice]) -> Weights:
-            found = [torch.zeros_like(weight) for weight in self.weights if self.learning]
+            sums = [torch.zeros_like(weight) for weight in self.weights if self.learning]
             for part in parts:
                 values = self.values[:, part]
-                flow = backwards(self.weights, values, self.between, part, given[:, part], found)
+                flow = backwards(self.weights, values, self.between, part, of_outputs[:, part], sums)
                 torch.mm(self.weights[0].T, flow, out=of_values[:, part])
-            return found
+            return sums
 
-        found = on_threads(given.shape[1], work)
+        sums = on_threads(of_outputs.shape[1], work)
         self.set_grad_in("values", mi.TensorXf(of_values))
         if self.learning:
-            self.set_grad_in("weights", [mi.TensorXf(f) for f in summed(found)])
+            self.set_grad_in("weights", [mi.TensorXf(s) for s in sum_over_threads(sums)])
 
     def name(self) -> str:
         return "network"
 
 
-def summed(found: Sequence[Weights]) -> list[torch.Tensor]:
-    """Over threads, what each of them found."""
-    return [torch.stack(parts).sum(0) for parts in zip(*found, strict=True)]
+def sum_over_threads(sums: Sequence[Weights]) -> list[torch.Tensor]:
+    """Totals of the sums of each thread."""
+    return [torch.stack(parts).sum(0) for parts in zip(*sums, strict=True)]

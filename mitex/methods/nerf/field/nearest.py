@@ -14,7 +14,7 @@ mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 CELL = 1.5  # side of a cell [spacings]
-EXTRA = 3  # vertices looked up at a cell's corners beyond those that are wanted
+EXTRA = 3  # vertices looked up at a cell's corners beyond the K nearest
 LENGTH = 5  # of a list, at most, in vertices looked up at a corner
 MARGIN = 0.25  # the grid goes beyond the vertices by this [diagonals of their bounding box]
 SIDE = 192  # cells along a side, at most
@@ -69,24 +69,24 @@ class NearestVertices:
             return listed, self._from_lists(points, slots)
         others = np.flatnonzero(slots == UNLISTED)
         near, index = self._from_tree(points[others])
-        chosen = np.concatenate([listed, others[near]])
-        order = np.argsort(chosen)
+        points_near = np.concatenate([listed, others[near]])
+        order = np.argsort(points_near)
         index = np.concatenate([self._from_lists(points[listed], slots[listed]), index])
-        return chosen[order], index[order]
+        return points_near[order], index[order]
 
     def _slots(self, points: np.ndarray) -> np.ndarray:
         """(N,) int32 number of the list of each point's cell; `UNLISTED` or `FAR` without one."""
         place = (points - self._low) / self._cell
-        inside = ((place >= 0) & (place < self._shape)).all(axis=1)
-        cell = place[inside].astype(np.int64)
+        in_grid = ((place >= 0) & (place < self._shape)).all(axis=1)
+        cell = place[in_grid].astype(np.int64)
         flat = (cell[:, 0] * self._shape[1] + cell[:, 1]) * self._shape[2] + cell[:, 2]
-        found = self._slot[flat]
-        new = found == NEW
+        slot = self._slot[flat]
+        new = slot == NEW
         if new.any():
             self._list(np.unique(flat[new]))
-            found = self._slot[flat]
+            slot = self._slot[flat]
         slots = np.full(len(points), UNLISTED, np.int32)
-        slots[inside] = found
+        slots[in_grid] = slot
         return slots
 
     def _from_tree(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -121,12 +121,12 @@ class NearestVertices:
             # Sorted insertion: what is put aside goes on down the row.
             for k in range(self.count):
                 closer = distance < distances[k]
-                kept = dr.select(closer, vertex, nearest[k])
+                closest = dr.select(closer, vertex, nearest[k])
                 vertex = dr.select(closer, nearest[k], vertex)
-                nearest[k] = kept
-                kept = dr.minimum(distance, distances[k])
+                nearest[k] = closest
+                shortest = dr.minimum(distance, distances[k])
                 distance = dr.maximum(distance, distances[k])
-                distances[k] = kept
+                distances[k] = shortest
             entry += 1
         return nearest
 

@@ -66,42 +66,44 @@ class Networks(dr.CustomOp):
         self.learning, self.values = learning, values.torch()
         self.first = 0 if moving else FINE  # of the inputs that get a gradient
         self.kind = torch.bfloat16 if low_precision and not moving else torch.float32
-        self.nets = _joined(*([weight.torch() for weight in net] for net in nets))
+        self.nets = _join(*([weight.torch() for weight in net] for net in nets))
         count = self.values.shape[1]
         self.between = {name: mlp.room(weights, count, self.kind) for name, weights in self.nets.items()}
         self.code = torch.empty(CODE + 1, count)
-        found = torch.empty(sum(self._parted), count)
+        results = torch.empty(sum(self._sizes), count)
 
         def work(parts: Iterator[slice]) -> None:
             for part in parts:
-                exponent, *outputs = found[:, part].split(self._parted)
+                exponent, *outputs = results[:, part].split(self._sizes)
                 for name, out in zip(self.nets, [self.code[:, part], *outputs], strict=True):
                     values = self._inputs(name, self.values[:, part], part)
                     mlp.forwards(self.nets[name], values, self.between[name], part, out)
                 exponent.copy_(self.code[:1, part])
 
         mlp.on_threads(count, work, self.kind)
-        return mi.TensorXf(found)
+        return mi.TensorXf(results)
 
     def backward(self) -> None:
         gradient: Any = self.grad_out()
-        given = gradient.torch()
+        of_results = gradient.torch()
         of_values = torch.empty_like(self.values)
         of_values[: self.first] = 0
         kinds = {kind: self._of_kind(kind) for kind in (self.kind, torch.float32)}
 
         def work(parts: Iterator[slice]) -> list[list[torch.Tensor]]:
-            sums = {k: [torch.zeros_like(w) for w in net if self.learning] for k, net in self.nets.items()}
+            totals = {k: [torch.zeros_like(w) for w in net if self.learning] for k, net in self.nets.items()}
             for part in parts:
                 kind = mlp.kind_of(part, self.kind)
-                of_values[self.first :, part] = self._flow(part, given[:, part].to(kind), *kinds[kind], sums)
-            return [*sums.values()]
+                of_values[self.first :, part] = self._flow(
+                    part, of_results[:, part].to(kind), *kinds[kind], totals
+                )
+            return [*totals.values()]
 
-        found = mlp.on_threads(given.shape[1], work, self.kind)
+        sums = mlp.on_threads(of_results.shape[1], work, self.kind)
         self.set_grad_in("values", mi.TensorXf(of_values))
         if self.learning:
-            apart = _apart(*map(mlp.summed, zip(*found, strict=True)))
-            self.set_grad_in("nets", [[mi.TensorXf(w.contiguous()) for w in net] for net in apart])
+            split = _split(*map(mlp.sum_over_threads, zip(*sums, strict=True)))
+            self.set_grad_in("nets", [[mi.TensorXf(w.contiguous()) for w in net] for net in split])
 
     def _flow(
         self, part: slice, gradient: torch.Tensor, nets: Nets, firsts: torch.Tensor, sums: Nets
@@ -113,14 +115,14 @@ class Networks(dr.CustomOp):
             inputs, between = self._inputs(name, values, part), self.between[name]
             return mlp.backwards(nets[name], inputs, between, part, gradient, sums[name])
 
-        exponent, reflection, angles = gradient.split(self._parted)
+        exponent, reflection, angles = gradient.split(self._sizes)
         of_code = nets["reflection"][0].T @ back("reflection", reflection)
         of_code[:1] = exponent
         flows = torch.cat([back("density", of_code).T, back("angles", angles).T], 1)
         return firsts @ flows.T
 
     @property
-    def _parted(self) -> list[int]:
+    def _sizes(self) -> list[int]:
         """How many of the outputs are the exponent, the reflection, the angles."""
         return [1, len(self.nets["reflection"][-1]), len(self.nets["angles"][-1])]
 
@@ -136,11 +138,11 @@ class Networks(dr.CustomOp):
         return "networks"
 
 
-def _joined(density: mlp.Weights, reflection: mlp.Weights, theta: mlp.Weights, phi: mlp.Weights) -> Nets:
+def _join(density: mlp.Weights, reflection: mlp.Weights, theta: mlp.Weights, phi: mlp.Weights) -> Nets:
     """The networks for inputs as above, each after those that it reads."""
-    angles = torch.cat([_placed(theta[0], "theta", "angles"), _placed(phi[0], "phi", "angles")])
+    angles = torch.cat([_place_columns(theta[0], "theta", "angles"), _place_columns(phi[0], "phi", "angles")])
     return {
-        "density": [_placed(density[0], "density", "density"), *density[1:]],
+        "density": [_place_columns(density[0], "density", "density"), *density[1:]],
         # With a column of zeros for the exponent, 16 in all: products with 15 take three times as long.
         "reflection": [F.pad(reflection[0], (1, 0)), *reflection[1:]],
         "angles": [angles, *map(torch.block_diag, theta[1:], phi[1:])],
@@ -152,14 +154,14 @@ def _firsts(nets: Nets) -> torch.Tensor:
     return torch.cat([F.pad(nets[name][0], (at.start, INPUTS - at.stop)) for name, at in READS.items()])
 
 
-def _placed(weight: torch.Tensor, name: str, reader: str) -> torch.Tensor:
+def _place_columns(weight: torch.Tensor, name: str, reader: str) -> torch.Tensor:
     """A first matrix with its columns at the places of the inputs."""
     wide = weight.new_zeros(len(weight), READS[reader].stop - READS[reader].start)
     wide[:, PLACES[name]] = weight
     return wide
 
 
-def _apart(density: mlp.Weights, reflection: mlp.Weights, angles: mlp.Weights) -> list[mlp.Weights]:
+def _split(density: mlp.Weights, reflection: mlp.Weights, angles: mlp.Weights) -> list[mlp.Weights]:
     """The four again, of what is joined."""
     (theta, phi), *blocks = (weights.chunk(2) for weights in angles)
     return [

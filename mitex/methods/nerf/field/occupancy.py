@@ -29,11 +29,11 @@ def hull_cells(capture: Capture, side: int) -> np.ndarray:
         return np.ones((side,) * 3, bool)
     centres = (np.arange(side) + 0.5) * (2 / side) - 1
     grid = np.stack(np.meshgrid(centres, centres, centres, indexing="ij"), axis=-1)
-    inside = hull.contains(grid.reshape(-1, 3)).reshape((side,) * 3)
-    return ndimage.binary_dilation(inside, iterations=2)
+    in_hull = hull.contains(grid.reshape(-1, 3)).reshape((side,) * 3)
+    return ndimage.binary_dilation(in_hull, iterations=2)
 
 
-def gridded(density: Callable[[np.ndarray], np.ndarray], occupied: np.ndarray, side: int) -> np.ndarray:
+def sample_grid(density: Callable[[np.ndarray], np.ndarray], occupied: np.ndarray, side: int) -> np.ndarray:
     """(side, side, side) density at the centres of cells of the scene cube, x slowest; 0 where unoccupied.
 
     Args:
@@ -56,7 +56,7 @@ class Occupancy:
 
     Args:
         side: cells along a side of the scene cube.
-        possible: (side, side, side) bool, x slowest; cells that are never looked at elsewhere, or None.
+        possible: (side, side, side) bool, x slowest; the only cells that are sampled; None for all.
     """
 
     def __init__(self, side: int, possible: np.ndarray | None = None) -> None:
@@ -88,23 +88,23 @@ class Occupancy:
         return count / self.side**3
 
     def refresh(self, density: Callable[[np.ndarray], np.ndarray], generator: torch.Generator) -> None:
-        """Looks at all cells at first, later at half of them: occupied ones and others by chance.
+        """Samples all cells at first, later at half of them: occupied ones and others by chance.
 
         Args:
             density: of points (N, 3) in the cube, (N,) [1 / scene units].
             generator: of the places in the cells.
         """
-        chosen = torch.arange(len(self.cells))
+        index = torch.arange(len(self.cells))
         if self.refreshes >= WARMUP:
             quarter = max(1, len(self.cells) // 4)
             others = torch.randint(len(self.cells), (quarter,), generator=generator)
             occupied = torch.from_numpy(np.flatnonzero(self._occupied()))
             if len(occupied) > quarter:
                 occupied = occupied[torch.randint(len(occupied), (quarter,), generator=generator)]
-            chosen = torch.unique(torch.cat([others, occupied]))
+            index = torch.unique(torch.cat([others, occupied]))
         self.values *= DECAY
-        found = torch.from_numpy(density(self._points(chosen, generator)))
-        self.values[chosen] = torch.maximum(self.values[chosen], found)
+        values = torch.from_numpy(density(self._points(index, generator)))
+        self.values[index] = torch.maximum(self.values[index], values)
         self.refreshes += 1
         self._mask = None
 
@@ -121,8 +121,8 @@ class Occupancy:
         values = self.values.numpy()
         return values > min(float(values.mean()), CEILING)
 
-    def _points(self, chosen: torch.Tensor, generator: torch.Generator) -> np.ndarray:
-        cell = self.cells[chosen.numpy()]
+    def _points(self, index: torch.Tensor, generator: torch.Generator) -> np.ndarray:
+        cell = self.cells[index.numpy()]
         corner = np.stack(np.unravel_index(cell, (self.side,) * 3), axis=1)
-        inside = torch.rand(len(cell), 3, generator=generator).numpy()
-        return ((corner + inside) * (2 / self.side) - 1).astype(np.float32)
+        offset = torch.rand(len(cell), 3, generator=generator).numpy()
+        return ((corner + offset) * (2 / self.side) - 1).astype(np.float32)

@@ -30,7 +30,7 @@ CANCELLED = 1e-5  # a weighted mean of unit vectors shorter than that has no dir
 
 
 @dataclass(frozen=True, eq=False)
-class Feet:
+class Projections:
     """Where N points project to.
 
     Attributes:
@@ -57,14 +57,14 @@ class Projection:
     """Projects points onto a mesh along an interpolated normal.
 
     The normal is equation 1 as the authors' program has it: of the nearest vertices, weighted by one over
-    their distances, and of the mean direction from them to the point at the pseudo-distance `pull`, turned
-    around where it opposes the normals, that is, inside.
+    their distances, and of the mean direction from them to the point at the pseudo-distance `repulsion`,
+    turned around where it opposes the normals, that is, inside.
 
     Args:
         mesh: the base shape; holes and separate pieces are allowed.
         neighbours: vertices that the normal is interpolated from.
-        pull: the smaller, the more the normal points away from the nearest vertices, so that it meets the
-            mesh from afar (0.01 in the paper); None for the vertex normals alone [mesh units].
+        repulsion: the smaller, the more the normal points away from the nearest vertices, so that it meets
+            the mesh from afar (0.01 in the paper); None for the vertex normals alone [mesh units].
         reach: points whose foot would be farther than this are missed, the sooner the farther they are from
             the mesh; None for no limit [mesh units].
 
@@ -74,16 +74,18 @@ class Projection:
     """
 
     def __init__(
-        self, mesh: Mesh, *, neighbours: int = 8, pull: float | None = 0.05, reach: float | None = None
+        self, mesh: Mesh, *, neighbours: int = 8, repulsion: float | None = 0.05, reach: float | None = None
     ) -> None:
         if neighbours < 1:
             raise ConfigError(f"a normal of {neighbours} neighbours", "use 1 or more")
-        if not all(value is None or value > 0.0 for value in (pull, reach)):
-            raise ConfigError(f"a pull of {pull} and a reach of {reach}", "use positive numbers or None")
+        if not all(value is None or value > 0.0 for value in (repulsion, reach)):
+            raise ConfigError(
+                f"a repulsion of {repulsion} and a reach of {reach}", "use positive numbers or None"
+            )
         if not len(mesh.faces):
             raise MeshError(f"{mesh.name} has no faces to project onto", "give a surface")
         init()
-        self.mesh, self.pull, self.reach = mesh, pull, reach
+        self.mesh, self.repulsion, self.reach = mesh, repulsion, reach
         # A point of a triangle with edges up to L is within L / sqrt(3) of a corner: the limit loses no foot.
         edges = _edge_lengths(mesh)
         limit = math.inf if reach is None else reach + float(edges.max()) / math.sqrt(3.0)
@@ -97,39 +99,39 @@ class Projection:
         scene = {"type": "scene", "embree_use_robust_intersections": True, "mesh": mesh_shape(mesh)}
         self._scene = mi.load_dict(scene)
 
-    def __call__(self, points: np.ndarray) -> Feet:
-        """The feet of points (N, 3), finite [mesh units]."""
+    def __call__(self, points: np.ndarray) -> Projections:
+        """Projections of points (N, 3), finite [mesh units]."""
         points = np.ascontiguousarray(points, np.float32)
-        chosen, index = self._nearest(points)
-        if 0 < len(chosen) == len(points):
+        near, index = self._nearest(points)
+        if 0 < len(near) == len(points):
             return self._cast(points, index)
-        feet = _missed(points)
-        if len(chosen):
-            found = self._cast(points[chosen], index)
-            for name, values in vars(feet).items():
-                values[chosen] = getattr(found, name)
-        return feet
+        projections = _missed(points)
+        if len(near):
+            subset = self._cast(points[near], index)
+            for name, values in vars(projections).items():
+                values[near] = getattr(subset, name)
+        return projections
 
-    def _cast(self, points: np.ndarray, index: np.ndarray) -> Feet:
-        """The feet of points (M, 3) with their nearest vertices (M, K): one kernel, both ways."""
+    def _cast(self, points: np.ndarray, index: np.ndarray) -> Projections:
+        """Projections of points (M, 3) with their nearest vertices (M, K): one kernel, both ways."""
         with dr.suspend_grad():
             x = dr.unravel(mi.Point3f, mi.Float(points.ravel()))
             normal = self._coarse_normal(x, mi.UInt32(index.ravel()))
             ahead, behind = self._first(x, normal), self._first(x, -normal)
-            inside = dr.abs(ahead[1]) < dr.abs(behind[1])
-            found, t = (dr.select(inside, a, b) for a, b in zip(ahead, behind, strict=True))
-            hit, face, distance = found.is_valid(), mi.Int32(found.prim_index), dr.select(inside, -t, t)
+            is_inside = dr.abs(ahead[1]) < dr.abs(behind[1])
+            hits, t = (dr.select(is_inside, a, b) for a, b in zip(ahead, behind, strict=True))
+            hit, face, distance = hits.is_valid(), mi.Int32(hits.prim_index), dr.select(is_inside, -t, t)
             results = [
                 x - dr.select(hit, distance, 0.0) * normal,
                 dr.select(hit, distance, MISSED),
                 dr.select(hit, normal, 0.0),
                 dr.select(hit, face, -1),
-                dr.select(hit, found.prim_uv, 0.0),
+                dr.select(hit, hits.prim_uv, 0.0),
             ]
             flat = [dr.ravel(result) for result in results]
             dr.eval(flat)
         arrays = [np.asarray(a) for a in flat]
-        return Feet(
+        return Projections(
             arrays[0].reshape(-1, 3), arrays[1], arrays[2].reshape(-1, 3), arrays[3], arrays[4].reshape(-1, 2)
         )
 
@@ -147,9 +149,9 @@ class Projection:
             away += (weight * weight) * offset
             weights += weight
             nearest = normal if k == 0 else nearest
-        if self.pull is not None:
-            pulled = dr.mulsign(away / weights, dr.dot(away, total)) / dr.opaque(mi.Float, self.pull)
-            total += pulled
+        if self.repulsion is not None:
+            outwards = dr.mulsign(away / weights, dr.dot(away, total)) / dr.opaque(mi.Float, self.repulsion)
+            total += outwards
         length = dr.norm(total)
         return dr.select(length > CANCELLED * weights, total / length, nearest)
 
@@ -159,30 +161,34 @@ class Projection:
         ray = mi.Ray3f(x - back * direction, direction)
         if self.reach is not None:
             ray.maxt = dr.opaque(mi.Float, self.reach + self._back)
-        found = self._scene.ray_intersect_preliminary(ray, coherent=False)
-        return found, found.t - back
+        hit = self._scene.ray_intersect_preliminary(ray, coherent=False)
+        return hit, hit.t - back
 
 
-def attach(points: torch.Tensor, feet: Feet) -> tuple[torch.Tensor, torch.Tensor]:
-    """The feet as tensors with the derivative of equation 2 to the points.
+def attach(points: torch.Tensor, projections: Projections) -> tuple[torch.Tensor, torch.Tensor]:
+    """Foot points and distances as tensors with the derivative of equation 2 to the points.
 
     Args:
         points: (N, 3) float32, attached.
-        feet: their projection.
+        projections: theirs.
 
     Returns:
         Foot points (N, 3) with d x_c / d x = I - n n^T, and signed distances (N,) with d s / d x = n; no
         derivative where missed. The normal n is constant.
     """
-    return _Attach.apply(points, feet)
+    return _Attach.apply(points, projections)
 
 
 class _Attach(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, points: torch.Tensor, feet: Feet) -> tuple[torch.Tensor, torch.Tensor]:
-        normal, hit = (torch.from_numpy(a).to(points.device) for a in (feet.normal, feet.hit))
+    def forward(
+        ctx: Any, points: torch.Tensor, projections: Projections
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        normal, hit = (torch.from_numpy(a).to(points.device) for a in (projections.normal, projections.hit))
         ctx.save_for_backward(normal, hit)
-        foot, distance = (torch.from_numpy(a).to(points.device) for a in (feet.point, feet.distance))
+        foot, distance = (
+            torch.from_numpy(a).to(points.device) for a in (projections.point, projections.distance)
+        )
         return foot, distance
 
     @staticmethod
@@ -193,9 +199,9 @@ class _Attach(torch.autograd.Function):
         return foot * hit[:, None] + along[:, None] * normal, None
 
 
-def _missed(points: np.ndarray) -> Feet:
+def _missed(points: np.ndarray) -> Projections:
     count = len(points)
-    return Feet(
+    return Projections(
         point=points.copy(),
         distance=np.full(count, MISSED, np.float32),
         normal=np.zeros((count, 3), np.float32),

@@ -1,4 +1,4 @@
-"""What the pixels of photos see of the base shape."""
+"""Rays of photos against a mesh."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ mi: Any = load_mitsuba(needs_llvm=False)
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
-    """What pixels (H, W) see.
+class PixelHits:
+    """Where the rays of pixels (H, W) meet a mesh.
 
     Attributes:
-        angle: to the normal, 180 where the mesh is missed [degrees].
+        angle: between the ray and the normal, 180 where the mesh is missed [degrees].
         points, normals: (H, W, 3) of the mesh, smooth normals of length 1.
     """
 
@@ -30,26 +30,26 @@ class Sight:
     normals: np.ndarray
 
 
-class Sights:
-    """Looks at a mesh in the scene cube through the cameras of a capture."""
+class Raycaster:
+    """Casts the rays of a capture onto a mesh in the scene cube."""
 
     def __init__(self, mesh: Mesh, capture: Capture) -> None:
         init()
         self.capture = capture
         self._scene = mi.load_dict({"type": "scene", "mesh": mesh_shape(mesh, smooth=True)})
 
-    def __call__(self, view: int, stride: int = 1) -> Sight:
-        """Every `stride`-th pixel of a view, in both directions."""
+    def __call__(self, view: int, stride: int = 1) -> PixelHits:
+        """Hits of every `stride`-th pixel of a view, in both directions."""
         height, width = self.capture.images[view].shape[:2]
         window = slice(0, height, stride), slice(0, width, stride)
         origins, directions = window_rays(self.capture, view, window)
         ray = mi.Ray3f(channels(mi.Point3f, origins), channels(mi.Vector3f, directions))
-        met = self._scene.ray_intersect(ray)
-        points, normals = rows(met.p), rows(met.sh_frame.n)
+        hits = self._scene.ray_intersect(ray)
+        points, normals = rows(hits.p), rows(hits.sh_frame.n)
         angle = np.degrees(np.arccos(np.clip(-(normals * directions).sum(1), -1, 1)))
-        angle[~np.array(met.is_valid()).astype(bool)] = 180.0
+        angle[~np.array(hits.is_valid()).astype(bool)] = 180.0
         shape = np.mgrid[window].shape[1:]
-        return Sight(*(values.reshape(*shape, *values.shape[1:]) for values in (angle, points, normals)))
+        return PixelHits(*(values.reshape(*shape, *values.shape[1:]) for values in (angle, points, normals)))
 
 
 def window_rays(capture: Capture, view: int, window: tuple[slice, slice]) -> tuple[np.ndarray, np.ndarray]:

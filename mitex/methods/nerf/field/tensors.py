@@ -32,7 +32,7 @@ def rows(values: Any) -> np.ndarray:
 
 
 # Slices of tensors would have N as a literal, and so would need new kernels for each N. An opaque N does not.
-def stacked(values: Sequence[Any]) -> Any:
+def stack_rows(values: Sequence[Any]) -> Any:
     """`mi.TensorXf` (C, N) of C arrays, of width N or 1."""
     count = max(dr.width(value) for value in values)
     flat = dr.zeros(mi.Float, count * len(values))
@@ -42,7 +42,7 @@ def stacked(values: Sequence[Any]) -> Any:
     return mi.TensorXf(flat, (len(values), count))
 
 
-def unstacked(tensor: Any) -> list[Any]:
+def unstack_rows(tensor: Any) -> list[Any]:
     """The rows of a tensor (C, N)."""
     rows, count = tensor.shape
     places = [row_places(k, count) for k in range(rows)]

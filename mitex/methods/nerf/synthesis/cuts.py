@@ -29,14 +29,14 @@ def cheapest_path(error: np.ndarray, closed: bool = False) -> np.ndarray:
     error = error.astype(np.float64)
     if not closed:
         costs = path_costs(error)
-        return _traced(costs, int(costs[-1].argmin()))
+        return _backtrack(costs, int(costs[-1].argmin()))
     width = error.shape[1]
     start = np.where(np.eye(width, dtype=bool), error[0], np.inf)  # one problem for every first cell
     costs = path_costs(np.broadcast_to(error[:, None], (len(error), width, width)), start)
     step = np.abs(np.subtract.outer(np.arange(width), np.arange(width))) <= 1
     ends = np.where(step, costs[-1], np.inf)
     first, last = np.unravel_index(ends.argmin(), ends.shape)
-    return _traced(costs[:, first], int(last))
+    return _backtrack(costs[:, first], int(last))
 
 
 def path_costs(error: np.ndarray, start: np.ndarray | None = None) -> np.ndarray:
@@ -79,8 +79,8 @@ def corner_paths(error: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]
     row, column = (int(k) for k in np.unravel_index(total.argmin(), total.shape))
     size = len(error)
     left, top = np.full(size, column), np.full(size, row)
-    left[row:] = _traced(up[: size - row], column)[::-1]
-    top[column:] = _traced(back[: size - column], row)[::-1]
+    left[row:] = _backtrack(up[: size - row], column)[::-1]
+    top[column:] = _backtrack(back[: size - column], row)[::-1]
     return left, top
 
 
@@ -92,7 +92,7 @@ def overlap_paths(error: np.ndarray, width: int, left: bool, top: bool) -> tuple
     if left:
         return cheapest_path(error[:, :width]), none
     if top:
-        return none, _traced(path_costs(error[:width].T.astype(np.float64)), width - 1)
+        return none, _backtrack(path_costs(error[:width].T.astype(np.float64)), width - 1)
     return none, none
 
 
@@ -101,7 +101,7 @@ def new_part(left: np.ndarray, top: np.ndarray) -> np.ndarray:
     return (np.arange(len(top)) > left[:, None]) & (np.arange(len(left))[:, None] > top)
 
 
-def feathered(new: np.ndarray, wrapped: bool = False) -> np.ndarray:
+def feather(new: np.ndarray, wrapped: bool = False) -> np.ndarray:
     """(H, W) float32 weights of the new part with a ramp of `FEATHER` texels across its seam.
 
     Args:
@@ -112,7 +112,7 @@ def feathered(new: np.ndarray, wrapped: bool = False) -> np.ndarray:
     return uniform_filter1d(down, FEATHER, axis=1, mode="wrap" if wrapped else "nearest")
 
 
-def _traced(costs: np.ndarray, column: int) -> np.ndarray:
+def _backtrack(costs: np.ndarray, column: int) -> np.ndarray:
     """(L,) columns of the cheapest path that ends in a cell of the last row."""
     path = np.empty(len(costs), np.int64)
     path[-1] = column

@@ -9,14 +9,14 @@ import numpy as np
 
 from mitex.errors import ConfigError
 from mitex.images import resize
-from mitex.methods.nerf.synthesis.matching import mirrored
+from mitex.methods.nerf.synthesis.matching import mirror
 
 WEIGHT = 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class Guide:
-    """What a texture shall look like.
+    """A picture that a texture shall resemble.
 
     Attributes:
         image: (H, W, 3) sRGB in [0, 1], stretched over the texture.
@@ -44,7 +44,7 @@ class Guide:
         object.__setattr__(self, "colours", colours)
 
 
-class Likeness:
+class GuideDistance:
     """How far patches are from a guide at the places of a texture.
 
     Args:
@@ -59,10 +59,10 @@ class Likeness:
     """
 
     def __init__(self, guide: Guide, count: int, size: tuple[int, int], patch: int, wrapped: bool) -> None:
-        found, self.cells = guide.colours.shape[:2]
-        if found != count or patch % self.cells:
+        colours, self.cells = guide.colours.shape[:2]
+        if colours != count or patch % self.cells:
             raise ConfigError(
-                f"a guide with colours of {found} patches in {self.cells} x {self.cells} blocks",
+                f"a guide with colours of {colours} patches in {self.cells} x {self.cells} blocks",
                 f"give those of all {count}, in a number of blocks that divides {patch} texels",
             )
         self.patch, self.weight = patch, guide.weight
@@ -75,5 +75,5 @@ class Likeness:
         below = self.image[top : top + self.patch, left : left + self.patch]
         block = self.patch // self.cells
         means = below.reshape(self.cells, block, self.cells, block, 3).mean((1, 3))
-        wanted = np.stack([mirrored(means, flip).ravel() for flip in flips])
-        return self.weight * np.sqrt(np.square(self.colours - wanted[:, None]).mean(2))
+        target = np.stack([mirror(means, flip).ravel() for flip in flips])
+        return self.weight * np.sqrt(np.square(self.colours - target[:, None]).mean(2))

@@ -11,7 +11,7 @@ from mitex.atlas import twice_area
 from mitex.mesh import Mesh
 from mitex.methods.nerf.base.base_shape import face_frames
 from mitex.methods.nerf.field.networks import FEATURES, PHASES
-from mitex.methods.nerf.field.shell import Located
+from mitex.methods.nerf.field.shell import ShellCoords
 from mitex.runtime import load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
@@ -64,38 +64,38 @@ class MappedLatents:
         self._uv = mi.Float(np.ascontiguousarray(uv, np.float32).ravel())
         self._frames = mi.Float(np.ascontiguousarray(frames, np.float32).ravel())
 
-    def __call__(self, located: Located) -> tuple[list[Any], list[Any]]:
-        values = self._blended(located, CHANNELS)
+    def __call__(self, coords: ShellCoords) -> tuple[list[Any], list[Any]]:
+        values = self._blended(coords, CHANNELS)
         return values[:FEATURES], values[FEATURES:]
 
-    def features(self, located: Located) -> list[Any]:
+    def features(self, coords: ShellCoords) -> list[Any]:
         """f alone, which the density needs."""
-        return self._blended(located, FEATURES)
+        return self._blended(coords, FEATURES)
 
-    def frame(self, located: Located) -> tuple[Any, Any, Any]:
+    def frame(self, coords: ShellCoords) -> tuple[Any, Any, Any]:
         """The captured frame's axes, laid on the mesh: equation 4 of each."""
-        x, y = self._place(located)
+        x, y = self._place(coords)
         height, width = self.size
         texel = self._index(mi.Int32(dr.floor(x + 0.5)), mi.Int32(dr.floor(y + 0.5)), height, width)
         turn = dr.gather(mi.UInt32, self._which, texel) * 9
-        axes = [dr.gather(mi.Vector3f, self._frames, located.face * 3 + k) for k in range(3)]
+        axes = [dr.gather(mi.Vector3f, self._frames, coords.face * 3 + k) for k in range(3)]
         captured = []
         for axis in range(3):
             parts = [dr.gather(mi.Float, self._turns, turn + 3 * row + axis) for row in range(3)]
             captured.append(axes[0] * parts[0] + axes[1] * parts[1] + axes[2] * parts[2])
         return captured[0], captured[1], captured[2]
 
-    def _place(self, located: Located) -> tuple[Any, Any]:
+    def _place(self, coords: ShellCoords) -> tuple[Any, Any]:
         """Column and row of the foot [texels], of which whole numbers are centres."""
         height, width = self.size
-        corner = [dr.gather(mi.Point2f, self._uv, located.face * 3 + k) for k in range(3)]
-        b, c = located.barycentric
+        corner = [dr.gather(mi.Point2f, self._uv, coords.face * 3 + k) for k in range(3)]
+        b, c = coords.barycentric
         uv = corner[0] * (1 - b - c) + corner[1] * b + corner[2] * c
         return uv.x * width - 0.5, (1 - uv.y) * height - 0.5
 
-    def _blended(self, located: Located, count: int) -> list[Any]:
+    def _blended(self, coords: ShellCoords, count: int) -> list[Any]:
         """The first `count` channels, bilinear."""
-        x, y = self._place(located)
+        x, y = self._place(coords)
         height, width = self.size
         left, top = dr.floor(x), dr.floor(y)
         across, down = x - left, y - top

@@ -70,7 +70,7 @@ class ArraySource:
         return self.values[index]
 
 
-def mirrored(square: np.ndarray, flip: int) -> np.ndarray:
+def mirror(square: np.ndarray, flip: int) -> np.ndarray:
     """An array (H, W, ...) with its columns, its rows or both in reverse order."""
     return square[:: -1 if flip & VERTICAL else 1, :: -1 if flip & HORIZONTAL else 1]
 
@@ -107,26 +107,26 @@ class Matcher:
         self.flips, self.centres = tuple(flips), np.asarray(source.centres, np.float64)
         self.apart = APART * source.length
         self.shape = _checked_shape(source)
-        needed = {_seen(side, flip) for side in sides for flip in self.flips}
+        needed = {_source_side(side, flip) for side in sides for flip in self.flips}
         side = self.shape[0]
         length = side // BLOCK * overlap(side) * source.matched
         self._strips = {side: np.empty((count, length), np.float32) for side in needed}
         for index in range(count):
             square = source.patch(index)[..., : source.matched]
             for name, rows in self._strips.items():
-                rows[index] = _summed(strip(square, name), name)
+                rows[index] = _block_sums(strip(square, name), name)
         # |a - b|^2 = |a|^2 - 2 a b + |b|^2 loses the fewest digits around the mean.
         self._means = {side: rows.mean(0) for side, rows in self._strips.items()}
-        self._squares = {name: _centred(rows, self._means[name]) for name, rows in self._strips.items()}
+        self._squares = {name: _centre(rows, self._means[name]) for name, rows in self._strips.items()}
 
     def distances(self, strips: Mapping[str, np.ndarray]) -> np.ndarray:
         """(flips, P) L2 distances to the strips around a place; where two meet, texels count twice."""
         total = np.zeros((len(self.flips), len(self.centres)), np.float32)
         for row, flip in enumerate(self.flips):
             for side, values in strips.items():
-                seen = _seen(side, flip)
-                wanted = _summed(mirrored(values, flip), seen) - self._means[seen]
-                total[row] += self._squares[seen] - 2.0 * (self._strips[seen] @ wanted) + wanted @ wanted
+                own = _source_side(side, flip)
+                target = _block_sums(mirror(values, flip), own) - self._means[own]
+                total[row] += self._squares[own] - 2.0 * (self._strips[own] @ target) + target @ target
         return np.sqrt(np.maximum(total, 0.0))
 
     def allowed(self, neighbours: Iterable[int]) -> np.ndarray:
@@ -167,19 +167,19 @@ class Matcher:
         return index, self.flips[row]
 
 
-def _seen(side: str, flip: int) -> str:
+def _source_side(side: str, flip: int) -> str:
     """Which side of an unmirrored patch lies at a side of its mirror image."""
     reversed_ = flip & (HORIZONTAL if side in ("left", "right") else VERTICAL)
     return _OPPOSITE[side] if reversed_ else side
 
 
-def _summed(values: np.ndarray, side: str) -> np.ndarray:
+def _block_sums(values: np.ndarray, side: str) -> np.ndarray:
     """The numbers that a strip is compared by."""
     along = values if side in ("left", "right") else values.swapaxes(0, 1)
     return along.reshape(-1, BLOCK, *along.shape[1:]).sum(1).ravel()
 
 
-def _centred(rows: np.ndarray, mean: np.ndarray) -> np.ndarray:
+def _centre(rows: np.ndarray, mean: np.ndarray) -> np.ndarray:
     """(P,) squared lengths of the rows (P, K), from which the mean is taken off in place."""
     rows -= mean
     squares = np.einsum("pk,pk->p", rows, rows)

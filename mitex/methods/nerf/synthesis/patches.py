@@ -2,7 +2,7 @@
 
 All patches share one orientation, so that a direction on the surface means the same in each: their x axis is
 a given direction, projected. Only the points where texels meet the shape are kept; what is asked of them,
-features for one, is found when it is needed.
+features for one, is evaluated when it is needed.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ MIN_FACING = 0.25  # cosine between a patch's z and the faces that it meets: the
 SPARSE = 4  # every so many texels are compared with the scan, whose points are not denser
 MAX_STEP = 1.0 / MIN_FACING  # between the depths of texels side by side; larger ones are a ledge [texel gaps]
 CHUNK = 64  # patches cast at once
-DENSITY = 30  # random points per wanted one that the evenly spread ones are chosen from
+DENSITY = 30  # random points for each evenly spread one
 SATURATED = 0.6  # area per point over squared distance when no further one fits, nearly
 
 
@@ -67,7 +67,7 @@ class Patches:
 
 @dataclass(frozen=True, eq=False)
 class FeatureSource:
-    """Patches of features for `quilting.quilt`, found when asked for.
+    """Patches of features for `quilting.quilt`, evaluated when asked for.
 
     Attributes:
         patches: where.
@@ -136,20 +136,20 @@ def extract_patches(
     # Pages of the arrays that no patch is written to take no memory.
     points = np.empty((len(centres), size, size, 3), np.float32)
     faces = np.empty(points.shape[:-1], np.int32)
-    kept = [np.zeros(0, np.int64)]
+    indices = [np.zeros(0, np.int64)]
     filled = 0
     for start in range(0, len(centres), CHUNK):
         part = slice(start, start + CHUNK)
-        good, found, met = caster(centres[part], frames[part])
+        good, hit_points, hit_faces = caster(centres[part], frames[part])
         end = filled + len(good)
-        points[filled:end], faces[filled:end], filled = found, met, end
-        kept.append(start + good)
+        points[filled:end], faces[filled:end], filled = hit_points, hit_faces, end
+        indices.append(start + good)
     if not filled:
         raise ConfigError(
             f"of {len(centres)} squares {gap * size:.3g} wide, none fits on {mesh.name}: {caster.reasons}",
             "use a smaller pattern rate",
         )
-    index = np.concatenate(kept)
+    index = np.concatenate(indices)
     return Patches(points[:filled], faces[:filled], frames[index], centres[index], gap)
 
 
@@ -160,7 +160,7 @@ def texel_gap(mesh: Mesh, pattern_rate: float) -> float:
     return float(edges.mean()) * pattern_rate
 
 
-def mirrored_frames(frames: np.ndarray, flip: np.ndarray) -> np.ndarray:
+def mirror_frames(frames: np.ndarray, flip: np.ndarray) -> np.ndarray:
     """T_s of mirrored patches.
 
     What a patch shows on its right, its mirror image shows on its left. The tangent that the columns run
@@ -204,14 +204,14 @@ def spread_points(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[np.
     apart = np.sqrt(SATURATED * areas.sum() / count)
     tree = KDTree(points)
     free = np.ones(len(points), bool)
-    chosen = []
+    selection = []
     for index in range(len(points)):
         if free[index]:
-            chosen.append(index)
+            selection.append(index)
             free[tree.query_ball_point(points[index], apart)] = False
-        if len(chosen) == count:
+        if len(selection) == count:
             break
-    return points[chosen].astype(np.float32), faces[chosen]
+    return points[selection].astype(np.float32), faces[selection]
 
 
 class _Caster:
@@ -239,13 +239,13 @@ class _Caster:
         hit = np.isfinite(depth).all((1, 2))
         even = hit & self._even(depth, faces, frames[:, 2])
         good = np.flatnonzero(even)
-        seen = self._scanned(plane[good])
-        good = good[seen]
+        near = self._near_scan(plane[good])
+        good = good[near]
         self.counts.update(
             {
                 "reach past its border": int((~hit).sum()),
                 "bend or fold": int((hit & ~even).sum()),
-                "lie off the captured surface": int((~seen).sum()),
+                "lie off the captured surface": int((~near).sum()),
             }
         )
         return good, plane[good] + (LIFT - depth[good][..., None]) * z[good], faces[good]
@@ -254,12 +254,12 @@ class _Caster:
         """How far along -z the mesh is met, infinite where it is not, and in which faces."""
         origin, way = (np.ascontiguousarray(a.reshape(-1, 3).T, np.float32) for a in (origins, -z))
         rays = mi.Ray3f(mi.Point3f(origin), mi.Vector3f(way))
-        found = self.scene.ray_intersect_preliminary(rays, coherent=True)
-        hit = found.is_valid()
-        dr.eval(hit, found.t, found.prim_index)
+        hits = self.scene.ray_intersect_preliminary(rays, coherent=True)
+        hit = hits.is_valid()
+        dr.eval(hit, hits.t, hits.prim_index)
         hit = np.asarray(hit).astype(bool)
-        depth = np.where(hit, np.asarray(found.t), np.inf).astype(np.float32)
-        faces = np.where(hit, np.asarray(found.prim_index), 0).astype(np.int32)
+        depth = np.where(hit, np.asarray(hits.t), np.inf).astype(np.float32)
+        faces = np.where(hit, np.asarray(hits.prim_index), 0).astype(np.int32)
         return depth.reshape(origins.shape[:-1]), faces.reshape(origins.shape[:-1])
 
     def _even(self, depth: np.ndarray, faces: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -269,7 +269,7 @@ class _Caster:
             step = np.maximum(*(np.abs(np.diff(depth, axis=k)).max((1, 2)) for k in (1, 2)))
         return facing.all((1, 2)) & (depth.max((1, 2)) < 2.0 * LIFT) & (step < MAX_STEP * self.gap)
 
-    def _scanned(self, plane: np.ndarray) -> np.ndarray:
+    def _near_scan(self, plane: np.ndarray) -> np.ndarray:
         """(N,) bool, which squares have points of the scan near every texel of their plane."""
         if self.scan is None:
             return np.ones(len(plane), bool)

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mitex.errors import ConfigError
-from mitex.methods.nerf.synthesis.cuts import cheapest_path, feathered, new_part, overlap_paths
-from mitex.methods.nerf.synthesis.guide import Guide, Likeness
-from mitex.methods.nerf.synthesis.matching import FLIPS, SIDES, Matcher, Source, mirrored, overlap, strip
-from mitex.methods.nerf.synthesis.repetition import EVENNESS, Usage
+from mitex.methods.nerf.synthesis.cuts import cheapest_path, feather, new_part, overlap_paths
+from mitex.methods.nerf.synthesis.guide import Guide, GuideDistance
+from mitex.methods.nerf.synthesis.matching import FLIPS, SIDES, Matcher, Source, mirror, overlap, strip
+from mitex.methods.nerf.synthesis.repetition import EVENNESS, Repetition
 
 NEAREST = 16  # candidates for a place
 Maps = dict[str, np.ndarray]  # the fields of `Quilt`
@@ -59,11 +59,11 @@ def quilt(
         source: the patches.
         size: height and width [texels]; any.
         rng: of all choices.
-        flips: use mirrored patches too. Their frames are mirrored along, see `patches.mirrored_frames`.
+        flips: use mirrored patches too. Their frames are mirrored along, see `patches.mirror_frames`.
         tileable: the last column and row also continue in the first.
         guide: a picture that the texture shall resemble.
         nearest: candidates for a place, among which chance decides; doubled until one is allowed.
-        evenness: how much what was used before is avoided, see `Usage`; 0 as published. By default 0 with a
+        evenness: how much repetition is avoided, see `Repetition`; 0 as published. By default 0 with a
             guide, which may ask for a few patches all over, else `EVENNESS`.
 
     Raises:
@@ -75,24 +75,24 @@ def quilt(
     canvas = _Canvas(source, size, matcher.shape, tileable)
     if evenness is None:
         evenness = EVENNESS if guide is None else 0.0
-    usage = Usage(matcher.centres, source.length, evenness)
-    likeness = None
+    repetition = Repetition(matcher.centres, source.length, evenness)
+    guide_distance = None
     if guide is not None:
-        likeness = Likeness(guide, len(matcher.centres), size, canvas.side, tileable)
+        guide_distance = GuideDistance(guide, len(matcher.centres), size, canvas.side, tileable)
     for row, top in enumerate(canvas.rows):
         for column, left in enumerate(canvas.columns):
             strips = canvas.strips(row, column)
             costs = matcher.distances(strips)
-            among = nearest if strips or likeness else costs.size
-            wishes = usage.penalties()
-            if likeness is not None:
-                wishes = wishes + likeness.differences(top, left, matcher.flips)
-            costs = costs + (costs.mean() or 1.0) * wishes
+            among = nearest if strips or guide_distance else costs.size
+            penalties = repetition.penalties()
+            if guide_distance is not None:
+                penalties = penalties + guide_distance.differences(top, left, matcher.flips)
+            costs = costs + (costs.mean() or 1.0) * penalties
             allowed = matcher.allowed(canvas.neighbours(row, column))
             index, flip = matcher.choose(costs, allowed, rng, among)
             canvas.paste(row, column, index, flip)
-            usage.add(index)
-    return canvas.finished()
+            repetition.add(index)
+    return canvas.result()
 
 
 class _Canvas:
@@ -113,7 +113,7 @@ class _Canvas:
             raise ConfigError(f"a tileable texture of {size[0]} x {size[1]} texels", f"use at least {side}")
         self.source, self.size, self.side, self.tileable = source, size, side, tileable
         self.rows, self.columns = (_places(length, side, tileable) for length in size)
-        self.placed: dict[tuple[int, int], int] = {}
+        self.patch_at: dict[tuple[int, int], int] = {}
         self.texels = np.moveaxis(np.indices((side, side)), 0, -1).astype(np.int16)
         extent = self.rows[-1] + side, self.columns[-1] + side
         self.maps: Maps = {
@@ -127,16 +127,16 @@ class _Canvas:
         """What a patch at a place has to continue: by side, the values that are compared."""
         features = self.maps["features"][..., : self.source.matched]
         across, down = self._window(row, column)
-        found = {}
+        strips = {}
         if column:
-            found["left"] = strip(features[across, down], "left")
+            strips["left"] = strip(features[across, down], "left")
         if row:
-            found["top"] = strip(features[across, down], "top")
+            strips["top"] = strip(features[across, down], "top")
         if self._wraps(column, self.columns):
-            found["right"] = strip(features[across, : self.side], "left")
+            strips["right"] = strip(features[across, : self.side], "left")
         if self._wraps(row, self.rows):
-            found["bottom"] = strip(features[: self.side, down], "top")
-        return found
+            strips["bottom"] = strip(features[: self.side, down], "top")
+        return strips
 
     def neighbours(self, row: int, column: int) -> list[int]:
         """The patches beside a place, across the border too if that is wrapped."""
@@ -145,32 +145,32 @@ class _Canvas:
             beside.append((row, 0))
         if self._wraps(row, self.rows):
             beside.append((0, column))
-        return [self.placed[place] for place in beside if place in self.placed]
+        return [self.patch_at[place] for place in beside if place in self.patch_at]
 
     def paste(self, row: int, column: int, index: int, flip: int) -> None:
         """Puts a patch at a place, cut along its left and top side."""
         window, width = self._window(row, column), overlap(self.side)
         new = {
-            "features": mirrored(self.source.patch(index), flip),
+            "features": mirror(self.source.patch(index), flip),
             "patch": np.full((self.side, self.side), index, np.int32),
             "flip": np.full((self.side, self.side), flip, np.uint8),
-            "texel": mirrored(self.texels, flip),
+            "texel": mirror(self.texels, flip),
         }
         old = {name: values[window] for name, values in self.maps.items()}
         error = _difference(old, new, self.source.matched)
         mask = new_part(*overlap_paths(error, width, left=column > 0, top=row > 0))
-        weights = feathered(mask)
+        weights = feather(mask)
         # Beyond the strips, nothing of what is there is meant to stay.
         weights[width * (row > 0) :, width * (column > 0) :] = 1.0
         _lay(old, new, mask, weights)
-        self.placed[row, column] = index
+        self.patch_at[row, column] = index
 
-    def finished(self) -> Quilt:
+    def result(self) -> Quilt:
         """The texture, cropped or wrapped."""
         maps, (height, width) = self.maps, self.size
         if self.tileable:
-            maps = _wrapped(_turned(maps), width, overlap(self.side), self.source.matched)
-            maps = _wrapped(_turned(maps), height, overlap(self.side), self.source.matched, closed=True)
+            maps = _wrap(_transpose(maps), width, overlap(self.side), self.source.matched)
+            maps = _wrap(_transpose(maps), height, overlap(self.side), self.source.matched, closed=True)
         return Quilt(**{name: values[:height, :width].copy() for name, values in maps.items()})
 
     def _window(self, row: int, column: int) -> tuple[slice, slice]:
@@ -201,7 +201,7 @@ def _lay(old: Maps, new: Maps, mask: np.ndarray, weights: np.ndarray) -> None:
         old[name][mask] = new[name][mask]
 
 
-def _wrapped(maps: Maps, length: int, width: int, channels: int, closed: bool = False) -> Maps:
+def _wrap(maps: Maps, length: int, width: int, channels: int, closed: bool = False) -> Maps:
     """Maps of `length` rows, the first of which continue the last; written over the given ones.
 
     Args:
@@ -215,11 +215,11 @@ def _wrapped(maps: Maps, length: int, width: int, channels: int, closed: bool = 
     old = {name: values[length : length + width] for name, values in maps.items()}
     path = cheapest_path(_difference(old, new, channels).T, closed)
     mask = np.arange(width)[:, None] > path
-    _lay(old, new, mask, feathered(mask, wrapped=closed))
+    _lay(old, new, mask, feather(mask, wrapped=closed))
     for name, values in new.items():
         values[:] = old[name]
     return {name: values[:length] for name, values in maps.items()}
 
 
-def _turned(maps: Maps) -> Maps:
+def _transpose(maps: Maps) -> Maps:
     return {name: values.swapaxes(0, 1) for name, values in maps.items()}

@@ -1,7 +1,7 @@
-"""How often each part of the captured surface is used, so that none is repeated while others are missing.
+"""How much the parts of the captured surface are repeated in a texture, as a penalty.
 
 Left alone, the search for the least difference shows a few patches over and over and shuns whatever is rare
-on the surface. Counting what was used is the remedy of Kaspar et al. 2015 (Self Tuning Texture Optimization);
+on the surface. Counting uses is the remedy of Kaspar et al. 2015 (Self Tuning Texture Optimization);
 the paper has none.
 """
 
@@ -12,14 +12,14 @@ import numpy as np
 from mitex.errors import ConfigError
 
 EVENNESS = 0.1
-REACH = 0.3  # standard deviation of what a patch counts for [sides of a patch]
+REACH = 0.3  # standard deviation of a use's spread over the surface [sides of a patch]
 
 
-class Usage:
-    """Counts what was used.
+class Repetition:
+    """Counts how often patches are used.
 
     Args:
-        centres: (P, D) where the patches were taken.
+        centres: (P, D) middles of the patches on the surface.
         length: side of a patch in the same units.
         evenness: one use of a patch weighs as much as this times the mean distance of all patches; 0 or more.
 

@@ -16,7 +16,7 @@ import numpy as np
 from mitex.mesh import Mesh
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.field.lighting import BANDS, COEFFICIENTS, COSINE, POWER
-from mitex.methods.nerf.field.raycast import Sights
+from mitex.methods.nerf.field.raycast import Raycaster
 from mitex.methods.nerf.field.tensors import channels
 from mitex.runtime import load_mitsuba
 
@@ -27,10 +27,10 @@ STRIDE = 4  # pixels
 SOLID = 0.5  # alpha of pixels that count
 STEEP = 75.0  # angle to the normal of pixels that count, at most [degrees]
 ALBEDO = 0.25  # mean of k_d: what is four times as bright can still be told
-UNKNOWN = 1e-3  # pull towards even light, beside the pixels
+PRIOR = 1e-3  # weight of even light, beside the pixels
 DARKEST = 0.01  # mean radiance of photos that a light is made for, at least
 SHADE = 0.25  # of what faces the least light, at least, beside the mean
-WAYS = 2000  # directions that are looked at for that
+DIRECTIONS = 2000  # in which the light is evaluated for that
 
 
 def estimated_light(mesh: Mesh, capture: Capture) -> np.ndarray:
@@ -44,29 +44,29 @@ def estimated_light(mesh: Mesh, capture: Capture) -> np.ndarray:
         (16,) float32 spherical harmonics, see `lighting`; zero above l = 2. No side is darker than a quarter
         of the mean. Dim even light where the photos are black or do not see the mesh.
     """
-    sights = Sights(mesh, capture)
+    raycaster = Raycaster(mesh, capture)
     count = BANDS**2
     gram, bright = np.zeros((count, count)), np.zeros(count)
     for view in range(len(capture)):
-        sight = sights(view, STRIDE)
+        hits = raycaster(view, STRIDE)
         image = capture.images[view][::STRIDE, ::STRIDE].astype(np.float64) / 255
-        seen = (sight.angle < STEEP) & (image[..., 3] > SOLID)
-        if seen.any():
-            basis = _irradiance(sight.normals[seen])
+        valid = (hits.angle < STEEP) & (image[..., 3] > SOLID)
+        if valid.any():
+            basis = _irradiance(hits.normals[valid])
             gram += basis.T @ basis
-            bright += basis.T @ (image[seen][:, :3] ** (1 / POWER)).mean(1)
+            bright += basis.T @ (image[valid][:, :3] ** (1 / POWER)).mean(1)
     light = np.zeros(COEFFICIENTS)
     if gram[0, 0]:
-        pull = UNKNOWN * gram[0, 0] * np.diag(np.arange(count) > 0)
-        light[:count] = np.linalg.solve(gram + pull, bright) / ALBEDO
+        prior = PRIOR * gram[0, 0] * np.diag(np.arange(count) > 0)
+        light[:count] = np.linalg.solve(gram + prior, bright) / ALBEDO
     light[0] = max(light[0], DARKEST / ALBEDO * math.sqrt(4 * math.pi))
     return _softened(light).astype(np.float32)
 
 
 def _softened(light: np.ndarray) -> np.ndarray:
     """The light, nearer to an even one if it leaves a side too dark."""
-    ways = np.random.default_rng(0).normal(size=(WAYS, 3))
-    shades = _irradiance(ways / np.linalg.norm(ways, axis=1, keepdims=True)) @ light[: BANDS**2]
+    directions = np.random.default_rng(0).normal(size=(DIRECTIONS, 3))
+    shades = _irradiance(directions / np.linalg.norm(directions, axis=1, keepdims=True)) @ light[: BANDS**2]
     mean = light[0] / math.sqrt(4 * math.pi)
     share = min(1.0, (1 - SHADE) * mean / max(mean - shades.min(), 1e-12))
     return light * np.where(np.arange(COEFFICIENTS) > 0, share, 1.0)

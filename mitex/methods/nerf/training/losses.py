@@ -62,7 +62,7 @@ def normal_agreement(predicted: torch.Tensor, target: torch.Tensor) -> torch.Ten
 
     Args:
         predicted: (R, 3) fine normals composited along R rays, of any length.
-        target: (R, 3) directions wanted, of any length; constant.
+        target: (R, 3) target directions, of any length; constant.
 
     Returns:
         Scalar in [-cos(pi / 8), 1], without a derivative where the angle is below pi / 8.
@@ -93,9 +93,9 @@ class _Clustering(torch.autograd.Function):
     @staticmethod
     @once_differentiable
     def backward(ctx, gradient):
-        offsets, pull = ctx.saved_tensors
-        pulls = offsets * (pull * (gradient.double() * ctx.scale))
-        return pulls.sum(1).T.to(ctx.dtypes[0]), -pulls.sum(2).T.to(ctx.dtypes[1]), None
+        offsets, force = ctx.saved_tensors
+        forces = offsets * (force * (gradient.double() * ctx.scale))
+        return forces.sum(1).T.to(ctx.dtypes[0]), -forces.sum(2).T.to(ctx.dtypes[1]), None
 
 
 def _before(values: torch.Tensor, starts: torch.Tensor) -> torch.Tensor:

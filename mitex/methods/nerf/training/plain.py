@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from mitex.bridge import call
-from mitex.integrators.march import Samples, accumulated, weights_of
+from mitex.integrators.march import Samples, sum_rays, weights_of
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.pixels import Batch
 from mitex.methods.nerf.config import NerfConfig
@@ -19,8 +19,9 @@ from mitex.methods.nerf.field.decoder import HIGHEST, sigmoid
 from mitex.methods.nerf.field.hash_grid import HashGrid
 from mitex.methods.nerf.field.mlp import network_rows, packed_networks, weight_bound
 from mitex.methods.nerf.field.occupancy import Occupancy, hull_cells
+from mitex.methods.nerf.field.rendering import batch_rays, render_step
 from mitex.methods.nerf.field.tensors import channels, tensor
-from mitex.methods.nerf.training.radiance import RadianceTask, Rendered, learn, look_step, rays_of
+from mitex.methods.nerf.training.radiance import RadianceTask, Rendered, learn
 from mitex.runtime import load_mitsuba
 from mitex.training import checkpoint
 
@@ -53,8 +54,8 @@ class PlainField:
         packed: bool = False,
     ) -> None:
         self.grid, self.table = grid, table
-        given = iter(weights)
-        nets = [[next(given) for _ in widths[1:]] for widths in (DENSITY, COLOUR)]
+        remaining = iter(weights)
+        nets = [[next(remaining) for _ in widths[1:]] for widths in (DENSITY, COLOUR)]
         self._nets = packed_networks(*nets) if packed else nets
         self.mask, self.step = mask, step
 
@@ -80,50 +81,50 @@ class PlainField:
 class PlainTask(RadianceTask):
     """Trains a plain field; arguments as of `RadianceTask`."""
 
-    def __init__(self, config: NerfConfig, capture: Capture, shown: tuple[Capture, int]) -> None:
-        drawn = torch.Generator().manual_seed(config.seed)
+    def __init__(self, config: NerfConfig, capture: Capture, preview_view: tuple[Capture, int]) -> None:
+        generator = torch.Generator().manual_seed(config.seed)
         self.grid = HashGrid(LEVELS, COARSEST, FINEST, config.table)  # as published
-        table = torch.empty(self.grid.size).uniform_(-1e-4, 1e-4, generator=drawn)
+        table = torch.empty(self.grid.size).uniform_(-1e-4, 1e-4, generator=generator)
         parameters = {"table": table}
         for k, shape in enumerate(_shapes()):
             bound = weight_bound(shape)
-            parameters[f"weights/{k}"] = torch.empty(shape).uniform_(-bound, bound, generator=drawn)
+            parameters[f"weights/{k}"] = torch.empty(shape).uniform_(-bound, bound, generator=generator)
         for value in parameters.values():
             value.requires_grad_()
         occupancy = Occupancy(config.occupancy, hull_cells(capture, config.occupancy))
-        super().__init__(config, capture, shown, occupancy, parameters)
+        super().__init__(config, capture, preview_view, occupancy, parameters)
 
     def metadata(self) -> dict[str, str]:
         return {"method": "plain", "capture": self.pixels.capture.name}
 
     def render(self, step: int, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
-        origin, direction = rays_of(batch)
+        origin, direction = batch_rays(batch)
 
-        def run(table: Any, *weights: Any) -> Any:
-            field = PlainField(self.grid, table.array, weights)
+        def run(table: Any, *matrices: Any) -> Any:
+            field = PlainField(self.grid, table.array, matrices)
             along = dr.gather(mi.Vector3f, direction, samples.ray)
             _, density, colour = field.evaluate(samples.points(origin, direction), along)
-            shares, through = weights_of(density, samples)
-            return tensor(accumulated(colour * shares, samples)), tensor(through), tensor(shares)
+            weights, transmittance = weights_of(density, samples)
+            return tensor(sum_rays(colour * weights, samples)), tensor(transmittance), tensor(weights)
 
-        colour, through, weights = call(run, *self.named.values())
-        return Rendered(colour, through, weights, samples)
+        colour, transmittance, weights = call(run, *self.named.values())
+        return Rendered(colour, transmittance, weights, samples)
 
     def field(self, parameters: dict[str, torch.Tensor], packed: bool = True) -> PlainField:
         table, *weights = (mi.TensorXf(value.detach().numpy()) for value in parameters.values())
-        mask, step = self.occupancy.mask, look_step(self.config)
+        mask, step = self.occupancy.mask, render_step(self.config)
         return PlainField(self.grid, table.array, weights, mask, step, packed)
 
     def density(self, points: np.ndarray) -> np.ndarray:
         return self.field(self.named).density_at(points)
 
 
-def trained(
-    config: NerfConfig, capture: Capture, shown: tuple[Capture, int], folder: str | Path, quiet: bool
+def train_plain_field(
+    config: NerfConfig, capture: Capture, preview_view: tuple[Capture, int], folder: str | Path, quiet: bool
 ) -> PlainTask:
-    """A field after its training in a run folder, which lets an interrupted one go on; arguments as above."""
+    """Trains a plain field in a run folder, or continues there; arguments as of `RadianceTask`."""
     folder = Path(folder)
-    task = PlainTask(config, capture, shown)
+    task = PlainTask(config, capture, preview_view)
     learn(task, config, folder, resume=(folder / checkpoint.NAME).exists(), quiet=quiet)
     return task
 

@@ -10,21 +10,30 @@ import numpy as np
 import torch
 
 from mitex.bridge import call
-from mitex.integrators.march import Samples, accumulated, weights_of
+from mitex.integrators.march import Samples, sum_rays, weights_of
 from mitex.mesh import Mesh
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.pixels import Batch
 from mitex.methods.nerf.config import NerfConfig
-from mitex.methods.nerf.field.decoder import Decoder, Encoding
+from mitex.methods.nerf.field.decoder import Decoder
+from mitex.methods.nerf.field.encoding import Encoding
 from mitex.methods.nerf.field.mlp import weight_bound
 from mitex.methods.nerf.field.networks import ELEVATION, weight_shapes
 from mitex.methods.nerf.field.occupancy import Occupancy, hull_cells
-from mitex.methods.nerf.field.projection import Feet, Projection, attach
-from mitex.methods.nerf.field.shell import CapturedLatents, Located, Shell, appearance, shell_cells, within
+from mitex.methods.nerf.field.projection import Projection, Projections, attach
+from mitex.methods.nerf.field.rendering import batch_rays, render_step
+from mitex.methods.nerf.field.shell import (
+    CapturedLatents,
+    Shell,
+    ShellCoords,
+    appearance,
+    shell_cells,
+    within,
+)
 from mitex.methods.nerf.field.tensors import rows, tensor
 from mitex.methods.nerf.training.light_estimate import estimated_light
 from mitex.methods.nerf.training.losses import clustering, normal_agreement
-from mitex.methods.nerf.training.radiance import RadianceTask, Rendered, look_step, rays_of
+from mitex.methods.nerf.training.radiance import RadianceTask, Rendered
 from mitex.runtime import bfloat16_is_fast, load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
@@ -32,10 +41,10 @@ import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit o
 
 CLUSTERS = 4  # centres in each level
 OUTWARDS = 0.1  # share of the coarse normal in what the fine one is compared with
-SURFACE = 0.5  # share of its ray from which on a sample is what one sees
-HIDDEN_RAYS = 0.25  # share of the rays below whose surface the inside is looked at
+SURFACE = 0.5  # compositing weight from which on a sample is the visible surface
+INTERIOR_RAYS = 0.25  # share of the rays below whose surface the interior is evaluated
 BURIED = 0.25  # of the shell's thickness on one side: what has so much matter around it, no photo sees
-AROUND = (0, 0, 0), (0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)  # where that is looked for
+AROUND = (0, 0, 0), (0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)  # where matter is looked for
 LEAST = 1e-3  # opacity of rays whose normals are compared
 # Fine normals start near those of the faces: under random ones k_d learns the shades first.
 FLAT = 1e-2
@@ -47,7 +56,7 @@ class TextureTask(RadianceTask):
 
     Args:
         config: settings.
-        capture, shown: as of `RadianceTask`.
+        capture, preview_view: as of `RadianceTask`.
         projection: onto the base shape.
         frames: (F, 3, 3) of its faces.
         thickness: h, half of the shell's [scene units].
@@ -57,66 +66,66 @@ class TextureTask(RadianceTask):
         self,
         config: NerfConfig,
         capture: Capture,
-        shown: tuple[Capture, int],
+        preview_view: tuple[Capture, int],
         projection: Projection,
         frames: np.ndarray,
         thickness: float,
     ) -> None:
         self.projection, self.frames, self.thickness = projection, frames, thickness
         self.encoding = Encoding(config)
-        parameters = _start(config, self.encoding, capture, projection.mesh)
+        parameters = _initial_parameters(config, self.encoding, capture, projection.mesh)
         possible = shell_cells(projection, thickness, hull_cells(capture, config.occupancy))
-        super().__init__(config, capture, shown, Occupancy(config.occupancy, possible), parameters)
+        super().__init__(config, capture, preview_view, Occupancy(config.occupancy, possible), parameters)
 
     def metadata(self) -> dict[str, str]:
         return {"method": "nerf", "capture": self.pixels.capture.name}
 
-    def aimed(self, batch: Batch) -> Batch:
+    def with_cameras(self, batch: Batch) -> Batch:
         if not self.config.refine_cameras:
             return batch
         turn, shift = (POSE * self.named["poses"].detach()[batch.view]).split(3, dim=1)
-        directions = _turned(torch.from_numpy(batch.directions), turn).numpy()
+        directions = _rotate(torch.from_numpy(batch.directions), turn).numpy()
         return replace(batch, origins=batch.origins + shift.numpy(), directions=directions)
 
     def render(self, step: int, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
-        origin, direction = rays_of(batch)
-        index, feet = within(self.projection(rows(samples.points(origin, direction))), self.thickness)
-        samples = samples.kept(mi.UInt32(index.astype(np.uint32)))
-        foot, distance, along = self._attached(batch, samples, feet)
+        origin, direction = batch_rays(batch)
+        index, projections = within(self.projection(rows(samples.points(origin, direction))), self.thickness)
+        samples = samples.subset(mi.UInt32(index.astype(np.uint32)))
+        foot, distance, along = self._attached(batch, samples, projections)
         compared = int(self.config.normal_rays * samples.rays) if self.config.normals else 0
-        hidden = int(HIDDEN_RAYS * samples.rays) if self._knows_inside(step) else 0
-        depths = torch.rand(hidden, generator=generator).numpy()
+        interior = int(INTERIOR_RAYS * samples.rays) if self._uses_interior(step) else 0
+        depths = torch.rand(interior, generator=generator).numpy()
 
         def run(foot: Any, distance: Any, along: Any, light: Any, *arrays: Any) -> Any:
-            located = Located.of(feet)
-            located.foot, located.distance = dr.unravel(mi.Point3f, foot.array), distance.array
+            coords = ShellCoords.of(projections)
+            coords.foot, coords.distance = dr.unravel(mi.Point3f, foot.array), distance.array
             latents, decoder = self._model(arrays)
             view = dr.unravel(mi.Vector3f, along.array)
             detach = self.config.detach_normals
-            density, colour, normal = appearance(latents, decoder, light, located, view, detach)
-            shares, through = weights_of(density, samples)
-            rgb = accumulated(colour * shares, samples)
-            fine, wanted = self._normals(arrays, located, normal, shares, samples, compared)
-            strange = self._inside(arrays, located, shares, samples, mi.Float(depths))
-            results = rgb, through, shares, fine, wanted, strange
+            density, colour, normal = appearance(latents, decoder, light, coords, view, detach)
+            weights, transmittance = weights_of(density, samples)
+            rgb = sum_rays(colour * weights, samples)
+            fine, target = self._normals(arrays, coords, normal, weights, samples, compared)
+            interior = self._interior(arrays, coords, weights, samples, mi.Float(depths))
+            results = rgb, transmittance, weights, fine, target, interior
             return tuple(tensor(result) for result in results)
 
         networks = [v for name, v in self.named.items() if name.startswith(("tables/", "weights/"))]
         results = call(run, foot, distance, along, self.named["light"], *networks)
-        colour, through, weights, fine, wanted, strange = results
-        made = Rendered(colour, through, weights, samples)
-        seen = wanted.norm(dim=1) > LEAST
-        if seen.any():
-            made.terms["normals"] = self.config.normals * normal_agreement(fine[seen], wanted[seen])
-        if len(strange):
-            made.terms["inside"] = self.config.inside * strange.mean()
+        colour, transmittance, weights, fine, target, interior = results
+        rendered = Rendered(colour, transmittance, weights, samples)
+        valid = target.norm(dim=1) > LEAST
+        if valid.any():
+            rendered.terms["normals"] = self.config.normals * normal_agreement(fine[valid], target[valid])
+        if len(interior):
+            rendered.terms["interior"] = self.config.interior_weight * interior.mean()
         if self.config.clustering:
-            made.terms["clusters"] = self.config.clustering * self._clusters(generator)
-        return made
+            rendered.terms["clusters"] = self.config.clustering * self._clusters(generator)
+        return rendered
 
     def field(self, parameters: dict[str, torch.Tensor]) -> Shell:
         model = self.model(parameters, packed=True)
-        mask, step = self.occupancy.mask, look_step(self.config)
+        mask, step = self.occupancy.mask, render_step(self.config)
         return Shell(self.projection, *model, self.thickness, mask=mask, step=step)
 
     def density(self, points: np.ndarray) -> np.ndarray:
@@ -136,81 +145,87 @@ class TextureTask(RadianceTask):
         return CapturedLatents(self.encoding, tables, self.frames), decoder
 
     def _attached(
-        self, batch: Batch, samples: Samples, feet: Feet
+        self, batch: Batch, samples: Samples, projections: Projections
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Foot points, distances and directions of samples, attached to the cameras if these are refined."""
         ray = torch.from_numpy(np.array(samples.ray).astype(np.int64))
         directions = torch.from_numpy(batch.directions)
         if not self.config.refine_cameras:
-            return torch.from_numpy(feet.point), torch.from_numpy(feet.distance), directions[ray]
+            return (
+                torch.from_numpy(projections.point),
+                torch.from_numpy(projections.distance),
+                directions[ray],
+            )
         correction = POSE * self.named["poses"][batch.view]
-        turn, shift = (correction - correction.detach()).split(3, dim=1)  # `aimed` has its value
-        directions = _turned(directions, turn)
+        turn, shift = (correction - correction.detach()).split(3, dim=1)  # `with_cameras` has its value
+        directions = _rotate(directions, turn)
         t = torch.from_numpy(np.array(samples.t))
         points = (torch.from_numpy(batch.origins) + shift)[ray] + directions[ray] * t[:, None]
-        return *attach(points, feet), directions[ray]
+        return *attach(points, projections), directions[ray]
 
     def _normals(
-        self, arrays: Any, located: Located, normal: Any, shares: Any, samples: Samples, rays: int
+        self, arrays: Any, coords: ShellCoords, normal: Any, weights: Any, samples: Samples, rays: int
     ) -> tuple[Any, Any]:
-        """Fine normals and those that the density's slope asks for, gathered along the first `rays` rays."""
+        """Fine normals and the density's directions of descent, gathered along the first `rays` rays."""
         compared = samples.ray < rays
-        chosen: Any = dr.compress(compared)
-        share = dr.detach(shares)
-        fine = accumulated(normal * dr.select(compared, share, 0), samples)
-        if not dr.width(chosen):
+        index: Any = dr.compress(compared)
+        weights = dr.detach(weights)
+        fine = sum_rays(normal * dr.select(compared, weights, 0), samples)
+        if not dr.width(index):
             return fine, dr.zeros(mi.Vector3f, samples.rays)
-        part = located.part(chosen)
+        part = coords.subset(index)
         slope = self._slope([dr.detach(a) for a in arrays], part)
         target = dr.normalize((1 - OUTWARDS) * slope + OUTWARDS * part.normal)
-        share = dr.gather(mi.Float, share, chosen)
-        return fine, accumulated(target * share, samples.kept(chosen))
+        weights = dr.gather(mi.Float, weights, index)
+        return fine, sum_rays(target * weights, samples.subset(index))
 
-    def _inside(self, arrays: Any, located: Located, shares: Any, samples: Samples, depths: Any) -> Any:
-        """How strange the looks of what is buried are, below the ends of the first rays: L1 of them.
+    def _interior(self, arrays: Any, coords: ShellCoords, weights: Any, samples: Samples, depths: Any) -> Any:
+        """L1 between the reflectances of buried points below the ends of rays, and of the surface above.
 
-        `depths` says for each of these rays which share of the way down to the shell's bottom that is. Places
+        `depths` are, for each of these rays, shares of the way down to the shell's bottom. Places
         near a surface are no part of it: photos may see them from elsewhere.
         """
-        chosen: Any = dr.compress((samples.ray < dr.width(depths)) & (dr.detach(shares) > SURFACE))
-        if not dr.width(chosen):
+        index: Any = dr.compress((samples.ray < dr.width(depths)) & (dr.detach(weights) > SURFACE))
+        if not dr.width(index):
             return mi.Float()
         latents, decoder = self._model([*map(dr.detach, arrays[:2]), *arrays[2:]])
-        part = located.part(chosen)
+        part = coords.subset(index)
         features = latents(part)
-        depth = dr.gather(mi.Float, depths, dr.gather(mi.UInt32, samples.ray, chosen))
+        depth = dr.gather(mi.Float, depths, dr.gather(mi.UInt32, samples.ray, index))
         with dr.suspend_grad():
             above = decoder(*features, part.distance)
             part.distance -= depth * (part.distance + self.thickness)
             buried = self._buried(latents, decoder, part)
         below = decoder(*features, part.distance)
-        return buried * sum(dr.abs(a - b) for a, b in zip(below.looks, above.looks, strict=True))
+        return buried * sum(
+            dr.abs(a - b) for a, b in zip(below.reflectances, above.reflectances, strict=True)
+        )
 
-    def _buried(self, latents: CapturedLatents, decoder: Decoder, located: Located) -> Any:
+    def _buried(self, latents: CapturedLatents, decoder: Decoder, coords: ShellCoords) -> Any:
         """The least opacity of a step at places, a bit above them, and a bit to four sides of them."""
-        across, along = mi.coordinate_system(located.normal)
+        across, along = mi.coordinate_system(coords.normal)
         reach = BURIED * self.thickness
         lowest = mi.Float(math.inf)
         for x, y, z in AROUND:
-            foot = located.foot + reach * (x * across + y * along)
-            moved = replace(located, foot=foot, distance=located.distance + reach * z)
+            foot = coords.foot + reach * (x * across + y * along)
+            moved = replace(coords, foot=foot, distance=coords.distance + reach * z)
             lowest = dr.minimum(lowest, decoder.exponent(latents.features(moved), moved.distance))
         return 1 - dr.exp(-dr.exp(lowest) * self.step_length)
 
-    def _knows_inside(self, step: int) -> bool:
+    def _uses_interior(self, step: int) -> bool:
         """Only late: colours learn slower beside a loss that wants them the same at all depths."""
-        return self.config.inside > 0 and 2 * step >= self.config.steps
+        return self.config.interior_weight > 0 and 2 * step >= self.config.steps
 
-    def _slope(self, arrays: Any, located: Located) -> Any:
+    def _slope(self, arrays: Any, coords: ShellCoords) -> Any:
         """The direction in which the density falls, by equation 2 from its slopes in foot and distance."""
         latents, decoder = self._model(arrays)
-        located = Located(**vars(located))
-        foot, distance = mi.Point3f(located.foot), mi.Float(located.distance)
+        coords = ShellCoords(**vars(coords))
+        foot, distance = mi.Point3f(coords.foot), mi.Float(coords.distance)
         with dr.resume_grad():
             dr.enable_grad(foot, distance)
-            located.foot, located.distance = foot, distance
-            dr.backward(decoder.exponent(latents.features(located), distance))
-        along, n = dr.grad(foot), located.normal
+            coords.foot, coords.distance = foot, distance
+            dr.backward(decoder.exponent(latents.features(coords), distance))
+        along, n = dr.grad(foot), coords.normal
         slope = along - n * dr.dot(along, n) + n * dr.grad(distance)
         return dr.normalize(-slope)
 
@@ -226,18 +241,20 @@ class TextureTask(RadianceTask):
         return clustering(entries, self.named["centres"][level])
 
 
-def _turned(directions: torch.Tensor, turn: torch.Tensor) -> torch.Tensor:
+def _rotate(directions: torch.Tensor, turn: torch.Tensor) -> torch.Tensor:
     """Unit vectors (N, 3), turned by small rotation vectors (N, 3) [rad]."""
     directions = directions + torch.linalg.cross(turn, directions)
     return directions / directions.norm(dim=1, keepdim=True)
 
 
-def _start(config: NerfConfig, encoding: Encoding, capture: Capture, base: Mesh) -> dict[str, torch.Tensor]:
+def _initial_parameters(
+    config: NerfConfig, encoding: Encoding, capture: Capture, base: Mesh
+) -> dict[str, torch.Tensor]:
     """Parameters to start from, by name."""
-    drawn = torch.Generator().manual_seed(config.seed)
+    generator = torch.Generator().manual_seed(config.seed)
 
     def uniform(shape: int | tuple[int, ...], low: float, high: float) -> torch.Tensor:
-        return torch.empty(shape).uniform_(low, high, generator=drawn)
+        return torch.empty(shape).uniform_(low, high, generator=generator)
 
     f, phase = encoding.sizes
     parameters = {"tables/f": uniform(f, -1e-4, 1e-4), "tables/phase": uniform(phase, 0.0, 1e-3)}

@@ -10,13 +10,12 @@ import numpy as np
 from mitex.asset import Asset
 from mitex.errors import ConfigError, MeshError
 from mitex.frames import encode, orthonormal
-from mitex.mesh import Mesh
+from mitex.mesh import Mesh, Similarity
 from mitex.methods.nerf.base.isosurface import isosurface
 from mitex.methods.nerf.field.lighting import COEFFICIENTS
-from mitex.methods.nerf.field.occupancy import gridded
-from mitex.methods.nerf.field.shell import appearance
+from mitex.methods.nerf.field.occupancy import sample_grid
+from mitex.methods.nerf.field.shell import Shell, appearance
 from mitex.methods.nerf.field.tensors import channels, rows
-from mitex.methods.nerf.use.applied import AppliedTexture
 from mitex.runtime import load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
@@ -26,51 +25,54 @@ FLOOR = -4.0  # logarithm of densities below [of the level]
 CHUNK = 1 << 17
 
 
-def extracted(applied: AppliedTexture, cells: int | None = None) -> Asset:
+def extract_mesh(shell: Shell, similarity: Similarity, name: str, cells: int | None = None) -> Asset:
     """The surface where the density takes half of the light within a cell, with albedo and normals.
 
     Args:
-        applied: a texture on a mesh.
+        shell: a texture around a mesh.
+        similarity: the mesh's space -> scene cube.
+        name: of the asset.
         cells: of the grid along a side of the scene cube, a multiple of the occupancy grid's; None for three
             times as many.
 
     Returns:
-        An asset in the space of the textured mesh; colours are those under an even light, without gloss.
+        An asset in the mesh's space; colours are those under an even light, without gloss.
 
     Raises:
+        ConfigError: `cells` is out of range.
         MeshError: nothing is so dense.
     """
-    side = applied.mask.shape[0]
+    side = shell.mask.shape[0]
     count = CELLS * side if cells is None else cells
     if count % side or not side <= count <= 8 * side:
         raise ConfigError(f"a grid of {count} cells", f"use a multiple of {side}, up to {8 * side}")
     level = math.log(2) * count / 2
-    density = gridded(applied.density, np.array(applied.mask).astype(bool), count)
+    density = sample_grid(shell.density, np.array(shell.mask).astype(bool), count)
     if not (density > level).any():
         raise MeshError("nothing in the shell is solid", "raise the density, or train the texture for longer")
     # In logarithms, so that the surface lies well between samples whose densities differ by orders.
     values = np.maximum(np.log(np.maximum(density, 1e-6) / level), FLOOR)
     cell = 2 / count
-    mesh = isosurface(values, 0.0, low=np.full(3, 0.5 * cell - 1), cell=cell, name=applied.mesh.name)
-    albedo, normals = _looks(applied, mesh)
-    placed = mesh.with_vertices(mesh.vertices * applied.similarity.scale + applied.similarity.center)
+    mesh = isosurface(values, 0.0, low=np.full(3, 0.5 * cell - 1), cell=cell, name=name)
+    albedo, normals = _albedo_and_normals(shell, mesh)
+    placed = mesh.with_vertices(similarity.inverse(mesh.vertices))
     tangents = orthonormal(np.broadcast_to(np.array([1.0, 0.0, 0.0]), normals.shape), mesh.normals)
     detail = encode(normals, tangents, np.cross(mesh.normals, tangents), mesh.normals)
-    return Asset(placed, {"albedo": albedo, "normal": detail}, tangents.astype(np.float32), name=mesh.name)
+    return Asset(placed, {"albedo": albedo, "normal": detail}, tangents.astype(np.float32), name=name)
 
 
-def _looks(applied: AppliedTexture, mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+def _albedo_and_normals(shell: Shell, mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     """Colours (V, 3) under an even light of the learned one's strength, and fine normals (V, 3)."""
     even = np.zeros(COEFFICIENTS, np.float32)
-    even[0] = np.array(applied.light).reshape(COEFFICIENTS, -1)[0].mean()
+    even[0] = np.array(shell.light).reshape(COEFFICIENTS, -1)[0].mean()
     light = mi.TensorXf(even)
     colours, normals = np.full((len(mesh.vertices), 3), 0.5, np.float32), mesh.normals.copy()
     for start in range(0, len(mesh.vertices), CHUNK):
         part = slice(start, start + CHUNK)
-        index, located = applied.locate(channels(mi.Point3f, mesh.vertices[part]))
-        where = np.array(index) + start
-        if len(where):
-            view = channels(mi.Vector3f, -mesh.normals[where])
-            _, colour, normal = appearance(applied.latents, applied.decoder, light, located, view)
-            colours[where], normals[where] = rows(colour), rows(normal)
+        index, coords = shell.locate(channels(mi.Point3f, mesh.vertices[part]))
+        vertex = np.array(index) + start
+        if len(vertex):
+            view = channels(mi.Vector3f, -mesh.normals[vertex])
+            _, colour, normal = appearance(shell.latents, shell.decoder, light, coords, view)
+            colours[vertex], normals[vertex] = rows(colour), rows(normal)
     return colours.clip(0, 1), normals

@@ -1,4 +1,4 @@
-"""The captured texture as maps over its own base shape, which gives it back: the check of the whole way."""
+"""Latent maps over a texture's own base shape, which repeat what was captured."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import numpy as np
 from mitex.atlas import Atlas
 from mitex.mesh import Mesh
 from mitex.methods.nerf.synthesis.maps import CHANNELS, LatentMaps, uv_frames
-from mitex.methods.nerf.use.applied import stretch
+from mitex.methods.nerf.use.placement import uv_unit_length
 
 
-def own_maps(
-    base: Mesh, captured: np.ndarray, features: Callable[[np.ndarray], np.ndarray], size: int
+def self_maps(
+    base: Mesh, frames: np.ndarray, features: Callable[[np.ndarray], np.ndarray], size: int
 ) -> tuple[Mesh, LatentMaps]:
     """Latent maps that repeat what was captured.
 
     Args:
         base: the base shape.
-        captured: (F, 3, 3) T_c of its faces.
+        frames: (F, 3, 3) T_c of its faces.
         features: points (N, 3) of it -> (N, 24).
         size: side of the maps [texels].
 
@@ -30,10 +30,10 @@ def own_maps(
     """
     atlas = Atlas.build(base, size)
     mesh = replace(base, uv=atlas.uv)
-    shown = atlas.face >= 0
-    corners = base.vertices[base.faces[atlas.face[shown]]]
+    occupied = atlas.face >= 0
+    corners = base.vertices[base.faces[atlas.face[occupied]]]
     values = np.zeros((size, size, CHANNELS), np.float32)
-    values[shown] = features(np.einsum("nk,nkd->nd", atlas.barycentric[shown], corners))
+    values[occupied] = features(np.einsum("nk,nkd->nd", atlas.barycentric[occupied], corners))
     # T_s^-1 T_c: the texture's own axes are those of the charts.
-    frames = np.einsum("kij,klj->kil", uv_frames(mesh), captured)
-    return mesh, LatentMaps(values, np.maximum(atlas.face, 0), frames, stretch(mesh) / size)
+    turns = np.einsum("kij,klj->kil", uv_frames(mesh), frames)
+    return mesh, LatentMaps(values, np.maximum(atlas.face, 0), turns, uv_unit_length(mesh) / size)

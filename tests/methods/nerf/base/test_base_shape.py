@@ -180,10 +180,10 @@ def test_faces_without_area_in_uv_still_have_a_frame():
 
 def test_the_shell_is_twice_the_distance_of_most_points(rng):
     x = np.column_stack([rng.uniform(-0.8, 0.8, (1000, 2)), np.linspace(-0.1, 0.1, 1000)])
-    thickness = shell_thickness(x, Projection(grid(20, 20), pull=None))
+    thickness = shell_thickness(x, Projection(grid(20, 20), repulsion=None))
     assert thickness == pytest.approx(2 * 0.07, rel=0.01)
 
 
 def test_a_scan_elsewhere_is_refused():
     with pytest.raises(MeshError, match="no point of the scan"):
-        shell_thickness(np.full((5, 3), 3.0), Projection(grid(4, 4), pull=None))
+        shell_thickness(np.full((5, 3), 3.0), Projection(grid(4, 4), repulsion=None))

@@ -7,7 +7,7 @@ import pytest
 
 from mitex.errors import MeshError
 from mitex.mesh import Mesh, icosphere, quality
-from mitex.methods.nerf.base.convex_parts import GROWN, convex_pieces, union
+from mitex.methods.nerf.base.convex_parts import GROWN, convex_parts, union
 
 
 def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> np.ndarray:
@@ -70,19 +70,19 @@ def test_flat_pieces_are_left_out():
 def test_pieces_cover_a_shape_that_is_not_convex():
     pytest.importorskip("coacd")
     corner = union([box((0, 0, 0), (2, 1, 1)), box((0, 0, 0), (1, 2, 1))], 0.3)
-    pieces = convex_pieces(corner, 0.1)
+    pieces = convex_parts(corner, 0.1)
     assert len(pieces) > 1
     assert volume(union(pieces, 0.05)) == pytest.approx(volume(corner), rel=0.1)
-    assert len(convex_pieces(corner, 1.0)) == 1
+    assert len(convex_parts(corner, 1.0)) == 1
 
 
 def test_coacd_is_silent(capfd):
     pytest.importorskip("coacd")
-    convex_pieces(icosphere(3), 0.3)
+    convex_parts(icosphere(3), 0.3)
     assert capfd.readouterr() == ("", "")
 
 
 def test_names_the_extra_that_is_missing(monkeypatch):
     monkeypatch.setitem(sys.modules, "coacd", None)
     with pytest.raises(MeshError, match=r"pip install 'mitex\[nerf\]'"):
-        convex_pieces(icosphere(2), 0.1)
+        convex_parts(icosphere(2), 0.1)

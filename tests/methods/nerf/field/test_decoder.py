@@ -13,7 +13,7 @@ from benchmarks import torch_field
 from mitex.bridge import call
 from mitex.methods.nerf.config import PRESETS, NerfConfig
 from mitex.methods.nerf.field import mlp
-from mitex.methods.nerf.field.decoder import Decoder, Reflection, embedded
+from mitex.methods.nerf.field.decoder import Decoder, Reflection, frequency_encoding
 from mitex.methods.nerf.field.mlp import weight_bound
 from mitex.methods.nerf.field.networks import FINE, weight_shapes
 from mitex.methods.nerf.field.tensors import rows, tensor
@@ -118,7 +118,7 @@ def test_gradients_of_points_that_move_are_exact():
 
 
 def test_the_embedding_is_the_distance_and_its_waves():
-    values = [np.array(v) for v in embedded(mi.Float(0.3, -0.1))]
+    values = [np.array(v) for v in frequency_encoding(mi.Float(0.3, -0.1))]
     assert len(values) == FINE == 25
     np.testing.assert_allclose(values[0], [0.3, -0.1], rtol=1e-6)
     np.testing.assert_allclose(values[23], np.sin(2**11 * np.array([0.3, -0.1], np.float32)), atol=2e-4)
@@ -134,7 +134,7 @@ def test_the_normal_of_equation_4():
 
 def test_surfaces_mirror_more_at_grazing_angles():
     found = said(specular=mi.Float(0.04), grazing=mi.Float(0.6))
-    np.testing.assert_allclose(np.array(found.mirrored(mi.Float([1.0, 0.5, 0.0]))), [0.04, 0.0575, 0.6])
+    np.testing.assert_allclose(np.array(found.specular_at(mi.Float([1.0, 0.5, 0.0]))), [0.04, 0.0575, 0.6])
 
 
 def test_as_published_they_mirror_as_much_from_all_sides():
@@ -143,7 +143,7 @@ def test_as_published_they_mirror_as_much_from_all_sides():
     f, phase = (_columns(mi.TensorXf(x.numpy())) for x in (f, phase))
     found = decoder(f, phase, mi.Float(distance.numpy()))
     for cosine in (0.0, 0.3, 1.0):
-        np.testing.assert_array_equal(np.array(found.mirrored(cosine)), np.array(found.specular))
+        np.testing.assert_array_equal(np.array(found.specular_at(cosine)), np.array(found.specular))
 
 
 def test_densities_stay_finite():

@@ -9,9 +9,9 @@ import torch
 from benchmarks import torch_field
 from mitex.bridge import call
 from mitex.methods.nerf.config import NerfConfig
-from mitex.methods.nerf.field.decoder import Encoding
+from mitex.methods.nerf.field.encoding import Encoding
 from mitex.methods.nerf.field.hash_grid import HashGrid
-from mitex.methods.nerf.field.tensors import channels, stacked
+from mitex.methods.nerf.field.tensors import channels, stack_rows
 from mitex.runtime import init
 
 mi = init()
@@ -26,7 +26,7 @@ def drawn(*shape: int, seed: int = 0) -> torch.Tensor:
 
 def features(grid: HashGrid, points: torch.Tensor, table: torch.Tensor) -> torch.Tensor:
     """(C, N) of points (N, 3)."""
-    return call(lambda p, t: stacked(grid(dr.unravel(mi.Point3f, p.array), t.array)), points, table)
+    return call(lambda p, t: stack_rows(grid(dr.unravel(mi.Point3f, p.array), t.array)), points, table)
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from mitex.methods.nerf.field.occupancy import WARMUP, Occupancy, gridded, hull_cells
+from mitex.methods.nerf.field.occupancy import WARMUP, Occupancy, hull_cells, sample_grid
 from tests.methods.nerf.tiny import tiny_capture
 
 
@@ -63,7 +63,7 @@ def test_the_state_goes_round_and_must_fit():
 def test_a_grid_is_the_density_where_cells_are_occupied():
     occupied = np.zeros((4, 4, 4), bool)
     occupied[1:3, 1:3, 2] = True
-    found = gridded(lambda p: p @ np.array([1, 10, 100], np.float32) + 200, occupied, 8)
+    found = sample_grid(lambda p: p @ np.array([1, 10, 100], np.float32) + 200, occupied, 8)
     axis = (np.arange(8) + 0.5) / 4 - 1
     x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
     inside = occupied.repeat(2, 0).repeat(2, 1).repeat(2, 2)

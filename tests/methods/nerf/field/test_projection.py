@@ -6,7 +6,7 @@ import torch
 
 from mitex.errors import ConfigError, MeshError
 from mitex.mesh import Mesh, grid, icosphere, subdivide_midpoint
-from mitex.methods.nerf.field.projection import MISSED, Feet, Projection, attach
+from mitex.methods.nerf.field.projection import MISSED, Projection, Projections, attach
 
 SAGITTA = 1.5e-4  # how far the faces of icosphere(45) lie below the unit sphere
 
@@ -31,17 +31,17 @@ def spread(rng: np.random.Generator, count: int, low: float, high: float) -> np.
     return x.astype(np.float32)
 
 
-def slow(mesh: Mesh, x: np.ndarray, neighbours: int, pull: float | None) -> tuple[float, np.ndarray]:
+def slow(mesh: Mesh, x: np.ndarray, neighbours: int, repulsion: float | None) -> tuple[float, np.ndarray]:
     """Signed distance and normal of one point in float64: equation 1, and the plane of every face."""
     x, vertices = x.astype(np.float64), mesh.vertices.astype(np.float64)
     distance = np.linalg.norm(vertices - x, axis=1)
     near = np.argsort(distance)[:neighbours]
     weight = 1 / distance[near]
     normal = (weight[:, None] * mesh.normals[near]).sum(0)
-    if pull is not None:
+    if repulsion is not None:
         unit = (x - vertices[near]) / distance[near, None]
         away = (weight[:, None] * unit).sum(0) / weight.sum()
-        normal = normal + (away if away @ normal > 0 else -away) / pull
+        normal = normal + (away if away @ normal > 0 else -away) / repulsion
     normal /= np.linalg.norm(normal)
     a, b, c = vertices[mesh.faces].transpose(1, 0, 2)
     matrix = np.stack([b - a, c - a, np.broadcast_to(normal, a.shape)], 2)
@@ -50,7 +50,7 @@ def slow(mesh: Mesh, x: np.ndarray, neighbours: int, pull: float | None) -> tupl
     return min(t[inside], key=abs, default=MISSED), normal
 
 
-def assert_consistent(mesh: Mesh, x: np.ndarray, feet: Feet) -> None:
+def assert_consistent(mesh: Mesh, x: np.ndarray, feet: Projections) -> None:
     """All parts of the feet that were hit describe one place, and the missed ones are marked as such."""
     hit = feet.hit
     np.testing.assert_allclose(np.linalg.norm(feet.normal[hit], axis=1), 1, atol=1e-6)
@@ -85,7 +85,7 @@ def test_normals_point_outwards_on_both_sides_of_a_sphere(ball, rng):
 
 def test_on_a_plane_it_is_the_orthogonal_projection(rng):
     x = rng.uniform(-0.7, 0.7, (2000, 3)).astype(np.float32)
-    feet = Projection(grid(20, 20), pull=None)(x)
+    feet = Projection(grid(20, 20), repulsion=None)(x)
     np.testing.assert_allclose(feet.distance, x[:, 2], atol=1e-6)
     np.testing.assert_allclose(feet.point, x * (1, 1, 0), atol=1e-6)
     np.testing.assert_allclose(feet.normal, np.tile((0, 0, 1), (2000, 1)), atol=1e-6)
@@ -108,20 +108,20 @@ def test_on_a_box_it_is_the_orthogonal_projection_away_from_the_edges(rng, side)
     foot = x.copy()
     foot[np.arange(3000), axis] = 0.5 * sign
     x[np.arange(3000), axis] = sign * (0.5 + side * height)
-    feet = Projection(mesh, pull=None)(x)
+    feet = Projection(mesh, repulsion=None)(x)
     np.testing.assert_allclose(feet.distance, side * height, atol=1e-6)
     np.testing.assert_allclose(feet.point, foot, atol=1e-6)
 
 
-@pytest.mark.parametrize("pull", [0.05, None])
+@pytest.mark.parametrize("repulsion", [0.05, None])
 @pytest.mark.parametrize("neighbours", [5, 8])
-def test_it_agrees_with_a_slow_reference(rng, neighbours, pull):
+def test_it_agrees_with_a_slow_reference(rng, neighbours, repulsion):
     mesh = icosphere(3)
     mesh = mesh.with_vertices(mesh.vertices * (1.0, 0.6, 0.4) + rng.normal(size=mesh.vertices.shape) * 0.02)
     x = rng.uniform(-1.2, 1.2, (150, 3)).astype(np.float32)
-    feet = Projection(mesh, neighbours=neighbours, pull=pull)(x)
+    feet = Projection(mesh, neighbours=neighbours, repulsion=repulsion)(x)
     for k in range(len(x)):
-        distance, normal = slow(mesh, x[k], neighbours, pull)
+        distance, normal = slow(mesh, x[k], neighbours, repulsion)
         assert feet.distance[k] == pytest.approx(distance, abs=1e-4)
         if feet.hit[k]:
             np.testing.assert_allclose(feet.normal[k], normal, atol=1e-4)
@@ -157,7 +157,7 @@ def test_it_turns_with_the_mesh(ball, rng):
 def test_points_beside_an_open_surface_are_missed(rng):
     x = rng.uniform(-1, 1, (500, 3)).astype(np.float32)
     x[:250, 0] += 3
-    feet = Projection(grid(8, 8), pull=None)(x)
+    feet = Projection(grid(8, 8), repulsion=None)(x)
     np.testing.assert_array_equal(feet.hit, x[:, 0] <= 1)
     assert_consistent(grid(8, 8), x, feet)
 
@@ -209,7 +209,7 @@ def test_all_points_out_of_reach_are_missed(ball):
     assert not Projection(ball, reach=0.1)(np.full((5, 3), 9, np.float32)).hit.any()
 
 
-@pytest.mark.parametrize("options", [{"neighbours": 0}, {"pull": 0.0}, {"reach": -1.0}])
+@pytest.mark.parametrize("options", [{"neighbours": 0}, {"repulsion": 0.0}, {"reach": -1.0}])
 def test_numbers_out_of_range_are_refused(options):
     with pytest.raises(ConfigError):
         Projection(icosphere(2), **options)
@@ -231,7 +231,7 @@ def derivatives(projection: Projection, x: np.ndarray, step: float) -> tuple[np.
     return foot, distance
 
 
-def equation_2(x: np.ndarray, feet: Feet) -> tuple[np.ndarray, np.ndarray]:
+def equation_2(x: np.ndarray, feet: Projections) -> tuple[np.ndarray, np.ndarray]:
     """The same derivatives by `attach`."""
     points = torch.tensor(x, requires_grad=True)
     foot, distance = attach(points, feet)
@@ -241,7 +241,7 @@ def equation_2(x: np.ndarray, feet: Feet) -> tuple[np.ndarray, np.ndarray]:
 
 def test_on_a_plane_the_derivative_is_exact(rng):
     x = rng.uniform(-0.7, 0.7, (300, 3)).astype(np.float32)
-    projection = Projection(grid(20, 20), pull=None)
+    projection = Projection(grid(20, 20), repulsion=None)
     for made, expected in zip(equation_2(x, projection(x)), derivatives(projection, x, 0.01), strict=True):
         np.testing.assert_allclose(made, expected, atol=1e-4)
 

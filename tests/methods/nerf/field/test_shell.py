@@ -13,7 +13,7 @@ from mitex.methods.nerf.field.lighting import to_display
 from mitex.methods.nerf.field.mlp import weight_bound
 from mitex.methods.nerf.field.networks import weight_shapes
 from mitex.methods.nerf.field.projection import Projection
-from mitex.methods.nerf.field.shell import Located, Shell, appearance, shell_cells
+from mitex.methods.nerf.field.shell import Shell, ShellCoords, appearance, shell_cells
 from mitex.methods.nerf.field.tensors import channels, rows
 from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents
 from mitex.runtime import init
@@ -41,10 +41,10 @@ def triangle(uv) -> MappedLatents:
     return MappedLatents(square(), np.array([uv], np.float32), axes[None])
 
 
-def at(barycentric) -> Located:
+def at(barycentric) -> ShellCoords:
     count = len(barycentric)
     zero = np.zeros((count, 3), np.float32)
-    return Located(
+    return ShellCoords(
         channels(mi.Point3f, zero),
         mi.Float(np.zeros(count)),
         mi.UInt32(np.zeros(count, np.uint32)),

@@ -12,7 +12,7 @@ from mitex.methods.nerf.synthesis.cuts import (
     NO_CUT,
     cheapest_path,
     corner_paths,
-    feathered,
+    feather,
     new_part,
     overlap_paths,
 )
@@ -120,7 +120,7 @@ def test_feather_is_a_ramp_across_the_seam():
     new = np.zeros((8, 20), bool)
     new[:, 10:] = True
     ramp = (np.arange(1, FEATHER)) / FEATHER
-    weights = feathered(new)
+    weights = feather(new)
     assert np.allclose(weights[:, 8:12], ramp, atol=1e-6)
     assert np.allclose(weights[:, :8], 0.0) and np.allclose(weights[:, 12:], 1.0)
-    assert np.allclose(feathered(new, wrapped=True)[:, [-2, -1, 0, 1]], ramp[::-1], atol=1e-6)
+    assert np.allclose(feather(new, wrapped=True)[:, [-2, -1, 0, 1]], ramp[::-1], atol=1e-6)

@@ -12,7 +12,7 @@ from mitex.methods.nerf.synthesis.patches import (
     FeatureSource,
     Patches,
     extract_patches,
-    mirrored_frames,
+    mirror_frames,
     principal_direction,
     spread_points,
 )
@@ -218,7 +218,7 @@ def test_mirrored_bumps_have_mirrored_normals(flip: int, rng: np.random.Generato
     expected = target[2] - along[..., None] * target[0] + drop[..., None] * target[1]
     expected /= np.linalg.norm(expected, axis=-1, keepdims=True)
     inner = slice(1, -1), slice(1, -1)
-    frame = mirrored_frames(sampled, made.flip[0, :1])[0]
+    frame = mirror_frames(sampled, made.flip[0, :1])[0]
     assert (transferred(frame) * expected).sum(-1)[inner].min() > 1.0 - 1e-5
     if flip:
         assert (transferred(sampled[0]) * expected).sum(-1)[inner].min() < 1.0 - 1e-3
@@ -227,7 +227,7 @@ def test_mirrored_bumps_have_mirrored_normals(flip: int, rng: np.random.Generato
 def test_mirrored_frames_turn_around_the_axis_that_is_mirrored():
     frames = np.broadcast_to(TURN, (4, 3, 3))
     signs = [[1, 1, 1], [-1, 1, 1], [1, -1, 1], [-1, -1, 1]]
-    assert np.allclose(mirrored_frames(frames, np.arange(4)), np.array(signs)[:, :, None] * TURN)
+    assert np.allclose(mirror_frames(frames, np.arange(4)), np.array(signs)[:, :, None] * TURN)
 
 
 def test_refusals(rng: np.random.Generator):

@@ -8,8 +8,8 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from mitex.errors import ConfigError
-from mitex.methods.nerf.synthesis.guide import Guide, Likeness
-from mitex.methods.nerf.synthesis.matching import SIDES, ArraySource, Matcher, mirrored, overlap, strip
+from mitex.methods.nerf.synthesis.guide import Guide, GuideDistance
+from mitex.methods.nerf.synthesis.matching import SIDES, ArraySource, Matcher, mirror, overlap, strip
 from mitex.methods.nerf.synthesis.quilting import Quilt, quilt
 
 SIDE, STRIDE = 32, 20
@@ -64,11 +64,11 @@ def test_mirrored_patches_are_turned_back(rng: np.random.Generator):
     """Half of the crops are stored mirrored; the quilt is still the image, mirrored as its first patch is."""
     image, corners = periodic_image(), every(4)
     stored = rng.integers(0, 4, len(corners))
-    values = np.stack([mirrored(v, f) for v, f in zip(crops(image, corners), stored, strict=True)])
+    values = np.stack([mirror(v, f) for v, f in zip(crops(image, corners), stored, strict=True)])
     made = quilt(ArraySource(values, corners.astype(float), 32.0), (72, 93), rng, flips=True, nearest=1)
     first = made.patch[0, 0]
     total = int(stored[first] ^ made.flip[0, 0])
-    seen = mirrored(image, total)  # of which the first patch is a crop at
+    seen = mirror(image, total)  # of which the first patch is a crop at
     down, right = corners[first]
     corner = np.array([32 - down if total & 2 else down, 32 - right if total & 1 else right])
     expected = continued(seen, corner % 64, (72, 93))
@@ -153,7 +153,7 @@ def test_distances_are_those_of_the_strips(rng: np.random.Generator):
         found = Matcher(source, (0, 1, 2, 3), sides).distances({side: wanted[side] for side in sides})
         for flip in range(4):
             for index in range(5):
-                square = mirrored(source.values[index], flip)[..., :2]
+                square = mirror(source.values[index], flip)[..., :2]
                 total = 0.0
                 for side in sides:
                     part = {
@@ -301,18 +301,18 @@ def test_guide_turns_patches(rng: np.random.Generator):
     source = noise_source(20)
     colours = np.zeros((20, 2, 2, 3))
     colours[:, 0, 1], colours[:, 1, 0], colours[:, 1, 1] = 0.3, 0.5, 0.8
-    picture = mirrored(colours[0], 3).repeat(16, 0).repeat(16, 1)
+    picture = mirror(colours[0], 3).repeat(16, 0).repeat(16, 1)
     made = quilt(source, (32, 32), rng, flips=True, guide=Guide(picture, colours), nearest=1)
     assert (made.flip == 3).all()
 
 
 def test_likeness_is_the_root_mean_square(rng: np.random.Generator):
     colours, picture = rng.random((3, 4, 4, 3)), rng.random((50, 50, 3))
-    likeness = Likeness(Guide(picture, colours, 2.0), 3, (50, 50), SIDE, wrapped=True)
+    likeness = GuideDistance(Guide(picture, colours, 2.0), 3, (50, 50), SIDE, wrapped=True)
     found = likeness.differences(40, 10, (0, 1, 2, 3))
     below = np.tile(picture, (2, 2, 1))[40:72, 10:42].reshape(4, 8, 4, 8, 3).mean((1, 3))
     for flip in range(4):
-        shown = np.stack([mirrored(c, flip) for c in colours])
+        shown = np.stack([mirror(c, flip) for c in colours])
         expected = 2.0 * np.sqrt(np.square(shown - below).mean((1, 2, 3)))
         assert found[flip] == pytest.approx(expected, rel=1e-5)
 

@@ -7,31 +7,31 @@ from mitex.errors import ConfigError
 from mitex.methods.nerf.synthesis.guide import Guide
 from mitex.methods.nerf.synthesis.matching import ArraySource
 from mitex.methods.nerf.synthesis.quilting import Quilt, quilt
-from mitex.methods.nerf.synthesis.repetition import REACH, Usage
+from mitex.methods.nerf.synthesis.repetition import REACH, Repetition
 
 SIDE, STRIDE = 32, 20
 
 
 def test_counts_fall_with_the_distance_of_sources():
-    usage = Usage(np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 100.0]]), 10.0, 0.5)
-    assert usage.penalties().tolist() == [0.0, 0.0, 0.0]
-    usage.add(0)
-    usage.add(0)
-    usage.add(2)
+    repetition = Repetition(np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 100.0]]), 10.0, 0.5)
+    assert repetition.penalties().tolist() == [0.0, 0.0, 0.0]
+    repetition.add(0)
+    repetition.add(0)
+    repetition.add(2)
     near = np.exp(-0.5 * (3.0 / (REACH * 10.0)) ** 2)
-    assert usage.penalties() == pytest.approx([1.0, near, 0.5])
+    assert repetition.penalties() == pytest.approx([1.0, near, 0.5])
 
 
 def test_none_is_preferred_without_evenness():
-    usage = Usage(np.zeros((4, 3)), 1.0, 0.0)
-    usage.add(1)
-    assert usage.penalties().tolist() == [0.0] * 4
+    repetition = Repetition(np.zeros((4, 3)), 1.0, 0.0)
+    repetition.add(1)
+    assert repetition.penalties().tolist() == [0.0] * 4
 
 
 @pytest.mark.parametrize("evenness", [-0.1, np.nan, np.inf])
 def test_refusals(evenness: float):
     with pytest.raises(ConfigError, match="evenness"):
-        Usage(np.zeros((4, 3)), 1.0, evenness)
+        Repetition(np.zeros((4, 3)), 1.0, evenness)
 
 
 def two_kinds(rng: np.random.Generator) -> ArraySource:

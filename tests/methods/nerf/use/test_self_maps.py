@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from mitex.errors import ConfigError
+from mitex.evaluation import elevations
 from mitex.evaluation.metrics import psnr, single_image_frechet
 from mitex.mesh import grid, icosphere
-from mitex.methods.nerf import elevations
+from mitex.methods.baselines.elevations import compare_elevations
 from mitex.methods.nerf.capture.pixels import Pixels
-from mitex.methods.nerf.elevations import compare_elevations
+from mitex.methods.nerf.field.rendering import render_batch, render_rays
 from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents, uv_frames
-from mitex.methods.nerf.synthesis.patch_images import pictured
+from mitex.methods.nerf.synthesis.patch_images import render_patches
 from mitex.methods.nerf.synthesis.patches import extract_patches
 from mitex.methods.nerf.synthesis.quilting import Quilt
-from mitex.methods.nerf.training.radiance import look, seen
-from mitex.methods.nerf.use.applied import EXTENT
+from mitex.methods.nerf.use.placement import EXTENT
 from tests.methods.nerf.field.test_shell import at, mi, rows, shell
 from tests.methods.nerf.tiny import tiny_capture
 
@@ -26,7 +26,7 @@ from tests.methods.nerf.tiny import tiny_capture
 def test_on_its_own_base_shape_it_gives_the_training_views_back(texture):
     """The promise is 1 dB less than the fit."""
     learned, _ = tiny_capture().split()
-    again = texture.itself(512)
+    again = texture.on_base_shape(512)
     thickness = again.thickness * again.similarity.scale
     np.testing.assert_allclose(thickness, texture.model.base.thickness, rtol=1e-5)
     losses = []
@@ -34,7 +34,7 @@ def test_on_its_own_base_shape_it_gives_the_training_views_back(texture):
         batch, shape = Pixels(learned).image(view, 48)
         photo = (batch.colours * batch.alpha + 1 - batch.alpha).numpy()
         moved = replace(batch, origins=again.similarity.apply(batch.origins).astype(np.float32))
-        found = [look(field, rays) for field, rays in ((texture.shell, batch), (again, moved))]
+        found = [render_batch(field, rays) for field, rays in ((texture.shell, batch), (again, moved))]
         qualities = [psnr(image.reshape(*shape, 3), photo.reshape(*shape, 3)) for image in found]
         losses.append(qualities[0] - qualities[1])
         assert psnr(*(image.reshape(*shape, 3) for image in found)) > 24
@@ -61,14 +61,14 @@ def test_mirrored_charts_mirror_the_normals():
 
 def test_pictures_of_patches_are_what_is_seen_from_above(texture):
     patches = texture.patches(np.random.default_rng(0), 20)
-    whole = pictured(texture.shell, patches)
+    whole = render_patches(texture.shell, patches)
     assert whole.shape == (*patches.faces.shape, 3) and whole.min() >= 0 and whole.max() <= 1
-    thin = pictured(texture.shell, patches, every=4)
+    thin = render_patches(texture.shell, patches, every=4)
     np.testing.assert_allclose(thin, whole[:, 2::4, 2::4], atol=1e-5)
     z, reach = patches.frames[3, 2], texture.model.base.thickness
     foot = patches.points[3, 40, 50]
-    colour, through = seen(texture.shell, (foot + 2 * reach * z)[None], -z[None], far=4 * reach)
-    np.testing.assert_allclose(whole[3, 40, 50], (colour / (1 - through))[0].clip(0, 1), atol=1e-4)
+    colour, transmittance = render_rays(texture.shell, (foot + 2 * reach * z)[None], -z[None], far=4 * reach)
+    np.testing.assert_allclose(whole[3, 40, 50], (colour / (1 - transmittance))[0].clip(0, 1), atol=1e-4)
 
 
 def test_a_guide_decides_where_it_is_bright(texture):
@@ -84,7 +84,7 @@ def test_a_guide_decides_where_it_is_bright(texture):
         whole = 2 * EXTENT / (336 * maps.gap)  # the plane shows the texture once
         assert texture.covering(grid(24, 24), whole) == 336
         field = texture.apply(grid(24, 24), maps, scale=whole, density=20.0)
-        colour, _ = seen(field, origins, down)
+        colour, _ = render_rays(field, origins, down)
         differences.append(colour[x > 0.1].mean() - colour[x < -0.1].mean())
     assert differences[0] > 0.03 and differences[1] < -0.03
 
@@ -103,9 +103,9 @@ def test_a_lifted_shell_lies_higher():
     height = high.projection(points).distance - 0.05
     inside = np.flatnonzero(np.abs(height) < high.thickness)
     assert radius[inside].min() > 0.54 and radius[inside].max() > 0.74
-    index, located = high.locate(mi.Point3f(points.T.copy()))
+    index, coords = high.locate(mi.Point3f(points.T.copy()))
     np.testing.assert_array_equal(np.array(index), inside)
-    np.testing.assert_allclose(np.array(located.distance), height[inside], atol=1e-6)
+    np.testing.assert_allclose(np.array(coords.distance), height[inside], atol=1e-6)
     np.testing.assert_array_equal(np.flatnonzero(high.density(points)), inside)
 
 
