@@ -20,7 +20,7 @@ from mitex.methods.nerf.occupancy import Occupancy
 from mitex.methods.nerf.pixels import Batch, Pixels
 from mitex.methods.nerf.tensors import channels, rows
 from mitex.runtime import load_mitsuba, modest_workers
-from mitex.training import TrainResult, train
+from mitex.training import Change, Step, TrainResult, train
 from mitex.training.optim import Adam
 
 mi: Any = load_mitsuba(needs_llvm=False)
@@ -91,10 +91,15 @@ class RadianceTask(ABC):
     def parameters(self) -> Sequence[torch.Tensor]:
         return list(self.named.values())
 
-    def loss(self, step: int, generator: torch.Generator) -> tuple[torch.Tensor, dict[str, float]]:
+    def begin(self, step: int, generator: torch.Generator) -> Change | None:
+        """Now and then a refresh of the occupancy."""
+        if step % REFRESH:
+            return None
+        undo = partial(self.occupancy.load_state, self.occupancy.state())
+        return Change(undo, {"density": self.occupancy.refresh(self.density, generator)})
+
+    def loss(self, step: int, generator: torch.Generator) -> Step:
         """L1 of colours before a random background, and the field's own terms."""
-        if step % REFRESH == 0:
-            self.occupancy.refresh(self.density, generator)
         batch = self.aimed(self.pixels.draw(self.config.rays, self.config.one_view, generator))
         jitter = torch.rand(len(batch.view), generator=generator)
         rays = rays_of(batch)
@@ -112,10 +117,12 @@ class RadianceTask(ABC):
             widths = torch.full_like(made.t, self.step_length)
             spread = distortion(made.weights, made.t, widths, made.ray)
             total = total + self.config.distortion * spread
-        record = {"colour": error.item(), "samples": float(len(made.t)), "occupied": self.occupancy.share}
-        return total, record | {name: value.item() for name, value in made.terms.items()}
+        metrics = {"colour": error.item(), "samples": float(len(made.t)), "occupied": self.occupancy.share}
+        metrics |= {name: value.item() for name, value in made.terms.items()}
+        return Step(total, metrics, self._average)
 
-    def commit(self) -> None:
+    def _average(self) -> None:
+        """Every `REFRESH` updates the mean parameters move towards those of now."""
         self._commits += 1
         if self._commits % REFRESH:
             return
