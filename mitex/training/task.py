@@ -52,8 +52,8 @@ class Task(Protocol):
     def begin(self, step: int, generator: torch.Generator) -> Change | None:
         """Changes the state that the loss of this step needs: a critic, an occupancy grid, the next level.
 
-        Called once before each `loss`, with the same arguments. None says that nothing was changed. A step may
-        be skipped, so what is due once must not depend on one certain number of `step` alone.
+        Called once before each `loss`, with the same arguments. None says that nothing was changed. A step
+        may be skipped, so what is due once must not depend on one certain number of `step` alone.
         """
         ...
 
