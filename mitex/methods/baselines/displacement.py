@@ -14,8 +14,9 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from mitex.asset import Asset, clay
-from mitex.atlas import laid_out, twice_area
+from mitex.atlas import laid_out
 from mitex.errors import ConfigError
+from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh, subdivide_midpoint
 from mitex.runtime import init, load_mitsuba
 from mitex.scenes.stage import mesh_shape

@@ -13,11 +13,11 @@ import torch
 from mitex.asset import Asset
 from mitex.atlas import laid_out
 from mitex.errors import ConfigError
-from mitex.frames import orthonormal, unit
+from mitex.geometry.vectors import orthonormal, rotate_about, unit
 from mitex.mesh import Mesh, remesh, subdivide_loop
 from mitex.methods.nca import files
 from mitex.methods.nca.model import MeshNCA
-from mitex.methods.nca.perception import perception, rotate_about
+from mitex.methods.nca.perception import perception
 from mitex.methods.nca.targets import state_maps
 from mitex.runtime import keep_freed_memory
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from mitex.frames import orthonormal
+from mitex.geometry.vectors import orthonormal
 from mitex.mesh import grid
 from mitex.methods.baselines.quilted import quilted_albedo
 from mitex.methods.nerf.applied import EXTENT

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mitex.atlas import Atlas
+from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh
 from mitex.methods.nerf.applied import stretch
 from mitex.methods.nerf.maps import CHANNELS, LatentMaps, uv_frames
@@ -33,7 +34,7 @@ def own_maps(
     shown = atlas.face >= 0
     corners = base.vertices[base.faces[atlas.face[shown]]]
     values = np.zeros((size, size, CHANNELS), np.float32)
-    values[shown] = features(np.einsum("nk,nkd->nd", atlas.barycentric[shown], corners))
+    values[shown] = features(interpolate(atlas.barycentric[shown], corners))
     # T_s^-1 T_c: the texture's own axes are those of the charts.
     frames = np.einsum("kij,klj->kil", uv_frames(mesh), captured)
     return mesh, LatentMaps(values, np.maximum(atlas.face, 0), frames, stretch(mesh) / size)
