@@ -66,28 +66,36 @@ class Asset:
             textures = {k: _checked(k, v, shape, "texture") for k, v in sorted(self.texture_maps.items())}
             object.__setattr__(self, "texture_maps", textures)
 
+    @property
+    def maps(self) -> Mapping[str, np.ndarray]:
+        """The textures if baked, else the maps at the vertices."""
+        return self.vertex_maps if self.texture_maps is None else self.texture_maps
+
     def detail_normals(self) -> np.ndarray:
         """(V, 3) float32 unit normals in object space: the mesh's own, bent by the normal map if any."""
         if "normal" not in self.vertex_maps or self.tangents is None:
             return self.mesh.normals
         return decode_at_vertices(self.vertex_maps["normal"], self.tangents, self.mesh.normals)
 
-    def baked(self, resolution: int = 1024, padding: int | None = None) -> Asset:
+    def baked(
+        self, resolution: int = 1024, padding: int | None = None, layout: np.ndarray | None = None
+    ) -> Asset:
         """The same asset with textures: every texel interpolates the vertex maps.
 
-        Uses the mesh's own UVs if nothing in them overlaps, else unwraps it. Normals are interpolated in
-        object space, where they are continuous, and written in the atlas' frame.
+        Uses the given layout, or the mesh's own UVs if nothing in them overlaps, else unwraps it. Normals are
+        interpolated in object space, where they are continuous, and written in the atlas' frame.
 
         Args:
             resolution: side of the textures [texels], 16 to 8192.
             padding: how far the charts are continued outwards [texels], so that no seam shows; 8 if None,
                 less for textures under 64 texels.
+            layout: (F, 3, 2) UVs in [0, 1] that do not overlap, which is not checked again.
 
         Raises:
             ConfigError: resolution or padding out of range.
         """
-        wanted = max(min(8, resolution // 8), 1) if padding is None else padding
-        atlas = Atlas.build(self.mesh, resolution, wanted)
+        padding = max(min(8, resolution // 8), 1) if padding is None else padding
+        atlas = Atlas.build(self.mesh, resolution, padding, layout)
         faces = self.mesh.faces
         textures = {k: atlas.interpolate(v[faces]) for k, v in self.vertex_maps.items() if k != "normal"}
         if "normal" in self.vertex_maps:

@@ -81,7 +81,9 @@ class Atlas:
         return encoded
 
     @staticmethod
-    def build(mesh: Mesh, resolution: int = 1024, padding: int = 8) -> Atlas:
+    def build(
+        mesh: Mesh, resolution: int = 1024, padding: int = 8, layout: np.ndarray | None = None
+    ) -> Atlas:
         """Unwraps a mesh, or takes its own UVs if they are usable (`usable_uv`), and rasterizes the texels.
 
         Args:
@@ -89,6 +91,7 @@ class Atlas:
             resolution: side of the map [texels], 16 to 8192.
             padding: how far the charts are continued outwards [texels]. Bilinear lookups need 1, the k-th
                 mip level 2^k.
+            layout: (F, 3, 2) UVs to take as they are.
 
         Raises:
             ConfigError: resolution or padding out of range.
@@ -99,7 +102,7 @@ class Atlas:
             )
         if not 1 <= padding <= resolution // 8:
             raise ConfigError(f"padding {padding} is out of range", f"use 1 to {resolution // 8} texels")
-        uv = laid_out(mesh, resolution, padding).uv
+        uv = laid_out(mesh, resolution, padding).uv if layout is None else layout
         assert uv is not None
         return Atlas.from_uv(uv, resolution, padding)
 

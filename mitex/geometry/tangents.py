@@ -6,24 +6,14 @@ The convention is that of OpenGL and glTF: the tangent points where u grows, the
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mitex.geometry.vectors import orthonormal
 
-
-class Mesh(Protocol):
-    """What tangents need of a mesh, see `mitex.mesh.Mesh`."""
-
-    @property
-    def vertices(self) -> np.ndarray: ...
-
-    @property
-    def faces(self) -> np.ndarray: ...
-
-    @property
-    def normals(self) -> np.ndarray: ...
+if TYPE_CHECKING:
+    from mitex.mesh import Mesh  # the type alone: meshes are built on geometry
 
 
 @dataclass(frozen=True, eq=False)
