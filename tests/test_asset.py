@@ -8,7 +8,9 @@ import pytest
 
 from mitex.asset import Asset
 from mitex.errors import ConfigError, MeshError, OutputError
-from mitex.frames import decode, split_at_seams, unit
+from mitex.geometry.normal_maps import decode
+from mitex.geometry.tangents import split_at_seams
+from mitex.geometry.vectors import unit
 from mitex.mesh import icosphere
 from tests.export.common import wavy
 
