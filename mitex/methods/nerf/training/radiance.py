@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,6 @@ from mitex.methods.nerf.field.rendering import batch_rays, render_view
 from mitex.methods.nerf.field.tensors import rows
 from mitex.methods.nerf.training.losses import distortion
 from mitex.runtime import load_mitsuba, modest_workers
-from mitex.training import TrainResult, train
 from mitex.training.optim import Adam
 
 mi: Any = load_mitsuba(needs_llvm=False)
@@ -134,17 +132,12 @@ class RadianceTask(ABC):
         return np.hstack(render_view(self.field(self.mean), *self.preview_view, PREVIEW)[::-1])
 
 
-def learn(task: RadianceTask, config: NerfConfig, folder: Path, *, resume: bool, quiet: bool) -> TrainResult:
-    """Trains by Adam with a learning rate that falls to a tenth in `lr_steps`; raises as `train`."""
-    return train(
-        task,
-        config,
-        folder,
-        lr=lambda step: config.lr * 0.1 ** (step / config.lr_steps),
-        optimizer=partial(Adam, betas=BETAS, eps=EPSILON),
-        resume=resume,
-        quiet=quiet,
-    )
+def schedule(config: NerfConfig) -> dict[str, Any]:
+    """Options of `train`: Adam with a learning rate that falls to a tenth in `lr_steps`."""
+    return {
+        "lr": lambda step: config.lr * 0.1 ** (step / config.lr_steps),
+        "optimizer": partial(Adam, betas=BETAS, eps=EPSILON),
+    }
 
 
 class Rendered:
