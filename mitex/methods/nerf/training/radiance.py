@@ -19,6 +19,7 @@ from mitex.methods.nerf.field.rendering import batch_rays, render_view
 from mitex.methods.nerf.field.tensors import rows
 from mitex.methods.nerf.training.losses import distortion
 from mitex.runtime import load_mitsuba, modest_workers
+from mitex.training import Change, Step
 from mitex.training.optim import Adam
 
 mi: Any = load_mitsuba(needs_llvm=False)
@@ -82,10 +83,15 @@ class RadianceTask(ABC):
     def parameters(self) -> Sequence[torch.Tensor]:
         return list(self.named.values())
 
-    def loss(self, step: int, generator: torch.Generator) -> tuple[torch.Tensor, dict[str, float]]:
+    def begin(self, step: int, generator: torch.Generator) -> Change | None:
+        """Now and then a refresh of the occupancy."""
+        if step % REFRESH:
+            return None
+        undo = partial(self.occupancy.load_state, self.occupancy.state())
+        return Change(undo, {"density": self.occupancy.refresh(self.density, generator)})
+
+    def loss(self, step: int, generator: torch.Generator) -> Step:
         """L1 of colours before a random background, and the field's own terms."""
-        if step % REFRESH == 0:
-            self.occupancy.refresh(self.density, generator)
         batch = self.with_cameras(self.pixels.draw(self.config.rays, self.config.one_view, generator))
         jitter = torch.rand(len(batch.view), generator=generator)
         rays = batch_rays(batch)
@@ -103,10 +109,16 @@ class RadianceTask(ABC):
             widths = torch.full_like(rendered.t, self.step_length)
             spread = distortion(rendered.weights, rendered.t, widths, rendered.ray)
             total = total + self.config.distortion * spread
-        record = {"colour": error.item(), "samples": float(len(rendered.t)), "occupied": self.occupancy.share}
-        return total, record | {name: value.item() for name, value in rendered.terms.items()}
+        metrics = {
+            "colour": error.item(),
+            "samples": float(len(rendered.t)),
+            "occupied": self.occupancy.share,
+        }
+        metrics |= {name: value.item() for name, value in rendered.terms.items()}
+        return Step(total, metrics, self._average)
 
-    def commit(self) -> None:
+    def _average(self) -> None:
+        """Every `REFRESH` updates the mean parameters move towards those of now."""
         self._commits += 1
         if self._commits % REFRESH:
             return
