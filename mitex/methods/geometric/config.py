@@ -26,7 +26,8 @@ class GeometricConfig:
         lr: learning rate, halved four times on each level.
         beta1, beta2: of Adam.
         remeasure: measure the mean edge on each level, instead of carrying it from the first.
-        carried: first level whose networks start from those of the level before.
+        carried: first level whose networks start from those of the level before; from level 3 on they are
+            of one size.
         fit_steps: of the optimisation of each training mesh.
         fit_samples: points on each surface, times the level's number + 1.
         fit_lr: how far a step moves a vertex [mean edges].
@@ -75,7 +76,7 @@ class GeometricConfig:
             lr=(0, 1),
             beta1=(0, 0.9999),
             beta2=(0, 0.9999),
-            carried=(1, MAX_LEVELS),
+            carried=(3, MAX_LEVELS),
             fit_steps=(1, None),
             fit_samples=(100, 1_000_000),
             fit_lr=(0, 1),
