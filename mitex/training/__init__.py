@@ -13,7 +13,6 @@ __all__ = [
     "Task",
     "TrainResult",
     "TrainingDiverged",
-    "check_ranges",
     "resolve",
     "train",
 ]
@@ -25,13 +24,12 @@ _HOMES = {
     "Task": "task",
     "TrainResult": "loop",
     "TrainingDiverged": "errors",
-    "check_ranges": "config",
     "resolve": "config",
     "train": "loop",
 }
 
 if TYPE_CHECKING:
-    from mitex.training.config import check_ranges, resolve
+    from mitex.training.config import resolve
     from mitex.training.errors import Interrupted, TrainingDiverged
     from mitex.training.loop import TrainResult, train
     from mitex.training.task import Change, Step, Task
