@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from mitex.cli.fitting import Fitting
-from mitex.runtime import yield_cores
+from mitex.runtime import let_idle_threads_sleep
 
 
 @dataclass(kw_only=True)
@@ -39,7 +39,7 @@ class FitNerf(Fitting):
 
     def run(self) -> None:
         shared = self.shared()
-        yield_cores()
+        let_idle_threads_sleep()
         from mitex.methods import nerf
 
         capture = nerf.load_capture(self.capture)

@@ -8,7 +8,6 @@ heights. What hangs over is hidden, and vertices move along their normals only.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.ndimage import map_coordinates
@@ -17,10 +16,9 @@ from mitex.asset import Asset, clay
 from mitex.atlas import laid_out, twice_area
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, subdivide_midpoint
-from mitex.runtime import init, load_mitsuba
+from mitex.runtime import init
+from mitex.runtime.jit import mi
 from mitex.scenes.stage import mesh_shape
-
-mi: Any = load_mitsuba(needs_llvm=False)
 
 WINDOW = 0.35  # side of the window, of the reference's extent
 ATLAS = 1024  # resolution that the target's charts are packed for

@@ -12,7 +12,6 @@ import torch
 from mitex.atlas import laid_out
 from mitex.errors import ConfigError, MeshError
 from mitex.images import write_image
-from mitex.integrators.march import DIAGONAL
 from mitex.mesh import Mesh, Similarity
 from mitex.methods.nerf.maps import LatentMaps, MappedLatents, uv_frames
 from mitex.methods.nerf.occupancy import Occupancy
@@ -20,13 +19,12 @@ from mitex.methods.nerf.projection import Projection
 from mitex.methods.nerf.radiance import look_step
 from mitex.methods.nerf.shell import Shell, shell_cells
 from mitex.paths import prepare_output
-from mitex.runtime import load_mitsuba
+from mitex.textures.march import DIAGONAL
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
     from mitex.methods.nerf.texture import NerfTexture
 
-mi: Any = load_mitsuba(needs_llvm=False)
 
 PICTURES = (".png", ".jpg", ".jpeg")
 EXTENT = 1 / 1.2  # of the mesh in the scene cube

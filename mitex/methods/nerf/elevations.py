@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -27,9 +26,7 @@ from mitex.methods.nerf.radiance import seen
 from mitex.methods.nerf.sights import Sight, Sights, window_rays
 from mitex.methods.nerf.texture import NerfTexture
 from mitex.metrics import single_image_frechet
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
+from mitex.runtime.jit import mi
 
 ELEVATIONS = (0, 20, 40, 60, 80)
 NEAR = 10.0  # pixels count whose angle is so near to the wanted one [degrees]

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mitex.integrators.march import RadianceField
 from mitex.methods.nerf.capture import Capture
 from mitex.methods.nerf.pixels import Pixels
 from mitex.methods.nerf.radiance import look
 from mitex.metrics import psnr, ssim, vgg_distance
+from mitex.textures.march import RadianceField
 
 
 @dataclass(frozen=True)

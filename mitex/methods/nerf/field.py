@@ -15,10 +15,7 @@ from mitex.methods.nerf.hash_grid import HashGrid
 from mitex.methods.nerf.mlp import network_rows, packed_networks
 from mitex.methods.nerf.networks import COARSE, FEATURES, LAYERS, OCTAVES, PHASES, REFLECTION, Networks
 from mitex.methods.nerf.tensors import stacked, unstacked
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
 
 HIGHEST = 15.0  # exponent of the density
 DULL = 3.0  # taken from the logit of k_s at grazing angles: surfaces start dull there

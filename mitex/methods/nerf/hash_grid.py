@@ -7,11 +7,7 @@ import math
 from typing import Any
 
 from mitex.methods.nerf.tensors import row_places
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
-from drjit.hashgrid import HashGridEncoding  # noqa: E402
+from mitex.runtime.jit import dr, mi
 
 CHANNELS = 2  # of a level
 PRIMES = 2654435761, 805459861  # for the second and the third axis
@@ -31,7 +27,7 @@ class HashGrid:
     def __init__(self, levels: int, coarsest: int, finest: int, size: int) -> None:
         growth = math.log2(finest / coarsest) / max(levels - 1, 1)
         self.cells = [coarsest * 2.0 ** (growth * level) for level in range(levels)]
-        self._grid: Any = HashGridEncoding(
+        self._grid: Any = dr.hashgrid.HashGridEncoding(
             mi.Float,
             3,
             n_levels=levels,
@@ -86,7 +82,7 @@ class HashGrid:
         side, first = (dr.gather(mi.UInt32, values, level) for values in (self._side, self._first))
         dense = dr.gather(mi.Bool, self._dense, level)
         low = mi.Point3u(dr.floor(place))
-        share = place - low
+        share = place - mi.Point3f(low)
         found = mi.Vector2f(0)
         for corner in itertools.product((0, 1), repeat=3):
             x, y, z = (low[k] + corner[k] for k in range(3))

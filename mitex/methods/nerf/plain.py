@@ -11,7 +11,6 @@ import numpy as np
 import torch
 
 from mitex.bridge import call
-from mitex.integrators.march import Samples, accumulated, weights_of
 from mitex.methods.nerf.capture import Capture
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field import HIGHEST, sigmoid
@@ -21,11 +20,9 @@ from mitex.methods.nerf.occupancy import Occupancy, hull_cells
 from mitex.methods.nerf.pixels import Batch
 from mitex.methods.nerf.radiance import RadianceTask, Rendered, learn, look_step, rays_of
 from mitex.methods.nerf.tensors import channels, tensor
-from mitex.runtime import load_mitsuba
+from mitex.runtime.jit import dr, mi
+from mitex.textures.march import Samples, accumulated, weights_of
 from mitex.training import checkpoint
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 LEVELS, COARSEST, FINEST = 16, 16, 2048
 CODE = 15

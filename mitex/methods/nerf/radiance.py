@@ -12,19 +12,17 @@ from typing import Any
 import numpy as np
 import torch
 
-from mitex.integrators.march import DIAGONAL, RadianceField, Samples, march, traverse, visible
 from mitex.methods.nerf.capture import Capture
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.losses import distortion
 from mitex.methods.nerf.occupancy import Occupancy
 from mitex.methods.nerf.pixels import Batch, Pixels
 from mitex.methods.nerf.tensors import channels, rows
-from mitex.runtime import load_mitsuba, modest_workers
+from mitex.runtime import lower_worker_priority
+from mitex.runtime.jit import dr, mi
+from mitex.textures.march import DIAGONAL, RadianceField, Samples, march, traverse, visible
 from mitex.training import TrainResult, train
 from mitex.training.optim import Adam
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 REFRESH = 16  # steps between looks at the occupancy, and between updates of the mean parameters
 BETAS, EPSILON = (0.9, 0.99), 1e-15  # of Adam
@@ -65,7 +63,7 @@ class RadianceTask(ABC):
         self.step_length = DIAGONAL / config.cells
         self._commits = 0
         dr.set_expand_threshold(2**26)  # by default gradients of large tables are 2.5 times slower
-        modest_workers()
+        lower_worker_priority()
 
     @abstractmethod
     def metadata(self) -> dict[str, str]:

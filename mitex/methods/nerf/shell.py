@@ -13,10 +13,7 @@ from mitex.methods.nerf.lighting import shade, to_display
 from mitex.methods.nerf.occupancy import gridded
 from mitex.methods.nerf.projection import Feet, Projection
 from mitex.methods.nerf.tensors import channels, rows
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
 
 
 @dataclass

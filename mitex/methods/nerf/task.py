@@ -10,7 +10,6 @@ import numpy as np
 import torch
 
 from mitex.bridge import call
-from mitex.integrators.march import Samples, accumulated, weights_of
 from mitex.mesh import Mesh
 from mitex.methods.nerf.capture import Capture
 from mitex.methods.nerf.config import NerfConfig
@@ -25,10 +24,9 @@ from mitex.methods.nerf.projection import Feet, Projection, attach
 from mitex.methods.nerf.radiance import RadianceTask, Rendered, look_step, rays_of
 from mitex.methods.nerf.shell import CapturedLatents, Located, Shell, appearance, shell_cells, within
 from mitex.methods.nerf.tensors import rows, tensor
-from mitex.runtime import bfloat16_is_fast, load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime import bfloat16_is_fast
+from mitex.runtime.jit import dr, mi
+from mitex.textures.march import Samples, accumulated, weights_of
 
 CLUSTERS = 4  # centres in each level
 OUTWARDS = 0.1  # share of the coarse normal in what the fine one is compared with

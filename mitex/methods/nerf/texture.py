@@ -25,9 +25,8 @@ from mitex.methods.nerf.quilting import Quilt, quilt
 from mitex.methods.nerf.radiance import look_step
 from mitex.methods.nerf.shell import CapturedLatents, Shell
 from mitex.methods.nerf.tensors import channels
-from mitex.runtime import init, load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
+from mitex.runtime import init
+from mitex.runtime.jit import mi
 
 SIZE = 2048  # texels of a synthesized texture
 LARGEST = 8192  # that is quilted for a guide [texels]

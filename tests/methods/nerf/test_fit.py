@@ -26,12 +26,12 @@ from mitex.methods.nerf.task import BURIED, POSE, TextureTask
 from mitex.methods.nerf.tensors import rows
 from mitex.metrics import psnr
 from mitex.runtime import init
+from mitex.runtime.jit import dr, mi
 from mitex.training import checkpoint
 from mitex.training.config import resolve
 from tests.methods.nerf.tiny import SETTINGS, tiny_capture
 
-mi: Any = init()
-import drjit as dr  # noqa: E402
+init()
 
 
 def test_the_loss_falls_and_the_run_folder_is_whole(run):

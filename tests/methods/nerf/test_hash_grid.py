@@ -13,9 +13,9 @@ from mitex.methods.nerf.field import Encoding
 from mitex.methods.nerf.hash_grid import HashGrid
 from mitex.methods.nerf.tensors import channels, stacked
 from mitex.runtime import init
+from mitex.runtime.jit import dr, mi
 
-mi = init()
-import drjit as dr  # noqa: E402
+init()
 
 CONFIG = NerfConfig(table=10, coarsest=8, finest=16)  # the first level is dense, the others are hashed
 
