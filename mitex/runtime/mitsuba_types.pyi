@@ -5,11 +5,11 @@ Vectors, rays and interactions are made of those; Mitsuba's stubs export types a
 
 from typing import Any
 
+import drjit.auto.ad
 from mitsuba import *  # noqa: F403
 from mitsuba import Integrator, Scene, Sensor
 
 # isort: split
-from drjit.auto import ad
 from drjit.auto.ad import Bool as Bool
 from drjit.auto.ad import Float as Float
 from drjit.auto.ad import Float64 as Float64
@@ -24,8 +24,8 @@ def _render(
     params: Any = None,
     sensor: int | Sensor = 0,
     integrator: Integrator | None = None,
-    seed: int | ad.UInt32 = 0,
-    seed_grad: int | ad.UInt32 = 0,
+    seed: int | drjit.auto.ad.UInt32 = 0,
+    seed_grad: int | drjit.auto.ad.UInt32 = 0,
     spp: int = 0,
     spp_grad: int = 0,
 ) -> TensorXf: ...
