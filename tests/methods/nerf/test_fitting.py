@@ -29,14 +29,14 @@ from mitex.methods.nerf.training import radiance
 from mitex.methods.nerf.training.light_estimate import estimated_light
 from mitex.methods.nerf.training.task import BURIED, POSE, TextureTask
 from mitex.runtime import init, threads
+from mitex.runtime.jit import dr, mi
 from mitex.training import Step, checkpoint
 from mitex.training.config import resolve
 from mitex.training.locate import NAME
 from tests.methods.nerf.tiny import SETTINGS, tiny_capture
 from tests.training.contract import FAULTS, assert_loss_is_pure, assert_third_step_leaves_no_trace
 
-mi: Any = init()
-import drjit as dr  # noqa: E402
+init()
 
 
 def test_the_loss_falls_and_the_run_folder_is_whole(run):

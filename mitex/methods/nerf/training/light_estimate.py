@@ -9,7 +9,6 @@ Ramamoorthi and Hanrahan 2001).
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -19,10 +18,7 @@ from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.field.lighting import BANDS, COEFFICIENTS, COSINE, POWER
 from mitex.methods.nerf.field.raycast import Raycaster
 from mitex.methods.nerf.field.tensors import channels
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
 
 STRIDE = 4  # pixels
 SOLID = 0.5  # alpha of pixels that count
