@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import secrets
 import sys
 from collections.abc import Iterator, Sequence
@@ -9,6 +10,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from mitex.errors import OutputError
+
+# Names of the temporary files of `atomic_write`, and of those that safetensors makes by itself.
+_TEMPORARY = re.compile(r"\..*\.[0-9a-f]{8}\.tmp(\.[^.]*)?|\.tmp[A-Za-z0-9]{6}", re.DOTALL)
 
 
 def prepare_output(path: str | os.PathLike[str], suffixes: Sequence[str] = ()) -> Path:
@@ -110,6 +114,11 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
         if isinstance(e, Exception) and os.strerror(errno.ENOSPC) in str(e):
             raise _translated(OSError(errno.ENOSPC, str(e)), target) from e
         raise
+
+
+def is_temporary(path: Path) -> bool:
+    """Whether a file is named as `atomic_write` names its temporary ones: in a killed process they stay."""
+    return _TEMPORARY.fullmatch(path.name) is not None and path.is_file()
 
 
 def cache_dir() -> Path:
