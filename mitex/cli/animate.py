@@ -67,11 +67,13 @@ class Animate(Displacing):
         in_range("--size", self.size, 16, 4096)
         in_range("--spp", self.spp, 1, 65536)
         in_range("--fps", self.fps, 1, 60)
+        from mitex.mesh.files import mesh_files
         from mitex.methods.kind import kind
         from mitex.paths import prepare_folder, prepare_output
         from mitex.render import VIDEO_SUFFIXES, check_video, film
 
-        out = prepare_output(self.out, VIDEO_SUFFIXES)
+        inputs = [self.model, *mesh_files(self.mesh)]
+        out = prepare_output(self.out, VIDEO_SUFFIXES, inputs)
         if (method := kind(self.model)) != "geometric":
             raise ConfigError(f"textures of {method} do not grow", "name a run of mitex fit geometric")
         from mitex.asset import clay
@@ -86,8 +88,9 @@ class Animate(Displacing):
         check_video(out, len(made), self.fps, self.size)
         if self.meshes is not None:
             folder = prepare_folder(self.meshes)
-            for k, frame in enumerate(made):
-                clay(frame).export(folder / f"{k:04}.ply")
+            places = [prepare_output(folder / f"{k:04}.ply", inputs=inputs) for k in range(len(made))]
+            for place, frame in zip(places, made, strict=True):
+                clay(frame).export(place)
         with bar("film") as progress:
             film(
                 map(clay, made),

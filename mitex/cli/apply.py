@@ -104,10 +104,12 @@ class Apply(Displacing):
         in_range("--size", self.size, 128, 8192)
         in_range("--density", self.density, 0.001, 1000.0)
         in_range("--lift", self.lift, 0.0, 1.0)
-        from mitex.paths import prepare_output
+        from mitex.export import prepare_export
+        from mitex.mesh.files import mesh_files
 
         method = self._method()
-        out = prepare_output(self.out, SUFFIXES + PICTURES * (method == "nerf"))
+        inputs = [self.model, self.guide, *mesh_files(self.mesh)]
+        out = prepare_export(self.out, SUFFIXES + PICTURES * (method == "nerf"), inputs)
         suffix = out.suffix.lower()
         if suffix in PICTURES:
             self._captured().render(out, resolution=self.resolution or PICTURE)
