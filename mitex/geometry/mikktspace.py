@@ -2,7 +2,7 @@
 
 M. S. Mikkelsen, "Simulation of wrinkled surfaces revisited" (2008), and the behaviour of the public
 implementations. A normal map is an encoding: only a reader with the same tangents decodes it, so the rules
-are kept to the letter:
+must be kept:
 
 - Corners of equal position, normal and UV are one vertex, whatever the mesh's indices say.
 - The corners around a vertex fall into fans: those of triangles that share edges (both ends equal, opposite
@@ -11,6 +11,9 @@ are kept to the letter:
   vertex normal, normalised, and weighted by the triangle's angle in that plane.
 - Triangles without UV area contribute nothing, and join the fan that reaches them first. Triangles of which
   two corners coincide take the tangents of the first proper triangle at the same vertex.
+
+One rule is left out, as rounding decides it: implementations keep triangles of a fan apart whose tangents are
+opposite to the last bit.
 """
 
 from __future__ import annotations
@@ -184,7 +187,7 @@ def _fans(preserving: np.ndarray, across: np.ndarray) -> np.ndarray:
     others = across[half_edges]
     same = preserving[half_edges // 3] == preserving[others // 3]
     pairs = half_edges[same], _next(others[same])  # where one starts, the other ends
-    graph = coo_array((np.ones(len(pairs[0]), np.int8), pairs), shape=(len(across),) * 2)
+    graph = coo_array((np.ones(len(pairs[0]), np.int8), pairs), shape=(len(across), len(across)))
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
