@@ -1,0 +1,59 @@
+"""Checks of option values that need no library."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from mitex.errors import ConfigError
+
+SEEDS = (0, 2**32 - 1)
+
+
+def in_range(option: str, value: float | None, low: float, high: float = math.inf) -> None:
+    """Refuses a value that is not finite or outside [low, high]; None passes.
+
+    Raises:
+        ConfigError: It is.
+    """
+    if value is None or (math.isfinite(value) and low <= value <= high):
+        return
+    bounds = f"of at least {low:g}" if high == math.inf else f"from {low:g} to {high:g}"
+    raise ConfigError(f"{option} {value} is out of range", f"choose a value {bounds}")
+
+
+def mutually_exclusive(first: str, second: str, condition: bool) -> None:
+    """Refuses two options that contradict each other.
+
+    Raises:
+        ConfigError: `condition` says that both were given.
+    """
+    if condition:
+        raise ConfigError(f"{first} and {second} contradict each other", "give only one of them")
+
+
+def reject_unused(option: str, out: Path, condition: bool) -> None:
+    """Refuses an option that means nothing for the kind of file to be written.
+
+    Raises:
+        ConfigError: `condition` says that it was given for such a file.
+    """
+    if condition:
+        raise ConfigError(f"{option} means nothing for {out.suffix} files", "leave it out or change --out")
+
+
+def merged_settings(groups: Sequence[Sequence[str]], **flags: object) -> list[str]:
+    """All `key=value` words of repeated `--set`, and of the flags that stand for a key (None: not given).
+
+    Raises:
+        ConfigError: A key is set twice, to different values.
+    """
+    words = [word for group in groups for word in group]
+    words += [f"{key}={value}" for key, value in flags.items() if value is not None]
+    seen: dict[str, str] = {}
+    for word in words:
+        key, _, value = (part.strip() for part in word.partition("="))
+        if seen.setdefault(key, value) != value:
+            raise ConfigError(f"{key} is set to {seen[key]} and to {value}", "give it once")
+    return words

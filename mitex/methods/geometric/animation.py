@@ -1,0 +1,111 @@
+"""`mitex animate` for geometric textures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, arg
+
+from mitex.methods.checks import SEEDS, in_range
+from mitex.methods.geometric.cli import TEMPLATE, GrowthOptions
+
+if TYPE_CHECKING:
+    from mitex.mesh import Mesh
+    from mitex.methods.geometric import GeometricTexture
+
+
+@dataclass(kw_only=True)
+class Animate(GrowthOptions):
+    """Film a geometric texture: as it grows on a mesh, or as one variant becomes another.
+
+    examples:
+      mitex animate runs/spikes --mesh bunny.obj --out growth.mp4 --remesh 1000
+      mitex animate runs/spikes --mesh bunny.obj --out change.mp4 --to-seed 7 --frames 48
+      mitex animate runs/spikes --mesh template --out growth.gif --meshes frames
+    """
+
+    model: Annotated[Positional[str], arg(metavar="RUN")]
+    """Run folder of mitex fit geometric."""
+
+    mesh: Annotated[str, arg(metavar="MESH|template")]
+    """Mesh file or embedded mesh; `template`: the mesh that the training started from."""
+
+    out: Annotated[Path, arg(metavar="FILE")]
+    """Video to write (.mp4 .gif)."""
+
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Random seed."""
+
+    to_seed: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None
+    """Show the way to this seed's variant, in place of the growth."""
+
+    frames: Annotated[int, arg(metavar="N")] = 36
+    """Frames: of each level's growth, or of the way from seed to seed."""
+
+    meshes: Annotated[Path | None, arg(metavar="FOLDER", help_behavior_hint="")] = None
+    """Write the mesh of each frame there too, as 0000.ply and so on."""
+
+    size: Annotated[int, arg(metavar="N")] = 384
+    """Width and height [pixels]."""
+
+    spp: Annotated[int, arg(metavar="N")] = 32
+    """Samples a pixel."""
+
+    fps: Annotated[int, arg(metavar="N")] = 24
+    """Frames a second."""
+
+    def run(self) -> None:
+        self.check_growth()
+        in_range("--seed", self.seed, *SEEDS)
+        in_range("--to-seed", self.to_seed, *SEEDS)
+        in_range("--frames", self.frames, 2, 3600)
+        in_range("--size", self.size, 16, 4096)
+        in_range("--spp", self.spp, 1, 65536)
+        in_range("--fps", self.fps, 1, 60)
+        from mitex.mesh.files import mesh_files
+        from mitex.paths import prepare_folder, prepare_output
+        from mitex.render import VIDEO_SUFFIXES, check_video, film
+
+        inputs = [self.model, *mesh_files(self.mesh)]
+        out = prepare_output(self.out, VIDEO_SUFFIXES, inputs)
+        from mitex.asset import clay
+        from mitex.methods.geometric import GeometricTexture
+        from mitex.render.progress import bar
+
+        texture, start = GeometricTexture.load(self.model), self.start_level
+        if self.mesh == TEMPLATE:
+            mesh, start = texture.template, start or 0
+        else:
+            mesh = self.even_mesh(self.mesh)
+        meshes = list(self._sequence(texture, mesh, start))
+        check_video(out, len(meshes), self.fps, self.size)
+        if self.meshes is not None:
+            folder = prepare_folder(self.meshes)
+            places = [prepare_output(folder / f"{k:04}.ply", inputs=inputs) for k in range(len(meshes))]
+            for place, frame in zip(places, meshes, strict=True):
+                clay(frame).export(place)
+        with bar("film") as progress:
+            film(
+                map(clay, meshes),
+                out,
+                frames=len(meshes),
+                like=meshes[-1],
+                fps=self.fps,
+                resolution=self.size,
+                spp=self.spp,
+                progress=progress,
+            )
+        if self.mesh != TEMPLATE:
+            self.advise(texture, mesh)
+        print(self.out)
+
+    def _sequence(self, texture: GeometricTexture, mesh: Mesh, start: int | None) -> Iterator[Mesh]:
+        if self.to_seed is None:
+            return texture.growth(
+                mesh, self.frames, seed=self.seed, start_level=start, end_level=self.end_level
+            )
+        seeds = self.seed, self.to_seed
+        return texture.interpolate(mesh, seeds, self.frames, start_level=start, end_level=self.end_level)

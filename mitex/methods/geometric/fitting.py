@@ -1,0 +1,109 @@
+"""Learning a geometric texture: from a reference mesh to a model file."""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+from pathlib import Path
+from typing import Unpack
+
+import numpy as np
+import torch
+
+from mitex.cache import cached, content_key
+from mitex.mesh import Mesh
+from mitex.methods.geometric.config import PRESETS, GeometricConfig
+from mitex.methods.geometric.hierarchy import Hierarchy
+from mitex.methods.geometric.references import find_reference
+from mitex.methods.geometric.report import FitReport, report
+from mitex.methods.geometric.task import GeometricTask, betas, learning_rate
+from mitex.methods.geometric.template import find_template, normalised
+from mitex.methods.geometric.texture import GeometricTexture
+from mitex.methods.geometric.training_meshes import fit_level
+from mitex.paths import cache_dir
+from mitex.runtime import keep_freed_memory
+from mitex.training.fit import Run
+from mitex.training.optim import Adam
+from mitex.training.settings import RunOptions
+
+VERSION = 1  # of the training meshes in the cache
+
+
+def fit(
+    reference: Mesh | str | Path,
+    out: str | Path,
+    *,
+    template: Mesh | str | Path | None = None,
+    **options: Unpack[RunOptions],
+) -> GeometricTexture:
+    """Learns the geometric texture of a reference mesh; writes a run folder with the model in it.
+
+    The training meshes of the levels are found first and kept in the user's cache folder.
+
+    Args:
+        reference: a mesh, what `Mesh.load` takes, or a name of `REFERENCES`.
+        out: run folder; must be new or empty, or hold a run to resume (with more `steps`, to further levels).
+        template: where the training meshes start from; None chooses by genus.
+        options: preset ("fast" or "paper"), config, overrides, resume, quiet, as of `RunOptions`.
+
+    Returns:
+        The texture, also saved as `texture.safetensors` in `out`.
+
+    Raises:
+        MitexError: bad input of any kind; nothing has been written then.
+        Interrupted: a checkpoint has been saved.
+    """
+    run = Run.of(PRESETS, out, **options)
+    config = run.config
+    shape = reference if isinstance(reference, Mesh) else find_reference(reference)
+    given = Mesh.load(template) if isinstance(template, str | Path) else template
+    shape, start = normalised(shape, find_template(shape, given))
+    keep_freed_memory()
+    meshes, reports = training_meshes(shape, start, config, run.quiet)
+    hierarchy = Hierarchy.of(start, config.levels)
+    task = GeometricTask(config, hierarchy, torch.from_numpy(start.vertices), meshes, shape)
+    origin = {key: getattr(config, key) for key in ("levels", "noise", "remeasure")}
+    origin["fit"] = [vars(r) for r in reports]
+    return run.train(
+        task,
+        shape.name,
+        lambda about: GeometricTexture(task.generators[: config.levels], start, task.fixed, about | origin),
+        lr=partial(learning_rate, config),
+        optimizer=partial(Adam, betas=betas(config)),
+    )
+
+
+def training_meshes(
+    reference: Mesh, template: Mesh, config: GeometricConfig, quiet: bool = True
+) -> tuple[list[torch.Tensor], list[FitReport]]:
+    """Vertices (V, 3) of the training mesh of each level, from the cache where known, and how they fit.
+
+    Args:
+        reference, template: from `normalised`.
+        config: settings.
+        quiet: say nothing; else a line for each level goes to stderr.
+    """
+    hierarchy = Hierarchy.of(template, config.levels)
+    options = [getattr(config, key) for key in vars(config) if key.startswith("fit_")]
+    arrays = (reference.vertices, reference.faces, template.vertices, template.faces)
+    found, reports = [], []
+    for level, mesh in enumerate(hierarchy.meshes):
+        place = cache_dir() / "geometric" / content_key(VERSION, *arrays, config.seed, *options, level)
+        start = hierarchy.finer(found[-1], level - 1) if found else torch.from_numpy(template.vertices)
+
+        def find(start: torch.Tensor = start, level: int = level) -> torch.Tensor:
+            return fit_level(reference, start, hierarchy.graphs[level], level, config)
+
+        found.append(cached(place, find, _read, _write))
+        reports.append(report(mesh.with_vertices(found[-1].numpy() / 2**level), reference))
+        if not quiet:
+            print(f"training mesh {level}: {reports[-1]}", file=sys.stderr, flush=True)
+    return found, reports
+
+
+def _read(place: Path) -> torch.Tensor:
+    return torch.from_numpy(np.load(place / "vertices.npy", allow_pickle=False))
+
+
+def _write(folder: Path, vertices: torch.Tensor) -> None:
+    np.save(folder / "vertices.npy", vertices.numpy(), allow_pickle=False)

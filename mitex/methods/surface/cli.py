@@ -1,0 +1,88 @@
+"""The command-line options of surface textures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import arg
+
+from mitex.methods.options import ExemplarOptions, MeshOptions
+
+if TYPE_CHECKING:
+    from mitex.asset import Asset
+
+
+@dataclass(kw_only=True)
+class Fit(ExemplarOptions):
+    """Synthesize a texture directly on one mesh, without views and without seams (tangent-space CNN).
+
+    The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the texture;
+    `mitex apply RUN --mesh MESH --out ASSET` writes it. Ctrl-C saves, and --resume goes on.
+
+    examples:
+      mitex fit surface --exemplar pebbles.png --mesh bunny.obj --out runs/bunny
+      mitex fit surface --exemplar scales --mesh octopus --resolution 1024
+      mitex fit surface --exemplar maps/ --mesh bunny.obj --preset paper --out runs/paper
+      mitex fit surface --exemplar painting.png --mesh bunny.obj --content ao --out runs/painted
+      mitex fit surface --exemplar bark.png --mesh tree.obj --orientation along.npy --out runs/tree
+      mitex fit surface --exemplar pebbles.png --mesh bunny.obj --out runs/bunny --resume
+    """
+
+    mesh: Annotated[str, arg(metavar="MESH|NAME")]
+    """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
+
+    preset: Annotated[str | None, arg(metavar="fast|paper|style", help_behavior_hint="(default: fast)")] = (
+        None
+    )
+    """Settings to start from: `fast` is quick and clean, `paper` follows the publication, `style` goes with
+    --content."""
+
+    resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the preset's)")] = None
+    """Side of the texture [texels]."""
+
+    content: Annotated[str | None, arg(metavar="IMAGE|ao", help_behavior_hint="")] = None
+    """Style transfer: keep the structure of this texture (on the mesh's own UVs), or of ambient occlusion."""
+
+    orientation: Annotated[Path | None, arg(metavar="FIELD.npy", help_behavior_hint="")] = None
+    """Where the exemplar's right shall point: a NumPy array (V, 3), a vector for each vertex of the mesh."""
+
+    keep_uvs: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Use the mesh's own UVs, which must not overlap."""
+
+    def run(self) -> None:
+        options = self.run_options(resolution=self.resolution)
+        from mitex.exemplar import Exemplar
+        from mitex.mesh import Mesh
+
+        exemplar, mesh = Exemplar.load(self.exemplar), Mesh.load(self.mesh)
+        out = self.folder(f"{exemplar.name}-{mesh.name}")
+        from mitex.methods import surface
+
+        surface.fit(
+            exemplar,
+            mesh,
+            out,
+            keep_uvs=self.keep_uvs,
+            content=self.content,
+            orientation=self.orientation,
+            **options,
+        )
+        print(out)
+
+
+@dataclass(kw_only=True)
+class Apply(MeshOptions):
+    """Write a surface texture on the mesh that it was synthesized on.
+
+    examples:
+      mitex apply runs/bunny --mesh bunny.obj --out bunny.glb
+    """
+
+    def applied(self, out: Path) -> Asset:
+        from mitex.mesh import Mesh
+        from mitex.methods.surface import SurfaceTexture
+
+        mesh = Mesh.load(self.mesh)
+        return SurfaceTexture.load(self.model).apply(mesh)

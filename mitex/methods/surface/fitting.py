@@ -1,0 +1,153 @@
+"""Synthesizing a texture on a mesh: from exemplar and mesh to texture file."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Unpack
+
+import numpy as np
+
+from mitex.atlas import twice_area, unwrap, usable_uv
+from mitex.cache import content_key
+from mitex.errors import ConfigError
+from mitex.exemplar import Exemplar
+from mitex.mesh import Mesh
+from mitex.methods.surface.borders import Border
+from mitex.methods.surface.cache import VERSION, cached_levels
+from mitex.methods.surface.config import PRESETS, SurfaceConfig
+from mitex.methods.surface.content import AO, content_colours
+from mitex.methods.surface.exponential import GeodesicTracer
+from mitex.methods.surface.frames import tangent_frames
+from mitex.methods.surface.levels import POOLS, Levels
+from mitex.methods.surface.orientation import read_orientation
+from mitex.methods.surface.taps import Surroundings, build
+from mitex.methods.surface.task import SurfaceTask
+from mitex.methods.surface.texels import Texels
+from mitex.methods.surface.texture import SurfaceTexture
+from mitex.runtime import available_memory
+from mitex.training.fit import Run
+from mitex.training.lbfgs import Lbfgs
+from mitex.training.optim import Adam
+from mitex.training.settings import RunOptions
+
+# Peak over precomputation and steps, measured at 512^2 and 1024^2 with bfloat16 features.
+BYTES_PER_TEXEL, BYTES_PER_PICTURE = 3600, 900
+PADDING = 2  # texels between charts: bilinear taps of one never see the other
+
+
+def fit(
+    exemplar: Exemplar | str | Path,
+    mesh: Mesh | str | Path,
+    out: str | Path,
+    *,
+    keep_uvs: bool = False,
+    content: str | Path | None = None,
+    orientation: np.ndarray | str | Path | None = None,
+    **options: Unpack[RunOptions],
+) -> SurfaceTexture:
+    """Synthesizes the look of an exemplar on a mesh; writes a run folder with the texture in it.
+
+    Args:
+        exemplar: maps, or what `Exemplar.load` takes.
+        mesh: or what `Mesh.load` takes.
+        out: run folder; must be new or empty, or hold a run to resume.
+        keep_uvs: use the mesh's own UVs.
+        content: style transfer: a texture on the mesh's own UVs (an image file), which are kept then, or "ao"
+            for the mesh's ambient occlusion.
+        orientation: (V, 3) where the exemplar's right shall point, or what `read_orientation` takes; else the
+            frames follow the config.
+        options: preset ("fast", "paper", or "style", the default with `content`), config, overrides, resume,
+            quiet, as of `RunOptions`.
+
+    Returns:
+        The texture, also saved as `texture.safetensors` in `out`.
+
+    Raises:
+        MitexError: bad input of any kind; nothing has been written then.
+        Interrupted: a checkpoint has been saved.
+    """
+    presets = PRESETS if content is None else {"style": PRESETS["style"], **PRESETS}
+    run = Run.of(presets, out, **options)
+    settings = run.config
+    shown = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
+    image = content is not None and str(content) != AO
+    surface = with_layout(mesh if isinstance(mesh, Mesh) else Mesh.load(mesh), settings, keep_uvs or image)
+    field = read_orientation(orientation, surface) if isinstance(orientation, str | Path) else orientation
+    assert surface.uv is not None
+    check_memory(surface, settings, len(shown.maps))
+    texels = Texels.rasterize(surface, surface.uv, settings.resolution)
+    start = None if content is None else content_colours(content, surface, texels)
+    levels = find_levels(surface, texels, settings, field)
+    known = {"content": content_key(start), "orientation": content_key(field)}
+    task = SurfaceTask(settings, shown, surface, texels, levels, start, known)
+    origin: dict[str, Any] = {key: getattr(settings, key) for key in ("resolution", "frames", "angle")}
+    return run.train(
+        task,
+        shown.name,
+        lambda about: SurfaceTexture(
+            surface, task.in_texel_order(), tuple(task.layout), about | origin, field
+        ),
+        lr=settings.lr,
+        milestones=settings.milestones,
+        decay=settings.decay,
+        optimizer=Lbfgs if settings.optimizer == "lbfgs" else partial(Adam, shared=settings.shared_moment),
+    )
+
+
+def with_layout(mesh: Mesh, config: SurfaceConfig, keep_uvs: bool) -> Mesh:
+    """The mesh with the UVs that its texels shall have.
+
+    Raises:
+        ConfigError: its own are wanted but missing, out of range or overlapping.
+    """
+    if not keep_uvs:
+        return replace(mesh, uv=unwrap(mesh, config.resolution, PADDING))
+    if mesh.uv is None:
+        raise ConfigError(f"mesh '{mesh.name}' has no UVs to keep", "leave out --keep-uvs")
+    if not usable_uv(mesh, mesh.uv):
+        raise ConfigError(
+            f"the UVs of mesh '{mesh.name}' overlap, leave [0, 1] or are incomplete",
+            "leave out --keep-uvs to have it unwrapped",
+        )
+    return mesh
+
+
+def check_memory(mesh: Mesh, config: SurfaceConfig, maps: int = 1) -> None:
+    """Refuses a resolution whose synthesis does not fit into the memory that is free.
+
+    Raises:
+        ConfigError: with the estimate.
+    """
+    assert mesh.uv is not None
+    share = 0.5 * np.abs(twice_area(mesh.uv)).sum()
+    each = BYTES_PER_TEXEL + BYTES_PER_PICTURE * (min(config.pictures, maps) - 1)
+    needed = each * share * config.resolution**2
+    free = available_memory()
+    if free is not None and needed > free:
+        fits = int(config.resolution * math.sqrt(free / needed))
+        raise ConfigError(
+            f"a texture of {config.resolution}^2 needs about {needed / 1e9:.1f} GB of memory, "
+            f"and {free / 1e9:.1f} GB are free",
+            f"set --resolution {max(fits, 1)} or less",
+        )
+
+
+def find_levels(
+    mesh: Mesh, texels: Texels, config: SurfaceConfig, orientation: np.ndarray | None = None
+) -> Levels:
+    """The levels of a surface, from the cache if it has been seen before."""
+    assert mesh.uv is not None
+    angle = math.radians(config.angle)
+    frames, count = config.frames, POOLS + config.scales
+    options = (config.resolution, frames, angle, config.correct, config.continued, count, orientation)
+
+    def find() -> Levels:
+        right, up = tangent_frames(mesh, texels.face, texels.barycentric, config.frames, angle, orientation)
+        tracer = GeodesicTracer(mesh)
+        border = Border.continued(mesh, texels, tracer) if config.continued else None
+        return build(Surroundings(texels, tracer, right, up, config.correct, border), count)
+
+    return cached_levels(content_key(VERSION, mesh.vertices, mesh.faces, mesh.uv, *options), find)

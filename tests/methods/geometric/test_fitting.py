@@ -1,0 +1,382 @@
+"""A small real training, its model, and growing it on other meshes."""
+
+from dataclasses import replace
+from functools import partial
+from itertools import combinations
+
+import numpy as np
+import pytest
+import torch
+
+from mitex.errors import CheckpointError, ConfigError, MeshError
+from mitex.mesh import Mesh, grid, icosphere, subdivide_midpoint, torus
+from mitex.methods import geometric
+from mitex.methods.geometric import METHOD
+from mitex.methods.geometric.config import PRESETS, GeometricConfig
+from mitex.methods.geometric.features import displaced, face_features
+from mitex.methods.geometric.hierarchy import Hierarchy
+from mitex.methods.geometric.pictures import portrait
+from mitex.methods.geometric.references import find_reference
+from mitex.methods.geometric.report import report
+from mitex.methods.geometric.task import GeometricTask, learning_rate
+from mitex.methods.geometric.template import normalised, topology
+from mitex.methods.geometric.texture import GeometricTexture, slerp
+from mitex.methods.registry import method_of
+from mitex.training import checkpoint
+from mitex.training.locate import NAME
+from mitex.training.optim import Adam
+from tests.shapes import collapsed, fan, moebius, pair, turned
+
+pytestmark = pytest.mark.usefixtures("own_cache")
+SMALL = [
+    "steps=9",
+    "level_steps=3",
+    "fit_steps=40",
+    "fit_samples=300",
+    "checkpoint_every=4",
+    "preview_every=0",
+]
+
+
+def bumpy() -> Mesh:
+    ball = icosphere(12)
+    height = 1 + 0.15 * np.sin(7 * ball.vertices).prod(1, keepdims=True)
+    return replace(ball.with_vertices(ball.vertices * height), name="bumpy")
+
+
+def hill() -> Mesh:
+    flat = grid(16, 16)
+    x, y, _ = flat.vertices.T
+    return replace(flat.with_vertices(np.stack([x, y, 0.2 * np.cos(2 * x) * np.cos(2 * y)], 1)), name="hill")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs") / "bumpy"
+    return folder, geometric.fit(bumpy(), folder, overrides=SMALL, quiet=True)
+
+
+def small_task(**changes) -> GeometricTask:
+    config = replace(GeometricConfig(steps=9, level_steps=3), **changes)
+    ball = icosphere(1)
+    hierarchy = Hierarchy.of(ball, config.levels)
+    drawn = torch.Generator().manual_seed(4)
+    meshes = [
+        torch.from_numpy(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=drawn)
+        for k, mesh in enumerate(hierarchy.meshes)
+    ]
+    return GeometricTask(config, hierarchy, torch.from_numpy(ball.vertices), meshes, bumpy())
+
+
+def test_the_run_folder(made):
+    folder, texture = made
+    assert {p.name for p in folder.iterdir()} >= {"config.toml", "metrics.jsonl", checkpoint.NAME, NAME}
+    assert method_of(folder) == method_of(folder / NAME) == METHOD
+    assert texture.levels == 3 and texture.about["steps"] == 9
+    assert [level["faces"] for level in texture.about["fit"]] == [20, 80, 320]
+
+
+def test_models_round_trip(made):
+    folder, texture = made
+    again = GeometricTexture.load(folder)
+    assert dict(again.about) == dict(texture.about)
+    mesh = icosphere(4)
+    for seed in (0, 1):
+        a, b = (t.apply(mesh, seed=seed).mesh.vertices for t in (texture, again))
+        assert np.array_equal(a, b)
+
+
+@pytest.mark.parametrize("damage", ["cut", "foreign", "nan", "noise", "missing"])
+def test_what_is_no_model_is_refused(made, tmp_path, damage):
+    from safetensors.torch import load_file, save_file
+
+    source = made[0] / NAME
+    path = tmp_path / NAME
+    if damage == "cut":
+        path.write_bytes(source.read_bytes()[:-100])
+    elif damage == "foreign":
+        save_file({"x": torch.zeros(3)}, path)
+    elif damage == "nan":
+        texture = GeometricTexture.load(source)
+        with torch.no_grad():
+            texture.generators[0].parameters[0][0, 0] = torch.nan
+        texture.save(path)
+        assert load_file(path)
+    elif damage == "noise":
+        texture = GeometricTexture.load(source)
+        replace(texture, fixed=texture.fixed[1:]).save(path)
+    with pytest.raises(CheckpointError, match="geometric texture"):
+        GeometricTexture.load(tmp_path)
+
+
+def test_the_mesh_is_split_on_every_level_but_the_first(made):
+    mesh = torus(12, 6)
+    for start, end, splits in ((0, 2, 2), (1, 2, 1), (2, 2, 0), (0, 0, 0), (None, None, 0)):
+        asset = made[1].apply(mesh, start_level=start, end_level=end)
+        assert len(asset.mesh.faces) == 4**splits * len(mesh.faces)
+        assert np.array_equal(asset.mesh.faces, subdivide_midpoint(mesh, splits).faces)
+
+
+def test_results_keep_place_and_size(made):
+    """Scaling and moving the mesh scales and moves the result; the noise decides the rest."""
+    mesh = icosphere(6)
+    a = made[1].apply(mesh, seed=3).mesh.vertices
+    b = made[1].apply(mesh.with_vertices(5 * mesh.vertices + [1, 2, 3]), seed=3).mesh.vertices
+    assert np.allclose(5 * a + [1, 2, 3], b, atol=2e-3)
+    assert not np.allclose(a, made[1].apply(mesh, seed=4).mesh.vertices, atol=1e-4)
+
+
+def test_uvs_are_interpolated(made):
+    mesh = grid(6, 6)
+    asset = made[1].apply(mesh, start_level=1)
+    expected = subdivide_midpoint(mesh).uv
+    assert asset.mesh.uv is not None and expected is not None and np.array_equal(asset.mesh.uv, expected)
+
+
+UNSOUND = [grid(5, 4), moebius(), fan(), turned(icosphere(3)), collapsed(icosphere(3)), pair(icosphere(3))]
+
+
+@pytest.mark.parametrize("mesh", [torus(8, 4), *UNSOUND], ids=lambda mesh: mesh.name)
+def test_open_and_unsound_meshes_are_displaced(made, mesh):
+    moved = made[1].apply(mesh, start_level=1).mesh
+    assert np.isfinite(moved.vertices).all()
+    far = np.linalg.norm(moved.vertices - subdivide_midpoint(mesh).vertices, axis=1)
+    assert (far > 1e-3).mean() > 0.9 and far.max() < 2 * np.ptp(mesh.vertices, axis=0).max()
+
+
+def test_faces_that_name_a_vertex_twice_are_refused(made, tmp_path):
+    ball = bumpy()
+    mesh = replace(ball, faces=np.concatenate([ball.faces, [[0, 0, 1]]]))
+    with pytest.raises(MeshError, match="bumpy has faces that name a vertex twice: 1"):
+        made[1].apply(mesh)
+    with pytest.raises(MeshError, match="bumpy has faces that name a vertex twice: 1"):
+        geometric.fit(mesh, tmp_path / "run", overrides=SMALL, quiet=True)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("mesh", [moebius(), fan(), turned(bumpy())], ids=lambda mesh: mesh.name)
+def test_references_without_two_sides_are_refused(tmp_path, mesh):
+    with pytest.raises(ConfigError, match="not a surface with two sides"):
+        geometric.fit(mesh, tmp_path / "run", overrides=SMALL, quiet=True)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("mesh", "template"),
+    [(hill(), grid(2, 2)), (pair(bumpy()), pair(icosphere(1))), (collapsed(bumpy()), None)],
+    ids=["open", "two components", "faces without area"],
+)
+def test_references_that_are_learned(tmp_path, mesh, template):
+    """Their training meshes come near (templates are 0.04 to 0.12 away) and keep pieces and boundaries."""
+    texture = geometric.fit(mesh, tmp_path / "run", template=template, overrides=SMALL, quiet=True)
+    assert texture.about["fit"][-1]["chamfer"] < 0.025
+    assert topology(texture.generate(seed=1)) == topology(mesh)
+
+
+def test_two_components_are_displaced_alike(made):
+    """Without noise: the instance norm is taken over both."""
+    two = pair(bumpy())
+    moved = replace_about(made[1], noise=0.0).apply(two, start_level=2).mesh.vertices
+    count = len(two.vertices) // 2
+    assert np.allclose(moved[:count] + [3.0, 0, 0], moved[count:], atol=1e-3)
+    assert not np.allclose(moved, two.vertices, atol=1e-2)
+
+
+def test_edges_are_measured_again_if_wanted(made):
+    """On the first level that changes nothing: the mesh's mean edge is 1 there."""
+    mesh, again = bumpy(), replace_about(made[1], remeasure=True)
+    for start, alike in ((2, True), (1, False)):
+        a, b = (texture.apply(mesh, start_level=start).mesh.vertices for texture in (made[1], again))
+        assert np.allclose(a, b, atol=1e-5) == alike
+
+
+def replace_about(texture: GeometricTexture, **changes) -> GeometricTexture:
+    return replace(texture, about={**texture.about, **changes})
+
+
+@pytest.mark.parametrize(("start", "end"), [(-1, 2), (2, 1), (0, 3), (3, None)])
+def test_levels_out_of_range(made, start, end):
+    with pytest.raises(ConfigError, match="this texture has the levels 0 to 2"):
+        made[1].apply(icosphere(2), start_level=start, end_level=end)
+
+
+def test_too_many_faces(made):
+    with pytest.raises(ConfigError, match="remesh it more coarsely"):
+        made[1].apply(icosphere(120), start_level=0)
+
+
+def test_growth_starts_at_the_mesh_and_ends_at_the_result(made):
+    mesh = icosphere(3)
+    shown = list(made[1].growth(mesh, frames=4, seed=2, start_level=1))
+    assert [len(m.faces) for m in shown] == [180] * 5 + [720] * 4
+    assert np.array_equal(shown[0].vertices, mesh.vertices)
+    assert np.allclose(shown[2].vertices, (shown[0].vertices + shown[4].vertices) / 2, atol=1e-6)
+    assert np.allclose(shown[-1].vertices, made[1].apply(mesh, seed=2, start_level=1).mesh.vertices)
+
+
+def test_interpolation_joins_two_seeds(made):
+    mesh = icosphere(3)
+    shown = list(made[1].interpolate(mesh, (0, 1), 5))
+    ends = [made[1].apply(mesh, seed=seed).mesh.vertices for seed in (0, 1)]
+    assert np.allclose(shown[0].vertices, ends[0], atol=1e-5)
+    assert np.allclose(shown[-1].vertices, ends[1], atol=1e-5)
+    assert not np.allclose(shown[2].vertices, ends[0], atol=1e-4)
+
+
+def test_the_great_circle_keeps_the_variance():
+    a, b = (torch.randn(5000, 3, generator=torch.Generator().manual_seed(k)) for k in range(2))
+    for t in (0.0, 0.3, 0.5, 1.0):
+        assert float(slerp(a, b, t).std()) == pytest.approx(1, abs=0.03)
+    assert float(torch.lerp(a, b, 0.5).std()) < 0.75
+    assert torch.allclose(slerp(a, a, 0.4), a)
+
+
+def test_variations_of_the_reference(made):
+    first, second = (made[1].generate(seed) for seed in (0, 1))
+    assert len(first.faces) == 320 and not np.allclose(first.vertices, second.vertices, atol=1e-4)
+    # From a level on that does not exist nothing is random: the reconstruction.
+    kept = [made[1].generate(seed, start_level=3).vertices for seed in (0, 1)]
+    assert np.array_equal(kept[0], kept[1])
+
+
+def test_resuming_changes_nothing(tmp_path):
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        whole = geometric.fit(bumpy(), tmp_path / "whole", overrides=SMALL, quiet=True)
+        part = [*SMALL, "steps=5"]  # between two steps of one critic, whose optimizer must go on too
+        # As many levels from the start: what is trained must not depend on where a run was cut.
+        geometric.fit(bumpy(), tmp_path / "part", overrides=part, quiet=True)
+        more = geometric.fit(bumpy(), tmp_path / "part", overrides=["steps=9"], resume=True, quiet=True)
+    finally:
+        torch.set_num_threads(threads)
+    for a, b in zip(whole.generators, more.generators, strict=True):
+        assert all(torch.equal(p, q) for p, q in zip(a.parameters, b.parameters, strict=True))
+
+
+def test_each_step_trains_the_generator_of_its_level():
+    task = small_task()
+    drawn = torch.Generator().manual_seed(0)
+    for step, level in ((0, 0), (2, 0), (3, 1), (8, 2)):
+        for parameter in task.parameters:
+            parameter.grad = None
+        loss, record = task.loss(step, drawn)
+        loss.backward()
+        assert record["level"] == level
+        for k, generator in enumerate(task.generators):
+            assert all((p.grad is not None) == (k == level) for p in generator.parameters)
+
+
+def test_the_loss_by_hand():
+    """The critic's score of a random mesh, and the distance of the one from the fixed noise (section 3.3)."""
+    task = small_task(reconstruction=7.0)
+    found, record = task.loss(0, torch.Generator().manual_seed(1))
+    graph, drawn = task.hierarchy.graphs[0], torch.Generator().manual_seed(1)
+    made = []
+    for noise in (task.config.noise * torch.randn(task.template.shape, generator=drawn), task.fixed):
+        offsets = task.generators[0](face_features(task.template + noise, graph), graph)
+        made.append(displaced(task.template, graph, offsets))
+    score = task.critics[0](face_features(made[0], graph), graph).mean()
+    error = ((made[1] - task.meshes[0]) ** 2).mean()
+    assert "critic" not in record  # it would have drawn first
+    assert error > 0.01 and score.abs() > 1e-3
+    assert torch.allclose(found, 7 * error - score, rtol=1e-5)
+
+
+def test_critics_take_turns():
+    task = small_task(critic_steps=2, generator_steps=3)
+    drawn = torch.Generator().manual_seed(0)
+    trained = ["critic" in task.loss(step, drawn)[1] for step in range(6)]
+    assert sum(trained) == 4 and trained[:3] == trained[3:]
+    often = small_task(critic_steps=5, generator_steps=1)
+    before = often.critics[0].parameters[0].clone()
+    often.loss(0, drawn)
+    assert often.optimizers[0].counts == [5] * len(often.critics[0].parameters)
+    assert not torch.equal(before, often.critics[0].parameters[0])
+
+
+def test_critics_prefer_the_training_mesh():
+    """After 40 steps the training mesh has the higher score: more is real, and the generator wants more."""
+
+    def lead(**changes) -> float:
+        task = small_task(lr=5e-3, **changes)
+        _, record = task.loss(0, torch.Generator().manual_seed(0))
+        graph = task.hierarchy.graphs[0]
+        score = task.critics[0](face_features(task.meshes[0], graph), graph).detach().mean()
+        return float(score) + record["adversarial"]
+
+    assert lead() < 0 and lead(critic_steps=40, generator_steps=1) > 0.05
+
+
+def test_weights_are_carried_up():
+    task = small_task(steps=5, level_steps=1, carried=3)
+    drawn = torch.Generator().manual_seed(0)
+    second = [p.detach().clone() for p in task.generators[2].parameters]
+    task.loss(2, drawn)
+    assert all(torch.equal(p, q) for p, q in zip(task.generators[2].parameters, second, strict=True))
+    assert "critic" not in task.loss(3, drawn)[1]  # trained, it would be another one
+    for networks in (task.generators, task.critics):
+        for p, q in zip(networks[3].parameters, networks[2].parameters, strict=True):
+            assert torch.equal(p, q)
+
+
+def test_the_reconstruction_comes_near():
+    """Without a critic's pull the generator learns the one mesh from the fixed noise."""
+    task = small_task(steps=300, level_steps=300, reconstruction=100.0, lr=5e-3)
+    optimizer, drawn = Adam(task.parameters), torch.Generator().manual_seed(0)
+    errors = []
+    for step in range(120):
+        optimizer.clear()
+        loss, record = task.loss(step, drawn)
+        loss.backward()
+        optimizer.step(5e-3)
+        errors.append(record["reconstruction"])
+    assert np.mean(errors[-10:]) < 0.4 * errors[0]
+
+
+def test_the_learning_rate_is_halved_on_each_level():
+    config = GeometricConfig(steps=30, level_steps=8, lr=1.0)
+    rates = [learning_rate(config, step) for step in range(10)]
+    assert rates == [1, 1, 0.5, 0.5, 0.25, 0.25, 0.125, 0.125, 1, 1]
+
+
+def test_critics_learn_at_that_rate(monkeypatch):
+    rates = []
+    monkeypatch.setattr(Adam, "step", lambda self, rate: rates.append(rate))
+    task, drawn = small_task(steps=8, level_steps=8, critic_steps=1, generator_steps=1), torch.Generator()
+    for step in range(8):
+        task.loss(step, drawn)
+    assert rates == [learning_rate(task.config, step) for step in range(8)] and len(set(rates)) == 4
+
+
+def test_settings():
+    assert PRESETS["paper"].levels == 5 and PRESETS["fast"].levels == 5
+    assert GeometricConfig(steps=42_000).levels == 7
+    with pytest.raises(ConfigError, match="8 levels; set steps to 42000 or less"):
+        GeometricConfig(steps=42_001)
+
+
+def test_previews(monkeypatch):
+    """The reference itself, the training mesh of the level, the reconstruction and two samples."""
+    small = partial(portrait, resolution=64, spp=4)
+    monkeypatch.setattr("mitex.methods.geometric.task.portrait", small)
+    task, reference = small_task(), bumpy()
+    tiles = np.split(task.preview(6), 5, axis=1)
+    level = task.meshes[1].numpy(), task.hierarchy.meshes[1].faces
+    assert np.allclose(tiles[0], small(reference.vertices, reference.faces), atol=0.01)
+    assert np.allclose(tiles[1], small(*level), atol=0.01)
+    for a, b in combinations(tiles, 2):
+        assert np.abs(a - b).mean() > 0.01
+
+
+@pytest.mark.parametrize("name", ["spikes", "scales"])
+def test_bundled_models_are_found_by_name(name):
+    """Without noise they rebuild their reference, about as near as the mesh that they were trained with."""
+    assert method_of(name) == METHOD
+    texture = GeometricTexture.load(name)
+    assert texture.about["name"] == name and texture.levels == 5
+    rebuilt = texture.generate(start_level=5)
+    assert len(rebuilt.faces) == 5120
+    found = report(rebuilt, normalised(find_reference(name), texture.template)[0])
+    assert found.chamfer < 1.2 * texture.about["fit"][-1]["chamfer"]
+    assert found.normals < 1.2 * texture.about["fit"][-1]["normals"]

@@ -1,0 +1,109 @@
+"""The whole way from an exemplar to a model file, as small as it can be."""
+
+import json
+
+import numpy as np
+import pytest
+
+from mitex.errors import CheckpointError, ConfigError, OutputError
+from mitex.mesh import icosphere
+from mitex.methods import nca
+from mitex.methods.nca import NcaTexture
+from mitex.runtime import threads
+from tests.methods.nca.tiny import SETTINGS, texture
+
+
+def _losses(folder):
+    return [json.loads(line)["appearance"] for line in (folder / "metrics.jsonl").read_text().splitlines()]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A real training of 40 steps on the albedo of an embedded exemplar."""
+    from mitex.exemplar import Exemplar
+
+    exemplar = Exemplar({"albedo": Exemplar.load("lava").maps["albedo"]}, "lava")
+    out = tmp_path_factory.mktemp("fit") / "run"
+    always_from_the_seed = ["pool=1", "inject_every=1", "min_steps=8", "max_steps=8"]
+    settings = [*SETTINGS, *always_from_the_seed, "steps=40", "preview_every=20", "checkpoint_every=20"]
+    return out, nca.fit(exemplar, out, overrides=settings, quiet=True)
+
+
+def test_it_learns(run):
+    losses = _losses(run[0])
+    assert len(losses) == 40
+    assert np.mean(losses[-5:]) < 0.6 * np.mean(losses[:5])
+
+
+def test_the_run_folder_is_complete(run):
+    names = {path.name for path in run[0].iterdir()}
+    assert {
+        "config.toml",
+        "checkpoint.safetensors",
+        "metrics.jsonl",
+        "texture.safetensors",
+        "previews",
+    } <= names
+    assert [p.name for p in sorted((run[0] / "previews").iterdir())] == ["000020.png", "000040.png"]
+
+
+def test_the_model_works_on_another_mesh(run):
+    out, made = run
+    assert made.maps == ("albedo",)
+    assert made.about["name"] == "lava" and made.about["steps"] == 40 and made.about["preset"] == "patch"
+    assert 0 < made.about["loss"] < 1e3 and made.about["seconds"] >= 0
+    sphere = icosphere(6)
+    grown = made.apply(sphere, steps=10, subdivide=0).vertex_maps["albedo"]
+    for source in (out, out / "texture.safetensors"):
+        again = NcaTexture.load(source)
+        assert again.about == made.about | {"maps": ["albedo"]}
+        assert np.array_equal(again.apply(sphere, steps=10, subdivide=0).vertex_maps["albedo"], grown)
+    assert grown.std() > 0.003
+
+
+def test_a_finished_run_is_not_overwritten(run):
+    with pytest.raises(OutputError):
+        nca.fit("lava", run[0], overrides=SETTINGS, quiet=True)
+
+
+def test_starting_from_a_parent(tmp_path):
+    parent = texture(seed=3, hidden=16)
+    path = parent.save(tmp_path / "parent.safetensors")
+    child = nca.fit("wicker", tmp_path / "run", init=path, overrides=[*SETTINGS, "steps=0"], quiet=True)
+    assert child.about["parent"] == "tiny"
+    assert "loss" not in child.about  # there was no step
+    for a, b in zip(child.model.parameters(), parent.model.parameters(), strict=True):
+        assert np.array_equal(a.detach(), b.detach())
+
+
+def test_a_parent_of_another_shape(tmp_path):
+    path = texture(hidden=8).save(tmp_path / "parent.safetensors")
+    with pytest.raises(CheckpointError, match="hidden"):
+        nca.fit("wicker", tmp_path / "run", init=path, overrides=SETTINGS, quiet=True)
+    assert not (tmp_path / "run").exists()
+
+
+def test_resuming_takes_the_settings_of_the_run(tmp_path):
+    threads(1)
+    out = tmp_path / "run"
+    first = nca.fit("wicker", out, overrides=[*SETTINGS, "steps=2"], quiet=True)
+    second = nca.fit("wicker", out, overrides=["steps=3"], resume=True, quiet=True)
+    assert (first.about["steps"], second.about["steps"]) == (2, 3)
+    assert second.model.hidden == 16 and len(_losses(out)) == 3
+    with pytest.raises(CheckpointError, match="frequency"):
+        nca.fit("wicker", out, overrides=["steps=4", "frequency=9"], resume=True, quiet=True)
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        ({"overrides": ["hiden=3"]}, ConfigError),
+        ({"preset": "fast"}, ConfigError),
+        ({"init": "no-such-model"}, CheckpointError),
+        ({"resume": True}, CheckpointError),
+    ],
+)
+def test_bad_input_leaves_nothing_behind(tmp_path, options, error):
+    with pytest.raises(error):
+        nca.fit("lava", tmp_path / "run", quiet=True, **options)
+    assert not (tmp_path / "run").exists()

@@ -1,0 +1,370 @@
+"""A small real synthesis, its texture, and what is refused."""
+
+from dataclasses import replace
+from importlib import import_module
+
+import numpy as np
+import pytest
+import torch
+
+from mitex.asset import Asset
+from mitex.atlas import usable_uv
+from mitex.errors import CheckpointError, ConfigError
+from mitex.exemplar import Exemplar
+from mitex.images import write_image
+from mitex.mesh import Mesh, embedded, icosphere
+from mitex.methods import surface
+from mitex.methods.registry import method_of
+from mitex.methods.surface import METHOD
+from mitex.methods.surface.config import PRESETS
+from mitex.methods.surface.content import content_colours
+from mitex.methods.surface.fitting import find_levels, with_layout
+from mitex.methods.surface.network import ALL_LAYERS
+from mitex.methods.surface.orientation import read_orientation
+from mitex.methods.surface.task import VIEW, SurfaceTask
+from mitex.methods.surface.texels import Texels, charts
+from mitex.methods.surface.texture import SurfaceTexture
+from mitex.training import resolve
+from mitex.training.locate import NAME
+from tests.methods.surface.grids import flat_square
+
+pytestmark = pytest.mark.usefixtures("own_cache")
+SMALL = ["resolution=48", "exemplar_size=48", "steps=12", "scales=0", "checkpoint_every=6", "preview_every=0"]
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return icosphere(6)
+
+
+@pytest.fixture(scope="module")
+def exemplar():
+    return Exemplar.load("cobblestone").resized(48)
+
+
+@pytest.fixture(scope="module")
+def made(mesh, exemplar, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run") / "run"
+    return folder, surface.fit(exemplar, mesh, folder, overrides=SMALL, quiet=True)
+
+
+def losses(folder):
+    import json
+
+    return [json.loads(line)["loss"] for line in (folder / "metrics.jsonl").read_text().splitlines()]
+
+
+def test_the_loss_falls_and_the_colours_come_near(exemplar, tmp_path):
+    colours = Exemplar({"albedo": exemplar.maps["albedo"]})
+    texture = surface.fit(
+        colours, embedded("vase"), tmp_path / "run", overrides=[*SMALL, "steps=60"], quiet=True
+    )
+    found = losses(tmp_path / "run")
+    assert found[-1] < 0.15 * found[0]
+    wanted = exemplar.maps["albedo"].reshape(-1, 3)
+    assert np.abs(texture.values.mean(0) - wanted.mean(0)).max() < 0.06
+    assert np.abs(texture.values.std(0) - wanted.std(0)).max() < 0.08
+
+
+def test_all_maps_are_synthesized(made, exemplar):
+    _, texture = made
+    asset = texture.apply()
+    assert isinstance(asset, Asset) and asset.texture_maps is not None
+    assert set(asset.texture_maps) == set(asset.vertex_maps) == set(exemplar.maps)
+    assert asset.texture_maps["albedo"].shape == (48, 48, 3)
+
+
+def test_textures_agree_with_vertex_maps(made, mesh):
+    """Both are read from the same texels."""
+    asset = made[1].apply(mesh)
+    assert asset.atlas is not None and asset.texture_maps is not None
+    row = (1 - asset.atlas.uv[..., 1]) * 48 - 0.5
+    column = asset.atlas.uv[..., 0] * 48 - 0.5
+    nearest = asset.texture_maps["albedo"][
+        np.rint(row).astype(int).clip(0, 47), np.rint(column).astype(int).clip(0, 47)
+    ]
+    at_corners = asset.vertex_maps["albedo"][asset.mesh.faces]
+    assert np.corrcoef(nearest.ravel(), at_corners.ravel())[0, 1] > 0.5
+
+
+def test_files_round_trip(made, mesh):
+    folder, texture = made
+    again = SurfaceTexture.load(folder)
+    assert method_of(folder) == method_of(folder / NAME) == METHOD
+    assert np.abs(again.values - texture.values).max() < 1e-3 and again.maps == texture.maps
+    assert np.array_equal(again.mesh.faces, mesh.faces) and again.about["steps"] == 12
+    with pytest.raises(ConfigError, match="belongs to mesh 'icosphere6', not to 'icosphere5'; synthesize"):
+        again.apply(icosphere(5))
+
+
+@pytest.mark.parametrize("name", ["config.toml", "nothing", "metrics.jsonl"])
+def test_what_is_no_texture_is_refused(made, name):
+    with pytest.raises(CheckpointError, match="surface texture"):
+        SurfaceTexture.load(made[0] / name)
+
+
+def test_resuming_changes_nothing(mesh, exemplar, tmp_path):
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        whole = surface.fit(exemplar, mesh, tmp_path / "whole", overrides=SMALL, quiet=True)
+        part = [*SMALL, "steps=6"]
+        surface.fit(exemplar, mesh, tmp_path / "part", overrides=part, quiet=True)
+        assert method_of(tmp_path / "part") == METHOD
+        rest = surface.fit(exemplar, mesh, tmp_path / "part", overrides=["steps=12"], resume=True, quiet=True)
+    finally:
+        torch.set_num_threads(threads)
+    assert np.array_equal(whole.values, rest.values)
+
+
+def test_resuming_on_another_mesh_is_refused(made, exemplar):
+    with pytest.raises(CheckpointError):
+        surface.fit(exemplar, icosphere(7), made[0], overrides=["steps=14"], resume=True, quiet=True)
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [
+        *("frames=fixed", "weights=random", "bilinear=false", "correct=false", "scales=2", "pooling=max"),
+        *("loss=transport", "shared_moment=false", "whitened=false", "layers=relu1_1,pool2"),
+    ],
+)
+def test_options_run(mesh, exemplar, tmp_path, setting):
+    overrides = [*SMALL, "steps=3", "pictures=1", setting]
+    if setting == "scales=2":
+        overrides.remove("scales=0")
+    texture = surface.fit(exemplar, mesh, tmp_path / "run", overrides=overrides, quiet=True)
+    assert np.isfinite(texture.values).all() and np.ptp(texture.values) > 0.1
+
+
+def test_optimizers_and_spaces(mesh, exemplar, tmp_path):
+    """After the same steps principal components are nearer than channels, and L-BFGS than Adam."""
+    colours, last = Exemplar({"albedo": exemplar.maps["albedo"]}), {}
+    for setting in ("whitened=false noise=0.2 lr=0.1", "optimizer=adam", "optimizer=lbfgs lr=1"):
+        overrides = [*SMALL, "steps=40", *setting.split()]
+        surface.fit(colours, mesh, tmp_path / setting, overrides=overrides, quiet=True)
+        last[setting] = losses(tmp_path / setting)[-1]
+    channels, adam, lbfgs = last.values()
+    assert adam < 0.7 * channels and lbfgs < 0.85 * adam
+
+
+def test_transport_gives_the_exemplars_colours(mesh, exemplar, tmp_path):
+    colours = Exemplar({"albedo": exemplar.maps["albedo"]})
+    overrides = [*SMALL, "steps=60", "loss=transport", "layers=relu1_1,relu2_1,relu3_1"]
+    texture = surface.fit(colours, mesh, tmp_path / "run", overrides=overrides, quiet=True)
+    found = losses(tmp_path / "run")
+    assert np.mean(found[-5:]) < 0.5 * found[0]
+    assert np.abs(texture.values.mean(0) - exemplar.maps["albedo"].mean((0, 1))).max() < 0.06
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (["optimizer=lbfgs", "loss=transport"], "without randomness"),
+        (["optimizer=lbfgs"], "one map"),
+        (["optimizer=lbfgs", "scales=1"], "scales=0"),
+        (["optimizer=sgd"], "adam or lbfgs"),
+        (["loss=l2"], "gram or transport"),
+        (["layers=relu3_4"], "relu3_4"),
+        (["weights=vgg19", "layers=relu3_5"], "relu3_5"),
+    ],
+)
+def test_settings_that_do_not_go_together(mesh, exemplar, tmp_path, settings, message):
+    with pytest.raises(ConfigError, match=message):
+        small = [word for word in SMALL if word != "scales=0" or "scales=1" not in settings]
+        surface.fit(exemplar, mesh, tmp_path / "run", overrides=[*small, *settings], quiet=True)
+    assert not (tmp_path / "run").exists()
+
+
+def test_vgg19_compares_its_own_layers():
+    config = resolve(PRESETS, None, None, ["weights=vgg19"])
+    assert len(config.compared) == 21 and "relu5_4" in config.compared
+    assert resolve(PRESETS, None, None, []).compared == ALL_LAYERS
+
+
+def test_more_than_the_memory_is_refused_with_the_estimate(mesh, monkeypatch):
+    room = import_module("mitex.methods.surface.fit")
+    config = resolve(PRESETS, None, None, ["resolution=2000"])
+    half = replace(
+        mesh, uv=np.tile(np.array([[0, 0], [1, 0], [0, 1]], np.float32), (1, 1, 1)), faces=mesh.faces[:1]
+    )
+    monkeypatch.setattr(room, "available_memory", lambda: 2_000_000 * room.BYTES_PER_TEXEL + 1)
+    room.check_memory(half, config)
+    monkeypatch.setattr(room, "available_memory", lambda: 500_000 * room.BYTES_PER_TEXEL)
+    with pytest.raises(
+        ConfigError, match=r"2000\^2 needs about 7.2 GB of memory, and 1.8 GB are free; set --resolution 1000"
+    ):
+        room.check_memory(half, config)
+    monkeypatch.setattr(room, "available_memory", lambda: None)
+    room.check_memory(half, config)
+
+
+class TestOrientation:
+    def test_a_field_turns_the_frames_and_stays_with_the_texture(self, mesh, exemplar, tmp_path):
+        down = np.tile(np.array([0.0, -1.0, 0.0], np.float32), (len(mesh.vertices), 1))
+        np.save(tmp_path / "down.npy", down)
+        given = {"overrides": [*SMALL, "steps=2"], "quiet": True, "orientation": tmp_path / "down.npy"}
+        surface.fit(exemplar, mesh, tmp_path / "run", **given)
+        made = SurfaceTexture.load(tmp_path / "run")
+        tangents = made.apply().tangents
+        assert made.orientation is not None and tangents is not None
+        assert np.array_equal(made.orientation, down)
+        around = np.abs(mesh.normals[:, 1]) < 0.5
+        assert (tangents[around, 1] < -0.8).all()
+
+    def test_resuming_with_another_field_is_refused(self, mesh, exemplar, tmp_path):
+        given = {"overrides": [*SMALL, "steps=2"], "quiet": True}
+        surface.fit(exemplar, mesh, tmp_path / "run", **given)
+        with pytest.raises(CheckpointError, match="orientation"):
+            surface.fit(exemplar, mesh, tmp_path / "run", **given, orientation=mesh.vertices, resume=True)
+
+    @pytest.mark.parametrize(
+        "kind", ["missing", "text", "shape", "words", "nan", "objects", "archive", "cut"]
+    )
+    def test_what_is_no_field_is_refused(self, mesh, tmp_path, kind):
+        path = tmp_path / "field.npy"
+        whole = np.zeros((len(mesh.vertices), 3), np.float32)
+        arrays = {
+            "shape": whole[:-1],
+            "words": np.full(whole.shape, "x"),
+            "nan": np.full_like(whole, np.nan),
+            "objects": whole.astype(object),
+        }
+        if kind in arrays:
+            np.save(path, arrays[kind])
+        elif kind == "text":
+            path.write_text("hello")
+        elif kind == "archive":
+            with path.open("wb") as file:
+                np.savez(file, whole)
+        elif kind == "cut":
+            np.save(path, whole)
+            path.write_bytes(path.read_bytes()[:-100])
+        with pytest.raises(ConfigError):
+            read_orientation(path, mesh)
+
+
+def test_previews_show_the_mesh_beside_the_exemplar(mesh, exemplar):
+    config = resolve(PRESETS, None, None, SMALL)
+    laid = with_layout(mesh, config, False)
+    assert laid.uv is not None
+    texels = Texels.rasterize(laid, laid.uv, 48)
+    task = SurfaceTask(config, exemplar, laid, texels, find_levels(laid, texels, config))
+    values = torch.zeros(len(task.coordinates), task.channels)
+    values[:, task.layout["albedo"][0]] = 1.0
+    with torch.no_grad():
+        task.coordinates.copy_(task.space.coordinates(values))
+    picture = task.preview(3)
+    assert picture.shape == (3 * VIEW, 3 * VIEW, 3)  # colours, normals and the grey maps in turn
+    sphere = picture[VIEW // 2, VIEW + VIEW // 2]
+    assert sphere[0] > 0.9 and (sphere[1:] < 1e-4).all()
+    assert (picture[0, VIEW] == 1).all()
+
+
+def test_noise_start_and_range(mesh, exemplar, tmp_path):
+    texture = surface.fit(exemplar, mesh, tmp_path / "run", overrides=[*SMALL, "steps=1", "lr=0"], quiet=True)
+    maps = [exemplar.maps[name] for name in texture.maps]
+    assert np.abs(texture.values.mean(0) - np.concatenate([m.mean((0, 1)) for m in maps])).max() < 0.05
+    spread = np.concatenate([m.std((0, 1)) for m in maps])
+    # Uniform noise of width 1 deviates by 0.289; a channel that hardly varies gets a little of the floor.
+    assert np.abs(texture.values.std(0) - 0.289 * spread).max() < 0.02
+    overrides = [*SMALL, "steps=1", "lr=0", "whitened=false", "noise=0.2"]
+    texture = surface.fit(exemplar, mesh, tmp_path / "paper", overrides=overrides, quiet=True)
+    assert texture.values.min() >= 0 and texture.values.max() <= 0.2
+    assert abs(texture.values.mean() - 0.1) < 0.005
+
+
+def test_diffusion_wears_down_what_is_finer_than_the_taps(mesh, exemplar, tmp_path):
+    """Without a gradient noise fades and the mean stays."""
+    made = {}
+    for amount in ("0", "0.1"):
+        overrides = [*SMALL, "lr=0", f"diffusion={amount}"]
+        made[amount] = surface.fit(exemplar, mesh, tmp_path / amount, overrides=overrides, quiet=True).values
+    assert np.abs(made["0.1"].mean(0) - made["0"].mean(0)).max() < 0.01
+    assert (made["0.1"].std(0) < 0.6 * made["0"].std(0)).all()
+
+
+def test_the_scale_becomes_finer():
+    task = object.__new__(SurfaceTask)
+    task.config = resolve(PRESETS, None, None, ["steps=100", "scales=2", "coarse_share=0.4"])
+    assert [task.scale(k) for k in (0, 19, 20, 39, 40, 99)] == [2, 2, 1, 1, 0, 0]
+
+
+class TestLayouts:
+    CONFIG = resolve(PRESETS, None, None, ["resolution=64"])
+
+    def test_own_uvs_are_kept_on_request(self, mesh):
+        laid = with_layout(mesh, self.CONFIG, False)
+        assert laid.uv is not None and usable_uv(laid, laid.uv)
+        assert with_layout(laid, self.CONFIG, True) is laid
+        assert len(np.unique(charts(laid, laid.uv))) >= 2
+
+    def test_missing_uvs(self, mesh):
+        with pytest.raises(ConfigError, match="no UVs to keep"):
+            with_layout(mesh, self.CONFIG, True)
+
+    @pytest.mark.parametrize("damage", ["overlap", "outside", "nan"])
+    def test_unusable_uvs(self, mesh, damage):
+        uv = np.array(with_layout(mesh, self.CONFIG, False).uv)
+        uv[: len(uv) // 2] = uv[len(uv) // 2 :] if damage == "overlap" else uv[: len(uv) // 2]
+        if damage == "outside":
+            uv = 2 * uv
+        if damage == "nan":
+            uv[0, 0] = 1e30
+        with pytest.raises(ConfigError, match="overlap"):
+            with_layout(replace(mesh, uv=uv), self.CONFIG, True)
+
+
+def test_one_triangle_is_enough(exemplar, tmp_path):
+    mesh = Mesh(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]), name="one")
+    texture = surface.fit(exemplar, mesh, tmp_path / "run", overrides=[*SMALL, "steps=2"], quiet=True)
+    assert np.isfinite(texture.values).all()
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_size_does_not_matter(mesh, exemplar, tmp_path, factor):
+    large = mesh.with_vertices(mesh.vertices * factor)
+    a = surface.fit(exemplar, mesh, tmp_path / "a", overrides=[*SMALL, "steps=2"], quiet=True)
+    b = surface.fit(exemplar, large, tmp_path / "b", overrides=[*SMALL, "steps=2"], quiet=True)
+    assert np.isfinite(b.values).all() and abs(len(a.values) - len(b.values)) < 0.2 * len(a.values)
+
+
+class TestStyleTransfer:
+    STYLE = [*SMALL, "steps=20"]
+
+    def test_ambient_occlusion_keeps_its_structure(self, exemplar, tmp_path):
+        """The result still follows the content, in the exemplar's colours."""
+        mesh = embedded("mushrooms")
+        image = Exemplar({"albedo": exemplar.maps["albedo"]})
+        made = surface.fit(image, mesh, tmp_path / "run", content="ao", overrides=self.STYLE, quiet=True)
+        content = content_colours("ao", made.mesh, made.texels)
+        assert content.std() > 0.05 and content.min() >= 0 and content.max() <= 1
+        assert np.corrcoef(content.mean(1), made.values.mean(1))[0, 1] > 0.3
+        assert np.abs(made.values - content).mean() > 0.02
+
+    def test_without_style_nothing_changes(self, mesh, exemplar, tmp_path):
+        """All weight on the content: its texture is the optimum from the start."""
+        image = Exemplar({"albedo": exemplar.maps["albedo"]})
+        overrides = [*self.STYLE, "content_weight=1e12", "lr=0.001", "steps=2"]
+        made = surface.fit(image, mesh, tmp_path / "run", content="ao", overrides=overrides, quiet=True)
+        assert np.abs(made.values - content_colours("ao", made.mesh, made.texels)).max() < 0.02
+
+    def test_images_are_read_on_the_meshs_own_uvs(self, tmp_path):
+        """A ramp in u and v; every texel gets its own uv as colour."""
+        square = flat_square(4)
+        assert square.uv is not None
+        u, v = np.meshgrid((np.arange(256) + 0.5) / 256, 1 - (np.arange(256) + 0.5) / 256)
+        write_image(tmp_path / "ramp.png", np.stack([u, v, 0 * u], -1))
+        texels = Texels.rasterize(square, square.uv, 32)
+        found = content_colours(tmp_path / "ramp.png", square, texels)
+        assert np.abs(found[:, :2] - texels.position[:, :2]).max() < 0.01 and not found[:, 2].any()
+
+    def test_an_image_needs_uvs(self, mesh, exemplar, tmp_path):
+        image = Exemplar({"albedo": exemplar.maps["albedo"]})
+        with pytest.raises(ConfigError, match="no UVs"):
+            surface.fit(image, mesh, tmp_path / "run", content="a.png", overrides=self.STYLE, quiet=True)
+
+    def test_one_image_is_transferred(self, mesh, exemplar, tmp_path):
+        with pytest.raises(ConfigError, match="one image"):
+            surface.fit(exemplar, mesh, tmp_path / "run", content="ao", overrides=self.STYLE, quiet=True)
+        assert not (tmp_path / "run").exists()
