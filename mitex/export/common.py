@@ -15,7 +15,9 @@ from mitex import __version__
 from mitex.asset import Asset
 from mitex.atlas import Atlas
 from mitex.errors import MeshError
-from mitex.frames import decode, encode, orthonormal, split_at_seams, unit
+from mitex.geometry.normal_maps import decode, encode
+from mitex.geometry.tangents import split_at_seams
+from mitex.geometry.vectors import orthonormal, scatter_add, unit
 from mitex.mesh import Mesh
 
 GENERATOR = "Mitex"
@@ -70,8 +72,7 @@ def asset_from_textures(mesh: Mesh, uv: np.ndarray, textures: Mapping[str, np.nd
         sampled["normal"] = decode(sampled["normal"], split.tangents[:, :3], split.bitangents, split.normals)
     maps = {}
     for key, values in sampled.items():
-        total = [np.bincount(split.source, values[:, c], len(copies)) for c in range(values.shape[1])]
-        maps[key] = np.stack(total, axis=1) / np.maximum(copies, 1)[:, None]
+        maps[key] = scatter_add(split.source, values, len(copies)) / np.maximum(copies, 1)[:, None]
     tangents = default_tangents(mesh)
     if "normal" in maps:
         t = tangents

@@ -24,6 +24,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from mitex.geometry.vectors import across, cross_2d, scatter_add, unit
+
 DEFAULT = (1.0, 0.0, 0.0)  # the tangent where no UVs give one; its sign is -1
 
 
@@ -70,9 +72,9 @@ def corner_tangents(
     """
     corners = _welded(vertices, normals, faces, uv)
     triangles = _triangles(vertices[faces], uv)
-    across = _across(corners, ~triangles.collapsed)
-    _orient_flat(triangles, corners, across)
-    fans = _fans(triangles.preserving, across)
+    partners = _partners(corners, ~triangles.collapsed)
+    _orient_flat(triangles, corners, partners)
+    fans = _fans(triangles.preserving, partners)
     vectors, defined = _summed(triangles, vertices[faces], normals[faces], fans)
     preserving = np.repeat(triangles.preserving, 3)
     _adopt(triangles.collapsed, corners, vectors, defined, preserving, fans)
@@ -109,7 +111,7 @@ def _triangles(points: np.ndarray, uv: np.ndarray) -> _Faces:
     edges = uv.astype(np.float32)
     edges = edges[:, 1:] - edges[:, :1]
     # In single precision like the others, so that thin triangles get the same orientation.
-    area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    area = cross_2d(edges[:, 0], edges[:, 1])
     p = points.astype(np.float64)
     first, second = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
     rise, run = edges[:, ::-1, 1, None].astype(np.float64), edges[:, ::-1, 0, None].astype(np.float64)
@@ -118,12 +120,12 @@ def _triangles(points: np.ndarray, uv: np.ndarray) -> _Faces:
     lengths = np.linalg.norm([along_u, along_v], axis=2)
     flat = (np.abs(area) <= np.finfo(np.float32).tiny) | (lengths == 0).any(axis=0)
     preserving = area > 0
-    tangents = _unit(along_u * np.where(preserving, 1.0, -1.0)[:, None])
+    tangents = unit(along_u * np.where(preserving, 1.0, -1.0)[:, None])
     collapsed = (points == np.roll(points, 1, axis=1)).all(axis=2).any(axis=1)
     return _Faces(tangents, preserving, flat, collapsed)
 
 
-def _across(corners: np.ndarray, usable: np.ndarray) -> np.ndarray:
+def _partners(corners: np.ndarray, usable: np.ndarray) -> np.ndarray:
     """(3 F,) the half-edge on the other side of each half-edge, -1 where there is none.
 
     Half-edge 3 f + k runs from corner k of triangle f to the next. Where more than two meet, each is paired
@@ -137,28 +139,28 @@ def _across(corners: np.ndarray, usable: np.ndarray) -> np.ndarray:
     half_edges, key = half_edges[order], key[order]
     first = np.flatnonzero(np.diff(key, prepend=-1))
     count = np.diff(first, append=len(key))
-    across = np.full(3 * len(corners), -1)
+    partners = np.full(3 * len(corners), -1)
     a, b = half_edges[first[count == 2]], half_edges[first[count == 2] + 1]
     opposite = start[a] == end[b]
-    across[a[opposite]], across[b[opposite]] = b[opposite], a[opposite]
+    partners[a[opposite]], partners[b[opposite]] = b[opposite], a[opposite]
     for k in np.flatnonzero(count > 2):
-        _pair(half_edges[first[k] : first[k] + count[k]].tolist(), start, across)
-    return across
+        _pair(half_edges[first[k] : first[k] + count[k]].tolist(), start, partners)
+    return partners
 
 
-def _pair(half_edges: list[int], start: np.ndarray, across: np.ndarray) -> None:
+def _pair(half_edges: list[int], start: np.ndarray, partners: np.ndarray) -> None:
     """Pairs the half-edges between two vertices."""
     for k, a in enumerate(half_edges):
-        later = (b for b in half_edges[k + 1 :] if across[b] < 0 and start[a] != start[b])
-        if across[a] < 0 and (b := next(later, -1)) >= 0:
-            across[a], across[b] = b, a
+        later = (b for b in half_edges[k + 1 :] if partners[b] < 0 and start[a] != start[b])
+        if partners[a] < 0 and (b := next(later, -1)) >= 0:
+            partners[a], partners[b] = b, a
 
 
 def _next(half_edges: np.ndarray) -> np.ndarray:
     return half_edges + 1 - 3 * (half_edges % 3 == 2)
 
 
-def _orient_flat(triangles: _Faces, corners: np.ndarray, across: np.ndarray) -> None:
+def _orient_flat(triangles: _Faces, corners: np.ndarray, partners: np.ndarray) -> None:
     """Gives triangles without UV area the orientation of the first fan that reaches them, in place.
 
     Fans are visited in the order of their first corners; only those at vertices of such triangles matter.
@@ -176,18 +178,18 @@ def _orient_flat(triangles: _Faces, corners: np.ndarray, across: np.ndarray) -> 
             if corner in visited or preserving[face] != preserving[seed // 3]:
                 continue
             visited.add(corner)
-            left, right = across[corner], across[3 * face + (corner + 2 - 3 * face) % 3]
+            left, right = partners[corner], partners[3 * face + (corner + 2 - 3 * face) % 3]
             stack += [int(_next(left))] if left >= 0 else []
             stack += [int(right)] if right >= 0 else []
 
 
-def _fans(preserving: np.ndarray, across: np.ndarray) -> np.ndarray:
+def _fans(preserving: np.ndarray, partners: np.ndarray) -> np.ndarray:
     """(3 F,) the number of each corner's fan."""
-    half_edges = np.flatnonzero(across >= 0)
-    others = across[half_edges]
+    half_edges = np.flatnonzero(partners >= 0)
+    others = partners[half_edges]
     same = preserving[half_edges // 3] == preserving[others // 3]
     pairs = half_edges[same], _next(others[same])  # where one starts, the other ends
-    graph = coo_array((np.ones(len(pairs[0]), np.int8), pairs), shape=(len(across), len(across)))
+    graph = coo_array((np.ones(len(pairs[0]), np.int8), pairs), shape=(len(partners), len(partners)))
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
@@ -196,15 +198,14 @@ def _summed(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(3 F, 3) each fan's tangent, and (3 F,) whether any triangle gave it one."""
     n, p = normals.astype(np.float64), points.astype(np.float64)
-    ahead = _unit(_projected(np.roll(p, -1, axis=1) - p, n))
-    behind = _unit(_projected(np.roll(p, 1, axis=1) - p, n))
+    ahead = unit(across(np.roll(p, -1, axis=1) - p, n))
+    behind = unit(across(np.roll(p, 1, axis=1) - p, n))
     angle = np.arccos(np.clip((ahead * behind).sum(axis=2), -1.0, 1.0))
-    tangents = _unit(_projected(triangles.tangents[:, None], n)) * angle[..., None]
+    tangents = unit(across(triangles.tangents[:, None], n)) * angle[..., None]
     given = np.repeat(~(triangles.flat | triangles.collapsed), 3)
     tangents, fan = tangents.reshape(-1, 3)[given], fans[given]
     count = int(fans.max(initial=0)) + 1
-    sums = np.stack([np.bincount(fan, tangents[:, k], count) for k in range(3)], axis=1)
-    return _unit(sums)[fans], (np.bincount(fan, minlength=count) > 0)[fans]
+    return unit(scatter_add(fan, tangents, count))[fans], (np.bincount(fan, minlength=count) > 0)[fans]
 
 
 def _adopt(
@@ -223,11 +224,3 @@ def _adopt(
     lost, source = lost[source >= 0], source[source >= 0]
     for values in (vectors, defined, preserving, fans):
         values[lost] = values[source]
-
-
-def _projected(vectors: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    return vectors - normals * (normals * vectors).sum(axis=-1, keepdims=True)
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300)

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from mitex.asset import Asset
-from mitex.atlas import twice_area
 from mitex.colour import srgb_to_linear
 from mitex.errors import ConfigError
 from mitex.export.common import DEFAULT_ALBEDO, DEFAULT_ROUGHNESS
-from mitex.frames import split_at_seams, unit
+from mitex.geometry.tangents import split_at_seams
+from mitex.geometry.triangles import twice_area
+from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh
 from mitex.mesh.mesh import Similarity
 from mitex.render.framing import FOV, View, frame, hull, rotation

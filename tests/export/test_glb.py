@@ -12,7 +12,7 @@ from mitex.asset import Asset
 from mitex.colour import srgb_to_linear
 from mitex.errors import MeshError
 from mitex.export.glb import glb_bytes
-from mitex.frames import unit
+from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh, icosphere
 from tests.export.common import Glb, wavy
 from tests.geometry.reference import mikktspace

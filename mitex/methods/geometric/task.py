@@ -25,8 +25,8 @@ QUARTERS = 4  # parts of a level with a learning rate each; the paper's 2,000 st
 class GeometricTask:
     """Generators that turn the template into the reference, or something like it, on each level.
 
-    A step updates the generator of its level. The critics have optimizers of their own and take their turns in
-    `begin`. Generators of lower levels stay as they are.
+    A step updates the generator of its level. The critics have optimizers of their own and take their turns
+    in `begin`. Generators of lower levels stay as they are.
 
     Args:
         config: settings.

@@ -13,11 +13,11 @@ import torch
 from mitex.asset import Asset
 from mitex.atlas import laid_out
 from mitex.errors import ConfigError
-from mitex.frames import orthonormal, unit
+from mitex.geometry.vectors import orthonormal, rotate_about, unit
 from mitex.mesh import Mesh, remesh, subdivide_loop
 from mitex.methods.nca import files
 from mitex.methods.nca.model import MeshNCA
-from mitex.methods.nca.perception import perception, rotate_about
+from mitex.methods.nca.perception import perception
 from mitex.methods.nca.targets import state_maps
 from mitex.runtime import keep_freed_memory
 
@@ -94,7 +94,9 @@ class NcaTexture:
         state = self.grow(dense, seed=seed, steps=STEPS if steps is None else steps, orientation=orientation)
         maps = state_maps(state.numpy(), list(self.maps))
         asset = Asset(dense, maps, tangents(dense, orientation), name=mesh.name)
-        return asset if resolution is None else asset.baked(resolution)
+        if resolution is None:
+            return asset
+        return asset.baked(resolution, layout=dense.uv if scale == 1.0 else None)
 
     @torch.no_grad()
     def grow(
@@ -118,7 +120,7 @@ class NcaTexture:
         if self.model.condition:
             name, width = self.about.get("name", "the model"), self.model.condition
             raise ConfigError(
-                f"'{name}' needs a condition of {width} values for each vertex, which a texture does not have",
+                f"'{name}' needs a condition of {width} values at each vertex, which a texture has not",
                 "use a model that was trained without, or give the condition to MeshNCA.evolve in Python",
             )
 

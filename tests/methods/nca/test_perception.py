@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, grid, icosphere
-from mitex.methods.nca.perception import _cache, perception, rotate_about
+from mitex.methods.nca.perception import _cache, perception
 from tests.mesh.examples import FAN, FAN_POINTS, meshes
 from tests.methods.nca import brute_force
 from tests.methods.nca.brute_force import patchwork, turned
@@ -153,16 +153,6 @@ def test_one_angle_is_the_same_for_all(generator):
     state = _state(mesh, generator)
     many = perception(mesh, 1, np.full(len(mesh.vertices), 0.4))(state)
     assert torch.allclose(perception(mesh, 1, 0.4)(state), many, atol=1e-6)
-
-
-def test_rotation_is_that_of_scipy(rng):
-    vectors, axes = rng.normal(size=(2, 20, 3))
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    angles = rng.uniform(-4, 4, 20)
-    expected = Rotation.from_rotvec(angles[:, None] * axes).apply(vectors)
-    assert np.allclose(rotate_about(vectors, axes, angles), expected)
-    single = Rotation.from_rotvec(0.8 * axes).apply(vectors)
-    assert np.allclose(rotate_about(vectors, axes, 0.8), single)
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2])

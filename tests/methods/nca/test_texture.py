@@ -1,11 +1,13 @@
 """Growing a texture on meshes of all kinds."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 
+from mitex import atlas
 from mitex.atlas import laid_out
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, grid, icosphere, subdivide_loop
@@ -120,6 +122,21 @@ def test_uvs_are_laid_out_before_the_subdivision(made, sphere):
     expected = subdivide_loop(laid_out(sphere, 128), 1).uv
     assert expected is not None and asset.mesh.uv is not None and np.array_equal(asset.mesh.uv, expected)
     assert made.apply(sphere, steps=1, subdivide=1, resolution=None).mesh.uv is None
+
+
+def test_uvs_are_looked_at_once(made, sphere, monkeypatch):
+    """The check of own UVs rasterizes them; what `apply` has laid out is baked on as it is."""
+    calls = []
+    for name in ("usable_uv", "unwrap"):
+        original = getattr(atlas, name)
+        monkeypatch.setattr(
+            atlas, name, lambda *args, f=original, name=name: (calls.append(name), f(*args))[1]
+        )
+    baked = made.apply(sphere, steps=1, subdivide=1, resolution=64)
+    assert calls == ["unwrap"]
+    made.apply(replace(sphere, uv=atlas.unwrap(sphere, 64, 8)), steps=1, subdivide=1, resolution=64)
+    assert calls == ["unwrap", "unwrap", "usable_uv"]
+    assert np.array_equal(baked.atlas.uv, baked.mesh.uv)
 
 
 def test_place_and_units_stay(made):

@@ -17,8 +17,9 @@ import torch
 from scipy.ndimage import map_coordinates
 
 from mitex.asset import Asset, clay
-from mitex.atlas import laid_out, twice_area
+from mitex.atlas import laid_out
 from mitex.errors import ConfigError
+from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh, subdivide_midpoint
 from mitex.methods.baselines.displacement import METHOD
 from mitex.runtime import init, load_mitsuba

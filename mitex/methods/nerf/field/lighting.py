@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from mitex.errors import ImageError
+from mitex.geometry.vectors import unit
 from mitex.methods.nerf.field.tensors import channels
 from mitex.runtime import load_mitsuba
 
@@ -103,8 +104,7 @@ def rotated(light: np.ndarray, turn: np.ndarray) -> np.ndarray:
     Returns:
         As `light`, float32: what it was in direction d, it is in direction turn d.
     """
-    ways = np.random.default_rng(0).normal(size=(8 * COEFFICIENTS, 3))
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    ways = unit(np.random.default_rng(0).normal(size=(8 * COEFFICIENTS, 3)))
     now, before = (  # the first harmonic is one number
         np.stack([np.broadcast_to(y, len(ways)) for y in dr.sh_eval(channels(mi.Vector3f, v), 3)], axis=1)
         for v in (ways, ways @ turn)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mitex.atlas import twice_area
+from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh
 from mitex.methods.nerf.base.base_shape import face_frames
 from mitex.methods.nerf.field.networks import FEATURES, PHASES

@@ -16,7 +16,8 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from mitex.errors import ConfigError, MeshError
-from mitex.frames import orthonormal
+from mitex.geometry.triangles import interpolate
+from mitex.geometry.vectors import orthonormal
 from mitex.mesh import Mesh
 from mitex.mesh.topology import mesh_edges
 from mitex.methods.nerf.synthesis.matching import HORIZONTAL, VERTICAL
@@ -200,7 +201,7 @@ def spread_points(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[np.
     faces = rng.choice(len(areas), DENSITY * count, p=areas / areas.sum())
     root, v = np.sqrt(rng.random((len(faces), 1))), rng.random((len(faces), 1))
     weights = np.concatenate([1.0 - root, root * (1.0 - v), root * v], 1)
-    points = np.einsum("nk,nkd->nd", weights, mesh.vertices[mesh.faces[faces]])
+    points = interpolate(weights, mesh.vertices[mesh.faces[faces]])
     apart = np.sqrt(SATURATED * areas.sum() / count)
     tree = KDTree(points)
     free = np.ones(len(points), bool)

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.field.lighting import BANDS, COEFFICIENTS, COSINE, POWER
@@ -65,8 +66,8 @@ def estimated_light(mesh: Mesh, capture: Capture) -> np.ndarray:
 
 def _softened(light: np.ndarray) -> np.ndarray:
     """The light, nearer to an even one if it leaves a side too dark."""
-    directions = np.random.default_rng(0).normal(size=(DIRECTIONS, 3))
-    shades = _irradiance(directions / np.linalg.norm(directions, axis=1, keepdims=True)) @ light[: BANDS**2]
+    directions = unit(np.random.default_rng(0).normal(size=(DIRECTIONS, 3)))
+    shades = _irradiance(directions) @ light[: BANDS**2]
     mean = light[0] / math.sqrt(4 * math.pi)
     share = min(1.0, (1 - SHADE) * mean / max(mean - shades.min(), 1e-12))
     return light * np.where(np.arange(COEFFICIENTS) > 0, share, 1.0)

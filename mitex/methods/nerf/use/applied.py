@@ -98,7 +98,7 @@ class AppliedTexture(Shell):
 
     @property
     def maps(self) -> Mapping[str, np.ndarray]:
-        """The latent features that the shell wears, (H, W, C)."""
+        """The latent features on the mesh's UVs, (H, W, C)."""
         return {"features": self._maps.features}
 
     def export(self, path: str | os.PathLike[str]) -> Path:
@@ -107,8 +107,7 @@ class AppliedTexture(Shell):
         Raises:
             OutputError: unknown suffix or unwritable place.
         """
-        target = prepare_output(path, SUFFIXES)
-        return self.extract().export(target)
+        return self.extract().export(prepare_output(path, SUFFIXES))
 
     def render(self, path: str | os.PathLike[str], *, exposure: float = 0.0, **options: Any) -> Path:
         """Path-traces the texture in the studio: PNG or JPEG; options as of `shell_still`.

@@ -9,7 +9,8 @@ import numpy as np
 
 from mitex.asset import Asset
 from mitex.errors import ConfigError, MeshError
-from mitex.frames import encode, orthonormal
+from mitex.geometry.normal_maps import encode
+from mitex.geometry.vectors import orthonormal
 from mitex.mesh import Mesh, Similarity
 from mitex.methods.nerf.base.isosurface import isosurface
 from mitex.methods.nerf.field.lighting import COEFFICIENTS
