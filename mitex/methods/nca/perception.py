@@ -103,7 +103,9 @@ def _build(mesh: Mesh, degree: int, orientation: float | np.ndarray, device) -> 
     receivers = np.repeat(np.arange(count), np.diff(mesh.edges.indptr))
     positions = mesh.vertices.astype(np.float64)
     offsets = positions[neighbours] - positions[receivers]
-    directions = offsets / (np.linalg.norm(offsets, axis=1, keepdims=True) + 1e-8)
+    # No constant is added to the lengths (the authors: 1e-8): meshes may have any size.
+    lengths = np.linalg.norm(offsets, axis=1, keepdims=True)
+    directions = offsets / np.where(lengths > 0.0, lengths, 1.0)
     if np.any(orientation):
         angle = np.broadcast_to(orientation, (count,))[receivers]
         directions = rotate_about(directions, mesh.normals.astype(np.float64)[receivers], -angle)

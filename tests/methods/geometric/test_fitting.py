@@ -363,6 +363,18 @@ def test_the_learning_rate_is_halved_on_each_level():
     assert rates == [1, 1, 0.5, 0.5, 0.25, 0.25, 0.125, 0.125, 1, 1]
 
 
+@pytest.mark.parametrize(("preset", "quarter"), [("fast", 500), ("paper", 1500)])
+def test_the_published_schedule(preset, quarter):
+    """From 5e-4, decayed by 0.5 "in intervals of 500 iterations" of the 2,000 on a level: three halvings.
+
+    An iteration has three steps of the generator in `paper`, and one in `fast`.
+    """
+    config = PRESETS[preset]
+    rates = np.array([learning_rate(config, step) for step in range(config.steps)])
+    expected = np.repeat([5e-4, 2.5e-4, 1.25e-4, 0.625e-4], quarter)
+    np.testing.assert_array_equal(rates.reshape(-1, 4 * quarter), np.tile(expected, (config.levels, 1)))
+
+
 def test_critics_learn_at_that_rate(monkeypatch):
     rates = []
     monkeypatch.setattr(Adam, "step", lambda self, rate: rates.append(rate))
