@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
-from dataclasses import dataclass, replace
+import time
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mitex.cache import cached, content_key
+from mitex.errors import CheckpointError
 from mitex.integrators.march import traverse
 from mitex.mesh import Mesh
 from mitex.methods.nerf.base_shape import base_shape, given_base, shell_thickness
@@ -27,7 +31,7 @@ mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 VERSION = 1  # of the base shapes in the cache
-COARSE = dict(  # what the coarse field needs less of
+COARSE: dict[str, Any] = dict(  # what the coarse field needs less of
     table=15,
     cells=256,
     rays=1024,
@@ -43,6 +47,7 @@ VIEWS = 16  # that the surface is scanned from
 SCAN_SIDE = 200  # pixels of a scan along its longest side
 SOLID = 0.95  # opacity of a ray that has met the surface
 VOXEL = 0.01  # the scan keeps one point in each [scene units]
+ABANDONED = 7 * 24 * 3600.0  # a training that nobody has gone on with for so long is removed [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,15 +79,17 @@ def find_base(
     Raises:
         MeshError: there is nothing dense, or the given mesh cannot be used.
     """
-    steps = config.base_steps
-    coarse = replace(config, **COARSE, steps=steps, lr_steps=steps)
+    coarse = coarse_config(config)
     arrays = (*capture.images, capture.poses, capture.intrinsics, capture.distortion)
     mesh = () if given is None else (given.vertices, given.faces)
-    settings = (config.seed, steps, config.lr, config.concavity, config.pull, config.neighbours)
-    place = cache_dir() / "nerf" / content_key(VERSION, *arrays, *mesh, *settings)
+    folder = cache_dir() / "nerf"
+    # A training goes on under equal configs only, so its folder is named by all that is in them.
+    training = folder / f"{content_key(VERSION, *arrays, capture.name, coarse)}.run"
+    settings = (config.concavity, config.pull, config.neighbours)
+    place = folder / content_key(VERSION, *arrays, *mesh, coarse, *settings)
 
     def find() -> BaseShape:
-        task = trained(coarse, capture, (capture, 0), place.with_suffix(".run"), quiet)
+        task = _trained(coarse, capture, training, quiet)
         _say("cutting the base shape out of the coarse field, about a minute", quiet)
         base = _shape_of(task, config) if given is None else given_base(given)
         scan = scanned(task)
@@ -90,8 +97,33 @@ def find_base(
         return BaseShape(base, scan, shell_thickness(scan, projection))
 
     found = cached(place, find, _read, _write)
+    shutil.rmtree(training, ignore_errors=True)
+    _remove_abandoned(folder)
     _say(f"base shape of {len(found.mesh.faces):,} faces, shell of +-{found.thickness:.3f}", quiet)
     return found
+
+
+def coarse_config(config: NerfConfig) -> NerfConfig:
+    """Settings of the coarse field; of a fit's own there are only those in it that change this field."""
+    steps = config.base_steps
+    return NerfConfig(preset="coarse", seed=config.seed, lr=config.lr, steps=steps, lr_steps=steps, **COARSE)
+
+
+def _trained(coarse: NerfConfig, capture: Capture, folder: Path, quiet: bool) -> PlainTask:
+    """The coarse field; an interrupted training goes on, unless its checkpoints cannot be used."""
+    try:
+        return trained(coarse, capture, (capture, 0), folder, quiet)
+    except CheckpointError:
+        shutil.rmtree(folder)
+        return trained(coarse, capture, (capture, 0), folder, quiet)
+
+
+def _remove_abandoned(folder: Path) -> None:
+    """Removes interrupted trainings that nobody has gone on with for a week."""
+    for training in folder.glob("*.run"):
+        with suppress(OSError):
+            if time.time() - training.stat().st_mtime > ABANDONED:
+                shutil.rmtree(training)
 
 
 def _shape_of(task: PlainTask, config: NerfConfig) -> Mesh:

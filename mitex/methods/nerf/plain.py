@@ -124,7 +124,8 @@ def trained(
     """A field after its training in a run folder, which lets an interrupted one go on; arguments as above."""
     folder = Path(folder)
     task = PlainTask(config, capture, shown)
-    learn(task, config, folder, resume=(folder / checkpoint.NAME).exists(), quiet=quiet)
+    begun = any((folder / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
+    learn(task, config, folder, resume=begun, quiet=quiet)
     return task
 
 
