@@ -30,7 +30,7 @@ class NerfConfig:
         fresnel: surfaces mirror more or less at grazing angles; else as much from all sides, as published.
         detach_normals: fine normals learn from the density alone, as published; else from colours too.
         clustering, distortion, normals: weights of the losses.
-        inside: weight of the one that, in the second half of the steps, gives what is hidden inside the looks
+        inside: weight of the one that, from half of `lr_steps` on, gives what is hidden inside the looks
             of the surface above it; as published there is none, and where a shell is cut any colour shows.
         cluster_entries: entries of a level that a step clusters, drawn by chance; 0 for all, as published.
         normal_rays: share of the rays whose normals are compared.

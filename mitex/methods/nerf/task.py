@@ -10,6 +10,7 @@ import numpy as np
 import torch
 
 from mitex.bridge import call
+from mitex.cache import content_key
 from mitex.integrators.march import Samples, accumulated, weights_of
 from mitex.mesh import Mesh
 from mitex.methods.nerf.capture import Capture
@@ -69,7 +70,9 @@ class TextureTask(RadianceTask):
         super().__init__(config, capture, shown, Occupancy(config.occupancy, possible), parameters)
 
     def metadata(self) -> dict[str, str]:
-        return {"method": "nerf", "capture": self.pixels.capture.name}
+        mesh = self.projection.mesh
+        base = content_key(mesh.vertices, mesh.faces, self.thickness)
+        return {"method": "nerf", "capture": self.pixels.capture.name, "base": base}
 
     def aimed(self, batch: Batch) -> Batch:
         if not self.config.refine_cameras:
@@ -198,8 +201,11 @@ class TextureTask(RadianceTask):
         return 1 - dr.exp(-dr.exp(lowest) * self.step_length)
 
     def _knows_inside(self, step: int) -> bool:
-        """Only late: colours learn slower beside a loss that wants them the same at all depths."""
-        return self.config.inside > 0 and 2 * step >= self.config.steps
+        """Only late: colours learn slower beside a loss that wants them the same at all depths.
+
+        `steps` has no say, or a run that goes on for more steps would not be that of one go.
+        """
+        return self.config.inside > 0 and 2 * step >= self.config.lr_steps
 
     def _slope(self, arrays: Any, located: Located) -> Any:
         """The direction in which the density falls, by equation 2 from its slopes in foot and distance."""
