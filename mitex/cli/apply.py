@@ -15,7 +15,7 @@ from mitex.errors import ConfigError
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
-    from mitex.methods.nerf.applied import AppliedTexture
+    from mitex.methods.nerf.use.applied import AppliedTexture
 
 SUFFIXES = (".glb", ".obj", ".ply", ".exr")
 PICTURES = (".png", ".jpg", ".jpeg")  # of radiance fields

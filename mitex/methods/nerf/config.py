@@ -18,7 +18,7 @@ class NerfConfig:
         seed: of all randomness.
         rays: in a step.
         one_view: all rays of a step from one picture, as published; else from all pictures.
-        cells: along the diagonal of the scene cube that a ray's steps divide.
+        ray_steps: that the diagonal of the scene cube is divided into.
         table: binary logarithm of the entries of a level's hash table.
         coarsest, finest: resolution of the first and the last level of features [per scene cube].
         density_width: channels of the density network's hidden layer.
@@ -30,11 +30,11 @@ class NerfConfig:
         fresnel: surfaces mirror more or less at grazing angles; else as much from all sides, as published.
         detach_normals: fine normals learn from the density alone, as published; else from colours too.
         clustering, distortion, normals: weights of the losses.
-        inside: weight of the one that, from half of `lr_steps` on, gives what is hidden inside the looks
-            of the surface above it; as published there is none, and where a shell is cut any colour shows.
+        interior_weight: of the loss that, from half of `lr_steps` on, gives the unseen interior the
+            reflectances of the surface above; as published there is none, and a cut shell shows any colour.
         cluster_entries: entries of a level that a step clusters, drawn by chance; 0 for all, as published.
         normal_rays: share of the rays whose normals are compared.
-        pull: pseudo-distance of the direction away from the nearest vertex, beside those of the normals.
+        repulsion: pseudo-distance of the direction away from the nearest vertex, beside those of the normals.
         neighbours: vertices whose normals make the coarse normal.
         occupancy: cells of the occupancy grid along a side.
         refine_cameras: optimize the poses too.
@@ -49,7 +49,7 @@ class NerfConfig:
     seed: int = 0
     rays: int = 4096
     one_view: bool = True
-    cells: int = 1024
+    ray_steps: int = 1024
     table: int = 19
     coarsest: int = 512
     finest: int = 1024
@@ -63,10 +63,10 @@ class NerfConfig:
     clustering: float = 1e-5
     distortion: float = 1e-2
     normals: float = 1.0
-    inside: float = 0.0
+    interior_weight: float = 0.0
     cluster_entries: int = 0
     normal_rays: float = 1.0
-    pull: float = 0.01
+    repulsion: float = 0.01
     neighbours: int = 8
     occupancy: int = 128
     refine_cameras: bool = False
@@ -81,7 +81,7 @@ class NerfConfig:
             steps=(1, None),
             seed=(0, 2**32 - 1),
             rays=(1, 1 << 20),
-            cells=(16, 8192),
+            ray_steps=(16, 8192),
             table=(8, 24),
             coarsest=(2, 8192),
             finest=(2, 8192),
@@ -92,10 +92,10 @@ class NerfConfig:
             clustering=(0, None),
             distortion=(0, None),
             normals=(0, None),
-            inside=(0, None),
+            interior_weight=(0, None),
             cluster_entries=(0, None),
             normal_rays=(0, 1),
-            pull=(1e-6, None),
+            repulsion=(1e-6, None),
             neighbours=(1, 64),
             occupancy=(8, 512),
             base_steps=(1, None),
@@ -117,7 +117,7 @@ PRESETS = {
         steps=6_000,
         lr_steps=6_000,
         one_view=False,
-        cells=512,
+        ray_steps=512,
         table=17,
         coarsest=64,
         finest=512,
@@ -127,9 +127,9 @@ PRESETS = {
         detach_normals=False,
         cluster_entries=1 << 14,
         normals=0.05,
-        inside=0.01,
+        interior_weight=0.01,
         normal_rays=0.25,
-        pull=0.05,
+        repulsion=0.05,
     ),
     "paper": PAPER,
 }

@@ -7,14 +7,14 @@ from pathlib import Path
 
 from mitex.mesh import Mesh
 from mitex.methods.nerf import files
-from mitex.methods.nerf.base_shape import face_frames
-from mitex.methods.nerf.capture import Capture, load_capture
-from mitex.methods.nerf.coarse import find_base
+from mitex.methods.nerf.base.base_shape import face_frames
+from mitex.methods.nerf.base.coarse import find_base
+from mitex.methods.nerf.capture.capture import Capture, load_capture
 from mitex.methods.nerf.config import PRESETS
-from mitex.methods.nerf.projection import Projection
-from mitex.methods.nerf.radiance import learn
-from mitex.methods.nerf.task import TextureTask
+from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.texture import NerfTexture
+from mitex.methods.nerf.training.radiance import learn
+from mitex.methods.nerf.training.task import TextureTask
 from mitex.runtime import init, keep_freed_memory
 from mitex.training import run
 
@@ -32,7 +32,7 @@ def fit(
 ) -> NerfTexture:
     """Learns a surface with its meso-structure from photos; writes a run folder with the model in it.
 
-    Every eighth view is held out; previews show the first of these. The base shape is found first and kept in
+    Every eighth view is held out; previews show the first of these. The base shape is found first and mean in
     the user's cache folder.
 
     Args:
@@ -60,24 +60,24 @@ def fit(
         given = given.with_vertices(photos.similarity.apply(given.vertices))
     init()
     keep_freed_memory()
-    learned, held = photos.split()
-    base = find_base(learned, settings, given, quiet)
+    training, held_out = photos.split()
+    base = find_base(training, settings, given, quiet)
     frames = face_frames(base.mesh)
     projection = Projection(
-        base.mesh, neighbours=settings.neighbours, pull=settings.pull, reach=base.thickness
+        base.mesh, neighbours=settings.neighbours, repulsion=settings.repulsion, reach=base.thickness
     )
-    task = TextureTask(settings, learned, (held, 0), projection, frames, base.thickness)
+    task = TextureTask(settings, training, (held_out, 0), projection, frames, base.thickness)
     result = learn(task, settings, out, resume=resume, quiet=quiet)
     about = result.about(photos.name, settings.preset)
     about |= {key: getattr(settings, key) for key in files.SETTINGS}
     about |= {"centre": photos.similarity.center.tolist(), "scale": float(photos.similarity.scale)}
-    kept = task.mean
+    mean = task.mean
     model = files.Model(
         base,
         frames,
-        [kept["tables/f"], kept["tables/phase"]],
-        [value for name, value in kept.items() if name.startswith("weights/")],
-        kept["light"],
+        [mean["tables/f"], mean["tables/phase"]],
+        [value for name, value in mean.items() if name.startswith("weights/")],
+        mean["light"],
         task.occupancy.occupied,
         about,
     )
