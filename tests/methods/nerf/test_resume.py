@@ -14,10 +14,11 @@ import torch
 from safetensors.torch import load_file
 
 from mitex.mesh import Mesh
-from mitex.methods.nerf import PRESETS, files, fit, occupancy
-from mitex.methods.nerf.plain import trained
-from mitex.methods.nerf.radiance import REFRESH
-from mitex.methods.nerf.task import TextureTask
+from mitex.methods.nerf import PRESETS, files, fit
+from mitex.methods.nerf.field import occupancy
+from mitex.methods.nerf.training.plain import train_plain_field
+from mitex.methods.nerf.training.radiance import REFRESH
+from mitex.methods.nerf.training.task import TextureTask
 from mitex.runtime import threads
 from mitex.training import Interrupted, checkpoint
 from mitex.training.config import resolve
@@ -29,7 +30,7 @@ SMALL = (
     "preview_every=10",
     "checkpoint_every=7",
     "rays=128",
-    "inside=0.01",
+    "interior_weight=0.01",
     "learn_light=true",
     "refine_cameras=true",
 )
@@ -87,7 +88,7 @@ def test_the_comparison_covers_what_a_fit_holds(whole):
     for name in ("tables/f", "light", "poses"):  # all of these have moved, so that a lost one would show
         assert not torch.equal(state[f"mean/{name}"], state[f"parameters/{name}"])
     assert all(value.abs().max() > 0 for name, value in optimizer.items() if name.startswith("first"))
-    assert "inside" in metrics(whole)[-1]
+    assert "interior" in metrics(whole)[-1]
 
 
 def test_an_interrupted_fit_is_that_of_one_go(whole, base, tmp_path, monkeypatch):
@@ -118,7 +119,9 @@ def test_a_plain_field_that_goes_on_is_that_of_one_go(tmp_path):
     settings = replace(resolve(PRESETS, overrides=SMALL), preview_every=0, refine_cameras=False)
     for name, parts in (("whole", (STEPS,)), ("parts", (BEFORE, STEPS))):
         for steps in parts:
-            trained(replace(settings, steps=steps), capture, (capture, 0), tmp_path / name, quiet=True)
+            train_plain_field(
+                replace(settings, steps=steps), capture, (capture, 0), tmp_path / name, quiet=True
+            )
     a, b = (checkpoint.load(tmp_path / name) for name in ("whole", "parts"))
     for one, other in ((a.task, b.task), (a.optimizer, b.optimizer), ({"": a.generator}, {"": b.generator})):
         assert [name for name in one if not torch.equal(one[name], other[name])] == []

@@ -6,18 +6,23 @@ import os
 import signal
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
-from mitex.mesh import Mesh, icosphere
-from mitex.methods.nerf import PRESETS, coarse
-from mitex.methods.nerf.capture import Capture
-from mitex.methods.nerf.coarse import find_base
-from mitex.methods.nerf.plain import PlainTask
+from mitex.mesh import Mesh, icosphere, quality
+from mitex.methods.nerf import PRESETS
+from mitex.methods.nerf.base import coarse
+from mitex.methods.nerf.base.base_shape import base_shape
+from mitex.methods.nerf.base.coarse import find_base
+from mitex.methods.nerf.capture.capture import Capture
+from mitex.methods.nerf.training.plain import PlainTask
 from mitex.paths import cache_dir
 from mitex.training import Interrupted, checkpoint
-from tests.methods.nerf.tiny import tiny_capture
+from tests.methods.nerf.tiny import captured, tiny_capture
 
 STEPS, BEFORE = 12, 5
 FEW = replace(PRESETS["fast"], base_steps=STEPS)
@@ -29,7 +34,7 @@ def ball(tmp_path, monkeypatch) -> Mesh:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     mesh = icosphere(44)
     mesh = mesh.with_vertices(0.55 * mesh.vertices)
-    monkeypatch.setattr(coarse, "scanned", lambda task: 1.1 * mesh.vertices)
+    monkeypatch.setattr(coarse, "scan_surface", lambda task: 1.1 * mesh.vertices)
     return mesh
 
 
@@ -74,7 +79,13 @@ def steps(monkeypatch) -> list[int]:
 
 @pytest.mark.parametrize(
     "change",
-    [{"preset": "paper"}, {"normals": 0.5}, {"density_width": 16}, {"pull": 0.2}, {"checkpoint_every": 7}],
+    [
+        {"preset": "paper"},
+        {"normals": 0.5},
+        {"density_width": 16},
+        {"repulsion": 0.2},
+        {"checkpoint_every": 7},
+    ],
 )
 def test_a_setting_of_the_fit_does_not_keep_the_training_from_going_on(capture, ball, steps, change):
     interrupt(capture, ball)
@@ -132,3 +143,32 @@ def test_trainings_that_nobody_goes_on_with_are_removed(capture, ball):
         os.utime(training, (then, then))
     find_base(capture, FEW, ball)
     assert trainings() == [recent]
+
+
+def dented_egg(frequency: int) -> Mesh:
+    """An ellipsoid off the middle of the scene, with shallow dents."""
+    ball = icosphere(frequency)
+    dents = 1 - 0.08 * np.prod(np.cos(9 * ball.vertices), axis=1) ** 2
+    egg = ball.vertices * dents[:, None] * (0.6, 0.45, 0.32) + (0.1, -0.05, 0.0)
+    return Mesh(egg, ball.faces, name="egg")
+
+
+def test_a_base_shape_is_found_in_photos_alone(tmp_path, monkeypatch):
+    """The whole way: coarse field, scan, convex pieces, mesh; with little training and long edges."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(coarse, "GRID", 128)
+    monkeypatch.setattr(coarse, "base_shape", partial(base_shape, edge=0.02))
+    photos = captured(dented_egg(24), views=14, side=64, spp=8)
+    base = find_base(photos, replace(PRESETS["fast"], base_steps=400))
+    true = dented_egg(80).vertices
+    report = quality(base.mesh)
+    assert (report.components, report.boundary_edges, report.genus) == (1, 0, 0)
+    surface = KDTree(true)
+    to_surface, scan_to_surface = (surface.query(points)[0] for points in (base.mesh.vertices, base.scan))
+    assert to_surface.mean() < 0.02 and to_surface.max() < 0.08
+    assert scan_to_surface.mean() < 0.03
+    for end in (np.min, np.max):
+        np.testing.assert_allclose(end(base.mesh.vertices, axis=0), end(true, axis=0), atol=0.03)
+    to_base, to_scan = (KDTree(points).query(true)[0] for points in (base.mesh.vertices, base.scan))
+    assert np.quantile(to_base, 0.95) < base.thickness < 0.12  # the surface is in the shell
+    assert np.quantile(to_scan, 0.95) < 0.05  # and was scanned from all sides
