@@ -64,9 +64,9 @@ def test_the_light_is_taken_off_patches_of_all_sides():
     ball = icosphere(24)
     patches = extract_patches(ball, np.random.default_rng(0), count=60, size=16)
     light = np.zeros(16)
-    light[0], light[3] = np.sqrt(4 * np.pi), -0.8  # brightest towards +x
+    light[0], light[3] = np.sqrt(4 * np.pi), -1.6  # brightest towards +x
     normals = ball.face_normals[patches.faces]
-    shades = 1.0 + 0.8 * 2 / 3 * np.sqrt(3 / (4 * np.pi)) * normals[..., 0]
+    shades = 1.0 + 1.6 * 2 / 3 * np.sqrt(3 / (4 * np.pi)) * normals[..., 0]
     colour = np.array([0.5, 0.4, 0.3])
     pictures = (shades ** (1 / 2.4))[..., None] * colour
     assert pictures.std((0, 1, 2)).min() > 0.02

@@ -31,10 +31,8 @@ def test_elevations_compare_what_photos_show(texture, monkeypatch):
         assert len(set(found[0])) == count  # every option shows
         assert row.captured < row.ours or row.angle > 40
         assert row.picture.shape[0] == 4 * 48 and row.picture.shape[1] % 48 == 0
-    for textures in (
-        masks[k : k + count - 1] for k in range(0, len(masks), count)
-    ):  # the last are other photos
-        for mask, photo in textures:  # only pixels that count in the photo
+    for k in range(0, len(masks), count):
+        for mask, photo in masks[k : k + count - 1]:  # but for other photos: only pixels that count in both
             assert mask.any() and not (mask & ~photo).any()
     # Seen from above, a plane fills its windows; seen flat, there is but one colour above its horizon.
     flat = [np.diff(np.split(row.picture, 4)[3], axis=0) for row in table]
