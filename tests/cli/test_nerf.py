@@ -186,5 +186,5 @@ def test_bad_uses(files, run, capsys, name):
 
 
 def test_lifts_are_for_radiance_fields(files, capsys):
-    words = ["apply", "cobblestone", "--mesh", "good.obj", "--out", "out/a.glb", "--lift", "0"]
-    check_refused(files, words, "--lift means nothing", capsys)
+    words = ["apply", "pebbles", "--mesh", "good.obj", "--out", "out/a.glb", "--lift", "0"]
+    check_refused(files, words, "--lift is no option", capsys)

@@ -14,7 +14,7 @@ import torch
 from safetensors.torch import load_file
 
 from mitex.mesh import Mesh
-from mitex.methods.nerf import PRESETS, files, fit
+from mitex.methods.nerf import PRESETS, fit
 from mitex.methods.nerf.field import occupancy
 from mitex.methods.nerf.training.plain import train_plain_field
 from mitex.methods.nerf.training.radiance import REFRESH
@@ -22,6 +22,7 @@ from mitex.methods.nerf.training.task import TextureTask
 from mitex.runtime import threads
 from mitex.training import Interrupted, checkpoint
 from mitex.training.config import resolve
+from mitex.training.locate import NAME
 from tests.methods.nerf.tiny import SETTINGS, tiny_capture
 
 SMALL = (
@@ -72,7 +73,7 @@ def assert_same(a: Path, b: Path) -> None:
 def tensors(folder: Path) -> list[dict[str, torch.Tensor]]:
     saved = checkpoint.load(folder)
     rest = {"generator": saved.generator, "loss": torch.tensor(saved.loss)}
-    return [saved.task, saved.optimizer, rest, load_file(folder / files.NAME)]
+    return [saved.task, saved.optimizer, rest, load_file(folder / NAME)]
 
 
 def metrics(folder: Path) -> list[dict[str, float]]:
@@ -92,14 +93,14 @@ def test_the_comparison_covers_what_a_fit_holds(whole):
 
 
 def test_an_interrupted_fit_is_that_of_one_go(whole, base, tmp_path, monkeypatch):
-    commit = TextureTask.commit
+    average = TextureTask._average
 
     def stop(task: TextureTask) -> None:
-        commit(task)
+        average(task)
         if task._commits == BEFORE:
             os.kill(os.getpid(), signal.SIGINT)
 
-    monkeypatch.setattr(TextureTask, "commit", stop)
+    monkeypatch.setattr(TextureTask, "_average", stop)
     with pytest.raises(Interrupted):
         small_fit(tmp_path / "run", base, *SMALL, f"steps={STEPS}")
     monkeypatch.undo()

@@ -87,12 +87,17 @@ class Occupancy:
         count = len(self.cells) if not self.refreshes else int(self._occupied().sum())
         return count / self.side**3
 
-    def refresh(self, density: Callable[[np.ndarray], np.ndarray], generator: torch.Generator) -> None:
+    def refresh(self, density: Callable[[np.ndarray], np.ndarray], generator: torch.Generator) -> float:
         """Samples all cells at first, later at half of them: occupied ones and others by chance.
+
+        `values` is a new tensor afterwards, so that an earlier `state` stays what it was.
 
         Args:
             density: of points (N, 3) in the cube, (N,) [1 / scene units].
             generator: of the places in the cells.
+
+        Returns:
+            Mean of `values`, not finite if a density was not [1 / scene units].
         """
         index = torch.arange(len(self.cells))
         if self.refreshes >= WARMUP:
@@ -102,11 +107,12 @@ class Occupancy:
             if len(occupied) > quarter:
                 occupied = occupied[torch.randint(len(occupied), (quarter,), generator=generator)]
             index = torch.unique(torch.cat([others, occupied]))
-        self.values *= DECAY
+        self.values = self.values * DECAY
         values = torch.from_numpy(density(self._points(index, generator)))
         self.values[index] = torch.maximum(self.values[index], values)
         self.refreshes += 1
         self._mask = None
+        return self.values.mean().item()
 
     def state(self) -> dict[str, torch.Tensor]:
         return {"occupancy": self.values, "refreshes": torch.tensor(self.refreshes)}

@@ -21,9 +21,9 @@ from mitex.methods.nerf.field.mlp import network_rows, packed_networks, weight_b
 from mitex.methods.nerf.field.occupancy import Occupancy, hull_cells
 from mitex.methods.nerf.field.rendering import batch_rays, render_step
 from mitex.methods.nerf.field.tensors import channels, tensor
-from mitex.methods.nerf.training.radiance import RadianceTask, Rendered, learn
+from mitex.methods.nerf.training.radiance import RadianceTask, Rendered, schedule
 from mitex.runtime import load_mitsuba
-from mitex.training import checkpoint
+from mitex.training import checkpoint, train
 
 mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
@@ -125,8 +125,8 @@ def train_plain_field(
     """Trains a plain field in a run folder, or continues there; arguments as of `RadianceTask`."""
     folder = Path(folder)
     task = PlainTask(config, capture, preview_view)
-    begun = any((folder / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
-    learn(task, config, folder, resume=begun, quiet=quiet)
+    resume = any((folder / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
+    train(task, config, folder, resume=resume, quiet=quiet, **schedule(config))
     return task
 
 

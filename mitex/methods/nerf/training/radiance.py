@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from mitex.methods.nerf.field.rendering import batch_rays, render_view
 from mitex.methods.nerf.field.tensors import rows
 from mitex.methods.nerf.training.losses import distortion
 from mitex.runtime import load_mitsuba, modest_workers
-from mitex.training import TrainResult, train
+from mitex.training import Change, Step
 from mitex.training.optim import Adam
 
 mi: Any = load_mitsuba(needs_llvm=False)
@@ -84,10 +83,15 @@ class RadianceTask(ABC):
     def parameters(self) -> Sequence[torch.Tensor]:
         return list(self.named.values())
 
-    def loss(self, step: int, generator: torch.Generator) -> tuple[torch.Tensor, dict[str, float]]:
+    def begin(self, step: int, generator: torch.Generator) -> Change | None:
+        """Now and then a refresh of the occupancy."""
+        if step % REFRESH:
+            return None
+        undo = partial(self.occupancy.load_state, self.occupancy.state())
+        return Change(undo, {"density": self.occupancy.refresh(self.density, generator)})
+
+    def loss(self, step: int, generator: torch.Generator) -> Step:
         """L1 of colours before a random background, and the field's own terms."""
-        if step % REFRESH == 0:
-            self.occupancy.refresh(self.density, generator)
         batch = self.with_cameras(self.pixels.draw(self.config.rays, self.config.one_view, generator))
         jitter = torch.rand(len(batch.view), generator=generator)
         rays = batch_rays(batch)
@@ -105,10 +109,16 @@ class RadianceTask(ABC):
             widths = torch.full_like(rendered.t, self.step_length)
             spread = distortion(rendered.weights, rendered.t, widths, rendered.ray)
             total = total + self.config.distortion * spread
-        record = {"colour": error.item(), "samples": float(len(rendered.t)), "occupied": self.occupancy.share}
-        return total, record | {name: value.item() for name, value in rendered.terms.items()}
+        metrics = {
+            "colour": error.item(),
+            "samples": float(len(rendered.t)),
+            "occupied": self.occupancy.share,
+        }
+        metrics |= {name: value.item() for name, value in rendered.terms.items()}
+        return Step(total, metrics, self._average)
 
-    def commit(self) -> None:
+    def _average(self) -> None:
+        """Every `REFRESH` updates the mean parameters move towards those of now."""
         self._commits += 1
         if self._commits % REFRESH:
             return
@@ -134,17 +144,12 @@ class RadianceTask(ABC):
         return np.hstack(render_view(self.field(self.mean), *self.preview_view, PREVIEW)[::-1])
 
 
-def learn(task: RadianceTask, config: NerfConfig, folder: Path, *, resume: bool, quiet: bool) -> TrainResult:
-    """Trains by Adam with a learning rate that falls to a tenth in `lr_steps`; raises as `train`."""
-    return train(
-        task,
-        config,
-        folder,
-        lr=lambda step: config.lr * 0.1 ** (step / config.lr_steps),
-        optimizer=partial(Adam, betas=BETAS, eps=EPSILON),
-        resume=resume,
-        quiet=quiet,
-    )
+def schedule(config: NerfConfig) -> dict[str, Any]:
+    """Options of `train`: Adam with a learning rate that falls to a tenth in `lr_steps`."""
+    return {
+        "lr": lambda step: config.lr * 0.1 ** (step / config.lr_steps),
+        "optimizer": partial(Adam, betas=BETAS, eps=EPSILON),
+    }
 
 
 class Rendered:

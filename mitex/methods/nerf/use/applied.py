@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import torch
 from mitex.asset import Asset
 from mitex.atlas import laid_out
 from mitex.errors import ConfigError
+from mitex.export import SUFFIXES
 from mitex.images import write_image
 from mitex.integrators.march import DIAGONAL
 from mitex.mesh import Mesh
@@ -67,7 +69,7 @@ class AppliedTexture(Shell):
                 f"a texture of {scale} times the size, {density} times the density and lifted by {lift}",
                 "use sizes from 0.05 to 20, densities up to 1000 and lifts from 0 to 1",
             )
-        self.mesh = laid_out(mesh, UNWRAP_SIZE)
+        self.mesh, self._maps = laid_out(mesh, UNWRAP_SIZE), maps
         placed, self.similarity = in_scene_cube(self.mesh)
         # One unit of the UVs shows so many textures that their elements have the requested size.
         uv = np.asarray(placed.uv) * (uv_unit_length(placed) / (maps.size[1] * maps.gap * scale))
@@ -93,6 +95,19 @@ class AppliedTexture(Shell):
         for _ in range(OCCUPANCY_SAMPLES):
             occupancy.refresh(self.density, generator)
         self.mask = occupancy.mask
+
+    @property
+    def maps(self) -> Mapping[str, np.ndarray]:
+        """The latent features on the mesh's UVs, (H, W, C)."""
+        return {"features": self._maps.features}
+
+    def export(self, path: str | os.PathLike[str]) -> Path:
+        """Writes what is solid as a coloured mesh, as of `Asset.export`.
+
+        Raises:
+            OutputError: unknown suffix or unwritable place.
+        """
+        return self.extract().export(prepare_output(path, SUFFIXES))
 
     def render(self, path: str | os.PathLike[str], *, exposure: float = 0.0, **options: Any) -> Path:
         """Path-traces the texture in the studio: PNG or JPEG; options as of `shell_still`.

@@ -50,14 +50,14 @@ def trainings() -> list[Path]:
 def interrupt(capture: Capture, ball: Mesh) -> None:
     """Stops a training after `BEFORE` steps."""
     with pytest.MonkeyPatch.context() as patch:
-        commit = PlainTask.commit
+        average = PlainTask._average
 
         def stop(task: PlainTask) -> None:
-            commit(task)
+            average(task)
             if task._commits == BEFORE:
                 os.kill(os.getpid(), signal.SIGINT)
 
-        patch.setattr(PlainTask, "commit", stop)
+        patch.setattr(PlainTask, "_average", stop)
         with pytest.raises(Interrupted):
             find_base(capture, FEW, ball)
     assert len(trainings()) == 1
