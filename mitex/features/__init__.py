@@ -1,5 +1,6 @@
 """Frozen networks that look at pictures."""
 
+from mitex.features.normalisation import normalise_colours
 from mitex.features.vgg import LAYERS, Vgg16
 
-__all__ = ["LAYERS", "Vgg16"]
+__all__ = ["LAYERS", "Vgg16", "normalise_colours"]

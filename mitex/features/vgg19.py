@@ -9,6 +9,7 @@ import torch
 from safetensors import SafetensorError
 from safetensors.torch import load_file
 
+from mitex.features.normalisation import SPREAD
 from mitex.features.vgg import CHANNELS, Weights
 from mitex.features.weights import WeightsError
 from mitex.paths import cache_dir
@@ -18,7 +19,6 @@ FILE = "vgg19.safetensors"
 LAYERS_19 = tuple(
     f"relu{block}_{i}" for block, count in enumerate((2, 2, 4, 4, 4), 1) for i in range(1, count + 1)
 )
-SPREAD_RGB = (0.229, 0.224, 0.225)  # torchvision's networks read (x - mean) / spread, x in [0, 1]
 
 
 def vgg19_path() -> Path:
@@ -69,7 +69,7 @@ def vgg19_convolutions(path: Path | None = None) -> Weights:
         inputs = outputs
     if torchvision:
         weight, bias = layers["relu1_1"]
-        layers["relu1_1"] = weight / (255 * torch.tensor(SPREAD_RGB))[:, None, None], bias
+        layers["relu1_1"] = weight / (255 * torch.tensor(SPREAD))[:, None, None], bias
     return layers
 
 
