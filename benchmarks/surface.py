@@ -20,12 +20,12 @@ import torch
 from rich.console import Console
 from rich.table import Table
 
-from mitex.features.vgg import CHANNELS, LAYERS
+from mitex.features.layers import CHANNELS, LAYERS
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.surface.borders import Border
 from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.exponential import GeodesicTracer
-from mitex.methods.surface.fit import with_layout
+from mitex.methods.surface.fitting import with_layout
 from mitex.methods.surface.frames import tangent_frames
 from mitex.methods.surface.levels import Levels
 from mitex.methods.surface.network import ALL_LAYERS, SurfaceVgg

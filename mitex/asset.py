@@ -66,6 +66,11 @@ class Asset:
             textures = {k: _checked(k, v, shape, "texture") for k, v in sorted(self.texture_maps.items())}
             object.__setattr__(self, "texture_maps", textures)
 
+    @property
+    def maps(self) -> Mapping[str, np.ndarray]:
+        """The textures if baked, else the maps at the vertices."""
+        return self.vertex_maps if self.texture_maps is None else self.texture_maps
+
     def detail_normals(self) -> np.ndarray:
         """(V, 3) float32 unit normals in object space: the mesh's own, bent by the normal map if any."""
         if "normal" not in self.vertex_maps or self.tangents is None:

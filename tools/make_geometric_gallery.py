@@ -52,7 +52,7 @@ def displaced(texture: GeometricTexture, reference: Mesh, mesh: Mesh, mapped: bo
     if not mapped:
         return texture.apply(mesh).mesh
     size, _ = texture.relative_size(mesh)
-    return DisplacementMap.bake(reference).apply(mesh, size, texture.levels - 1 - START).mesh
+    return DisplacementMap.bake(reference).apply(mesh, scale=size, levels=texture.levels - 1 - START).mesh
 
 
 def level_sheet(texture: GeometricTexture, reference: str, meshes: Path, wanted: list[str]) -> np.ndarray:

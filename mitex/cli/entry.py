@@ -6,46 +6,16 @@ with what could be saved saved; anything else that escapes is a bug and shows it
 
 from __future__ import annotations
 
-import difflib
 import os
 import sys
 import warnings
 from collections.abc import Sequence
-from importlib import import_module
 
 import mitex
+from mitex.cli import commands, overview
+from mitex.cli.settings import settings_text
 from mitex.cli.usage import UsageError, parse
 from mitex.errors import MitexError, MitexWarning
-
-# Words -> module and class of the command, and its line in the overview. Only the called one is imported.
-COMMANDS = {
-    "doctor": ("doctor:Doctor", "check that everything Mitex needs works here"),
-    "demo": ("demo:Demo", "learn, apply, render and export a texture in a few minutes"),
-    "fit nca": ("fit_nca:FitNca", "learn a living texture from an image or PBR maps (MeshNCA)"),
-    "fit surface": ("fit_surface:FitSurface", "synthesize a texture on one mesh (tangent-space CNN)"),
-    "fit geometric": ("fit_geometric:FitGeometric", "learn the relief of a mesh (face-convolution GAN)"),
-    "fit nerf": ("fit_nerf:FitNerf", "capture a texture with its meso-structure from photos (NeRF-Texture)"),
-    "apply": ("apply:Apply", "put a learned texture on a mesh"),
-    "animate": ("animate:Animate", "film how a geometric texture grows or changes"),
-    "render": ("render:Render", "path-trace an asset: a still or a turntable"),
-    "models": ("models:Models", "list the textures that ship with Mitex"),
-}
-
-OVERVIEW = """usage: mitex COMMAND [OPTIONS]
-
-Texture synthesis on meshes.
-
-commands:
-{commands}
-
-examples:
-  mitex doctor
-  mitex demo --out demo
-  mitex fit nca --exemplar pebbles.png --out runs/pebbles
-  mitex apply runs/pebbles --mesh bunny.obj --out bunny.glb
-  mitex render bunny.glb --out bunny.png
-
-`mitex COMMAND --help` tells more."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -79,50 +49,24 @@ def _run(words: list[str]) -> int:
     if not words:
         raise UsageError("no command given", "see `mitex --help`")
     if words[0] in ("-h", "--help", "help"):
-        print(overview())
+        print(overview.overview())
         return 0
     if words[0] == "--version":
         print(f"mitex {mitex.__version__}")
         return 0
-    if words[1:] and set(words[1:]) <= {"-h", "--help"} and _group(words[0]):
-        print(overview(words[0]))
+    if words[1:] and set(words[1:]) <= commands.HELP:
+        if words[0] in commands.OF_MODELS:
+            print(overview.model_help(words[0]))
+            return 0
+        if commands.lines(words[0]):
+            print(overview.group_help(words[0]))
+            return 0
+    if words[0] == "fit" and "--settings" in words:
+        print(settings_text(words[1:]))
         return 0
-    name, rest = _find(words)
-    module, _, attribute = COMMANDS[name][0].partition(":")
-    command = getattr(import_module(f"mitex.cli.{module}"), attribute)
-    call = parse(command, rest, f"mitex {name}")
-    return 0 if call is None else call.run() or 0
-
-
-def _find(words: list[str]) -> tuple[str, list[str]]:
-    """The command that the words start with, and the words after it."""
-    for count in (2, 1):
-        name = " ".join(words[:count])
-        if name in COMMANDS:
-            return name, words[count:]
-    group = _group(words[0])
-    if group and not words[1:]:
-        raise UsageError(f"`mitex {words[0]}` needs a method", f"try `mitex {group[0]} --help`")
-    given = " ".join(words[:2]) if group else words[0]
-    close = difflib.get_close_matches(given, group or COMMANDS, 1)
-    remedy = f"try `mitex {close[0]}`" if close else "see `mitex --help`"
-    raise UsageError(f"there is no command '{given}'", remedy)
-
-
-def _group(word: str) -> list[str]:
-    """Commands of two words that begin with this one."""
-    return [name for name in COMMANDS if name.startswith(f"{word} ")]
-
-
-def overview(group: str = "") -> str:
-    """The text of `mitex --help`, or the commands of one group."""
-    shown = {name: line for name, (_, line) in COMMANDS.items() if not group or name in _group(group)}
-    width = max(map(len, shown))
-    commands = "\n".join(f"  {name:{width}}  {line}" for name, line in shown.items())
-    if group:
-        usage = f"mitex {group} METHOD"
-        return f"usage: {usage} [OPTIONS]\n\n{commands}\n\n`{usage} --help` tells more."
-    return OVERVIEW.format(commands=commands)
+    call = commands.find(words)
+    command = parse(call.command, call.words, call.program)
+    return 0 if command is None else command.run() or 0
 
 
 def _route_warnings() -> None:

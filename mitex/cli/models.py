@@ -9,6 +9,8 @@ from typing import Annotated, Any
 
 from tyro.conf import arg
 
+from mitex.methods.registry import bundled, methods
+
 THUMBNAILS = (".png", ".jpg")
 
 
@@ -30,30 +32,28 @@ class Models:
             print(json.dumps(models, indent=2))
             return
         for model in models:
-            made = [f"{key} {model[key]}" for key in ("preset", "steps", "seconds", "loss") if key in model]
+            origin = [f"{key} {model[key]}" for key in ("preset", "steps", "seconds", "loss") if key in model]
             print(f"{model['name']:16}  {model['method']}: {', '.join(model.get('maps', ['relief']))}")
-            print(f"{'':16}  {', '.join(made)}")
+            print(f"{'':16}  {', '.join(origin)}")
             if model["thumbnail"]:
                 print(f"{'':16}  {model['thumbnail']}")
 
 
 def listing() -> list[dict[str, Any]]:
-    """What is known about every bundled model: name, method, path, thumbnail or None, how it was made.
-
-    Those of nca have their maps there too.
-    """
-    from mitex.methods.geometric import GeometricTexture
-    from mitex.methods.kind import bundled
-    from mitex.methods.nca import NcaTexture
-
-    models = []
-    for method, texture in (("nca", NcaTexture), ("geometric", GeometricTexture)):
-        for name, path in bundled(method).items():
-            known = {**texture.load(path).about, "name": name, "method": method}
-            models.append({**known, "path": str(path), "thumbnail": _thumbnail(path)})
-    return models
+    """What every bundled model tells: name, method, path, thumbnail or None, maps if any, its training."""
+    return [
+        {
+            **method.load_texture().load(path).about,
+            "name": name,
+            "method": method.name,
+            "path": str(path),
+            "thumbnail": _thumbnail(path),
+        }
+        for method in methods().values()
+        for name, path in bundled(method).items()
+    ]
 
 
 def _thumbnail(path: Path) -> str | None:
-    found = [path.with_suffix(suffix) for suffix in THUMBNAILS if path.with_suffix(suffix).is_file()]
-    return str(found[0]) if found else None
+    pictures = (path.with_suffix(suffix) for suffix in THUMBNAILS)
+    return next((str(picture) for picture in pictures if picture.is_file()), None)

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 from tyro.conf import Positional, arg
 
-from mitex.cli.checks import in_range, needless
-from mitex.cli.progress import bar
+from mitex.methods.checks import in_range, reject_unused
+from mitex.render.progress import bar
 
 STILLS = (".png", ".jpg", ".jpeg", ".exr")
 MOVIES = (".mp4", ".gif")
@@ -65,9 +65,9 @@ class Render:
 
         out = prepare_output(self.out, STILLS + MOVIES)
         moving = out.suffix.lower() in MOVIES
-        needless("--frames", out, not moving and self.frames is not None)
-        needless("--fps", out, not moving and self.fps is not None)
-        needless("--azimuth", out, moving and self.azimuth is not None)
+        reject_unused("--frames", out, not moving and self.frames is not None)
+        reject_unused("--fps", out, not moving and self.fps is not None)
+        reject_unused("--azimuth", out, moving and self.azimuth is not None)
         options = self._options()
         from mitex.asset import Asset
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import difflib
 import inspect
 import io
 import re
 from collections.abc import Sequence
 from contextlib import redirect_stderr
+from dataclasses import fields
 from typing import Any
 
 from mitex.errors import MitexError
@@ -40,6 +42,28 @@ def parse(command: type, words: Sequence[str], program: str) -> Any:
         if e.code in (0, None):
             return None
         raise UsageError(one_line(complaint.getvalue()), f"see `{program} --help`") from e
+
+
+def refuse_unknown_options(command: type, words: Sequence[str], whose: str, remedy: str) -> None:
+    """Checks the names of all options before anything else is said of a command line.
+
+    Args:
+        command: dataclass whose fields are the options.
+        words: of the command line.
+        whose: options they are, for the message.
+        remedy: if no option has a similar name.
+
+    Raises:
+        UsageError: one is none of the command's; the closest is named.
+    """
+    options = ["--help", *(f"--{field.name.replace('_', '-')}" for field in fields(command))]
+    for word in words:
+        name = word.partition("=")[0].replace("_", "-")
+        if name.startswith("--") and name not in options:
+            close = difflib.get_close_matches(name, options, 1)
+            raise UsageError(
+                f"{name} is no option of {whose}", f"did you mean {close[0]}?" if close else remedy
+            )
 
 
 def one_line(complaint: str) -> str:

@@ -11,11 +11,9 @@ import torch
 from mitex.errors import ConfigError
 from mitex.features import weights
 from mitex.features.frozen import FrozenConv, FrozenStack, Pool, Tap
+from mitex.features.layers import LAYERS
 from mitex.runtime import bfloat16_is_fast
 
-BLOCKS = ((1, 2), (2, 2), (3, 3), (4, 3), (5, 3))  # (block, convolutions)
-LAYERS = tuple(f"relu{block}_{i}" for block, count in BLOCKS for i in range(1, count + 1))
-CHANNELS = {name: (64, 128, 256, 512, 512)[int(name[4]) - 1] for name in LAYERS}
 Weights = Mapping[str, tuple[torch.Tensor, torch.Tensor]]  # layer -> weight (O, I, 3, 3), bias (O,)
 MEAN_RGB = (123.68, 116.779, 103.939)  # of ImageNet, in [0, 255]
 

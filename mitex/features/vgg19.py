@@ -9,16 +9,14 @@ import torch
 from safetensors import SafetensorError
 from safetensors.torch import load_file
 
+from mitex.features.layers import CHANNELS, LAYERS_19
 from mitex.features.normalisation import SPREAD
-from mitex.features.vgg import CHANNELS, Weights
+from mitex.features.vgg import Weights
 from mitex.features.weights import WeightsError
 from mitex.paths import cache_dir
 
 VARIABLE = "MITEX_VGG19"
 FILE = "vgg19.safetensors"
-LAYERS_19 = tuple(
-    f"relu{block}_{i}" for block, count in enumerate((2, 2, 4, 4, 4), 1) for i in range(1, count + 1)
-)
 
 
 def vgg19_path() -> Path:

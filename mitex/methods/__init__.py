@@ -1,12 +1,14 @@
-"""The systems: each package offers `fit` and a texture with `apply`."""
+"""The methods of texture synthesis, one package each; `registry.methods()` lists them.
+
+Each package has a `METHOD`, a `fit`, and a texture whose `apply` puts it on a mesh.
+"""
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
-
-NAMES = ("nca", "surface", "geometric", "nerf")
 
 
 def __getattr__(name: str) -> Any:
-    if name in NAMES:
-        return import_module(f"mitex.methods.{name}")
-    raise AttributeError(f"mitex.methods has no {name!r}")
+    if name.startswith("_") or find_spec(f"{__name__}.{name}") is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return import_module(f"{__name__}.{name}")

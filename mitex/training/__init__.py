@@ -6,20 +6,19 @@ Names are resolved on first use: configs and errors are wanted where torch is no
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__all__ = ["Interrupted", "Task", "TrainResult", "TrainingDiverged", "check_ranges", "resolve", "train"]
+__all__ = ["Interrupted", "Task", "TrainResult", "TrainingDiverged", "resolve", "train"]
 
 _HOMES = {
     "Interrupted": "errors",
     "Task": "task",
     "TrainResult": "loop",
     "TrainingDiverged": "errors",
-    "check_ranges": "config",
     "resolve": "config",
     "train": "loop",
 }
 
 if TYPE_CHECKING:
-    from mitex.training.config import check_ranges, resolve
+    from mitex.training.config import resolve
     from mitex.training.errors import Interrupted, TrainingDiverged
     from mitex.training.loop import TrainResult, train
     from mitex.training.task import Task

@@ -15,9 +15,9 @@ from safetensors.torch import save_file
 from mitex.errors import CheckpointError, MitexWarning
 from mitex.paths import atomic_write
 from mitex.training import model_file
+from mitex.training.locate import CHECKPOINT as NAME
+from mitex.training.locate import PREVIOUS
 
-NAME = "checkpoint.safetensors"
-PREVIOUS = "checkpoint.previous.safetensors"
 FORMAT = "1"
 
 

@@ -1,4 +1,4 @@
-"""Configs: flat frozen dataclasses, resolved from a preset, a TOML file and `key=value` settings."""
+"""Resolving a config from a preset, a TOML file and `key=value` settings."""
 
 import difflib
 import tomllib
@@ -51,29 +51,6 @@ def resolve(
     if name not in presets:
         raise ConfigError(f"there is no preset '{name}'", f"use {_choices(name, presets)}")
     return replace(presets[name], **(changes | {"preset": name}))  # type: ignore[type-var]
-
-
-def check_ranges(config: Any, **ranges: tuple[float | None, float | None]) -> None:
-    """Checks numbers, or every number of a tuple, against inclusive bounds; None leaves a side open.
-
-    Made for `__post_init__`: `check_ranges(self, steps=(1, None), fire_rate=(0, 1))`. A None value passes.
-
-    Raises:
-        ConfigError: A value is out of its range.
-    """
-    for key, (low, high) in ranges.items():
-        value = getattr(config, key)
-        for number in value if isinstance(value, tuple) else (value,):
-            if number is None:
-                continue
-            if (low is not None and number < low) or (high is not None and number > high):
-                raise ConfigError(f"{key} = {number} is out of range", f"choose {_range(low, high)}")
-
-
-def _range(low: float | None, high: float | None) -> str:
-    if low is not None and high is not None:
-        return f"from {low} to {high}"
-    return f"{low} or more" if high is None else f"{high} or less"
 
 
 def _kinds(example: Any) -> dict[str, Any]:

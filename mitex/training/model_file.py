@@ -14,6 +14,7 @@ from safetensors.torch import save_file
 
 from mitex.errors import CheckpointError
 from mitex.paths import atomic_write
+from mitex.training.locate import CHECKPOINT, PREVIOUS, locate
 
 
 def save(
@@ -32,19 +33,16 @@ def save(
 
 
 @contextmanager
-def opened(
-    source: str | Path, kind: str, name: str
-) -> Iterator[tuple[dict[str, torch.Tensor], dict[str, Any]]]:
-    """Yields tensors and `about` of a file, or of the file `name` of a run folder.
+def opened(source: str | Path, kind: str) -> Iterator[tuple[dict[str, torch.Tensor], dict[str, Any]]]:
+    """Yields tensors and `about` of a model file, a finished run folder, or a bundled model by its name.
 
     What goes wrong in the body for lack of good tensors (a missing key, a wrong shape) means a damaged file.
 
     Raises:
         CheckpointError: there is none, or it is damaged.
     """
-    path = Path(source).expanduser()
-    path = path / name if path.is_dir() else path
-    if not path.is_file():
+    path = locate(source)[0]
+    if path.name in (CHECKPOINT, PREVIOUS):
         raise CheckpointError(
             f"there is no finished {kind} texture at '{source}'", f"go on with mitex fit {kind} --resume"
         )

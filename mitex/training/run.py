@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
@@ -13,7 +13,6 @@ from mitex import __version__
 from mitex.errors import CheckpointError, OutputError
 from mitex.paths import atomic_write, missing_folders, prepare_folder
 from mitex.training import checkpoint
-from mitex.training.config import Config, resolve
 from mitex.training.metrics import Metrics
 from mitex.training.toml import to_toml
 
@@ -49,26 +48,6 @@ def check(out: str | os.PathLike[str], resume: bool = False) -> None:
         )
     if foreign:
         raise OutputError(f"'{out}' holds other files", "name a new or empty folder with --out")
-
-
-def settings(
-    presets: Mapping[str, Config],
-    out: Path,
-    preset: str | None,
-    config: Path | None,
-    overrides: Sequence[str],
-    resume: bool,
-) -> Config:
-    """Checks the folder as `check` does, and resolves a config; a resumed run's own one unless one is given.
-
-    Raises:
-        OutputError, CheckpointError: as `check`.
-        ConfigError: as `resolve`.
-    """
-    check(out, resume)
-    own = out / CONFIG
-    file = own if resume and config is None and own.is_file() else config
-    return resolve(presets, preset, file, overrides)
 
 
 @contextmanager

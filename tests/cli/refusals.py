@@ -20,7 +20,7 @@ def fit(words, files, exemplar="good.png", out="out/run"):
     return f"fit nca --exemplar {exemplar} --out {out} --quiet {words}".split()
 
 
-def apply(words="", mesh="good.obj", model="cobblestone", out="out/a.glb"):
+def apply(words="", mesh="good.obj", model="pebbles", out="out/a.glb"):
     return f"apply {model} --mesh {mesh} --out {out} {words}".split()
 
 

@@ -127,8 +127,8 @@ MESHES = {
 
 # Name -> (words of the command, words of the message)
 APPLIES = {
-    "no options": ("apply", "are missing"),
-    "unknown model": (apply(model="cobblestoan"), "cobblestoan"),
+    "no options": ("apply", "RUN|MODEL is missing"),
+    "unknown model": (apply(model="peblles"), "peblles"),
     "missing run": (apply(model="runs/none"), "runs/none"),
     "empty run": (apply(model="empty"), "empty"),
     "damaged model": (apply(model="damaged.safetensors"), "damaged.safetensors"),

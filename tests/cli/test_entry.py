@@ -1,16 +1,18 @@
 """The contract of `main`: exit codes, one line for every complaint, help, warnings, and a quick start."""
 
 import os
+import re
 import subprocess
 import sys
 import types
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
 
-from mitex.cli import entry, main
+from mitex.cli import commands, main
 from mitex.errors import ConfigError, MeshWarning
 from mitex.training.errors import Interrupted
 
@@ -35,10 +37,10 @@ def command(monkeypatch):
         def run(self):
             return Try.action(self)
 
-    module = types.ModuleType("mitex.cli.try_it")
+    module = types.ModuleType("try_it")
     module.__dict__["Try"] = Try
-    monkeypatch.setitem(sys.modules, "mitex.cli.try_it", module)
-    monkeypatch.setitem(entry.COMMANDS, "try", ("try_it:Try", "try something"))
+    monkeypatch.setitem(sys.modules, "try_it", module)
+    monkeypatch.setitem(commands.COMMANDS, "try", ("try_it:Try", "try something"))
     return Try
 
 
@@ -103,9 +105,19 @@ class TestWarnings:
 
 
 class TestHelp:
-    @pytest.mark.parametrize("name", entry.COMMANDS)
+    @pytest.mark.parametrize("name", [n for n in commands.lines() if n not in commands.OF_MODELS])
     def test_every_command_has_examples_of_itself(self, name, capsys):
         assert main([*name.split(), "--help"]) == 0
+        self.check_examples(name, capsys)
+
+    @pytest.mark.parametrize(
+        ("name", "model"), [("apply", "waffle"), ("apply", "spikes"), ("animate", "spikes")]
+    )
+    def test_commands_on_models_explain_the_options_of_their_method(self, name, model, capsys):
+        assert main([name, model, "--help"]) == 0
+        self.check_examples(name, capsys)
+
+    def check_examples(self, name, capsys):
         text = capsys.readouterr().out
         examples = [line for line in text.split("examples:")[1].splitlines() if line.startswith("  ")]
         assert examples[0].strip().startswith(f"mitex {name}") and "--help" in text
@@ -114,12 +126,18 @@ class TestHelp:
         for words in (["--help"], ["-h"], ["help"]):
             assert main(words) == 0
             text = capsys.readouterr().out
-            assert all(f"  {name} " in text for name in entry.COMMANDS)
+            assert all(f"  {name} " in text for name in commands.lines())
 
     def test_group(self, capsys):
         assert main(["fit", "--help"]) == 0
         text = capsys.readouterr().out
         assert "fit nca" in text and "render" not in text
+
+    def test_apply_lists_the_options_of_every_method(self, capsys):
+        assert main(["apply", "--help"]) == 0
+        rows = dict(line.strip().split("  ", 1) for line in capsys.readouterr().out.splitlines()[4:-2])
+        assert "--end-level" in rows["geometric"] and "--orientation" not in rows["geometric"]
+        assert "--orientation" in rows["nca"] and "--end-level" not in rows["nca"]
 
     def test_starts_without_heavy_imports(self):
         """torch, Mitsuba and even NumPy stay out until a command runs."""
@@ -138,10 +156,39 @@ class TestUsage:
             ([], "no command given; see `mitex --help`"),
             (["modles"], "there is no command 'modles'; try `mitex models`"),
             (["xyzzy"], "there is no command 'xyzzy'; see `mitex --help`"),
-            (["fit"], "`mitex fit` needs a method; try `mitex fit nca --help`"),
+            (["fit"], "`mitex fit` needs a method; try `mitex fit geometric --help`"),
             (["fit", "nac"], "there is no command 'fit nac'; try `mitex fit nca`"),
             (["fit", "nca"], "--exemplar is missing; see `mitex fit nca --help`"),
-            (["apply"], "RUN|MODEL and --mesh and --out are missing; see `mitex apply --help`"),
+            (["apply"], "RUN|MODEL is missing; see `mitex apply --help`"),
+            (["apply", "waffle"], "--out and --mesh are missing; see `mitex apply --help`"),
+            (
+                ["apply", "--seed", "3"],
+                "there is no model '3'; use a path, or one of bricks, honeycomb, "
+                "pebbles, scales, spikes, waffle",
+            ),
+            (
+                ["apply", "--mesh", "vase", "waffle", "--orientatoin=3"],
+                "--orientatoin is no option of nca textures in `mitex apply`; did you mean --orientation?",
+            ),
+            (
+                ["apply", "spikes", "--orientation", "3"],
+                "--orientation is no option of geometric textures in `mitex apply`; see `mitex apply spikes "
+                "--help`",
+            ),
+            (["animate", "waffle"], "`mitex animate` takes no nca textures; name a run of geometric"),
+            (
+                ["fit", "nca", "--exemplr", "x"],
+                "--exemplr is no option of `mitex fit nca`; did you mean --exemplar?",
+            ),
+            (
+                ["fit", "nac", "--settings"],
+                "there is no method 'nac'; use one of geometric, nca, nerf, surface",
+            ),
+            (["fit", "nca", "--settings", "--preset", "papr"], "there is no preset 'papr'; use 'paper'"),
+            (
+                ["fit", "nca", "--settings", "--preset"],
+                "--preset needs a name; see `mitex fit METHOD --help`",
+            ),
             (["try", "--count", "x"], "--count cannot be 'x'; see `mitex try --help`"),
             (
                 ["try", "--count"],
@@ -175,3 +222,25 @@ class TestUsage:
             == "something new"
         )
         assert one_line("") == "this command line is not understood"
+
+
+class TestSettings:
+    def test_every_key_is_listed_with_the_preset_s_value(self, capsys):
+        from mitex.methods.nca import PRESETS
+
+        assert main(["fit", "nca", "--settings", "--preset", "paper"]) == 0
+        rows = dict(line.split(" = ", 1) for line in capsys.readouterr().out.splitlines() if " = " in line)
+        assert list(rows) == [field.name for field in fields(PRESETS["paper"])]
+        assert rows["frequency"].startswith("64 ") and "from 1 to 4096" in rows["frequency"]
+
+    def test_the_first_preset_is_shown_and_the_others_are_named(self, capsys):
+        assert main(["fit", "geometric", "--settings"]) == 0
+        text = capsys.readouterr().out
+        assert text.startswith("preset = fast ") and text.endswith("further presets: paper\n")
+
+
+def test_the_command_line_knows_no_method_by_name():
+    """Methods bring their own options; nothing in `mitex/cli` is about one of them."""
+    pattern = re.compile(r"\b(nca|nerf|geometric)\b|[\"'`.]surface\b|fit surface", re.IGNORECASE)
+    for file in Path(commands.__file__).parent.glob("*.py"):
+        assert not pattern.findall(file.read_text()), file

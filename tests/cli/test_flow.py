@@ -13,12 +13,13 @@ import pytest
 from PIL import Image
 
 from mitex.asset import Asset
-from mitex.cli import demo, main
+from mitex.cli import main
 from mitex.cli.models import listing
 from mitex.exemplar import MAPS
 from mitex.exemplar import names as exemplar_names
 from mitex.images import read_image
 from mitex.mesh import embedded_names
+from mitex.methods.nca import demo
 from tests.cli import bad_files
 
 TINY = [
@@ -98,7 +99,7 @@ def test_options_reach_the_library(folder, monkeypatch, capsys):
 
 
 def test_models(folder, monkeypatch, capsys):
-    monkeypatch.setattr("mitex.methods.kind.BUNDLED", folder)
+    monkeypatch.setattr("mitex.training.locate.BUNDLED", folder)
     bad_files.model(folder / "moss.safetensors")
     (folder / "moss.png").touch()
     bad_files.model(folder / "rust.safetensors")

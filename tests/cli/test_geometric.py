@@ -212,10 +212,10 @@ def test_too_many_faces(files, run, capsys, monkeypatch):
 
 
 def test_an_unfinished_run(files, run, capsys):
-    (run / "geometry.safetensors").unlink()
+    (run / "texture.safetensors").unlink()
     check_refused(files, apply(), "--resume", capsys)
 
 
 def test_a_damaged_model(files, run, capsys):
-    bad.cut(run / "geometry.safetensors")
+    bad.cut(run / "texture.safetensors")
     check_refused(files, apply(), "geometric texture", capsys)

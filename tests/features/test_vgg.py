@@ -8,7 +8,8 @@ import torch
 from benchmarks.naive import vectors
 from mitex.errors import ConfigError
 from mitex.features import LAYERS, Vgg16
-from mitex.features.vgg import CHANNELS, MEAN_ACTIVATION
+from mitex.features.layers import CHANNELS
+from mitex.features.vgg import MEAN_ACTIVATION
 from mitex.losses import gram_loss, gram_matrix, moment_distance, relaxed_transport
 from mitex.methods.nca.config import PRESETS
 from tests.features.reference import cosine, exemplars, plain_vgg, relative_error

@@ -6,9 +6,10 @@ import torch.nn.functional as F
 from safetensors.torch import save_file
 
 from mitex.features import Vgg16
+from mitex.features.layers import LAYERS_19
 from mitex.features.normalisation import SPREAD
 from mitex.features.vgg import MEAN_RGB
-from mitex.features.vgg19 import LAYERS_19, vgg19_convolutions, vgg19_path
+from mitex.features.vgg19 import vgg19_convolutions, vgg19_path
 from mitex.features.weights import WeightsError
 
 WIDTHS = (64, 64, 128, 128, *(256,) * 4, *(512,) * 8)

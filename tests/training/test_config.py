@@ -1,33 +1,33 @@
 """Resolving configs from presets, files and settings."""
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Literal
 
 import pytest
 
 from mitex.errors import ConfigError
-from mitex.training.config import check_ranges, resolve
+from mitex.training.config import resolve
+from mitex.training.settings import TrainingConfig, bounds, key, meaning, table
 from mitex.training.toml import to_toml
 
 
 @dataclass(frozen=True)
-class Config:
-    steps: int = 100
-    seed: int = 0
+class Config(TrainingConfig):
     preset: str = "patch"
-    lr: float = 1e-3
-    pooling: Literal["max", "average"] = "max"
-    cull: bool = False
-    layers: tuple[str, ...] = ("relu1_1", "relu2_1")
-    milestones: tuple[int, ...] = (50, 75)
-    size: tuple[int, int] = (96, 96)
-    init: str | None = None
-    cap: int | None = 5
-    pace: float | Literal["auto"] = "auto"
+    steps: int = 100
+    lr: float = key(1e-3, "learning rate", 0, 1)
+    pooling: Literal["max", "average"] = key("max", "of the network")
+    cull: bool = key(False, "leave out back faces")
+    layers: tuple[str, ...] = key(("relu1_1", "relu2_1"), "of the network")
+    milestones: tuple[int, ...] = key((50, 75), "steps")
+    size: tuple[int, int] = key((96, 96), "height and width [px]", 8)
+    init: str | None = key(None, "a model")
+    cap: int | None = key(5, "the most", None, 10)
+    pace: float | Literal["auto"] = key("auto", "speed")
 
     def __post_init__(self):
-        check_ranges(self, steps=(1, None), lr=(0, 1), size=(8, None), cap=(None, 10))
+        super().__post_init__()
         if self.milestones and self.milestones[-1] > self.steps:
             raise ConfigError("milestones lie beyond steps", "raise steps")
 
@@ -56,7 +56,7 @@ def test_order_preset_file_override(tmp_path):
     ("setting", "key", "value"),
     [
         ("steps=1_000", "steps", 1000),
-        (" seed = -3 ", "seed", -3),
+        (" seed = 3 ", "seed", 3),
         ("lr=1", "lr", 1.0),
         ("lr=2.5e-1", "lr", 0.25),
         ("pooling=average", "pooling", "average"),
@@ -119,7 +119,7 @@ def test_wrong_values_name_key_value_and_what_is_wanted(setting):
     ("setting", "message"),
     [
         ("stepps=3", "there is no key 'stepps'; use 'steps'"),
-        ("zzz=3", "there is no key 'zzz'; use one of steps, seed, preset, lr"),
+        ("zzz=3", "there is no key 'zzz'; use one of preset, seed, steps, checkpoint_every"),
         ("steps", "'steps' is not a setting; write key=value"),
         ("=3", "'=3' is not a setting; write key=value"),
         ("preset=papr", "there is no preset 'papr'; use 'paper'"),
@@ -210,3 +210,32 @@ def test_a_resolved_config_reads_back(tmp_path):
     file.write_text(to_toml(config, {"run": {"method": "nca"}, "versions": {"torch": "2"}}), encoding="utf-8")
     assert resolve(PRESETS, file=file) == config
     assert json.dumps(resolve(PRESETS, file=file).lr) == "0.30000000000000004"
+
+
+class TestKeys:
+    def test_a_class_that_gives_another_default_inherits_meaning_and_range(self):
+        steps = {one.name: one for one in fields(Config)}["steps"]
+        assert Config().steps == 100
+        assert (meaning(Config, steps), bounds(Config, steps)) == ("training steps", (1, None))
+
+    def test_a_key_without_a_meaning_is_a_mistake_in_the_class(self):
+        @dataclass(frozen=True)
+        class Bare(TrainingConfig):
+            width: int = 3
+
+        with pytest.raises(TypeError, match="Bare.width is not declared"):
+            Bare()
+
+    def test_choices_are_checked_however_a_config_is_made(self):
+        with pytest.raises(ConfigError, match="pooling = 'min' is unknown; give one of 'max', 'average'"):
+            replace(Config(), pooling="min")
+
+    def test_the_table_tells_value_range_and_meaning_of_every_key(self):
+        lines = table(replace(Config(), lr=0.25)).splitlines()
+        assert [line.split(" = ")[0] for line in lines] == [one.name for one in fields(Config)]
+        rows = dict(line.split(" = ", 1) for line in lines)
+        assert rows["lr"].split() == ["0.25", "learning", "rate", "(from", "0", "to", "1)"]
+        assert rows["pooling"].split() == ["max", "of", "the", "network", "(max,", "average)"]
+        assert rows["milestones"].split() == ["50,75", "steps"]
+        assert rows["cap"].endswith("the most (10 or less)")
+        assert rows["init"].startswith("none ")

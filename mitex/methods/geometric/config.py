@@ -5,87 +5,40 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from mitex.errors import ConfigError
-from mitex.training.config import check_ranges
+from mitex.training.settings import TrainingConfig, key
 
 MAX_LEVELS = 7  # 0 to 6
 
 
 @dataclass(frozen=True)
-class GeometricConfig:
-    """Settings of a fit; keys as in `--set key=value`.
-
-    Attributes:
-        preset: its name.
-        steps: of the generators, all levels together; more add levels.
-        level_steps: of them for each level.
-        seed: of all randomness.
-        critic_steps, generator_steps: how many of each take turns.
-        noise: standard deviation of what is added to the vertices [mean edges].
-        reconstruction: weight of the distance from the training mesh.
-        penalty: weight of the gradient penalty.
-        lr: learning rate, halved four times on each level.
-        beta1, beta2: of Adam.
-        remeasure: measure the mean edge on each level, instead of carrying it from the first.
-        carried: first level whose networks start from those of the level before.
-        fit_steps: of the optimisation of each training mesh.
-        fit_samples: points on each surface, times the level's number + 1.
-        fit_lr: how far a step moves a vertex [mean edges].
-        fit_normals: weight of the normals beside the distances, in both directions.
-        fit_uniform: weight of the deviation of edge lengths.
-        fit_entropy: weight of the evenness of the sides of each face.
-        fit_smooth: weight of the distance from the mean of the neighbours.
-        checkpoint_every, preview_every: steps between them.
-    """
+class GeometricConfig(TrainingConfig):
+    """Settings of a fit; every key can be set from a TOML file or with `--set`."""
 
     preset: str = "fast"
-    steps: int = 30_000
-    level_steps: int = 6_000
-    seed: int = 0
-    critic_steps: int = 2
-    generator_steps: int = 3
-    noise: float = 0.1
-    reconstruction: float = 5.0
-    penalty: float = 0.1
-    lr: float = 5e-4
-    beta1: float = 0.5
-    beta2: float = 0.99
-    remeasure: bool = False
-    carried: int = 3
-    fit_steps: int = 600
-    fit_samples: int = 3_000
-    fit_lr: float = 0.02
-    fit_normals: float = 0.1
-    fit_uniform: float = 0.05
-    fit_entropy: float = 0.005
-    fit_smooth: float = 0.02
+    steps: int = key(10_000, "steps of the generators, all levels together; more add levels", 1)
+    level_steps: int = key(2_000, "of these for each level", 1)
+    critic_steps: int = key(2, "steps of a critic", 1, 100)
+    generator_steps: int = key(3, "steps of a generator that take turns with them", 1, 100)
+    noise: float = key(0.1, "standard deviation of what is added to the vertices [mean edges]", 0, 10)
+    reconstruction: float = key(5.0, "weight of the distance from the training mesh", 0)
+    penalty: float = key(0.1, "weight of the gradient penalty", 0)
+    lr: float = key(5e-4, "learning rate at the beginning of each level", 0, 1)
+    beta1: float = key(0.5, "Adam's decay of the first moment", 0, 0.9999)
+    beta2: float = key(0.99, "Adam's decay of the second moment", 0, 0.9999)
+    remeasure: bool = key(False, "measure the mean edge on each level, instead of carrying it from the first")
+    carried: int = key(3, "first level whose networks start from those of the level before", 1, MAX_LEVELS)
+    fit_steps: int = key(600, "of the optimisation of each training mesh", 1)
+    fit_samples: int = key(3_000, "points on each surface, times the level's number + 1", 100, 1_000_000)
+    fit_lr: float = key(0.02, "how far a step moves a vertex [mean edges]", 0, 1)
+    fit_normals: float = key(0.1, "weight of the normals beside the distances, in both directions", 0)
+    fit_uniform: float = key(0.05, "weight of the deviation of edge lengths", 0)
+    fit_entropy: float = key(0.005, "weight of the evenness of the sides of each face", 0)
+    fit_smooth: float = key(0.02, "weight of the distance from the mean of the neighbours", 0)
     checkpoint_every: int = 200
     preview_every: int = 1_000
 
     def __post_init__(self) -> None:
-        check_ranges(
-            self,
-            steps=(1, None),
-            level_steps=(1, None),
-            seed=(0, 2**32 - 1),
-            critic_steps=(1, 100),
-            generator_steps=(1, 100),
-            noise=(0, 10),
-            reconstruction=(0, None),
-            penalty=(0, None),
-            lr=(0, 1),
-            beta1=(0, 0.9999),
-            beta2=(0, 0.9999),
-            carried=(1, MAX_LEVELS),
-            fit_steps=(1, None),
-            fit_samples=(100, 1_000_000),
-            fit_lr=(0, 1),
-            fit_normals=(0, None),
-            fit_uniform=(0, None),
-            fit_entropy=(0, None),
-            fit_smooth=(0, None),
-            checkpoint_every=(1, None),
-            preview_every=(0, None),
-        )
+        super().__post_init__()
         if self.levels > MAX_LEVELS:
             raise ConfigError(
                 f"{self.steps} steps at {self.level_steps} a level are {self.levels} levels",
@@ -98,7 +51,8 @@ class GeometricConfig:
         return -(-self.steps // self.level_steps)
 
 
+DEFAULT = GeometricConfig()
 PRESETS = {
-    "fast": replace(GeometricConfig(), steps=10_000, level_steps=2_000),
-    "paper": replace(GeometricConfig(), preset="paper"),
+    DEFAULT.preset: DEFAULT,
+    "paper": replace(DEFAULT, preset="paper", steps=30_000, level_steps=6_000),
 }

@@ -9,13 +9,10 @@ from typing import Any
 import torch
 
 from mitex.mesh import Mesh
+from mitex.methods.geometric import METHOD
 from mitex.methods.geometric.model import network
 from mitex.methods.geometric.network import FaceNetwork
-from mitex.methods.kind import bundled
 from mitex.training import model_file
-
-NAME = "geometry.safetensors"
-KIND = "geometric"
 
 
 def save(
@@ -37,7 +34,7 @@ def save(
     }
     tensors |= {"vertices": torch.from_numpy(template.vertices), "faces": torch.from_numpy(template.faces)}
     tensors["fixed"] = fixed
-    return model_file.save(path, tensors, KIND, about)
+    return model_file.save(path, tensors, METHOD.name, about)
 
 
 def load(source: str | Path) -> tuple[list[FaceNetwork], Mesh, torch.Tensor, dict[str, Any]]:
@@ -46,9 +43,7 @@ def load(source: str | Path) -> tuple[list[FaceNetwork], Mesh, torch.Tensor, dic
     Raises:
         CheckpointError: there is none, or it is damaged.
     """
-    if not Path(source).expanduser().exists():
-        source = bundled(KIND).get(str(source), source)
-    with model_file.opened(source, KIND, NAME) as (tensors, about):
+    with model_file.opened(source, METHOD.name) as (tensors, about):
         template = Mesh(
             tensors["vertices"].numpy(), tensors["faces"].numpy(), name=f"{about['name']} template"
         )

@@ -43,15 +43,15 @@ class GeometricTexture:
     def levels(self) -> int:
         return len(self.generators)
 
-    @staticmethod
-    def load(source: str | Path) -> GeometricTexture:
+    @classmethod
+    def load(cls, source: str | Path) -> GeometricTexture:
         """Loads a model by file, run folder or bundled name.
 
         Raises:
             CheckpointError: there is none, or it is damaged.
         """
         generators, template, fixed, about = files.load(source)
-        return GeometricTexture(generators, template, fixed, about)
+        return cls(generators, template, fixed, about)
 
     def save(self, path: str | Path) -> Path:
         """Writes the model file (safetensors)."""

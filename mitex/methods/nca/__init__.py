@@ -1,8 +1,36 @@
 """Mesh neural cellular automata (Pajouheshgar et al. 2024)."""
 
-from mitex.methods.nca.config import PRESETS, NcaConfig
-from mitex.methods.nca.fit import fit
-from mitex.methods.nca.model import MeshNCA
-from mitex.methods.nca.texture import NcaTexture
+from typing import TYPE_CHECKING
 
-__all__ = ["PRESETS", "MeshNCA", "NcaConfig", "NcaTexture", "fit"]
+from mitex.lazy import attributes
+from mitex.methods.method import Method
+
+METHOD = Method(
+    name="nca",
+    title="learn a living texture from an image or PBR maps (MeshNCA)",
+    presets="mitex.methods.nca.config:PRESETS",
+    fit="mitex.methods.nca.cli:Fit",
+    apply="mitex.methods.nca.cli:Apply",
+    texture="mitex.methods.nca.texture:NcaTexture",
+    demo="mitex.methods.nca.demo:Demo",
+    tensors=frozenset({"fc1.weight", "fc1.bias", "fc2.weight", "fc2.bias"}),
+)
+
+__all__ = ["METHOD", "PRESETS", "MeshNCA", "NcaConfig", "NcaTexture", "fit"]
+
+__getattr__ = attributes(
+    __name__,
+    {
+        "PRESETS": "mitex.methods.nca.config",
+        "NcaConfig": "mitex.methods.nca.config",
+        "MeshNCA": "mitex.methods.nca.model",
+        "NcaTexture": "mitex.methods.nca.texture",
+        "fit": "mitex.methods.nca.fitting",
+    },
+)
+
+if TYPE_CHECKING:
+    from mitex.methods.nca.config import PRESETS, NcaConfig
+    from mitex.methods.nca.fitting import fit
+    from mitex.methods.nca.model import MeshNCA
+    from mitex.methods.nca.texture import NcaTexture

@@ -6,7 +6,6 @@ to safetensors; all five maps are assumed) can be read, and a run folder stands 
 
 from __future__ import annotations
 
-import difflib
 import json
 from pathlib import Path
 from typing import Any
@@ -15,14 +14,14 @@ import torch
 from safetensors import SafetensorError
 
 from mitex.errors import CheckpointError
-from mitex.methods.kind import bundled
+from mitex.methods.nca import METHOD
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.perception import HARMONICS
 from mitex.methods.nca.targets import STATE_CHANNELS
 from mitex.training import checkpoint, model_file
+from mitex.training.locate import CHECKPOINT, NAME, PREVIOUS, locate
 
-NAME = "model.safetensors"
-PARAMETERS = ("fc1.weight", "fc1.bias", "fc2.weight", "fc2.bias")
+PARAMETERS = METHOD.tensors
 
 
 def save(path: Path, model: MeshNCA, about: dict[str, Any]) -> Path:
@@ -31,7 +30,7 @@ def save(path: Path, model: MeshNCA, about: dict[str, Any]) -> Path:
     Raises:
         OutputError: the place is not writable.
     """
-    return model_file.save(path, model.state_dict(), "nca", about, degree=str(model.degree))
+    return model_file.save(path, model.state_dict(), METHOD.name, about, degree=str(model.degree))
 
 
 def load(source: str | Path) -> tuple[MeshNCA, dict[str, Any]]:
@@ -43,8 +42,8 @@ def load(source: str | Path) -> tuple[MeshNCA, dict[str, Any]]:
     Raises:
         CheckpointError: nothing there, not a model, or weights of an impossible shape.
     """
-    path = _find(source)
-    if path.name in (checkpoint.NAME, checkpoint.PREVIOUS):
+    path = _newest(source)
+    if path.name in (CHECKPOINT, PREVIOUS):
         state = checkpoint.load(path.parent)
         tensors = {k[6:]: v for k, v in state.task.items() if k.startswith("model.")}
         maps = state.metadata.get("maps", "albedo").split(",")
@@ -55,35 +54,17 @@ def load(source: str | Path) -> tuple[MeshNCA, dict[str, Any]]:
     try:
         tensors, metadata = model_file.read(path)
     except (SafetensorError, OSError, ValueError) as e:
-        raise CheckpointError(
-            f"'{path}' is not a model ({e})", "give a model.safetensors or a run folder"
-        ) from e
+        raise CheckpointError(f"'{path}' is not a model ({e})", "give a model file or a run folder") from e
     model = _model(tensors, metadata.get("degree"), path)
     return model, _about(metadata, model, path)
 
 
-def _find(source: str | Path) -> Path:
-    path = Path(source).expanduser()
-    try:
-        if path.is_dir():
-            found = [path / name for name in (NAME, checkpoint.NAME) if (path / name).is_file()]
-            if found:  # a resumed run's checkpoint is newer than the model of its first part
-                return max(found, key=lambda file: file.stat().st_mtime_ns)
-            if (path / checkpoint.PREVIOUS).is_file():
-                return path / checkpoint.PREVIOUS
-            raise CheckpointError(
-                f"there is no model in '{source}'", "name a run folder that has a checkpoint"
-            )
-        if path.is_file():
-            return path
-    except (OSError, ValueError) as e:
-        raise CheckpointError(f"cannot read '{source}' ({e})", "name a model, a file or a run folder") from e
-    known = bundled("nca")
-    if str(source) in known:
-        return known[str(source)]
-    close = difflib.get_close_matches(str(source), known, 1)
-    remedy = f"did you mean {close[0]}?" if close else f"use a path, or one of {', '.join(known) or 'none'}"
-    raise CheckpointError(f"there is no model '{source}'", remedy)
+def _newest(source: str | Path) -> Path:
+    """A resumed run's checkpoint is newer than the model of its first part."""
+    first, *others = locate(source)
+    if first.name == NAME and others and others[0].name == CHECKPOINT:
+        return max(first, others[0], key=lambda file: file.stat().st_mtime_ns)
+    return first
 
 
 def _about(metadata: dict[str, str], model: MeshNCA, path: Path) -> dict[str, Any]:
@@ -114,7 +95,7 @@ def _model(tensors: dict[str, torch.Tensor], degree: object, path: Path) -> Mesh
     problem = CheckpointError(
         f"'{path}' does not hold a MeshNCA model", "give a file written by mitex fit nca"
     )
-    if set(tensors) != set(PARAMETERS) or any(tensors[k].ndim != 2 - k.endswith("bias") for k in PARAMETERS):
+    if set(tensors) != PARAMETERS or any(tensors[k].ndim != 2 - k.endswith("bias") for k in PARAMETERS):
         raise problem
     (channels, hidden), inputs = tensors["fc2.weight"].shape, tensors["fc1.weight"].shape[1]
     known = _degree(degree, channels, inputs)

@@ -41,15 +41,15 @@ class NcaTexture:
     maps: tuple[str, ...]
     about: Mapping[str, Any] = field(default_factory=dict)
 
-    @staticmethod
-    def load(source: str | Path) -> NcaTexture:
+    @classmethod
+    def load(cls, source: str | Path) -> NcaTexture:
         """Loads a bundled model by name, a model file, or a run folder.
 
         Raises:
             CheckpointError: there is no such model, or it is damaged.
         """
         model, about = files.load(source)
-        return NcaTexture(model, tuple(about["maps"]), about)
+        return cls(model, tuple(about["maps"]), about)
 
     def save(self, path: str | Path) -> Path:
         """Writes the model file (safetensors, about 50 KB)."""
@@ -78,8 +78,8 @@ class NcaTexture:
             orientation: turns the texture about the normals, counter-clockwise [rad].
             scale: size of the pattern, 1 for what the density gives; others need a remeshing to the fitting
                 density (extra `remesh`).
-            resolution: of the textures that will be baked [texels]: UVs are laid out for it before the mesh
-                is subdivided, which is much faster. None if there will be none.
+            resolution: of the baked textures [texels]: UVs are laid out for it before the mesh is subdivided,
+                which is much faster. None leaves the maps at the vertices.
 
         Returns:
             An asset on the subdivided mesh, in the mesh's own units and place, with one map per learned map.
@@ -92,7 +92,8 @@ class NcaTexture:
         dense = self._dense(laid, subdivide, scale)
         state = self.grow(dense, seed=seed, steps=STEPS if steps is None else steps, orientation=orientation)
         maps = state_maps(state.numpy(), list(self.maps))
-        return Asset(dense, maps, tangents(dense, orientation), name=mesh.name)
+        asset = Asset(dense, maps, tangents(dense, orientation), name=mesh.name)
+        return asset if resolution is None else asset.baked(resolution)
 
     @torch.no_grad()
     def grow(

@@ -1,8 +1,35 @@
 """NeRF-Texture: textures with a meso-structure, captured from photos (Huang et al. 2023)."""
 
-from mitex.methods.nerf.capture import Capture, load_capture
-from mitex.methods.nerf.config import PRESETS, NerfConfig
-from mitex.methods.nerf.fit import fit
-from mitex.methods.nerf.texture import NerfTexture
+from typing import TYPE_CHECKING
 
-__all__ = ["PRESETS", "Capture", "NerfConfig", "NerfTexture", "fit", "load_capture"]
+from mitex.lazy import attributes
+from mitex.methods.method import Method
+
+METHOD = Method(
+    name="nerf",
+    title="capture a texture with its meso-structure from photos (NeRF-Texture)",
+    presets="mitex.methods.nerf.config:PRESETS",
+    fit="mitex.methods.nerf.cli:Fit",
+    apply="mitex.methods.nerf.cli:Apply",
+    texture="mitex.methods.nerf.texture:NerfTexture",
+)
+
+__all__ = ["METHOD", "PRESETS", "Capture", "NerfConfig", "NerfTexture", "fit", "load_capture"]
+
+__getattr__ = attributes(
+    __name__,
+    {
+        "PRESETS": "mitex.methods.nerf.config",
+        "Capture": "mitex.methods.nerf.capture",
+        "NerfConfig": "mitex.methods.nerf.config",
+        "NerfTexture": "mitex.methods.nerf.texture",
+        "fit": "mitex.methods.nerf.fitting",
+        "load_capture": "mitex.methods.nerf.capture",
+    },
+)
+
+if TYPE_CHECKING:
+    from mitex.methods.nerf.capture import Capture, load_capture
+    from mitex.methods.nerf.config import PRESETS, NerfConfig
+    from mitex.methods.nerf.fitting import fit
+    from mitex.methods.nerf.texture import NerfTexture

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ import torch
 
 from mitex.atlas import laid_out
 from mitex.errors import ConfigError, MeshError
+from mitex.export import SUFFIXES
 from mitex.images import write_image
 from mitex.integrators.march import DIAGONAL
 from mitex.mesh import Mesh, Similarity
@@ -63,7 +65,7 @@ class AppliedTexture(Shell):
                 f"a texture of {scale} times the size, {density} times the density and lifted by {lift}",
                 "use sizes from 0.05 to 20, densities up to 1000 and lifts from 0 to 1",
             )
-        self.mesh = laid_out(mesh, UNWRAPPED)
+        self.mesh, self._maps = laid_out(mesh, UNWRAPPED), maps
         placed, self.similarity = centred(self.mesh)
         # One unit of the UVs shows so many textures that their elements have the size that is wanted.
         uv = np.asarray(placed.uv) * (stretch(placed) / (maps.size[1] * maps.gap * scale))
@@ -91,6 +93,19 @@ class AppliedTexture(Shell):
         for _ in range(LOOKS):
             occupancy.refresh(self.density, drawn)
         self.mask = occupancy.mask
+
+    @property
+    def maps(self) -> Mapping[str, np.ndarray]:
+        """The latent features that the shell wears, (H, W, C)."""
+        return {"features": self._maps.features}
+
+    def export(self, path: str | os.PathLike[str]) -> Path:
+        """Writes what is solid as a coloured mesh, as of `Asset.export`.
+
+        Raises:
+            OutputError: unknown suffix or unwritable place.
+        """
+        return self.extract().export(prepare_output(path, SUFFIXES))
 
     def render(self, path: str | os.PathLike[str], *, exposure: float = 0.0, **options: Any) -> Path:
         """Path-traces the texture in the studio: PNG or JPEG; options as of `shell_still`.

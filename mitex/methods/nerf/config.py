@@ -5,131 +5,87 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from mitex.errors import ConfigError
-from mitex.training.config import check_ranges
+from mitex.training.settings import TrainingConfig, key
 
 
 @dataclass(frozen=True)
-class NerfConfig:
-    """Settings of a fit; keys as in `--set key=value`.
-
-    Attributes:
-        preset: its name.
-        steps: of the training.
-        seed: of all randomness.
-        rays: in a step.
-        one_view: all rays of a step from one picture, as published; else from all pictures.
-        cells: along the diagonal of the scene cube that a ray's steps divide.
-        table: binary logarithm of the entries of a level's hash table.
-        coarsest, finest: resolution of the first and the last level of features [per scene cube].
-        density_width: channels of the density network's hidden layer.
-        lr: learning rate, times 0.1 after `lr_steps`.
-        lr_steps: as said.
-        average: decay of the running mean of the parameters, the model that is kept, per 16 steps.
-        learn_light: the light is learned with the field, as published; else it stays as the photos and the
-            base shape tell it.
-        fresnel: surfaces mirror more or less at grazing angles; else as much from all sides, as published.
-        detach_normals: fine normals learn from the density alone, as published; else from colours too.
-        clustering, distortion, normals: weights of the losses.
-        inside: weight of the one that, in the second half of the steps, gives what is hidden inside the looks
-            of the surface above it; as published there is none, and where a shell is cut any colour shows.
-        cluster_entries: entries of a level that a step clusters, drawn by chance; 0 for all, as published.
-        normal_rays: share of the rays whose normals are compared.
-        pull: pseudo-distance of the direction away from the nearest vertex, beside those of the normals.
-        neighbours: vertices whose normals make the coarse normal.
-        occupancy: cells of the occupancy grid along a side.
-        refine_cameras: optimize the poses too.
-        base_steps: of the coarse field that the base shape is taken from.
-        concavity: how far the base shape may be from convex pieces (CoACD's threshold); more than the
-            height of the meso-structure beside the object, or its rows are cut apart.
-        checkpoint_every, preview_every: steps between them.
-    """
+class NerfConfig(TrainingConfig):
+    """Settings of a fit; every key can be set from a TOML file or with `--set`."""
 
     preset: str = "fast"
-    steps: int = 40_000
-    seed: int = 0
-    rays: int = 4096
-    one_view: bool = True
-    cells: int = 1024
-    table: int = 19
-    coarsest: int = 512
-    finest: int = 1024
-    density_width: int = 32
-    lr: float = 1e-2
-    lr_steps: int = 40_000
-    average: float = 0.95
-    learn_light: bool = True
-    fresnel: bool = False
-    detach_normals: bool = True
-    clustering: float = 1e-5
-    distortion: float = 1e-2
-    normals: float = 1.0
-    inside: float = 0.0
-    cluster_entries: int = 0
-    normal_rays: float = 1.0
-    pull: float = 0.01
-    neighbours: int = 8
-    occupancy: int = 128
-    refine_cameras: bool = False
-    base_steps: int = 1_000
-    concavity: float = 0.3
+    steps: int = 6_000
+    rays: int = key(4096, "rays in a step", 1, 1 << 20)
+    one_view: bool = key(False, "all rays of a step from one photo (the paper), instead of from all")
+    cells: int = key(512, "steps of a ray along the diagonal of the scene cube", 16, 8192)
+    # Tables of 2^17 entries have room for the surface's cells at 64 to 512; with the published resolutions
+    # these share entries, and colours learn half as fast.
+    table: int = key(17, "binary logarithm of the entries of a level's hash table", 8, 24)
+    coarsest: int = key(64, "resolution of the first level of features [per scene cube]", 2, 8192)
+    finest: int = key(512, "resolution of the last level of features [per scene cube]", 2, 8192)
+    density_width: int = key(64, "channels of the density network's hidden layer", 1, 1024)
+    lr: float = key(1e-2, "learning rate", 0, 1)
+    lr_steps: int = key(6_000, "steps in which it falls to a tenth", 1)
+    average: float = key(0.95, "decay of the parameters' running mean per 16 steps: it is kept", 0, 0.9999)
+    learn_light: bool = key(
+        False, "learn the light with the field (the paper), instead of estimating it beforehand"
+    )
+    fresnel: bool = key(True, "how much a surface mirrors depends on the angle; the paper: it does not")
+    detach_normals: bool = key(
+        False, "fine normals learn from the density alone (the paper), instead of from colours too"
+    )
+    clustering: float = key(1e-5, "weight of the clustering loss", 0)
+    distortion: float = key(1e-2, "weight of the distortion loss", 0)
+    normals: float = key(0.05, "weight of the normal loss", 0)
+    inside: float = key(
+        0.01,
+        "weight of the loss that gives what is hidden the reflectance above it, in the second half; the "
+        "paper: 0, and where a shell is cut any colour is seen",
+        0,
+    )
+    cluster_entries: int = key(1 << 14, "entries of a level clustered in a step; 0 for all (the paper)", 0)
+    normal_rays: float = key(0.25, "share of the rays whose normals are compared", 0, 1)
+    pull: float = key(0.05, "pseudo-distance that keeps projections from the nearest vertex", 1e-6)
+    neighbours: int = key(8, "vertices whose normals make the coarse normal", 1, 64)
+    occupancy: int = key(128, "cells of the occupancy grid along a side", 8, 512)
+    refine_cameras: bool = key(False, "optimize the poses too")
+    base_steps: int = key(1_000, "of the coarse field that the base shape is taken from", 1)
+    concavity: float = key(
+        0.3,
+        "CoACD's threshold of the base shape: more than the height of the meso-structure beside the object, "
+        "or its rows are cut apart",
+        0.01,
+        1,
+    )
     checkpoint_every: int = 500
     preview_every: int = 1_000
 
     def __post_init__(self) -> None:
-        check_ranges(
-            self,
-            steps=(1, None),
-            seed=(0, 2**32 - 1),
-            rays=(1, 1 << 20),
-            cells=(16, 8192),
-            table=(8, 24),
-            coarsest=(2, 8192),
-            finest=(2, 8192),
-            density_width=(1, 1024),
-            lr=(0, 1),
-            lr_steps=(1, None),
-            average=(0, 0.9999),
-            clustering=(0, None),
-            distortion=(0, None),
-            normals=(0, None),
-            inside=(0, None),
-            cluster_entries=(0, None),
-            normal_rays=(0, 1),
-            pull=(1e-6, None),
-            neighbours=(1, 64),
-            occupancy=(8, 512),
-            base_steps=(1, None),
-            concavity=(0.01, 1),
-            checkpoint_every=(1, None),
-            preview_every=(0, None),
-        )
+        super().__post_init__()
         if self.finest < self.coarsest:
             raise ConfigError(f"finest = {self.finest} is coarser than {self.coarsest}", "raise finest")
 
 
-PAPER = NerfConfig(preset="paper")
+DEFAULT = NerfConfig()
 PRESETS = {
-    # Tables of 2^17 entries have room for the surface's cells at 64 to 512; with the published resolutions
-    # these share entries, and colours learn half as fast.
-    "fast": replace(
-        PAPER,
-        preset="fast",
-        steps=6_000,
-        lr_steps=6_000,
-        one_view=False,
-        cells=512,
-        table=17,
-        coarsest=64,
-        finest=512,
-        density_width=64,
-        learn_light=False,
-        fresnel=True,
-        detach_normals=False,
-        cluster_entries=1 << 14,
-        normals=0.05,
-        inside=0.01,
-        normal_rays=0.25,
-        pull=0.05,
+    DEFAULT.preset: DEFAULT,
+    "paper": replace(
+        DEFAULT,
+        preset="paper",
+        steps=40_000,
+        lr_steps=40_000,
+        one_view=True,
+        cells=1024,
+        table=19,
+        coarsest=512,
+        finest=1024,
+        density_width=32,
+        learn_light=True,
+        fresnel=False,
+        detach_normals=True,
+        cluster_entries=0,
+        normals=1.0,
+        inside=0.0,
+        normal_rays=1.0,
+        pull=0.01,
     ),
-    "paper": PAPER,
 }

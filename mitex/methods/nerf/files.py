@@ -11,6 +11,7 @@ import numpy as np
 import torch
 
 from mitex.mesh import Mesh
+from mitex.methods.nerf import METHOD
 from mitex.methods.nerf.coarse import BaseShape
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field import Encoding
@@ -19,8 +20,6 @@ from mitex.methods.nerf.networks import MATRICES, weight_shapes
 from mitex.runtime import init
 from mitex.training import model_file
 
-NAME = "texture.safetensors"
-KIND = "nerf"
 SETTINGS = (
     "table",
     "coarsest",
@@ -80,7 +79,7 @@ def save(path: Path, model: Model) -> Path:
         "occupied": torch.from_numpy(np.packbits(model.occupied)),
     }
     tensors |= {f"weights/{k}": value for k, value in enumerate(model.weights)}
-    return model_file.save(path, tensors, KIND, model.about | {"thickness": base.thickness})
+    return model_file.save(path, tensors, METHOD.name, model.about | {"thickness": base.thickness})
 
 
 def load(source: str | Path) -> Model:
@@ -90,7 +89,7 @@ def load(source: str | Path) -> Model:
         CheckpointError: there is none, or it is damaged.
     """
     init()
-    with model_file.opened(source, KIND, NAME) as (tensors, about):
+    with model_file.opened(source, METHOD.name) as (tensors, about):
         if not all(tensor.isfinite().all() for tensor in tensors.values()):
             raise ValueError("values that are not finite")
         mesh = Mesh(tensors["vertices"].numpy(), tensors["faces"].numpy(), name=f"{about['name']} base")

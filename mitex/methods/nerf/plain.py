@@ -19,10 +19,10 @@ from mitex.methods.nerf.hash_grid import HashGrid
 from mitex.methods.nerf.mlp import network_rows, packed_networks, weight_bound
 from mitex.methods.nerf.occupancy import Occupancy, hull_cells
 from mitex.methods.nerf.pixels import Batch
-from mitex.methods.nerf.radiance import RadianceTask, Rendered, learn, look_step, rays_of
+from mitex.methods.nerf.radiance import RadianceTask, Rendered, look_step, rays_of, schedule
 from mitex.methods.nerf.tensors import channels, tensor
 from mitex.runtime import load_mitsuba
-from mitex.training import checkpoint
+from mitex.training import checkpoint, train
 
 mi: Any = load_mitsuba(needs_llvm=False)
 import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
@@ -124,7 +124,8 @@ def trained(
     """A field after its training in a run folder, which lets an interrupted one go on; arguments as above."""
     folder = Path(folder)
     task = PlainTask(config, capture, shown)
-    learn(task, config, folder, resume=(folder / checkpoint.NAME).exists(), quiet=quiet)
+    resume = (folder / checkpoint.NAME).exists()
+    train(task, config, folder, resume=resume, quiet=quiet, **schedule(config))
     return task
 
 

@@ -6,7 +6,6 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,6 @@ from mitex.methods.nerf.occupancy import Occupancy
 from mitex.methods.nerf.pixels import Batch, Pixels
 from mitex.methods.nerf.tensors import channels, rows
 from mitex.runtime import load_mitsuba, modest_workers
-from mitex.training import TrainResult, train
 from mitex.training.optim import Adam
 
 mi: Any = load_mitsuba(needs_llvm=False)
@@ -147,17 +145,12 @@ class RadianceTask(ABC):
         return look(self.field(self.mean), batch)
 
 
-def learn(task: RadianceTask, config: NerfConfig, folder: Path, *, resume: bool, quiet: bool) -> TrainResult:
-    """Trains by Adam with a learning rate that falls to a tenth in `lr_steps`; raises as `train`."""
-    return train(
-        task,
-        config,
-        folder,
-        lr=lambda step: config.lr * 0.1 ** (step / config.lr_steps),
-        optimizer=partial(Adam, betas=BETAS, eps=EPSILON),
-        resume=resume,
-        quiet=quiet,
-    )
+def schedule(config: NerfConfig) -> dict[str, Any]:
+    """Options of `train`: Adam with a learning rate that falls to a tenth in `lr_steps`."""
+    return {
+        "lr": lambda step: config.lr * 0.1 ** (step / config.lr_steps),
+        "optimizer": partial(Adam, betas=BETAS, eps=EPSILON),
+    }
 
 
 class Rendered:

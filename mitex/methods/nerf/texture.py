@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -47,14 +48,19 @@ class NerfTexture:
         init()
         self.model = model
 
-    @staticmethod
-    def load(source: str | Path) -> NerfTexture:
+    @property
+    def about(self) -> Mapping[str, Any]:
+        """How it was made."""
+        return self.model.about
+
+    @classmethod
+    def load(cls, source: str | Path) -> NerfTexture:
         """Reads a run folder or a model file.
 
         Raises:
             CheckpointError: there is none, or it is damaged.
         """
-        return NerfTexture(files.load(source))
+        return cls(files.load(source))
 
     def save(self, path: str | Path) -> Path:
         """Writes the model file.

@@ -2,127 +2,93 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 from mitex.errors import ConfigError
-from mitex.features.vgg import LAYERS
-from mitex.features.vgg19 import LAYERS_19
-from mitex.methods.surface.network import layers_of
-from mitex.training import check_ranges
-
-FRAMES = ("smooth", "fixed")
-WEIGHTS = ("vgg16", "vgg19", "random")
-LOSSES = ("gram", "transport")
-OPTIMIZERS = ("adam", "lbfgs")
+from mitex.features.layers import LAYERS, LAYERS_19, with_poolings
+from mitex.training.settings import TrainingConfig, key
 
 
 @dataclass(frozen=True)
-class SurfaceConfig:
-    """Everything that shapes a synthesis; every key can be set from a TOML file or `--set`.
+class SurfaceConfig(TrainingConfig):
+    """Everything that shapes a synthesis; every key can be set from a TOML file or with `--set`."""
 
-    Attributes:
-        steps, seed, preset: as in every method.
-        resolution: side of the texture [texels].
-        exemplar_size: the exemplar's central square is resized to it [px]; a pixel becomes a texel.
-        frames: "fixed" (the paper: Gram-Schmidt with a fixed vector) or "smooth" (least turning).
-        angle: turns the texture about the normals, counter-clockwise from outside [degrees].
-        correct: walk geodesics back that overshoot (figure 3).
-        continued: texels whose centres lie outside their chart show what lies across the seam; False: they
-            have values of their own (the paper).
-        bilinear: the first convolution interpolates the texels; False: it reads the nearest ones.
-        weights: "vgg16"; "vgg19", which the user provides (see `mitex.features.vgg19`); or "random" ones (the
-            ablation of figure 5).
-        pooling: "average" or "max".
-        loss: "gram" (the paper), or "transport": MeshNCA's relaxed optimal transport and moments, of
-        samples: feature vectors a layer and step,
-        moment_weight: the moments counting as much.
-        region: Gram matrices are compared region by region of the surface, each a square of so many times the
-            exemplar's side in area, which keeps the contrast even; 0: of the whole surface (the paper).
-        layers: that are compared; VGG's convolutions and poolings. None stands for all.
-        content_layer, content_weight: whose features shall stay those of the content texture, where one is
-            given (style transfer), and how much that counts.
-        scales: how many coarser pyramids of texels are matched first, each half as fine.
-        coarse_share: of the steps, spent on the coarser scales together.
-        pictures: views of the maps compared in a step, when the exemplar has several maps.
-        whitened: the optimizer works in the principal components of the exemplar's channels, each measured by
-            its spread, so that colours move together as they do there; False: in the channels (the paper).
-        diffusion: part of each texel that is replaced in every step by the mean of what its taps read, which
-            wears down what the first convolution, as it interpolates, cannot see. 0 in the paper.
-        noise: width of the uniform noise that the texture starts with: from 0 on (the paper), or around the
-            exemplar's mean and in multiples of the spread, if `whitened`.
-        optimizer: "adam" (the paper), or "lbfgs" for one map, one scale and the Gram loss.
-        lr, milestones, decay: its learning rate, for "lbfgs" the largest change in a step, and the schedule.
-        shared_moment: Adam's second moment is one number for the whole texture, which leaves noise alone that
-            the features do not see; False gives each texel its own (the paper), which amplifies it.
-        checkpoint_every, preview_every: in steps.
-    """
-
-    steps: int
-    preset: str
-    seed: int = 0
-    resolution: int = 512
-    exemplar_size: int = 256
-    frames: str = "smooth"
-    angle: float = 0.0
-    correct: bool = True
-    continued: bool = True
-    bilinear: bool = True
-    weights: str = "vgg16"
-    pooling: str = "average"
-    loss: str = "gram"
-    samples: int = 2048
-    moment_weight: float = 0.1
-    region: float = 0.5
-    layers: tuple[str, ...] = ()
-    content_layer: str = "relu4_2"
-    content_weight: float = 1000.0
-    scales: int = 0
-    coarse_share: float = 0.4
-    pictures: int = 2
-    whitened: bool = True
-    diffusion: float = 0.03
-    noise: float = 1.0
-    optimizer: str = "adam"
-    lr: float = 0.2
-    milestones: tuple[int, ...] = (200, 400)
-    decay: float = 0.5
-    shared_moment: bool = True
+    preset: str = "fast"
+    steps: int = 200
+    resolution: int = key(512, "side of the texture [texels]", 1, 4096)
+    exemplar_size: int = key(
+        256, "side that the exemplar's central square is resized to [px]; a pixel becomes a texel", 32, 2048
+    )
+    frames: Literal["smooth", "fixed"] = key(
+        "smooth", "tangent frames that turn least, or Gram-Schmidt with a fixed vector (the paper)"
+    )
+    angle: float = key(0.0, "turns the texture counter-clockwise, seen from outside [degrees]", -360, 360)
+    correct: bool = key(True, "walk geodesics back that overshoot (figure 3)")
+    continued: bool = key(
+        True,
+        "texels whose centres lie outside their chart show what lies across the seam, instead of values of "
+        "their own (the paper)",
+    )
+    bilinear: bool = key(True, "the first convolution interpolates the texels, instead of the nearest ones")
+    weights: Literal["vgg16", "vgg19", "random"] = key(
+        "vgg16", "vgg19 is a file of yours (mitex.features.vgg19), random the ablation of figure 5"
+    )
+    pooling: Literal["average", "max"] = key("average", "of the network")
+    loss: Literal["gram", "transport"] = key(
+        "gram", "Gram matrices (the paper), or MeshNCA's relaxed optimal transport and moments"
+    )
+    samples: int = key(2048, "loss=transport: feature vectors a layer and step", 1)
+    moment_weight: float = key(0.1, "loss=transport: weight of the moments", 0)
+    region: float = key(
+        0.5,
+        "Gram matrices are compared region by region, each a square of so many times the exemplar's side in "
+        "area, which keeps the contrast even; 0: of the whole surface (the paper)",
+        0,
+        10,
+    )
+    layers: tuple[str, ...] = key((), "compared: VGG's convolutions and poolings; none stands for all")
+    content_layer: str = key("relu4_2", "style transfer: the layer whose features stay the content's")
+    content_weight: float = key(1000.0, "style transfer: how much that counts", 0)
+    scales: int = key(2, "coarser pyramids of texels matched first, each half as fine", 0, 3)
+    coarse_share: float = key(0.4, "of the steps, spent on the coarser scales together", 0, 0.95)
+    pictures: int = key(2, "pictures of the maps compared in a step, for several maps", 1, 16)
+    whitened: bool = key(
+        True,
+        "the optimizer works in the principal components of the exemplar's channels, each measured by its "
+        "spread, so that colours move together as they do there; instead of in the channels (the paper)",
+    )
+    diffusion: float = key(
+        0.03,
+        "part of each texel replaced in every step by the mean of what its taps read, which wears down what "
+        "the first convolution cannot see; the paper: 0",
+        0,
+        1,
+    )
+    noise: float = key(
+        1.0,
+        "width of the uniform noise at the start: from 0 on (the paper), or around the exemplar's mean and "
+        "in multiples of its spread, if whitened",
+        0,
+        10,
+    )
+    optimizer: Literal["adam", "lbfgs"] = key(
+        "adam", "Adam (the paper), or L-BFGS, for one map, one scale and Gram matrices"
+    )
+    lr: float = key(0.2, "learning rate; of L-BFGS the largest change in a step", 0)
+    milestones: tuple[int, ...] = key((150, 180), "steps at which the learning rate falls", 0)
+    decay: float = key(0.5, "factor of the learning rate at a milestone", 0)
+    shared_moment: bool = key(
+        True,
+        "Adam's second moment is one number for the whole texture, which leaves noise alone that the "
+        "features do not see; instead of one for each texel (the paper), which amplifies it",
+    )
     checkpoint_every: int = 50
     preview_every: int = 50
 
     def __post_init__(self) -> None:
-        check_ranges(
-            self,
-            steps=(1, None),
-            seed=(0, 2**63 - 1),
-            resolution=(1, 4096),
-            exemplar_size=(32, 2048),
-            angle=(-360, 360),
-            content_weight=(0, None),
-            scales=(0, 3),
-            coarse_share=(0, 0.95),
-            pictures=(1, 16),
-            diffusion=(0, 1),
-            noise=(0, 10),
-            samples=(1, None),
-            region=(0, 10),
-            moment_weight=(0, None),
-            lr=(0, None),
-            decay=(0, None),
-            checkpoint_every=(1, None),
-            preview_every=(0, None),
-        )
-        choices = {
-            "frames": FRAMES,
-            "weights": WEIGHTS,
-            "loss": LOSSES,
-            "optimizer": OPTIMIZERS,
-            "pooling": ("average", "max"),
-        }
-        for key, allowed in choices.items():
-            if getattr(self, key) not in allowed:
-                raise ConfigError(f"{key} = '{getattr(self, key)}' is unknown", f"use {' or '.join(allowed)}")
-        known = layers_of(LAYERS_19 if self.weights == "vgg19" else LAYERS)
+        super().__post_init__()
+        known = with_poolings(LAYERS_19 if self.weights == "vgg19" else LAYERS)
         unknown = [layer for layer in (*self.layers, self.content_layer) if layer not in known]
         if unknown:
             raise ConfigError(f"layers holds {', '.join(unknown)}", f"use some of {', '.join(known)}")
@@ -133,14 +99,18 @@ class SurfaceConfig:
     @property
     def compared(self) -> tuple[str, ...]:
         """The layers that are compared, by name."""
-        return self.layers or layers_of(LAYERS_19 if self.weights == "vgg19" else LAYERS)
+        return self.layers or with_poolings(LAYERS_19 if self.weights == "vgg19" else LAYERS)
 
 
+DEFAULT = SurfaceConfig()
 PRESETS = {
-    "fast": SurfaceConfig(steps=200, preset="fast", scales=2, milestones=(150, 180)),
-    "paper": SurfaceConfig(
-        steps=500,
+    DEFAULT.preset: DEFAULT,
+    "paper": replace(
+        DEFAULT,
         preset="paper",
+        steps=500,
+        scales=0,
+        milestones=(200, 400),
         frames="fixed",
         continued=False,
         exemplar_size=512,
@@ -151,9 +121,11 @@ PRESETS = {
         lr=0.1,
         shared_moment=False,
     ),
-    "style": SurfaceConfig(
-        steps=300,
+    "style": replace(
+        DEFAULT,
         preset="style",
+        steps=300,
+        scales=0,
         layers=("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"),
         # The content's colours may be none of the exemplar's: in its components they would hardly change.
         whitened=False,

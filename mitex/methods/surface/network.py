@@ -8,7 +8,8 @@ import torch
 
 from mitex.errors import ConfigError
 from mitex.features.frozen import FrozenStack, GramTap, Operation, Tap
-from mitex.features.vgg import LAYERS, MEAN_RGB, Weights, convolutions
+from mitex.features.layers import LAYERS, with_poolings
+from mitex.features.vgg import MEAN_RGB, Weights, convolutions
 from mitex.methods.surface.levels import Levels
 from mitex.methods.surface.operations import BilinearConv, SurfaceConv, SurfacePool
 from mitex.runtime import bfloat16_is_fast
@@ -16,15 +17,7 @@ from mitex.runtime import bfloat16_is_fast
 POOLED = tuple(f"pool{n}" for n in range(1, 6))
 
 
-def layers_of(convolutions: Iterable[str]) -> tuple[str, ...]:
-    """All layers of a network with these convolutions, poolings included, as they are computed."""
-    names = list(convolutions)
-    return tuple(
-        name for n in range(1, 6) for name in (*(x for x in names if x.startswith(f"relu{n}_")), f"pool{n}")
-    )
-
-
-ALL_LAYERS = layers_of(LAYERS)
+ALL_LAYERS = with_poolings(LAYERS)
 
 
 class SurfaceVgg:

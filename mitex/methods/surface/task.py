@@ -15,7 +15,8 @@ from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
 from mitex.features.frozen import Tap
-from mitex.features.vgg import LAYERS, Weights, convolutions
+from mitex.features.layers import LAYERS
+from mitex.features.vgg import Weights, convolutions
 from mitex.features.vgg19 import vgg19_convolutions
 from mitex.mesh import Mesh
 from mitex.methods.surface.comparison import Comparison, GramComparison, TransportComparison

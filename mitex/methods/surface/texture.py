@@ -18,12 +18,11 @@ from mitex.errors import ConfigError
 from mitex.exemplar import MAPS
 from mitex.frames import atlas_normals, decode
 from mitex.mesh import Mesh
+from mitex.methods.surface import METHOD
 from mitex.methods.surface.frames import face_normals, tangent_frames, vertex_directions
 from mitex.methods.surface.texels import Texels
 from mitex.training import model_file
 
-NAME = "texture.safetensors"
-KIND = "surface"
 PADDING = 8  # texels by which charts are continued outwards
 
 
@@ -99,20 +98,20 @@ class SurfaceTexture:
         tensors = {name: torch.from_numpy(np.ascontiguousarray(a)) for name, a in arrays.items()}
         tensors["values"] = torch.from_numpy(np.ascontiguousarray(self.values, np.float16))
         about = {**self.about, "maps": list(self.maps), "mesh": self.mesh.name}
-        return model_file.save(path, tensors, KIND, about)
+        return model_file.save(path, tensors, METHOD.name, about)
 
-    @staticmethod
-    def load(source: str | Path) -> SurfaceTexture:
+    @classmethod
+    def load(cls, source: str | Path) -> SurfaceTexture:
         """Reads a texture file, or that of a run folder.
 
         Raises:
             CheckpointError: there is none, or it is damaged.
         """
-        with model_file.opened(source, KIND, NAME) as (tensors, about):
+        with model_file.opened(source, METHOD.name) as (tensors, about):
             arrays = {key: tensor.numpy() for key, tensor in tensors.items()}
             mesh = Mesh(arrays["vertices"], arrays["faces"], arrays["uv"], str(about["mesh"]))
             values, orientation = arrays["values"].astype(np.float32), arrays.get("orientation")
-            texture = SurfaceTexture(mesh, values, tuple(about["maps"]), about, orientation)
+            texture = cls(mesh, values, tuple(about["maps"]), about, orientation)
             if len(texture.texels.index) != len(texture.values):
                 raise ValueError("texels are missing")
             return texture

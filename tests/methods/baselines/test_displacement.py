@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mitex.errors import ConfigError
+from mitex.errors import CheckpointError, ConfigError
 from mitex.mesh import Mesh, grid, icosphere
-from mitex.methods.baselines.displacement import WINDOW, DisplacementMap
+from mitex.methods.baselines.displacement import DisplacementConfig, DisplacementMap, fit
 from mitex.methods.geometric.references import knobs
+
+WINDOW = DisplacementConfig().window
 
 
 def waves(count: int = 240) -> Mesh:
@@ -40,7 +42,7 @@ def test_a_ball_is_nearly_flat():
 
 def test_vertices_move_along_their_normals_only():
     ball = icosphere(8)
-    moved = DisplacementMap.bake(knobs()).apply(ball, size=1.5, levels=1).mesh
+    moved = DisplacementMap.bake(knobs()).apply(ball, scale=1.5, levels=1).mesh
     assert len(moved.faces) == 4 * len(ball.faces)
     still = DisplacementMap(np.zeros((8, 8)), 0.2).apply(ball, levels=1).mesh
     way = moved.vertices - still.vertices
@@ -77,3 +79,19 @@ def test_refuses_holes():
     hole = Mesh(frame.vertices, frame.faces[middle > 0.3 * np.ptp(frame.vertices)], name="hole")
     with pytest.raises(ConfigError, match="has holes"):
         DisplacementMap.bake(hole)
+
+
+def test_a_fit_is_kept_and_its_settings_count(tmp_path):
+    baked = fit(waves(), tmp_path / "run", overrides=["resolution=32", "window=0.2"])
+    again = DisplacementMap.load(tmp_path / "run")
+    assert np.array_equal(again.heights, baked.heights) and again.heights.shape == (32, 32)
+    assert again.side == pytest.approx(0.2 / np.sqrt(waves().face_areas.sum()), rel=1e-5)
+    assert again.about["name"] == "waves" and again.about["preset"] == "default"
+    ball = icosphere(4)
+    assert np.array_equal(again.apply(ball).mesh.vertices, baked.apply(ball).mesh.vertices)
+
+
+def test_damaged_files_are_refused(tmp_path):
+    flat = DisplacementMap(np.zeros((4, 5)), 0.2, {"name": "flat"}).save(tmp_path / "flat.safetensors")
+    with pytest.raises(CheckpointError, match="heights of shape"):
+        DisplacementMap.load(flat)

@@ -12,7 +12,7 @@ from mitex.losses.chamfer import sample_surface
 from mitex.mesh import Mesh, grid, icosphere, torus
 from mitex.methods.geometric.config import GeometricConfig
 from mitex.methods.geometric.connectivity import FaceGraph
-from mitex.methods.geometric.fit import training_meshes
+from mitex.methods.geometric.fitting import training_meshes
 from mitex.methods.geometric.hierarchy import Hierarchy, mean_edge
 from mitex.methods.geometric.references import REFERENCES
 from mitex.methods.geometric.report import report

@@ -9,8 +9,8 @@ import torch
 from safetensors.torch import load_file, save_file
 
 from mitex.errors import CheckpointError, OutputError
-from mitex.methods.kind import bundled
-from mitex.methods.nca import MeshNCA, NcaTexture, files
+from mitex.methods.nca import METHOD, MeshNCA, NcaTexture, files
+from mitex.methods.registry import bundled
 from mitex.training import checkpoint, model_file
 from mitex.training.checkpoint import Checkpoint
 from tests.methods.nca.tiny import texture
@@ -35,7 +35,7 @@ def _same(one, other):
 )
 def test_round_trip(tmp_path, options):
     made = texture(("albedo", "height"), **options)
-    again = NcaTexture.load(made.save(tmp_path / "model.safetensors"))
+    again = NcaTexture.load(made.save(tmp_path / "texture.safetensors"))
     assert _same(again.model, made.model)
     assert (again.model.degree, again.model.condition) == (made.model.degree, made.model.condition)
     assert again.maps == ("albedo", "height")
@@ -120,7 +120,7 @@ def test_the_previous_checkpoint_will_do(tmp_path):
 
 
 def test_bundled_models_are_found_by_name():
-    found = bundled("nca")
+    found = bundled(METHOD)
     assert found, "no model is bundled"
     for name, path in found.items():
         loaded = NcaTexture.load(name)

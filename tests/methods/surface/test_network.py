@@ -7,7 +7,8 @@ import torch
 from mitex.errors import ConfigError
 from mitex.features import Vgg16
 from mitex.features.frozen import GramTap
-from mitex.features.vgg import LAYERS, convolutions
+from mitex.features.layers import LAYERS
+from mitex.features.vgg import convolutions
 from mitex.methods.surface import operations as room
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.frames import tangent_frames

@@ -9,7 +9,7 @@ from mitex.exemplar import Exemplar
 from mitex.mesh import icosphere
 from mitex.methods import surface
 from mitex.methods.surface.config import PRESETS
-from mitex.methods.surface.fit import with_layout
+from mitex.methods.surface.fitting import with_layout
 from mitex.methods.surface.seams import seam_ratio
 from mitex.methods.surface.texels import Texels
 from mitex.methods.surface.texture import SurfaceTexture

@@ -1,4 +1,4 @@
-"""`mitex demo`: the whole walk in a few minutes, from an exemplar to textured meshes."""
+"""`mitex demo`: the whole way in a few minutes, from an exemplar to textured meshes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from tyro.conf import arg
 
-from mitex.cli.checks import SEEDS, in_range
+from mitex.methods.checks import SEEDS, in_range
 
 EXEMPLAR = "wicker"
 MESHES = ("shaderball", "knot")
@@ -71,18 +71,18 @@ def demo(out: Path, seed: int, steps: int, say: Callable[[str], None] = lambda l
     prepare_output(out / "demo.png")
     exemplar = Exemplar.load(EXEMPLAR)
     texture = _fit(exemplar, out / "run", seed, steps, say)
-    made, pictures = [], []
+    files, pictures = [], []
     for source in MESHES:
         mesh = Mesh.load(source)
         say(f"{mesh.name}: growing the texture, baking, rendering")
         asset = texture.apply(mesh, seed=seed, resolution=RESOLUTION)
         picture = _picture(asset)
         pictures.append(picture)
-        made += [
-            asset.baked(RESOLUTION).export(out / f"{mesh.name}.glb"),
+        files += [
+            asset.export(out / f"{mesh.name}.glb"),
             _write(out / f"{mesh.name}.png", picture),
         ]
-    return [*made, _write(out / "demo.png", _side_by_side(exemplar, pictures))]
+    return [*files, _write(out / "demo.png", _side_by_side(exemplar, pictures))]
 
 
 def _fit(exemplar: Any, run: Path, seed: int, steps: int, say: Callable[[str], None]) -> Any:
@@ -100,9 +100,12 @@ def _fit(exemplar: Any, run: Path, seed: int, steps: int, say: Callable[[str], N
 
 def _parent() -> str | None:
     """The bundled model that the others descend from."""
-    from mitex.cli.models import listing
+    from mitex.methods.nca import METHOD, NcaTexture
+    from mitex.methods.registry import bundled
 
-    return next((model["name"] for model in listing() if "parent" not in model), None)
+    return next(
+        (name for name, path in bundled(METHOD).items() if "parent" not in NcaTexture.load(path).about), None
+    )
 
 
 def _picture(asset: Any) -> Any:

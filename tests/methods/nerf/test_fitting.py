@@ -28,6 +28,7 @@ from mitex.metrics import psnr
 from mitex.runtime import init
 from mitex.training import checkpoint
 from mitex.training.config import resolve
+from mitex.training.locate import NAME
 from tests.methods.nerf.tiny import SETTINGS, tiny_capture
 
 mi: Any = init()
@@ -39,7 +40,7 @@ def test_the_loss_falls_and_the_run_folder_is_whole(run):
     colour = [line["colour"] for line in lines]
     assert len(lines) == 160 and np.mean(colour[-20:]) < 0.5 * np.mean(colour[:20])
     assert {"normals", "clusters", "inside", "samples"} <= lines[-1].keys()
-    assert (run / files.NAME).is_file() and len(list((run / "previews").glob("*.png"))) == 1
+    assert (run / NAME).is_file() and len(list((run / "previews").glob("*.png"))) == 1
 
 
 def test_a_held_out_view_looks_like_its_photo(texture):

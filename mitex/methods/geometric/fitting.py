@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 import torch
 
 from mitex.cache import cached, content_key
 from mitex.mesh import Mesh
-from mitex.methods.geometric import files
 from mitex.methods.geometric.config import PRESETS, GeometricConfig
 from mitex.methods.geometric.hierarchy import Hierarchy
 from mitex.methods.geometric.references import find_reference
@@ -23,8 +22,9 @@ from mitex.methods.geometric.texture import GeometricTexture
 from mitex.methods.geometric.training_meshes import fit_level
 from mitex.paths import cache_dir
 from mitex.runtime import keep_freed_memory
-from mitex.training import run, train
+from mitex.training.fit import Run
 from mitex.training.optim import Adam
+from mitex.training.settings import RunOptions
 
 VERSION = 1  # of the training meshes in the cache
 
@@ -34,11 +34,7 @@ def fit(
     out: str | Path,
     *,
     template: Mesh | str | Path | None = None,
-    preset: str | None = None,
-    config: Path | None = None,
-    overrides: Sequence[str] = (),
-    resume: bool = False,
-    quiet: bool = False,
+    **options: Unpack[RunOptions],
 ) -> GeometricTexture:
     """Learns the geometric texture of a reference mesh; writes a run folder with the model in it.
 
@@ -46,46 +42,35 @@ def fit(
 
     Args:
         reference: a mesh, what `Mesh.load` takes, or a name of `REFERENCES`.
-        out: run folder; must be new or empty, or hold a run to `resume`.
+        out: run folder; must be new or empty, or hold a run to resume (with more `steps`, to further levels).
         template: where the training meshes start from; None chooses by genus.
-        preset: "fast" (default) or "paper".
-        config: TOML file with any of `GeometricConfig`'s keys.
-        overrides: `key=value`, for any key.
-        resume: go on from the run's checkpoint, with its config as far as no other is given; with more
-            `steps`, to further levels.
-        quiet: show no progress.
+        options: preset ("fast" or "paper"), config, overrides, resume, quiet, as of `RunOptions`.
 
     Returns:
-        The texture, also saved as `geometry.safetensors` in `out`.
+        The texture, also saved as `texture.safetensors` in `out`.
 
     Raises:
         MitexError: bad input of any kind; nothing has been written then.
         Interrupted: a checkpoint has been saved.
     """
-    out = Path(out).expanduser()
-    settings = run.settings(PRESETS, out, preset, config, overrides, resume)
+    run = Run.of(PRESETS, out, **options)
+    config = run.config
     shape = reference if isinstance(reference, Mesh) else find_reference(reference)
     given = Mesh.load(template) if isinstance(template, str | Path) else template
     shape, start = normalised(shape, find_template(shape, given))
     keep_freed_memory()
-    meshes, reports = training_meshes(shape, start, settings, quiet)
-    hierarchy = Hierarchy.of(start, settings.levels)
-    task = GeometricTask(settings, hierarchy, torch.from_numpy(start.vertices), meshes, shape)
-    result = train(
+    meshes, reports = training_meshes(shape, start, config, run.quiet)
+    hierarchy = Hierarchy.of(start, config.levels)
+    task = GeometricTask(config, hierarchy, torch.from_numpy(start.vertices), meshes, shape)
+    origin = {key: getattr(config, key) for key in ("levels", "noise", "remeasure")}
+    origin["fit"] = [vars(r) for r in reports]
+    return run.train(
         task,
-        settings,
-        out,
-        lr=partial(learning_rate, settings),
-        optimizer=partial(Adam, betas=betas(settings)),
-        resume=resume,
-        quiet=quiet,
+        shape.name,
+        lambda about: GeometricTexture(task.generators[: config.levels], start, task.fixed, about | origin),
+        lr=partial(learning_rate, config),
+        optimizer=partial(Adam, betas=betas(config)),
     )
-    about = result.about(shape.name, settings.preset)
-    about |= {key: getattr(settings, key) for key in ("levels", "noise", "remeasure")}
-    about["fit"] = [vars(r) for r in reports]
-    texture = GeometricTexture(task.generators[: settings.levels], start, task.fixed, about)
-    texture.save(out / files.NAME)
-    return texture
 
 
 def training_meshes(

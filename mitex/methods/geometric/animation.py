@@ -1,4 +1,4 @@
-"""`mitex animate`."""
+"""`mitex animate` for geometric textures."""
 
 from __future__ import annotations
 
@@ -9,18 +9,16 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
-from mitex.cli.checks import SEEDS, in_range
-from mitex.cli.displacing import TEMPLATE, Displacing
-from mitex.cli.progress import bar
-from mitex.errors import ConfigError
+from mitex.methods.checks import SEEDS, in_range
+from mitex.methods.geometric.cli import TEMPLATE, GrowthOptions
 
 if TYPE_CHECKING:
     from mitex.mesh import Mesh
     from mitex.methods.geometric import GeometricTexture
 
 
-@dataclass
-class Animate(Displacing):
+@dataclass(kw_only=True)
+class Animate(GrowthOptions):
     """Film a geometric texture: as it grows on a mesh, or as one variant becomes another.
 
     examples:
@@ -60,40 +58,38 @@ class Animate(Displacing):
     """Frames a second."""
 
     def run(self) -> None:
-        self.check_displacing()
+        self.check_growth()
         in_range("--seed", self.seed, *SEEDS)
         in_range("--to-seed", self.to_seed, *SEEDS)
         in_range("--frames", self.frames, 2, 3600)
         in_range("--size", self.size, 16, 4096)
         in_range("--spp", self.spp, 1, 65536)
         in_range("--fps", self.fps, 1, 60)
-        from mitex.methods.kind import kind
         from mitex.paths import prepare_folder, prepare_output
         from mitex.render import VIDEO_SUFFIXES, check_video, film
 
         out = prepare_output(self.out, VIDEO_SUFFIXES)
-        if (method := kind(self.model)) != "geometric":
-            raise ConfigError(f"textures of {method} do not grow", "name a run of mitex fit geometric")
         from mitex.asset import clay
         from mitex.methods.geometric import GeometricTexture
+        from mitex.render.progress import bar
 
         texture, start = GeometricTexture.load(self.model), self.start_level
         if self.mesh == TEMPLATE:
             mesh, start = texture.template, start or 0
         else:
             mesh = self.even_mesh(self.mesh)
-        made = list(self._sequence(texture, mesh, start))
-        check_video(out, len(made), self.fps, self.size)
+        meshes = list(self._sequence(texture, mesh, start))
+        check_video(out, len(meshes), self.fps, self.size)
         if self.meshes is not None:
             folder = prepare_folder(self.meshes)
-            for k, frame in enumerate(made):
+            for k, frame in enumerate(meshes):
                 clay(frame).export(folder / f"{k:04}.ply")
         with bar("film") as progress:
             film(
-                map(clay, made),
+                map(clay, meshes),
                 out,
-                frames=len(made),
-                like=made[-1],
+                frames=len(meshes),
+                like=meshes[-1],
                 fps=self.fps,
                 resolution=self.size,
                 spp=self.spp,

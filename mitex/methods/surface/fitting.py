@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -26,11 +26,12 @@ from mitex.methods.surface.orientation import read_orientation
 from mitex.methods.surface.taps import Surroundings, build
 from mitex.methods.surface.task import SurfaceTask
 from mitex.methods.surface.texels import Texels
-from mitex.methods.surface.texture import NAME, SurfaceTexture
+from mitex.methods.surface.texture import SurfaceTexture
 from mitex.runtime import available_memory
-from mitex.training import run, train
+from mitex.training.fit import Run
 from mitex.training.lbfgs import Lbfgs
 from mitex.training.optim import Adam
+from mitex.training.settings import RunOptions
 
 # Peak over precomputation and steps, measured at 512^2 and 1024^2 with bfloat16 features.
 BYTES_PER_TEXEL, BYTES_PER_PICTURE = 3600, 900
@@ -42,31 +43,24 @@ def fit(
     mesh: Mesh | str | Path,
     out: str | Path,
     *,
-    preset: str | None = None,
-    config: Path | None = None,
-    overrides: Sequence[str] = (),
     keep_uvs: bool = False,
     content: str | Path | None = None,
     orientation: np.ndarray | str | Path | None = None,
-    resume: bool = False,
-    quiet: bool = False,
+    **options: Unpack[RunOptions],
 ) -> SurfaceTexture:
     """Synthesizes the look of an exemplar on a mesh; writes a run folder with the texture in it.
 
     Args:
         exemplar: maps, or what `Exemplar.load` takes.
         mesh: or what `Mesh.load` takes.
-        out: run folder; must be new or empty, or hold a run to `resume`.
-        preset: "fast" (default), "paper", or "style" (default with `content`).
-        config: TOML file with any of `SurfaceConfig`'s keys.
-        overrides: `key=value`, for any key.
+        out: run folder; must be new or empty, or hold a run to resume.
         keep_uvs: use the mesh's own UVs.
         content: style transfer: a texture on the mesh's own UVs (an image file), which are kept then, or "ao"
             for the mesh's ambient occlusion.
         orientation: (V, 3) where the exemplar's right shall point, or what `read_orientation` takes; else the
             frames follow the config.
-        resume: go on from the run's checkpoint, with its config as far as no other is given.
-        quiet: show no progress.
+        options: preset ("fast", "paper", or "style", the default with `content`), config, overrides, resume,
+            quiet, as of `RunOptions`.
 
     Returns:
         The texture, also saved as `texture.safetensors` in `out`.
@@ -75,9 +69,9 @@ def fit(
         MitexError: bad input of any kind; nothing has been written then.
         Interrupted: a checkpoint has been saved.
     """
-    out = Path(out).expanduser()
     presets = PRESETS if content is None else {"style": PRESETS["style"], **PRESETS}
-    settings = run.settings(presets, out, preset, config, overrides, resume)
+    run = Run.of(presets, out, **options)
+    settings = run.config
     shown = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
     image = content is not None and str(content) != AO
     surface = with_layout(mesh if isinstance(mesh, Mesh) else Mesh.load(mesh), settings, keep_uvs or image)
@@ -89,22 +83,18 @@ def fit(
     levels = find_levels(surface, texels, settings, field)
     known = {"content": content_key(start), "orientation": content_key(field)}
     task = SurfaceTask(settings, shown, surface, texels, levels, start, known)
-    result = train(
+    origin: dict[str, Any] = {key: getattr(settings, key) for key in ("resolution", "frames", "angle")}
+    return run.train(
         task,
-        settings,
-        out,
+        shown.name,
+        lambda about: SurfaceTexture(
+            surface, task.in_texel_order(), tuple(task.layout), about | origin, field
+        ),
         lr=settings.lr,
         milestones=settings.milestones,
         decay=settings.decay,
         optimizer=Lbfgs if settings.optimizer == "lbfgs" else partial(Adam, shared=settings.shared_moment),
-        resume=resume,
-        quiet=quiet,
     )
-    about = result.about(shown.name, settings.preset)
-    about |= {key: getattr(settings, key) for key in ("resolution", "frames", "angle")}
-    texture = SurfaceTexture(surface, task.in_texel_order(), tuple(task.layout), about, field)
-    texture.save(out / NAME)
-    return texture
 
 
 def with_layout(mesh: Mesh, config: SurfaceConfig, keep_uvs: bool) -> Mesh:

@@ -11,7 +11,7 @@ import torch
 from mitex.errors import CheckpointError, ConfigError, MeshError
 from mitex.mesh import Mesh, grid, icosphere, subdivide_midpoint, torus
 from mitex.methods import geometric
-from mitex.methods.geometric import files
+from mitex.methods.geometric import METHOD
 from mitex.methods.geometric.config import PRESETS, GeometricConfig
 from mitex.methods.geometric.features import displaced, face_features
 from mitex.methods.geometric.hierarchy import Hierarchy
@@ -21,8 +21,9 @@ from mitex.methods.geometric.report import report
 from mitex.methods.geometric.task import GeometricTask, learning_rate
 from mitex.methods.geometric.template import normalised, topology
 from mitex.methods.geometric.texture import GeometricTexture, slerp
-from mitex.methods.kind import kind
+from mitex.methods.registry import method_of
 from mitex.training import checkpoint
+from mitex.training.locate import NAME
 from mitex.training.optim import Adam
 from tests.shapes import collapsed, fan, moebius, pair, turned
 
@@ -69,8 +70,8 @@ def small_task(**changes) -> GeometricTask:
 
 def test_the_run_folder(made):
     folder, texture = made
-    assert {p.name for p in folder.iterdir()} >= {"config.toml", "metrics.jsonl", checkpoint.NAME, files.NAME}
-    assert kind(folder) == kind(folder / files.NAME) == "geometric"
+    assert {p.name for p in folder.iterdir()} >= {"config.toml", "metrics.jsonl", checkpoint.NAME, NAME}
+    assert method_of(folder) == method_of(folder / NAME) == METHOD
     assert texture.levels == 3 and texture.about["steps"] == 9
     assert [level["faces"] for level in texture.about["fit"]] == [20, 80, 320]
 
@@ -89,8 +90,8 @@ def test_models_round_trip(made):
 def test_what_is_no_model_is_refused(made, tmp_path, damage):
     from safetensors.torch import load_file, save_file
 
-    source = made[0] / files.NAME
-    path = tmp_path / files.NAME
+    source = made[0] / NAME
+    path = tmp_path / NAME
     if damage == "cut":
         path.write_bytes(source.read_bytes()[:-100])
     elif damage == "foreign":
@@ -371,7 +372,7 @@ def test_previews(monkeypatch):
 @pytest.mark.parametrize("name", ["spikes", "scales"])
 def test_bundled_models_are_found_by_name(name):
     """Without noise they rebuild their reference, about as near as the mesh that they were trained with."""
-    assert kind(name) == "geometric"
+    assert method_of(name) == METHOD
     texture = GeometricTexture.load(name)
     assert texture.about["name"] == name and texture.levels == 5
     rebuilt = texture.generate(start_level=5)

@@ -14,16 +14,18 @@ from mitex.exemplar import Exemplar
 from mitex.images import write_image
 from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods import surface
-from mitex.methods.kind import kind
+from mitex.methods.registry import method_of
+from mitex.methods.surface import METHOD
 from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.content import content_colours
-from mitex.methods.surface.fit import find_levels, with_layout
+from mitex.methods.surface.fitting import find_levels, with_layout
 from mitex.methods.surface.network import ALL_LAYERS
 from mitex.methods.surface.orientation import read_orientation
 from mitex.methods.surface.task import VIEW, SurfaceTask
 from mitex.methods.surface.texels import Texels, charts
-from mitex.methods.surface.texture import NAME, SurfaceTexture
+from mitex.methods.surface.texture import SurfaceTexture
 from mitex.training import resolve
+from mitex.training.locate import NAME
 from tests.methods.surface.grids import flat_square
 
 pytestmark = pytest.mark.usefixtures("own_cache")
@@ -88,7 +90,7 @@ def test_textures_agree_with_vertex_maps(made, mesh):
 def test_files_round_trip(made, mesh):
     folder, texture = made
     again = SurfaceTexture.load(folder)
-    assert kind(folder) == kind(folder / NAME) == "surface" and kind(folder / "config.toml") == "nca"
+    assert method_of(folder) == method_of(folder / NAME) == METHOD
     assert np.abs(again.values - texture.values).max() < 1e-3 and again.maps == texture.maps
     assert np.array_equal(again.mesh.faces, mesh.faces) and again.about["steps"] == 12
     with pytest.raises(ConfigError, match="belongs to mesh 'icosphere6', not to 'icosphere5'; synthesize"):
@@ -108,7 +110,7 @@ def test_resuming_changes_nothing(mesh, exemplar, tmp_path):
         whole = surface.fit(exemplar, mesh, tmp_path / "whole", overrides=SMALL, quiet=True)
         part = [*SMALL, "steps=6"]
         surface.fit(exemplar, mesh, tmp_path / "part", overrides=part, quiet=True)
-        assert kind(tmp_path / "part") == "surface"
+        assert method_of(tmp_path / "part") == METHOD
         rest = surface.fit(exemplar, mesh, tmp_path / "part", overrides=["steps=12"], resume=True, quiet=True)
     finally:
         torch.set_num_threads(threads)

@@ -7,22 +7,26 @@ heights. What hangs over is hidden, and vertices move along their normals only.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from scipy.ndimage import map_coordinates
 
 from mitex.asset import Asset, clay
 from mitex.atlas import laid_out, twice_area
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, subdivide_midpoint
+from mitex.methods.baselines.displacement import METHOD
 from mitex.runtime import init, load_mitsuba
 from mitex.scenes.stage import mesh_shape
+from mitex.training import model_file
 
 mi: Any = load_mitsuba(needs_llvm=False)
 
-WINDOW = 0.35  # side of the window, of the reference's extent
 ATLAS = 1024  # resolution that the target's charts are packed for
 
 
@@ -33,21 +37,28 @@ class DisplacementMap:
     Attributes:
         heights: (N, N) float64, mean 0 [parts of the root of the reference's area].
         side: of the square [parts of the root of the reference's area].
+        about: how it was made.
     """
 
     heights: np.ndarray
     side: float
+    about: Mapping[str, Any] = field(default_factory=dict)
 
     @staticmethod
-    def bake(reference: Mesh, resolution: int = 256) -> DisplacementMap:
+    def bake(reference: Mesh, resolution: int = 256, window: float = 0.35) -> DisplacementMap:
         """Takes the map off the side of the reference that faces +z.
+
+        Args:
+            reference: whose relief it is.
+            resolution: side of the map [texels].
+            window: side of the square that is taken off [of the reference's extent].
 
         Raises:
             ConfigError: nothing of it lies in a part of the window.
         """
         low, high = reference.vertices.min(0), reference.vertices.max(0)
         extent, centre = float((high - low).max()), 0.5 * (low + high)
-        side = WINDOW * extent
+        side = window * extent
         place = (np.arange(resolution) + 0.5) / resolution - 0.5
         x, y = (side * a.ravel() for a in np.meshgrid(place, place))
         start = np.stack([centre[0] + x, centre[1] + y, np.full_like(x, high[2] + extent)], 1)
@@ -62,12 +73,37 @@ class DisplacementMap:
         unit = float(np.sqrt(reference.face_areas.sum(dtype=np.float64)))
         return DisplacementMap(heights.reshape(resolution, resolution) / unit, side / unit)
 
-    def apply(self, mesh: Mesh, size: float = 1.0, levels: int = 0) -> Asset:
+    @classmethod
+    def load(cls, source: str | Path) -> DisplacementMap:
+        """Reads a run folder or a model file.
+
+        Raises:
+            CheckpointError: there is none, or it is damaged.
+        """
+        with model_file.opened(source, METHOD.name) as (tensors, about):
+            heights, side = tensors["heights"].numpy(), float(tensors["side"])
+            if heights.ndim != 2 or heights.shape[0] != heights.shape[1]:
+                raise ValueError(f"heights of shape {heights.shape}")
+            return cls(heights, side, about)
+
+    def save(self, path: str | Path) -> Path:
+        """Writes the model file (safetensors).
+
+        Raises:
+            OutputError: the place is not writable.
+        """
+        tensors = {
+            "heights": torch.from_numpy(self.heights),
+            "side": torch.tensor(self.side, dtype=torch.float64),
+        }
+        return model_file.save(path, tensors, METHOD.name, self.about)
+
+    def apply(self, mesh: Mesh, *, scale: float = 1.0, levels: int = 0) -> Asset:
         """A mesh displaced along its normals by the map, repeated in mirrored squares over its UVs.
 
         Args:
             mesh: its own UVs are used if they do not overlap, else new ones.
-            size: of the features in relation to the mesh, beside that on the reference.
+            scale: size of the features beside the whole mesh, against that on the reference.
             levels: how often every face is split in four first.
 
         Returns:
@@ -77,7 +113,7 @@ class DisplacementMap:
         assert fine.uv is not None
         area = float(fine.face_areas.sum(dtype=np.float64))
         stretch = np.sqrt(area / max(0.5 * np.abs(twice_area(fine.uv)).sum(), 1e-12))  # [mesh units per UV]
-        unit = size * np.sqrt(area)  # of the map's lengths, on this mesh
+        unit = scale * np.sqrt(area)  # of the map's lengths, on this mesh
         squares = fine.uv * (stretch / (self.side * unit))
         at = squares[..., ::-1].reshape(-1, 2).T * len(self.heights) - 0.5
         corners = map_coordinates(self.heights, at, order=1, mode="reflect") * unit

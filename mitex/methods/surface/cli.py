@@ -1,18 +1,21 @@
-"""`mitex fit surface`."""
+"""The command-line options of surface textures."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from mitex.cli.fitting import ExemplarFitting
+from mitex.methods.options import ExemplarOptions, MeshOptions
+
+if TYPE_CHECKING:
+    from mitex.asset import Asset
 
 
 @dataclass(kw_only=True)
-class FitSurface(ExemplarFitting):
+class Fit(ExemplarOptions):
     """Synthesize a texture directly on one mesh, without views and without seams (tangent-space CNN).
 
     The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the texture;
@@ -29,9 +32,6 @@ class FitSurface(ExemplarFitting):
 
     mesh: Annotated[str, arg(metavar="MESH|NAME")]
     """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
-
-    out: Annotated[Path | None, arg(metavar="RUN", help_behavior_hint="(default: runs/EXEMPLAR-MESH)")] = None
-    """Run folder."""
 
     preset: Annotated[str | None, arg(metavar="fast|paper|style", help_behavior_hint="(default: fast)")] = (
         None
@@ -52,12 +52,12 @@ class FitSurface(ExemplarFitting):
     """Use the mesh's own UVs, which must not overlap."""
 
     def run(self) -> None:
-        shared = self.shared(resolution=self.resolution)
+        options = self.run_options(resolution=self.resolution)
         from mitex.exemplar import Exemplar
         from mitex.mesh import Mesh
 
         exemplar, mesh = Exemplar.load(self.exemplar), Mesh.load(self.mesh)
-        out = self.out or Path("runs") / f"{exemplar.name}-{mesh.name}"
+        out = self.folder(f"{exemplar.name}-{mesh.name}")
         from mitex.methods import surface
 
         surface.fit(
@@ -67,6 +67,22 @@ class FitSurface(ExemplarFitting):
             keep_uvs=self.keep_uvs,
             content=self.content,
             orientation=self.orientation,
-            **shared,
+            **options,
         )
         print(out)
+
+
+@dataclass(kw_only=True)
+class Apply(MeshOptions):
+    """Write a surface texture on the mesh that it was synthesized on.
+
+    examples:
+      mitex apply runs/bunny --mesh bunny.obj --out bunny.glb
+    """
+
+    def applied(self, out: Path) -> Asset:
+        from mitex.mesh import Mesh
+        from mitex.methods.surface import SurfaceTexture
+
+        mesh = Mesh.load(self.mesh)
+        return SurfaceTexture.load(self.model).apply(mesh)

@@ -23,7 +23,7 @@ def in_range(option: str, value: float | None, low: float, high: float = math.in
     raise ConfigError(f"{option} {value} is out of range", f"choose a value {bounds}")
 
 
-def not_both(first: str, second: str, condition: bool) -> None:
+def mutually_exclusive(first: str, second: str, condition: bool) -> None:
     """Refuses two options that contradict each other.
 
     Raises:
@@ -33,7 +33,7 @@ def not_both(first: str, second: str, condition: bool) -> None:
         raise ConfigError(f"{first} and {second} contradict each other", "give only one of them")
 
 
-def needless(option: str, out: Path, condition: bool) -> None:
+def reject_unused(option: str, out: Path, condition: bool) -> None:
     """Refuses an option that means nothing for the kind of file to be written.
 
     Raises:
@@ -43,7 +43,7 @@ def needless(option: str, out: Path, condition: bool) -> None:
         raise ConfigError(f"{option} means nothing for {out.suffix} files", "leave it out or change --out")
 
 
-def settings(groups: Sequence[Sequence[str]], **flags: object) -> list[str]:
+def merged_settings(groups: Sequence[Sequence[str]], **flags: object) -> list[str]:
     """All `key=value` words of repeated `--set`, and of the flags that stand for a key (None: not given).
 
     Raises:

@@ -41,7 +41,7 @@ def test_the_run_folder_is_complete(run):
         "config.toml",
         "checkpoint.safetensors",
         "metrics.jsonl",
-        "model.safetensors",
+        "texture.safetensors",
         "previews",
     } <= names
     assert [p.name for p in sorted((run[0] / "previews").iterdir())] == ["000020.png", "000040.png"]
@@ -54,7 +54,7 @@ def test_the_model_works_on_another_mesh(run):
     assert 0 < made.about["loss"] < 1e3 and made.about["seconds"] >= 0
     sphere = icosphere(6)
     grown = made.apply(sphere, steps=10, subdivide=0).vertex_maps["albedo"]
-    for source in (out, out / "model.safetensors"):
+    for source in (out, out / "texture.safetensors"):
         again = NcaTexture.load(source)
         assert again.about == made.about | {"maps": ["albedo"]}
         assert np.array_equal(again.apply(sphere, steps=10, subdivide=0).vertex_maps["albedo"], grown)

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, Unpack
+
+import numpy as np
 
 from mitex.mesh import Mesh
 from mitex.methods.nerf import files
 from mitex.methods.nerf.base_shape import face_frames
 from mitex.methods.nerf.capture import Capture, load_capture
-from mitex.methods.nerf.coarse import find_base
+from mitex.methods.nerf.coarse import BaseShape, find_base
 from mitex.methods.nerf.config import PRESETS
 from mitex.methods.nerf.projection import Projection
-from mitex.methods.nerf.radiance import learn
+from mitex.methods.nerf.radiance import schedule
 from mitex.methods.nerf.task import TextureTask
 from mitex.methods.nerf.texture import NerfTexture
 from mitex.runtime import init, keep_freed_memory
-from mitex.training import run
+from mitex.training.fit import Run
+from mitex.training.settings import RunOptions
 
 
 def fit(
@@ -24,11 +27,7 @@ def fit(
     out: str | Path,
     *,
     base_mesh: Mesh | str | Path | None = None,
-    preset: str | None = None,
-    config: Path | None = None,
-    overrides: Sequence[str] = (),
-    resume: bool = False,
-    quiet: bool = False,
+    **options: Unpack[RunOptions],
 ) -> NerfTexture:
     """Learns a surface with its meso-structure from photos; writes a run folder with the model in it.
 
@@ -37,13 +36,9 @@ def fit(
 
     Args:
         capture: photos with masks and cameras, or the folder that `load_capture` takes.
-        out: run folder; must be new or empty, or hold a run to `resume`.
+        out: run folder; must be new or empty, or hold a run to resume.
         base_mesh: the shape without its texture, in the capture's world; None finds it.
-        preset: "fast" (default) or "paper".
-        config: TOML file with any of `NerfConfig`'s keys.
-        overrides: `key=value`, for any key.
-        resume: go on from the run's checkpoint, with its config as far as no other is given.
-        quiet: show no progress.
+        options: preset ("fast" or "paper"), config, overrides, resume, quiet, as of `RunOptions`.
 
     Returns:
         The texture, also saved as `texture.safetensors` in `out`.
@@ -52,35 +47,38 @@ def fit(
         MitexError: bad input of any kind; nothing has been written then.
         Interrupted: a checkpoint has been saved.
     """
-    out = Path(out).expanduser()
-    settings = run.settings(PRESETS, out, preset, config, overrides, resume)
+    run = Run.of(PRESETS, out, **options)
+    config = run.config
     photos = capture if isinstance(capture, Capture) else load_capture(capture)
     given = Mesh.load(base_mesh) if isinstance(base_mesh, str | Path) else base_mesh
     if given is not None:
         given = given.with_vertices(photos.similarity.apply(given.vertices))
     init()
     keep_freed_memory()
-    learned, held = photos.split()
-    base = find_base(learned, settings, given, quiet)
+    learned, held_out = photos.split()
+    base = find_base(learned, config, given, run.quiet)
     frames = face_frames(base.mesh)
-    projection = Projection(
-        base.mesh, neighbours=settings.neighbours, pull=settings.pull, reach=base.thickness
+    projection = Projection(base.mesh, neighbours=config.neighbours, pull=config.pull, reach=base.thickness)
+    task = TextureTask(config, learned, (held_out, 0), projection, frames, base.thickness)
+    origin: dict[str, Any] = {key: getattr(config, key) for key in files.SETTINGS}
+    origin |= {"centre": photos.similarity.center.tolist(), "scale": float(photos.similarity.scale)}
+    return run.train(
+        task,
+        photos.name,
+        lambda about: NerfTexture(_model(base, frames, task, about | origin)),
+        **schedule(config),
     )
-    task = TextureTask(settings, learned, (held, 0), projection, frames, base.thickness)
-    result = learn(task, settings, out, resume=resume, quiet=quiet)
-    about = result.about(photos.name, settings.preset)
-    about |= {key: getattr(settings, key) for key in files.SETTINGS}
-    about |= {"centre": photos.similarity.center.tolist(), "scale": float(photos.similarity.scale)}
-    kept = task.mean
-    model = files.Model(
+
+
+def _model(base: BaseShape, frames: np.ndarray, task: TextureTask, about: dict[str, Any]) -> files.Model:
+    """What a training leaves: the running mean of its parameters."""
+    mean = task.mean
+    return files.Model(
         base,
         frames,
-        [kept["tables/f"], kept["tables/phase"]],
-        [value for name, value in kept.items() if name.startswith("weights/")],
-        kept["light"],
+        [mean["tables/f"], mean["tables/phase"]],
+        [value for name, value in mean.items() if name.startswith("weights/")],
+        mean["light"],
         task.occupancy.occupied,
         about,
     )
-    texture = NerfTexture(model)
-    texture.save(out / files.NAME)
-    return texture

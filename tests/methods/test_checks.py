@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from mitex.cli.checks import in_range, needless, not_both, settings
 from mitex.errors import ConfigError
+from mitex.methods.checks import in_range, merged_settings, mutually_exclusive, reject_unused
 
 
 @pytest.mark.parametrize("value", [None, 1, 2.5, 10])
@@ -28,20 +28,25 @@ def test_open_range():
 
 
 def test_contradictions():
-    not_both("--a", "--b", False)
-    needless("--a", Path("x.png"), False)
+    mutually_exclusive("--a", "--b", False)
+    reject_unused("--a", Path("x.png"), False)
     with pytest.raises(ConfigError, match="--a and --b contradict"):
-        not_both("--a", "--b", True)
+        mutually_exclusive("--a", "--b", True)
     with pytest.raises(ConfigError, match="--a means nothing for .png files"):
-        needless("--a", Path("x.png"), True)
+        reject_unused("--a", Path("x.png"), True)
 
 
 def test_settings_come_together():
-    assert settings([["a=1", "b=2"], ["c = 3"]], seed=4, steps=None) == ["a=1", "b=2", "c = 3", "seed=4"]
-    assert settings([["seed=4"]], seed=4) == ["seed=4", "seed=4"]
+    assert merged_settings([["a=1", "b=2"], ["c = 3"]], seed=4, steps=None) == [
+        "a=1",
+        "b=2",
+        "c = 3",
+        "seed=4",
+    ]
+    assert merged_settings([["seed=4"]], seed=4) == ["seed=4", "seed=4"]
 
 
 @pytest.mark.parametrize("words", [["a=1", "a=2"], ["seed=5"]])
 def test_settings_refuse_two_values(words):
     with pytest.raises(ConfigError, match="give it once"):
-        settings([words], seed=4)
+        merged_settings([words], seed=4)

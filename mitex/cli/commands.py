@@ -1,0 +1,112 @@
+"""Which commands there are, and which one a command line asks for; methods bring their own."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mitex.cli.usage import UsageError, refuse_unknown_options
+from mitex.lazy import load
+from mitex.methods.method import Method
+from mitex.methods.registry import method_of, methods
+
+# Word -> dataclass of the command, and its line in the overview. Only the called one is imported.
+COMMANDS = {
+    "doctor": ("mitex.cli.doctor:Doctor", "check that everything Mitex needs works here"),
+    "models": ("mitex.cli.models:Models", "list the textures that ship with Mitex"),
+    "render": ("mitex.cli.render:Render", "path-trace an asset: a still or a turntable"),
+}
+DEMO = "learn, apply, render and export a texture in a few minutes"
+# Commands whose options are those of the model's method.
+OF_MODELS = {
+    "apply": "put a learned texture on a mesh",
+    "animate": "film how a texture grows or changes",
+}
+HELP = frozenset({"-h", "--help"})
+
+
+@dataclass(frozen=True)
+class Call:
+    """A command that was asked for.
+
+    Attributes:
+        program: its words, as its help shows them.
+        command: the dataclass of its options.
+        words: what follows.
+    """
+
+    program: str
+    command: Any
+    words: list[str]
+
+
+def lines(group: str = "") -> dict[str, str]:
+    """Commands and their lines in the overview, or those of a group of two words."""
+    fits = {f"fit {method.name}": method.title for method in methods().values()}
+    if group:
+        return {name: line for name, line in fits.items() if name.startswith(f"{group} ")}
+    doctor, *others = [(word, line) for word, (_, line) in COMMANDS.items()]
+    return dict([doctor, ("demo", DEMO), *fits.items(), *OF_MODELS.items(), *others])
+
+
+def find(words: Sequence[str]) -> Call:
+    """The command that the words ask for.
+
+    Raises:
+        UsageError: there is none, or an option is not one of its method's.
+        CheckpointError: the model of `apply` or `animate` does not exist.
+    """
+    word, rest = words[0], list(words[1:])
+    if word in COMMANDS:
+        return Call(f"mitex {word}", load(COMMANDS[word][0]), rest)
+    if word == "demo":
+        return Call("mitex demo", load(_demonstrated().demo or ""), rest)
+    if word in OF_MODELS:
+        return _of_model(word, rest)
+    if word == "fit" and rest and rest[0] in methods():
+        method = methods()[rest[0]]
+        call = Call(f"mitex fit {method.name}", method.load_fit(), rest[1:])
+        refuse_unknown_options(call.command, call.words, f"`{call.program}`", f"see `{call.program} --help`")
+        return call
+    raise _no_such_command(words)
+
+
+def _of_model(word: str, words: list[str]) -> Call:
+    """A command on a model: the options are those of the model's method."""
+    model = _model(words)
+    if model is None:
+        raise UsageError("RUN|MODEL is missing", f"see `mitex {word} --help`")
+    method = method_of(model)
+    reference = getattr(method, word)
+    if reference is None:
+        able = [m.name for m in methods().values() if getattr(m, word)]
+        raise UsageError(
+            f"`mitex {word}` takes no {method.name} textures", f"name a run of {' or '.join(able)}"
+        )
+    command = load(reference)
+    whose, remedy = f"{method.name} textures in `mitex {word}`", f"see `mitex {word} {model} --help`"
+    refuse_unknown_options(command, words, whose, remedy)
+    return Call(f"mitex {word}", command, words)
+
+
+def _model(words: list[str]) -> str | None:
+    """The word that names the model: the first that is neither an option nor an option's value."""
+    free = [k for k, word in enumerate(words) if not word.startswith("-")]
+    alone = [k for k in free if k == 0 or not words[k - 1].startswith("--") or "=" in words[k - 1]]
+    return next((words[k] for k in alone or free), None)
+
+
+def _demonstrated() -> Method:
+    return next(method for method in methods().values() if method.demo)
+
+
+def _no_such_command(words: Sequence[str]) -> UsageError:
+    group = list(lines(words[0]))
+    if group and not words[1:]:
+        return UsageError(f"`mitex {words[0]}` needs a method", f"try `mitex {group[0]} --help`")
+    given = " ".join(words[:2]) if group else words[0]
+    close = difflib.get_close_matches(given, group or lines(), 1)
+    remedy = f"try `mitex {close[0]}`" if close else "see `mitex --help`"
+    return UsageError(f"there is no command '{given}'", remedy)

@@ -1,0 +1,119 @@
+"""The command-line options of geometric textures."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import arg
+
+from mitex.methods.checks import SEEDS, in_range
+from mitex.methods.options import MeshOptions, TrainingOptions
+
+if TYPE_CHECKING:
+    from mitex.asset import Asset
+    from mitex.mesh import Mesh
+    from mitex.methods.geometric import GeometricTexture
+
+TEMPLATE = "template"  # as a mesh: the one that the texture's training started from
+
+
+@dataclass(kw_only=True)
+class Fit(TrainingOptions):
+    """Learn the geometric texture of one mesh with a hierarchy of face-convolution GANs.
+
+    The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the texture;
+    `mitex apply RUN --mesh MESH --out ASSET` grows it on any mesh. Ctrl-C saves, and --resume goes on.
+
+    examples:
+      mitex fit geometric --reference spikes
+      mitex fit geometric --reference cactus.obj --out runs/cactus
+      mitex fit geometric --reference ring.obj --template coarse-ring.obj --preset paper
+      mitex fit geometric --reference cactus.obj --out runs/cactus --resume --steps 12000   (one more level)
+    """
+
+    reference: Annotated[str, arg(metavar="MESH|NAME")]
+    """Mesh file (.obj .ply .stl .glb .gltf .off), or a reference by formula: spikes, scales, knobs, ridges,
+    craters, warts."""
+
+    preset: Annotated[str | None, arg(metavar="fast|paper", help_behavior_hint="(default: fast)")] = None
+    """Settings to start from: `fast`, or `paper`, which follows the publication."""
+
+    template: Annotated[str | None, arg(metavar="MESH", help_behavior_hint="(default: by genus)")] = None
+    """Coarse mesh of the reference's topology from which its training meshes are made."""
+
+    def run(self) -> None:
+        options = self.run_options()
+        from mitex.methods import geometric
+        from mitex.methods.geometric.references import find_reference
+
+        reference = find_reference(self.reference)
+        out = self.folder(reference.name)
+        geometric.fit(reference, out, template=self.template, **options)
+        print(out)
+
+
+@dataclass(kw_only=True)
+class GrowthOptions:
+    """How a geometric texture grows on a mesh."""
+
+    start_level: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 2)")] = None
+    """The generator to begin with; low ones change the shape."""
+
+    end_level: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the last)")] = None
+    """The last generator; each one after the first splits every face in four."""
+
+    remesh: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None
+    """Give the mesh N even vertices first; fewer make the texture larger."""
+
+    def check_growth(self) -> None:
+        in_range("--start-level", self.start_level, 0, 6)
+        in_range("--end-level", self.end_level, 0, 6)
+        in_range("--remesh", self.remesh, 12, 2_000_000)
+
+    def even_mesh(self, name: str) -> Mesh:
+        """The mesh to be displaced, remeshed if that is asked for."""
+        from mitex.mesh import Mesh, remesh
+
+        mesh = Mesh.load(name)
+        return mesh if self.remesh is None else remesh(mesh, self.remesh)
+
+    def advise(self, texture: GeometricTexture, mesh: Mesh) -> None:
+        """Says, on stderr, how large the texture is on a mesh, and what would change that."""
+        size, vertices = texture.relative_size(mesh, self.start_level)
+        print(
+            f"features are {size:.2g} times as large as on the reference, beside the whole mesh; "
+            f"--remesh {vertices} makes them as large",
+            file=sys.stderr,
+        )
+
+
+@dataclass(kw_only=True)
+class Apply(GrowthOptions, MeshOptions):
+    """Grow a geometric texture on a mesh, or on its own template: --mesh template.
+
+    examples:
+      mitex apply runs/spikes --mesh bunny.obj --out bunny.glb --remesh 2000
+      mitex apply spikes --mesh template --out variation.glb --seed 7
+    """
+
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Random seed: another seed, another variant of the texture."""
+
+    def check(self) -> None:
+        self.check_growth()
+        in_range("--seed", self.seed, *SEEDS)
+
+    def applied(self, out: Path) -> Asset:
+        from mitex.asset import clay
+        from mitex.methods.geometric import GeometricTexture
+
+        texture = GeometricTexture.load(self.model)
+        if self.mesh == TEMPLATE:
+            return clay(texture.generate(self.seed, self.start_level or 0, self.end_level))
+        mesh = self.even_mesh(self.mesh)
+        asset = texture.apply(mesh, seed=self.seed, start_level=self.start_level, end_level=self.end_level)
+        self.advise(texture, mesh)
+        return asset

@@ -1,0 +1,65 @@
+"""What a method of texture synthesis is: the one object by which everything else knows it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from mitex.lazy import load
+
+if TYPE_CHECKING:
+    from mitex.methods.interface import Texture
+    from mitex.methods.options import ApplyOptions, FitOptions
+    from mitex.training.settings import FitConfig
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method, described without importing it: "module:name" stands for what is imported on first use.
+
+    Attributes:
+        name: as in `mitex fit NAME`, in model files and in run folders.
+        title: its line in the overview.
+        presets: reference to its presets, name -> config; the first one is the default.
+        fit, apply: references to the dataclasses of its options, a `FitOptions` and an `ApplyOptions`.
+        texture: reference to its `Texture`.
+        animate: reference to the options of `mitex animate`, for textures that grow or change.
+        demo: reference to the options of `mitex demo`, for the method that it shows.
+        tensors: names of the tensors in weights of the authors', which say nothing else of their method.
+        baseline: it is there to be compared with.
+    """
+
+    name: str
+    title: str
+    presets: str
+    fit: str
+    apply: str
+    texture: str
+    animate: str | None = None
+    demo: str | None = None
+    tensors: frozenset[str] = frozenset()
+    baseline: bool = False
+
+    def load_presets(self) -> Mapping[str, FitConfig]:
+        return load(self.presets)
+
+    def load_fit(self) -> type[FitOptions]:
+        return load(self.fit)
+
+    def load_apply(self) -> type[ApplyOptions]:
+        return load(self.apply)
+
+    def load_texture(self) -> type[Texture]:
+        return load(self.texture)
+
+    def recognises(self, tensors: frozenset[str], metadata: Mapping[str, str]) -> bool:
+        """Whether a safetensors file with these tensors and metadata is one of this method's.
+
+        A model file's format is mitex-METHOD-VERSION; a checkpoint names its method.
+        """
+        if "task.method" in metadata:
+            return metadata["task.method"] == self.name
+        if metadata.get("format", "").startswith("mitex-"):
+            return metadata["format"].removeprefix("mitex-").rpartition("-")[0] == self.name
+        return bool(self.tensors) and tensors == self.tensors

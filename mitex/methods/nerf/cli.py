@@ -1,0 +1,118 @@
+"""The command-line options of radiance-field textures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import arg
+
+from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
+from mitex.methods.options import PICTURES, MeshOptions, TrainingOptions
+
+if TYPE_CHECKING:
+    from mitex.methods.nerf.applied import AppliedTexture
+
+SIZE = 2048  # of the synthesized texture [texels]
+RESOLUTION = 512  # of a picture [pixels]
+
+
+@dataclass(kw_only=True)
+class Fit(TrainingOptions):
+    """Capture a texture with its meso-structure from photos (NeRF-Texture).
+
+    The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the texture;
+    `mitex apply RUN --mesh MESH --out ASSET` puts it on any mesh. Ctrl-C saves, and --resume goes on.
+
+    examples:
+      mitex fit nerf --capture durian/
+      mitex fit nerf --capture durian/ --base-mesh ellipsoid.obj --out runs/durian
+      mitex fit nerf --capture durian/ --out runs/durian --resume
+    """
+
+    capture: Annotated[Path, arg(metavar="DIR")]
+    """Folder with transforms.json and photos with masks (alpha), or with plain photos."""
+
+    preset: Annotated[str | None, arg(metavar="fast|paper", help_behavior_hint="(default: fast)")] = None
+    """Settings to start from: `fast`, or `paper`, which follows the publication."""
+
+    base_mesh: Annotated[str | None, arg(metavar="MESH", help_behavior_hint="(default: found)")] = None
+    """The shape without its texture, in the cameras' world."""
+
+    def run(self) -> None:
+        options = self.run_options()
+        from mitex.runtime import yield_cores
+
+        yield_cores()
+        from mitex.methods import nerf
+
+        capture = nerf.load_capture(self.capture)
+        out = self.folder(capture.name)
+        nerf.fit(capture, out, base_mesh=self.base_mesh, **options)
+        print(out)
+
+
+@dataclass(kw_only=True)
+class Apply(MeshOptions):
+    """Put a captured texture in the shell of a mesh: a picture (.png .jpg), or what is solid as a mesh.
+
+    examples:
+      mitex apply runs/durian --mesh bunny.obj --out bunny.png
+      mitex apply runs/durian --mesh bunny.obj --out bunny.glb --scale 0.5
+      mitex apply runs/grass --mesh hill.obj --out hill.png --guide path.png --scale 0.1
+    """
+
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Random seed: another seed, another variant of the texture."""
+
+    scale: Annotated[float, arg(metavar="X")] = 1.0
+    """Size of the texture's elements."""
+
+    size: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {SIZE})")] = None
+    """Side of the synthesized texture [texels]."""
+
+    density: Annotated[float, arg(metavar="X")] = 1.0
+    """Factor of the density; more makes thin parts solid."""
+
+    lift: Annotated[float, arg(metavar="X")] = 1.0
+    """1 stands the texture on the mesh, 0 carves it in, as it was captured."""
+
+    guide: Annotated[Path | None, arg(metavar="IMAGE", help_behavior_hint="")] = None
+    """A picture over the mesh's UVs that the texture resembles from afar; --scale says how small the
+    texture's elements are, and so how fine the picture."""
+
+    resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {RESOLUTION})")] = None
+    """Side of a picture [pixels]."""
+
+    def check(self) -> None:
+        in_range("--seed", self.seed, *SEEDS)
+        in_range("--scale", self.scale, 0.05, 20.0)
+        in_range("--resolution", self.resolution, 64, 8192)
+        in_range("--size", self.size, 128, 8192)
+        in_range("--density", self.density, 0.001, 1000.0)
+        in_range("--lift", self.lift, 0.0, 1.0)
+        mutually_exclusive("--size", "--guide", self.size is not None and self.guide is not None)
+
+    def check_output(self, out: Path) -> None:
+        picture = out.suffix.lower() in PICTURES
+        reject_unused("--resolution", out, self.resolution is not None and not picture)
+
+    def picture_options(self) -> dict[str, object]:
+        return {"resolution": self.resolution or RESOLUTION}
+
+    def applied(self, out: Path) -> AppliedTexture:
+        from mitex.images import read_image
+        from mitex.mesh import Mesh
+        from mitex.methods.nerf import NerfTexture
+
+        mesh, texture = Mesh.load(self.mesh), NerfTexture.load(self.model)
+        return texture.apply(
+            mesh,
+            size=self.size or SIZE,
+            seed=self.seed,
+            scale=self.scale,
+            density=self.density,
+            lift=self.lift,
+            guide=None if self.guide is None else read_image(self.guide),
+        )

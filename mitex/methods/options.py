@@ -1,0 +1,137 @@
+"""The command-line options that methods share; each method's own are in its `cli.py`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, UseAppendAction, arg
+
+from mitex.methods.checks import SEEDS, in_range, merged_settings
+from mitex.training.settings import RunOptions
+
+if TYPE_CHECKING:
+    from mitex.methods.interface import Applied
+
+EXPORTS = (".glb", ".obj", ".ply", ".exr")
+PICTURES = (".png", ".jpg", ".jpeg")
+
+
+@dataclass(kw_only=True)
+class FitOptions:
+    """Options of every `mitex fit METHOD`."""
+
+    out: Annotated[Path | None, arg(metavar="RUN", help_behavior_hint="(default: a folder in runs/)")] = None
+    """Run folder."""
+
+    preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
+    """Settings to start from."""
+
+    config: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None
+    """TOML file with any of the settings, or a run's config.toml."""
+
+    set: Annotated[
+        tuple[tuple[str, ...], ...],
+        UseAppendAction,
+        arg(metavar="KEY=VALUE ...", help_behavior_hint="(repeatable)"),
+    ] = ()
+    """Any setting."""
+
+    settings: Annotated[bool, arg(help_behavior_hint="")] = False
+    """List the settings with their meaning, values in the preset and ranges, and do nothing else."""
+
+    seed: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the preset's)")] = None
+    """Random seed."""
+
+    quiet: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Show no progress."""
+
+    def run(self) -> None:
+        """Fits, and prints the run folder."""
+        raise NotImplementedError
+
+    def run_options(self, **flags: object) -> RunOptions:
+        """Checks the seed; what every `fit` takes, with further `flags` as settings."""
+        in_range("--seed", self.seed, *SEEDS)
+        return RunOptions(
+            preset=self.preset,
+            config=self.config,
+            overrides=merged_settings(self.set, seed=self.seed, **flags),
+            quiet=self.quiet,
+        )
+
+    def folder(self, name: str) -> Path:
+        """The run folder: --out, else one of that name in runs/."""
+        return self.out or Path("runs") / name
+
+
+@dataclass(kw_only=True)
+class TrainingOptions(FitOptions):
+    """Options of the methods that train step by step."""
+
+    resume: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Go on from the run's checkpoint."""
+
+    steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the preset's)")] = None
+    """Training steps."""
+
+    def run_options(self, **flags: object) -> RunOptions:
+        in_range("--steps", self.steps, 1)
+        return {**super().run_options(steps=self.steps, **flags), "resume": self.resume}
+
+
+@dataclass(kw_only=True)
+class ExemplarOptions(TrainingOptions):
+    """Options of the methods that learn from images."""
+
+    exemplar: Annotated[str, arg(metavar="IMAGE|DIR|NAME")]
+    """PNG or JPEG, a folder with any of albedo, height, normal, roughness, ambient_occlusion, or a name."""
+
+
+@dataclass(kw_only=True)
+class ApplyOptions:
+    """Options of every `mitex apply RUN|MODEL`."""
+
+    model: Annotated[Positional[str], arg(metavar="RUN|MODEL")]
+    """Run folder, model file, or name of a bundled model (see `mitex models`)."""
+
+    out: Annotated[Path, arg(metavar="ASSET|PICTURE")]
+    """File to write: .glb (PBR textures), .obj (with .mtl and PNG maps), .ply (vertex colours), .exr (the
+    maps as layers), or a picture (.png .jpg)."""
+
+    def run(self) -> None:
+        """Applies the texture, writes the file, and prints its path."""
+        self.check()
+        from mitex.paths import prepare_output
+
+        out = prepare_output(self.out, EXPORTS + PICTURES)
+        self.check_output(out)
+        applied = self.applied(out)
+        if out.suffix.lower() in PICTURES:
+            applied.render(out, **self.picture_options())
+        else:
+            applied.export(out)
+        print(self.out)
+
+    def check(self) -> None:
+        """Refuses values out of range, before anything is read."""
+
+    def check_output(self, out: Path) -> None:
+        """Refuses options that mean nothing for a file of this suffix."""
+
+    def picture_options(self) -> dict[str, object]:
+        """Options of `Applied.render`."""
+        return {}
+
+    def applied(self, out: Path) -> Applied:
+        """The texture on the mesh, as `out` needs it."""
+        raise NotImplementedError
+
+
+@dataclass(kw_only=True)
+class MeshOptions(ApplyOptions):
+    """Options of the methods that put a texture on a mesh of the user's."""
+
+    mesh: Annotated[str, arg(metavar="MESH|NAME")]
+    """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""

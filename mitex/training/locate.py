@@ -1,0 +1,56 @@
+"""Finding the files of a model by its name, and reading what they say of themselves, without torch."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+
+from safetensors import SafetensorError, safe_open
+
+from mitex.errors import CheckpointError
+
+NAME = "texture.safetensors"  # the result of a fit, in its run folder
+CHECKPOINT = "checkpoint.safetensors"
+PREVIOUS = "checkpoint.previous.safetensors"
+BUNDLED = Path(__file__).parents[1] / "data" / "models"
+
+
+def bundled_files() -> dict[str, Path]:
+    """The models that ship with Mitex: name -> file."""
+    return {path.stem: path for path in sorted(BUNDLED.glob("*.safetensors"))}
+
+
+def locate(source: str | Path) -> list[Path]:
+    """The files of a model: a run folder's texture and checkpoints, a file, or the bundled one of that name.
+
+    Raises:
+        CheckpointError: there is none.
+    """
+    path = Path(source).expanduser()
+    try:
+        if path.is_dir():
+            files = [path / name for name in (NAME, CHECKPOINT, PREVIOUS) if (path / name).is_file()]
+            if not files:
+                raise CheckpointError(
+                    f"there is no model in '{source}'", "name a run folder that has a checkpoint"
+                )
+            return files
+        if path.is_file():
+            return [path]
+    except (OSError, ValueError) as e:  # ValueError: a null byte in the name
+        raise CheckpointError(f"cannot read '{source}' ({e})", "name a model, a file or a run folder") from e
+    bundled = bundled_files()
+    if str(source) in bundled:
+        return [bundled[str(source)]]
+    close = difflib.get_close_matches(str(source), bundled, 1)
+    remedy = f"did you mean {close[0]}?" if close else f"use a path, or one of {', '.join(bundled) or 'none'}"
+    raise CheckpointError(f"there is no model '{source}'", remedy)
+
+
+def header(file: Path) -> tuple[frozenset[str], dict[str, str]] | None:
+    """Names of the tensors and metadata of a safetensors file; None if it is none."""
+    try:
+        with safe_open(file, "np") as content:
+            return frozenset(content.keys()), content.metadata() or {}
+    except (SafetensorError, OSError, ValueError):
+        return None

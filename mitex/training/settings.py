@@ -1,0 +1,133 @@
+"""Settings of a fit: what every fit is told, and configs whose keys say what they mean and take."""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Sequence
+from dataclasses import Field, dataclass, field, fields
+from pathlib import Path
+from typing import Any, Literal, TypedDict, get_args, get_origin
+
+from mitex.errors import ConfigError
+from mitex.training import values
+
+MOST_SEEDS = 2**32 - 1
+
+
+class RunOptions(TypedDict, total=False):
+    """What every `fit` takes beside what it learns from.
+
+    Attributes:
+        preset: Name of the preset to start from; the first one if None.
+        config: TOML file with any of the settings, or a run's config.toml.
+        overrides: `key=value` strings, for any key.
+        resume: Go on from the run's checkpoint, with its config as far as no other is given.
+        quiet: Show no progress.
+    """
+
+    preset: str | None
+    config: Path | None
+    overrides: Sequence[str]
+    resume: bool
+    quiet: bool
+
+
+def key(default: Any, meaning: str, low: float | None = None, high: float | None = None) -> Any:
+    """A key of a config, to be used as a dataclass field's default.
+
+    Args:
+        default: Its value in the default preset.
+        meaning: A phrase for `--settings`, with units in brackets.
+        low, high: Inclusive bounds of a number, or of every number of a tuple; None leaves a side open.
+    """
+    return field(default=default, metadata={"meaning": meaning, "range": (low, high)})
+
+
+@dataclass(frozen=True)
+class FitConfig:
+    """What every method's config has; a default-constructed one is the method's default preset.
+
+    A method's config extends it with keys of its own, and may give these other defaults, whose meaning and
+    range stay. `Literal` annotations are the choices of a key.
+
+    Raises:
+        ConfigError: A value is out of its range or none of the choices.
+    """
+
+    preset: str = key("default", "the preset that the settings started from")
+    seed: int = key(0, "of all randomness", 0, MOST_SEEDS)
+
+    def __post_init__(self) -> None:
+        kinds = typing.get_type_hints(type(self))
+        for one in fields(self):
+            value = getattr(self, one.name)
+            _check_choice(one.name, value, kinds[one.name])
+            _check_range(one.name, value, *bounds(type(self), one))
+
+
+@dataclass(frozen=True)
+class TrainingConfig(FitConfig):
+    """What the configs of methods have that train step by step."""
+
+    steps: int = key(1000, "training steps", 1)
+    checkpoint_every: int = key(100, "steps between two checkpoints", 1)
+    preview_every: int = key(100, "steps between two previews; 0 makes none", 0)
+
+
+def meaning(config: type[FitConfig], one: Field) -> str:
+    """The phrase that explains a key."""
+    return _metadata(config, one)["meaning"]
+
+
+def bounds(config: type[FitConfig], one: Field) -> tuple[float | None, float | None]:
+    """Inclusive bounds of a key's numbers."""
+    return _metadata(config, one)["range"]
+
+
+def table(config: FitConfig) -> str:
+    """The text of `--settings`: a line for each key, with its value in this config, its range and meaning."""
+    rows = []
+    kinds = typing.get_type_hints(type(config))
+    for one in fields(config):
+        value = getattr(config, one.name)
+        shown = ",".join(map(str, value)) if isinstance(value, tuple) else str(value).lower()
+        allowed = _allowed(kinds[one.name], *bounds(type(config), one))
+        rows.append((f"{one.name} = {shown}", allowed, meaning(type(config), one)))
+    width = min(max(len(row[0]) for row in rows), 30)
+    return "\n".join(
+        f"{setting:{width}}  {text}{f' ({allowed})' if allowed else ''}" for setting, allowed, text in rows
+    )
+
+
+def _metadata(config: type, one: Field) -> Any:
+    """The metadata of a key, which a class that only gives it another default inherits."""
+    for base in config.__mro__:
+        known = vars(base).get("__dataclass_fields__", {}).get(one.name)
+        if known is not None and known.metadata:
+            return known.metadata
+    raise TypeError(f"{config.__name__}.{one.name} is not declared with `key`")
+
+
+def _check_choice(name: str, value: Any, kind: Any) -> None:
+    if get_origin(kind) is Literal and value not in get_args(kind):
+        raise ConfigError(f"{name} = '{value}' is unknown", f"give {values.describe(kind)}")
+
+
+def _check_range(name: str, value: Any, low: float | None, high: float | None) -> None:
+    for number in value if isinstance(value, tuple) else (value,):
+        if not isinstance(number, int | float):
+            continue
+        if (low is not None and number < low) or (high is not None and number > high):
+            raise ConfigError(f"{name} = {number} is out of range", f"choose {_range(low, high)}")
+
+
+def _allowed(kind: Any, low: float | None, high: float | None) -> str:
+    if get_origin(kind) is Literal:
+        return ", ".join(map(str, get_args(kind)))
+    return _range(low, high) if (low, high) != (None, None) else ""
+
+
+def _range(low: float | None, high: float | None) -> str:
+    if low is not None and high is not None:
+        return f"from {low} to {high}"
+    return f"{low} or more" if high is None else f"{high} or less"

@@ -1,0 +1,61 @@
+"""A tiny fit of each method, as words of the command line: what the contract test runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.cli import bad_files as bad
+
+
+@dataclass(frozen=True)
+class TinyFit:
+    """Words after `mitex fit METHOD`, and after `mitex apply RUN`.
+
+    Attributes:
+        fit: what is learned, and settings that make it quick.
+        apply: on which mesh, and options that make it quick.
+        resume: words with which the fit is resumed; empty if the method does not train.
+    """
+
+    fit: str
+    apply: str
+    resume: str = "--resume --steps 3"
+
+
+SMALL_RUN = "checkpoint_every=1 preview_every=0"
+RADIANCE = "base_steps=150 rays=512 table=11 coarsest=8 finest=32 occupancy=32"
+FITS = {
+    "checkerboard": TinyFit("--exemplar lava --steps 2", "--mesh cube.obj --offset 0.5"),
+    "nca": TinyFit(
+        "--exemplar photo.png --steps 2 --set frequency=4 pool=1 view_count=1 resolution=32 target_size=32 "
+        f"exemplar_size=32 hidden=8 min_steps=2 max_steps=2 layers=relu1_1 {SMALL_RUN}",
+        "--mesh cube.obj --subdivide 1 --steps 2 --resolution 64",
+    ),
+    "surface": TinyFit(
+        "--exemplar photo.png --mesh cube.obj --steps 2 --set resolution=32 exemplar_size=32 scales=0 "
+        f"layers=relu1_1 {SMALL_RUN}",
+        "--mesh cube.obj",
+    ),
+    "geometric": TinyFit(
+        f"--reference cube.obj --steps 2 --set level_steps=2 fit_steps=10 fit_samples=100 {SMALL_RUN}",
+        "--mesh cube.obj --start-level 0",
+    ),
+    "nerf": TinyFit(
+        f"--capture photos --base-mesh base.obj --steps 2 --set ray_steps=96 {RADIANCE} {SMALL_RUN}",
+        "--mesh ball.obj --size 128",
+    ),
+    "displacement": TinyFit("--reference spikes --set resolution=16", "--mesh cube.obj", resume=""),
+}
+
+
+def prepare(folder: Path) -> None:
+    """Writes the files that the words name."""
+    from tests.cli.test_nerf import holed, icosphere, save
+    from tests.methods.nerf.capture.test_capture import write
+
+    bad.text(folder / "cube.obj", bad.CUBE)
+    bad.image(folder / "photo.png")
+    save(holed(), folder / "base.obj")
+    save(icosphere(6), folder / "ball.obj")
+    write(folder / "photos", 16)
