@@ -60,7 +60,7 @@ def _scale():
 
 @pytest.mark.parametrize("preset", ["patch", "paper"])
 def test_loss_of_an_albedo(exemplar, network, preset):
-    settings = config("samples=4096", "views=patch", "colour_histogram=false", preset=preset)
+    settings = config("samples=4096", "views=patch", "colour_weight=3", preset=preset)
     appearance = _appearance(exemplar, network, settings, ["albedo"])
     assert appearance.channels.tolist() == [0, 1, 2]
     views = _views(3, 3)
@@ -130,14 +130,16 @@ def test_randomness_is_the_generators(exemplar, network):
 
 
 def test_a_sample_estimates_the_whole(exemplar, network):
-    """Each side draws its own places, so a sample of the exemplar against itself costs a little."""
-    whole, part = (
-        _appearance(exemplar, network, config(f"samples={n}", "blend=false", "colour_weight=1"))
-        for n in (4096, 512)
-    )
+    """From above: of fewer vectors, the nearest is farther."""
     views = _views(4, 8)
-    everything = whole(views, torch.Generator().manual_seed(0)).item()
-    assert part(views, torch.Generator().manual_seed(0)).item() == pytest.approx(everything, rel=0.1)
+    whole, half, quarter = (
+        _appearance(exemplar, network, config(f"samples={n}", "blend=false"))(
+            views, torch.Generator().manual_seed(0)
+        ).item()
+        for n in (4096, 512, 256)
+    )
+    assert 1.01 * whole < half < 1.2 * whole
+    assert half < quarter < 1.5 * whole
 
 
 def test_places_do_not_repeat():
