@@ -14,17 +14,17 @@ from scipy.spatial.transform import Rotation
 
 from mitex.asset import Asset
 from mitex.errors import CheckpointError, ConfigError, MeshError, OutputError
+from mitex.evaluation.metrics import psnr
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nerf import PRESETS, NerfTexture, files, fit
-from mitex.methods.nerf.base_shape import face_frames
-from mitex.methods.nerf.light_estimate import estimated_light
-from mitex.methods.nerf.pixels import Pixels
-from mitex.methods.nerf.projection import Projection
-from mitex.methods.nerf.radiance import look
-from mitex.methods.nerf.shell import Located
-from mitex.methods.nerf.task import BURIED, POSE, TextureTask
-from mitex.methods.nerf.tensors import rows
-from mitex.metrics import psnr
+from mitex.methods.nerf.base.base_shape import face_frames
+from mitex.methods.nerf.capture.pixels import Pixels
+from mitex.methods.nerf.field.projection import Projection
+from mitex.methods.nerf.field.rendering import render_batch
+from mitex.methods.nerf.field.shell import ShellCoords
+from mitex.methods.nerf.field.tensors import rows
+from mitex.methods.nerf.training.light_estimate import estimated_light
+from mitex.methods.nerf.training.task import BURIED, POSE, TextureTask
 from mitex.runtime import init
 from mitex.training import checkpoint
 from mitex.training.config import resolve
@@ -39,7 +39,7 @@ def test_the_loss_falls_and_the_run_folder_is_whole(run):
     lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
     colour = [line["colour"] for line in lines]
     assert len(lines) == 160 and np.mean(colour[-20:]) < 0.5 * np.mean(colour[:20])
-    assert {"normals", "clusters", "inside", "samples"} <= lines[-1].keys()
+    assert {"normals", "clusters", "interior", "samples"} <= lines[-1].keys()
     assert (run / NAME).is_file() and len(list((run / "previews").glob("*.png"))) == 1
 
 
@@ -47,7 +47,7 @@ def test_a_held_out_view_looks_like_its_photo(texture):
     _, held = tiny_capture().split()
     batch, shape = Pixels(held).image(0, 48)
     photo = (batch.colours * batch.alpha + 1 - batch.alpha).numpy()
-    found = look(texture.shell, batch)
+    found = render_batch(texture.shell, batch)
     quality = psnr(found.reshape(*shape, 3), photo.reshape(*shape, 3))
     assert quality > 17
     assert quality > 3 + psnr(np.ones_like(photo).reshape(*shape, 3), photo.reshape(*shape, 3))
@@ -171,7 +171,7 @@ def test_a_resumed_run_continues_as_if_it_had_not_stopped(run, tmp_path, base, m
 
 
 def small_task(base: Mesh, **more) -> TextureTask:
-    small = dict(rays=512, table=12, coarsest=8, finest=16, occupancy=32, cells=128)
+    small = dict(rays=512, table=12, coarsest=8, finest=16, occupancy=32, ray_steps=128)
     settings = replace(PRESETS["fast"], **small, **more)
     capture = tiny_capture()
     return TextureTask(settings, capture, (capture, 0), Projection(base, reach=0.12), face_frames(base), 0.12)
@@ -182,9 +182,9 @@ def test_fine_normals_start_near_those_of_the_faces(base):
     task = small_task(base)
     latents, decoder, _ = task.model(task.named, packed=True)
     points = (base.vertices[base.faces].mean(1) * 1.02).astype(np.float32)
-    located = Located.of(task.projection(points))
-    normal = decoder(*latents(located), located.distance).normal(*latents.frame(located))
-    cosine = (rows(normal) * base.face_normals[np.array(located.face)]).sum(1)
+    coords = ShellCoords.of(task.projection(points))
+    normal = decoder(*latents(coords), coords.distance).normal(*latents.frame(coords))
+    cosine = (rows(normal) * base.face_normals[np.array(coords.face)]).sum(1)
     assert cosine.min() > np.cos(np.radians(3.0))
 
 
@@ -242,9 +242,9 @@ def trained_task(run, base: Mesh, capture, setting: str) -> TextureTask:
 def test_the_inside_learns_from_the_surface_and_not_the_surface_from_it(run, base):
     gradients = []
     for weight in (0.0, 1.0):
-        task = trained_task(run, base, tiny_capture(), f"inside={weight}")
+        task = trained_task(run, base, tiny_capture(), f"interior_weight={weight}")
         loss, record = task.loss(task.config.steps, torch.Generator().manual_seed(0))
-        assert record.get("inside", 0.0) > 0 or not weight
+        assert record.get("interior", 0.0) > 0 or not weight
         gradients.append(torch.autograd.grad(loss, [task.named["tables/f"], task.named["weights/4"]]))
     (features, reflection), (features_too, reflection_too) = gradients
     scale = float(features.abs().max())
@@ -253,27 +253,29 @@ def test_the_inside_learns_from_the_surface_and_not_the_surface_from_it(run, bas
 
 
 def test_an_inside_that_looks_as_the_surface_costs_nothing(run, base):
-    task = trained_task(run, base, tiny_capture(), "inside=1.0")
+    task = trained_task(run, base, tiny_capture(), "interior_weight=1.0")
     with torch.no_grad():
         task.named["weights/4"].zero_()  # the last of the reflection's: all is grey
     _, record = task.loss(task.config.steps, torch.Generator().manual_seed(0))
-    assert record["inside"] == 0
+    assert record["interior"] == 0
     _, early = task.loss(0, torch.Generator().manual_seed(0))
-    assert "inside" not in early
+    assert "interior" not in early
 
 
 def test_buried_is_what_has_matter_above_and_beside_it(run, base):
     """In matter that ends at the base shape and at x = 0.1: near either of them a photo may see it."""
-    task = trained_task(run, base, tiny_capture(), "inside=1.0")
+    task = trained_task(run, base, tiny_capture(), "interior_weight=1.0")
     reach = BURIED * task.thickness
     x, distance = [0, 0, 0, 0.1 - 0.9 * reach, 0.1 - 1.5 * reach], [0.5, -0.9, -1.1, -1.1, -1.1]
     up = mi.Vector3f(0, 0, mi.Float([1] * 5))
-    here = Located(mi.Point3f(mi.Float(x), 0, 0), reach * mi.Float(distance), mi.UInt32(0), mi.Point2f(0), up)
+    here = ShellCoords(
+        mi.Point3f(mi.Float(x), 0, 0), reach * mi.Float(distance), mi.UInt32(0), mi.Point2f(0), up
+    )
 
     def exponent(f, distance):
         return dr.select((f[0] < 0.1) & (distance < 0), 12.0, -12.0)
 
-    latents: Any = SimpleNamespace(features=lambda located: [located.foot.x])
+    latents: Any = SimpleNamespace(features=lambda coords: [coords.foot.x])
     decoder: Any = SimpleNamespace(exponent=exponent)
     buried = np.array(task._buried(latents, decoder, here))
     np.testing.assert_allclose(buried, [0, 0, 1, 0, 1], atol=1e-3)
