@@ -38,7 +38,8 @@ def build(exemplar):
 
 def _loss(task, step=1, seed=0):
     """(total, parts) of one step; step 1 does not inject the seed."""
-    return task.loss(step, torch.Generator().manual_seed(seed))
+    result = task.loss(step, torch.Generator().manual_seed(seed))
+    return result.value, result.metrics
 
 
 def _appearance(task, seed=0):
