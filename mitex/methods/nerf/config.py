@@ -38,8 +38,8 @@ class NerfConfig(TrainingConfig):
     normals: float = key(0.05, "weight of the normal loss", 0)
     interior_weight: float = key(
         0.01,
-        "weight of the loss that gives what is hidden the reflectance above it, in the second half; the "
-        "paper: 0, and where a shell is cut any colour is seen",
+        "weight of the loss that gives the unseen interior the reflectance above it, in the second half; "
+        "the paper: 0, and where a shell is cut any colour shows",
         0,
     )
     cluster_entries: int = key(1 << 14, "entries of a level clustered in a step; 0 for all (the paper)", 0)

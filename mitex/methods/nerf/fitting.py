@@ -31,7 +31,7 @@ def fit(
 ) -> NerfTexture:
     """Learns a surface with its meso-structure from photos; writes a run folder with the model in it.
 
-    Every eighth view is held out; previews show the first of these. The base shape is found first and mean in
+    Every eighth view is held out; previews show the first of these. The base shape is made first and kept in
     the user's cache folder.
 
     Args:
