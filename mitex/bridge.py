@@ -82,7 +82,7 @@ def render(
         targets, tensors = [_only_field(scene, integrator)], [values]
     else:
         table = _parameters(scene, integrator)
-        targets, tensors = [_found(table, name) for name in values], list(values.values())
+        targets, tensors = [_parameter(table, name) for name in values], list(values.values())
     for target, tensor in zip(targets, tensors, strict=True):
         target.check(tensor)
 
@@ -144,11 +144,11 @@ class _Target:
 
     def assign(self, array: Any) -> None:
         """Sets the parameter from an `mi.TensorXf`."""
-        kind = type(self.params[self.key])
-        if dr.depth_v(kind) > 1:
-            array = dr.unravel(kind, array.array)
-        elif not dr.is_tensor_v(kind):
-            array = kind(array.array)
+        array_type = type(self.params[self.key])
+        if dr.depth_v(array_type) > 1:
+            array = dr.unravel(array_type, array.array)
+        elif not dr.is_tensor_v(array_type):
+            array = array_type(array.array)
         self.params[self.key] = array
         self.params.update()
 
@@ -163,7 +163,7 @@ def _parameters(scene: Any, integrator: Any) -> dict[str, _Target]:
     return table
 
 
-def _found(table: Mapping[str, _Target], name: str) -> _Target:
+def _parameter(table: Mapping[str, _Target], name: str) -> _Target:
     if name not in table:
         close = difflib.get_close_matches(name, table, n=1)
         remedy = f"did you mean '{close[0]}'?" if close else "print(mi.traverse(scene)) lists all"

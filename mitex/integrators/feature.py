@@ -165,37 +165,37 @@ class FeatureMethods:
         """The textures that are imaged, as (shape, texture) pairs; a shape of None stands for all shapes."""
         if self.field is not None:
             return [(None, self.field)]
-        found = [(shape, textures_named(shape, self.name)) for shape in scene.shapes()]
-        pairs = [(shape, textures[0]) for shape, textures in found if textures]
+        named = ((shape, textures_named(shape, self.name)) for shape in scene.shapes())
+        pairs = [(shape, textures[0]) for shape, textures in named if textures]
         if not pairs:
             raise RuntimeError(f"feature: no shape of the scene has a texture called '{self.name}'")
         return pairs
 
     def _backgrounds(self, channels: int) -> list[Any]:
-        given = dr.width(self.background)
-        if given not in (1, channels):
+        count = dr.width(self.background)
+        if count not in (1, channels):
             raise RuntimeError(
-                f"feature: 'background' has {given} values for {channels} channels; give 1 or {channels}"
+                f"feature: 'background' has {count} values for {channels} channels; give 1 or {channels}"
             )
-        return [dr.gather(mi.Float, self.background, c if given > 1 else 0) for c in range(channels)]
+        return [dr.gather(mi.Float, self.background, c if count > 1 else 0) for c in range(channels)]
 
 
 def textures_named(thing: Any, name: str) -> list[Any]:
     """Textures with the parameter name `name` in a shape or BSDF or nested in it, outermost first."""
-    found: list[Any] = []
+    textures: list[Any] = []
     nested: list[Any] = []
 
     class Callback(mi.TraversalCallback):
         def put(self, key: str, value: Any, *_flags: Any) -> None:
             if isinstance(value, mi.Texture) and key == name:
-                found.append(value)
+                textures.append(value)
             elif isinstance(value, mi.BSDF):
                 nested.append(value)
 
     thing.traverse(Callback())
     for child in nested:
-        found += textures_named(child, name)
-    return found
+        textures += textures_named(child, name)
+    return textures
 
 
 def _evaluate(texture: Any, si: Any, active: Any) -> list[Any]:
@@ -224,8 +224,8 @@ def _first_hits(scene: Any, sensor: Any, n: int) -> Any:
     y = mi.Float(pixel // width) + (mi.Float(sample // n) + 0.5) / n
     position = mi.Point2f(x / width, y / height)
     ray, _ = sensor.sample_ray(sensor.shutter_open(), 0.5, position, mi.Point2f(0.5))
-    found = scene.ray_intersect_preliminary(ray, coherent=True)
-    return found.compute_surface_interaction(ray, mi.RayFlags.All | mi.RayFlags.DetachShape, found.is_valid())
+    hit = scene.ray_intersect_preliminary(ray, coherent=True)
+    return hit.compute_surface_interaction(ray, mi.RayFlags.All | mi.RayFlags.DetachShape, hit.is_valid())
 
 
 def register() -> None:
