@@ -1,8 +1,8 @@
 """`shell_field`: a volume that carries a radiance field, for the `shell` integrator.
 
 Mitsuba 3.9 registers no Python volumes, so a `shell_field` is not named in a scene's dictionary: it is made
-by `shell_field(...)` and given to the integrator as an object. That keeps the field's arrays as they are; as
-the integrator's parameters they would have to be named and copied one by one.
+by `shell_field(...)` and given to the integrator as an object. The parameters of a `DifferentiableField`
+are then those of the scene: `mi.traverse` lists them, and images have derivatives to them.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mitex.integrators.march import Composite, RadianceField, composite
+from mitex.integrators.march import Composite, DifferentiableField, RadianceField, composite
 from mitex.mesh import Similarity
 from mitex.runtime import load_mitsuba
 from mitex.textures.variant import for_variant
@@ -75,9 +75,13 @@ class ShellFieldMethods:
         return total
 
     def traverse(self, callback: Any) -> None:
-        parameters = getattr(self.field, "parameters", None)
-        for name, value in (parameters() if parameters else {}).items():
-            callback.put(name, value, mi.ParamFlags.Differentiable)
+        if isinstance(self.field, DifferentiableField):
+            for name, value in self.field.parameters().items():
+                callback.put(name, value, mi.ParamFlags.Differentiable)
+
+    def parameters_changed(self, keys: Any = ()) -> None:
+        if isinstance(self.field, DifferentiableField):
+            self.field.parameters_changed()
 
     def to_string(self) -> str:
         return f"ShellField[\n  bbox = {self.bbox()},\n  step = {self.field.step}\n]"
