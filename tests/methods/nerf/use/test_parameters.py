@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,12 +12,11 @@ from mitex.mesh import Similarity, icosphere
 from mitex.methods.nerf import NerfTexture
 from mitex.methods.nerf.field.networks import LAYERS
 from mitex.runtime import init
+from mitex.runtime.jit import dr, mi
+from mitex.textures.shell_field import shell_field
 from tests.methods.nerf.small import small_maps, small_texture
 
-mi: Any = init()
-import drjit as dr  # noqa: E402
-
-from mitex.textures.shell_field import shell_field  # noqa: E402
+init()
 
 MATRICES = {f"weights.{name}.{k}" for name, widths in LAYERS.items() for k in range(len(widths) - 1)}
 SEED, SPP = 3, 4
