@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from mitex.runtime.jit import dr, mi
 
@@ -59,6 +59,19 @@ class RadianceField(Protocol):
     def evaluate(self, points: Any, view: Any) -> tuple[Any, Any, Any]:
         """Of N points, and the unit directions in which they are seen: ascending indices of those that have
         matter (M,), their density [1 / scene units] and colour `mi.Color3f`."""
+        ...
+
+
+@runtime_checkable
+class DifferentiableField(RadianceField, Protocol):
+    """A field with parameters that scenes list and change, and that images are differentiable in."""
+
+    def parameters(self) -> Mapping[str, Any]:
+        """Dr.Jit arrays by name, the same objects with each call: they are changed in place."""
+        ...
+
+    def parameters_changed(self) -> None:
+        """Takes over new values; RuntimeError if they cannot be used."""
         ...
 
 

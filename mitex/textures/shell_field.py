@@ -1,8 +1,8 @@
 """`shell_field`: a volume that carries a radiance field, for the `shell` integrator.
 
 Mitsuba 3.9 registers no Python volumes, so a `shell_field` is not named in a scene's dictionary: it is made
-by `shell_field(...)` and given to the integrator as an object. That keeps the field's arrays as they are; as
-the integrator's parameters they would have to be named and copied one by one.
+by `shell_field(...)` and given to the integrator as an object. The parameters of a `DifferentiableField`
+are then those of the scene: `mi.traverse` lists them, and images have derivatives to them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from mitex.mesh import Similarity
 from mitex.runtime.jit import dr, mi
-from mitex.textures.march import Composite, RadianceField, composite
+from mitex.textures.march import Composite, DifferentiableField, RadianceField, composite
 from mitex.textures.variant import for_variant, init_base
 
 CHUNK = 1 << 16  # rays that are marched at a time
@@ -72,9 +72,13 @@ class ShellFieldMethods:
         return total
 
     def traverse(self, callback: Any) -> None:
-        parameters = getattr(self.field, "parameters", None)
-        for name, value in (parameters() if parameters else {}).items():
-            callback.put(name, value, mi.ParamFlags.Differentiable)
+        if isinstance(self.field, DifferentiableField):
+            for name, value in self.field.parameters().items():
+                callback.put(name, value, mi.ParamFlags.Differentiable)
+
+    def parameters_changed(self, keys: Any = ()) -> None:
+        if isinstance(self.field, DifferentiableField):
+            self.field.parameters_changed()
 
     def to_string(self) -> str:
         return f"ShellField[\n  bbox = {self.bbox()},\n  step = {self.field.step}\n]"

@@ -34,6 +34,9 @@ class Ball:
     def parameters(self):
         return {"density": self.density}
 
+    def parameters_changed(self):
+        pass
+
     def evaluate(self, points, view):
         return self.found(dr.compress(dr.norm(points) < 0.5))
 
