@@ -1,6 +1,6 @@
 """How fast the field of a radiance texture is evaluated and trained.
 
-usage: python -m benchmarks.nerf [--quick] [--run RUN]
+repetition: python -m benchmarks.nerf [--quick] [--run RUN]
 
 Points per second through hash grids and networks, forwards, and forwards and backwards to tables and weights,
 by `drjit.nn` and by plain torch in the same run; and forwards as it is packed for pictures. RUN, a finished
@@ -26,10 +26,11 @@ from mitex.bridge import call
 from mitex.mesh import embedded
 from mitex.methods.nerf import NerfTexture
 from mitex.methods.nerf.config import PRESETS, NerfConfig
-from mitex.methods.nerf.field import Decoder, Encoding
-from mitex.methods.nerf.mlp import weight_bound
-from mitex.methods.nerf.networks import weight_shapes
-from mitex.methods.nerf.tensors import tensor
+from mitex.methods.nerf.field.decoder import Decoder
+from mitex.methods.nerf.field.encoding import Encoding
+from mitex.methods.nerf.field.mlp import weight_bound
+from mitex.methods.nerf.field.networks import weight_shapes
+from mitex.methods.nerf.field.tensors import tensor
 from mitex.render.shell import shell_still
 from mitex.runtime import bfloat16_is_fast, init, keep_freed_memory, modest_workers
 

@@ -1,4 +1,4 @@
-"""The field in plain torch: what `mitex.methods.nerf.field` is measured and tested against."""
+"""The field in plain torch: what `mitex.methods.nerf.field.decoder` is measured and tested against."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import Any
 import torch
 from torch.nn import functional as F
 
-from mitex.methods.nerf.field import DULL, Encoding, Reflection
-from mitex.methods.nerf.networks import COARSE
+from mitex.methods.nerf.field.decoder import DULL, Reflection
+from mitex.methods.nerf.field.encoding import Encoding
+from mitex.methods.nerf.field.networks import COARSE
 
 PRIMES = (1, 2654435761, 805459861)
 

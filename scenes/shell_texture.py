@@ -1,6 +1,6 @@
 """A captured texture on a vase, an automaton's texture on a mesh, and a ball of glass, in one picture.
 
-usage: python scenes/shell_texture.py RUN [OUT.png]
+repetition: python scenes/shell_texture.py RUN [OUT.png]
 
 RUN is a finished run of `mitex fit nerf`.
 """

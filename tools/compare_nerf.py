@@ -1,6 +1,6 @@
 """Compares captured textures with what the paper compares them with: tables, and sheets of pictures.
 
-usage: python tools/compare_nerf.py RUNS CAPTURES NAME ...
+repetition: python tools/compare_nerf.py RUNS CAPTURES NAME ...
 
 RUNS holds a finished run of `mitex fit nerf` for each NAME, CAPTURES its photos. Held-out views are compared
 with those of a plain field, trained for the same time into RUNS/plain-NAME (docs/gallery/nerf-views.jpg), and
@@ -14,16 +14,17 @@ from pathlib import Path
 
 import numpy as np
 
+from mitex.evaluation.views import view_quality
 from mitex.images import write_image
+from mitex.methods.baselines.elevations import compare_elevations
 from mitex.methods.baselines.plain_field import fit_plain
 from mitex.methods.nerf import PRESETS, NerfTexture, load_capture
-from mitex.methods.nerf.elevations import compare_elevations
-from mitex.methods.nerf.evaluation import view_pair, view_quality
+from mitex.methods.nerf.field.rendering import render_view, render_views
 from mitex.render import sheet
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 CELL = 320  # side of a picture [px]
-SHOWN = 8  # windows of each angle
+COLUMNS = 8  # windows of each angle
 
 
 def main() -> None:
@@ -33,20 +34,20 @@ def main() -> None:
         texture = NerfTexture.load(Path(runs) / name)
         capture = load_capture(Path(captures) / name).within(texture.similarity)
         elevations(name, texture, capture)
-        learned, held = capture.split()
+        training, held_out = capture.split()
         about = texture.model.about
         plain = fit_plain(
-            learned,
+            training,
             Path(runs) / f"plain-{name}",
             PRESETS[about["preset"]],
             about["seconds"],
-            (held, 0),
+            (held_out, 0),
             quiet=False,
         )
         fields = {"ours": texture.shell, "plain": plain.field(plain.mean)}
-        for word, field in fields.items():
-            print(f"{name}, {word}: {view_quality(field, held)}", flush=True)
-        pairs = [view_pair(field, held, 0) for field in fields.values()]
+        for label, field in fields.items():
+            print(f"{name}, {label}: {view_quality(render_views(field, held_out))}", flush=True)
+        pairs = [render_view(field, held_out, 0) for field in fields.values()]
         cells += [pairs[0][1], pairs[0][0], pairs[1][0]]
         labels += [f"{name}, held out", "NeRF-Texture", "plain, equal time"]
     write_image(GALLERY / "nerf-views.jpg", sheet(cells, columns=3, labels=labels, cell=CELL))
@@ -61,7 +62,7 @@ def elevations(name: str, texture: NerfTexture, capture) -> None:
         print(f"{row.angle:4.0f}  " + "  ".join(f"{d:.3f}" for d in distances), flush=True)
     ratio = np.mean([row.ours for row in table]) / np.mean([row.flat for row in table])
     print(f"{name}: ratio of the means {ratio:.2f}", flush=True)
-    picture = np.concatenate([row.picture[:, : SHOWN * row.picture.shape[0] // 4] for row in table])
+    picture = np.concatenate([row.picture[:, : COLUMNS * row.picture.shape[0] // 4] for row in table])
     write_image(GALLERY / f"nerf-elevations-{name}.jpg", picture)
 
 

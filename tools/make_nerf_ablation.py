@@ -1,6 +1,6 @@
 """Shows what the clustering loss does (section 4.5, figure 11).
 
-usage: python tools/make_nerf_ablation.py RUN CAPTURE WITHOUT
+repetition: python tools/make_nerf_ablation.py RUN CAPTURE WITHOUT
 
 RUN and WITHOUT are finished runs of `mitex fit nerf` on CAPTURE, the second one with `--set clustering=0`.
 docs/gallery/nerf-clustering.jpg has a row for each: the first three principal components of synthesized
@@ -17,13 +17,13 @@ import numpy as np
 from make_nerf_gallery import CELL, GALLERY, picture, plane
 
 from mitex.images import write_image
+from mitex.methods.baselines.elevations import compare_elevations
 from mitex.methods.nerf import NerfTexture, load_capture
-from mitex.methods.nerf.elevations import compare_elevations
-from mitex.methods.nerf.networks import FEATURES
+from mitex.methods.nerf.field.networks import FEATURES
 from mitex.render import sheet
 
 SIZE = 512  # of the maps that are shown [texels]
-SHOWN = 3.0  # standard deviations of a component that span its colour
+SPAN = 3.0  # standard deviations of a component that span its colour
 
 
 def components(features: np.ndarray) -> np.ndarray:
@@ -31,9 +31,9 @@ def components(features: np.ndarray) -> np.ndarray:
     flat = features.reshape(-1, features.shape[2]).astype(np.float64)
     flat = flat - flat.mean(0)
     _, axes = np.linalg.eigh(np.cov(flat.T))
-    found = flat @ axes[:, :-4:-1]
+    values = flat @ axes[:, :-4:-1]
     return (
-        (0.5 + found / (SHOWN * found.std(0))).clip(0, 1).reshape(*features.shape[:2], 3).astype(np.float32)
+        (0.5 + values / (SPAN * values.std(0))).clip(0, 1).reshape(*features.shape[:2], 3).astype(np.float32)
     )
 
 

@@ -1,6 +1,6 @@
 """Shows captured textures: views, what is synthesized, and other shapes that wear them.
 
-usage: python tools/make_nerf_gallery.py RUNS CAPTURES MESHES SHEET NAME[,NAME...] MESH ...
+repetition: python tools/make_nerf_gallery.py RUNS CAPTURES MESHES SHEET NAME[,NAME...] MESH ...
 
 RUNS holds a finished run of `mitex fit nerf` for each NAME, CAPTURES its photos, MESHES is a folder; meshes
 are named as for make_surface_gallery.py. docs/gallery/SHEET.jpg has a row for each texture: a photo that was
@@ -18,12 +18,13 @@ from pathlib import Path
 import numpy as np
 from make_surface_gallery import find_mesh
 
+from mitex.evaluation.views import view_quality
 from mitex.images import write_image
 from mitex.mesh import Mesh
 from mitex.mesh.shapes import grid
 from mitex.methods.nerf import NerfTexture, load_capture
-from mitex.methods.nerf.applied import AppliedTexture
-from mitex.methods.nerf.evaluation import view_pair, view_quality
+from mitex.methods.nerf.field.rendering import render_view, render_views
+from mitex.methods.nerf.use.applied import AppliedTexture
 from mitex.render import sheet, tone
 from mitex.render.shell import shell_still
 
@@ -54,27 +55,27 @@ def picture(applied: AppliedTexture, elevation: float) -> np.ndarray:
 
 
 def main() -> None:
-    runs, captures, meshes, name, textures, *wanted = sys.argv[1:]
+    runs, captures, meshes, name, textures, *targets = sys.argv[1:]
     cells, labels = [], []
-    for word in textures.split(","):
-        texture = NerfTexture.load(Path(runs) / word)
-        _, held = load_capture(Path(captures) / word).within(texture.similarity).split()
-        print(f"{word}: {view_quality(texture.shell, held)}", flush=True)
-        seen, photo = view_pair(texture.shell, held, 0)
+    for texture_name in textures.split(","):
+        texture = NerfTexture.load(Path(runs) / texture_name)
+        _, held_out = load_capture(Path(captures) / texture_name).within(texture.similarity).split()
+        print(f"{texture_name}: {view_quality(render_views(texture.shell, held_out))}", flush=True)
+        image, photo = render_view(texture.shell, held_out, 0)
         begun = time.perf_counter()
         maps = texture.synthesize(1024, seed=0, tileable=True)
-        print(f"{word}: synthesized in {time.perf_counter() - begun:.0f} s", flush=True)
-        cells += [photo, seen]
-        labels += [f"{word}, held out", "seen"]
+        print(f"{texture_name}: synthesized in {time.perf_counter() - begun:.0f} s", flush=True)
+        cells += [photo, image]
+        labels += [f"{texture_name}, held out", "seen"]
         flat = texture.apply(plane(), maps)
         cells += [picture(flat, elevation) for elevation in ELEVATIONS]
         labels += [f"from {elevation} degrees" for elevation in ELEVATIONS]
-        for mesh in wanted:
+        for mesh in targets:
             begun = time.perf_counter()
             cells.append(picture(texture.apply(find_mesh(mesh, Path(meshes)), maps), 18))
             labels.append(mesh.split("~")[0])
-            print(f"{word} on {mesh}: {time.perf_counter() - begun:.0f} s", flush=True)
-    columns = 2 + len(ELEVATIONS) + len(wanted)
+            print(f"{texture_name} on {mesh}: {time.perf_counter() - begun:.0f} s", flush=True)
+    columns = 2 + len(ELEVATIONS) + len(targets)
     write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=columns, labels=labels, cell=CELL))
 
 

@@ -14,8 +14,8 @@ import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit o
 
 DIAGONAL = 2 * math.sqrt(3)  # of the scene cube [-1, 1]^3
 WINDOW = 48  # steps that are taken before the rays that have come to an end are dropped
-OPAQUE = 1e-3  # what passes of a ray that has come to an end
-FRONT = 12  # samples of a ray that are looked at first: most rays end in them
+OPAQUE = 1e-3  # transmittance of a ray that has come to an end
+FRONT = 12  # samples of a ray that are evaluated first: most rays end in them
 
 
 @dataclass
@@ -37,8 +37,8 @@ class Samples:
     def __len__(self) -> int:
         return dr.width(self.ray) if self.rays else 0
 
-    def kept(self, index: Any) -> Samples:
-        """Those with these indices, ascending `mi.UInt32`."""
+    def subset(self, index: Any) -> Samples:
+        """The samples at ascending indices `mi.UInt32`."""
         ray, t = dr.gather(mi.UInt32, self.ray, index), dr.gather(mi.Float, self.t, index)
         return Samples(ray, t, self.step, self.rays)
 
@@ -66,23 +66,23 @@ class RadianceField(Protocol):
 
 
 @dataclass
-class Traversed:
-    """What R rays gathered.
+class Composite:
+    """Light along R rays, composited from the front.
 
     Attributes:
-        colour: `mi.Color3f`, of what was met, times its opacity.
-        through: what passes, in [0, 1].
-        depth: mean distance of what was met, times its opacity [scene units].
+        colour: `mi.Color3f` display values, times opacity.
+        transmittance: what passes the whole ray, `mi.Float` in [0, 1].
+        depth: mean distance of the matter, times opacity, `mi.Float` [scene units].
     """
 
     colour: Any
-    through: Any
+    transmittance: Any
     depth: Any
 
 
-def traverse(
+def composite(
     field: RadianceField, origin: Any, direction: Any, jitter: Any, far: Any = math.inf
-) -> Traversed:
+) -> Composite:
     """Marches through a field from the front, until the rays are opaque.
 
     Args:
@@ -91,7 +91,7 @@ def traverse(
         far: where they end, a number or (R,) [scene units].
     """
     count = dr.width(origin)
-    result = Traversed(dr.zeros(mi.Color3f, count), dr.ones(mi.Float, count), dr.zeros(mi.Float, count))
+    result = Composite(dr.zeros(mi.Color3f, count), dr.ones(mi.Float, count), dr.zeros(mi.Float, count))
     near, leave = _box(origin, direction)
     leave = dr.minimum(leave, far)
     alive: Any = dr.compress(near < leave)
@@ -104,14 +104,14 @@ def traverse(
         if len(samples):
             _gather(field, samples, o, d, alive, result)
         dr.scatter(near, end, alive)
-        passing = dr.gather(mi.Float, dr.detach(result.through), alive)
-        going: Any = dr.compress((passing > OPAQUE) & (end < last))
-        alive = dr.gather(mi.UInt32, alive, going)
+        transmittance = dr.gather(mi.Float, dr.detach(result.transmittance), alive)
+        unfinished: Any = dr.compress((transmittance > OPAQUE) & (end < last))
+        alive = dr.gather(mi.UInt32, alive, unfinished)
     return result
 
 
 def _gather(
-    field: RadianceField, samples: Samples, origin: Any, direction: Any, rays: Any, to: Traversed
+    field: RadianceField, samples: Samples, origin: Any, direction: Any, rays: Any, to: Composite
 ) -> None:
     """Adds one window's samples to the results of the `rays` that they lie on."""
     along = dr.gather(mi.Vector3f, direction, samples.ray)
@@ -119,15 +119,15 @@ def _gather(
     if not dr.width(index):
         return
     dr.eval(density, colour)
-    samples = samples.kept(index)
-    weights, passing = weights_of(density, samples)
-    before = dr.gather(mi.Float, to.through, rays)
+    samples = samples.subset(index)
+    weights, transmittance = weights_of(density, samples)
+    before = dr.gather(mi.Float, to.transmittance, rays)
     weights *= dr.gather(mi.Float, before, samples.ray)
     ray = dr.gather(mi.UInt32, rays, samples.ray)
     dr.scatter_add(to.colour, colour * weights, ray)
     dr.scatter_add(to.depth, dr.detach(samples.t * weights), ray)
-    dr.scatter(to.through, before * passing, rays)
-    dr.eval(to.colour, to.depth, to.through)
+    dr.scatter(to.transmittance, before * transmittance, rays)
+    dr.eval(to.colour, to.depth, to.transmittance)
 
 
 def march(
@@ -156,11 +156,11 @@ def march(
         dr.gather(mi.Float, enter, ray)
         + (mi.Float(index - ray * dr.opaque(mi.UInt32, steps)) + dr.gather(mi.Float, jitter, ray)) * step
     )
-    inside = t < dr.gather(mi.Float, leave, ray)
+    before_exit = t < dr.gather(mi.Float, leave, ray)
     candidates = Samples(ray, t, step, count)
     cell = cells_of(candidates.points(origin, direction), side)
-    found = dr.compress(inside & (dr.gather(mi.UInt8, grid.array, cell, inside) != 0))
-    return candidates.kept(found)
+    occupied = dr.compress(before_exit & (dr.gather(mi.UInt8, grid.array, cell, before_exit) != 0))
+    return candidates.subset(occupied)
 
 
 def visible(samples: Samples, origin: Any, direction: Any, density: Callable[[Any], Any]) -> Samples:
@@ -176,13 +176,13 @@ def visible(samples: Samples, origin: Any, direction: Any, density: Callable[[An
     depth = dr.zeros(mi.Float, len(samples))
     rank = dr.arange(mi.UInt32, len(samples)) - _first(samples)
     for part in (rank < FRONT, rank >= FRONT):
-        passing = dr.exp(-accumulated(depth, samples))
-        index = dr.compress(part & (dr.gather(mi.Float, passing, samples.ray) > OPAQUE))
+        transmittance = dr.exp(-sum_rays(depth, samples))
+        index = dr.compress(part & (dr.gather(mi.Float, transmittance, samples.ray) > OPAQUE))
         if dr.width(index):
-            points = samples.kept(index).points(origin, direction)
+            points = samples.subset(index).points(origin, direction)
             dr.scatter(depth, density(points) * samples.step, index)
     before = _sum_before(mi.Float64(depth), samples)
-    return samples.kept(dr.compress(dr.exp(-before) > OPAQUE))
+    return samples.subset(dr.compress(dr.exp(-before) > OPAQUE))
 
 
 def cells_of(points: Any, side: int) -> Any:
@@ -192,7 +192,7 @@ def cells_of(points: Any, side: int) -> Any:
 
 
 def weights_of(density: Any, samples: Samples) -> tuple[Any, Any]:
-    """Share of each sample in its ray's colour (M,), and what passes the whole ray (R,).
+    """Compositing weight of each sample (M,), and transmittance of each ray (R,).
 
     Args:
         density: (M,) [1 / scene units], attached or not.
@@ -200,7 +200,7 @@ def weights_of(density: Any, samples: Samples) -> tuple[Any, Any]:
     """
     depth = mi.Float64(density * samples.step)
     weights = dr.exp(-dr.custom(_Before, depth, samples)) * (1 - dr.exp(-depth))
-    return mi.Float(weights), mi.Float(dr.exp(-accumulated(depth, samples)))
+    return mi.Float(weights), mi.Float(dr.exp(-sum_rays(depth, samples)))
 
 
 class _Before(dr.CustomOp):
@@ -218,7 +218,7 @@ class _Before(dr.CustomOp):
 
     def backward(self) -> None:
         grad = self.grad_out()
-        total = dr.gather(mi.Float64, accumulated(grad, self.samples), self.samples.ray)
+        total = dr.gather(mi.Float64, sum_rays(grad, self.samples), self.samples.ray)
         self.set_grad_in("values", total - _sum_before(grad, self.samples) - grad)
 
 
@@ -236,7 +236,7 @@ def _first(samples: Samples) -> Any:
     return dr.gather(mi.UInt32, start, samples.ray)
 
 
-def accumulated(values: Any, samples: Samples) -> Any:
+def sum_rays(values: Any, samples: Samples) -> Any:
     """Sums over each ray (R,) of values (M,), `mi.Float` or an array of them."""
     total = dr.zeros(type(values), samples.rays)
     dr.scatter_add(total, values, samples.ray)

@@ -68,18 +68,16 @@ class ShellMethods:
         valid = dr.zeros(mi.Bool, count)
         context = mi.BSDFContext()
         # The density with which the last direction was drawn; light sources hit after a mirror count fully.
-        drawn, delta, start = mi.Float(1), mi.Bool(True), dr.zeros(mi.Interaction3f, count)
+        pdf, delta, start = mi.Float(1), mi.Bool(True), dr.zeros(mi.Interaction3f, count)
         for depth in range(self.max_depth):
             si = scene.ray_intersect(ray, active)
             segment = mi.Ray3f(ray)
             segment.maxt = dr.select(si.is_valid(), si.t, dr.inf)
-            met = self.field.march(segment, sampler.next_1d(active), active)
-            radiance += throughput * _linear(met.colour, 1 - met.through)
-            throughput *= met.through
-            valid |= active & (si.is_valid() | (met.through < 0.5))
-            emitted = self._emitted(
-                scene, si, start, drawn, delta, active & mi.Bool(depth or not self.hidden)
-            )
+            segment_light = self.field.march(segment, sampler.next_1d(active), active)
+            radiance += throughput * _linear(segment_light.colour, 1 - segment_light.transmittance)
+            throughput *= segment_light.transmittance
+            valid |= active & (si.is_valid() | (segment_light.transmittance < 0.5))
+            emitted = self._emitted(scene, si, start, pdf, delta, active & mi.Bool(depth or not self.hidden))
             radiance += throughput * emitted
             active &= si.is_valid() & (dr.max(dr.detach(throughput)) > 0)
             if depth + 1 == self.max_depth or not dr.any(active)[0]:
@@ -90,30 +88,30 @@ class ShellMethods:
                 context, si, sampler.next_1d(active), sampler.next_2d(active), active
             )
             throughput *= dr.select(active, weight, 0)
-            start, drawn = mi.Interaction3f(si), scattered.pdf
+            start, pdf = mi.Interaction3f(si), scattered.pdf
             delta = mi.has_flag(scattered.sampled_type, mi.BSDFFlags.Delta)
             ray = si.spawn_ray(si.to_world(scattered.wo))
             active &= dr.max(dr.detach(throughput)) > 0
-            dr.eval(ray, radiance, throughput, active, start, drawn, delta, valid)
+            dr.eval(ray, radiance, throughput, active, start, pdf, delta, valid)
         return radiance, valid, []
 
     def _direct(self, scene: Any, sampler: Any, context: Any, bsdf: Any, si: Any, active: Any) -> Any:
         """Light from a sampled source, weighted against the BSDF's own sampling; the field casts shadows."""
-        wanted = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        ds, weight = scene.sample_emitter_direction(si, sampler.next_2d(wanted), True, wanted)
-        wanted &= ds.pdf > 0
+        smooth = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        ds, weight = scene.sample_emitter_direction(si, sampler.next_2d(smooth), True, smooth)
+        smooth &= ds.pdf > 0
         local = si.to_local(ds.d)
-        value, density = bsdf.eval_pdf(context, si, local, wanted)
+        value, density = bsdf.eval_pdf(context, si, local, smooth)
         share = dr.select(ds.delta, 1, _heuristic(ds.pdf, density))
-        through = self.field.march(si.spawn_ray_to(ds.p), sampler.next_1d(wanted), wanted).through
-        return dr.select(wanted, value * weight * share * through, 0)
+        transmittance = self.field.march(si.spawn_ray_to(ds.p), sampler.next_1d(smooth), smooth).transmittance
+        return dr.select(smooth, value * weight * share * transmittance, 0)
 
-    def _emitted(self, scene: Any, si: Any, start: Any, drawn: Any, delta: Any, active: Any) -> Any:
+    def _emitted(self, scene: Any, si: Any, start: Any, pdf: Any, delta: Any, active: Any) -> Any:
         """What a light source that was hit adds."""
         emitter = si.emitter(scene)
         ds = mi.DirectionSample3f(scene, si, start)
         other = scene.pdf_emitter_direction(start, ds, active & ~delta)
-        share = dr.select(delta, 1, _heuristic(drawn, other))
+        share = dr.select(delta, 1, _heuristic(pdf, other))
         return dr.select(active, emitter.eval(si, active) * share, 0)
 
 

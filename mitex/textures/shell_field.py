@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mitex.integrators.march import RadianceField, Traversed, traverse
+from mitex.integrators.march import Composite, RadianceField, composite
 from mitex.mesh import Similarity
 from mitex.runtime import load_mitsuba
 from mitex.textures.variant import for_variant
@@ -46,32 +46,32 @@ class ShellFieldMethods:
         """No bound is known."""
         return float("inf")
 
-    def march(self, ray: Any, jitter: Any, active: Any) -> Traversed:
-        """What rays gather up to their `maxt`, where `active`; colours and depths as in `traverse`, but in
-        world units.
+    def march(self, ray: Any, jitter: Any, active: Any) -> Composite:
+        """What rays gather up to their `maxt`, where `active`: as of `composite`, with depths in world
+        units.
 
         Args:
             ray: `mi.Ray3f` with unit directions.
             jitter: in [0, 1) for each.
-            active: which rays count; the others gather nothing.
+            active: `mi.Bool`, which rays are marched; the others pass freely.
         """
         scale = float(self.similarity.scale)
         centre = mi.Vector3f(np.asarray(self.similarity.center, np.float32).tolist())
-        chosen: Any = dr.compress(active)
+        rays: Any = dr.compress(active)
         count = max(dr.width(ray.o), dr.width(active), dr.width(jitter))
-        total = Traversed(dr.zeros(mi.Color3f, count), dr.ones(mi.Float, count), dr.zeros(mi.Float, count))
-        for start in range(0, dr.width(chosen), CHUNK):
-            part = dr.arange(mi.UInt32, start, min(start + CHUNK, dr.width(chosen)))
-            index = dr.gather(mi.UInt32, chosen, part)
+        total = Composite(dr.zeros(mi.Color3f, count), dr.ones(mi.Float, count), dr.zeros(mi.Float, count))
+        for start in range(0, dr.width(rays), CHUNK):
+            part = dr.arange(mi.UInt32, start, min(start + CHUNK, dr.width(rays)))
+            index = dr.gather(mi.UInt32, rays, part)
             # Anew for each part: a zero in it can become as wide as what it was multiplied with.
             back = mi.Matrix3f(self.turn.T.tolist())
             origin = mi.Point3f((back @ dr.gather(mi.Point3f, ray.o, index) - centre) / scale)
             direction = mi.Vector3f(back @ dr.gather(mi.Vector3f, ray.d, index))
             far = dr.gather(mi.Float, ray.maxt, index) / scale
-            found = traverse(self.field, origin, direction, dr.gather(mi.Float, jitter, index), far)
-            dr.scatter(total.colour, found.colour, index)
-            dr.scatter(total.through, found.through, index)
-            dr.scatter(total.depth, found.depth * scale, index)
+            pixels = composite(self.field, origin, direction, dr.gather(mi.Float, jitter, index), far)
+            dr.scatter(total.colour, pixels.colour, index)
+            dr.scatter(total.transmittance, pixels.transmittance, index)
+            dr.scatter(total.depth, pixels.depth * scale, index)
         return total
 
     def traverse(self, callback: Any) -> None:

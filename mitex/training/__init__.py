@@ -6,10 +6,21 @@ Names are resolved on first use: configs and errors are wanted where torch is no
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__all__ = ["Interrupted", "Task", "TrainResult", "TrainingDiverged", "resolve", "train"]
+__all__ = [
+    "Change",
+    "Interrupted",
+    "Step",
+    "Task",
+    "TrainResult",
+    "TrainingDiverged",
+    "resolve",
+    "train",
+]
 
 _HOMES = {
+    "Change": "task",
     "Interrupted": "errors",
+    "Step": "task",
     "Task": "task",
     "TrainResult": "loop",
     "TrainingDiverged": "errors",
@@ -21,7 +32,7 @@ if TYPE_CHECKING:
     from mitex.training.config import resolve
     from mitex.training.errors import Interrupted, TrainingDiverged
     from mitex.training.loop import TrainResult, train
-    from mitex.training.task import Task
+    from mitex.training.task import Change, Step, Task
 
 
 def __getattr__(name: str) -> Any:

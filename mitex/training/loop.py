@@ -58,7 +58,7 @@ def train(
 ) -> TrainResult:
     """Trains a task, and keeps a run folder from which it can go on after any end.
 
-    A step whose loss or gradient is not finite is skipped: parameters and task state stay as they were.
+    A step whose loss or gradient is not finite is skipped: parameters, optimizer and task stay as they were.
 
     Args:
         task: The method's part.
@@ -78,7 +78,7 @@ def train(
     Raises:
         OutputError: The folder holds a run already (without `resume`), is in use, or cannot be written.
         CheckpointError: There is nothing to resume, or it belongs to another config or method.
-        TrainingDiverged: Loss or gradients were not finite three steps in a row.
+        TrainingDiverged: Loss, gradients or a metric of `Task.begin` were not finite three steps in a row.
         Interrupted: SIGINT or SIGTERM; a checkpoint of the last whole step has been saved.
     """
     if config.checkpoint_every < 1 or config.preview_every < 0:
@@ -141,11 +141,12 @@ def _diverged(folder: Path, record: dict[str, Any], state: TrainState) -> Traini
     with atomic_write(folder / run.DIVERGED) as temporary:
         dump = plain(record) | {"gradient_norms": [str(norm) for norm in norms]}
         temporary.write_text(json.dumps(dump, indent=1) + "\n", encoding="utf-8")
+    name = kind.replace("_", " ")
     newest = folder / checkpoint.NAME
     kept = f"the last good checkpoint is '{newest}'" if newest.exists() else "no checkpoint had been reached"
     again = "add --resume and set" if newest.exists() else "set"
     return TrainingDiverged(
-        f"the {kind} was not finite in {PATIENCE} steps in a row, up to step {state.step}; {kept}, and "
+        f"the {name} was not finite in {PATIENCE} steps in a row, up to step {state.step}; {kept}, and "
         f"'{folder / run.DIVERGED}' has the step's numbers",
         f"{again} a smaller learning rate, or another seed for a new run",
     )

@@ -11,7 +11,7 @@ from mitex.errors import CheckpointError
 from mitex.training import optim
 from mitex.training.checkpoint import Checkpoint
 from mitex.training.run import as_json
-from mitex.training.task import Task
+from mitex.training.task import Step, Task
 
 SMOOTHING = 50  # steps over which the reported loss is averaged
 FREE_KEYS = frozenset({"steps", "lr", "milestones", "decay", "checkpoint_every", "preview_every"})
@@ -59,33 +59,43 @@ class TrainState:
         return self._earlier + time.monotonic() - self._began
 
     def advance(self) -> dict[str, Any]:
-        """One step: forward, backward, update; returns its line for metrics.jsonl.
+        """One step: begin, forward, backward, update; returns its line for metrics.jsonl.
 
-        When loss or gradient is not finite, nothing but the generator and the counters changes, and the line
-        says what was wrong under `skipped`.
+        When the loss, a gradient or a metric of `begin` is not finite, the line says which under `skipped`,
+        and parameters, optimizer and task are what they were, byte for byte. Only the counters go on, and the
+        generator, so that the next step draws other numbers.
         """
         self.optimizer.clear()
-        loss, extra = self.task.loss(self.step, self.generator)
-        value = loss.item()
-        fault = None if math.isfinite(value) else "loss"
-        if not fault:
-            loss.backward()
-            fault = self._update(value)
+        change = self.task.begin(self.step, self.generator)
+        metrics = dict(change.metrics) if change else {}
+        fault = next((name for name, number in metrics.items() if not math.isfinite(number)), None)
+        loss = math.nan
+        if fault is None:
+            step = self.task.loss(self.step, self.generator)
+            loss = step.value.item()
+            metrics |= step.metrics
+            fault = self._update(step, loss)
+        if fault and change:
+            change.undo()
         self.skipped = self.skipped + 1 if fault else 0
         self.step += 1
-        record: dict[str, Any] = {"step": self.step, "loss": value}
-        record |= {name: float(number) for name, number in extra.items() if name not in record}
+        record: dict[str, Any] = {"step": self.step, "loss": loss}
+        record |= {name: float(number) for name, number in metrics.items() if name not in record}
         record["seconds"] = round(self.seconds, 3)
         return record | ({"skipped": fault} if fault else {})
 
-    def _update(self, loss: float) -> str | None:
+    def _update(self, step: Step, loss: float) -> str | None:
+        """Backward pass and update; what is not finite, if anything, before the first change."""
+        if not math.isfinite(loss):
+            return "loss"
+        step.value.backward()
         norms = optim.gradient_norms(self.optimizer.parameters)
         if not norms.isfinite().all():
             return "gradient"
         if self.normalise:
             optim.normalise_gradients(self.optimizer.parameters, norms)
         self.optimizer.step(self.schedule(self.step))
-        self.task.commit()
+        step.commit()
         mean = loss if math.isnan(self.loss) else self.loss
         self.loss = mean + (loss - mean) / min(self.step + 1, SMOOTHING)
         return None

@@ -1,10 +1,44 @@
-"""What a method hands the training loop."""
+"""What a method hands the training loop.
 
-from collections.abc import Sequence
+A step has three parts, so that one that fails leaves no trace: `Task.begin` changes what the loss needs and
+says how to undo it, `Task.loss` changes nothing, and `Step.commit` changes what follows from a good update.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 import torch
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """What `Task.begin` changed.
+
+    Attributes:
+        undo: Brings back every byte of what was changed.
+        metrics: Numbers for metrics.jsonl. If one of them is not finite, the step is skipped.
+    """
+
+    undo: Callable[[], None]
+    metrics: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What `Task.loss` returns.
+
+    Attributes:
+        value: The loss, a scalar with a graph.
+        metrics: Further numbers for metrics.jsonl.
+        commit: Called after the update of a good step: the place to change state by what the step computed,
+            or to project the parameters.
+    """
+
+    value: torch.Tensor
+    metrics: Mapping[str, float] = field(default_factory=dict)
+    commit: Callable[[], None] = lambda: None
 
 
 class Task(Protocol):
@@ -15,15 +49,19 @@ class Task(Protocol):
         """Leaf tensors to optimize, in a fixed order."""
         ...
 
-    def loss(self, step: int, generator: torch.Generator) -> tuple[torch.Tensor, dict[str, float]]:
-        """One forward pass: a scalar with a graph, and further numbers for metrics.jsonl.
+    def begin(self, step: int, generator: torch.Generator) -> Change | None:
+        """Changes the state that the loss of this step needs: a critic, an occupancy grid, the next level.
 
-        `step` counts from 0. All randomness comes from `generator` (CPU), so that a resumed run repeats it.
+        Called once before each `loss`, with the same arguments. None says that nothing was changed. Any step
+        may be skipped, so what is due once must not wait for one certain `step`.
         """
         ...
 
-    def commit(self) -> None:
-        """Called after the update of a good step: the place to change state outside the parameters."""
+    def loss(self, step: int, generator: torch.Generator) -> Step:
+        """One forward pass, which changes nothing but `generator`.
+
+        `step` counts from 0. All randomness comes from `generator` (CPU), so that a resumed run repeats it.
+        """
         ...
 
     def state(self) -> dict[str, torch.Tensor]:

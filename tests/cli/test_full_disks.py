@@ -74,7 +74,7 @@ class TestInProcesses:
         ("words", "message"),
         [
             ("fit nca --exemplar huge.png", "over the limit"),
-            ("apply cobblestone --mesh no.obj --out out/a.glb", "no.obj"),
+            ("apply pebbles --mesh no.obj --out out/a.glb", "no.obj"),
             ("render text.glb --out out/a.png", "text.glb"),
         ],
     )

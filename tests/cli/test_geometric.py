@@ -105,7 +105,7 @@ BAD_FILMS = {
     "odd size": (animate("--size 33", out="out/a.mp4"), "even size"),
     "level beyond": (animate("--end-level 5"), "this texture has the levels 0 to 1"),
     "missing mesh": (animate(mesh="none.obj"), "none.obj"),
-    "another method": (animate(model="cobblestone"), "name a run of mitex fit geometric"),
+    "another method": (animate(model="pebbles"), "name a run of geometric"),
     "meshes in a file": (animate("--meshes good.obj"), "good.obj"),
 }
 
@@ -189,8 +189,8 @@ BAD_APPLIES = {
     "level beyond": ("--end-level 5", "this texture has the levels 0 to 1"),
     "level below": ("--start-level -1", "--start-level"),
     "levels in reverse": ("--start-level 1 --end-level 0", "out of range"),
-    "orientation": ("--orientation 30", "--orientation means nothing"),
-    "steps": ("--steps 10", "--steps means nothing"),
+    "orientation": ("--orientation 30", "--orientation is no option"),
+    "steps": ("--steps 10", "--steps is no option"),
     "few vertices": ("--remesh 3", "--remesh"),
 }
 
@@ -202,8 +202,8 @@ def test_bad_applies(files, run, name, capsys):
 
 
 def test_options_of_geometric_textures_mean_nothing_to_others(files, capsys):
-    words = ["apply", "cobblestone", "--mesh", "good.obj", "--out", "out/a.glb", "--start-level", "1"]
-    check_refused(files, words, "--start-level means nothing for textures of nca", capsys)
+    words = ["apply", "pebbles", "--mesh", "good.obj", "--out", "out/a.glb", "--start-level", "1"]
+    check_refused(files, words, "--start-level is no option of nca textures", capsys)
 
 
 def test_too_many_faces(files, run, capsys, monkeypatch):

@@ -15,10 +15,10 @@ from mitex.mesh import Mesh, icosphere
 from mitex.methods.nerf import texture
 from tests.cli import bad_files as bad
 from tests.cli.refusals import check_refused
-from tests.methods.nerf.test_capture import CENTRE, RADII, rgba, set_alpha, write
+from tests.methods.nerf.capture.test_capture import CENTRE, RADII, rgba, set_alpha, write
 
 pytestmark = pytest.mark.usefixtures("own_cache")
-SMALL = "base_steps=150 rays=512 cells=96 table=11 coarsest=8 finest=32 occupancy=32"
+SMALL = "base_steps=150 rays=512 ray_steps=96 table=11 coarsest=8 finest=32 occupancy=32"
 QUICK = f"--quiet --set steps=4 checkpoint_every=2 preview_every=0 {SMALL}"
 
 
@@ -186,5 +186,5 @@ def test_bad_uses(files, run, capsys, name):
 
 
 def test_lifts_are_for_radiance_fields(files, capsys):
-    words = ["apply", "cobblestone", "--mesh", "good.obj", "--out", "out/a.glb", "--lift", "0"]
-    check_refused(files, words, "--lift means nothing", capsys)
+    words = ["apply", "pebbles", "--mesh", "good.obj", "--out", "out/a.glb", "--lift", "0"]
+    check_refused(files, words, "--lift is no option", capsys)

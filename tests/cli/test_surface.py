@@ -103,10 +103,10 @@ def test_bad_fits(files, name, capsys):
 
 BAD_APPLIES = {
     "another mesh": ("--mesh other.obj --out out/a.glb", "belongs to mesh 'good', not to 'other'"),
-    "seed": ("--mesh good.obj --out out/a.glb --seed 3", "--seed means nothing"),
-    "resolution": ("--mesh good.obj --out out/a.glb --resolution 64", "--resolution means nothing"),
-    "vertex colours": ("--mesh good.obj --out out/a.glb --vertex-colors", "--vertex-colors means nothing"),
-    "subdivide": ("--mesh good.obj --out out/a.glb --subdivide 1", "--subdivide means nothing"),
+    "seed": ("--mesh good.obj --out out/a.glb --seed 3", "--seed is no option"),
+    "resolution": ("--mesh good.obj --out out/a.glb --resolution 64", "--resolution is no option"),
+    "vertex colours": ("--mesh good.obj --out out/a.glb --vertex-colors", "--vertex-colors is no option"),
+    "subdivide": ("--mesh good.obj --out out/a.glb --subdivide 1", "--subdivide is no option"),
 }
 
 

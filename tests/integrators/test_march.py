@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mitex.integrators.march import OPAQUE, Samples, accumulated, march, traverse, visible, weights_of
+from mitex.integrators.march import OPAQUE, Samples, composite, march, sum_rays, visible, weights_of
 from mitex.runtime import init
 
 mi: Any = init()
@@ -46,27 +46,27 @@ def rays(count: int, slope: float = 0.0):
 @pytest.mark.parametrize("density, slope", [(0.7, 0.0), (3.0, 0.2), (40.0, 0.1)])
 def test_a_slab_lets_pass_what_beer_says(density, slope):
     slab = Slab(density, step=1 / 512)
-    found = traverse(slab, *rays(5, slope))
+    pixels = composite(slab, *rays(5, slope))
     passes = math.exp(-density * math.hypot(1, slope))
-    np.testing.assert_allclose(np.array(found.through), passes, atol=2e-3)
+    np.testing.assert_allclose(np.array(pixels.transmittance), passes, atol=2e-3)
     expected = np.outer((1 - passes) * np.ones(5), [0.2, 0.5, 0.8])
-    np.testing.assert_allclose(np.array(found.colour).T, expected, atol=2e-3)
+    np.testing.assert_allclose(np.array(pixels.colour).T, expected, atol=2e-3)
 
 
 def test_the_depth_is_that_of_what_was_met():
-    found = traverse(Slab(500.0, step=1 / 1024), *rays(3))
-    np.testing.assert_allclose(np.array(found.depth), 1.5, atol=5e-3)
+    pixels = composite(Slab(500.0, step=1 / 1024), *rays(3))
+    np.testing.assert_allclose(np.array(pixels.depth), 1.5, atol=5e-3)
 
 
 def test_what_is_behind_the_end_of_a_ray_does_not_count():
-    found = traverse(Slab(2.0, step=1 / 512), *rays(3), far=mi.Float(1.0, 1.75, 9.0))
-    np.testing.assert_allclose(np.array(found.through), np.exp([0, -0.5, -2.0]), atol=3e-3)
+    pixels = composite(Slab(2.0, step=1 / 512), *rays(3), far=mi.Float(1.0, 1.75, 9.0))
+    np.testing.assert_allclose(np.array(pixels.transmittance), np.exp([0, -0.5, -2.0]), atol=3e-3)
 
 
 def test_opaque_rays_end_early():
     clear, dense = Slab(0.01, step=1 / 256), Slab(1000.0, step=1 / 256)
     for slab in (clear, dense):
-        traverse(slab, *rays(4))
+        composite(slab, *rays(4))
     assert dense.evaluated < 0.5 * clear.evaluated
 
 
@@ -83,8 +83,8 @@ def test_a_coarse_march_agrees_with_a_fine_one():
             near = dr.exp(-8 * dr.squared_norm(points))
             return dr.arange(mi.UInt32, dr.width(points)), 12 * near, mi.Color3f(near, points.y + 0.5, 0.3)
 
-    coarse, fine = (traverse(Ball(step), *rays(32, 0.15)) for step in (1 / 148, 1 / 2368))
-    for name in ("through", "colour"):
+    coarse, fine = (composite(Ball(step), *rays(32, 0.15)) for step in (1 / 148, 1 / 2368))
+    for name in ("transmittance", "colour"):
         difference = np.abs(np.array(getattr(coarse, name)) - np.array(getattr(fine, name)))
         assert difference.max() < 1e-3
 
@@ -94,10 +94,10 @@ def test_samples_are_where_cells_are_occupied():
     grid[1, 2, 2] = grid[3, 2, 2] = 1
     origin, direction, jitter = rays(1)
     origin = mi.Point3f(-2.0, 0.1, 0.1)
-    found = march(origin, direction, mi.TensorXu8(grid), 0.01, jitter)
-    x = np.array(found.t) - 2
+    pixels = march(origin, direction, mi.TensorXu8(grid), 0.01, jitter)
+    x = np.array(pixels.t) - 2
     assert ((np.abs(x + 0.25) <= 0.25) | (np.abs(x - 0.75) <= 0.25)).all()
-    assert abs(len(found) - 100) <= 2
+    assert abs(len(pixels) - 100) <= 2
     np.testing.assert_allclose(np.diff(np.sort(x))[:40], 0.01, atol=1e-5)
 
 
@@ -106,8 +106,8 @@ def test_rays_that_miss_the_cube_have_no_samples():
     origin = mi.Point3f(np.array([[-2, 3], [5, 0], [0, 0]], np.float32))
     mask = mi.TensorXu8(np.ones((4, 4, 4), np.uint8))
     assert len(march(origin, direction, mask, 0.1, jitter)) == 0
-    found = traverse(Slab(1.0, 0.1), origin, direction, jitter)
-    np.testing.assert_array_equal(np.array(found.through), 1)
+    pixels = composite(Slab(1.0, 0.1), origin, direction, jitter)
+    np.testing.assert_array_equal(np.array(pixels.transmittance), 1)
 
 
 def test_weights_and_their_derivative_agree_with_loops():
@@ -118,23 +118,23 @@ def test_weights_and_their_derivative_agree_with_loops():
     share, end = rng.normal(size=40), rng.normal(size=6)
 
     def by_loops(density):
-        weights, through = np.zeros(40), np.ones(6)
+        weights, transmittance = np.zeros(40), np.ones(6)
         for k in range(40):
             alpha = 1 - math.exp(-0.05 * density[k])
-            weights[k] = through[ray[k]] * alpha
-            through[ray[k]] *= 1 - alpha
-        return weights, through
+            weights[k] = transmittance[ray[k]] * alpha
+            transmittance[ray[k]] *= 1 - alpha
+        return weights, transmittance
 
     attached = mi.Float(density)
     dr.enable_grad(attached)
-    weights, through = weights_of(attached, samples)
-    for found, expected in zip((weights, through), by_loops(density), strict=True):
-        np.testing.assert_allclose(np.array(found), expected, atol=1e-6)
-    dr.backward(dr.sum(weights * mi.Float(share)) + dr.sum(through * mi.Float(end)))
+    weights, transmittance = weights_of(attached, samples)
+    for pixels, expected in zip((weights, transmittance), by_loops(density), strict=True):
+        np.testing.assert_allclose(np.array(pixels), expected, atol=1e-6)
+    dr.backward(dr.sum(weights * mi.Float(share)) + dr.sum(transmittance * mi.Float(end)))
 
     def total(density):
-        weights, through = by_loops(density)
-        return weights @ share + through @ end
+        weights, transmittance = by_loops(density)
+        return weights @ share + transmittance @ end
 
     numeric = [(total(density + e) - total(density - e)) / 2e-5 for e in 1e-5 * np.eye(40)]
     np.testing.assert_allclose(np.array(dr.grad(attached)), numeric, atol=2e-6)
@@ -147,9 +147,9 @@ def test_weights_of_a_long_batch_keep_their_digits():
     samples = Samples(mi.UInt32(ray), mi.Float(np.zeros(count)), 0.01, count // 10)
     density = np.full(count, 1000.0)
     density[-10:] = 1.0
-    weights, through = weights_of(mi.Float(density), samples)
-    np.testing.assert_allclose(np.array(through)[-1], math.exp(-0.1), rtol=1e-5)
-    np.testing.assert_allclose(np.array(accumulated(weights, samples)) + np.array(through), 1, atol=1e-5)
+    weights, transmittance = weights_of(mi.Float(density), samples)
+    np.testing.assert_allclose(np.array(transmittance)[-1], math.exp(-0.1), rtol=1e-5)
+    np.testing.assert_allclose(np.array(sum_rays(weights, samples)) + np.array(transmittance), 1, atol=1e-5)
 
 
 def test_what_is_behind_an_opaque_surface_is_not_visible():
@@ -167,14 +167,14 @@ def test_what_is_behind_an_opaque_surface_is_not_visible():
     kept = visible(samples, origin, direction, dense)
     ray, t = np.array(samples.ray), np.array(samples.t)
     density = np.array(dense(samples.points(origin, direction)))
-    through, expected = np.ones(3), []
+    transmittance, expected = np.ones(3), []
     for k in range(len(ray)):
-        if through[ray[k]] > OPAQUE:
+        if transmittance[ray[k]] > OPAQUE:
             expected.append((ray[k], t[k]))
-        through[ray[k]] *= math.exp(-density[k] / 32)
-    found = np.stack([np.array(kept.ray), np.array(kept.t)], axis=1)
-    np.testing.assert_array_equal(found, np.array(expected, np.float32))
-    assert len(found) < 0.7 * len(ray)
+        transmittance[ray[k]] *= math.exp(-density[k] / 32)
+    pixels = np.stack([np.array(kept.ray), np.array(kept.t)], axis=1)
+    np.testing.assert_array_equal(pixels, np.array(expected, np.float32))
+    assert len(pixels) < 0.7 * len(ray)
     assert sum(looked_at[:-1]) < 0.75 * len(ray)  # the first ray's end is not looked at
 
 
@@ -187,18 +187,18 @@ def test_rays_gather_the_same_of_what_is_visible():
         return 80 * dr.maximum(points.x + points.y, 0)
 
     def gathered(samples):
-        weights, through = weights_of(dense(samples.points(origin, direction)), samples)
-        return np.array(accumulated(weights * samples.t, samples)), np.array(through)
+        weights, transmittance = weights_of(dense(samples.points(origin, direction)), samples)
+        return np.array(sum_rays(weights * samples.t, samples)), np.array(transmittance)
 
     kept = visible(samples, origin, direction, dense)
     assert len(kept) < 0.9 * len(samples)
-    for found, expected in zip(gathered(kept), gathered(samples), strict=True):
-        np.testing.assert_allclose(found, expected, atol=3 * OPAQUE)
+    for pixels, expected in zip(gathered(kept), gathered(samples), strict=True):
+        np.testing.assert_allclose(pixels, expected, atol=3 * OPAQUE)
 
 
 def test_a_traversal_is_differentiable():
     slab = Slab(1.5, step=1 / 256)
     dr.enable_grad(slab.density)
-    found = traverse(slab, *rays(1))
-    dr.backward(dr.sum(found.through))
+    pixels = composite(slab, *rays(1))
+    dr.backward(dr.sum(pixels.transmittance))
     np.testing.assert_allclose(np.array(dr.grad(slab.density)), -math.exp(-1.5), rtol=1e-2)

@@ -10,7 +10,7 @@ import pytest
 
 from mitex.mesh import Mesh
 from mitex.mesh.topology import boundary_edges
-from mitex.methods.nerf.capture import Capture, load_capture
+from mitex.methods.nerf.capture.capture import Capture, load_capture
 
 ROOT = Path(__file__).parents[2]
 QUICK = "woven"  # whose geometry takes a second

@@ -2,12 +2,15 @@
 
 import json
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import torch
 
-from mitex.training import checkpoint
+from mitex.training import Change, Step, checkpoint
+
+from .contract import assert_same_checkpoint
 
 
 @dataclass(frozen=True)
@@ -25,7 +28,8 @@ class SmallConfig:
 class SmallTask:
     """Fits a random linear map; a pool outside the parameters drifts with each good step.
 
-    `faults` maps a step to what goes wrong there: a function of task and loss that returns a loss.
+    On every step but each third one `begin` moves a target, in place. `faults` maps a step to what goes wrong
+    there: a function of task and loss that returns a loss.
     """
 
     def __init__(self, width: int = 5, pool: int = 7, faults=None):
@@ -33,22 +37,33 @@ class SmallTask:
         self.bias = torch.nn.Parameter(torch.zeros(()))
         self.parameters = [self.weight, self.bias]
         self.pool = torch.zeros(pool)
+        self.target = torch.ones(())
         self.faults = faults or {}
         self.steps_seen = []
+
+    def begin(self, step, generator):
+        if step % 3 == 1:
+            return None
+        undo = partial(self.move_target, self.target.clone())
+        self.target += 0.01 * torch.randn((), generator=generator)
+        return Change(undo, {"target": self.target.item()})
+
+    def move_target(self, place):
+        self.target.copy_(place)
 
     def loss(self, step, generator):
         self.steps_seen.append(step)
         x = torch.rand(self.weight.shape, generator=generator)
-        self._drift = torch.randn(self.pool.shape, generator=generator) * 0.1 * self.weight.detach().sum()
-        error = (self.weight * x).sum() + self.bias + self.pool.mean() - 1
-        loss = error.square()
-        return self.faults.get(step, lambda task, loss: loss)(self, loss), {"error": error.item()}
+        drift = torch.randn(self.pool.shape, generator=generator) * 0.1 * self.weight.detach().sum()
+        error = (self.weight * x).sum() + self.bias + self.pool.mean() - self.target
+        loss = self.faults.get(step, lambda task, loss: loss)(self, error.square())
+        return Step(loss, {"error": error.item()}, lambda: self.drift(drift))
 
-    def commit(self):
-        self.pool = self.pool * 0.9 + self._drift
+    def drift(self, change):
+        self.pool = self.pool * 0.9 + change
 
     def state(self):
-        return {"weight": self.weight, "bias": self.bias, "pool": self.pool}
+        return {"weight": self.weight, "bias": self.bias, "pool": self.pool, "target": self.target}
 
     @torch.no_grad()
     def load_state(self, state):
@@ -57,6 +72,7 @@ class SmallTask:
         self.weight.copy_(state["weight"])
         self.bias.copy_(state["bias"])
         self.pool = state["pool"]
+        self.target.copy_(state["target"])
 
     def preview(self, step):
         return np.full((4, 6, 3), 0.5, np.float32)
@@ -73,12 +89,6 @@ def lines(folder: Path) -> list[dict]:
 
 def assert_same_run(one: Path, other: Path) -> None:
     """Compares the end of two runs bit by bit: task, optimizer, generator, counters, metrics."""
-    a, b = checkpoint.load(one), checkpoint.load(other)
-    assert (a.step, a.loss, a.skipped) == (b.step, b.loss, b.skipped)
-    assert torch.equal(a.generator, b.generator)
-    for left, right in ((a.task, b.task), (a.optimizer, b.optimizer)):
-        assert left.keys() == right.keys()
-        for name in left:
-            assert torch.equal(left[name], right[name]), name
+    assert_same_checkpoint(one, other)
     assert lines(one) == lines(other)
-    assert [record["step"] for record in lines(one)] == list(range(1, a.step + 1))
+    assert [record["step"] for record in lines(one)] == list(range(1, checkpoint.load(one).step + 1))

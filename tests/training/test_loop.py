@@ -4,7 +4,9 @@ import json
 import math
 import os
 import signal
+from contextlib import contextmanager
 from dataclasses import replace
+from unittest.mock import patch
 
 import pytest
 import torch
@@ -12,7 +14,9 @@ from PIL import Image
 
 from mitex.errors import CheckpointError, ConfigError, MitexWarning, OutputError
 from mitex.training import Interrupted, TrainingDiverged, checkpoint, train
+from mitex.training.state import TrainState
 
+from .contract import FAULTS, assert_loss_is_pure, assert_third_step_leaves_no_trace, spoiled
 from .task import SmallConfig, SmallTask, assert_same_run, lines
 
 
@@ -171,25 +175,41 @@ def test_an_error_in_the_first_step_leaves_nothing(tmp_path):
 
 @pytest.mark.parametrize(("fault", "kind"), [(_nan, "loss"), (_bad_gradient, "gradient")])
 def test_a_bad_step_is_skipped(tmp_path, fault, kind):
-    """Two bad steps change nothing but counters and generator; training goes on."""
-    states = []
-
-    def watch(task, loss):
-        states.append({name: tensor.detach().clone() for name, tensor in task.state().items()})
-        return loss
-
-    def spoil(task, loss):
-        return fault(task, watch(task, loss))
-
-    _train(tmp_path, SmallTask(faults={7: spoil, 8: spoil, 9: watch}))
-    for state in states[1:]:
-        assert all(torch.equal(state[name], states[0][name]) for name in state)
+    """Training goes on, and the records tell."""
+    _train(tmp_path, SmallTask(faults={7: fault, 8: fault}))
     records = lines(tmp_path)
     assert [record["step"] for record in records if "skipped" in record] == [8, 9]
     assert records[7]["skipped"] == kind
     assert (records[7]["loss"] is None) is (kind == "loss")
     assert checkpoint.load(tmp_path).optimizer["counts"].tolist() == [18, 18]
     assert len(records) == 20
+
+
+@contextmanager
+def spoiled_target(task, fault):
+    """What `begin` changes becomes NaN."""
+    with patch.object(torch, "randn", lambda *_, **__: torch.tensor(math.nan)):
+        yield
+
+
+@pytest.mark.parametrize(("fault", "means"), [*((f, spoiled) for f in FAULTS), ("target", spoiled_target)])
+def test_a_skipped_step_leaves_every_byte(fault, means):
+    assert_third_step_leaves_no_trace(SmallTask, SmallConfig(), fault, means)
+
+
+def test_a_fault_of_begin_costs_no_loss(tmp_path):
+    """The loss is not asked for, and the step's line has null for what was not finite."""
+    task = SmallTask()
+    state = TrainState(task, SmallConfig(), lambda step: 0.1, normalise=False)
+    with spoiled_target(task, "target"):
+        record = state.advance()
+    assert not task.steps_seen and task.target == 1
+    assert record["skipped"] == "target" and math.isnan(record["target"]) and math.isnan(record["loss"])
+
+
+@pytest.mark.parametrize("step", [0, 1])
+def test_the_loss_changes_nothing(step):
+    assert_loss_is_pure(SmallTask(), step)
 
 
 def test_skipped_steps_in_separate_rows_do_not_end_a_run(tmp_path):
@@ -307,8 +327,9 @@ def test_metrics_of_a_task_cannot_hide_the_loops(tmp_path, monkeypatch):
     real = SmallTask.loss
 
     def loss(self, step, generator):
-        value, extra = real(self, step, generator)
-        return value, extra | {"step": -1, "loss": -1, "seconds": -1, "views": torch.tensor(6)}
+        result = real(self, step, generator)
+        metrics = {"step": -1, "loss": -1, "seconds": -1, "views": torch.tensor(6)}
+        return replace(result, metrics={**result.metrics, **metrics})
 
     monkeypatch.setattr(SmallTask, "loss", loss)
     _train(tmp_path, config=replace(SmallConfig(), steps=1))

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from mitex.methods.nerf.capture import Capture
+from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.config import NerfConfig
-from mitex.methods.nerf.plain import PlainTask, trained
+from mitex.methods.nerf.training.plain import PlainTask, train_plain_field
 from mitex.training import run
 
 PROBED, LAST = 1000, 200  # steps of the training that tells the pace, and of those the ones that tell it
@@ -23,7 +23,7 @@ def fit_plain(
     out: str | Path,
     config: NerfConfig,
     seconds: float,
-    shown: tuple[Capture, int] | None = None,
+    preview_view: tuple[Capture, int] | None = None,
     quiet: bool = True,
 ) -> PlainTask:
     """Trains a plain field for a time; its model is `field(task.mean)`.
@@ -36,20 +36,20 @@ def fit_plain(
         out: run folder, new or empty; an interrupted training in it goes on.
         config: settings; those of the texture make the two alike in rays, steps along them, and table size.
         seconds: that the training may take.
-        shown: a view for previews, as (capture, index).
+        preview_view: a view for previews, as (capture, index).
         quiet: show no progress.
 
     Raises:
         MitexError: as `fit`.
     """
-    view = shown or (capture, 0)
+    view = preview_view or (capture, 0)
     with tempfile.TemporaryDirectory() as probe:
         short = replace(config, steps=PROBED, preview_every=0, checkpoint_every=PROBED, refine_cameras=False)
-        trained(short, capture, view, Path(probe) / "run", quiet=True)
+        train_plain_field(short, capture, view, Path(probe) / "run", quiet=True)
         lines = (Path(probe) / "run" / run.METRICS).read_text().splitlines()
     steps = steps_within(seconds, [json.loads(line)["seconds"] for line in lines])
     whole = replace(short, steps=steps, lr_steps=steps, checkpoint_every=500)
-    return trained(whole, capture, view, out, quiet)
+    return train_plain_field(whole, capture, view, out, quiet)
 
 
 def steps_within(seconds: float, clock: Sequence[float]) -> int:

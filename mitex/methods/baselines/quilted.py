@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from mitex.errors import ConfigError
-from mitex.methods.nerf.matching import ArraySource
-from mitex.methods.nerf.patches import Patches
-from mitex.methods.nerf.quilting import quilt
+from mitex.methods.nerf.synthesis.matching import ArraySource
+from mitex.methods.nerf.synthesis.patches import Patches
+from mitex.methods.nerf.synthesis.quilting import quilt
 
 
 def quilted_albedo(
@@ -21,7 +21,7 @@ def quilted_albedo(
 
     Args:
         patches: P squares on the base shape.
-        pictures: what they look like from above, (P, S, S, 3) sRGB in [0, 1], in the order of their texels.
+        pictures: (P, S, S, 3) sRGB in [0, 1], as of `render_patches`, in the order of the patches' texels.
         size: height and width [texels].
         rng: of all choices.
         tileable: the image can be repeated.

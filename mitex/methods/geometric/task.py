@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 import torch
@@ -14,7 +16,8 @@ from mitex.methods.geometric.gan import adversarial_loss, critic_loss, generate
 from mitex.methods.geometric.hierarchy import Hierarchy
 from mitex.methods.geometric.model import grow, network
 from mitex.methods.geometric.pictures import portrait
-from mitex.training.optim import Adam
+from mitex.training import Change, Step
+from mitex.training.optim import Adam, gradient_norms
 
 HALVINGS = 4  # of the learning rate on a level
 
@@ -22,8 +25,8 @@ HALVINGS = 4  # of the learning rate on a level
 class GeometricTask:
     """Generators that turn the template into the reference, or something like it, on each level.
 
-    A step updates the generator of its level; the critics have optimizers of their own and take turns with it
-    inside `loss`. Generators of lower levels stay as they are.
+    A step updates the generator of its level. The critics have optimizers of their own and take their turns
+    in `begin`. Generators of lower levels stay as they are.
 
     Args:
         config: settings.
@@ -35,6 +38,7 @@ class GeometricTask:
     Attributes:
         generators, critics: a network for each possible level, so that a resumed run may go on to more.
         fixed: (V, 3) the noise from which the reference shall come; 0 on higher levels.
+        started: how many levels have been trained, the one under way included.
     """
 
     def __init__(
@@ -54,6 +58,7 @@ class GeometricTask:
         self.optimizers = [Adam(critic.parameters, betas(config)) for critic in self.critics]
         with torch.no_grad():
             self.real = [face_features(v, g) for v, g in zip(meshes, hierarchy.graphs, strict=True)]
+        self.started = 0
         self._start: tuple[int, torch.Tensor] | None = None
 
     @property
@@ -64,43 +69,72 @@ class GeometricTask:
         """Which level a step trains."""
         return min(step // self.config.level_steps, self.config.levels - 1)
 
-    def loss(self, step: int, generator: torch.Generator) -> tuple[torch.Tensor, dict[str, float]]:
+    def begin(self, step: int, generator: torch.Generator) -> Change | None:
+        """First weights of a new level, and the critic's turns; the metrics are those of its last turn."""
+        level, turns = self.level(step), self._critic_turns(step)
+        new = level >= self.started
+        if not new and not turns:
+            return None
+        undo = partial(self._restore, level, self.started, _clones(self._level_state(level)))
+        if new:
+            self._start_level(level)
+        metrics: dict[str, float] = {}
+        for _ in range(turns):
+            metrics = self._train_critic(level, step, generator)
+            if not math.isfinite(metrics["critic_gradient"]):
+                break
+        return Change(undo, metrics)
+
+    def loss(self, step: int, generator: torch.Generator) -> Step:
+        """The critic's score of a random mesh, and the distance of the reconstruction (section 3.3)."""
         level = self.level(step)
-        if step == level * self.config.level_steps and level >= self.config.carried:
-            self.generators[level].load(self.generators[level - 1].parameters)
-            self.critics[level].load(self.critics[level - 1].parameters)
-        record = {"level": float(level)}
-        for _ in range(self._critic_turns(step)):
-            record |= self._train_critic(level, step, generator)
         graph = self.hierarchy.graphs[level]
         fake = self._sample(level, generator)
         adversarial = adversarial_loss(self.critics[level], fake, graph)
         noise = self.fixed if level == 0 else 0.0
-        made = generate(self.generators[level], self._rebuilt(level), graph, noise, self.config.remeasure)
-        error = (made - self.meshes[level]).square().mean()
-        record |= {"adversarial": adversarial.item(), "reconstruction": error.item()}
-        return adversarial + self.config.reconstruction * error, record
-
-    def commit(self) -> None:
-        """The critics' weights were changed in `loss`."""
+        rebuilt = generate(self.generators[level], self._rebuilt(level), graph, noise, self.config.remeasure)
+        error = (rebuilt - self.meshes[level]).square().mean()
+        metrics = {"level": level, "adversarial": adversarial.item(), "reconstruction": error.item()}
+        return Step(adversarial + self.config.reconstruction * error, metrics)
 
     def state(self) -> dict[str, torch.Tensor]:
-        state = {}
-        for level, pair in enumerate(zip(self.generators, self.critics, strict=True)):
-            for kind, net in zip(("generator", "critic"), pair, strict=True):
-                state |= {f"{kind}/{level}/{k}": p.detach() for k, p in enumerate(net.parameters)}
-            moments = self.optimizers[level].state()
-            state |= {f"optimizer/{level}/{key}": value for key, value in moments.items()}
+        state = {"started": torch.tensor(self.started)}
+        for level in range(MAX_LEVELS):
+            state |= {f"{level}/{name}": value for name, value in self._level_state(level).items()}
         return state
 
     def load_state(self, state: dict[str, torch.Tensor]) -> None:
-        for level, pair in enumerate(zip(self.generators, self.critics, strict=True)):
-            for kind, net in zip(("generator", "critic"), pair, strict=True):
-                net.load([state[f"{kind}/{level}/{k}"] for k in range(len(net.parameters))])
-            start = f"optimizer/{level}/"
-            moments = {k.removeprefix(start): v for k, v in state.items() if k.startswith(start)}
-            self.optimizers[level].load_state(moments)
-        self._start = None
+        for level in range(MAX_LEVELS):
+            start = f"{level}/"
+            own = {k.removeprefix(start): v for k, v in state.items() if k.startswith(start)}
+            self._load_level(level, own)
+        self.started, self._start = int(state["started"]), None
+
+    def _level_state(self, level: int) -> dict[str, torch.Tensor]:
+        """The live tensors of a level: both networks, and the moments of the critic's optimizer."""
+        networks = {"generator": self.generators[level], "critic": self.critics[level]}
+        state = {
+            f"{name}/{k}": p.detach() for name, net in networks.items() for k, p in enumerate(net.parameters)
+        }
+        return state | {f"optimizer/{k}": v for k, v in self.optimizers[level].state().items()}
+
+    def _load_level(self, level: int, state: dict[str, torch.Tensor]) -> None:
+        for name, net in (("generator", self.generators[level]), ("critic", self.critics[level])):
+            net.load([state[f"{name}/{k}"] for k in range(len(net.parameters))])
+        start = "optimizer/"
+        moments = {k.removeprefix(start): v for k, v in state.items() if k.startswith(start)}
+        self.optimizers[level].load_state(moments)
+
+    def _restore(self, level: int, started: int, state: dict[str, torch.Tensor]) -> None:
+        self._load_level(level, state)
+        self.started = started
+
+    def _start_level(self, level: int) -> None:
+        """From level `carried` on the first weights are those of the level before."""
+        self.started = level + 1
+        if level >= self.config.carried:
+            self.generators[level].load(self.generators[level - 1].parameters)
+            self.critics[level].load(self.critics[level - 1].parameters)
 
     def preview(self, step: int) -> np.ndarray:
         """The reference, the training mesh of the level, its reconstruction, and two random samples."""
@@ -122,6 +156,7 @@ class GeometricTask:
         return (step + 1) * turns // of - step * turns // of
 
     def _train_critic(self, level: int, step: int, generator: torch.Generator) -> dict[str, float]:
+        """One turn; the critic stays as it is when the norm of its gradient is not finite."""
         graph, optimizer = self.hierarchy.graphs[level], self.optimizers[level]
         with torch.no_grad():
             fake = face_features(self._sample(level, generator), graph)
@@ -131,10 +166,12 @@ class GeometricTask:
                 self.critics[level], self.real[level], fake, graph, mix, self.config.penalty
             )
             gradients = torch.autograd.grad(loss, self.critics[level].parameters)
-        for parameter, gradient in zip(self.critics[level].parameters, gradients, strict=True):
+        for parameter, gradient in zip(optimizer.parameters, gradients, strict=True):
             parameter.grad = gradient
-        optimizer.step(learning_rate(self.config, step))
-        return {"critic": loss.item(), "distance": distance.item()}
+        norm = gradient_norms(optimizer.parameters).norm().item()
+        if math.isfinite(norm):
+            optimizer.step(learning_rate(self.config, step))
+        return {"critic": loss.item(), "distance": distance.item(), "critic_gradient": norm}
 
     def _sample(self, level: int, generator: torch.Generator) -> torch.Tensor:
         """A random mesh of a level; only its own generator has a gradient."""
@@ -164,6 +201,10 @@ class GeometricTask:
         count = level + 1
         given = [*noises[:count], *[0.0] * (count - len(noises))]
         return grow(self.generators[:count], self.hierarchy, self.template, given, self.config.remeasure)
+
+
+def _clones(state: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    return {name: value.clone() for name, value in state.items()}
 
 
 def betas(config: GeometricConfig) -> tuple[float, float]:

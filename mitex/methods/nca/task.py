@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import torch
@@ -20,6 +21,7 @@ from mitex.methods.nca.targets import OFFSET, STATE_CHANNELS, Targets, enlarged,
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, orbit, patch_views, random_views
 from mitex.scenes.stage import Stage
+from mitex.training import Step
 from mitex.triples import channel_triples, triple_images
 
 
@@ -49,13 +51,16 @@ class NcaTask:
         self.appearance = Appearance(config, Targets(target, pictures, network, config.layers), network)
         self.pool = torch.zeros(config.pool, self.perception.vertices, config.channels)
         self._touched = torch.zeros(config.pool, dtype=torch.bool)
-        self._last: tuple[int, torch.Tensor] | None = None
 
     @property
     def parameters(self) -> list[torch.nn.Parameter]:
         return list(self.model.parameters())
 
-    def loss(self, step: int, generator: torch.Generator) -> tuple[torch.Tensor, dict[str, float]]:
+    def begin(self, step: int, generator: torch.Generator) -> None:
+        """Nothing changes before the loss."""
+
+    def loss(self, step: int, generator: torch.Generator) -> Step:
+        """Appearance and overflow of a state of the pool after some steps; `commit` puts it back, evolved."""
         config = self.config
         index = int(torch.randint(config.pool, (), generator=generator))
         state = self.pool[index][None]
@@ -66,9 +71,14 @@ class NcaTask:
         visibility = self.stage.visibility(self.cameras(generator))
         views = bridge.lookup(state[0].index_select(1, self.appearance.channels) + OFFSET, visibility)
         appearance, overflow = self.appearance(views, generator), overflow_loss(state)
-        self._last = (index, state.detach()[0])
-        total = appearance + config.overflow_weight * overflow
-        return total, {"appearance": appearance.item(), "overflow": overflow.item()}
+        return Step(
+            appearance + config.overflow_weight * overflow,
+            {"appearance": appearance.item(), "overflow": overflow.item()},
+            partial(self._put_back, index, state.detach()[0]),
+        )
+
+    def _put_back(self, index: int, state: torch.Tensor) -> None:
+        self.pool[index], self._touched[index] = state, True
 
     def cameras(self, generator: torch.Generator) -> Cameras:
         """The views of one step."""
@@ -88,11 +98,6 @@ class NcaTask:
     def half_width(self) -> float:
         """Half the width of a patch view [mesh units]."""
         return 0.5 * self.pixel * self.config.resolution
-
-    def commit(self) -> None:
-        assert self._last is not None
-        index, state = self._last
-        self.pool[index], self._touched[index], self._last = state, True, None
 
     def state(self) -> dict[str, torch.Tensor]:
         """Weights, and the pool's states that are no longer the seed."""

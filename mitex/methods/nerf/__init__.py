@@ -20,16 +20,16 @@ __getattr__ = attributes(
     __name__,
     {
         "PRESETS": "mitex.methods.nerf.config",
-        "Capture": "mitex.methods.nerf.capture",
+        "Capture": "mitex.methods.nerf.capture.capture",
         "NerfConfig": "mitex.methods.nerf.config",
         "NerfTexture": "mitex.methods.nerf.texture",
         "fit": "mitex.methods.nerf.fitting",
-        "load_capture": "mitex.methods.nerf.capture",
+        "load_capture": "mitex.methods.nerf.capture.capture",
     },
 )
 
 if TYPE_CHECKING:
-    from mitex.methods.nerf.capture import Capture, load_capture
+    from mitex.methods.nerf.capture.capture import Capture, load_capture
     from mitex.methods.nerf.config import PRESETS, NerfConfig
     from mitex.methods.nerf.fitting import fit
     from mitex.methods.nerf.texture import NerfTexture

@@ -12,7 +12,7 @@ from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unu
 from mitex.methods.options import PICTURES, MeshOptions, TrainingOptions
 
 if TYPE_CHECKING:
-    from mitex.methods.nerf.applied import AppliedTexture
+    from mitex.methods.nerf.use.applied import AppliedTexture
 
 SIZE = 2048  # of the synthesized texture [texels]
 RESOLUTION = 512  # of a picture [pixels]

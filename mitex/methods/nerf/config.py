@@ -16,7 +16,7 @@ class NerfConfig(TrainingConfig):
     steps: int = 6_000
     rays: int = key(4096, "rays in a step", 1, 1 << 20)
     one_view: bool = key(False, "all rays of a step from one photo (the paper), instead of from all")
-    cells: int = key(512, "steps of a ray along the diagonal of the scene cube", 16, 8192)
+    ray_steps: int = key(512, "steps of a ray along the diagonal of the scene cube", 16, 8192)
     # Tables of 2^17 entries have room for the surface's cells at 64 to 512; with the published resolutions
     # these share entries, and colours learn half as fast.
     table: int = key(17, "binary logarithm of the entries of a level's hash table", 8, 24)
@@ -36,15 +36,15 @@ class NerfConfig(TrainingConfig):
     clustering: float = key(1e-5, "weight of the clustering loss", 0)
     distortion: float = key(1e-2, "weight of the distortion loss", 0)
     normals: float = key(0.05, "weight of the normal loss", 0)
-    inside: float = key(
+    interior_weight: float = key(
         0.01,
-        "weight of the loss that gives what is hidden the reflectance above it, in the second half; the "
-        "paper: 0, and where a shell is cut any colour is seen",
+        "weight of the loss that gives the unseen interior the reflectance above it, in the second half; "
+        "the paper: 0, and where a shell is cut any colour shows",
         0,
     )
     cluster_entries: int = key(1 << 14, "entries of a level clustered in a step; 0 for all (the paper)", 0)
     normal_rays: float = key(0.25, "share of the rays whose normals are compared", 0, 1)
-    pull: float = key(0.05, "pseudo-distance that keeps projections from the nearest vertex", 1e-6)
+    repulsion: float = key(0.05, "pseudo-distance that keeps projections from the nearest vertex", 1e-6)
     neighbours: int = key(8, "vertices whose normals make the coarse normal", 1, 64)
     occupancy: int = key(128, "cells of the occupancy grid along a side", 8, 512)
     refine_cameras: bool = key(False, "optimize the poses too")
@@ -74,7 +74,7 @@ PRESETS = {
         steps=40_000,
         lr_steps=40_000,
         one_view=True,
-        cells=1024,
+        ray_steps=1024,
         table=19,
         coarsest=512,
         finest=1024,
@@ -84,8 +84,8 @@ PRESETS = {
         detach_normals=True,
         cluster_entries=0,
         normals=1.0,
-        inside=0.0,
+        interior_weight=0.0,
         normal_rays=1.0,
-        pull=0.01,
+        repulsion=0.01,
     ),
 }

@@ -12,11 +12,11 @@ import torch
 
 from mitex.mesh import Mesh
 from mitex.methods.nerf import METHOD
-from mitex.methods.nerf.coarse import BaseShape
+from mitex.methods.nerf.base.coarse import BaseShape
 from mitex.methods.nerf.config import NerfConfig
-from mitex.methods.nerf.field import Encoding
-from mitex.methods.nerf.lighting import COEFFICIENTS
-from mitex.methods.nerf.networks import MATRICES, weight_shapes
+from mitex.methods.nerf.field.encoding import Encoding
+from mitex.methods.nerf.field.lighting import COEFFICIENTS
+from mitex.methods.nerf.field.networks import MATRICES, weight_shapes
 from mitex.runtime import init
 from mitex.training import model_file
 
@@ -26,9 +26,9 @@ SETTINGS = (
     "finest",
     "density_width",
     "fresnel",
-    "cells",
+    "ray_steps",
     "occupancy",
-    "pull",
+    "repulsion",
     "neighbours",
 )
 
@@ -110,6 +110,6 @@ def _check(model: Model) -> None:
         "frames": (model.frames.shape, (len(model.base.mesh.faces), 3, 3)),
         "light": (tuple(model.light.shape), (COEFFICIENTS,)),
     }
-    for name, (found, wanted) in shapes.items():
-        if found != wanted:
+    for name, (shape, expected) in shapes.items():
+        if shape != expected:
             raise ValueError(f"{name} of another shape")

@@ -9,14 +9,14 @@ import numpy as np
 
 from mitex.mesh import Mesh
 from mitex.methods.nerf import files
-from mitex.methods.nerf.base_shape import face_frames
-from mitex.methods.nerf.capture import Capture, load_capture
-from mitex.methods.nerf.coarse import BaseShape, find_base
+from mitex.methods.nerf.base.base_shape import face_frames
+from mitex.methods.nerf.base.coarse import BaseShape, find_base
+from mitex.methods.nerf.capture.capture import Capture, load_capture
 from mitex.methods.nerf.config import PRESETS
-from mitex.methods.nerf.projection import Projection
-from mitex.methods.nerf.radiance import schedule
-from mitex.methods.nerf.task import TextureTask
+from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.texture import NerfTexture
+from mitex.methods.nerf.training.radiance import schedule
+from mitex.methods.nerf.training.task import TextureTask
 from mitex.runtime import init, keep_freed_memory
 from mitex.training.fit import Run
 from mitex.training.settings import RunOptions
@@ -31,7 +31,7 @@ def fit(
 ) -> NerfTexture:
     """Learns a surface with its meso-structure from photos; writes a run folder with the model in it.
 
-    Every eighth view is held out; previews show the first of these. The base shape is found first and kept in
+    Every eighth view is held out; previews show the first of these. The base shape is made first and kept in
     the user's cache folder.
 
     Args:
@@ -55,11 +55,13 @@ def fit(
         given = given.with_vertices(photos.similarity.apply(given.vertices))
     init()
     keep_freed_memory()
-    learned, held_out = photos.split()
-    base = find_base(learned, config, given, run.quiet)
+    training, held_out = photos.split()
+    base = find_base(training, config, given, run.quiet)
     frames = face_frames(base.mesh)
-    projection = Projection(base.mesh, neighbours=config.neighbours, pull=config.pull, reach=base.thickness)
-    task = TextureTask(config, learned, (held_out, 0), projection, frames, base.thickness)
+    projection = Projection(
+        base.mesh, neighbours=config.neighbours, repulsion=config.repulsion, reach=base.thickness
+    )
+    task = TextureTask(config, training, (held_out, 0), projection, frames, base.thickness)
     origin: dict[str, Any] = {key: getattr(config, key) for key in files.SETTINGS}
     origin |= {"centre": photos.similarity.center.tolist(), "scale": float(photos.similarity.scale)}
     return run.train(

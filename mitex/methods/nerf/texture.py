@@ -13,19 +13,27 @@ from mitex.atlas import laid_out
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, Similarity
 from mitex.methods.nerf import files
-from mitex.methods.nerf.applied import EXTENT, UNWRAPPED, AppliedTexture, centred, stretch
-from mitex.methods.nerf.field import Decoder, Encoding
-from mitex.methods.nerf.guide import WEIGHT, Guide
-from mitex.methods.nerf.itself import own_maps
-from mitex.methods.nerf.maps import LatentMaps
-from mitex.methods.nerf.patches import SIZE as PATCH
-from mitex.methods.nerf.patches import FeatureSource, Patches, extract_patches, mirrored_frames, texel_gap
-from mitex.methods.nerf.pictures import pictured
-from mitex.methods.nerf.projection import Projection
-from mitex.methods.nerf.quilting import Quilt, quilt
-from mitex.methods.nerf.radiance import look_step
-from mitex.methods.nerf.shell import CapturedLatents, Shell
-from mitex.methods.nerf.tensors import channels
+from mitex.methods.nerf.field.decoder import Decoder
+from mitex.methods.nerf.field.encoding import Encoding
+from mitex.methods.nerf.field.projection import Projection
+from mitex.methods.nerf.field.rendering import render_step
+from mitex.methods.nerf.field.shell import CapturedLatents, Shell
+from mitex.methods.nerf.field.tensors import channels
+from mitex.methods.nerf.synthesis.guide import WEIGHT, Guide
+from mitex.methods.nerf.synthesis.maps import LatentMaps
+from mitex.methods.nerf.synthesis.patch_images import render_patches
+from mitex.methods.nerf.synthesis.patches import SIZE as PATCH
+from mitex.methods.nerf.synthesis.patches import (
+    FeatureSource,
+    Patches,
+    extract_patches,
+    mirror_frames,
+    texel_gap,
+)
+from mitex.methods.nerf.synthesis.quilting import Quilt, quilt
+from mitex.methods.nerf.use.applied import AppliedTexture
+from mitex.methods.nerf.use.placement import EXTENT, UNWRAP_SIZE, in_scene_cube, uv_unit_length
+from mitex.methods.nerf.use.self_maps import self_maps
 from mitex.runtime import init, load_mitsuba
 
 mi: Any = load_mitsuba(needs_llvm=False)
@@ -38,7 +46,7 @@ DEEPEST = 2.0  # percentile of the scan's distances
 
 
 class NerfTexture:
-    """A texture with meso-structure, as `fit` captured it.
+    """A texture with meso-structure, captured by `fit`.
 
     Attributes:
         model: features, networks, light and base shape.
@@ -75,7 +83,10 @@ class NerfTexture:
         """The texture on the shape that it was captured on, in the scene cube, ready to be marched."""
         model, config = self.model, self.model.config
         projection = Projection(
-            model.base.mesh, neighbours=config.neighbours, pull=config.pull, reach=model.base.thickness
+            model.base.mesh,
+            neighbours=config.neighbours,
+            repulsion=config.repulsion,
+            reach=model.base.thickness,
         )
         return Shell(
             projection,
@@ -84,7 +95,7 @@ class NerfTexture:
             self.light,
             model.base.thickness,
             mask=mi.TensorXu8(model.occupied),
-            step=look_step(config),
+            step=render_step(config),
         )
 
     @cached_property
@@ -133,18 +144,21 @@ class NerfTexture:
             tileable: the texture continues over its borders.
             guide: a picture that it shall resemble from afar, (H, W, 3) sRGB in [0, 1], stretched over it.
             guide_weight: a colour difference of 1 counts as much as this times the mean distance of patches.
-            evenness: how much patches are avoided that were used before; as of `quilt`.
+            evenness: how much repetition is avoided; as of `quilt`.
 
         Raises:
             ConfigError: a number is out of range, the guide is no picture, or no patch fits.
         """
         rng = np.random.default_rng(seed)
-        found = self.patches(rng, patches, pattern_rate)
-        source = FeatureSource(found, self.features, len(self.latents.encoding.levels(0)) * 2)
+        squares = self.patches(rng, patches, pattern_rate)
+        source = FeatureSource(squares, self.features, len(self.latents.encoding.levels(0)) * 2)
         shape = (size, size) if isinstance(size, int) else size
-        wanted = None if guide is None else Guide(guide, pictured(self.shell, found, BLOCK), guide_weight)
-        made = quilt(source, shape, rng, flips=flips, tileable=tileable, guide=wanted, evenness=evenness)
-        return self.maps(found, made)
+        if guide is not None:
+            target = Guide(guide, render_patches(self.shell, squares, BLOCK), guide_weight)
+        else:
+            target = None
+        layout = quilt(source, shape, rng, flips=flips, tileable=tileable, guide=target, evenness=evenness)
+        return self.maps(squares, layout)
 
     def covering(self, mesh: Mesh, scale: float = 1.0, pattern_rate: float = GOOD_RATE) -> int:
         """Side of the texture that the unit square of a mesh's UVs shows once, as a guide asks for [texels].
@@ -155,10 +169,10 @@ class NerfTexture:
 
         Raises:
             MeshError: the mesh has no area.
-            ConfigError: no such texture can be made.
+            ConfigError: no such texture can be layout.
         """
         gap = texel_gap(self.model.base.mesh, pattern_rate) * scale
-        texels = round(stretch(centred(laid_out(mesh, UNWRAPPED))[0]) / gap)
+        texels = round(uv_unit_length(in_scene_cube(laid_out(mesh, UNWRAP_SIZE))[0]) / gap)
         if not PATCH <= texels <= LARGEST:
             raise ConfigError(
                 f"a guide over {texels} x {texels} texels",
@@ -182,25 +196,25 @@ class NerfTexture:
         values = [row for k in range(2) for row in encoding(k, place, tables[k])]
         return np.stack([np.array(value) for value in values], axis=1)
 
-    def maps(self, patches: Patches, made: Quilt) -> LatentMaps:
-        """Latent maps of a quilt: the frames of equation 4 are found once for each patch and face."""
-        face = made.look_up(patches.faces).astype(np.int64)
+    def maps(self, patches: Patches, layout: Quilt) -> LatentMaps:
+        """Latent maps of a quilt: the frames of equation 4 are computed once for each patch and face."""
+        face = layout.look_up(patches.faces).astype(np.int64)
         faces = len(self.model.frames)
-        code = (made.patch.astype(np.int64) * 4 + made.flip) * faces + face
+        code = (layout.patch.astype(np.int64) * 4 + layout.flip) * faces + face
         unique, frame = np.unique(code, return_inverse=True)
         sampling, face = unique // faces, unique % faces
-        turned = mirrored_frames(patches.frames[sampling // 4], (sampling % 4).astype(np.uint8))
+        turned = mirror_frames(patches.frames[sampling // 4], (sampling % 4).astype(np.uint8))
         frames = np.einsum("kij,klj->kil", turned, self.model.frames[face])
         return LatentMaps(
-            made.features,
-            frame.reshape(made.patch.shape).astype(np.int32),
+            layout.features,
+            frame.reshape(layout.patch.shape).astype(np.int32),
             frames.astype(np.float32),
             patches.gap,
         )
 
-    def itself(self, size: int = SIZE) -> AppliedTexture:
-        """The captured texture on its own base shape, by maps of `size` texels: in the scene cube."""
-        mesh, maps = own_maps(self.model.base.mesh, self.model.frames, self.features, size)
+    def on_base_shape(self, size: int = SIZE) -> AppliedTexture:
+        """The captured texture as maps of `size` texels on its own base shape, in the scene cube."""
+        mesh, maps = self_maps(self.model.base.mesh, self.model.frames, self.features, size)
         low, high = mesh.vertices.min(0), mesh.vertices.max(0)
         return self.apply(mesh, maps, scale=2 * EXTENT / float((high - low).max()), lift=0.0)
 
@@ -208,8 +222,8 @@ class NerfTexture:
     def ground(self) -> float:
         """How far the deepest parts of the captured surface are from the base shape, negative inside [scene
         units]."""
-        feet = self.shell.projection(self.model.base.scan)
-        return float(np.percentile(feet.distance[feet.hit], DEEPEST))
+        projections = self.shell.projection(self.model.base.scan)
+        return float(np.percentile(projections.distance[projections.hit], DEEPEST))
 
     def apply(
         self,
@@ -242,12 +256,23 @@ class NerfTexture:
             MeshError: the mesh has no area.
             ConfigError: a number is out of range.
         """
-        mesh = laid_out(mesh, UNWRAPPED)
+        mesh = laid_out(mesh, UNWRAP_SIZE)
         if maps is None:
             side = size if guide is None else self.covering(mesh, scale)
             maps = self.synthesize(side, seed, tileable=True, guide=guide)
-        shone = self.light if light is None else mi.TensorXf(np.asarray(light, np.float32))
-        return AppliedTexture(self, mesh, maps, scale=scale, density=density, lift=lift, light=shone)
+        light_coefficients = self.light if light is None else mi.TensorXf(np.asarray(light, np.float32))
+        return AppliedTexture(
+            mesh,
+            maps,
+            self.decoder,
+            light_coefficients,
+            self.model.config,
+            thickness=self.model.base.thickness,
+            ground=self.ground,
+            scale=scale,
+            density=density,
+            lift=lift,
+        )
 
     def __repr__(self) -> str:
         about = self.model.about

@@ -27,6 +27,7 @@ from mitex.methods.surface.texture import texel_layout
 from mitex.methods.surface.views import Views
 from mitex.runtime import keep_freed_memory
 from mitex.sparse import csr_tensor
+from mitex.training import Step
 from mitex.triples import CYCLE, channel_triples, triple_images
 
 VIEW = 384  # side of a preview's images [px]
@@ -113,7 +114,11 @@ class SurfaceTask:
         """(n, C) the maps' channels by `layout`, in the order of `levels`, in [0, 1]."""
         return self.space.values(self.coordinates)
 
-    def loss(self, step: int, generator: torch.Generator) -> tuple[torch.Tensor, dict[str, float]]:
+    def begin(self, step: int, generator: torch.Generator) -> None:
+        """Nothing changes before the loss."""
+
+    def loss(self, step: int, generator: torch.Generator) -> Step:
+        """Distance of features from the exemplar's, averaged over the triples of the step."""
         scale = self.scale(step)
         network, comparison = self.networks[scale], self.comparisons[scale]
         triples = self._draw_triples(step, generator)
@@ -128,14 +133,15 @@ class SurfaceTask:
                 difference = features.pop(CONTENT) - self.content
                 total = total + self.config.content_weight * difference.square().mean()
             total = total + comparison.cost(features, colours, k, generator)
-        return total / len(triples), {"scale": float(scale)}
+        return Step(total / len(triples), {"scale": float(scale)}, self._diffuse_and_clamp)
 
     def scale(self, step: int) -> int:
         """How often the texels are pooled before they enter the network in a step."""
         coarse = round(self.config.coarse_share * self.config.steps) if self.config.scales else 0
         return 0 if step >= coarse else self.config.scales - step * self.config.scales // coarse
 
-    def commit(self) -> None:
+    def _diffuse_and_clamp(self) -> None:
+        """Wears down what is finer than the taps, and brings values back to [0, 1]."""
         with torch.no_grad():
             if self.config.diffusion:
                 self.coordinates.lerp_(self._mean_of_taps @ self.coordinates, self.config.diffusion)

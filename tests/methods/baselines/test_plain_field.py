@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mitex.evaluation.metrics import psnr
 from mitex.methods.baselines import plain_field
 from mitex.methods.nerf.config import PRESETS
-from mitex.methods.nerf.evaluation import view_pair
-from mitex.metrics import psnr
+from mitex.methods.nerf.field.rendering import render_view
 from mitex.training import run
 from tests.methods.nerf.tiny import tiny_capture
 
@@ -40,11 +40,11 @@ def test_a_plain_field_learns_for_the_steps_of_its_time(monkeypatch, tmp_path):
 
     monkeypatch.setattr(plain_field, "PROBED", 3)
     monkeypatch.setattr(plain_field, "steps_within", steps_within)
-    config = replace(PRESETS["fast"], rays=1024, cells=192, table=13, occupancy=48, average=0.5)
+    config = replace(PRESETS["fast"], rays=1024, ray_steps=192, table=13, occupancy=48, average=0.5)
     learned, held = tiny_capture().split()
     task = plain_field.fit_plain(learned, tmp_path / "run", config, 12.0, (held, 0))
     assert given == [(12.0, 3)]
     assert len((tmp_path / "run" / run.METRICS).read_text().splitlines()) == 120
     assert task.config.lr_steps == 120
-    seen, photo = view_pair(task.field(task.mean), held, 0)
+    seen, photo = render_view(task.field(task.mean), held, 0)
     assert psnr(seen, photo) > 3 + psnr(np.ones_like(photo), photo)

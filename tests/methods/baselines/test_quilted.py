@@ -6,7 +6,7 @@ import pytest
 from mitex.errors import ConfigError
 from mitex.mesh import grid
 from mitex.methods.baselines.quilted import quilted_albedo
-from mitex.methods.nerf.patches import Patches, extract_patches
+from mitex.methods.nerf.synthesis.patches import Patches, extract_patches
 
 
 def checks(patches: Patches) -> np.ndarray:

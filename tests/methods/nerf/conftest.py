@@ -8,7 +8,7 @@ import pytest
 
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nerf import NerfTexture, fit
-from mitex.methods.nerf.maps import LatentMaps
+from mitex.methods.nerf.synthesis.maps import LatentMaps
 from tests.methods.nerf.tiny import SETTINGS, tiny_capture
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from contextlib import contextmanager
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -14,22 +16,24 @@ from scipy.spatial.transform import Rotation
 
 from mitex.asset import Asset
 from mitex.errors import CheckpointError, ConfigError, MeshError, OutputError
+from mitex.evaluation.metrics import psnr
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nerf import PRESETS, NerfTexture, files, fit
-from mitex.methods.nerf.base_shape import face_frames
-from mitex.methods.nerf.light_estimate import estimated_light
-from mitex.methods.nerf.pixels import Pixels
-from mitex.methods.nerf.projection import Projection
-from mitex.methods.nerf.radiance import look
-from mitex.methods.nerf.shell import Located
-from mitex.methods.nerf.task import BURIED, POSE, TextureTask
-from mitex.methods.nerf.tensors import rows
-from mitex.metrics import psnr
-from mitex.runtime import init
-from mitex.training import checkpoint
+from mitex.methods.nerf.base.base_shape import face_frames
+from mitex.methods.nerf.capture.pixels import Pixels
+from mitex.methods.nerf.field.projection import Projection
+from mitex.methods.nerf.field.rendering import render_batch
+from mitex.methods.nerf.field.shell import ShellCoords
+from mitex.methods.nerf.field.tensors import rows
+from mitex.methods.nerf.training import radiance
+from mitex.methods.nerf.training.light_estimate import estimated_light
+from mitex.methods.nerf.training.task import BURIED, POSE, TextureTask
+from mitex.runtime import init, threads
+from mitex.training import Step, checkpoint
 from mitex.training.config import resolve
 from mitex.training.locate import NAME
 from tests.methods.nerf.tiny import SETTINGS, tiny_capture
+from tests.training.contract import FAULTS, assert_loss_is_pure, assert_third_step_leaves_no_trace
 
 mi: Any = init()
 import drjit as dr  # noqa: E402
@@ -39,7 +43,7 @@ def test_the_loss_falls_and_the_run_folder_is_whole(run):
     lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
     colour = [line["colour"] for line in lines]
     assert len(lines) == 160 and np.mean(colour[-20:]) < 0.5 * np.mean(colour[:20])
-    assert {"normals", "clusters", "inside", "samples"} <= lines[-1].keys()
+    assert {"normals", "clusters", "interior", "samples"} <= lines[-1].keys()
     assert (run / NAME).is_file() and len(list((run / "previews").glob("*.png"))) == 1
 
 
@@ -47,7 +51,7 @@ def test_a_held_out_view_looks_like_its_photo(texture):
     _, held = tiny_capture().split()
     batch, shape = Pixels(held).image(0, 48)
     photo = (batch.colours * batch.alpha + 1 - batch.alpha).numpy()
-    found = look(texture.shell, batch)
+    found = render_batch(texture.shell, batch)
     quality = psnr(found.reshape(*shape, 3), photo.reshape(*shape, 3))
     assert quality > 17
     assert quality > 3 + psnr(np.ones_like(photo).reshape(*shape, 3), photo.reshape(*shape, 3))
@@ -146,8 +150,6 @@ def test_bad_requests_are_refused(texture, maps):
 
 
 def test_a_resumed_run_continues_as_if_it_had_not_stopped(run, tmp_path, base, monkeypatch):
-    from mitex.runtime import threads
-
     monkeypatch.setenv("XDG_CACHE_HOME", str(run.parent / "cache"))  # with the base shape
     few = [s for s in SETTINGS if not s.startswith(("steps", "preview", "checkpoint"))]
     few += ["preview_every=0", "checkpoint_every=4", "rays=128"]
@@ -171,10 +173,49 @@ def test_a_resumed_run_continues_as_if_it_had_not_stopped(run, tmp_path, base, m
 
 
 def small_task(base: Mesh, **more) -> TextureTask:
-    small = dict(rays=512, table=12, coarsest=8, finest=16, occupancy=32, cells=128)
+    small = dict(rays=512, table=12, coarsest=8, finest=16, occupancy=32, ray_steps=128)
     settings = replace(PRESETS["fast"], **small, **more)
     capture = tiny_capture()
     return TextureTask(settings, capture, (capture, 0), Projection(base, reach=0.12), face_frames(base), 0.12)
+
+
+def run_step(task: TextureTask, step: int, generator: torch.Generator | None = None) -> Step:
+    """The loss of a step after what comes before it."""
+    generator = generator or torch.Generator().manual_seed(0)
+    task.begin(step, generator)
+    return task.loss(step, generator)
+
+
+def refresh_each_step(monkeypatch) -> None:
+    """So that `begin` changes something in every step."""
+    monkeypatch.setattr(radiance, "REFRESH", 1)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_skipped_step_leaves_every_byte(base, fault, monkeypatch):
+    refresh_each_step(monkeypatch)
+    threads(1)
+    task = small_task(base)
+    assert_third_step_leaves_no_trace(lambda: small_task(base), task.config, fault)
+
+
+def test_a_refresh_that_finds_no_number_is_taken_back(base, monkeypatch):
+    refresh_each_step(monkeypatch)
+    threads(1)
+    task = small_task(base)
+
+    @contextmanager
+    def spoiled(task, fault):
+        with patch.object(task, "density", lambda points: np.full(len(points), np.nan, np.float32)):
+            yield
+
+    assert_third_step_leaves_no_trace(lambda: small_task(base), task.config, "density", spoiled)
+
+
+@pytest.mark.parametrize("step", [0, 1])
+def test_the_loss_changes_nothing(base, step):
+    threads(1)
+    assert_loss_is_pure(small_task(base), step)
 
 
 def test_fine_normals_start_near_those_of_the_faces(base):
@@ -182,9 +223,9 @@ def test_fine_normals_start_near_those_of_the_faces(base):
     task = small_task(base)
     latents, decoder, _ = task.model(task.named, packed=True)
     points = (base.vertices[base.faces].mean(1) * 1.02).astype(np.float32)
-    located = Located.of(task.projection(points))
-    normal = decoder(*latents(located), located.distance).normal(*latents.frame(located))
-    cosine = (rows(normal) * base.face_normals[np.array(located.face)]).sum(1)
+    coords = ShellCoords.of(task.projection(points))
+    normal = decoder(*latents(coords), coords.distance).normal(*latents.frame(coords))
+    cosine = (rows(normal) * base.face_normals[np.array(coords.face)]).sum(1)
     assert cosine.min() > np.cos(np.radians(3.0))
 
 
@@ -193,7 +234,7 @@ def test_the_light_is_that_of_the_photos_unless_it_is_learned(base):
         task = small_task(base, learn_light=learned)
         estimate = estimated_light(base, task.pixels.capture)
         np.testing.assert_allclose(task.named["light"].detach(), estimate, rtol=1e-5, atol=1e-6)
-        loss, _ = task.loss(0, torch.Generator().manual_seed(0))
+        loss = run_step(task, 0).value
         loss.backward()
         gradient = task.named["light"].grad
         assert (gradient is not None and gradient.abs().max() > 0) == learned
@@ -202,7 +243,7 @@ def test_the_light_is_that_of_the_photos_unless_it_is_learned(base):
 def test_refined_cameras_get_the_gradient_of_the_loss(base):
     task = small_task(base, refine_cameras=True)
     capture = task.pixels.capture
-    loss, _ = task.loss(0, torch.Generator().manual_seed(0))
+    loss = run_step(task, 0).value
     loss.backward()
     gradient = task.named["poses"].grad
     assert gradient is not None and gradient.shape == (len(capture), 6)
@@ -242,10 +283,10 @@ def trained_task(run, base: Mesh, capture, setting: str) -> TextureTask:
 def test_the_inside_learns_from_the_surface_and_not_the_surface_from_it(run, base):
     gradients = []
     for weight in (0.0, 1.0):
-        task = trained_task(run, base, tiny_capture(), f"inside={weight}")
-        loss, record = task.loss(task.config.steps, torch.Generator().manual_seed(0))
-        assert record.get("inside", 0.0) > 0 or not weight
-        gradients.append(torch.autograd.grad(loss, [task.named["tables/f"], task.named["weights/4"]]))
+        task = trained_task(run, base, tiny_capture(), f"interior_weight={weight}")
+        result = run_step(task, task.config.steps)
+        assert result.metrics.get("interior", 0.0) > 0 or not weight
+        gradients.append(torch.autograd.grad(result.value, [task.named["tables/f"], task.named["weights/4"]]))
     (features, reflection), (features_too, reflection_too) = gradients
     scale = float(features.abs().max())
     np.testing.assert_allclose(features, features_too, rtol=1e-3, atol=1e-4 * scale)
@@ -253,27 +294,27 @@ def test_the_inside_learns_from_the_surface_and_not_the_surface_from_it(run, bas
 
 
 def test_an_inside_that_looks_as_the_surface_costs_nothing(run, base):
-    task = trained_task(run, base, tiny_capture(), "inside=1.0")
+    task = trained_task(run, base, tiny_capture(), "interior_weight=1.0")
     with torch.no_grad():
         task.named["weights/4"].zero_()  # the last of the reflection's: all is grey
-    _, record = task.loss(task.config.steps, torch.Generator().manual_seed(0))
-    assert record["inside"] == 0
-    _, early = task.loss(0, torch.Generator().manual_seed(0))
-    assert "inside" not in early
+    assert run_step(task, task.config.steps).metrics["interior"] == 0
+    assert "interior" not in run_step(task, 0).metrics
 
 
 def test_buried_is_what_has_matter_above_and_beside_it(run, base):
     """In matter that ends at the base shape and at x = 0.1: near either of them a photo may see it."""
-    task = trained_task(run, base, tiny_capture(), "inside=1.0")
+    task = trained_task(run, base, tiny_capture(), "interior_weight=1.0")
     reach = BURIED * task.thickness
     x, distance = [0, 0, 0, 0.1 - 0.9 * reach, 0.1 - 1.5 * reach], [0.5, -0.9, -1.1, -1.1, -1.1]
     up = mi.Vector3f(0, 0, mi.Float([1] * 5))
-    here = Located(mi.Point3f(mi.Float(x), 0, 0), reach * mi.Float(distance), mi.UInt32(0), mi.Point2f(0), up)
+    here = ShellCoords(
+        mi.Point3f(mi.Float(x), 0, 0), reach * mi.Float(distance), mi.UInt32(0), mi.Point2f(0), up
+    )
 
     def exponent(f, distance):
         return dr.select((f[0] < 0.1) & (distance < 0), 12.0, -12.0)
 
-    latents: Any = SimpleNamespace(features=lambda located: [located.foot.x])
+    latents: Any = SimpleNamespace(features=lambda coords: [coords.foot.x])
     decoder: Any = SimpleNamespace(exponent=exponent)
     buried = np.array(task._buried(latents, decoder, here))
     np.testing.assert_allclose(buried, [0, 0, 1, 0, 1], atol=1e-3)
@@ -290,7 +331,7 @@ def test_wrong_cameras_find_back(run, base):
     task = trained_task(run, base, wrong, "refine_cameras=true")
     generator, optimizer = torch.Generator().manual_seed(0), torch.optim.Adam([task.named["poses"]], lr=0.03)
     for step in range(150):
-        loss, _ = task.loss(step, generator)
+        loss = run_step(task, step, generator).value
         (task.named["poses"].grad,) = torch.autograd.grad(loss, [task.named["poses"]])
         optimizer.step()
     found = POSE * task.named["poses"].detach().numpy()

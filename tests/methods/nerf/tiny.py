@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from mitex.mesh import Mesh, Similarity, icosphere
-from mitex.methods.nerf.capture import Capture
+from mitex.methods.nerf.capture.capture import Capture
 from mitex.runtime import init
 from mitex.scenes.stage import mesh_shape
 
@@ -19,7 +19,7 @@ SETTINGS = (  # of a small real fit
     "lr_steps=160",
     "base_steps=260",
     "rays=1024",
-    "cells=192",
+    "ray_steps=192",
     "table=13",
     "coarsest=32",
     "finest=128",

@@ -1,0 +1,1 @@
+"""How good a result is: measures, and the experiments of the papers."""

@@ -1,0 +1,1 @@
+"""From photos to the base shape that a texture lies on."""

@@ -1,0 +1,145 @@
+"""From photos to the base shape: a coarse density, what is solid in it, and how thick the shell must be."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mitex.cache import cached, content_key
+from mitex.integrators.march import composite
+from mitex.mesh import Mesh
+from mitex.methods.nerf.base.base_shape import base_shape, given_base, shell_thickness
+from mitex.methods.nerf.capture.capture import Capture
+from mitex.methods.nerf.capture.pixels import Pixels
+from mitex.methods.nerf.config import NerfConfig
+from mitex.methods.nerf.field.occupancy import sample_grid
+from mitex.methods.nerf.field.projection import Projection
+from mitex.methods.nerf.field.rendering import batch_rays
+from mitex.methods.nerf.training.plain import PlainTask, train_plain_field
+from mitex.paths import cache_dir
+from mitex.runtime import load_mitsuba
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+
+VERSION = 1  # of the base shapes in the cache
+COARSE = dict(  # what the coarse field needs less of
+    table=15,
+    ray_steps=256,
+    rays=1024,
+    occupancy=64,
+    one_view=False,
+    distortion=1e-2,
+    average=0.8,
+    preview_every=0,
+    refine_cameras=False,
+)
+GRID = 256  # samples of the density along a side of the scene cube
+VIEWS = 16  # that the surface is scanned from
+SCAN_SIDE = 200  # pixels of a scan along its longest side
+SOLID = 0.95  # opacity of a ray that has met the surface
+VOXEL = 0.01  # the scan keeps one point in each [scene units]
+
+
+@dataclass(frozen=True, eq=False)
+class BaseShape:
+    """What the texture lies on.
+
+    Attributes:
+        mesh: in the scene cube.
+        scan: (M, 3) float32 points of the captured surface.
+        thickness: h, half of the shell's [scene units].
+    """
+
+    mesh: Mesh
+    scan: np.ndarray
+    thickness: float
+
+
+def find_base(
+    capture: Capture, config: NerfConfig, given: Mesh | None = None, quiet: bool = True
+) -> BaseShape:
+    """Trains a coarse field on a capture and takes the base shape from it; kept in the user's cache folder.
+
+    Args:
+        capture: the views to learn from.
+        config: settings.
+        given: a base shape of the user's in the capture's world, or None.
+        quiet: show no progress.
+
+    Raises:
+        MeshError: there is nothing dense, or the given mesh cannot be used.
+    """
+    steps = config.base_steps
+    coarse = replace(config, **COARSE, steps=steps, lr_steps=steps)
+    arrays = (*capture.images, capture.poses, capture.intrinsics, capture.distortion)
+    mesh = () if given is None else (given.vertices, given.faces)
+    settings = (config.seed, steps, config.lr, config.concavity, config.repulsion, config.neighbours)
+    place = cache_dir() / "nerf" / content_key(VERSION, *arrays, *mesh, *settings)
+
+    def compute() -> BaseShape:
+        task = train_plain_field(coarse, capture, (capture, 0), place.with_suffix(".run"), quiet)
+        _say("cutting the base shape out of the coarse field, about a minute", quiet)
+        base = _shape_of(task, config) if given is None else given_base(given)
+        scan = scan_surface(task)
+        projection = Projection(base, neighbours=config.neighbours, repulsion=config.repulsion)
+        return BaseShape(base, scan, shell_thickness(scan, projection))
+
+    base = cached(place, compute, _read, _write)
+    _say(f"base shape of {len(base.mesh.faces):,} faces, shell of +-{base.thickness:.3f}", quiet)
+    return base
+
+
+def _shape_of(task: PlainTask, config: NerfConfig) -> Mesh:
+    occupied = task.occupancy.occupied.astype(bool)
+    density = sample_grid(task.field(task.mean).density_at, occupied, GRID)
+    return base_shape(density, concavity=config.concavity)
+
+
+def _say(line: str, quiet: bool) -> None:
+    if not quiet:
+        print(line, file=sys.stderr, flush=True)
+
+
+def scan_surface(task: PlainTask) -> np.ndarray:
+    """(M, 3) float32 points where rays of views from all around become solid."""
+    capture, field = task.pixels.capture, task.field(task.mean)
+    points = []
+    for view in _farthest(capture.poses[:, :, 3], VIEWS):
+        batch, _ = Pixels(capture).image(int(view), SCAN_SIDE)
+        origin, direction = batch_rays(batch)
+        pixels = composite(field, origin, direction, dr.full(mi.Float, 0.5, dr.width(origin)))
+        opacity = 1 - np.array(pixels.transmittance)
+        solid = opacity > SOLID
+        depth = (np.array(pixels.depth)[solid] / opacity[solid])[:, None]
+        points.append(batch.origins[solid] + batch.directions[solid] * depth)
+    points = np.concatenate(points)
+    _, first = np.unique(np.floor(points / VOXEL).astype(np.int64), axis=0, return_index=True)
+    return points[np.sort(first)].astype(np.float32)
+
+
+def _farthest(points: np.ndarray, count: int) -> np.ndarray:
+    """Indices of `count` points, each as far as can be from those before it."""
+    index = [0]
+    distance = np.linalg.norm(points - points[0], axis=1)
+    for _ in range(min(count, len(points)) - 1):
+        index.append(int(distance.argmax()))
+        distance = np.minimum(distance, np.linalg.norm(points - points[index[-1]], axis=1))
+    return np.array(index)
+
+
+def _read(place: Path) -> BaseShape:
+    with np.load(place / "base.npz", allow_pickle=False) as file:
+        mesh = Mesh(file["vertices"], file["faces"], name="base")
+        return BaseShape(mesh, file["scan"], float(file["thickness"]))
+
+
+def _write(folder: Path, base: BaseShape) -> None:
+    mesh, thickness = base.mesh, np.float64(base.thickness)
+    np.savez(
+        folder / "base.npz", vertices=mesh.vertices, faces=mesh.faces, scan=base.scan, thickness=thickness
+    )

@@ -1,0 +1,157 @@
+"""Cameras of plain photos: structure from motion by COLMAP (extra `nerf`)."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tempfile
+import warnings
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from mitex.cache import cached, content_key
+from mitex.errors import CaptureError, CaptureWarning
+from mitex.images import SUFFIXES, read_bytes
+from mitex.methods.nerf.capture.transforms import ONE_FILE, Frame, find_mask, no_mask, parse_frames
+from mitex.paths import cache_dir
+
+MIN_PHOTOS = 8
+PLACED = 0.5  # part of the photos that must get a pose
+LONGER_SIDE = 1600  # of what COLMAP sees [pixels]
+VERSION = 1  # of the cached poses
+
+
+def photo_frames(folder: Path) -> list[Frame]:
+    """The photos in a folder, or in its `images/`, with the cameras that COLMAP finds.
+
+    That takes minutes; the poses are kept in the user's cache as a `transforms.json`, under a hash of the
+    photos. Nothing is written into the folder. Photos without a pose are left out with a warning.
+
+    Raises:
+        CaptureError: too few photos, too few of them overlap, or pycolmap is not installed.
+        ImageError: a photo is damaged.
+    """
+    try:
+        photos = _photos(folder)
+        contents = [hashlib.sha256(path.read_bytes()).hexdigest() for path in photos]
+    except OSError as error:
+        raise CaptureError(f"{folder} cannot be read ({error.strerror})", "check its permissions") from error
+    if len(photos) < MIN_PHOTOS:
+        raise CaptureError(
+            f"{folder} has no transforms.json, and {len(photos)} photos",
+            f"give {MIN_PHOTOS} or more PNG or JPEG files that overlap, or the cameras in a transforms.json",
+        )
+    names = [path.relative_to(folder).as_posix() for path in photos]
+    place = cache_dir() / "captures" / content_key(VERSION, LONGER_SIDE, names, contents)
+    tree = cached(place, lambda: _reconstruct(folder, names), _read, _write)
+    missing = len(names) - len(tree["frames"])
+    if missing:
+        text = f"{folder}: {missing} of {len(names)} photos could not be placed and are left out"
+        warnings.warn(text, CaptureWarning, stacklevel=2)
+    return parse_frames(tree, folder, "COLMAP")
+
+
+def _photos(folder: Path) -> list[Path]:
+    source = folder / "images" if (folder / "images").is_dir() else folder
+    return sorted(path for path in source.iterdir() if path.suffix.lower() in SUFFIXES and path.is_file())
+
+
+def _reconstruct(folder: Path, names: Sequence[str]) -> dict[str, Any]:
+    """The content of a `transforms.json` for those photos that COLMAP places in one world."""
+    with tempfile.TemporaryDirectory(prefix="mitex-") as temporary:
+        work = Path(temporary)
+        (work / "images").mkdir()
+        # COLMAP sees copies: upright as `read_bytes` gives them, and no larger than it needs.
+        copies = {f"{k:05}.png": name for k, name in enumerate(names)}
+        sizes = {copy: _copy(folder, name, work / "images" / copy) for copy, name in copies.items()}
+        model = _largest(work, one_camera=len(set(sizes.values())) == 1)
+        placed = {} if model is None else {i.name: i for i in model.images.values() if i.has_pose}
+        if len(placed) < max(MIN_PHOTOS, PLACED * len(names)):
+            raise CaptureError(
+                f"only {len(placed)} of {len(names)} photos in {folder} could be placed",
+                "take sharp, overlapping photos all around a textured object, before a still background",
+            )
+        frames = [_frame(copies[name], placed[name], sizes[name]) for name in sorted(placed)]
+        return {"camera_model": "OPENCV", "frames": frames}
+
+
+def _copy(folder: Path, name: str, target: Path) -> tuple[int, int]:
+    """Writes a photo without alpha, scaled down where it is large; gives its own width and height."""
+    pixels = read_bytes(folder / name)
+    if pixels.shape[2] == 3 and find_mask(folder, folder / name) is None:
+        raise no_mask(folder / name)  # before it takes minutes
+    image = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
+    size = image.size
+    image.thumbnail((LONGER_SIDE, LONGER_SIDE), Image.Resampling.LANCZOS)
+    image.save(target, compress_level=1)
+    return size
+
+
+def _largest(work: Path, one_camera: bool) -> Any:
+    """COLMAP's model with the most photos, or None; always the same for the same photos."""
+    colmap = _pycolmap()
+    level, colmap.logging.minloglevel = colmap.logging.minloglevel, colmap.logging.FATAL
+    verification = colmap.TwoViewGeometryOptions()
+    verification.ransac.random_seed = 0
+    mapping = colmap.IncrementalPipelineOptions()
+    mapping.random_seed, mapping.min_model_size = 0, MIN_PHOTOS
+    mode = colmap.CameraMode.SINGLE if one_camera else colmap.CameraMode.PER_IMAGE
+    database, images, models = work / "database.db", work / "images", work / "models"
+    models.mkdir()
+    try:
+        colmap.set_random_seed(0)
+        colmap.extract_features(database, images, camera_mode=mode, device=colmap.Device.cpu)
+        colmap.match_exhaustive(database, verification_options=verification, device=colmap.Device.cpu)
+        found = colmap.incremental_mapping(database, images, models, mapping)
+    except (RuntimeError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise CaptureError(f"COLMAP failed ({reason})", "find the cameras with another program") from error
+    finally:
+        colmap.logging.minloglevel = level
+    return max(found.values(), key=lambda model: model.num_reg_images(), default=None)
+
+
+def _frame(name: str, image: Any, size: tuple[int, int]) -> dict[str, Any]:
+    """An entry of `transforms.json`; COLMAP's cameras look along +z, y down, and map world to camera."""
+    camera, width, height = image.camera, *size
+    x, y = width / camera.width, height / camera.height
+    matrix = image.cam_from_world().matrix()
+    rotation = matrix[:, :3].T
+    pose = np.column_stack([rotation * (1.0, -1.0, -1.0), -rotation @ matrix[:, 3]])
+    (radial,) = (camera.params[k] for k in camera.extra_params_idxs())
+    return {
+        "file_path": name,
+        "w": width,
+        "h": height,
+        "fl_x": camera.focal_length * x,
+        "fl_y": camera.focal_length * y,
+        "cx": camera.principal_point_x * x,
+        "cy": camera.principal_point_y * y,
+        "k1": float(radial),
+        "transform_matrix": [*pose.tolist(), [0.0, 0.0, 0.0, 1.0]],
+    }
+
+
+def _read(place: Path) -> dict[str, Any]:
+    tree = json.loads((place / ONE_FILE).read_text())
+    tree["frames"]  # a KeyError marks a damaged file
+    return tree
+
+
+def _write(place: Path, tree: Mapping[str, Any]) -> None:
+    (place / ONE_FILE).write_text(json.dumps(tree, indent=1) + "\n")
+
+
+def _pycolmap() -> Any:
+    try:
+        import pycolmap
+    except ImportError as error:
+        raise CaptureError(
+            "finding the cameras of photos needs pycolmap",
+            "install it with `pip install 'mitex[nerf]'`, or add a transforms.json",
+        ) from error
+    return pycolmap

@@ -1,0 +1,1 @@
+"""The radiance field in the shell around a base shape."""

@@ -1,0 +1,131 @@
+"""The networks that read the features of a point: density and reflection (section 3.1.4).
+
+The weights belong to whoever trains them, and come in with each call.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mitex.methods.nerf.field.mlp import network_rows, packed_networks
+from mitex.methods.nerf.field.networks import COARSE, LAYERS, OCTAVES, REFLECTION, Networks
+from mitex.methods.nerf.field.tensors import stack_rows, unstack_rows
+from mitex.runtime import load_mitsuba
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+
+HIGHEST = 15.0  # exponent of the density
+DULL = 3.0  # taken from the logit of k_s at grazing angles: surfaces start dull there
+
+
+@dataclass
+class Reflection:
+    """What the networks predict at a point.
+
+    Attributes:
+        exponent: natural logarithm of the density [1 / scene units].
+        diffuse: k_d, `mi.Color3f` in [0, 1].
+        specular: k_s in [0, 1], where the surface faces the viewer.
+        grazing: the same at grazing angles; k_s again as published.
+        glossiness: g, at least 1.
+        theta, phi: elevation and azimuth of the fine normal in the frame of the face [rad], unbounded.
+    """
+
+    exponent: Any
+    diffuse: Any
+    specular: Any
+    grazing: Any
+    glossiness: Any
+    theta: Any
+    phi: Any
+
+    @property
+    def density(self) -> Any:
+        return dr.exp(dr.minimum(self.exponent, HIGHEST))
+
+    @property
+    def reflectances(self) -> list[Any]:
+        """k_d (3) and k_s at both ends of its range, all in [0, 1]."""
+        return [*self.diffuse, self.specular, self.grazing]
+
+    def specular_at(self, cosine: Any) -> Any:
+        """k_s under an angle to the normal, by Schlick's law with both ends learned (Hoffman 2019)."""
+        return self.specular + (self.grazing - self.specular) * (1 - cosine) ** 5
+
+    def normal(self, tangent: Any, bitangent: Any, normal: Any) -> Any:
+        """R(theta, phi) of equation 4 in a frame of `mi.Vector3f`s."""
+        sin_theta, cos_theta = dr.sincos(self.theta)
+        sin_phi, cos_phi = dr.sincos(self.phi)
+        return tangent * (sin_theta * cos_phi) + bitangent * (sin_theta * sin_phi) + normal * cos_theta
+
+
+class Decoder:
+    """The networks from features and signed distance to density and reflection.
+
+    Args:
+        weights: matrices (out, in) as of `weight_shapes`, each a `mi.TensorXf`.
+        packed: evaluate as cooperative vectors: fast forwards, slow backwards.
+        low_precision: gradients in bfloat16 where points stay; what is evaluated is the same.
+    """
+
+    def __init__(self, weights: Sequence[Any], packed: bool = False, low_precision: bool = False) -> None:
+        self._low_precision = low_precision
+        remaining = iter(weights)
+        self.weights = {name: [next(remaining) for _ in widths[1:]] for name, widths in LAYERS.items()}
+        self._packed = (
+            dict(zip(LAYERS, packed_networks(*self.weights.values()), strict=True)) if packed else {}
+        )
+
+    def exponent(self, f: Sequence[Any], distance: Any) -> Any:
+        """Only the logarithm of the density."""
+        return network_rows(self._net("density"), [*f, *frequency_encoding(distance)])[0]
+
+    def __call__(self, f: Sequence[Any], phase: Sequence[Any], distance: Any) -> Reflection:
+        """Density and reflection for features f (16 arrays), f-hat (8) and signed distance [scene units]."""
+        run = self._cooperative if self._packed else self._together
+        exponent, *reflection, theta, phi = run([*f], [*phase], frequency_encoding(distance))
+        *diffuse, specular, glossiness = reflection[:REFLECTION]
+        specular, grazing = sigmoid(specular), reflection[REFLECTION:]
+        return Reflection(
+            exponent,
+            mi.Color3f(*(sigmoid(k) for k in diffuse)),
+            specular,
+            sigmoid(grazing[0] - DULL) if grazing else specular,
+            _softplus(glossiness) + 1,
+            theta,
+            phi,
+        )
+
+    def _cooperative(self, f: list[Any], phase: list[Any], fine: list[Any]) -> list[Any]:
+        exponent, *code = network_rows(self._packed["density"], f + fine)
+        reflection = network_rows(self._packed["reflection"], code)
+        theta = network_rows(self._packed["theta"], f + fine[:COARSE])
+        return [exponent, *reflection, *theta, *network_rows(self._packed["phi"], phase + fine[:COARSE])]
+
+    def _together(self, f: list[Any], phase: list[Any], fine: list[Any]) -> list[Any]:
+        nets = list(self.weights.values())
+        learning, moving = any(map(dr.grad_enabled, nets)), dr.grad_enabled(fine)
+        values = stack_rows(fine[COARSE:] + fine[:COARSE] + f + phase)
+        return unstack_rows(dr.custom(Networks, values, nets, learning, moving, self._low_precision))
+
+    def _net(self, name: str) -> Any:
+        return self._packed.get(name, self.weights[name])
+
+
+def frequency_encoding(distance: Any) -> list[Any]:
+    """The signed distance itself, then its sine and cosine at 12 octaves from 1 rad per scene unit on."""
+    values = [distance]
+    for octave in range(OCTAVES):
+        values += dr.sincos(distance * 2.0**octave)
+    return values
+
+
+def sigmoid(x: Any) -> Any:
+    return 0.5 * dr.tanh(0.5 * x) + 0.5
+
+
+def _softplus(x: Any) -> Any:
+    return dr.maximum(x, 0) + dr.log(1 + dr.exp(-dr.abs(x)))

@@ -1,0 +1,133 @@
+"""Phong shading under a light in spherical harmonics (section 3.1.5; Ramamoorthi and Hanrahan 2001).
+
+A light is the 16 coefficients L_lm of real spherical harmonics up to l = 3, at index l (l + 1) + m, for one
+channel or three. The signs are those of `dr.sh_eval`, with the Condon-Shortley phase: for l = 1 the harmonics
+go as (-y, z, -x), for l = 2 as (xy, -yz, 2 z^2 - x^2 - y^2, -xz, x^2 - y^2).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from mitex.errors import ImageError
+from mitex.geometry.vectors import unit
+from mitex.methods.nerf.field.tensors import channels
+from mitex.runtime import load_mitsuba
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+
+COEFFICIENTS = 16
+BANDS = 3  # of l that are rendered
+COSINE = (1.0, 2 / 3, 1 / 4, 0.0)  # of max(cos, 0) / pi, by l
+POWER = 1 / 2.4
+TOE = 1e-4  # radiance below which the display curve is a line, of slope 215
+
+
+def shade(normal: Any, view: Any, kd: Any, ks: Any, glossiness: Any, light: Any, bands: int = BANDS) -> Any:
+    """Radiance that points, at least one, send back along view rays; differentiable in all but `bands`.
+
+    The diffuse part is kd times the light convolved with the clamped cosine over pi, exactly; the specular
+    part is ks times the light convolved with a lobe of coefficients exp(-l^2 / 2g) around the mirrored ray,
+    for large g nearly that of cos^g, normalised.
+
+    Args:
+        normal: unit normals, `mi.Vector3f`.
+        view: unit directions in which the rays travel, from the camera on, `mi.Vector3f`.
+        kd: diffuse coefficients in [0, 1], `mi.Color3f` or `mi.Float`.
+        ks: specular coefficients in [0, 1], likewise.
+        glossiness: g, positive; the larger, the sharper the mirrored light, `mi.Float`.
+        light: `mi.TensorXf` of shape (16,), (16, 1) or (16, 3), linear.
+        bands: values of l that are rendered, from 0 on; 1 to 4.
+
+    Returns:
+        `mi.Color3f`, linear, at least 0; see `to_display`.
+    """
+    radiance = _coefficients(light, bands, dr.width(normal, view))
+    lobe = [dr.exp(-degree * degree / (2 * glossiness)) for degree in range(bands)]
+    diffuse = kd * _expand(radiance, COSINE[:bands], normal)
+    specular = ks * _expand(radiance, lobe, view - 2 * dr.dot(normal, view) * normal)
+    return dr.maximum(mi.Color3f(diffuse + specular), 0)
+
+
+def to_display(linear: Any) -> Any:
+    """Values for a display: the power 1/2.4 of linear ones, at least 0.
+
+    Below `TOE` a line to the origin replaces the power, whose derivative is infinite there; that is 1.6 / 255
+    off at most.
+    """
+    line = dr.maximum(linear, 0) * TOE ** (POWER - 1)
+    return dr.select(linear < TOE, line, dr.maximum(linear, TOE) ** POWER)
+
+
+def project_environment(image: np.ndarray) -> np.ndarray:
+    """The light of an environment map.
+
+    Args:
+        image: (H, W, C) linear radiance, C 1 or 3, in the layout of Mitsuba's `envmap`, not rotated: row 0
+            is +y, the columns run from -z over +x, +z and -x back to -z.
+
+    Returns:
+        (16, C) float32.
+
+    Raises:
+        ImageError: another shape, or values that are not finite.
+    """
+    if image.ndim != 3 or image.shape[2] not in (1, 3) or not image.size:
+        raise ImageError(f"an environment of shape {image.shape}", "give (H, W, 3) or (H, W, 1)")
+    if not np.isfinite(image).all():
+        raise ImageError("the environment holds NaN or infinite values", "check the step that made it")
+    height, width, channels = image.shape
+    turn = (np.arange(width) + 0.5) * (2 * math.pi / width)
+    polar = (np.arange(height)[:, None] + 0.5) * (math.pi / height)
+    level = np.broadcast_to(np.cos(polar), (height, width))
+    towards = (np.sin(polar) * np.sin(turn), level, -np.sin(polar) * np.cos(turn))
+    # Exact areas of the pixels on the sphere: together 4 pi at any resolution.
+    area = -np.diff(np.cos(np.arange(height + 1) * (math.pi / height))) * (2 * math.pi / width)
+    weighted = image * area[:, None, None]
+    basis = dr.sh_eval(mi.Vector3f(*(_flat(axis) for axis in towards)), 3)
+    light = [[dr.sum(y * _flat(weighted[..., c]))[0] for c in range(channels)] for y in basis]
+    return np.array(light, np.float32)
+
+
+def rotated(light: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """A light that is turned.
+
+    Args:
+        light: (16,) or (16, C) spherical harmonics.
+        turn: (3, 3) rotation.
+
+    Returns:
+        As `light`, float32: what it was in direction d, it is in direction turn d.
+    """
+    ways = unit(np.random.default_rng(0).normal(size=(8 * COEFFICIENTS, 3)))
+    now, before = (  # the first harmonic is one number
+        np.stack([np.broadcast_to(y, len(ways)) for y in dr.sh_eval(channels(mi.Vector3f, v), 3)], axis=1)
+        for v in (ways, ways @ turn)
+    )
+    return np.linalg.lstsq(now, before @ light, rcond=None)[0].astype(np.float32)
+
+
+def _coefficients(light: Any, bands: int, count: int) -> list[Any]:
+    """The first `bands` squared coefficients for `count` points, `mi.Float`s or `mi.Color3f`s."""
+    kind = mi.Color3f if light.shape[-1] == 3 else mi.Float
+    # One index a point, not one for all: the gradients are then summed where they arise, five times as fast.
+    return [dr.gather(kind, light.array, dr.full(mi.UInt32, k, count)) for k in range(bands * bands)]
+
+
+def _expand(radiance: Sequence[Any], weights: Sequence[Any], direction: Any) -> Any:
+    """sum_lm weight_l L_lm Y_lm(direction)."""
+    basis = dr.sh_eval(direction, len(weights) - 1)
+    terms = [y * coefficient for y, coefficient in zip(basis, radiance, strict=True)]
+    total = 0.0
+    for degree, weight in enumerate(weights):
+        total += weight * sum(terms[degree * degree : (degree + 1) ** 2])
+    return total
+
+
+def _flat(values: np.ndarray) -> Any:
+    return mi.Float(np.ascontiguousarray(values, np.float32).ravel())

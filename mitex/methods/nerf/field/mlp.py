@@ -1,0 +1,184 @@
+"""Networks of linear layers without biases and ReLUs between them, on N points: (channels, N) arrays.
+
+Inside Dr.Jit they are run by torch: on a CPU several times as fast as the products of `drjit.nn`. What is
+between two layers has the channels of a point side by side in memory, where narrow matrices are multiplied
+faster; and a part of the points goes through all layers while it is in a core's cache.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
+
+import torch
+
+from mitex.methods.nerf.field.tensors import stack_rows, unstack_rows
+from mitex.runtime import load_mitsuba
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+import drjit.nn as nn  # noqa: E402
+
+T = TypeVar("T")
+Weights = Sequence[torch.Tensor]
+CHUNK = 2560  # points of a part
+# In bfloat16 products are short work beside the calls that ask for them, and each new number of points costs
+# as much as several products: oneDNN compiles for it.
+LONG, GRAIN = 8192, 512  # points of a part there, and what their number is a multiple of
+_pool = ThreadPoolExecutor(os.cpu_count(), initializer=torch.set_num_threads, initargs=(1,))
+_relu_backward = torch.ops.aten.threshold_backward.grad_input
+
+
+def on_threads(
+    count: int, work: Callable[[Iterator[slice]], T], kind: torch.dtype = torch.float32
+) -> list[T]:
+    """Results of `work` on each of torch's threads, which share the parts of `count` points.
+
+    Each thread could take as many of them; one that the machine holds up takes fewer.
+    """
+    threads = torch.get_num_threads()  # torch first counts them here: in the pool it would find one
+    most, grain = (CHUNK, 1) if kind == torch.float32 else (LONG, GRAIN)
+    whole = count - count % grain
+    part_count = threads * max(math.ceil(whole / threads / most), 1)
+    size = max(math.ceil(whole / part_count / grain), 1) * grain
+    starts = [*range(0, whole, size), whole, count]
+    parts = iter([slice(start, end) for start, end in itertools.pairwise(starts) if end > start])
+    return list(_pool.map(work, [parts] * threads))
+
+
+def kind_of(part: slice, kind: torch.dtype) -> torch.dtype:
+    """What a part is multiplied in: `kind`, but for the rest that is no multiple of `GRAIN`."""
+    return torch.float32 if (part.stop - part.start) % GRAIN else kind
+
+
+def room(weights: Weights, count: int, kind: torch.dtype = torch.float32) -> list[torch.Tensor]:
+    """Memory for what `forwards` computes between the layers, of `count` points."""
+    return [torch.empty(count, len(weight), dtype=kind).T for weight in weights[:-1]]
+
+
+def forwards(
+    weights: Weights, values: torch.Tensor, between: Weights, part: slice, out: torch.Tensor
+) -> None:
+    """Runs a network on a part of the points.
+
+    Args:
+        weights: (out, in) of each layer.
+        values: inputs of the part.
+        between: a `room` for all points; in bfloat16 it keeps, for gradients, what is exact here.
+        part: which of them.
+        out: where the outputs of the part go.
+    """
+    for weight, layer_room in zip(weights[:-1], between, strict=True):
+        outputs = layer_room[:, part]
+        if outputs.dtype == values.dtype:
+            values = torch.mm(values.T, weight.T, out=outputs.T).T.relu_()
+        else:
+            values = (values.T @ weight.T).T.relu_()
+            outputs.copy_(values)
+    torch.mm(weights[-1], values, out=out)
+
+
+def backwards(
+    weights: Weights,
+    values: torch.Tensor,
+    between: Weights,
+    part: slice,
+    gradient: torch.Tensor,
+    sums: Weights,
+) -> torch.Tensor:
+    """The gradient of what the first layer makes, from that of the outputs.
+
+    Args:
+        weights, values, between, part: as of `forwards`; the first two of the gradient's type.
+        gradient: of the outputs of the part.
+        sums: gradients of the weights are added to it, float32; none if empty.
+    """
+    for k in reversed(range(len(weights))):
+        inputs = between[k - 1][:, part].to(gradient.dtype) if k else values
+        if sums:
+            sums[k].add_(gradient @ inputs.T)
+        if k:
+            gradient = (gradient.T @ weights[k]).T  # the same as weights[k].T @ gradient, but by points
+            _relu_backward(gradient, inputs, 0, grad_input=gradient)
+    return gradient
+
+
+def weight_bound(shape: tuple[int, int]) -> float:
+    """Of the uniform distribution that weights start from (Glorot and Bengio 2010)."""
+    return math.sqrt(6 / sum(shape))
+
+
+def packed_networks(*nets: Sequence[Any]) -> list[Any]:
+    """Networks for cooperative vectors, of the matrices (out, in) of each."""
+    modules = []
+    for weights in nets:
+        layers: list[Any] = []
+        for weight in weights:
+            linear: Any = nn.Linear(weight.shape[1], weight.shape[0], bias=False)
+            linear.weights = weight
+            layers += [linear, nn.ReLU()]
+        modules.append(nn.Sequential(*layers[:-1]))
+    return list(nn.pack(*modules))
+
+
+def network_rows(net: Any, values: list[Any]) -> list[Any]:
+    """Evaluates a network on N points: from its input channels, (N,) each, to its output channels.
+
+    Args:
+        net: its matrices (out, in), or one of `packed_networks`.
+        values: input channels.
+    """
+    if isinstance(net, nn.Module):
+        return list(net(nn.CoopVec(*values)))
+    return unstack_rows(evaluate(net, stack_rows(values)))
+
+
+def evaluate(weights: Sequence[Any], values: Any) -> Any:
+    """Outputs (M, N) for inputs (K, N), all `mi.TensorXf`; differentiable backwards."""
+    return dr.custom(_Network, values, [*weights], dr.grad_enabled(weights))
+
+
+class _Network(dr.CustomOp):
+    def eval(self, values: Any, weights: list[Any], learning: bool) -> Any:
+        self.weights, self.learning = [weight.torch() for weight in weights], learning
+        self.values = values.torch()
+        count = self.values.shape[1]
+        self.between = room(self.weights, count)
+        outputs = torch.empty(len(self.weights[-1]), count)
+
+        def work(parts: Iterator[slice]) -> None:
+            for part in parts:
+                forwards(self.weights, self.values[:, part], self.between, part, outputs[:, part])
+
+        on_threads(count, work)
+        return mi.TensorXf(outputs)
+
+    def backward(self) -> None:
+        gradient: Any = self.grad_out()
+        of_outputs = gradient.torch()
+        of_values = torch.empty_like(self.values)
+
+        def work(parts: Iterator[slice]) -> Weights:
+            sums = [torch.zeros_like(weight) for weight in self.weights if self.learning]
+            for part in parts:
+                values = self.values[:, part]
+                flow = backwards(self.weights, values, self.between, part, of_outputs[:, part], sums)
+                torch.mm(self.weights[0].T, flow, out=of_values[:, part])
+            return sums
+
+        sums = on_threads(of_outputs.shape[1], work)
+        self.set_grad_in("values", mi.TensorXf(of_values))
+        if self.learning:
+            self.set_grad_in("weights", [mi.TensorXf(s) for s in sum_over_threads(sums)])
+
+    def name(self) -> str:
+        return "network"
+
+
+def sum_over_threads(sums: Sequence[Weights]) -> list[torch.Tensor]:
+    """Totals of the sums of each thread."""
+    return [torch.stack(parts).sum(0) for parts in zip(*sums, strict=True)]

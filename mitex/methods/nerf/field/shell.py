@@ -1,0 +1,208 @@
+"""A radiance-field texture in the shell around a mesh: density and colour of points (section 3.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+from scipy import ndimage
+
+from mitex.methods.nerf.field.decoder import HIGHEST, Decoder
+from mitex.methods.nerf.field.encoding import Encoding
+from mitex.methods.nerf.field.lighting import shade, to_display
+from mitex.methods.nerf.field.occupancy import sample_grid
+from mitex.methods.nerf.field.projection import Projection, Projections
+from mitex.methods.nerf.field.tensors import channels, rows
+from mitex.runtime import load_mitsuba
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+
+
+@dataclass
+class ShellCoords:
+    """Coordinates of N points in the shell, as Dr.Jit arrays.
+
+    Attributes:
+        foot: `mi.Point3f` foot points on the mesh [scene units].
+        distance: signed, `mi.Float`, in the units that the networks were trained with.
+        face: `mi.UInt32`.
+        barycentric: `mi.Point2f`, weights of the face's corners 1 and 2.
+        normal: `mi.Vector3f`, the coarse normal n_c.
+    """
+
+    foot: Any
+    distance: Any
+    face: Any
+    barycentric: Any
+    normal: Any
+
+    @staticmethod
+    def of(projections: Projections, scale: float = 1.0) -> ShellCoords:
+        """Of projections that all hit; `scale` divides the distances."""
+        return ShellCoords(
+            channels(mi.Point3f, projections.point),
+            mi.Float(projections.distance / np.float32(scale)),
+            mi.UInt32(projections.face.astype(np.uint32)),
+            channels(mi.Point2f, projections.barycentric),
+            channels(mi.Vector3f, projections.normal),
+        )
+
+    def subset(self, index: Any) -> ShellCoords:
+        """The points at `index`, detached."""
+        return ShellCoords(*(dr.gather(type(v), dr.detach(v), index) for v in vars(self).values()))
+
+
+class Latents(Protocol):
+    """Where features come from: hash grids on the captured shape, or synthesized maps on another one."""
+
+    def __call__(self, coords: ShellCoords) -> tuple[list[Any], list[Any]]:
+        """f (16 arrays) and f-hat (8)."""
+        ...
+
+    def features(self, coords: ShellCoords) -> list[Any]:
+        """f alone, which the density needs."""
+        ...
+
+    def frame(self, coords: ShellCoords) -> tuple[Any, Any, Any]:
+        """Tangent, bitangent and normal that theta and phi refer to, `mi.Vector3f`s."""
+        ...
+
+
+class CapturedLatents:
+    """Features of the captured base shape.
+
+    Args:
+        encoding: the hash grids.
+        tables: of f and f-hat, flat `mi.Float`.
+        frames: (F, 3, 3) rows t, b, n of its faces.
+    """
+
+    def __init__(self, encoding: Encoding, tables: list[Any], frames: np.ndarray) -> None:
+        self.encoding, self.tables = encoding, tables
+        self.frames = mi.Float(np.ascontiguousarray(frames, np.float32).ravel())
+
+    def __call__(self, coords: ShellCoords) -> tuple[list[Any], list[Any]]:
+        return self.features(coords), self.encoding(1, coords.foot, self.tables[1])
+
+    def features(self, coords: ShellCoords) -> list[Any]:
+        return self.encoding(0, coords.foot, self.tables[0])
+
+    def frame(self, coords: ShellCoords) -> tuple[Any, Any, Any]:
+        rows = [dr.gather(mi.Vector3f, self.frames, coords.face * 3 + k) for k in range(3)]
+        return rows[0], rows[1], rows[2]
+
+
+def appearance(
+    latents: Latents, decoder: Decoder, light: Any, coords: ShellCoords, view: Any, detach: bool = False
+) -> tuple[Any, Any, Any]:
+    """Density, colour and fine normal of points in the shell (section 3.1.5).
+
+    Args:
+        latents, decoder: the texture.
+        light: spherical harmonics, see `lighting`.
+        coords: N points.
+        view: `mi.Vector3f`, the unit directions in which the rays travel.
+        detach: the colour has no derivative to the normal.
+
+    Returns:
+        Density [1 / scene units of the texture], colour `mi.Color3f` in display values, and unit normal.
+    """
+    f, phase = latents(coords)
+    reflection = decoder(f, phase, coords.distance)
+    normal = reflection.normal(*latents.frame(coords))
+    facing = dr.detach(normal) if detach else normal
+    specular = reflection.specular_at(dr.clip(-dr.dot(facing, view), 0, 1))
+    shaded = shade(facing, view, reflection.diffuse, specular, reflection.glossiness, light)
+    return reflection.density, to_display(shaded), normal
+
+
+class Shell:
+    """A texture around a mesh, as a renderer sees it.
+
+    Args:
+        projection: onto the mesh.
+        latents, decoder: the texture; a packed decoder is fast.
+        light: spherical harmonics.
+        thickness: h, half of the shell's [scene units].
+        mask: (G, G, G) `mi.TensorXu8`, the occupied cells of the scene cube.
+        step: of rays through it [scene units].
+        scale: size of the texture beside that of the capture.
+        strength: factor of the density.
+        lift: of the shell's middle above the mesh [scene units].
+    """
+
+    def __init__(
+        self,
+        projection: Projection,
+        latents: Latents,
+        decoder: Decoder,
+        light: Any,
+        thickness: float,
+        mask: Any,
+        step: float,
+        scale: float = 1.0,
+        strength: float = 1.0,
+        lift: float = 0.0,
+    ) -> None:
+        self.projection, self.latents, self.decoder = projection, latents, decoder
+        self.light, self.thickness, self.scale = light, thickness, scale
+        self.mask, self.step, self.strength, self.lift = mask, step, strength, lift
+
+    def locate(self, points: Any) -> tuple[Any, ShellCoords]:
+        """Which of the points, `mi.Point3f`, are in the shell, as ascending `mi.UInt32`, and where."""
+        index, projections = within(self.projection(rows(points)), self.thickness, self.lift)
+        return mi.UInt32(index.astype(np.uint32)), ShellCoords.of(projections, self.scale)
+
+    def density(self, points: np.ndarray) -> np.ndarray:
+        """Density [1 / scene units] of points (N, 3), (N,); 0 outside of the shell."""
+        index, projections = within(self.projection(points), self.thickness, self.lift)
+        result = np.zeros(len(points), np.float32)
+        if len(index):
+            coords = ShellCoords.of(projections, self.scale)
+            exponent = self.decoder.exponent(self.latents.features(coords), coords.distance)
+            result[index] = np.array(dr.exp(dr.minimum(exponent, HIGHEST))) * (self.strength / self.scale)
+        return result
+
+    def evaluate(self, points: Any, view: Any) -> tuple[Any, Any, Any]:
+        """Where in the shell, which of N points are; their density and colour.
+
+        Args:
+            points, view: `mi.Point3f` and the unit directions of the rays, `mi.Vector3f`.
+
+        Returns:
+            Ascending indices (M,) `mi.UInt32`, density (M,) [1 / scene units], colour (M,) in display values.
+        """
+        index, coords = self.locate(points)
+        if not dr.width(index):
+            return mi.UInt32(), mi.Float(), mi.Color3f()
+        along = dr.gather(mi.Vector3f, view, index)
+        density, colour, _ = appearance(self.latents, self.decoder, self.light, coords, along)
+        return index, density * (self.strength / self.scale), colour
+
+
+def within(projections: Projections, thickness: float, lift: float = 0.0) -> tuple[np.ndarray, Projections]:
+    """Indices and projections of the points in the shell, |s| < h; s counts from the lift on."""
+    distance = projections.distance - np.float32(lift)
+    index = np.flatnonzero(np.abs(distance) < thickness)
+    subset = Projections(*(values[index] for values in vars(projections).values()))
+    return index, replace(subset, distance=distance[index])
+
+
+def shell_cells(
+    projection: Projection, thickness: float, possible: np.ndarray, lift: float = 0.0
+) -> np.ndarray:
+    """Cells of the scene cube whose centres are in the shell, and their neighbours.
+
+    Args:
+        projection: onto the mesh.
+        thickness: h [scene units].
+        possible: (G, G, G) bool, the cells that are looked at.
+        lift: of the shell's middle above the mesh [scene units].
+    """
+
+    def in_shell(points: np.ndarray) -> np.ndarray:
+        return np.abs(projection(points).distance - lift) < thickness
+
+    return ndimage.binary_dilation(sample_grid(in_shell, possible, len(possible)) > 0)

@@ -1,0 +1,54 @@
+"""Between arrays in memory, Dr.Jit's arrays of C channels, and its tensors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from mitex.runtime import load_mitsuba
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+
+
+def tensor(values: Any) -> Any:
+    """`mi.TensorXf` (N,) of a `mi.Float`, (N, C) of an array of C of them."""
+    count = dr.width(values)
+    if dr.depth_v(values) == 1:
+        return mi.TensorXf(values, (count,))
+    return mi.TensorXf(dr.ravel(values), (count, len(values)))
+
+
+def channels(kind: Any, values: np.ndarray) -> Any:
+    """A Dr.Jit array such as `mi.Point3f` of values (N, C); N is no part of the kernel."""
+    return dr.unravel(kind, mi.Float(np.ascontiguousarray(values, np.float32).ravel()))
+
+
+def rows(values: Any) -> np.ndarray:
+    """(N, C) float32 of an array of C channels."""
+    return np.array(dr.ravel(values)).reshape(-1, len(values))
+
+
+# Slices of tensors would have N as a literal, and so would need new kernels for each N. An opaque N does not.
+def stack_rows(values: Sequence[Any]) -> Any:
+    """`mi.TensorXf` (C, N) of C arrays, of width N or 1."""
+    count = max(dr.width(value) for value in values)
+    flat = dr.zeros(mi.Float, count * len(values))
+    for k, value in enumerate(values):
+        wide = value if dr.width(value) == count else mi.Float(value) + dr.zeros(mi.Float, count)
+        dr.scatter(flat, wide, row_places(k, count), mode=dr.ReduceMode.Permute)
+    return mi.TensorXf(flat, (len(values), count))
+
+
+def unstack_rows(tensor: Any) -> list[Any]:
+    """The rows of a tensor (C, N)."""
+    rows, count = tensor.shape
+    places = [row_places(k, count) for k in range(rows)]
+    return [dr.gather(mi.Float, tensor.array, place, mode=dr.ReduceMode.Permute) for place in places]
+
+
+def row_places(k: int, count: int) -> Any:
+    """Where the elements of row k are in a flat tensor of rows of `count`."""
+    return dr.arange(mi.UInt32, count) + dr.opaque(mi.UInt32, k * count)

@@ -1,0 +1,1 @@
+"""More of a captured texture, in the plane."""

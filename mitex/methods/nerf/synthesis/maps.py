@@ -1,0 +1,131 @@
+"""Latent maps: a texture in the plane, and its features on the UVs of any mesh (section 3.2.4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mitex.geometry.triangles import twice_area
+from mitex.mesh import Mesh
+from mitex.methods.nerf.base.base_shape import face_frames
+from mitex.methods.nerf.field.networks import FEATURES, PHASES
+from mitex.methods.nerf.field.shell import ShellCoords
+from mitex.runtime import load_mitsuba
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+
+CHANNELS = FEATURES + PHASES
+PACKET = 8  # channels that are gathered at once
+
+
+@dataclass(frozen=True, eq=False)
+class LatentMaps:
+    """A synthesized texture. Row 0 is on top; it repeats beyond its borders.
+
+    Attributes:
+        features: (H, W, 24) float32 f and f-hat.
+        frame: (H, W) int32, which of `frames` turns the fine normal of a texel.
+        frames: (K, 3, 3) float32 T_s^-1 T_c of equation 4: from the frame of the captured face to the
+            texture's x (right), y (up) and z (outwards).
+        gap: between texels [scene units of the capture].
+    """
+
+    features: np.ndarray
+    frame: np.ndarray
+    frames: np.ndarray
+    gap: float
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(H, W)."""
+        return self.features.shape[0], self.features.shape[1]
+
+
+class MappedLatents:
+    """Features of a mesh by its UVs.
+
+    Attributes:
+        texels: flat values of the maps' features; derivatives reach them.
+
+    Args:
+        maps: the texture.
+        uv: (F, 3, 2) of the mesh's corners; v points up, one unit is the whole texture.
+        frames: (F, 3, 3) rows dP/du, dP/dv and normal of its faces, orthonormal.
+    """
+
+    def __init__(self, maps: LatentMaps, uv: np.ndarray, frames: np.ndarray) -> None:
+        self.size = maps.size
+        self.texels = mi.Float(maps.features.ravel())
+        self._which = mi.UInt32(maps.frame.astype(np.uint32).ravel())
+        self._turns = mi.Float(np.ascontiguousarray(maps.frames, np.float32).ravel())
+        self._uv = mi.Float(np.ascontiguousarray(uv, np.float32).ravel())
+        self._frames = mi.Float(np.ascontiguousarray(frames, np.float32).ravel())
+
+    def __call__(self, coords: ShellCoords) -> tuple[list[Any], list[Any]]:
+        values = self._blended(coords, CHANNELS)
+        return values[:FEATURES], values[FEATURES:]
+
+    def features(self, coords: ShellCoords) -> list[Any]:
+        """f alone, which the density needs."""
+        return self._blended(coords, FEATURES)
+
+    def frame(self, coords: ShellCoords) -> tuple[Any, Any, Any]:
+        """The captured frame's axes, laid on the mesh: equation 4 of each."""
+        x, y = self._place(coords)
+        height, width = self.size
+        texel = self._index(mi.Int32(dr.floor(x + 0.5)), mi.Int32(dr.floor(y + 0.5)), height, width)
+        turn = dr.gather(mi.UInt32, self._which, texel) * 9
+        axes = [dr.gather(mi.Vector3f, self._frames, coords.face * 3 + k) for k in range(3)]
+        captured = []
+        for axis in range(3):
+            parts = [dr.gather(mi.Float, self._turns, turn + 3 * row + axis) for row in range(3)]
+            captured.append(axes[0] * parts[0] + axes[1] * parts[1] + axes[2] * parts[2])
+        return captured[0], captured[1], captured[2]
+
+    def _place(self, coords: ShellCoords) -> tuple[Any, Any]:
+        """Column and row of the foot [texels], of which whole numbers are centres."""
+        height, width = self.size
+        corner = [dr.gather(mi.Point2f, self._uv, coords.face * 3 + k) for k in range(3)]
+        b, c = coords.barycentric
+        uv = corner[0] * (1 - b - c) + corner[1] * b + corner[2] * c
+        return uv.x * width - 0.5, (1 - uv.y) * height - 0.5
+
+    def _blended(self, coords: ShellCoords, count: int) -> list[Any]:
+        """The first `count` channels, bilinear."""
+        x, y = self._place(coords)
+        height, width = self.size
+        left, top = dr.floor(x), dr.floor(y)
+        across, down = x - left, y - top
+        total: list[Any] = [mi.Float(0)] * count
+        for right in (0, 1):
+            for below in (0, 1):
+                share = (across if right else 1 - across) * (down if below else 1 - down)
+                texel = self._index(mi.Int32(left) + right, mi.Int32(top) + below, height, width)
+                for k in range(0, count, PACKET):
+                    packet = texel * (CHANNELS // PACKET) + k // PACKET
+                    shape = (PACKET, dr.width(texel))
+                    values = dr.gather(mi.ArrayXf, self.texels, packet, shape=shape)
+                    for j in range(PACKET):
+                        total[k + j] = dr.fma(values[j], share, total[k + j])
+        return total
+
+    @staticmethod
+    def _index(column: Any, row: Any, height: int, width: int) -> Any:
+        """Of texels, repeated beyond the borders."""
+        return mi.UInt32(_wrapped(row, height) * width + _wrapped(column, width))
+
+
+def uv_frames(mesh: Mesh) -> np.ndarray:
+    """T~ of equation 4: `face_frames` whose second row is dP/dv, so left-handed in mirrored charts."""
+    frames = face_frames(mesh)
+    mirrored = twice_area(np.asarray(mesh.uv)) < 0
+    frames[mirrored, 1] *= -1
+    return frames
+
+
+def _wrapped(index: Any, size: int) -> Any:
+    rest = index % size
+    return dr.select(rest < 0, rest + size, rest)

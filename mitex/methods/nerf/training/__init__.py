@@ -1,0 +1,1 @@
+"""Learning a radiance field from a capture."""

@@ -1,0 +1,80 @@
+"""The light that photos were taken in, from how the brightness of the base shape goes with its normals.
+
+A radiance field cannot tell light from colour: whatever shades it is told by k_d as well, which does not turn
+with the surface. Over the whole object, though, colours do not know where the surface faces, and what goes
+with its normals is light (inverse lighting, as Marschner and Greenberg 1997 have it, in the harmonics of
+Ramamoorthi and Hanrahan 2001).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from mitex.geometry.vectors import unit
+from mitex.mesh import Mesh
+from mitex.methods.nerf.capture.capture import Capture
+from mitex.methods.nerf.field.lighting import BANDS, COEFFICIENTS, COSINE, POWER
+from mitex.methods.nerf.field.raycast import Raycaster
+from mitex.methods.nerf.field.tensors import channels
+from mitex.runtime import load_mitsuba
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+
+STRIDE = 4  # pixels
+SOLID = 0.5  # alpha of pixels that count
+STEEP = 75.0  # angle to the normal of pixels that count, at most [degrees]
+ALBEDO = 0.25  # mean of k_d: what is four times as bright can still be told
+PRIOR = 1e-3  # weight of even light, beside the pixels
+DARKEST = 0.01  # mean radiance of photos that a light is made for, at least
+SHADE = 0.25  # of what faces the least light, at least, beside the mean
+DIRECTIONS = 2000  # in which the light is evaluated for that
+
+
+def estimated_light(mesh: Mesh, capture: Capture) -> np.ndarray:
+    """The light under which a base shape of k_d = 1/4 looks as in its photos, by least squares.
+
+    Args:
+        mesh: base shape in the scene cube.
+        capture: its photos.
+
+    Returns:
+        (16,) float32 spherical harmonics, see `lighting`; zero above l = 2. No side is darker than a quarter
+        of the mean. Dim even light where the photos are black or do not see the mesh.
+    """
+    raycaster = Raycaster(mesh, capture)
+    count = BANDS**2
+    gram, bright = np.zeros((count, count)), np.zeros(count)
+    for view in range(len(capture)):
+        hits = raycaster(view, STRIDE)
+        image = capture.images[view][::STRIDE, ::STRIDE].astype(np.float64) / 255
+        valid = (hits.angle < STEEP) & (image[..., 3] > SOLID)
+        if valid.any():
+            basis = _irradiance(hits.normals[valid])
+            gram += basis.T @ basis
+            bright += basis.T @ (image[valid][:, :3] ** (1 / POWER)).mean(1)
+    light = np.zeros(COEFFICIENTS)
+    if gram[0, 0]:
+        prior = PRIOR * gram[0, 0] * np.diag(np.arange(count) > 0)
+        light[:count] = np.linalg.solve(gram + prior, bright) / ALBEDO
+    light[0] = max(light[0], DARKEST / ALBEDO * math.sqrt(4 * math.pi))
+    return _softened(light).astype(np.float32)
+
+
+def _softened(light: np.ndarray) -> np.ndarray:
+    """The light, nearer to an even one if it leaves a side too dark."""
+    directions = unit(np.random.default_rng(0).normal(size=(DIRECTIONS, 3)))
+    shades = _irradiance(directions) @ light[: BANDS**2]
+    mean = light[0] / math.sqrt(4 * math.pi)
+    share = min(1.0, (1 - SHADE) * mean / max(mean - shades.min(), 1e-12))
+    return light * np.where(np.arange(COEFFICIENTS) > 0, share, 1.0)
+
+
+def _irradiance(normals: np.ndarray) -> np.ndarray:
+    """What each coefficient of a light gives to surfaces of k_d = 1 with these normals (N, 3); (N, 9)."""
+    basis = dr.sh_eval(channels(mi.Vector3f, normals.astype(np.float32)), BANDS - 1)
+    weights = np.repeat(COSINE[:BANDS], [2 * degree + 1 for degree in range(BANDS)])
+    return np.stack([np.broadcast_to(np.array(y), len(normals)) for y in basis], axis=1) * weights

@@ -1,0 +1,104 @@
+"""Losses of the radiance-field texture beside that of colour (sections 3.2.3 and 3.3)."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+import torch.nn.functional as F
+from torch.autograd.function import once_differentiable
+
+FREE_ANGLE = math.pi / 8  # between normals, without penalty [rad]
+SHORT = 1e-4  # composited normals of less length have no direction
+
+
+def clustering(features: torch.Tensor, centres: torch.Tensor, kappa: float = 1.0) -> torch.Tensor:
+    """Draws features to the centres that they are nearest to (equation 3; Xie et al. 2016).
+
+    KL(P || Q), where Q says by Student's t-kernel how much a feature belongs to each centre, and P is Q
+    squared, divided by the centres' shares and normalised; P is constant.
+
+    Args:
+        features: (N, D) entries of one level.
+        centres: (K, D).
+        kappa: degrees of freedom of the kernel.
+
+    Returns:
+        Scalar: the terms' mean over the N K elements, at least 0 up to rounding; differentiable (once) in
+        features and centres.
+    """
+    return _Clustering.apply(features, centres, kappa)
+
+
+def distortion(
+    weights: torch.Tensor, midpoints: torch.Tensor, widths: torch.Tensor, rays: torch.Tensor
+) -> torch.Tensor:
+    """Gathers the weights of a ray in one short interval (Barron et al. 2022, equation 15).
+
+    A ray's loss is sum_ij w_i w_j |m_i - m_j| + 1/3 sum_i w_i^2 d_i, here in linear time by prefix sums.
+
+    Args:
+        weights: (M,) compositing weights w of the samples of all rays, those of one ray after another.
+        midpoints: (M,) places m of the samples along their rays, ascending in each ray.
+        widths: (M,) lengths d of the samples' intervals, in the same units.
+        rays: (M,) integers, the rays that the samples are on; equal ones are adjacent.
+
+    Returns:
+        Scalar: the mean over the rays that have samples, 0 without any.
+    """
+    # The sums run over all rays; their differences are as good as the weights only in float64.
+    w, m, d = weights.double(), midpoints.double(), widths.double()
+    _, lengths = torch.unique_consecutive(rays, return_counts=True)
+    starts = (lengths.cumsum(0) - lengths).repeat_interleave(lengths)
+    mass, moment = (_before(x, starts) for x in (w, w * m))
+    total = (2 * w * (m * mass - moment) + w.square() * d / 3).sum()
+    return (total / max(len(lengths), 1)).to(weights.dtype)
+
+
+def normal_agreement(predicted: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
+    """-min(cos, cos(pi / 8)) of the angles between normals, averaged: what equation 5 means.
+
+    As printed, equation 5 rewards only angles below pi / 8; noise in the target asks for the contrary.
+
+    Args:
+        predicted: (R, 3) fine normals composited along R rays, of any length.
+        target: (R, 3) target directions, of any length; constant.
+
+    Returns:
+        Scalar in [-cos(pi / 8), 1], without a derivative where the angle is below pi / 8.
+    """
+    cosine = F.cosine_similarity(predicted, target.detach(), dim=1, eps=SHORT)
+    return -cosine.clamp(max=math.cos(FREE_ANGLE)).mean()
+
+
+class _Clustering(torch.autograd.Function):
+    """The loss and its derivative in closed form, for which autograd takes twice as long.
+
+    In float64: the features start within 1e-4, and P and Q are then equal to float32's precision.
+    """
+
+    @staticmethod
+    def forward(ctx, features: torch.Tensor, centres: torch.Tensor, kappa: float) -> torch.Tensor:
+        # Features along the last axis: sums over the few centres are slow there.
+        offsets = features.double().T.contiguous()[:, None] - centres.double().T[:, :, None]  # (D, K, N)
+        inverse = 1 / (1 + offsets.square().sum(0) / kappa)
+        q = inverse ** (0.5 * (kappa + 1))
+        q = q / q.sum(0)
+        p = q.square() / q.sum(1, keepdim=True)
+        p = p / p.sum(0)
+        ctx.save_for_backward(offsets, (p - q) * inverse)
+        ctx.scale, ctx.dtypes = (kappa + 1) / kappa / p.numel(), (features.dtype, centres.dtype)
+        return (p * (p / q).log()).mean().to(features.dtype)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx, gradient):
+        offsets, force = ctx.saved_tensors
+        forces = offsets * (force * (gradient.double() * ctx.scale))
+        return forces.sum(1).T.to(ctx.dtypes[0]), -forces.sum(2).T.to(ctx.dtypes[1]), None
+
+
+def _before(values: torch.Tensor, starts: torch.Tensor) -> torch.Tensor:
+    """For each value the sum of those before it that are at or after its start."""
+    sums = values.cumsum(0) - values
+    return sums - sums[starts]

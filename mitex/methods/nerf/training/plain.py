@@ -1,0 +1,134 @@
+"""A plain hash-grid radiance field (Mueller et al. 2022): the coarse density that the base shape comes from,
+and what the paper compares view synthesis with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from mitex.bridge import call
+from mitex.integrators.march import Samples, sum_rays, weights_of
+from mitex.methods.nerf.capture.capture import Capture
+from mitex.methods.nerf.capture.pixels import Batch
+from mitex.methods.nerf.config import NerfConfig
+from mitex.methods.nerf.field.decoder import HIGHEST, sigmoid
+from mitex.methods.nerf.field.hash_grid import HashGrid
+from mitex.methods.nerf.field.mlp import network_rows, packed_networks, weight_bound
+from mitex.methods.nerf.field.occupancy import Occupancy, hull_cells
+from mitex.methods.nerf.field.rendering import batch_rays, render_step
+from mitex.methods.nerf.field.tensors import channels, tensor
+from mitex.methods.nerf.training.radiance import RadianceTask, Rendered, schedule
+from mitex.runtime import load_mitsuba
+from mitex.training import checkpoint, train
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+
+LEVELS, COARSEST, FINEST = 16, 16, 2048
+CODE = 15
+DENSITY, COLOUR = (2 * LEVELS, 64, CODE + 1), (CODE + 16, 64, 64, 3)
+
+
+class PlainField:
+    """Density and colour of points in the scene cube, by a hash grid and two networks.
+
+    Args:
+        grid: of features.
+        table: its values, flat.
+        weights: matrices of the networks.
+        mask, step: as `RadianceField` has them.
+        packed: evaluate as cooperative vectors, fast forwards.
+    """
+
+    def __init__(
+        self,
+        grid: HashGrid,
+        table: Any,
+        weights: Sequence[Any],
+        mask: Any = None,
+        step: float = 0.0,
+        packed: bool = False,
+    ) -> None:
+        self.grid, self.table = grid, table
+        remaining = iter(weights)
+        nets = [[next(remaining) for _ in widths[1:]] for widths in (DENSITY, COLOUR)]
+        self._nets = packed_networks(*nets) if packed else nets
+        self.mask, self.step = mask, step
+
+    def density(self, points: Any) -> tuple[Any, list[Any]]:
+        """Density [1 / scene units] of `mi.Point3f`, and a code for the colour."""
+        exponent, *code = network_rows(self._nets[0], self.grid(points, self.table))
+        return dr.exp(dr.minimum(exponent, HIGHEST)), code
+
+    def density_at(self, points: np.ndarray) -> np.ndarray:
+        """The same of points (N, 3) in memory, (N,)."""
+        return np.array(self.density(channels(mi.Point3f, points))[0])
+
+    def colour(self, code: list[Any], view: Any) -> Any:
+        """`mi.Color3f` in display values, seen in the unit directions `view`."""
+        rows = network_rows(self._nets[1], [*code, *dr.sh_eval(view, 3)])
+        return mi.Color3f(*(sigmoid(row) for row in rows))
+
+    def evaluate(self, points: Any, view: Any) -> tuple[Any, Any, Any]:
+        density, code = self.density(points)
+        return dr.arange(mi.UInt32, dr.width(points)), density, self.colour(code, view)
+
+
+class PlainTask(RadianceTask):
+    """Trains a plain field; arguments as of `RadianceTask`."""
+
+    def __init__(self, config: NerfConfig, capture: Capture, preview_view: tuple[Capture, int]) -> None:
+        generator = torch.Generator().manual_seed(config.seed)
+        self.grid = HashGrid(LEVELS, COARSEST, FINEST, config.table)  # as published
+        table = torch.empty(self.grid.size).uniform_(-1e-4, 1e-4, generator=generator)
+        parameters = {"table": table}
+        for k, shape in enumerate(_shapes()):
+            bound = weight_bound(shape)
+            parameters[f"weights/{k}"] = torch.empty(shape).uniform_(-bound, bound, generator=generator)
+        for value in parameters.values():
+            value.requires_grad_()
+        occupancy = Occupancy(config.occupancy, hull_cells(capture, config.occupancy))
+        super().__init__(config, capture, preview_view, occupancy, parameters)
+
+    def metadata(self) -> dict[str, str]:
+        return {"method": "plain", "capture": self.pixels.capture.name}
+
+    def render(self, step: int, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
+        origin, direction = batch_rays(batch)
+
+        def run(table: Any, *matrices: Any) -> Any:
+            field = PlainField(self.grid, table.array, matrices)
+            along = dr.gather(mi.Vector3f, direction, samples.ray)
+            _, density, colour = field.evaluate(samples.points(origin, direction), along)
+            weights, transmittance = weights_of(density, samples)
+            return tensor(sum_rays(colour * weights, samples)), tensor(transmittance), tensor(weights)
+
+        colour, transmittance, weights = call(run, *self.named.values())
+        return Rendered(colour, transmittance, weights, samples)
+
+    def field(self, parameters: dict[str, torch.Tensor], packed: bool = True) -> PlainField:
+        table, *weights = (mi.TensorXf(value.detach().numpy()) for value in parameters.values())
+        mask, step = self.occupancy.mask, render_step(self.config)
+        return PlainField(self.grid, table.array, weights, mask, step, packed)
+
+    def density(self, points: np.ndarray) -> np.ndarray:
+        return self.field(self.named).density_at(points)
+
+
+def train_plain_field(
+    config: NerfConfig, capture: Capture, preview_view: tuple[Capture, int], folder: str | Path, quiet: bool
+) -> PlainTask:
+    """Trains a plain field in a run folder, or continues there; arguments as of `RadianceTask`."""
+    folder = Path(folder)
+    task = PlainTask(config, capture, preview_view)
+    resume = (folder / checkpoint.NAME).exists()
+    train(task, config, folder, resume=resume, quiet=quiet, **schedule(config))
+    return task
+
+
+def _shapes() -> list[tuple[int, int]]:
+    return [(o, i) for w in (DENSITY, COLOUR) for i, o in zip(w[:-1], w[1:], strict=True)]

@@ -1,0 +1,177 @@
+"""Training a radiance field on a capture: what the textured shell and the plain field share (section 3.3)."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+import torch
+
+from mitex.integrators.march import DIAGONAL, RadianceField, Samples, march, visible
+from mitex.methods.nerf.capture.capture import Capture
+from mitex.methods.nerf.capture.pixels import Batch, Pixels
+from mitex.methods.nerf.config import NerfConfig
+from mitex.methods.nerf.field.occupancy import Occupancy
+from mitex.methods.nerf.field.rendering import batch_rays, render_view
+from mitex.methods.nerf.field.tensors import rows
+from mitex.methods.nerf.training.losses import distortion
+from mitex.runtime import load_mitsuba, modest_workers
+from mitex.training import Change, Step
+from mitex.training.optim import Adam
+
+mi: Any = load_mitsuba(needs_llvm=False)
+import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+
+REFRESH = 16  # steps between refreshes of the occupancy, and between updates of the mean parameters
+BETAS, EPSILON = (0.9, 0.99), 1e-15  # of Adam
+PREVIEW = 160  # pixels along the longest side
+
+
+class RadianceTask(ABC):
+    """A radiance field as a task of the training loop; the parameters that are kept are their running mean.
+
+    Args:
+        config: settings.
+        capture: views to learn from.
+        preview_view: a view for previews, held out or not, as (capture, index).
+        occupancy: which cells may hold matter.
+        parameters: leaf tensors by name.
+    """
+
+    def __init__(
+        self,
+        config: NerfConfig,
+        capture: Capture,
+        preview_view: tuple[Capture, int],
+        occupancy: Occupancy,
+        parameters: dict[str, torch.Tensor],
+    ) -> None:
+        self.config, self.occupancy = config, occupancy
+        self.pixels = Pixels(capture)
+        self.preview_view = preview_view
+        self.named = parameters
+        self.mean = {name: value.detach().clone() for name, value in parameters.items()}
+        self.step_length = DIAGONAL / config.ray_steps
+        self._commits = 0
+        dr.set_expand_threshold(2**26)  # by default gradients of large tables are 2.5 times slower
+        modest_workers()
+
+    @abstractmethod
+    def metadata(self) -> dict[str, str]:
+        """What checkpoints tell."""
+
+    def with_cameras(self, batch: Batch) -> Batch:
+        """The batch with rays of the refined cameras."""
+        return batch
+
+    @abstractmethod
+    def render(self, step: int, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
+        """Composites the samples of a batch's rays, attached to the parameters."""
+
+    @abstractmethod
+    def field(self, parameters: dict[str, torch.Tensor]) -> RadianceField:
+        """The field as it is with these parameters, for marching without derivatives."""
+
+    @abstractmethod
+    def density(self, points: np.ndarray) -> np.ndarray:
+        """Density (N,) of points (N, 3) with the parameters of now."""
+
+    @property
+    def parameters(self) -> Sequence[torch.Tensor]:
+        return list(self.named.values())
+
+    def begin(self, step: int, generator: torch.Generator) -> Change | None:
+        """Now and then a refresh of the occupancy."""
+        if step % REFRESH:
+            return None
+        undo = partial(self.occupancy.load_state, self.occupancy.state())
+        return Change(undo, {"density": self.occupancy.refresh(self.density, generator)})
+
+    def loss(self, step: int, generator: torch.Generator) -> Step:
+        """L1 of colours before a random background, and the field's own terms."""
+        batch = self.with_cameras(self.pixels.draw(self.config.rays, self.config.one_view, generator))
+        jitter = torch.rand(len(batch.view), generator=generator)
+        rays = batch_rays(batch)
+        samples = march(*rays, self.occupancy.mask, self.step_length, mi.Float(jitter.numpy()))
+        background = torch.rand(batch.colours.shape, generator=generator)
+        target = batch.colours * batch.alpha + background * (1 - batch.alpha)
+        if not len(samples):
+            raise ValueError("no ray meets an occupied cell")
+        samples = visible(samples, *rays, lambda points: mi.Float(self.density(rows(points))))
+        rendered = self.render(step, batch, samples, generator)
+        colour = rendered.colour + rendered.transmittance[:, None] * background
+        error = (colour - target).abs().mean()
+        total = error + sum(rendered.terms.values())
+        if self.config.distortion:
+            widths = torch.full_like(rendered.t, self.step_length)
+            spread = distortion(rendered.weights, rendered.t, widths, rendered.ray)
+            total = total + self.config.distortion * spread
+        metrics = {
+            "colour": error.item(),
+            "samples": float(len(rendered.t)),
+            "occupied": self.occupancy.share,
+        }
+        metrics |= {name: value.item() for name, value in rendered.terms.items()}
+        return Step(total, metrics, self._average)
+
+    def _average(self) -> None:
+        """Every `REFRESH` updates the mean parameters move towards those of now."""
+        self._commits += 1
+        if self._commits % REFRESH:
+            return
+        with torch.no_grad():
+            for name, value in self.named.items():
+                self.mean[name].lerp_(value, 1 - self.config.average)
+
+    def state(self) -> dict[str, torch.Tensor]:
+        state = {f"parameters/{name}": value.detach() for name, value in self.named.items()}
+        state |= {f"mean/{name}": value for name, value in self.mean.items()}
+        return state | self.occupancy.state() | {"commits": torch.tensor(self._commits)}
+
+    def load_state(self, state: dict[str, torch.Tensor]) -> None:
+        with torch.no_grad():
+            for name, value in self.named.items():
+                value.copy_(state[f"parameters/{name}"])
+                self.mean[name].copy_(state[f"mean/{name}"])
+        self.occupancy.load_state(state)
+        self._commits = int(state["commits"])
+
+    def preview(self, step: int) -> np.ndarray:
+        """A photo, and the same view of the field, on white."""
+        return np.hstack(render_view(self.field(self.mean), *self.preview_view, PREVIEW)[::-1])
+
+
+def schedule(config: NerfConfig) -> dict[str, Any]:
+    """Options of `train`: Adam with a learning rate that falls to a tenth in `lr_steps`."""
+    return {
+        "lr": lambda step: config.lr * 0.1 ** (step / config.lr_steps),
+        "optimizer": partial(Adam, betas=BETAS, eps=EPSILON),
+    }
+
+
+class Rendered:
+    """R rays composited from M samples, as tensors.
+
+    Attributes:
+        colour: (R, 3) in display values, times opacity.
+        transmittance: (R,) in [0, 1].
+        weights, t: (M,) compositing weight of each sample, and its distance along the ray [scene units].
+        ray: (M,) int64.
+        terms: further losses, weighted.
+    """
+
+    def __init__(
+        self,
+        colour: torch.Tensor,
+        transmittance: torch.Tensor,
+        weights: torch.Tensor,
+        samples: Samples,
+        terms: dict[str, torch.Tensor] | None = None,
+    ) -> None:
+        self.colour, self.transmittance, self.weights = colour, transmittance, weights
+        self.t = torch.from_numpy(np.array(samples.t))
+        self.ray = torch.from_numpy(np.array(samples.ray).astype(np.int64))
+        self.terms = terms or {}

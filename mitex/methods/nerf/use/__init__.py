@@ -1,0 +1,1 @@
+"""A texture on the user's meshes, and what leaves the renderer."""

@@ -1,0 +1,134 @@
+"""`AppliedTexture`: a radiance-field texture on a mesh of the user's (section 3.2.4)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from mitex.asset import Asset
+from mitex.atlas import laid_out
+from mitex.errors import ConfigError
+from mitex.export import SUFFIXES
+from mitex.images import write_image
+from mitex.integrators.march import DIAGONAL
+from mitex.mesh import Mesh
+from mitex.methods.nerf.config import NerfConfig
+from mitex.methods.nerf.field.decoder import Decoder
+from mitex.methods.nerf.field.occupancy import Occupancy
+from mitex.methods.nerf.field.projection import Projection
+from mitex.methods.nerf.field.rendering import render_step
+from mitex.methods.nerf.field.shell import Shell, shell_cells
+from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents, uv_frames
+from mitex.methods.nerf.use.extract import extract_mesh
+from mitex.methods.nerf.use.placement import UNWRAP_SIZE, in_scene_cube, uv_unit_length
+from mitex.paths import prepare_output
+
+PICTURES = (".png", ".jpg", ".jpeg")
+NEIGHBOURS = 5  # vertices that make the coarse normal of a target
+OCCUPANCY_SAMPLES = 6  # of the density in each cell, to find which ones are occupied
+FINEST = 2048  # steps across the scene cube, at most
+
+
+class AppliedTexture(Shell):
+    """A texture in the shell around a mesh, in the scene cube.
+
+    Attributes:
+        mesh: the target, as it was given but for its UVs.
+        similarity: the mesh's space -> scene cube.
+
+    Args:
+        mesh, maps, scale, density, lift: as of `NerfTexture.apply`.
+        decoder: the texture's networks, packed.
+        light: spherical harmonics, see `lighting`.
+        config: settings of the texture.
+        thickness: h of the captured shell [scene units].
+        ground: how far the deepest parts of the captured surface are from the base shape [scene units].
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        maps: LatentMaps,
+        decoder: Decoder,
+        light: Any,
+        config: NerfConfig,
+        *,
+        thickness: float,
+        ground: float,
+        scale: float,
+        density: float,
+        lift: float,
+    ) -> None:
+        if not 0.05 <= scale <= 20 or not 0 < density <= 1000 or not 0 <= lift <= 1:
+            raise ConfigError(
+                f"a texture of {scale} times the size, {density} times the density and lifted by {lift}",
+                "use sizes from 0.05 to 20, densities up to 1000 and lifts from 0 to 1",
+            )
+        self.mesh, self._maps = laid_out(mesh, UNWRAP_SIZE), maps
+        placed, self.similarity = in_scene_cube(self.mesh)
+        # One unit of the UVs shows so many textures that their elements have the requested size.
+        uv = np.asarray(placed.uv) * (uv_unit_length(placed) / (maps.size[1] * maps.gap * scale))
+        raised = lift * scale * max(-ground, 0.0)
+        thickness = thickness * scale
+        projection = Projection(placed, neighbours=NEIGHBOURS, repulsion=None, reach=thickness + raised)
+        cells = config.occupancy
+        possible = shell_cells(projection, thickness, np.ones((cells,) * 3, bool), raised)
+        occupancy = Occupancy(cells, possible)
+        super().__init__(
+            projection,
+            MappedLatents(maps, uv, uv_frames(placed)),
+            decoder,
+            light,
+            thickness,
+            mask=occupancy.mask,
+            step=max(scale * render_step(config), DIAGONAL / FINEST),
+            scale=scale,
+            strength=density,
+            lift=raised,
+        )
+        generator = torch.Generator().manual_seed(0)
+        for _ in range(OCCUPANCY_SAMPLES):
+            occupancy.refresh(self.density, generator)
+        self.mask = occupancy.mask
+
+    @property
+    def maps(self) -> Mapping[str, np.ndarray]:
+        """The latent features on the mesh's UVs, (H, W, C)."""
+        return {"features": self._maps.features}
+
+    def export(self, path: str | os.PathLike[str]) -> Path:
+        """Writes what is solid as a coloured mesh, as of `Asset.export`.
+
+        Raises:
+            OutputError: unknown suffix or unwritable place.
+        """
+        return self.extract().export(prepare_output(path, SUFFIXES))
+
+    def render(self, path: str | os.PathLike[str], *, exposure: float = 0.0, **options: Any) -> Path:
+        """Path-traces the texture in the studio: PNG or JPEG; options as of `shell_still`.
+
+        Raises:
+            OutputError: unknown suffix or unwritable place.
+        """
+        from mitex.render import tone
+        from mitex.render.shell import shell_still
+
+        target = prepare_output(path, PICTURES)
+        return write_image(
+            target, tone(shell_still(self, self.similarity, self.outline, **options), exposure)
+        )
+
+    def extract(self, cells: int | None = None) -> Asset:
+        """A coloured mesh of what is solid, in the mesh's space; see `extract_mesh`."""
+        return extract_mesh(self, self.similarity, self.mesh.name, cells)
+
+    @property
+    def outline(self) -> np.ndarray:
+        """(2 V, 3) points of the mesh's space that the shell lies between."""
+        ends = self.similarity.scale * np.array([self.lift - self.thickness, self.lift + self.thickness])
+        return np.concatenate([self.mesh.vertices + end * self.mesh.normals for end in ends])

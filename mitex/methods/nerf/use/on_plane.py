@@ -1,0 +1,63 @@
+"""A texture by the rays of photos: on its base shape, and on planes that touch this (section 4.3)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mitex.evaluation.elevations import HALF
+from mitex.evaluation.windows import SOLID, Rendering, Window
+from mitex.mesh import Mesh, grid
+from mitex.methods.nerf.field.lighting import rotated
+from mitex.methods.nerf.field.rendering import render_rays
+from mitex.methods.nerf.field.shell import Shell
+from mitex.methods.nerf.use.applied import AppliedTexture
+from mitex.methods.nerf.use.placement import EXTENT
+from mitex.runtime import load_mitsuba
+
+mi: Any = load_mitsuba(needs_llvm=False)
+
+SIDE = 96  # squares along the plane
+SCALE = EXTENT / HALF  # of a texture on the plane, such that it keeps its size in the scene
+
+
+def plane() -> Mesh:
+    """The square [-1, 1]^2 that windows are seen on."""
+    mesh = grid(SIDE, SIDE)
+    return mesh.with_vertices(HALF * mesh.vertices)
+
+
+class CapturedRenderer:
+    """Renders a texture where it was captured."""
+
+    def __init__(self, shell: Shell) -> None:
+        self.shell = shell
+
+    def __call__(self, window: Window) -> Rendering:
+        colour, transmittance = render_rays(self.shell, window.origins, window.directions)
+        return window.rendering(colour + transmittance[:, None] * window.background)
+
+
+class PlaneRenderer:
+    """Renders a texture on the plane of a window, under the light of the capture.
+
+    Args:
+        field: the texture on `plane()`, with `SCALE`.
+        light: (16,) spherical harmonics of the capture.
+        along: (3,) direction in the scene that the plane's x follows.
+    """
+
+    def __init__(self, field: AppliedTexture, light: np.ndarray, along: np.ndarray) -> None:
+        self.field, self.light, self.along = field, light, along
+
+    def __call__(self, window: Window) -> Rendering:
+        turn, origins, directions = window.to_plane(self.along)
+        self.field.light = mi.TensorXf(rotated(self.light, turn))
+        origins = self.field.similarity.apply(origins)
+        colour, transmittance = render_rays(
+            self.field, origins.astype(np.float32), directions.astype(np.float32)
+        )
+        return window.rendering(
+            colour + transmittance[:, None] * window.background, 1 - transmittance > SOLID
+        )

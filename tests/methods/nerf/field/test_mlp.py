@@ -1,0 +1,49 @@
+"""Networks inside Dr.Jit against autograd."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from mitex.methods.nerf.field import mlp
+from mitex.runtime import init, threads
+
+mi = init()
+import drjit as dr  # noqa: E402
+
+WIDTHS, POINTS = (5, 8, 7, 3), 50
+
+
+@pytest.fixture
+def given() -> list[torch.Tensor]:
+    """Inputs, then the matrices."""
+    drawn = torch.Generator().manual_seed(0)
+    shapes = [(WIDTHS[0], POINTS), *((o, i) for i, o in zip(WIDTHS[:-1], WIDTHS[1:], strict=True))]
+    return [torch.randn(shape, generator=drawn, requires_grad=True) for shape in shapes]
+
+
+@pytest.mark.parametrize(("chunk", "cores"), [(mlp.CHUNK, 2), (16, 1), (7, 3)])
+@pytest.mark.parametrize("learning", [True, False])
+def test_values_and_gradients_are_those_of_autograd(given, learning, chunk, cores, monkeypatch):
+    monkeypatch.setattr(mlp, "CHUNK", chunk)
+    threads(cores)
+    values, *weights = given
+    x = values
+    for weight in weights[:-1]:
+        x = torch.relu(weight @ x)
+    expected = weights[-1] @ x
+    expected.square().sum().backward()
+
+    ours, *matrices = (mi.TensorXf(value.detach().numpy()) for value in given)
+    dr.enable_grad(ours, *(matrices if learning else ()))
+    found = mlp.evaluate(matrices, ours)
+    dr.backward(dr.sum(found.array * found.array))
+    np.testing.assert_allclose(np.array(found), expected.detach(), rtol=1e-4, atol=1e-4)
+    _close(dr.grad(ours), values.grad)
+    for matrix, weight in zip(matrices, weights, strict=True):
+        _close(dr.grad(matrix), weight.grad if learning else torch.zeros_like(weight))
+
+
+def _close(found, expected):
+    np.testing.assert_allclose(np.array(found), expected, rtol=1e-4, atol=1e-4 * float(expected.abs().max()))

@@ -1,0 +1,361 @@
+"""Quilts of patches whose right continuation is known. Patches of 32 texels: strips of 12, 20 apart."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from mitex.errors import ConfigError
+from mitex.methods.nerf.synthesis.guide import Guide, GuideDistance
+from mitex.methods.nerf.synthesis.matching import SIDES, ArraySource, Matcher, mirror, overlap, strip
+from mitex.methods.nerf.synthesis.quilting import Quilt, quilt
+
+SIDE, STRIDE = 32, 20
+
+
+def periodic_image(period: int = 64, channels: int = 2, seed: int = 1) -> np.ndarray:
+    noise = np.random.default_rng(seed).normal(size=(period, period, channels))
+    smooth = gaussian_filter(noise, (2.0, 2.0, 0.0), mode="wrap")
+    return (smooth / smooth.std()).astype(np.float32)
+
+
+def crops(image: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """(P, SIDE, SIDE, C) parts of an image that goes on periodically."""
+    index = np.arange(SIDE)
+    rows = (corners[:, 0, None] + index) % image.shape[0]
+    columns = (corners[:, 1, None] + index) % image.shape[1]
+    return image[rows[:, :, None], columns[:, None]]
+
+
+def every(step: int, period: int = 64) -> np.ndarray:
+    """(P, 2) the upper left corners of all crops on a lattice."""
+    return np.stack(np.meshgrid(*[np.arange(0, period, step)] * 2, indexing="ij"), -1).reshape(-1, 2)
+
+
+def crop_source(image: np.ndarray, corners: np.ndarray, channels: int | None = None) -> ArraySource:
+    return ArraySource(crops(image, corners), corners.astype(float), float(SIDE), channels)
+
+
+def noise_source(count: int = 60, channels: int = 3, seed: int = 4) -> ArraySource:
+    """Patches that fit nowhere, from all over a plane."""
+    draw = np.random.default_rng(seed)
+    values = draw.normal(size=(count, SIDE, SIDE, channels)).astype(np.float32)
+    return ArraySource(values, draw.random((count, 2)) * 5.0 * SIDE, float(SIDE))
+
+
+def continued(image: np.ndarray, corner: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    rows, columns = ((first + np.arange(length)) % 64 for first, length in zip(corner, size, strict=True))
+    return image[rows[:, None], columns]
+
+
+def test_one_source_is_put_together_again(rng: np.random.Generator):
+    """Where every crop of a periodic image is there, the best quilt is that image, without a flaw."""
+    image, corners = periodic_image(), every(4)
+    made = quilt(crop_source(image, corners), (105, 90), rng, nearest=1)
+    expected = continued(image, corners[made.patch[0, 0]], (105, 90))
+    assert np.abs(made.features - expected).max() < 1e-5
+    assert (made.look_up(crops(image, corners)) == expected).all()
+    assert len(np.unique(made.patch)) > 10
+
+
+def test_mirrored_patches_are_turned_back(rng: np.random.Generator):
+    """Half of the crops are stored mirrored; the quilt is still the image, mirrored as its first patch is."""
+    image, corners = periodic_image(), every(4)
+    stored = rng.integers(0, 4, len(corners))
+    values = np.stack([mirror(v, f) for v, f in zip(crops(image, corners), stored, strict=True)])
+    made = quilt(ArraySource(values, corners.astype(float), 32.0), (72, 93), rng, flips=True, nearest=1)
+    first = made.patch[0, 0]
+    total = int(stored[first] ^ made.flip[0, 0])
+    seen = mirror(image, total)  # of which the first patch is a crop at
+    down, right = corners[first]
+    corner = np.array([32 - down if total & 2 else down, 32 - right if total & 1 else right])
+    expected = continued(seen, corner % 64, (72, 93))
+    assert np.abs(made.features - expected).max() < 1e-5
+    assert (made.look_up(values) == expected).all()
+    assert (np.unique(stored[made.patch] ^ made.flip) == total).all() and len(np.unique(made.flip)) == 4
+
+
+def test_stripes_go_on(rng: np.random.Generator):
+    """Vertical stripes of any phase, as published: rows stay alike, and the wavelength is kept."""
+    phase = rng.random(300)
+    x = np.arange(SIDE) / 10.0
+    waves = np.sin(2.0 * np.pi * (x + phase[:, None]))
+    values = np.broadcast_to(waves[:, None, :, None], (300, SIDE, SIDE, 1)).astype(np.float32)
+    source = ArraySource(values, rng.random((300, 2)) * 1000.0, float(SIDE))
+    made = quilt(source, (112, 192), rng, evenness=0.0).features[..., 0]
+    assert made.std(axis=0).max() < 0.2
+    spectrum = np.abs(np.fft.rfft(made.mean(0)[:190]))
+    assert spectrum[1:].argmax() + 1 == 19
+    seams = np.abs(np.diff(made, axis=1)).max()
+    assert seams < 1.3 * 2.0 * np.pi / 10.0  # no step is steeper than the waves by much
+
+
+def places(made: Quilt, tileable: bool = False) -> np.ndarray:
+    """(rows, columns) which patches lie there, by the middle of their cores."""
+    size = made.patch.shape
+    if tileable:
+        counts = [-(-length // STRIDE) for length in size]
+        corners = [np.round(np.linspace(0, n - STRIDE, k)) for n, k in zip(size, counts, strict=True)]
+    else:
+        corners = [np.arange(0, max(length - 12, 1), STRIDE) for length in size]
+    middle = [corner.astype(int) + SIDE // 2 for corner in corners]
+    return made.patch[np.ix_(*(m[m < length] for m, length in zip(middle, size, strict=True)))]
+
+
+@pytest.mark.parametrize("tileable", [False, True])
+@pytest.mark.parametrize("flips", [False, True])
+def test_neighbours_are_from_elsewhere(tileable: bool, flips: bool, rng: np.random.Generator):
+    """Every patch has a twin nearby, which would continue it best."""
+    base = noise_source(30)
+    smooth = base.values.mean((1, 2), keepdims=True) * 10.0 + 0.0 * base.values  # constant: fits itself best
+    values = np.concatenate([smooth, smooth])
+    centres = np.concatenate([base.centres, base.centres + 0.1 * SIDE])
+    made = quilt(ArraySource(values, centres, float(SIDE)), (192, 152), rng, flips=flips, tileable=tileable)
+    grid = centres[places(made, tileable)]
+    pairs = [grid[1:] - grid[:-1], grid[:, 1:] - grid[:, :-1]]
+    if tileable:
+        pairs += [grid[:1] - grid[-1:], grid[:, :1] - grid[:, -1:]]
+    assert len(grid) >= 9
+    assert min(np.linalg.norm(pair, axis=-1).min() for pair in pairs) >= 0.2 * SIDE
+
+
+def test_few_patches_repeat_as_little_as_they_can(rng: np.random.Generator):
+    two = ArraySource(noise_source(2).values, np.zeros((2, 3)), 1.0)
+    found = places(quilt(two, (92, 92), rng))
+    assert (found[1:] != found[:-1]).all() and (found[:, 1:] != found[:, :-1]).all()
+    one = ArraySource(noise_source(1).values, np.zeros((1, 3)), 1.0)
+    assert (quilt(one, (70, 40), rng).patch == 0).all()
+
+
+def test_exclusion_is_by_distance_of_sources():
+    centres = np.array([[0.0, 0.0], [0.19 * SIDE, 0.0], [0.21 * SIDE, 0.0], [SIDE, 0.0]])
+    matcher = Matcher(ArraySource(noise_source(4).values, centres, float(SIDE)), (0,), ("left",))
+    assert matcher.allowed([]).tolist() == [True, True, True, True]
+    assert matcher.allowed([0]).tolist() == [False, False, True, True]
+    assert matcher.allowed([0, 2]).tolist() == [False, False, False, True]
+    # None is far from all: others than the neighbours are left.
+    assert matcher.allowed([0, 2, 3]).tolist() == [False, True, False, False]
+
+
+def summed_blocks(values: np.ndarray, axis: int) -> np.ndarray:
+    parts = np.split(values, range(4, values.shape[axis], 4), axis)
+    return np.stack([part.sum(axis, dtype=np.float64) for part in parts])
+
+
+def test_distances_are_those_of_the_strips(rng: np.random.Generator):
+    """Against the definition, for all sides and mirror images; only the first channels count."""
+    source = ArraySource(noise_source(5).values, np.zeros((5, 2)), 1.0, channels=2)
+    wanted: Any = {side: strip(rng.normal(size=(SIDE, SIDE, 2)), side) for side in SIDES}
+    assert overlap(SIDE) == 12 and wanted["left"].shape == (32, 12, 2) and wanted["top"].shape == (12, 32, 2)
+    for sides in (("left",), ("left", "top"), SIDES):
+        found = Matcher(source, (0, 1, 2, 3), sides).distances({side: wanted[side] for side in sides})
+        for flip in range(4):
+            for index in range(5):
+                square = mirror(source.values[index], flip)[..., :2]
+                total = 0.0
+                for side in sides:
+                    part = {
+                        "left": square[:, :12],
+                        "right": square[:, 20:],
+                        "top": square[:12],
+                        "bottom": square[20:],
+                    }[side]
+                    axis = 0 if side in ("left", "right") else 1
+                    total += np.square(summed_blocks(part - wanted[side], axis)).sum()
+                assert found[flip, index] == pytest.approx(np.sqrt(total), rel=1e-4)
+
+
+def test_chances_fall_with_the_cube(rng: np.random.Generator):
+    matcher = Matcher(noise_source(8), (0,), ("left",))
+    costs = np.array([[4.0, 0.0, 9.0, 1.0, 2.0, 3.0, 8.0, 7.0]])
+    everyone = np.ones(8, bool)
+    drawn = [matcher.choose(costs, everyone, rng, 5)[0] for _ in range(6000)]
+    weights = np.array([0.0, 1.0, 0.0, 0.75**3, 0.5**3, 0.25**3, 0.0, 0.0])
+    assert np.bincount(drawn, minlength=8) / 6000 == pytest.approx(weights / weights.sum(), abs=0.02)
+    # Four are looked at until one is allowed.
+    allowed = np.zeros(8, bool)
+    allowed[[7, 2]] = True
+    assert {matcher.choose(costs, allowed, rng, 2)[0] for _ in range(50)} == {7}
+
+
+def test_seeds(rng: np.random.Generator):
+    source = noise_source()
+    a, b, c = (quilt(source, (80, 80), np.random.default_rng(seed), flips=True) for seed in (7, 7, 8))
+    for name in ("features", "patch", "flip", "texel"):
+        assert (getattr(a, name) == getattr(b, name)).all()
+    assert (a.patch != c.patch).mean() > 0.5
+    firsts = {int(quilt(source, (8, 8), np.random.default_rng(seed)).patch[0, 0]) for seed in range(40)}
+    assert len(firsts) > 20  # the first is any of 60, not one of the 16 nearest to nothing
+
+
+def border_steps(values: np.ndarray, axis: int) -> tuple[float, float]:
+    """Mean difference across the border, and the largest of those between rows inside."""
+    moved = np.moveaxis(values, axis, 0)
+    inside = np.square(np.diff(moved, axis=0)).mean(tuple(range(1, moved.ndim)))
+    return float(np.square(moved[0] - moved[-1]).mean()), float(inside.max())
+
+
+@pytest.mark.parametrize("size", [(100, 100), (90, 131), (32, 32)])
+def test_tileable_has_no_border(size: tuple[int, int], rng: np.random.Generator):
+    image = periodic_image(256, 1)
+    corners = rng.integers(0, 256 - SIDE, (600, 2))
+    source = crop_source(image, corners)
+    made = quilt(source, size, rng, tileable=True)
+    assert made.features.shape == (*size, 1) and made.texel.shape == (*size, 2)
+    for axis in (0, 1):
+        across, inside = border_steps(made.features, axis)
+        assert across <= inside
+    plain = quilt(source, size, rng)
+    steps = [border_steps(plain.features, axis) for axis in (0, 1)]
+    assert all(across > 2.0 * inside for across, inside in steps)
+
+
+def test_tileable_puts_a_periodic_image_together(rng: np.random.Generator):
+    """Two periods by one wrap without a flaw, as every crop is there."""
+    image, corners = periodic_image(), every(1)
+    made = quilt(crop_source(image, corners), (128, 64), rng, tileable=True, nearest=1)
+    corner = corners[made.patch[20, 20]] + made.texel[20, 20] - 20
+    expected = continued(image, corner % 64, (128, 64))
+    assert np.abs(made.features - expected).max() < 1e-5
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_last_patches_lead_back_to_the_first(axis: int, rng: np.random.Generator):
+    """Ramps between any two values: only a ramp that ends where the first one begins leaves no step."""
+    ends = rng.random((2000, 2, 1, 1, 1))
+    place = (np.arange(SIDE) / (SIDE - 1)).reshape((-1, 1, 1) if axis == 0 else (1, -1, 1))
+    ramps = (ends[:, 0] + (ends[:, 1] - ends[:, 0]) * place) + np.zeros((1, SIDE, SIDE, 1))
+    source = ArraySource(ramps.astype(np.float32), rng.random((2000, 2)) * 1e4, float(SIDE))
+    size = (75, 32) if axis == 0 else (32, 75)
+    steps = []
+    for _ in range(4):
+        made = quilt(source, size, rng, tileable=True, nearest=4).features
+        steps.append(np.abs(made - np.roll(made, 1, axis)).max())
+    assert np.mean(steps) < 0.08
+
+
+def test_wrapped_seam_is_closed(rng: np.random.Generator):
+    """Down to where a column shows the last row's patches changes by one at most, around the border too."""
+    source = noise_source(60, 1)
+    for _ in range(8):
+        made = quilt(source, (64, 90), rng, tileable=True)
+        first = made.texel[:12, :, 0] == np.arange(12)[:, None]  # patches of the first row begin there
+        depth = (~first).sum(0)
+        assert np.ptp(depth) > 3
+        assert np.abs(depth - np.roll(depth, 1)).max() <= 1
+
+
+@pytest.mark.parametrize("size", [(1, 1), (12, 33), (32, 32), (33, 32), (71, 52)])
+def test_any_size(size: tuple[int, int], rng: np.random.Generator):
+    made = quilt(noise_source(), size, rng)
+    assert made.features.shape == (*size, 3) and made.features.dtype == np.float32
+    assert made.patch.shape == made.flip.shape == size
+    assert made.texel.shape == (*size, 2)
+    assert not made.flip.any()
+
+
+@pytest.mark.parametrize("tileable", [False, True])
+def test_one_mask_serves_all_maps(tileable: bool, rng: np.random.Generator):
+    """Away from seams, features are the very texels that the maps name; at seams, a mean of two."""
+    source = noise_source()
+    made = quilt(source, (112, 95), rng, flips=True, tileable=tileable)
+    named = made.look_up(source.values)
+    mode: Any = "wrap" if tileable else "edge"
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(made.patch, 4, mode=mode), (9, 9))
+    quiet = (around == made.patch[..., None, None]).all((2, 3))
+    assert 0.1 < quiet.mean() < 0.8
+    assert np.abs(made.features - named)[quiet].max() < 1e-5
+    assert np.abs(made.features - named)[~quiet].max() > 0.1
+
+
+def bright_source(rng: np.random.Generator) -> tuple[ArraySource, np.ndarray]:
+    """Patches of noise, with a brightness each that is not compared, and their colours."""
+    base = noise_source(200, 2)
+    base.values[..., 1] = rng.random(200)[:, None, None]
+    source = ArraySource(base.values, base.centres, base.length, channels=1)
+    return source, np.broadcast_to(base.values[:, :1, :1, 1:], (200, 2, 2, 3))
+
+
+def test_guide_decides_what_is_where(rng: np.random.Generator):
+    source, colours = bright_source(rng)
+    picture = np.zeros((20, 30, 3))
+    picture[:, 15:] = 1.0
+    made = quilt(source, (112, 172), rng, guide=Guide(picture, colours, weight=20.0)).features[..., 1]
+    assert made[:, :70].mean() < 0.2 and made[:, 102:].mean() > 0.8
+    ignored = quilt(source, (112, 172), rng, guide=Guide(picture, colours, weight=0.0)).features[..., 1]
+    assert ignored[:, :70].mean() > 0.35
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0])
+def test_guide_chooses_the_first_patch_too(level: float, rng: np.random.Generator):
+    source, colours = bright_source(rng)
+    guide = Guide(np.full((4, 4, 3), level), colours)
+    made = [quilt(source, (32, 32), rng, guide=guide).features[0, 0, 1] for _ in range(10)]
+    assert np.abs(np.array(made) - level).max() < 0.15
+
+
+def test_guide_turns_patches(rng: np.random.Generator):
+    """All are dark on their left and bright below; the guide wants it the other way round."""
+    source = noise_source(20)
+    colours = np.zeros((20, 2, 2, 3))
+    colours[:, 0, 1], colours[:, 1, 0], colours[:, 1, 1] = 0.3, 0.5, 0.8
+    picture = mirror(colours[0], 3).repeat(16, 0).repeat(16, 1)
+    made = quilt(source, (32, 32), rng, flips=True, guide=Guide(picture, colours), nearest=1)
+    assert (made.flip == 3).all()
+
+
+def test_likeness_is_the_root_mean_square(rng: np.random.Generator):
+    colours, picture = rng.random((3, 4, 4, 3)), rng.random((50, 50, 3))
+    likeness = GuideDistance(Guide(picture, colours, 2.0), 3, (50, 50), SIDE, wrapped=True)
+    found = likeness.differences(40, 10, (0, 1, 2, 3))
+    below = np.tile(picture, (2, 2, 1))[40:72, 10:42].reshape(4, 8, 4, 8, 3).mean((1, 3))
+    for flip in range(4):
+        shown = np.stack([mirror(c, flip) for c in colours])
+        expected = 2.0 * np.sqrt(np.square(shown - below).mean((1, 2, 3)))
+        assert found[flip] == pytest.approx(expected, rel=1e-5)
+
+
+def broken(values: Iterable[tuple[Any, Any]]) -> ArraySource:
+    source = noise_source(4)
+    for place, value in values:
+        source.values[place] = value
+    return source
+
+
+def test_refusals(rng: np.random.Generator):
+    good = noise_source(4)
+    squares = good.values
+    options: list[tuple[ArraySource, tuple[int, int], dict[str, Any], str]] = [
+        (good, (0, 5), {}, "texture of"),
+        (good, (5, 5), {"nearest": 0}, "candidates"),
+        (good, (31, 64), {"tileable": True}, "use at least 32"),
+        (ArraySource(squares[:0], np.zeros((0, 2)), 1.0), (5, 5), {}, "no patches"),
+        (ArraySource(squares[:, :30, :30], good.centres, 1.0), (5, 5), {}, "multiple of 8"),
+        (ArraySource(squares[:, :24], good.centres, 1.0), (5, 5), {}, "multiple of 8"),
+        (ArraySource(squares, good.centres, 1.0, 0), (5, 5), {}, "0 of 3 channels"),
+        (ArraySource(squares, good.centres, 1.0, 4), (5, 5), {}, "4 of 3 channels"),
+        (broken([((2, 20, 5, 1), np.nan)]), (5, 5), {}, "NaN or infinite"),
+        (good, (5, 5), {"guide": Guide(np.zeros((4, 4, 3)), np.zeros((3, 2, 2, 3)))}, "all 4"),
+        (good, (5, 5), {"guide": Guide(np.zeros((4, 4, 3)), np.zeros((4, 5, 5, 3)))}, "divides 32"),
+    ]
+    for source, size, wrong, message in options:
+        with pytest.raises(ConfigError, match=message):
+            quilt(source, size, rng, **wrong)
+
+
+def test_guide_refusals():
+    picture, colours = np.zeros((4, 4, 3)), np.zeros((3, 2, 2, 3))
+    guides: list[tuple[np.ndarray, np.ndarray, float]] = [
+        (picture[..., :2], colours, 1.0),
+        (picture[:0], colours, 1.0),
+        (picture + np.nan, colours, 1.0),
+        (picture, colours[:, :1], 1.0),
+        (picture, colours + np.inf, 1.0),
+        (picture, colours, -1.0),
+        (picture, colours, np.nan),
+    ]
+    for wrong in guides:
+        with pytest.raises(ConfigError):
+            Guide(*wrong)
