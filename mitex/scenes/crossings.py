@@ -44,6 +44,6 @@ def _first(
     origin = mi.Point3f(np.ascontiguousarray((start + begun[:, None] * way).T))
     ray = mi.Ray3f(origin, mi.Vector3f(np.ascontiguousarray(way.T)))
     ray.maxt = mi.Float(np.maximum(1 - PAST - begun, 0))
-    found = scene.ray_intersect_preliminary(ray)
-    hit, face, t = (np.asarray(a) for a in (found.is_valid(), found.prim_index, found.t))
+    hits = scene.ray_intersect_preliminary(ray)
+    hit, face, t = (np.asarray(a) for a in (hits.is_valid(), hits.prim_index, hits.t))
     return hit.astype(bool), face, begun + t

@@ -195,8 +195,8 @@ class Stage:
         """Hit (bool), triangle (int32), barycentrics u and v of every sample, (K H W n n,) each."""
         with dr.suspend_grad():
             ray = _rays(cameras, n)
-            found = self.scene.ray_intersect_preliminary(ray, coherent=True)
-            hit, triangle, uv = found.is_valid(), found.prim_index, found.prim_uv
+            hits = self.scene.ray_intersect_preliminary(ray, coherent=True)
+            hit, triangle, uv = hits.is_valid(), hits.prim_index, hits.prim_uv
             dr.eval(hit, triangle, uv)
             u, v = mi.Float(uv.x), mi.Float(uv.y)
         hit, triangle, u, v = (_tensor(array) for array in (hit, triangle, u, v))

@@ -22,7 +22,7 @@ class TexelFieldMethods(FieldMethods):
        - |tensor|
        - `mi.TensorXf` of shape (H, W, C), finite. Row 0 is the top of the map, see below.
        - exposed, differentiable
-     * - mask
+     * - charts
        - |tensor|
        - `mi.TensorXf` of shape (H, W): the number of the chart that a texel belongs to (an integer from 0 on,
          a chart's padding included), or -1 where it is unused. (Default: one chart everywhere)
@@ -53,7 +53,7 @@ class TexelFieldMethods(FieldMethods):
 
     def __init__(self, props: Any) -> None:
         self._read(props)
-        self.mask = mi.TensorXf(props["mask"]) if "mask" in props else None
+        self.charts = mi.TensorXf(props["charts"]) if "charts" in props else None
         self.filter = str(props.get("filter", "bilinear"))
         if self.filter not in FILTERS:
             raise RuntimeError(f"texel_field: 'filter' is '{self.filter}'; use {' or '.join(FILTERS)}")
@@ -64,11 +64,11 @@ class TexelFieldMethods(FieldMethods):
 
     def traverse(self, callback: Any) -> None:
         FieldMethods.traverse(self, callback)
-        if self.mask is not None:
-            callback.put("mask", self.mask, mi.ParamFlags.NonDifferentiable)
+        if self.charts is not None:
+            callback.put("charts", self.charts, mi.ParamFlags.NonDifferentiable)
 
     def parameters_changed(self, keys: Any = ()) -> None:
-        if not keys or "mask" in keys:  # not for every step of an optimisation
+        if not keys or "charts" in keys:  # not for every step of an optimisation
             self._chart = self._charts()
         self._check()
 
@@ -76,20 +76,20 @@ class TexelFieldMethods(FieldMethods):
         shape = self.data.shape
         if len(shape) != 3 or 0 in shape:
             raise RuntimeError(f"texel_field: 'data' has shape {shape}; give one of shape (H, W, C)")
-        if self.mask is not None and self.mask.shape != shape[:2]:
+        if self.charts is not None and self.charts.shape != shape[:2]:
             raise RuntimeError(
-                f"texel_field: 'mask' has shape {self.mask.shape}; give {shape[:2]}, one number per texel"
+                f"texel_field: 'charts' has shape {self.charts.shape}; give {shape[:2]}, one number per texel"
             )
 
     def _charts(self) -> Any:
-        """The mask as flat Int32, or None."""
-        if self.mask is None:
+        """The chart numbers as flat Int32, or None."""
+        if self.charts is None:
             return None
-        number = dr.detach(self.mask.array)
+        number = dr.detach(self.charts.array)
         if not dr.all((number >= -1) & (number < MAX_CHART) & (number == dr.round(number))):
-            raise RuntimeError("texel_field: 'mask' holds chart numbers, integers from 0 on, or -1 if unused")
+            raise RuntimeError("texel_field: 'charts' holds numbers that are no integers from 0 on, or -1")
         if not dr.any(number >= 0):
-            raise RuntimeError("texel_field: 'mask' is -1 everywhere; no texel is used")
+            raise RuntimeError("texel_field: 'charts' is -1 everywhere; no texel is used")
         chart = mi.Int32(number)
         dr.eval(chart)
         return chart
@@ -126,7 +126,7 @@ class TexelFieldMethods(FieldMethods):
     def to_string(self) -> str:
         height, width = self.data.shape[:2]
         own = {"resolution": f"[{width}, {height}]", "channels": self.channel_count, "filter": self.filter}
-        return self._description("TexelField", **own, masked=str(self.mask is not None).lower())
+        return self._description("TexelField", **own, masked=str(self.charts is not None).lower())
 
     def resolution(self) -> Any:
         return mi.ScalarVector2i(self.data.shape[1], self.data.shape[0])

@@ -103,7 +103,8 @@ def test_gradients_are_those_of_finite_differences(field, name):
     step = 5e-4 * np.abs(value).max()
     totals = []
     for sign in (1, -1):
-        params[key] = type(params[key])(value + sign * step * along)
+        array: Any = type(params[key])
+        params[key] = array(value + sign * step * along)
         params.update()
         totals.append((picture(scene) * pixels).sum())
     slope = (totals[0] - totals[1]) / (2 * step)
