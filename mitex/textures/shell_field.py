@@ -7,8 +7,6 @@ the integrator's parameters they would have to be named and copied one by one.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from mitex.mesh import Similarity
@@ -33,7 +31,7 @@ class ShellFieldMethods:
         self.field, self.similarity = field, similarity
         self.turn = np.eye(3) if turn is None else turn
 
-    def bbox(self) -> Any:
+    def bbox(self) -> mi.ScalarBoundingBox3f:
         """Of the cube, in the world."""
         corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
         corners = (corners * self.similarity.scale + self.similarity.center) @ self.turn.T
@@ -43,7 +41,7 @@ class ShellFieldMethods:
         """No bound is known."""
         return float("inf")
 
-    def march(self, ray: Any, jitter: Any, active: Any) -> Traversed:
+    def march(self, ray: mi.Ray3f, jitter: mi.Float, active: mi.Bool) -> Traversed:
         """What rays gather up to their `maxt`, where `active`; colours and depths as in `traverse`, but in
         world units.
 
@@ -54,12 +52,12 @@ class ShellFieldMethods:
         """
         scale = float(self.similarity.scale)
         centre = mi.Vector3f(np.asarray(self.similarity.center, np.float32).tolist())
-        chosen: Any = dr.compress(active)
+        marching = mi.UInt32(dr.compress(active))
         count = max(dr.width(ray.o), dr.width(active), dr.width(jitter))
         total = Traversed(dr.zeros(mi.Color3f, count), dr.ones(mi.Float, count), dr.zeros(mi.Float, count))
-        for start in range(0, dr.width(chosen), CHUNK):
-            part = dr.arange(mi.UInt32, start, min(start + CHUNK, dr.width(chosen)))
-            index = dr.gather(mi.UInt32, chosen, part)
+        for start in range(0, dr.width(marching), CHUNK):
+            part = dr.arange(mi.UInt32, start, min(start + CHUNK, dr.width(marching)))
+            index = dr.gather(mi.UInt32, marching, part)
             # Anew for each part: a zero in it can become as wide as what it was multiplied with.
             back = mi.Matrix3f(self.turn.T.tolist())
             origin = mi.Point3f((back @ dr.gather(mi.Point3f, ray.o, index) - centre) / scale)
@@ -71,7 +69,7 @@ class ShellFieldMethods:
             dr.scatter(total.depth, found.depth * scale, index)
         return total
 
-    def traverse(self, callback: Any) -> None:
+    def traverse(self, callback: mi.TraversalCallback) -> None:
         parameters = getattr(self.field, "parameters", None)
         for name, value in (parameters() if parameters else {}).items():
             callback.put(name, value, mi.ParamFlags.Differentiable)
@@ -80,6 +78,6 @@ class ShellFieldMethods:
         return f"ShellField[\n  bbox = {self.bbox()},\n  step = {self.field.step}\n]"
 
 
-def shell_field(field: RadianceField, similarity: Similarity, turn: np.ndarray | None = None) -> Any:
+def shell_field(field: RadianceField, similarity: Similarity, turn: np.ndarray | None = None) -> mi.Volume:
     """An `mi.Volume` of the current variant that carries a radiance field; see `ShellFieldMethods`."""
     return for_variant("ShellField", mi.Volume, ShellFieldMethods)(field, similarity, turn)
