@@ -49,7 +49,7 @@ def tiny_capture(views: int = 16, side: int = 48, spp: int = 16, seed: int = 0) 
         mesh,
         mi.load_dict({"type": "diffuse", "reflectance": {"type": "mesh_attribute", "name": "vertex_color"}}),
     )
-    shape.add_attribute("vertex_color", 3, colours.astype(np.float32).ravel())
+    shape.add_attribute("vertex_color", 3, colours.astype(np.float32).ravel().tolist())
     images, poses = [], []
     for k in range(views):
         pose = _pose(k, views, rng)
