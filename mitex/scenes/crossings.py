@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from mitex.mesh import Mesh
@@ -37,7 +35,7 @@ def crossing_edges(mesh: Mesh) -> np.ndarray:
 
 
 def _first(
-    scene: Any, start: np.ndarray, end: np.ndarray, begun: np.ndarray
+    scene: mi.Scene, start: np.ndarray, end: np.ndarray, begun: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of edges, from the part `begun` on: whether a face is hit, which one, and at what part."""
     way = end - start

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from mitex.mesh import Mesh
@@ -43,7 +41,7 @@ def ambient_occlusion(
     return openness
 
 
-def _open(scene: Any, origins: np.ndarray, normals: np.ndarray, samples: int, seed: int) -> np.ndarray:
+def _open(scene: mi.Scene, origins: np.ndarray, normals: np.ndarray, samples: int, seed: int) -> np.ndarray:
     count = len(origins)
     index = dr.arange(mi.UInt32, count) if samples == 1 else dr.repeat(dr.arange(mi.UInt32, count), samples)
     origin, normal = (
