@@ -57,14 +57,14 @@ class BaseShape:
 
 
 def find_base(
-    capture: Capture, config: NerfConfig, given: Mesh | None = None, quiet: bool = True
+    capture: Capture, config: NerfConfig, base_mesh: Mesh | None = None, quiet: bool = True
 ) -> BaseShape:
     """Trains a coarse field on a capture and takes the base shape from it; kept in the user's cache folder.
 
     Args:
         capture: the views to learn from.
         config: settings.
-        given: a base shape of the user's in the capture's world, or None.
+        base_mesh: a base shape of the user's in the capture's world, or None.
         quiet: show no progress.
 
     Raises:
@@ -73,14 +73,14 @@ def find_base(
     steps = config.base_steps
     coarse = replace(config, **COARSE, steps=steps, lr_steps=steps)
     arrays = (*capture.images, capture.poses, capture.intrinsics, capture.distortion)
-    mesh = () if given is None else (given.vertices, given.faces)
+    mesh = () if base_mesh is None else (base_mesh.vertices, base_mesh.faces)
     settings = (config.seed, steps, config.lr, config.concavity, config.repulsion, config.neighbours)
     place = cache_dir() / "nerf" / content_key(VERSION, *arrays, *mesh, *settings)
 
     def compute() -> BaseShape:
         task = train_plain_field(coarse, capture, (capture, 0), place.with_suffix(".run"), quiet)
         _say("cutting the base shape out of the coarse field, about a minute", quiet)
-        base = _shape_of(task, config) if given is None else given_base(given)
+        base = _shape_of(task, config) if base_mesh is None else given_base(base_mesh)
         scan = scan_surface(task)
         projection = Projection(base, neighbours=config.neighbours, repulsion=config.repulsion)
         return BaseShape(base, scan, shell_thickness(scan, projection))
