@@ -7,6 +7,8 @@ are then those of the scene: `mi.traverse` lists them, and images have derivativ
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mitex.mesh import Similarity

@@ -143,11 +143,11 @@ def test_new_values_are_rendered(name):
     params.update()
     after = picture(scene)
     assert np.abs(after - before).max() > 1e-2
-    np.testing.assert_array_equal(picture(second), before)
+    np.testing.assert_allclose(picture(second), before, atol=1e-5)  # sums in another order
 
     fresh = with_value(name, value)
     fresh.mask = first.mask
-    np.testing.assert_array_equal(picture(scene_of(fresh)), after)
+    np.testing.assert_allclose(picture(scene_of(fresh)), after, atol=1e-5)
 
 
 def with_value(name: str, value: np.ndarray):
