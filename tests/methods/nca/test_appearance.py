@@ -49,6 +49,8 @@ def _expected(images, pictures, settings):
         total = total + (naive.relaxed_transport(a, b) + moments).mean()
     a, b = (x.flatten(1, 2).numpy() for x in (images, pictures))
     colours = np.mean([authors.colour_cost(x, y) for x, y in zip(a, b, strict=True)])
+    if settings.colour_histogram:
+        colours += np.mean(np.abs(np.sort(a, 1) - np.sort(b, 1)) / authors.SPREAD)
     return settings.appearance_weight * (total + settings.colour_weight * colours)
 
 
