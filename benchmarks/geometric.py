@@ -38,8 +38,8 @@ def step_seconds(task: GeometricTask, level: int) -> float:
 
     def turn(start: int) -> None:
         for step in range(start, start + TURN):
-            loss, _ = task.loss(step, generator)
-            torch.autograd.grad(loss, task.generators[level].parameters)
+            task.begin(step, generator)
+            torch.autograd.grad(task.loss(step, generator).value, task.generators[level].parameters)
 
     turn(first)
     begun, turns = time.perf_counter(), 0

@@ -129,10 +129,10 @@ class Bench:
 
     def step(self) -> None:
         self.adam.clear()
-        loss, _ = self.task.loss(1, torch.Generator().manual_seed(3))
-        loss.backward()
+        step = self.task.loss(1, torch.Generator().manual_seed(3))
+        step.value.backward()
         self._update()
-        self.task.commit()
+        step.commit()
 
     # The same by the ordinary ways.
 

@@ -13,7 +13,7 @@ import numpy as np
 from mitex.atlas import Atlas
 from mitex.errors import ConfigError
 from mitex.exemplar import MAPS
-from mitex.frames import atlas_normals, vertex_detail
+from mitex.geometry.normal_maps import decode_at_vertices
 from mitex.mesh import Mesh
 
 CLAY = 0.7  # sRGB
@@ -32,7 +32,7 @@ class Asset:
             normal map.
         atlas: UV layout of `texture_maps`.
         texture_maps: name -> (N, N, c) float32 in [0, 1], row 0 on top; the normals are in the atlas' own
-            frame (`frames.split_at_seams`), which is written as glTF TANGENT.
+            frame (`geometry.tangents.split_at_seams`), which is written as glTF TANGENT.
         name: for messages and object names.
 
     Raises:
@@ -75,32 +75,32 @@ class Asset:
         """(V, 3) float32 unit normals in object space: the mesh's own, bent by the normal map if any."""
         if "normal" not in self.vertex_maps or self.tangents is None:
             return self.mesh.normals
-        return vertex_detail(self.mesh, self.tangents, self.vertex_maps["normal"])
+        return decode_at_vertices(self.vertex_maps["normal"], self.tangents, self.mesh.normals)
 
-    def baked(self, resolution: int = 1024, padding: int | None = None) -> Asset:
+    def baked(
+        self, resolution: int = 1024, padding: int | None = None, layout: np.ndarray | None = None
+    ) -> Asset:
         """The same asset with textures: every texel interpolates the vertex maps.
 
-        Uses the mesh's own UVs if nothing in them overlaps, else unwraps it. Normals are interpolated in
-        object space, where they are continuous, and written in the atlas' frame.
+        Uses the given layout, or the mesh's own UVs if nothing in them overlaps, else unwraps it. Normals are
+        interpolated in object space, where they are continuous, and written in the atlas' frame.
 
         Args:
             resolution: side of the textures [texels], 16 to 8192.
             padding: how far the charts are continued outwards [texels], so that no seam shows; 8 if None,
                 less for textures under 64 texels.
+            layout: (F, 3, 2) UVs in [0, 1] that do not overlap, which is not checked again.
 
         Raises:
             ConfigError: resolution or padding out of range.
         """
-        wanted = max(min(8, resolution // 8), 1) if padding is None else padding
-        atlas = Atlas.build(self.mesh, resolution, wanted)
+        padding = max(min(8, resolution // 8), 1) if padding is None else padding
+        atlas = Atlas.build(self.mesh, resolution, padding, layout)
         faces = self.mesh.faces
         textures = {k: atlas.interpolate(v[faces]) for k, v in self.vertex_maps.items() if k != "normal"}
         if "normal" in self.vertex_maps:
-            textures["normal"] = self._bake_normals(atlas)
+            textures["normal"] = atlas.normal_map(self.mesh, atlas.interpolate(self.detail_normals()[faces]))
         return replace(self, atlas=atlas, texture_maps=textures)
-
-    def _bake_normals(self, atlas: Atlas) -> np.ndarray:
-        return atlas_normals(self.mesh, atlas, atlas.interpolate(self.detail_normals()[self.mesh.faces]))
 
     def export(self, path: str | os.PathLike[str]) -> Path:
         """Writes the asset; the suffix chooses the format.

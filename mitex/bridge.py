@@ -12,12 +12,9 @@ import torch
 from torch.autograd.function import once_differentiable
 
 from mitex.errors import ConfigError
-from mitex.runtime import load_mitsuba
+from mitex.runtime.jit import dr, mi
 from mitex.scenes.stage import Visibility, background_values
 from mitex.textures.field import Field
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 
 def lookup(
@@ -175,7 +172,8 @@ def _found(table: Mapping[str, _Target], name: str) -> _Target:
 
 
 def _only_field(scene: Any, integrator: Any) -> _Target:
-    fields = {id(texture): texture for _, texture in integrator.fields(scene) if isinstance(texture, Field)}
+    textures: list[mi.Texture] = [texture for _, texture in integrator.fields(scene)]
+    fields = {id(texture): texture for texture in textures if isinstance(texture, Field)}
     if len(fields) != 1:
         raise ConfigError(
             f"the integrator images {len(fields)} fields, not one",

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from mitex.errors import ImageError
+from mitex.geometry.vectors import unit
 from mitex.images import SUFFIXES, read_image, resize
 
 MAPS = {"albedo": 3, "ambient_occlusion": 1, "height": 1, "normal": 3, "roughness": 1}
@@ -183,8 +184,7 @@ def _resize_map(name: str, array: np.ndarray, height: int, width: int) -> np.nda
         return array
     result = resize(array, height, width)
     if name == "normal":  # averaged normals are too short
-        n = result * 2.0 - 1.0
-        result = n / np.maximum(np.linalg.norm(n, axis=2, keepdims=True), 1e-6) * 0.5 + 0.5
+        result = unit(result * 2.0 - 1.0) * 0.5 + 0.5
     return result.astype(np.float32)
 
 

@@ -11,7 +11,7 @@ import sys
 import numpy as np
 
 from mitex import Asset
-from mitex.frames import orthonormal
+from mitex.geometry.vectors import orthonormal
 from mitex.mesh import embedded
 
 

@@ -18,7 +18,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from mitex.atlas import Atlas
-from mitex.frames import Split, split_at_seams
+from mitex.geometry.tangents import Split, split_at_seams
 from mitex.mesh import embedded
 
 mi.set_variant("llvm_ad_rgb")

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
+from mitex.geometry.triangles import interpolate
+from mitex.geometry.vectors import across, unit
 from mitex.mesh import Mesh, icosphere
 
 
@@ -73,7 +75,7 @@ class Base:
         face = rng.choice(len(mesh.faces), count, p=mesh.face_areas / mesh.face_areas.sum())
         root, share = np.sqrt(rng.random(count)), rng.random(count)
         weights = np.stack([1 - root, root * (1 - share), root * share], axis=1)
-        return self.onto(np.einsum("nk,nkd->nd", weights, mesh.vertices[mesh.faces[face]]))
+        return self.onto(interpolate(weights, mesh.vertices[mesh.faces[face]]))
 
     def frames(self, points: np.ndarray, along: np.ndarray | None = None) -> np.ndarray:
         """(N, 3, 3) rows tangent, bitangent, normal at points (N, 3).
@@ -84,7 +86,7 @@ class Base:
         """
         normal = self.normals(points)
         along = np.broadcast_to((0.0, 0.0, 1.0) if along is None else along, points.shape)
-        tangent = along - (along * normal).sum(1, keepdims=True) * normal
+        tangent = across(along, normal)
         # Where `along` is the normal any tangent will do.
         spare = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
         tangent = unit(np.where(np.linalg.norm(tangent, axis=1, keepdims=True) > 1e-3, tangent, spare))
@@ -174,11 +176,6 @@ def noise(rng: np.random.Generator, points: np.ndarray, size: float, waves: int 
     return np.cos(points.astype(np.float32) @ vectors.astype(np.float32) + phases).sum(-1) * np.sqrt(
         2.0 / waves
     )
-
-
-def unit(vectors: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) of length 1."""
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
 def ball(count: int, rng: np.random.Generator) -> np.ndarray:

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from capture_kit import Part, ball, unit
+from capture_kit import Part, ball
 from PIL import Image
 
 from mitex.colour import linear_to_srgb
+from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh
 from mitex.paths import atomic_write
 from mitex.runtime import init

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import spatial
 
+from mitex.geometry.vectors import unit
+
 SIZE = 256
 FINE = 768
 
@@ -113,8 +115,7 @@ def normals(height: np.ndarray) -> np.ndarray:
     """Tangent-space normals (N, N, 3), +x right, +y up, of a periodic height in texture widths."""
     dx = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) * (FINE / 2)
     dy = (np.roll(height, 1, 0) - np.roll(height, -1, 0)) * (FINE / 2)
-    n = np.stack([-dx, -dy, np.ones_like(height)], axis=-1)
-    return n / np.linalg.norm(n, axis=-1, keepdims=True)
+    return unit(np.stack([-dx, -dy, np.ones_like(height)], axis=-1))
 
 
 def ambient_occlusion(height: np.ndarray, reach: float = 0.12, directions: int = 16) -> np.ndarray:
@@ -141,8 +142,7 @@ def downsample(field: np.ndarray) -> np.ndarray:
 def maps(material: Material) -> dict[str, np.ndarray]:
     """The five 8-bit maps of a material; the height is stretched to the full range."""
     height = material.height
-    normal = downsample(normals(height))
-    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    normal = unit(downsample(normals(height)))
     albedo = np.clip(downsample(material.albedo), 0.0, 1.0)
     albedo = np.where(albedo <= 0.0031308, albedo * 12.92, 1.055 * albedo ** (1 / 2.4) - 0.055)
     low, high = np.percentile(height, [0.1, 99.9])

@@ -19,6 +19,7 @@ from capture_kit import Base, Part, cells, joined, lattice, noise, repeated, rib
 from capture_studio import write_capture
 from exemplar_kit import mix, ramp, step
 
+from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh, icosphere
 
 OUT = Path(__file__).parents[1] / "out" / "captures"
@@ -129,7 +130,7 @@ def _turf(base: Base, rng: np.random.Generator, roots: np.ndarray, blades: Blade
     count, (strips, points) = len(roots), blades.across.shape
     wind = np.arctan2(noise(rng, roots, 0.4), noise(rng, roots, 0.4)) + 1.4 * rng.normal(size=count)
     towards = np.stack([np.cos(wind), np.sin(wind)], axis=1)
-    frames = base.frames(roots, np.einsum("nk,nkd->nd", towards, base.frames(roots)[:, :2]))
+    frames = base.frames(roots, interpolate(towards, base.frames(roots)[:, :2]))
 
     t = np.linspace(0.0, 1.0, blades.rings)
     bend = rng.uniform(0.0, blades.lean, (count, 1)) + rng.gamma(2.2, blades.bend, (count, 1)) * t**1.5

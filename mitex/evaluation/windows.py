@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from mitex.frames import orthonormal
+from mitex.geometry.vectors import orthonormal
 
 ELEVATIONS = (0, 20, 40, 60, 80)
 TOLERANCE = 10.0  # pixels count whose angle is so near to that of the elevation [degrees]

@@ -17,7 +17,7 @@ from mitex.asset import Asset
 from mitex.colour import srgb_to_linear
 from mitex.export.common import DEFAULT_ALBEDO, DEFAULT_ROUGHNESS, GENERATOR, png
 from mitex.export.glb_read import read_glb
-from mitex.frames import split_at_seams
+from mitex.geometry.tangents import split_at_seams
 from mitex.paths import atomic_write
 
 __all__ = ["glb_bytes", "read_glb", "write_glb"]

@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from mitex.runtime import load_mitsuba
+from mitex.runtime.jit import dr, mi
 from mitex.textures.field import Field
-from mitex.textures.variant import for_variant
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.textures.variant import for_variant, init_base
 
 
 class FeatureMethods:
@@ -48,8 +45,8 @@ class FeatureMethods:
     """
 
     def __init__(self, props: Any) -> None:
-        mi.CppADIntegrator.__init__(self, props)
-        if not mi.variant().startswith(("llvm", "cuda")):
+        init_base(mi.CppADIntegrator, self, props)
+        if not dr.is_jit_v(mi.Float):
             raise RuntimeError(f"feature: variant '{mi.variant()}' is not supported; use an llvm or cuda one")
         self.field = props.get("field")
         self.name = props.get("name", "")

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from mitex.runtime import load_mitsuba
-from mitex.textures.variant import for_variant
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
+from mitex.textures.variant import for_variant, init_base
 
 TOE, SLOPE = 0.04045, 12.92  # of the sRGB curve
 
@@ -36,8 +33,8 @@ class ShellMethods:
     """
 
     def __init__(self, props: Any) -> None:
-        mi.SamplingIntegrator.__init__(self, props)
-        if not mi.variant().startswith(("llvm", "cuda")) or mi.is_spectral or mi.is_polarized:
+        init_base(mi.SamplingIntegrator, self, props)
+        if not dr.is_jit_v(mi.Float) or mi.is_spectral or mi.is_polarized:
             raise RuntimeError(f"shell: variant '{mi.variant()}' is not supported; use llvm_ad_rgb")
         self.field = props.get("field")
         if not hasattr(self.field, "march"):

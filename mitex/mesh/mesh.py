@@ -10,6 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from mitex.errors import MeshError
+from mitex.geometry.triangles import triangle_crosses
+from mitex.geometry.vectors import scatter_add, unit_normals
 from mitex.mesh.topology import EdgeGraph, edge_graph
 
 
@@ -58,8 +60,7 @@ class Mesh:
     @cached_property
     def face_crosses(self) -> np.ndarray:
         """(F, 3) float64 normals of twice the length of the face's area [mesh units^2]."""
-        a, b, c = (self.vertices[self.faces[:, k]].astype(np.float64) for k in range(3))
-        return np.cross(b - a, c - a)
+        return triangle_crosses(self.vertices[self.faces].astype(np.float64))
 
     @cached_property
     def face_areas(self) -> np.ndarray:
@@ -69,16 +70,14 @@ class Mesh:
     @cached_property
     def face_normals(self) -> np.ndarray:
         """(F, 3) float32 unit normals; +z where a face has no area."""
-        return _unit(self.face_crosses)
+        return unit_normals(self.face_crosses).astype(np.float32)
 
     @cached_property
     def normals(self) -> np.ndarray:
         """(V, 3) float32 unit normals, the area-weighted mean of the faces around; +z where that is zero."""
-        corners = self.faces.ravel()
-        count = len(self.vertices)
         crosses = np.repeat(self.face_crosses, 3, axis=0)
-        total = [np.bincount(corners, weights=crosses[:, k], minlength=count) for k in range(3)]
-        return _unit(np.stack(total, axis=1))
+        total = scatter_add(self.faces.ravel(), crosses, len(self.vertices))
+        return unit_normals(total).astype(np.float32)
 
     def normalised(self) -> tuple[Mesh, Similarity]:
         """The mesh with its vertex mean at the origin and its farthest vertex at distance 1.
@@ -131,12 +130,6 @@ class Similarity:
     def inverse(self, points: np.ndarray) -> np.ndarray:
         """Maps normalised points (..., 3) back to mesh units, float64."""
         return np.asarray(points, np.float64) * self.scale + self.center
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    safe = np.where(length > 0.0, length, 1.0)
-    return np.where(length > 0.0, vectors / safe, (0.0, 0.0, 1.0)).astype(np.float32)
 
 
 def _check_arrays(name: str, vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None) -> None:

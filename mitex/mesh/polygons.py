@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mitex.errors import MeshError
+from mitex.geometry.triangles import triangle_crosses
+from mitex.geometry.vectors import cross_2d
 
 MAX_CORNERS = 2000
 
@@ -51,8 +53,7 @@ def _cut_quads(quads: np.ndarray) -> np.ndarray:
     options = np.array([[[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]])
     cost = []
     for option, (start, end) in zip(options, ((0, 2), (1, 3)), strict=True):
-        a, b, c = (quads[:, option[:, k]] for k in range(3))
-        normals = np.cross(b - a, c - a)
+        normals = triangle_crosses(quads[:, option])
         inside = np.einsum("qk,qk->q", normals[:, 0], normals[:, 1]) > 0.0
         length = np.linalg.norm(quads[:, start] - quads[:, end], axis=1)
         cost.append(np.where(inside, length, np.inf))
@@ -67,7 +68,7 @@ def _clip_ears(polygon: np.ndarray) -> np.ndarray:
     triangles = []
     while len(left) > 3:
         a, b, c = (plane[np.roll(left, shift)] for shift in (1, 0, -1))
-        turn = _cross(b - a, c - b)
+        turn = cross_2d(b - a, c - b)
         ear = turn > 0.0
         for point in left[turn <= 0.0]:
             ear &= ~_contains(a, b, c, plane[point])
@@ -92,11 +93,9 @@ def _flatten(polygon: np.ndarray) -> np.ndarray:
 def _contains(a: np.ndarray, b: np.ndarray, c: np.ndarray, point: np.ndarray) -> np.ndarray:
     """Whether counter-clockwise triangles contain a point, corners excepted."""
     inside = (
-        (_cross(b - a, point - a) >= 0) & (_cross(c - b, point - b) >= 0) & (_cross(a - c, point - c) >= 0)
+        (cross_2d(b - a, point - a) >= 0)
+        & (cross_2d(c - b, point - b) >= 0)
+        & (cross_2d(a - c, point - c) >= 0)
     )
     corner = (a == point).all(axis=1) | (b == point).all(axis=1) | (c == point).all(axis=1)
     return inside & ~corner
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mitex.errors import MeshError
+from mitex.geometry.vectors import scatter_add
 from mitex.mesh.mesh import Mesh
 from mitex.mesh.topology import face_edges
 
@@ -73,7 +74,7 @@ def _loop_points(mesh: Mesh, pairs: np.ndarray, sides: np.ndarray) -> np.ndarray
     old = mesh.vertices.astype(np.float64)
     count, edges = len(old), len(pairs)
     ends = old[pairs[:, 0]] + old[pairs[:, 1]]
-    opposite = _summed(sides.ravel(), old[np.roll(mesh.faces, 1, axis=1).ravel()], edges)
+    opposite = scatter_add(sides.ravel(), old[np.roll(mesh.faces, 1, axis=1).ravel()], edges)
     crease = np.bincount(sides.ravel(), minlength=edges) != 2
     new = np.where(crease[:, None], 0.5 * ends, 0.375 * ends + 0.125 * opposite)
 
@@ -90,9 +91,4 @@ def _loop_points(mesh: Mesh, pairs: np.ndarray, sides: np.ndarray) -> np.ndarray
 
 
 def _neighbour_sum(pairs: np.ndarray, points: np.ndarray) -> np.ndarray:
-    return _summed(pairs.ravel(), points[pairs[:, ::-1].ravel()], len(points))
-
-
-def _summed(index: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
-    """(count, 3) sums of the rows of `values` that have the same index."""
-    return np.stack([np.bincount(index, values[:, k], count) for k in range(3)], axis=1)
+    return scatter_add(pairs.ravel(), points[pairs[:, ::-1].ravel()], len(points))

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from mitex.errors import ConfigError
+from mitex.geometry.triangles import interpolate
+from mitex.geometry.vectors import unit
 
 if TYPE_CHECKING:
     import torch
@@ -66,8 +68,8 @@ class Cameras:
 
     def frame(self) -> tuple[Array, Array, Array]:
         """Orthonormal (right, up, forward) of every camera, (K, 3) float32 each."""
-        forward = _unit(self.target.astype(np.float64) - self.origin)
-        right = _unit(np.cross(forward, self.up.astype(np.float64)))
+        forward = unit(self.target.astype(np.float64) - self.origin)
+        right = unit(np.cross(forward, self.up.astype(np.float64)))
         up = np.cross(right, forward)
         return right.astype(np.float32), up.astype(np.float32), forward.astype(np.float32)
 
@@ -103,14 +105,14 @@ class Cameras:
         y = (1 - (np.arange(self.height, dtype=np.float32) + 0.5) * (2 / self.height))[None, :, None, None]
         origins = o[:, 0] + x * o[:, 1] + y * o[:, 2]
         directions = d[:, 0] + x * d[:, 1] + y * d[:, 2]
-        return origins.astype(np.float32), _unit(directions).astype(np.float32)
+        return origins.astype(np.float32), unit(directions).astype(np.float32)
 
     def sensors(self) -> list[dict[str, Any]]:
         """One Mitsuba sensor dictionary per camera, with a box-filtered float32 film, for `mi.load_dict`."""
         return [self._sensor(index) for index in range(len(self))]
 
     def _sensor(self, index: int) -> dict[str, Any]:
-        import mitsuba as mi
+        from mitex.runtime.jit import mi
 
         origin, target, up = (
             getattr(self, name)[index].astype(np.float64) for name in ("origin", "target", "up")
@@ -237,8 +239,8 @@ def patch_views(
     root, v = uniform(2, count)
     root = np.sqrt(root)
     weight = np.stack((1 - root, root * (1 - v), root * v), axis=1)
-    point = np.einsum("kc,kcx->kx", weight, corners[face])
-    normal = _unit(np.einsum("kc,kcx->kx", weight, mesh.normals[mesh.faces[face]].astype(np.float64)))
+    point = interpolate(weight, corners[face])
+    normal = unit(interpolate(weight, mesh.normals[mesh.faces[face]].astype(np.float64)))
 
     center = 0.5 * (mesh.vertices.min(0) + mesh.vertices.max(0)).astype(np.float64)
     radius = np.linalg.norm(mesh.vertices - center, axis=1).max()
@@ -276,10 +278,6 @@ def _around(
         width=width,
         height=height,
     )
-
-
-def _unit(v: Array) -> Array:
-    return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
 def _check(cameras: Cameras) -> None:

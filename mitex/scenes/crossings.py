@@ -8,10 +8,9 @@ import numpy as np
 
 from mitex.mesh import Mesh
 from mitex.mesh.topology import mesh_edges
-from mitex.runtime import init, load_mitsuba
+from mitex.runtime import init
+from mitex.runtime.jit import mi
 from mitex.scenes.stage import mesh_shape
-
-mi: Any = load_mitsuba(needs_llvm=False)
 
 PAST = 1e-4  # part of an edge by which a ray goes on behind a face that it may touch
 

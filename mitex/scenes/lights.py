@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from mitex.geometry.vectors import unit
+
 # Softboxes of the studio: where they are, half width and height at distance 1, linear radiance.
 _BOXES = (
     ((-0.8, 0.9, 0.9), (0.45, 0.45), (6.4, 6.1, 5.7)),  # key, upper left behind a camera on +z
@@ -33,9 +35,8 @@ def studio_image(height: int = 128) -> np.ndarray:
     above = _smoothstep(-0.5, 0.9, direction[..., 1:2])
     image = (1 - above) * np.array((0.08, 0.076, 0.072)) + above * np.array((0.40, 0.42, 0.45))
     for position, (half_width, half_height), radiance in _BOXES:
-        forward = np.array(position) / np.linalg.norm(position)
-        right = np.cross(forward, (0.0, 1.0, 0.0))
-        right /= np.linalg.norm(right)
+        forward = unit(np.array(position))
+        right = unit(np.cross(forward, (0.0, 1.0, 0.0)))
         # Coordinates on the plane of the box, which is at distance 1; behind the centre it is out of sight.
         depth = np.maximum(direction @ forward, 1e-3)
         x, y = direction @ right / depth, direction @ np.cross(right, forward) / depth
@@ -53,7 +54,7 @@ def environment(strength: float = 1.0, azimuth: float = math.pi / 2, height: int
             angle.
         height: rows of the image.
     """
-    import mitsuba as mi
+    from mitex.runtime.jit import mi
 
     return {
         "type": "envmap",
@@ -84,7 +85,7 @@ def _panel(
     position: tuple[float, ...], half: float, radiance: tuple[float, ...], strength: float, radius: float
 ):
     """A square that faces the origin and emits on that side."""
-    import mitsuba as mi
+    from mitex.runtime.jit import mi
 
     frame = mi.ScalarTransform4f().look_at(
         origin=[radius * p for p in position], target=[0, 0, 0], up=[0, 1, 0]

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
 
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh
-from mitex.runtime import init, load_mitsuba
+from mitex.plugins import init
+from mitex.runtime.jit import dr, mi
 from mitex.scenes.cameras import Cameras
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +122,7 @@ class Stage:
 
     def __init__(self, mesh: Mesh, channels: int = 3, background: Sequence[float] | float = 0.0) -> None:
         init()
-        if not mi.variant().startswith(("llvm", "cuda")):
+        if not dr.is_jit_v(mi.Float):
             raise ConfigError(f"the variant is '{mi.variant()}'", "set an llvm or cuda one, or none")
         if channels < 1:
             raise ConfigError(f"a field of {channels} channels", "use at least 1")
@@ -201,7 +199,12 @@ class Stage:
             hit, triangle, uv = found.is_valid(), found.prim_index, found.prim_uv
             dr.eval(hit, triangle, uv)
             u, v = mi.Float(uv.x), mi.Float(uv.y)
-        return hit.torch(), triangle.torch().view(torch.int32), u.torch(), v.torch()
+        hit, triangle, u, v = (_tensor(array) for array in (hit, triangle, u, v))
+        return hit, triangle.view(torch.int32), u, v
+
+
+def _tensor(array: dr.ArrayBase) -> torch.Tensor:
+    return cast(torch.Tensor, array.torch())
 
 
 def mesh_shape(mesh: Mesh, bsdf: Any = None, smooth: bool = False) -> Any:

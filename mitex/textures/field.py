@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Protocol, runtime_checkable
 
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
+from mitex.textures.variant import init_base
 
 # Rows of the data, their weights, and whether there are any, for each lookup.
 Located = tuple[tuple[Any, ...], tuple[Any, ...], Any]
@@ -41,8 +39,8 @@ class FieldMethods:
 
     def _read(self, props: Any) -> None:
         """Reads the properties that all fields have."""
-        mi.Texture.__init__(self, props)
-        if not mi.variant().startswith(("llvm", "cuda")):
+        init_base(mi.Texture, self, props)
+        if not dr.is_jit_v(mi.Float):
             raise RuntimeError(
                 f"{self.plugin}: variant '{mi.variant()}' is not supported; use an llvm or cuda one"
             )

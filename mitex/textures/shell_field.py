@@ -11,13 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from mitex.integrators.march import Composite, RadianceField, composite
 from mitex.mesh import Similarity
-from mitex.runtime import load_mitsuba
-from mitex.textures.variant import for_variant
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
+from mitex.textures.march import Composite, RadianceField, composite
+from mitex.textures.variant import for_variant, init_base
 
 CHUNK = 1 << 16  # rays that are marched at a time
 
@@ -32,7 +29,7 @@ class ShellFieldMethods:
     """
 
     def __init__(self, field: RadianceField, similarity: Similarity, turn: np.ndarray | None = None) -> None:
-        mi.Volume.__init__(self, mi.Properties("shell_field"))
+        init_base(mi.Volume, self, mi.Properties("shell_field"))
         self.field, self.similarity = field, similarity
         self.turn = np.eye(3) if turn is None else turn
 

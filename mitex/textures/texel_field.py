@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from mitex.runtime import load_mitsuba
+from mitex.runtime.jit import dr, mi
 from mitex.textures.field import FieldMethods, Located
 from mitex.textures.variant import for_variant
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 FILTERS = ("bilinear", "nearest")
 MAX_CHART = 2.0**24  # beyond, float32 skips integers

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from mitex.runtime import load_mitsuba
+from mitex.runtime.jit import dr, mi
 from mitex.textures.field import FieldMethods, Located
 from mitex.textures.variant import for_variant
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 
 class VertexFieldMethods(FieldMethods):

@@ -136,16 +136,17 @@ class _Writer:
 
 
 def _diverged(folder: Path, record: dict[str, Any], state: TrainState) -> TrainingDiverged:
-    kind: str = record["skipped"]
+    kind = record["skipped"]
     norms = optim.gradient_norms(state.optimizer.parameters).tolist() if kind == "gradient" else []
     with atomic_write(folder / run.DIVERGED) as temporary:
         dump = plain(record) | {"gradient_norms": [str(norm) for norm in norms]}
         temporary.write_text(json.dumps(dump, indent=1) + "\n", encoding="utf-8")
+    name = kind.replace("_", " ")
     newest = folder / checkpoint.NAME
     kept = f"the last good checkpoint is '{newest}'" if newest.exists() else "no checkpoint had been reached"
     again = "add --resume and set" if newest.exists() else "set"
     return TrainingDiverged(
-        f"the {kind.replace('_', ' ')} was not finite in {PATIENCE} steps in a row, up to step {state.step}; {kept}, and "
+        f"the {name} was not finite in {PATIENCE} steps in a row, up to step {state.step}; {kept}, and "
         f"'{folder / run.DIVERGED}' has the step's numbers",
         f"{again} a smaller learning rate, or another seed for a new run",
     )

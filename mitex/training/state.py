@@ -61,8 +61,8 @@ class TrainState:
     def advance(self) -> dict[str, Any]:
         """One step: begin, forward, backward, update; returns its line for metrics.jsonl.
 
-        When the loss, a gradient or a metric of `begin` is not finite, the line says which under `skipped`, and
-        parameters, optimizer and task are what they were, byte for byte. Only the counters go on, and the
+        When the loss, a gradient or a metric of `begin` is not finite, the line says which under `skipped`,
+        and parameters, optimizer and task are what they were, byte for byte. Only the counters go on, and the
         generator, so that the next step draws other numbers.
         """
         self.optimizer.clear()

@@ -1,7 +1,7 @@
 """What a method hands the training loop.
 
-A step has three parts, so that one that fails leaves no trace: `Task.begin` changes what the loss needs and says
-how to undo it, `Task.loss` changes nothing, and `Step.commit` changes what follows from a good update.
+A step has three parts, so that one that fails leaves no trace: `Task.begin` changes what the loss needs and
+says how to undo it, `Task.loss` changes nothing, and `Step.commit` changes what follows from a good update.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -52,8 +52,8 @@ class Task(Protocol):
     def begin(self, step: int, generator: torch.Generator) -> Change | None:
         """Changes the state that the loss of this step needs: a critic, an occupancy grid, the next level.
 
-        Called once before each `loss`, with the same arguments. None says that nothing was changed. A step
-        may be skipped, so what is due once must not depend on one certain number of `step` alone.
+        Called once before each `loss`, with the same arguments. None says that nothing was changed. Any step
+        may be skipped, so what is due once must not wait for one certain `step`.
         """
         ...
 

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 from mitex.asset import Asset
-from mitex.frames import orthonormal
+from mitex.geometry.vectors import orthonormal
 from mitex.mesh import Mesh, icosphere
 
 

@@ -11,9 +11,9 @@ import pytest
 from mitex.colour import srgb_to_linear
 from mitex.mesh import Similarity
 from mitex.runtime import init
+from mitex.runtime.jit import dr, mi
 
-mi: Any = init()
-import drjit as dr  # noqa: E402
+init()
 
 from mitex.render.framing import rotation  # noqa: E402
 from mitex.textures import shell_field as module  # noqa: E402

@@ -1,7 +1,7 @@
 """The contract of a training task, as checks that the tests of every method share."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from unittest.mock import patch
@@ -42,6 +42,14 @@ def assert_loss_is_pure(task: Task, step: int) -> None:
     assert_same_bytes(task.state(), before)
 
 
+def with_nan_gradients(loss: torch.Tensor, parameters: Sequence[torch.Tensor]) -> torch.Tensor:
+    """The same value."""
+    for p in parameters:
+        if p.requires_grad:
+            loss = loss + (p - p.detach()).abs().sqrt().sum()  # 0, with a gradient of 0 / 0
+    return loss
+
+
 @contextmanager
 def spoiled(task: Task, fault: str) -> Iterator[None]:
     """The task with NaN for its loss, or in the gradients of a finite loss."""
@@ -51,9 +59,7 @@ def spoiled(task: Task, fault: str) -> Iterator[None]:
         result = sound(step, generator)
         if fault == "loss":
             return replace(result, value=result.value * math.nan)
-        trained = (p for p in task.parameters if p.requires_grad)
-        roots = sum((p - p.detach()).abs().sqrt().sum() for p in trained)  # 0, with a gradient of 0 / 0
-        return replace(result, value=result.value + roots)
+        return replace(result, value=with_nan_gradients(result.value, task.parameters))
 
     with patch.object(task, "loss", loss):
         yield
@@ -64,10 +70,15 @@ def assert_third_step_leaves_no_trace(
     config,
     fault: str,
     spoiled: Callable[[Task, str], AbstractContextManager[None]] = spoiled,
+    first: int = 0,
 ) -> None:
-    """A task whose third step fails has the bytes of one that never ran it, and goes on as that one does."""
+    """A task whose third step fails has the bytes of one that never ran it, and goes on as that one does.
+
+    `first` is the number of the first of the four steps.
+    """
     failing, other = (TrainState(make(), config, lambda step: 1e-3, normalise=False) for _ in range(2))
     for state in (failing, other):
+        state.step = first
         assert not any("skipped" in state.advance() for _ in range(2))
     with spoiled(failing.task, fault):
         assert failing.advance()["skipped"] == fault

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -43,9 +44,12 @@ class SmallTask:
     def begin(self, step, generator):
         if step % 3 == 1:
             return None
-        before = self.target.clone()
+        undo = partial(self.move_target, self.target.clone())
         self.target += 0.01 * torch.randn((), generator=generator)
-        return Change(lambda: self.target.copy_(before), {"target": self.target.item()})
+        return Change(undo, {"target": self.target.item()})
+
+    def move_target(self, place):
+        self.target.copy_(place)
 
     def loss(self, step, generator):
         self.steps_seen.append(step)

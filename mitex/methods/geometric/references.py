@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mitex.geometry.vectors import across, unit
 from mitex.mesh import Mesh, icosphere, torus
 
 FREQUENCY = 56  # of the spheres: 62,720 faces
@@ -39,8 +40,7 @@ def knobs() -> Mesh:
     around = np.interp(t, [0.2, 1.0], [neck, 0.0])
     radius = np.where(t < 0.2, np.interp(t, [0.0, 0.2], [rim, size * np.sin(neck)]), size * np.sin(around))
     height = np.where(t < 0.2, 0.0, up + size * np.cos(around))
-    outwards = points - (points * centre).sum(1, keepdims=True) * centre
-    outwards /= np.maximum(np.linalg.norm(outwards, axis=1, keepdims=True), 1e-12)
+    outwards = unit(across(points, centre))
     placed = np.cos(radius)[:, None] * centre + np.sin(radius)[:, None] * outwards
     moved = np.where((angle < rim)[:, None], placed * (1 + height)[:, None], points)
     return _mesh(moved, "knobs")
@@ -50,8 +50,7 @@ def ridges() -> Mesh:
     """A ball with the winding ridges of a brain coral."""
     rng = np.random.default_rng(3)
     points = icosphere(FREQUENCY).vertices.astype(np.float64)
-    waves = rng.normal(size=(160, 3))
-    waves *= 20.0 / np.linalg.norm(waves, axis=1, keepdims=True)
+    waves = 20.0 * unit(rng.normal(size=(160, 3)))
     field = np.cos(points @ waves.T + rng.uniform(0, 2 * np.pi, 160)).sum(1) / np.sqrt(80)
     return _sphere(0.14 * (1 + np.tanh(2 * field)), "ridges")
 

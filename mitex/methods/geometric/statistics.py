@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.stats
 
+from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh
 from mitex.mesh.topology import face_edges
 
@@ -41,7 +42,7 @@ def _dihedral_angles(mesh: Mesh, sides: np.ndarray, count: int) -> np.ndarray:
     total = np.bincount(sides.ravel(), minlength=count)
     first = (np.cumsum(total) - total)[total == 2]
     one, other = order[first] // 3, order[first + 1] // 3
-    normals = mesh.face_crosses / np.maximum(np.linalg.norm(mesh.face_crosses, axis=1, keepdims=True), LEAST)
+    normals = unit(mesh.face_crosses)
     centres = mesh.vertices[mesh.faces].astype(np.float64).mean(1)
     angle = np.arccos(np.clip((normals[one] * normals[other]).sum(1), -1, 1))
     convex = ((centres[other] - centres[one]) * normals[one]).sum(1) <= 0

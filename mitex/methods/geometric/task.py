@@ -19,14 +19,14 @@ from mitex.methods.geometric.pictures import portrait
 from mitex.training import Change, Step
 from mitex.training.optim import Adam, gradient_norms
 
-HALVINGS = 4  # of the learning rate on a level
+QUARTERS = 4  # parts of a level with a learning rate each; the paper's 2,000 steps in intervals of 500
 
 
 class GeometricTask:
     """Generators that turn the template into the reference, or something like it, on each level.
 
-    A step updates the generator of its level. The critics have optimizers of their own and take their turns in
-    `begin`. Generators of lower levels stay as they are.
+    A step updates the generator of its level. The critics have optimizers of their own and take their turns
+    in `begin`. Generators of lower levels stay as they are.
 
     Args:
         config: settings.
@@ -213,6 +213,6 @@ def betas(config: GeometricConfig) -> tuple[float, float]:
 
 
 def learning_rate(config: GeometricConfig, step: int) -> float:
-    """Halved four times on each level, anew on the next."""
-    part = step % config.level_steps * HALVINGS // config.level_steps
-    return config.lr * 0.5**part
+    """Halved after each quarter of a level, so three times, and whole again on the next level."""
+    quarter = step % config.level_steps * QUARTERS // config.level_steps
+    return config.lr * 0.5**quarter

@@ -15,6 +15,7 @@ import numpy as np
 import torch
 
 from mitex.errors import ConfigError
+from mitex.geometry.vectors import rotate_about, scatter_add
 from mitex.mesh import Mesh
 from mitex.sparse import csr_tensor
 
@@ -63,15 +64,6 @@ def harmonics(directions: np.ndarray, degree: int) -> np.ndarray:
     return np.stack(terms[: HARMONICS[degree]], axis=1)
 
 
-def rotate_about(vectors: np.ndarray, axes: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
-    """Vectors (E, 3) turned counter-clockwise about unit axes (E, 3) by `angle` [rad], one or (E,)."""
-    cos, sin = np.cos(angle), np.sin(angle)
-    if np.ndim(angle):
-        cos, sin = cos[:, None], sin[:, None]
-    along = (vectors * axes).sum(1, keepdims=True)
-    return vectors * cos + np.cross(axes, vectors) * sin + axes * along * (1 - cos)
-
-
 _cache: weakref.WeakKeyDictionary[Mesh, dict[tuple, Perception]] = weakref.WeakKeyDictionary()
 
 
@@ -111,14 +103,14 @@ def _build(mesh: Mesh, degree: int, orientation: float | np.ndarray, device) -> 
     receivers = np.repeat(np.arange(count), np.diff(mesh.edges.indptr))
     positions = mesh.vertices.astype(np.float64)
     offsets = positions[neighbours] - positions[receivers]
-    directions = offsets / (np.linalg.norm(offsets, axis=1, keepdims=True) + 1e-8)
+    # No constant is added to the lengths (the authors: 1e-8): meshes may have any size.
+    lengths = np.linalg.norm(offsets, axis=1, keepdims=True)
+    directions = offsets / np.where(lengths > 0.0, lengths, 1.0)
     if np.any(orientation):
         angle = np.broadcast_to(orientation, (count,))[receivers]
         directions = rotate_about(directions, mesh.normals.astype(np.float64)[receivers], -angle)
     weights = harmonics(directions, degree)
-    centre = np.stack(
-        [np.bincount(receivers, weights[:, k], minlength=count) for k in range(blocks - 1)], axis=1
-    )
+    centre = scatter_add(receivers, weights, count)
     own = np.arange(count)
     first_rows = receivers[:, None] * blocks + np.arange(blocks - 1)
     own_rows = own[:, None] * blocks + np.arange(blocks)

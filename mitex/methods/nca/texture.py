@@ -13,11 +13,11 @@ import torch
 from mitex.asset import Asset
 from mitex.atlas import laid_out
 from mitex.errors import ConfigError
-from mitex.frames import orthonormal, unit
+from mitex.geometry.vectors import orthonormal, rotate_about, unit
 from mitex.mesh import Mesh, remesh, subdivide_loop
 from mitex.methods.nca import files
 from mitex.methods.nca.model import MeshNCA
-from mitex.methods.nca.perception import perception, rotate_about
+from mitex.methods.nca.perception import perception
 from mitex.methods.nca.targets import state_maps
 from mitex.runtime import keep_freed_memory
 
@@ -85,15 +85,18 @@ class NcaTexture:
             An asset on the subdivided mesh, in the mesh's own units and place, with one map per learned map.
 
         Raises:
-            ConfigError: options out of range.
+            ConfigError: options out of range, or the model needs a condition.
             MeshError: the mesh cannot be remeshed.
         """
+        self._check_unconditioned()
         laid = mesh if resolution is None or scale != 1.0 else laid_out(mesh, resolution)
         dense = self._dense(laid, subdivide, scale)
         state = self.grow(dense, seed=seed, steps=STEPS if steps is None else steps, orientation=orientation)
         maps = state_maps(state.numpy(), list(self.maps))
         asset = Asset(dense, maps, tangents(dense, orientation), name=mesh.name)
-        return asset if resolution is None else asset.baked(resolution)
+        if resolution is None:
+            return asset
+        return asset.baked(resolution, layout=dense.uv if scale == 1.0 else None)
 
     @torch.no_grad()
     def grow(
@@ -102,6 +105,7 @@ class NcaTexture:
         """The state (V, C) after `steps` steps from the seed; held in [-clamp, clamp] as in the authors'
         demo.
         """
+        self._check_unconditioned()
         if steps < 0:
             raise ConfigError(f"{steps} steps", "give 0 or more")
         keep_freed_memory()
@@ -111,6 +115,14 @@ class NcaTexture:
         for _ in range(steps):
             state = self.model.evolve(state, seen, 1, generator).clamp_(-clamp, clamp)
         return state[0]
+
+    def _check_unconditioned(self) -> None:
+        if self.model.condition:
+            name, width = self.about.get("name", "the model"), self.model.condition
+            raise ConfigError(
+                f"'{name}' needs a condition of {width} values at each vertex, which a texture has not",
+                "use a model that was trained without, or give the condition to MeshNCA.evolve in Python",
+            )
 
     def _dense(self, mesh: Mesh, subdivide: int | str, scale: float) -> Mesh:
         if subdivide == "auto":

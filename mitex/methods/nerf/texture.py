@@ -34,9 +34,8 @@ from mitex.methods.nerf.synthesis.quilting import Quilt, quilt
 from mitex.methods.nerf.use.applied import AppliedTexture
 from mitex.methods.nerf.use.placement import EXTENT, UNWRAP_SIZE, in_scene_cube, uv_unit_length
 from mitex.methods.nerf.use.self_maps import self_maps
-from mitex.runtime import init, load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
+from mitex.runtime import init
+from mitex.runtime.jit import mi
 
 SIZE = 2048  # texels of a synthesized texture
 LARGEST = 8192  # that is quilted for a guide [texels]

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from mitex.atlas import barycentric_gradients, texel_space, twice_area
+from mitex.geometry.raster import texel_space
+from mitex.geometry.triangles import barycentric_gradients, interpolate, twice_area
 from mitex.mesh import Mesh
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.texels import Texels
@@ -79,11 +80,11 @@ def _reads(mesh: Mesh, texels: Texels, tracer: GeodesicTracer, outside: np.ndarr
     face, barycentric = texels.face[outside], texels.barycentric[outside]
     corners = texel_space(texels.uv[face], texels.resolution)
     row, column = np.divmod(texels.index[outside], texels.resolution)
-    away = np.stack([column, row], 1) - np.einsum("nk,nkc->nc", barycentric, corners)
+    away = np.stack([column, row], 1) - interpolate(barycentric, corners)
     slopes = barycentric_gradients(corners, twice_area(corners))[1]
     rates = np.stack([(slopes[:, :2] * away).sum(1), (slopes[:, 2:] * away).sum(1)], 1)
     points = mesh.vertices[mesh.faces[face]].astype(np.float64)
-    direction = np.einsum("nk,nkc->nc", rates, points[:, 1:] - points[:, :1])
+    direction = interpolate(rates, points[:, 1:] - points[:, :1])
     length = np.minimum(np.linalg.norm(direction, axis=1), FARTHEST * texels.size)
     end = tracer.trace(face, barycentric, direction, length)
     index, weight = texels.bilinear(end.face, end.barycentric)

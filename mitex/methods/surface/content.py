@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import map_coordinates
 
+from mitex.geometry.triangles import interpolate
+from mitex.geometry.vectors import unit
 from mitex.images import read_image
 from mitex.mesh import Mesh
 from mitex.methods.surface.texels import Texels
@@ -29,11 +31,10 @@ def content_colours(content: str | Path, mesh: Mesh, texels: Texels) -> np.ndarr
         from mitex.scenes.occlusion import ambient_occlusion
 
         corners = mesh.normals[mesh.faces[texels.face]].astype(np.float64)
-        normals = np.einsum("nk,nkc->nc", texels.barycentric, corners)
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+        normals = unit(interpolate(texels.barycentric, corners))
         return np.repeat(ambient_occlusion(mesh, texels.position, normals)[:, None], 3, axis=1)
     image = read_image(Path(content))
-    uv = np.einsum("nk,nkc->nc", texels.barycentric, texels.uv[texels.face].astype(np.float64))
+    uv = interpolate(texels.barycentric, texels.uv[texels.face].astype(np.float64))
     row, column = (1 - uv[:, 1]) * image.shape[0] - 0.5, uv[:, 0] * image.shape[1] - 0.5
     looked = [map_coordinates(image[..., k], [row, column], order=1, mode="nearest") for k in range(3)]
     return np.stack(looked, axis=1).astype(np.float32)

@@ -10,10 +10,11 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from mitex.atlas import twice_area, unwrap, usable_uv
+from mitex.atlas import unwrap, usable_uv
 from mitex.cache import content_key
 from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
+from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh
 from mitex.methods.surface.borders import Border
 from mitex.methods.surface.cache import VERSION, cached_levels

@@ -13,7 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from mitex.errors import ConfigError
-from mitex.frames import orthonormal
+from mitex.geometry.triangles import interpolate
+from mitex.geometry.vectors import across, dot, orthonormal, rotate_about, scatter_add, unit, unit_normals
 from mitex.mesh import Mesh
 from mitex.mesh.topology import mesh_edges, welded
 
@@ -61,14 +62,10 @@ def tangent_frames(
         raise ConfigError(f"an orientation of {angle}", "give an angle in radians")
     directions = vertex_directions(mesh, kind, field)
     face = np.asarray(face)
-    normal = face_normals(mesh)[face]
-    right = np.zeros((len(face), 3))
-    for k in range(3):
-        right += np.asarray(barycentric)[:, k, None] * directions[mesh.faces[face, k]]
-    right = orthonormal(_without_faint(right), normal)
-    up = np.cross(normal, right)
-    cos, sin = np.cos(angle), np.sin(angle)
-    return cos * right + sin * up, cos * up - sin * right
+    normal = unit_normals(mesh.face_crosses[face])
+    right = interpolate(np.asarray(barycentric), directions[mesh.faces[face]])
+    right = rotate_about(orthonormal(_without_faint(right), normal), normal, angle)
+    return right, np.cross(normal, right)
 
 
 def vertex_directions(mesh: Mesh, kind: str = "smooth", field: np.ndarray | None = None) -> np.ndarray:
@@ -81,22 +78,17 @@ def vertex_directions(mesh: Mesh, kind: str = "smooth", field: np.ndarray | None
     place = welded(mesh.vertices)
     corners = place[mesh.faces]
     count = int(place.max(initial=-1)) + 1
-    normals = _unit(_summed(corners.ravel(), np.repeat(mesh.face_crosses, 3, axis=0), count))
+    normals = unit_normals(scatter_add(corners.ravel(), np.repeat(mesh.face_crosses, 3, axis=0), count))
     directions = _fixed(normals)
     if field is not None:
-        wanted = _summed(place, _checked(field, len(place)), count)
-        wanted = _without_faint(_across(wanted, normals))
+        wanted = scatter_add(place, _checked(field, len(place)), count)
+        wanted = _without_faint(across(wanted, normals))
         directions = np.where(wanted.any(axis=1, keepdims=True), orthonormal(wanted, normals), directions)
     elif kind == "smooth":
         areas = np.linalg.norm(mesh.face_crosses, axis=1) / 6.0
         share = np.bincount(corners.ravel(), np.repeat(areas, 3), count)
         directions = _smooth(normals, share, mesh_edges(corners, count)[0], directions)
     return directions[place]
-
-
-def face_normals(mesh: Mesh) -> np.ndarray:
-    """(F, 3) float64 unit normals; +z where a face has no area."""
-    return _unit(mesh.face_crosses)
 
 
 def _fixed(normals: np.ndarray) -> np.ndarray:
@@ -125,7 +117,7 @@ def _smooth(normals: np.ndarray, areas: np.ndarray, edges: np.ndarray, spare: np
     upright = np.cross(UP, normals)
     tilt = np.linalg.norm(upright, axis=1, keepdims=True)
     wanted = upright + LEVEL_PULL * np.maximum(1.0 - 2.0 * tilt, 0.0) * np.cross(SPARE_UP, normals)
-    q = _dot(wanted, x) + 1j * _dot(wanted, y)
+    q = dot(wanted, x) + 1j * dot(wanted, y)
     u = _solve(edges, _transport(normals, x, y, edges), weight, q)
     solution = _without_faint(np.real(u)[:, None] * x + np.imag(u)[:, None] * y)
     return np.where(solution.any(axis=1, keepdims=True), orthonormal(solution, normals), spare)
@@ -134,9 +126,9 @@ def _smooth(normals: np.ndarray, areas: np.ndarray, edges: np.ndarray, spare: np
 def _transport(normals: np.ndarray, x: np.ndarray, y: np.ndarray, edges: np.ndarray) -> np.ndarray:
     """(E,) r_ij: the number that the x axis of j becomes in the plane of i; 0 over folded edges."""
     i, j = edges.T
-    cos1 = 1.0 + _dot(normals[i], normals[j])
-    carried = x[j] - (_dot(x[j], normals[i]) / np.maximum(cos1, FOLD))[:, None] * (normals[i] + normals[j])
-    return np.where(cos1 > FOLD, _dot(carried, x[i]) + 1j * _dot(carried, y[i]), 0.0)
+    cos1 = 1.0 + dot(normals[i], normals[j])
+    carried = x[j] - (dot(x[j], normals[i]) / np.maximum(cos1, FOLD))[:, None] * (normals[i] + normals[j])
+    return np.where(cos1 > FOLD, dot(carried, x[i]) + 1j * dot(carried, y[i]), 0.0)
 
 
 def _solve(edges: np.ndarray, transport: np.ndarray, weight: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -168,27 +160,8 @@ def _checked(field: np.ndarray, vertices: int) -> np.ndarray:
             "an orientation field with NaN or infinite entries", "use zeros where it is unknown"
         )
     largest = np.abs(field).max(axis=1, keepdims=True, initial=0.0)
-    field = field / np.where(largest > 0.0, largest, 1.0)
-    length = np.linalg.norm(field, axis=1, keepdims=True)
-    return field / np.where(length > 0.0, length, 1.0)
-
-
-def _summed(index: np.ndarray, vectors: np.ndarray, count: int) -> np.ndarray:
-    return np.stack([np.bincount(index, vectors[:, k], count) for k in range(3)], axis=1)
-
-
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.einsum("nk,nk->n", a, b)
-
-
-def _across(vectors: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    return vectors - _dot(vectors, normals)[:, None] * normals
+    return unit(field / np.where(largest > 0.0, largest, 1.0))  # first: squares may overflow
 
 
 def _without_faint(vectors: np.ndarray) -> np.ndarray:
     return np.where(np.linalg.norm(vectors, axis=1, keepdims=True) > FAINT, vectors, 0.0)
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.where(length > 0.0, vectors / np.where(length > 0.0, length, 1.0), (0.0, 0.0, 1.0))

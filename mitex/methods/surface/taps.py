@@ -14,6 +14,7 @@ import numpy as np
 import scipy.sparse
 from scipy.sparse.csgraph import connected_components
 
+from mitex.geometry.vectors import scatter_add
 from mitex.methods.surface.borders import Border
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.levels import POOLS, Level, Levels
@@ -172,7 +173,7 @@ def representatives(position: np.ndarray, labels: np.ndarray, size: float) -> np
         size: of a texel; distances are told apart to a thousandth of it.
     """
     count = np.bincount(labels)
-    mean = np.stack([np.bincount(labels, position[:, k]) for k in range(3)], 1) / count[:, None]
+    mean = scatter_add(labels, position, len(count)) / count[:, None]
     distance = np.linalg.norm(position - mean[labels], axis=1)
     ranked = np.lexsort((np.round(distance / (1e-3 * size)), labels))
     return ranked[np.cumsum(count) - count]

@@ -15,14 +15,15 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from mitex.atlas import MAX_RESOLUTION, barycentric_gradients, texel_space, texels_in_boxes, twice_area
+from mitex.atlas import MAX_RESOLUTION
 from mitex.errors import ConfigError, MeshError
+from mitex.geometry.conservative import FLAT, cover, nearest_points
+from mitex.geometry.raster import texel_space
+from mitex.geometry.triangles import interpolate, twice_area
 from mitex.mesh import Mesh
 from mitex.mesh.topology import face_edges, welded
 
-CHUNK = 1 << 17  # texels or points that are looked at together: a megabyte per array stays in the cache
-FLAT = 1e-12  # [texel^2] faces of a smaller area in the layout show nothing
-ON_EDGE = 1e-9  # [texel] a centre so close to a face is on its edge
+CHUNK = 1 << 17  # points that are looked at together: a megabyte per array stays in the cache
 NO_WEIGHT = 1e-6  # bilinear weights below are rounding: a point on a texel centre reads that texel alone
 
 
@@ -74,20 +75,19 @@ class Texels:
         uv = np.ascontiguousarray(uv, np.float32)
         _check(mesh, uv, resolution)
         corners = texel_space(uv, resolution)
-        face, distance = _cover(corners, resolution)
+        face, distance = cover(corners, resolution)
         index = np.flatnonzero(face >= 0)
         if not len(index):
             raise ConfigError(f"the UVs of {mesh.name} cover no area", "unwrap the mesh again")
         face, inside = face[index], distance[index] == 0.0
-        barycentric = _shown(
-            corners, face, np.stack([index % resolution, index // resolution], axis=1), inside
-        )
+        centre = np.stack([index % resolution, index // resolution], axis=1)
+        barycentric = nearest_points(corners, face, centre, inside)
         return Texels(
             resolution=resolution,
             index=index.astype(np.int32),
             face=face,
             barycentric=barycentric,
-            position=_points(mesh, face, barycentric),
+            position=interpolate(barycentric, mesh.vertices[mesh.faces[face]]),
             inside=inside,
             size=_texel_size(mesh, corners),
             chart=charts(mesh, uv),
@@ -137,8 +137,7 @@ class Texels:
 
     def _place(self, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """(M, 2) float64 (column, row) of points on the surface."""
-        uv = np.einsum("mk,mkc->mc", barycentric, self.uv[face].astype(np.float64))
-        return texel_space(uv, self.resolution)
+        return texel_space(interpolate(barycentric, self.uv[face].astype(np.float64)), self.resolution)
 
     def _of_chart(self, chart: np.ndarray, column: np.ndarray, row: np.ndarray) -> np.ndarray:
         """The numbers (M, k) of the texels at (M, k) places, -1 unless they are of the charts (M,)."""
@@ -219,115 +218,3 @@ def _texel_size(mesh: Mesh, corners: np.ndarray) -> float:
     if not solid.any():
         raise MeshError(f"no face of {mesh.name} has an area", "check how it was exported")
     return float(np.median(np.sqrt(area[solid] / texels[solid])))
-
-
-def _points(mesh: Mesh, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
-    """(M, 3) float64 points of the faces (M,) [mesh units]."""
-    points = np.zeros((len(face), 3))
-    for k in range(3):
-        points += barycentric[:, k, None] * mesh.vertices[mesh.faces[face, k]]
-    return points
-
-
-class _Edges:
-    """The edge functions of triangles (F, 3, 2): three times twice a partial area, positive inside.
-
-    Unlike barycentrics they are not divided by the area, which keeps the test whether a triangle touches a
-    square exact where the coordinates are short binary fractions, as on layouts aligned with the texels.
-
-    Attributes:
-        area: (F,) twice the areas [texel^2].
-        reach: (3, F) by how much each function grows from a texel's centre to its best corner.
-    """
-
-    def __init__(self, triangles: np.ndarray):
-        signed = twice_area(triangles)
-        self.area = np.abs(signed)
-        origin, slopes = barycentric_gradients(triangles, np.sign(signed))
-        self._origin = np.ascontiguousarray(origin.T)
-        self._slope = np.ascontiguousarray(slopes.T)
-        dx, dy = self._slope[::2], self._slope[1::2]
-        half = 0.5 * (np.abs(dx) + np.abs(dy))
-        self.reach = np.concatenate([0.5 * (np.abs(dx.sum(axis=0)) + np.abs(dy.sum(axis=0)))[None], half])
-
-    def __call__(self, face: np.ndarray, column: np.ndarray, row: np.ndarray) -> np.ndarray:
-        """(3, M) values of the faces (M,) at points (M,)."""
-        dx, dy = column - self._origin[0][face], row - self._origin[1][face]
-        value = np.empty((3, len(face)))
-        for k in (1, 2):
-            value[k] = self._slope[2 * k - 2][face] * dx + self._slope[2 * k - 1][face] * dy
-        value[0] = self.area[face] - value[1] - value[2]
-        return value
-
-
-def _cover(corners: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray]:
-    """Which face each texel shows.
-
-    A triangle and a square overlap unless an axis separates them: one of the square's two normals (the
-    texel is not in the triangle's bounding box) or of the triangle's three (an edge function is negative on
-    the whole square).
-
-    Args:
-        corners: (F, 3, 2) float64 (column, row).
-
-    Returns:
-        (R * R,) int32 faces, -1 for none, and (R * R,) float64 distances from the centre [texel], 0 inside.
-    """
-    edges = _Edges(corners)
-    low = np.maximum(np.ceil(corners.min(axis=1) - 0.5), 0).astype(np.int64)
-    high = np.minimum(np.floor(corners.max(axis=1) + 0.5), resolution - 1).astype(np.int64)
-    high[edges.area <= FLAT] = -1
-    owner = np.full(resolution**2, -1, np.int32)
-    best = np.full(resolution**2, np.inf)
-    for face, column, row in texels_in_boxes(low, high, CHUNK):
-        value = edges(face, column, row)
-        reach = edges.reach[:, face]
-        over = np.flatnonzero((value + reach).min(axis=0) >= 0.0)
-        face, column, row = face[over], column[over], row[over]
-        inside = (value[:, over] + 2.0 * ON_EDGE * reach[:, over]).min(axis=0) >= 0.0
-        texel = row * resolution + column
-        _claim(owner, best, texel[inside], face[inside], np.zeros(inside.sum()))
-        border = np.flatnonzero(~inside)
-        border = border[best[texel[border]] > 0.0]
-        point = np.stack([column[border], row[border]], axis=1)
-        _, distance = _nearest_point(corners[face[border]], point)
-        _claim(owner, best, texel[border], face[border], distance)
-    return owner, best
-
-
-def _claim(
-    owner: np.ndarray, best: np.ndarray, texel: np.ndarray, face: np.ndarray, distance: np.ndarray
-) -> None:
-    closer = np.flatnonzero(distance < best[texel])[::-1]
-    # The nearest is written last, and of equals the first face.
-    closer = closer[np.argsort(-distance[closer], kind="stable")]
-    best[texel[closer]] = distance[closer]
-    owner[texel[closer]] = face[closer]
-
-
-def _shown(corners: np.ndarray, face: np.ndarray, point: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """(N, 3) barycentrics of the points (N, 2) in their faces (N,), or of the nearest points of those."""
-    edges = _Edges(corners)
-    barycentric = np.empty((len(face), 3))
-    for start in range(0, len(face), CHUNK):
-        part = slice(start, start + CHUNK)
-        barycentric[part] = np.maximum(edges(face[part], *point[part].T), 0.0).T
-    outside = np.flatnonzero(~inside)
-    barycentric[outside] = _nearest_point(corners[face[outside]], point[outside])[0]
-    return barycentric / barycentric.sum(axis=1, keepdims=True)
-
-
-def _nearest_point(triangle: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The border points, as barycentrics (M, 3), of triangles (M, 3, 2) nearest to (M, 2); distances (M,)."""
-    barycentric = np.zeros((len(point), 3))
-    best = np.full(len(point), np.inf)
-    for k, end in ((0, 1), (1, 2), (2, 0)):
-        along, to = triangle[:, end] - triangle[:, k], point - triangle[:, k]
-        length2 = np.maximum((along**2).sum(axis=1), np.finfo(np.float64).tiny)
-        t = np.clip((to * along).sum(axis=1) / length2, 0.0, 1.0)
-        distance = np.linalg.norm(to - t[:, None] * along, axis=1)
-        closer = np.flatnonzero(distance < best)
-        best[closer] = distance[closer]
-        barycentric[closer] = 0.0
-        barycentric[closer, k], barycentric[closer, end] = 1.0 - t[closer], t[closer]
-    return barycentric, best

@@ -16,10 +16,12 @@ from mitex.asset import Asset
 from mitex.atlas import Atlas, spread
 from mitex.errors import ConfigError
 from mitex.exemplar import MAPS
-from mitex.frames import atlas_normals, decode
+from mitex.geometry.normal_maps import decode
+from mitex.geometry.triangles import interpolate
+from mitex.geometry.vectors import rotate_about, unit_normals
 from mitex.mesh import Mesh
 from mitex.methods.surface import METHOD
-from mitex.methods.surface.frames import face_normals, tangent_frames, vertex_directions
+from mitex.methods.surface.frames import tangent_frames, vertex_directions
 from mitex.methods.surface.texels import Texels
 from mitex.training import model_file
 
@@ -85,7 +87,9 @@ class SurfaceTexture:
         if "normal" in layout:
             textures["normal"] = self._normals(atlas, layout["normal"], used, kind, angle)
         at_vertices = self._at_vertices()
-        tangents = _turned(vertex_directions(self.mesh, kind, self.orientation), self.mesh.normals, angle)
+        tangents = rotate_about(
+            vertex_directions(self.mesh, kind, self.orientation), self.mesh.normals, angle
+        )
         maps = {name: at_vertices[:, channels] for name, channels in layout.items()}
         return Asset(self.mesh, maps, tangents, atlas, textures, self.mesh.name)
 
@@ -122,7 +126,7 @@ class SurfaceTexture:
         vertices, first = np.unique(corners, return_index=True)
         index, weight = self.texels.bilinear(first // 3, np.eye(3)[first % 3])
         values = np.zeros((len(self.mesh.vertices), self.values.shape[1]), np.float32)
-        values[vertices] = np.einsum("nk,nkc->nc", weight, self.values[index])
+        values[vertices] = interpolate(weight, self.values[index])
         return values
 
     def _normals(
@@ -133,16 +137,12 @@ class SurfaceTexture:
         right, up = tangent_frames(self.mesh, texels.face, texels.barycentric, kind, angle, self.orientation)
         # Bumps are added to the smooth surface that viewers shade, not to its flat faces.
         corners = self.mesh.normals[self.mesh.faces[texels.face]]
-        smooth = np.einsum("nk,nkc->nc", texels.barycentric, corners)
-        flat = face_normals(self.mesh)[texels.face]
+        smooth = interpolate(texels.barycentric, corners)
+        flat = unit_normals(self.mesh.face_crosses[texels.face])
         detail = decode(self.values[:, channels], right, up, flat) - flat + smooth
-        return atlas_normals(self.mesh, atlas, spread(texels.image(detail), used, PADDING))
+        return atlas.normal_map(self.mesh, spread(texels.image(detail), used, PADDING))
 
 
 def same_surface(a: Mesh, b: Mesh) -> bool:
     """Whether two meshes have the same vertices and faces."""
     return np.array_equal(a.vertices, b.vertices) and np.array_equal(a.faces, b.faces)
-
-
-def _turned(right: np.ndarray, normals: np.ndarray, angle: float) -> np.ndarray:
-    return (np.cos(angle) * right + np.sin(angle) * np.cross(normals, right)).astype(np.float32)

@@ -44,13 +44,12 @@ def unfold(mesh: Mesh) -> Unfolding:
 
 def _planes(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     a, b, c = (mesh.vertices[mesh.faces[:, k]].astype(np.float64) for k in range(3))
-    cross = np.cross(b - a, c - a)
     length = np.linalg.norm(b - a, axis=1)
-    twice_area = np.linalg.norm(cross, axis=1)
+    twice_area = np.linalg.norm(mesh.face_crosses, axis=1)
     flat = degenerate_faces(mesh)
     safe = np.where(length > 0.0, length, 1.0)
     along = (b - a) / safe[:, None]
-    normal = cross / np.where(flat, 1.0, twice_area)[:, None]
+    normal = mesh.face_crosses / np.where(flat, 1.0, twice_area)[:, None]
     axes = np.where(flat[:, None, None], 0.0, np.stack([along, np.cross(normal, along)], axis=1))
     height = np.where(flat, 0.0, twice_area / safe)
     return np.stack([length, ((c - a) * along).sum(axis=1), height], axis=1), axes

@@ -6,6 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
+from mitex.geometry.triangles import interpolate
+from mitex.geometry.vectors import dot
 from mitex.mesh import Mesh
 from mitex.methods.surface.texels import Texels
 from mitex.scenes.cameras import Cameras, orbit
@@ -32,7 +34,7 @@ class Views:
     def images(self, values: np.ndarray) -> np.ndarray:
         """Pictures (K, H, W, C) of values (N, C), ordered as `Texels`; white around the mesh."""
         hits, index, weight, shade = self._seen
-        colours = np.einsum("pk,pkc->pc", weight, values[index]) * shade[:, None]
+        colours = interpolate(weight, values[index]) * shade[:, None]
         samples = np.ones((len(hits.hit), values.shape[1]), np.float32)
         samples[hits.hit.numpy()] = colours
         return samples.reshape(*self.cameras.shape, SAMPLES**2, -1).mean(3)
@@ -43,7 +45,7 @@ class Views:
         hits = Stage(self.mesh).hits(self.cameras, SAMPLES)
         index, weight = self.texels.bilinear(hits.face.numpy(), hits.barycentric.numpy())
         towards = np.repeat(self._eyes, SAMPLES**2, axis=0)[hits.hit.numpy()]
-        facing = np.abs(np.einsum("pc,pc->p", self.mesh.face_normals[hits.face.numpy()], towards))
+        facing = np.abs(dot(self.mesh.face_normals[hits.face.numpy()], towards))
         return hits, index, weight, (1 - SHADE * (1 - facing)).astype(np.float32)
 
     @property

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, grid, icosphere
-from mitex.methods.nca.perception import _cache, perception, rotate_about
+from mitex.methods.nca.perception import _cache, perception
 from tests.mesh.examples import FAN, FAN_POINTS, meshes
 from tests.methods.nca import brute_force
 from tests.methods.nca.brute_force import patchwork, turned
@@ -85,6 +85,17 @@ def test_place_and_size_of_the_mesh_do_not_matter(generator, degree):
     assert torch.allclose(perception(moved, degree)(state), perception(mesh, degree)(state), atol=1e-4)
 
 
+@pytest.mark.parametrize("radius", [10.0**k for k in range(-12, 13, 2)])
+@pytest.mark.parametrize("orientation", [0.0, 0.7])
+def test_no_size_is_too_small_or_too_large(generator, radius, orientation):
+    """The edges of the smallest one are 1e-13 long, far below any constant that looks small."""
+    mesh = icosphere(8)
+    state = _state(mesh, generator)
+    sized = mesh.with_vertices(radius * mesh.vertices.astype(float))
+    expected = perception(mesh, 2, orientation)(state)
+    assert torch.allclose(perception(sized, 2, orientation)(state), expected, rtol=1e-5, atol=1e-5)
+
+
 def test_a_constant_state_is_seen_as_no_change(generator):
     mesh = patchwork()
     seen = perception(mesh, 2)(torch.full((1, len(mesh.vertices), 2), 0.7))
@@ -142,16 +153,6 @@ def test_one_angle_is_the_same_for_all(generator):
     state = _state(mesh, generator)
     many = perception(mesh, 1, np.full(len(mesh.vertices), 0.4))(state)
     assert torch.allclose(perception(mesh, 1, 0.4)(state), many, atol=1e-6)
-
-
-def test_rotation_is_that_of_scipy(rng):
-    vectors, axes = rng.normal(size=(2, 20, 3))
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    angles = rng.uniform(-4, 4, 20)
-    expected = Rotation.from_rotvec(angles[:, None] * axes).apply(vectors)
-    assert np.allclose(rotate_about(vectors, axes, angles), expected)
-    single = Rotation.from_rotvec(0.8 * axes).apply(vectors)
-    assert np.allclose(rotate_about(vectors, axes, 0.8), single)
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2])

@@ -12,6 +12,12 @@ from mitex.methods.nca.task import NcaTask
 from mitex.runtime import threads
 from mitex.training import train
 from tests.methods.nca.tiny import config
+from tests.training.contract import (
+    FAULTS,
+    assert_loss_is_pure,
+    assert_same_checkpoint,
+    assert_third_step_leaves_no_trace,
+)
 
 MAPS = ("albedo", "height")
 
@@ -30,7 +36,6 @@ def task(exemplar):
 def _fresh(task):
     task.pool.zero_()
     task._touched.zero_()
-    task._last = None
 
 
 def _grow(task, state, steps, generator):
@@ -43,9 +48,9 @@ def test_a_step_evolves_a_state_of_the_pool(task):
     _fresh(task)
     torch.nn.init.normal_(task.pool, std=0.1, generator=torch.Generator().manual_seed(9))
     before = task.pool.clone()
-    task.loss(1, torch.Generator().manual_seed(4))
+    result = task.loss(1, torch.Generator().manual_seed(4))
     assert torch.equal(task.pool, before)
-    task.commit()
+    result.commit()
     generator = torch.Generator().manual_seed(4)
     index = int(torch.randint(4, (), generator=generator))
     steps = int(torch.randint(2, 5, (), generator=generator))
@@ -57,8 +62,7 @@ def test_a_step_evolves_a_state_of_the_pool(task):
 def test_the_seed_is_injected(task):
     _fresh(task)
     task.pool.fill_(0.3)
-    task.loss(3, torch.Generator().manual_seed(4))  # every third step
-    task.commit()
+    task.loss(3, torch.Generator().manual_seed(4)).commit()  # every third step
     generator = torch.Generator().manual_seed(4)
     index = int(torch.randint(4, (), generator=generator))
     steps = int(torch.randint(2, 5, (), generator=generator))
@@ -68,10 +72,11 @@ def test_the_seed_is_injected(task):
 def test_loss_is_appearance_and_overflow(task):
     _fresh(task)
     task.pool.fill_(2.0)
-    total, parts = task.loss(1, torch.Generator().manual_seed(0))
+    result = task.loss(1, torch.Generator().manual_seed(0))
+    parts = result.metrics
     assert parts["overflow"] > 0.5
-    assert total.item() == pytest.approx(parts["appearance"] + 1e4 * parts["overflow"], rel=1e-6)
-    total.backward()
+    assert result.value.item() == pytest.approx(parts["appearance"] + 1e4 * parts["overflow"], rel=1e-6)
+    result.value.backward()
     assert all(p.grad is not None and p.grad.any() for p in task.parameters)
 
 
@@ -94,8 +99,7 @@ def test_state_round_trip(exemplar, task):
     _fresh(task)
     generator = torch.Generator().manual_seed(1)
     for step in range(2):
-        task.loss(step, generator)
-        task.commit()
+        task.loss(step, generator).commit()
     saved = {name: value.clone() for name, value in task.state().items()}
     other = NcaTask(config("seed=8"), exemplar)
     other.pool.fill_(0.2)  # what the checkpoint does not hold was the seed
@@ -132,8 +136,7 @@ def test_full_views(exemplar):
     assert (cameras.kind, cameras.shape) == ("perspective", (4, 32, 32))
     assert cameras.fov == pytest.approx(np.radians(45))
     assert np.allclose(np.linalg.norm(cameras.origin, axis=1), 3, atol=1e-5)
-    loss, _ = task.loss(0, torch.Generator().manual_seed(0))
-    assert loss.isfinite()
+    assert task.loss(0, torch.Generator().manual_seed(0)).value.isfinite()
 
 
 def test_preview_shows_a_row_for_each_map(task):
@@ -173,13 +176,28 @@ def test_a_resumed_training_is_the_same_training(tmp_path, exemplar):
     whole = _run(exemplar, tmp_path / "whole", 6)
     _run(exemplar, tmp_path / "parts", 3)
     parts = _run(exemplar, tmp_path / "parts", 6, resume=True)
-    assert all(torch.equal(a, b) for a, b in zip(whole.parameters, parts.parameters, strict=True))
+    assert_same_checkpoint(tmp_path / "whole", tmp_path / "parts")
     assert torch.equal(whole.pool, parts.pool) and whole.pool.any()
     losses = []
     for name in ("whole", "parts"):
         lines = (tmp_path / name / "metrics.jsonl").read_text().splitlines()
         losses.append([json.loads(line)["loss"] for line in lines])
     assert len(losses[0]) == 6 and losses[0] == losses[1]
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_skipped_step_leaves_every_byte(exemplar, fault):
+    threads(1)
+    assert_third_step_leaves_no_trace(lambda: NcaTask(config(), exemplar), config(), fault)
+
+
+@pytest.mark.parametrize("step", [0, 1])
+def test_the_loss_changes_nothing(exemplar, step):
+    threads(1)
+    task = NcaTask(config(), exemplar)
+    task.pool.fill_(0.1)
+    assert_loss_is_pure(task, step)
+    assert (task.pool == 0.1).all()
 
 
 def test_resuming_with_another_exemplar_is_refused(tmp_path, exemplar):
@@ -191,6 +209,6 @@ def test_resuming_with_another_exemplar_is_refused(tmp_path, exemplar):
 def test_the_smallest_sizes_train(exemplar):
     """16 pixels are one place of relu5_3, where a covariance of one vector is zero."""
     smallest = ("resolution=16", "exemplar_size=16", "target_size=16", "layers=relu1_1,relu5_3")
-    loss, _ = NcaTask(config(*smallest), exemplar).loss(0, torch.Generator().manual_seed(0))
+    loss = NcaTask(config(*smallest), exemplar).loss(0, torch.Generator().manual_seed(0)).value
     loss.backward()
     assert loss.isfinite()

@@ -1,11 +1,13 @@
 """Growing a texture on meshes of all kinds."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 
+from mitex import atlas
 from mitex.atlas import laid_out
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, grid, icosphere, subdivide_loop
@@ -122,6 +124,21 @@ def test_uvs_are_laid_out_before_the_subdivision(made, sphere):
     assert made.apply(sphere, steps=1, subdivide=1, resolution=None).mesh.uv is None
 
 
+def test_uvs_are_looked_at_once(made, sphere, monkeypatch):
+    """The check of own UVs rasterizes them; what `apply` has laid out is baked on as it is."""
+    calls = []
+    for name in ("usable_uv", "unwrap"):
+        original = getattr(atlas, name)
+        monkeypatch.setattr(
+            atlas, name, lambda *args, f=original, name=name: (calls.append(name), f(*args))[1]
+        )
+    baked = made.apply(sphere, steps=1, subdivide=1, resolution=64)
+    assert calls == ["unwrap"]
+    made.apply(replace(sphere, uv=atlas.unwrap(sphere, 64, 8)), steps=1, subdivide=1, resolution=64)
+    assert calls == ["unwrap", "unwrap", "usable_uv"]
+    assert np.array_equal(baked.atlas.uv, baked.mesh.uv)
+
+
 def test_place_and_units_stay(made):
     """In a far corner of a world in millimetres; the growth is that of the unit sphere."""
     sphere = icosphere(4)
@@ -189,3 +206,11 @@ def test_unusable_options(made, sphere, options, problem):
 def test_too_many_vertices_are_refused_before_they_are_made(made, options):
     with pytest.raises(ConfigError, match="more than 4,000,000 vertices"):
         made.apply(icosphere(16), **options)
+
+
+def test_a_model_with_a_condition_says_what_it_needs(sphere):
+    """Before any work: 200 million steps would not end."""
+    conditioned = texture(condition=3)
+    for use in (conditioned.apply, conditioned.grow):
+        with pytest.raises(ConfigError, match=r"'tiny' needs a condition of 3 values .*; .*MeshNCA\.evolve"):
+            use(sphere, steps=200_000_000)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from contextlib import contextmanager
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -23,16 +25,18 @@ from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.field.rendering import render_batch
 from mitex.methods.nerf.field.shell import ShellCoords
 from mitex.methods.nerf.field.tensors import rows
+from mitex.methods.nerf.training import radiance
 from mitex.methods.nerf.training.light_estimate import estimated_light
 from mitex.methods.nerf.training.task import BURIED, POSE, TextureTask
-from mitex.runtime import init
-from mitex.training import checkpoint
+from mitex.runtime import init, threads
+from mitex.runtime.jit import dr, mi
+from mitex.training import Step, checkpoint
 from mitex.training.config import resolve
 from mitex.training.locate import NAME
 from tests.methods.nerf.tiny import SETTINGS, tiny_capture
+from tests.training.contract import FAULTS, assert_loss_is_pure, assert_third_step_leaves_no_trace
 
-mi: Any = init()
-import drjit as dr  # noqa: E402
+init()
 
 
 def test_the_loss_falls_and_the_run_folder_is_whole(run):
@@ -160,6 +164,45 @@ def test_a_run_does_not_go_on_on_another_base_shape(base):
     assert first == same != other
 
 
+def run_step(task: TextureTask, step: int, generator: torch.Generator | None = None) -> Step:
+    """The loss of a step after what comes before it."""
+    generator = generator or torch.Generator().manual_seed(0)
+    task.begin(step, generator)
+    return task.loss(step, generator)
+
+
+def refresh_each_step(monkeypatch) -> None:
+    """So that `begin` changes something in every step."""
+    monkeypatch.setattr(radiance, "REFRESH", 1)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_skipped_step_leaves_every_byte(base, fault, monkeypatch):
+    refresh_each_step(monkeypatch)
+    threads(1)
+    task = small_task(base)
+    assert_third_step_leaves_no_trace(lambda: small_task(base), task.config, fault)
+
+
+def test_a_refresh_that_finds_no_number_is_taken_back(base, monkeypatch):
+    refresh_each_step(monkeypatch)
+    threads(1)
+    task = small_task(base)
+
+    @contextmanager
+    def spoiled(task, fault):
+        with patch.object(task, "density", lambda points: np.full(len(points), np.nan, np.float32)):
+            yield
+
+    assert_third_step_leaves_no_trace(lambda: small_task(base), task.config, "density", spoiled)
+
+
+@pytest.mark.parametrize("step", [0, 1])
+def test_the_loss_changes_nothing(base, step):
+    threads(1)
+    assert_loss_is_pure(small_task(base), step)
+
+
 def test_fine_normals_start_near_those_of_the_faces(base):
     """Else the light stays even, and its shades become part of k_d."""
     task = small_task(base)
@@ -176,7 +219,7 @@ def test_the_light_is_that_of_the_photos_unless_it_is_learned(base):
         task = small_task(base, learn_light=learned)
         estimate = estimated_light(base, task.pixels.capture)
         np.testing.assert_allclose(task.named["light"].detach(), estimate, rtol=1e-5, atol=1e-6)
-        loss, _ = task.loss(0, torch.Generator().manual_seed(0))
+        loss = run_step(task, 0).value
         loss.backward()
         gradient = task.named["light"].grad
         assert (gradient is not None and gradient.abs().max() > 0) == learned
@@ -185,7 +228,7 @@ def test_the_light_is_that_of_the_photos_unless_it_is_learned(base):
 def test_refined_cameras_get_the_gradient_of_the_loss(base):
     task = small_task(base, refine_cameras=True)
     capture = task.pixels.capture
-    loss, _ = task.loss(0, torch.Generator().manual_seed(0))
+    loss = run_step(task, 0).value
     loss.backward()
     gradient = task.named["poses"].grad
     assert gradient is not None and gradient.shape == (len(capture), 6)
@@ -226,9 +269,9 @@ def test_the_inside_learns_from_the_surface_and_not_the_surface_from_it(run, bas
     gradients = []
     for weight in (0.0, 1.0):
         task = trained_task(run, base, tiny_capture(), f"interior_weight={weight}")
-        loss, record = task.loss(task.config.steps, torch.Generator().manual_seed(0))
-        assert record.get("interior", 0.0) > 0 or not weight
-        gradients.append(torch.autograd.grad(loss, [task.named["tables/f"], task.named["weights/4"]]))
+        result = run_step(task, task.config.steps)
+        assert result.metrics.get("interior", 0.0) > 0 or not weight
+        gradients.append(torch.autograd.grad(result.value, [task.named["tables/f"], task.named["weights/4"]]))
     (features, reflection), (features_too, reflection_too) = gradients
     scale = float(features.abs().max())
     np.testing.assert_allclose(features, features_too, rtol=1e-3, atol=1e-4 * scale)
@@ -239,10 +282,8 @@ def test_an_inside_that_looks_as_the_surface_costs_nothing(run, base):
     task = trained_task(run, base, tiny_capture(), "interior_weight=1.0")
     with torch.no_grad():
         task.named["weights/4"].zero_()  # the last of the reflection's: all is grey
-    _, record = task.loss(task.config.steps, torch.Generator().manual_seed(0))
-    assert record["interior"] == 0
-    _, early = task.loss(0, torch.Generator().manual_seed(0))
-    assert "interior" not in early
+    assert run_step(task, task.config.steps).metrics["interior"] == 0
+    assert "interior" not in run_step(task, 0).metrics
 
 
 def test_buried_is_what_has_matter_above_and_beside_it(run, base):
@@ -275,7 +316,7 @@ def test_wrong_cameras_find_back(run, base):
     task = trained_task(run, base, wrong, "refine_cameras=true")
     generator, optimizer = torch.Generator().manual_seed(0), torch.optim.Adam([task.named["poses"]], lr=0.03)
     for step in range(150):
-        loss, _ = task.loss(step, generator)
+        loss = run_step(task, step, generator).value
         (task.named["poses"].grad,) = torch.autograd.grad(loss, [task.named["poses"]])
         optimizer.step()
     found = POSE * task.named["poses"].detach().numpy()

@@ -24,9 +24,16 @@ from mitex.methods.surface.orientation import read_orientation
 from mitex.methods.surface.task import VIEW, SurfaceTask
 from mitex.methods.surface.texels import Texels, charts
 from mitex.methods.surface.texture import SurfaceTexture
+from mitex.runtime import threads
 from mitex.training import resolve
 from mitex.training.locate import NAME
 from tests.methods.surface.grids import flat_square
+from tests.training.contract import (
+    FAULTS,
+    assert_loss_is_pure,
+    assert_same_checkpoint,
+    assert_third_step_leaves_no_trace,
+)
 
 pytestmark = pytest.mark.usefixtures("own_cache")
 SMALL = ["resolution=48", "exemplar_size=48", "steps=12", "scales=0", "checkpoint_every=6", "preview_every=0"]
@@ -115,6 +122,7 @@ def test_resuming_changes_nothing(mesh, exemplar, tmp_path):
     finally:
         torch.set_num_threads(threads)
     assert np.array_equal(whole.values, rest.values)
+    assert_same_checkpoint(tmp_path / "whole", tmp_path / "part")
 
 
 def test_resuming_on_another_mesh_is_refused(made, exemplar):
@@ -244,12 +252,32 @@ class TestOrientation:
             read_orientation(path, mesh)
 
 
-def test_previews_show_the_mesh_beside_the_exemplar(mesh, exemplar):
-    config = resolve(PRESETS, None, None, SMALL)
+def small_task(mesh, exemplar, *settings) -> SurfaceTask:
+    config = resolve(PRESETS, None, None, [*SMALL, *settings])
     laid = with_layout(mesh, config, False)
     assert laid.uv is not None
     texels = Texels.rasterize(laid, laid.uv, 48)
-    task = SurfaceTask(config, exemplar, laid, texels, find_levels(laid, texels, config))
+    return SurfaceTask(config, exemplar, laid, texels, find_levels(laid, texels, config))
+
+
+DIFFUSION = "diffusion=0.01"  # so that `commit` changes the texels in every step
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_skipped_step_leaves_every_byte(mesh, exemplar, fault):
+    threads(1)
+    config = small_task(mesh, exemplar, DIFFUSION).config
+    assert_third_step_leaves_no_trace(lambda: small_task(mesh, exemplar, DIFFUSION), config, fault)
+
+
+@pytest.mark.parametrize("setting", ["loss=gram", "loss=transport"])
+def test_the_loss_changes_nothing(mesh, exemplar, setting):
+    threads(1)
+    assert_loss_is_pure(small_task(mesh, exemplar, setting), 1)
+
+
+def test_previews_show_the_mesh_beside_the_exemplar(mesh, exemplar):
+    task = small_task(mesh, exemplar)
     values = torch.zeros(len(task.coordinates), task.channels)
     values[:, task.layout["albedo"][0]] = 1.0
     with torch.no_grad():

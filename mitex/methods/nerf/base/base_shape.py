@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from mitex.errors import MeshError, MeshWarning
-from mitex.frames import orthonormal
+from mitex.geometry.vectors import orthonormal
 from mitex.mesh import Mesh, remesh
 from mitex.mesh.remesh import simplified
 from mitex.mesh.topology import boundary_edges, components

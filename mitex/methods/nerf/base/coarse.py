@@ -14,7 +14,6 @@ import numpy as np
 
 from mitex.cache import cached, content_key
 from mitex.errors import CheckpointError
-from mitex.integrators.march import composite
 from mitex.mesh import Mesh
 from mitex.methods.nerf.base.base_shape import base_shape, given_base, shell_thickness
 from mitex.methods.nerf.capture.capture import Capture
@@ -25,10 +24,8 @@ from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.field.rendering import batch_rays
 from mitex.methods.nerf.training.plain import PlainTask, train_plain_field
 from mitex.paths import cache_dir
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
+from mitex.textures.march import composite
 
 VERSION = 1  # of the base shapes in the cache
 COARSE: dict[str, Any] = dict(  # what the coarse field needs less of

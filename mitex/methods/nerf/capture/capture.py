@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from mitex.errors import CaptureError, CaptureWarning
+from mitex.geometry.vectors import unit
 from mitex.images import read_bytes, read_image
 from mitex.mesh import Similarity
 from mitex.methods.nerf.capture.colmap import photo_frames
@@ -60,8 +61,7 @@ class Capture:
         """
         camera = self.intrinsics[view].astype(np.float64)
         ideal = undistort((pixels - camera[..., 2:]) / camera[..., :2], self.distortion[view])
-        local = np.stack([ideal[:, 0], -ideal[:, 1], np.full(len(ideal), -1.0)], axis=1)
-        local /= np.linalg.norm(local, axis=1, keepdims=True)
+        local = unit(np.stack([ideal[:, 0], -ideal[:, 1], np.full(len(ideal), -1.0)], axis=1))
         pose = self.poses[view]
         directions = np.einsum("...ij,...j->...i", pose[..., :3], local)
         origins = np.broadcast_to(pose[..., 3], directions.shape)

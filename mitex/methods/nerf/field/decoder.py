@@ -12,10 +12,7 @@ from typing import Any
 from mitex.methods.nerf.field.mlp import network_rows, packed_networks
 from mitex.methods.nerf.field.networks import COARSE, LAYERS, OCTAVES, REFLECTION, Networks
 from mitex.methods.nerf.field.tensors import stack_rows, unstack_rows
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
 
 HIGHEST = 15.0  # exponent of the density
 DULL = 3.0  # taken from the logit of k_s at grazing angles: surfaces start dull there

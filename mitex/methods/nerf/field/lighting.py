@@ -14,11 +14,9 @@ from typing import Any
 import numpy as np
 
 from mitex.errors import ImageError
+from mitex.geometry.vectors import unit
 from mitex.methods.nerf.field.tensors import channels
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
 
 COEFFICIENTS = 16
 BANDS = 3  # of l that are rendered
@@ -103,8 +101,7 @@ def rotated(light: np.ndarray, turn: np.ndarray) -> np.ndarray:
     Returns:
         As `light`, float32: what it was in direction d, it is in direction turn d.
     """
-    ways = np.random.default_rng(0).normal(size=(8 * COEFFICIENTS, 3))
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    ways = unit(np.random.default_rng(0).normal(size=(8 * COEFFICIENTS, 3)))
     now, before = (  # the first harmonic is one number
         np.stack([np.broadcast_to(y, len(ways)) for y in dr.sh_eval(channels(mi.Vector3f, v), 3)], axis=1)
         for v in (ways, ways @ turn)

@@ -14,10 +14,7 @@ from mitex.methods.nerf.field.lighting import shade, to_display
 from mitex.methods.nerf.field.occupancy import sample_grid
 from mitex.methods.nerf.field.projection import Projection, Projections
 from mitex.methods.nerf.field.tensors import channels, rows
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
 
 
 @dataclass

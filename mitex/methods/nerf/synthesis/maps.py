@@ -7,15 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from mitex.atlas import twice_area
+from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh
 from mitex.methods.nerf.base.base_shape import face_frames
 from mitex.methods.nerf.field.networks import FEATURES, PHASES
 from mitex.methods.nerf.field.shell import ShellCoords
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
 
 CHANNELS = FEATURES + PHASES
 PACKET = 8  # channels that are gathered at once

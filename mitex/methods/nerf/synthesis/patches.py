@@ -10,21 +10,19 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from mitex.errors import ConfigError, MeshError
-from mitex.frames import orthonormal
+from mitex.geometry.triangles import interpolate
+from mitex.geometry.vectors import orthonormal
 from mitex.mesh import Mesh
 from mitex.mesh.topology import mesh_edges
 from mitex.methods.nerf.synthesis.matching import HORIZONTAL, VERTICAL
-from mitex.runtime import init, load_mitsuba
+from mitex.runtime import init
+from mitex.runtime.jit import dr, mi
 from mitex.scenes.stage import mesh_shape
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 SIZE = 128  # side of a patch [texels]
 LIFT = 0.1  # of the plane that the rays start from above the tangent plane [scene units]
@@ -200,7 +198,7 @@ def spread_points(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[np.
     faces = rng.choice(len(areas), DENSITY * count, p=areas / areas.sum())
     root, v = np.sqrt(rng.random((len(faces), 1))), rng.random((len(faces), 1))
     weights = np.concatenate([1.0 - root, root * (1.0 - v), root * v], 1)
-    points = np.einsum("nk,nkd->nd", weights, mesh.vertices[mesh.faces[faces]])
+    points = interpolate(weights, mesh.vertices[mesh.faces[faces]])
     apart = np.sqrt(SATURATED * areas.sum() / count)
     tree = KDTree(points)
     free = np.ones(len(points), bool)

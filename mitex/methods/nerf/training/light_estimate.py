@@ -9,19 +9,16 @@ Ramamoorthi and Hanrahan 2001).
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
+from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.field.lighting import BANDS, COEFFICIENTS, COSINE, POWER
 from mitex.methods.nerf.field.raycast import Raycaster
 from mitex.methods.nerf.field.tensors import channels
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
 
 STRIDE = 4  # pixels
 SOLID = 0.5  # alpha of pixels that count
@@ -80,8 +77,8 @@ def brightness(light: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 def _softened(light: np.ndarray) -> np.ndarray:
     """The light, nearer to an even one if it leaves a side too dark."""
-    directions = np.random.default_rng(0).normal(size=(DIRECTIONS, 3))
-    shades = _irradiance(directions / np.linalg.norm(directions, axis=1, keepdims=True)) @ light[: BANDS**2]
+    directions = unit(np.random.default_rng(0).normal(size=(DIRECTIONS, 3)))
+    shades = _irradiance(directions) @ light[: BANDS**2]
     mean = light[0] / math.sqrt(4 * math.pi)
     share = min(1.0, (1 - SHADE) * mean / max(mean - shades.min(), 1e-12))
     return light * np.where(np.arange(COEFFICIENTS) > 0, share, 1.0)

@@ -11,7 +11,6 @@ import torch
 
 from mitex.bridge import call
 from mitex.cache import content_key
-from mitex.integrators.march import Samples, sum_rays, weights_of
 from mitex.mesh import Mesh
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.pixels import Batch
@@ -35,10 +34,9 @@ from mitex.methods.nerf.field.tensors import rows, tensor
 from mitex.methods.nerf.training.light_estimate import estimated_light
 from mitex.methods.nerf.training.losses import clustering, normal_agreement
 from mitex.methods.nerf.training.radiance import RadianceTask, Rendered
-from mitex.runtime import bfloat16_is_fast, load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime import bfloat16_is_fast
+from mitex.runtime.jit import dr, mi
+from mitex.textures.march import Samples, sum_rays, weights_of
 
 CLUSTERS = 4  # centres in each level
 OUTWARDS = 0.1  # share of the coarse normal in what the fine one is compared with

@@ -15,7 +15,6 @@ from mitex.atlas import laid_out
 from mitex.errors import ConfigError
 from mitex.export import SUFFIXES
 from mitex.images import write_image
-from mitex.integrators.march import DIAGONAL
 from mitex.mesh import Mesh
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field.decoder import Decoder
@@ -27,6 +26,7 @@ from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents, uv_fram
 from mitex.methods.nerf.use.extract import extract_mesh
 from mitex.methods.nerf.use.placement import UNWRAP_SIZE, in_scene_cube, uv_unit_length
 from mitex.paths import prepare_output
+from mitex.textures.march import DIAGONAL
 
 PICTURES = (".png", ".jpg", ".jpeg")
 NEIGHBOURS = 5  # vertices that make the coarse normal of a target

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mitex.atlas import Atlas
+from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh
 from mitex.methods.nerf.synthesis.maps import CHANNELS, LatentMaps, uv_frames
 from mitex.methods.nerf.use.placement import uv_unit_length
@@ -33,7 +34,7 @@ def self_maps(
     occupied = atlas.face >= 0
     corners = base.vertices[base.faces[atlas.face[occupied]]]
     values = np.zeros((size, size, CHANNELS), np.float32)
-    values[occupied] = features(np.einsum("nk,nkd->nd", atlas.barycentric[occupied], corners))
+    values[occupied] = features(interpolate(atlas.barycentric[occupied], corners))
     # T_s^-1 T_c: the texture's own axes are those of the charts.
     turns = np.einsum("kij,klj->kil", uv_frames(mesh), frames)
     return mesh, LatentMaps(values, np.maximum(atlas.face, 0), turns, uv_unit_length(mesh) / size)

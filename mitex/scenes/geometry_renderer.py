@@ -10,13 +10,11 @@ from torch.autograd.function import once_differentiable
 
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh
-from mitex.runtime import init, load_mitsuba
+from mitex.runtime import init
+from mitex.runtime.jit import dr, mi
 from mitex.scenes.cameras import Cameras
 from mitex.scenes.lights import environment
 from mitex.scenes.stage import mesh_shape
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 
 class GeometryRenderer:

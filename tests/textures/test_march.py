@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 
-from mitex.integrators.march import OPAQUE, Samples, composite, march, sum_rays, visible, weights_of
 from mitex.runtime import init
+from mitex.runtime.jit import dr, mi
+from mitex.textures.march import OPAQUE, Samples, composite, march, sum_rays, visible, weights_of
 
-mi: Any = init()
-import drjit as dr  # noqa: E402
+init()
 
 
 class Slab:

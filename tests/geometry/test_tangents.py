@@ -1,9 +1,9 @@
-"""Tangent frames against flat patches, spheres and a hand-made mirror."""
+"""Tangents against flat patches, spheres and a hand-made mirror."""
 
 import numpy as np
 import pytest
 
-from mitex.frames import MIN_Z, decode, encode, orthonormal, split_at_seams, unit, vertex_detail
+from mitex.geometry.tangents import split_at_seams
 from mitex.mesh import Mesh, icosphere
 
 
@@ -15,59 +15,6 @@ def patch(mirrored: bool = False, turn: float = 0.0) -> Mesh:
     c, s = np.cos(turn), np.sin(turn)
     uv = flat @ np.array([[c, -s], [s, c]]) * ([-1, 1] if mirrored else [1, 1])
     return Mesh(points, faces, 0.5 + 0.5 * uv)
-
-
-def random_frames(rng, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Unit but skewed, as interpolated ones are."""
-    normal = unit(rng.normal(size=(count, 3)))
-    tangent = orthonormal(rng.normal(size=(count, 3)), normal)
-    skew = 0.1 * rng.normal(size=(2, count, 3))
-    bitangent = np.cross(normal, tangent) * rng.choice([-1.0, 1.0], (count, 1))
-    return unit(tangent + skew[0]), unit(bitangent + skew[1]), normal
-
-
-def test_decode_inverts_encode(rng):
-    frame = random_frames(rng, 500)
-    detail = unit(unit(rng.normal(size=(500, 3))) + 1.6 * frame[2])
-    encoded = encode(detail, *frame)
-    assert encoded.min() >= 0 and encoded.max() <= 1
-    np.testing.assert_allclose(decode(encoded, *frame), detail, atol=2e-6)
-
-
-def test_eight_bits_cost_less_than_a_degree(rng):
-    frame = random_frames(rng, 500)
-    detail = unit(unit(rng.normal(size=(500, 3))) + 1.6 * frame[2])
-    rounded = np.round(encode(detail, *frame) * 255) / 255
-    cosine = (decode(rounded, *frame) * detail).sum(axis=1)
-    assert np.degrees(np.arccos(cosine.min())) < 1.0
-
-
-def test_normals_below_the_surface_are_lifted():
-    x, y, z = np.eye(3)[:, None]
-    encoded = encode(np.array([[1.0, 0.0, -1.0]]), x, y, z)
-    assert 0.5 + 0.5 * 0.9 * MIN_Z < encoded[0, 2] < 0.5 + MIN_Z
-    assert encoded[0, 0] > 0.99
-
-
-def test_a_collapsed_frame_gives_the_even_normal():
-    x, _, z = np.eye(3)[:, None]
-    np.testing.assert_allclose(encode(z, x, x, z), [[0.5, 0.5, 1.0]], atol=0.03)
-
-
-def test_orthonormal_survives_parallel_and_zero_tangents(rng):
-    normals = unit(rng.normal(size=(20, 3)))
-    for tangents in (normals.copy(), np.zeros_like(normals)):
-        t = orthonormal(tangents, normals)
-        np.testing.assert_allclose((t * normals).sum(axis=1), 0.0, atol=1e-6)
-        np.testing.assert_allclose(np.linalg.norm(t, axis=1), 1.0, atol=1e-6)
-
-
-def test_vertex_detail_leans_where_the_map_says():
-    mesh = patch()
-    east = np.tile([1.0, 0.0, 0.0], (4, 1))
-    right, up = 0.5 + 0.5 * np.array([[0.6, 0.0, 0.8], [0.0, 0.6, 0.8]])
-    np.testing.assert_allclose(vertex_detail(mesh, east, np.tile(right, (4, 1)))[0], [0.6, 0, 0.8], atol=1e-6)
-    np.testing.assert_allclose(vertex_detail(mesh, east, np.tile(up, (4, 1)))[0], [0, 0.6, 0.8], atol=1e-6)
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.7, 2.5])

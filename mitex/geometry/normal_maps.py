@@ -1,0 +1,54 @@
+"""Normal maps: object-space detail normals from encoded ones, and back.
+
+A frame is (tangent, bitangent, normal). The convention is that of OpenGL and glTF: the tangent points where
+u grows, the bitangent where v grows (up in the image), and a map stores (n + 1) / 2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mitex.geometry.vectors import orthonormal, unit
+
+FLAT = (0.5, 0.5, 1.0)  # the normal map of an even surface
+MIN_Z = 0.05  # detail normals stay this far above the surface: maps cannot show an overhang
+
+
+def decode(encoded: np.ndarray, tangent: np.ndarray, bitangent: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Unit object-space normals (..., 3) from map values in [0, 1] and the frame at each."""
+    n = _upward(2.0 * encoded - 1.0)
+    return unit(n[..., 0:1] * tangent + n[..., 1:2] * bitangent + n[..., 2:3] * normal)
+
+
+def decode_at_vertices(encoded: np.ndarray, tangents: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Object-space detail normals of a map given per vertex.
+
+    Args:
+        encoded: (V, 3) map values in [0, 1].
+        tangents: (V, 3), where the map's +u points.
+        normals: (V, 3) of the mesh, unit.
+
+    Returns:
+        (V, 3) float32, unit.
+    """
+    t = orthonormal(tangents, normals)
+    return decode(encoded, t, np.cross(normals, t), normals).astype(np.float32)
+
+
+def encode(detail: np.ndarray, tangent: np.ndarray, bitangent: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Map values (..., 3) in [0, 1] from which `decode` gives the unit normals `detail` back.
+
+    The frame need not be orthogonal (interpolated ones are not quite). Normals below the surface are
+    lifted to `MIN_Z`.
+    """
+    # Rows of the inverse frame, by Cramer's rule: a million 3x3 solves would take seconds.
+    x, y, z = np.cross(bitangent, normal), np.cross(normal, tangent), np.cross(tangent, bitangent)
+    determinant = (tangent * x).sum(axis=-1, keepdims=True)
+    local = np.stack([(detail * row).sum(axis=-1) for row in (x, y, z)], axis=-1)
+    local = np.where(np.abs(determinant) > 1e-3, local * np.sign(determinant), (0.0, 0.0, 1.0))
+    return (0.5 + 0.5 * _upward(local)).astype(np.float32)
+
+
+def _upward(n: np.ndarray) -> np.ndarray:
+    n = unit(n)
+    return unit(np.concatenate([n[..., :2], np.maximum(n[..., 2:], MIN_Z)], axis=-1))

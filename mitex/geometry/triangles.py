@@ -1,0 +1,54 @@
+"""Triangles in rows of arrays: normals, areas, barycentric coordinates."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mitex.geometry.vectors import cross_2d
+
+
+def triangle_crosses(p: np.ndarray) -> np.ndarray:
+    """(..., 3) normals of triangles (..., 3, 3), twice as long as their areas."""
+    return np.cross(p[..., 1, :] - p[..., 0, :], p[..., 2, :] - p[..., 0, :])
+
+
+def twice_area(p: np.ndarray) -> np.ndarray:
+    """(F,) twice the signed areas of triangles (F, 3, 2)."""
+    return cross_2d(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+
+
+def interpolate(barycentric: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """(N, C) sums of the values (N, K, C) of K corners with the weights (N, K)."""
+    return np.einsum("nk,nkc->nc", barycentric, corners)
+
+
+def barycentric_gradients(p: np.ndarray, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First corners (F, 2) and gradients (F, 4), (db1/dx, db1/dy, db2/dx, db2/dy), of triangles (F, 3, 2).
+
+    Args:
+        p: the triangles.
+        area: (F,) their `twice_area`.
+    """
+    a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+    inverse = np.divide(1.0, area, out=np.zeros_like(area), where=area != 0)[:, None]
+    return p[:, 0], np.stack([b[:, 1], -b[:, 0], -a[:, 1], a[:, 0]], axis=1) * inverse
+
+
+def nearest_on_border(triangles: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The points of the borders of triangles (M, 3, 2) nearest to points (M, 2).
+
+    Returns:
+        (M, 3) barycentric coordinates, and (M,) distances.
+    """
+    barycentric = np.zeros((len(points), 3))
+    best = np.full(len(points), np.inf)
+    for k, end in ((0, 1), (1, 2), (2, 0)):
+        along, to = triangles[:, end] - triangles[:, k], points - triangles[:, k]
+        length2 = np.maximum((along**2).sum(axis=1), np.finfo(along.dtype).tiny)
+        t = np.clip((to * along).sum(axis=1) / length2, 0.0, 1.0)
+        distance = np.linalg.norm(to - t[:, None] * along, axis=1)
+        closer = np.flatnonzero(distance < best)
+        best[closer] = distance[closer]
+        barycentric[closer] = 0.0
+        barycentric[closer, k], barycentric[closer, end] = 1.0 - t[closer], t[closer]
+    return barycentric, best

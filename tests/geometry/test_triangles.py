@@ -1,0 +1,51 @@
+"""Triangles against formulas and dense sampling."""
+
+import numpy as np
+
+from mitex.geometry.triangles import (
+    barycentric_gradients,
+    interpolate,
+    nearest_on_border,
+    triangle_crosses,
+    twice_area,
+)
+
+
+def test_areas(rng):
+    flat = rng.normal(size=(30, 3, 2))
+    crosses = triangle_crosses(np.pad(flat, ((0, 0), (0, 0), (0, 1))))
+    np.testing.assert_allclose(crosses[:, 2], twice_area(flat))
+    assert not crosses[:, :2].any()
+    a, b, c = (np.linalg.norm(flat[:, k] - flat[:, k - 1], axis=1) for k in range(3))
+    half = 0.5 * (a + b + c)
+    heron = np.sqrt(half * (half - a) * (half - b) * (half - c))
+    np.testing.assert_allclose(np.abs(twice_area(flat)), 2 * heron, rtol=1e-6)
+
+
+def test_gradients_give_the_weights_that_interpolate_the_point(rng):
+    p = rng.normal(size=(30, 3, 2))
+    points = rng.normal(size=(30, 2))
+    origin, gradient = barycentric_gradients(p, twice_area(p))
+    b = interpolate(points - origin, gradient.reshape(-1, 2, 2).transpose(0, 2, 1))
+    weights = np.column_stack([1 - b.sum(1), b])
+    np.testing.assert_allclose(interpolate(weights, p), points, atol=1e-9)
+
+
+def test_nearest_points_of_the_border_against_dense_samples(rng):
+    triangles, points = rng.normal(size=(30, 3, 2)), 2 * rng.normal(size=(30, 2))
+    barycentric, distance = nearest_on_border(triangles, points)
+    np.testing.assert_allclose(barycentric.sum(1), 1.0)
+    assert (barycentric.min(1) == 0.0).all()
+    found = interpolate(barycentric, triangles)
+    np.testing.assert_allclose(np.linalg.norm(found - points, axis=1), distance, atol=1e-12)
+    t = np.linspace(0, 1, 2001)[:, None]
+    for triangle, point, value in zip(triangles, points, distance, strict=True):
+        sides = np.concatenate([(1 - t) * triangle[k] + t * triangle[k - 1] for k in range(3)])
+        nearest = np.linalg.norm(sides - point, axis=1).min()
+        assert value <= nearest < value + 1e-3
+
+
+def test_sides_without_length_are_points():
+    triangle = np.zeros((1, 3, 2), np.float32)
+    barycentric, distance = nearest_on_border(triangle, np.array([[3.0, 4.0]], np.float32))
+    assert distance[0] == 5.0 and np.isfinite(barycentric).all()
