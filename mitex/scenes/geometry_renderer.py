@@ -98,7 +98,7 @@ class GeometryRenderer:
             self._move(dr.detach(positions))
         return total.reshape(vertices.shape)
 
-    def _move(self, positions: Any) -> None:
+    def _move(self, positions: mi.Float) -> None:
         self._params[self._key] = positions
         self._params.update()
 

@@ -8,7 +8,7 @@ from mitex.features import Vgg16, normalise_colours
 from mitex.losses import channel_transport, moment_distance, relaxed_transport
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.targets import Targets
-from mitex.pictures import CYCLE
+from mitex.triples import CYCLE
 
 
 class Appearance:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -103,7 +104,8 @@ def test_gradients_are_those_of_finite_differences(field, name):
     step = 5e-4 * np.abs(value).max()
     totals = []
     for sign in (1, -1):
-        params[key] = type(params[key])(value + sign * step * along)
+        array: Any = type(params[key])
+        params[key] = array(value + sign * step * along)
         params.update()
         totals.append((picture(scene) * pixels).sum())
     slope = (totals[0] - totals[1]) / (2 * step)
@@ -141,11 +143,11 @@ def test_new_values_are_rendered(name):
     params.update()
     after = picture(scene)
     assert np.abs(after - before).max() > 1e-2
-    np.testing.assert_array_equal(picture(second), before)
+    np.testing.assert_allclose(picture(second), before, atol=1e-5)  # sums in another order
 
     fresh = with_value(name, value)
     fresh.mask = first.mask
-    np.testing.assert_array_equal(picture(scene_of(fresh)), after)
+    np.testing.assert_allclose(picture(scene_of(fresh)), after, atol=1e-5)
 
 
 def with_value(name: str, value: np.ndarray):
