@@ -141,3 +141,12 @@ def test_a_second_run_leaves_the_first_alone(tmp_path):
             pass
         metrics.write({"step": 1})
         assert _files(folder) == ["config.toml", "metrics.jsonl"]
+
+
+def test_a_finished_texture_is_not_overwritten(tmp_path):
+    """A method that does not train leaves no checkpoint, but a texture."""
+    run.prepare(tmp_path, SmallConfig(), {"method": "small"})
+    run.check(tmp_path)
+    (tmp_path / "texture.safetensors").touch()
+    with pytest.raises(OutputError, match="holds a texture already"):
+        run.check(tmp_path)
