@@ -163,7 +163,7 @@ def test_wrong_views():
     for spp in (0, 70000):
         with pytest.raises(ConfigError, match="samples per pixel"):
             renderer.render(0.0, renderer.fit_view(0.0), spp)
-    OrbitRenderer(asset, resolution=16, backdrop=False).frame(0.0, -1.0)
+    OrbitRenderer(asset, resolution=16, backdrop=False).fit_view(0.0, -1.0)
 
 
 @pytest.mark.parametrize("lean", [(0.0, 0.0), (0.5, 0.2), (-0.4, 0.4)])
