@@ -32,10 +32,10 @@ from mitex.methods.nerf.field.mlp import weight_bound
 from mitex.methods.nerf.field.networks import weight_shapes
 from mitex.methods.nerf.field.tensors import tensor
 from mitex.render.shell import shell_still
-from mitex.runtime import bfloat16_is_fast, init, keep_freed_memory, modest_workers
+from mitex.runtime import bfloat16_is_fast, init, keep_freed_memory, lower_worker_priority
+from mitex.runtime.jit import dr, mi
 
-mi = init()
-import drjit as dr  # noqa: E402
+init()
 
 TURNS, TURN = 6, 0.6  # of each that is timed, and their length [s]
 TABLE = 17
@@ -102,7 +102,7 @@ def main() -> None:
     parser.add_argument("--run", metavar="RUN", help="a captured texture")
     given = parser.parse_args()
     keep_freed_memory()  # these two as in a fit
-    modest_workers()
+    lower_worker_priority()
     Console(width=100).print(rates(1 << (14 if given.quick else 16)))
     if given.run:
         Console(width=100).print(uses(NerfTexture.load(given.run)))

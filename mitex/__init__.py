@@ -14,7 +14,7 @@ _HOMES = {
     "Asset": ("mitex.asset", "Asset"),
     "Exemplar": ("mitex.exemplar", "Exemplar"),
     "Mesh": ("mitex.mesh", "Mesh"),
-    "init": ("mitex.runtime", "init"),
+    "init": ("mitex.plugins", "init"),
     "methods": ("mitex.methods", None),
 }
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from mitex.asset import Asset
     from mitex.exemplar import Exemplar
     from mitex.mesh import Mesh
-    from mitex.runtime import init
+    from mitex.plugins import init
 
 
 def __getattr__(name: str) -> Any:

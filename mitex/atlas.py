@@ -73,12 +73,22 @@ class Atlas:
             detail: (N, N, 3) detail normals in object space, of any length; anything where no chart is near.
 
         Returns:
-            (N, N, 3) float32 in [0, 1], in the frames of `split_at_seams`.
+            (N, N, 3) float32 in [0, 1], in the `shading_frames`.
         """
-        frames = split_at_seams(mesh, self.uv).corner_frames()
-        encoded = encode(unit(detail), *(unit(self.interpolate(axis)) for axis in frames))
+        encoded = encode(unit(detail), *self.shading_frames(mesh))
         encoded[self.face < 0] = FLAT
         return encoded
+
+    def shading_frames(self, mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(N, N, 3) tangents, bitangents and normals as shaders that follow MikkTSpace have them.
+
+        Tangent and normal are interpolated and not normalised; the bitangent is sign * cross(normal, tangent)
+        in each texel.
+        """
+        split = split_at_seams(mesh, self.uv)
+        tangent, normal = (self.interpolate(v[split.faces]) for v in (split.tangents[:, :3], split.normals))
+        sign = split.tangents[split.faces[:, 0], 3][self.face][..., None]
+        return tangent, sign * np.cross(normal, tangent), normal
 
     @staticmethod
     def build(

@@ -2,16 +2,24 @@
 
 import errno
 import os
+import re
 import secrets
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from mitex.errors import OutputError
 
+# Names of the temporary files of `atomic_write`, and of those that safetensors makes by itself.
+_TEMPORARY = re.compile(r"\..*\.[0-9a-f]{8}\.tmp(\.[^.]*)?|\.tmp[A-Za-z0-9]{6}", re.DOTALL)
 
-def prepare_output(path: str | os.PathLike[str], suffixes: Sequence[str] = ()) -> Path:
+
+def prepare_output(
+    path: str | os.PathLike[str],
+    suffixes: Sequence[str] = (),
+    inputs: Iterable[str | os.PathLike[str] | None] = (),
+) -> Path:
     """Checks, before any long work, that a file can be written at `path`. Creates nothing.
 
     Folders that do not exist yet are allowed when the nearest existing ancestor is writable;
@@ -20,12 +28,14 @@ def prepare_output(path: str | os.PathLike[str], suffixes: Sequence[str] = ()) -
     Args:
         path: The file to be written; `~` is expanded.
         suffixes: Allowed endings with their dot, in lower case, such as `(".png", ".exr")`; empty allows any.
+        inputs: What the work reads, which must not be replaced; names that are no files do not matter.
 
     Returns:
         The path, absolute.
 
     Raises:
-        OutputError: The suffix is not allowed, a folder has that name, or the place is not writable.
+        OutputError: The suffix is not allowed, a folder has that name, the place is not writable, or the file
+            is one of the inputs, be it through a link or in another spelling.
     """
     target = _absolute(path)
     if suffixes and target.suffix.lower() not in suffixes:
@@ -38,6 +48,8 @@ def prepare_output(path: str | os.PathLike[str], suffixes: Sequence[str] = ()) -
         _check_folder(target.parent)
         if target.exists() and not os.access(target, os.W_OK):
             raise OutputError(f"'{path}' is write-protected", "change its permissions or name another file")
+        if any(_same_file(target, source) for source in inputs if source is not None):
+            raise OutputError(f"'{path}' is an input, and would be overwritten", "name another --out")
     except OSError as e:
         raise _translated(e, target) from e
     return target
@@ -112,6 +124,11 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise
 
 
+def is_temporary(path: Path) -> bool:
+    """Whether a file is named as `atomic_write` names its temporary ones: in a killed process they stay."""
+    return _TEMPORARY.fullmatch(path.name) is not None and path.is_file()
+
+
 def cache_dir() -> Path:
     """The user's folder for things that Mitex can make again (not created here)."""
     if sys.platform == "darwin":
@@ -125,6 +142,14 @@ def _absolute(path: str | os.PathLike[str]) -> Path:
     if not os.fspath(path) or "\0" in os.fspath(path):
         raise OutputError(f"{os.fspath(path)!r} is not a path", "name a file or folder")
     return Path(os.path.abspath(Path(path).expanduser()))
+
+
+def _same_file(target: Path, source: str | os.PathLike[str]) -> bool:
+    try:
+        source = Path(source).expanduser()
+        return source.is_file() and os.path.samefile(target, source)
+    except (OSError, ValueError):  # one of them does not exist, or is no path
+        return False
 
 
 def _check_folder(folder: Path) -> None:

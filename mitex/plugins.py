@@ -1,33 +1,31 @@
-"""Registers the Mitsuba plugins of Mitex, for the variant in use and for every one chosen later.
+"""Mitsuba with the plugins of Mitex, for the variant in use and for every one set later.
 
-Importing this module is enough; it sets no variant::
+Importing this module registers them; it sets no variant::
 
     import mitex.plugins
     import mitsuba as mi
 
     mi.set_variant("llvm_ad_rgb")
     mi.load_dict({"type": "vertex_field", ...})
+
+Code that needs them takes `init` from here; that of `mitex.runtime` knows no plugin.
 """
 
-from importlib import import_module
+from mitex.integrators import feature, shell
+from mitex.runtime import init
+from mitex.runtime.jit import mi
+from mitex.textures import texel_field, vertex_field
 
-from mitex.runtime import load_mitsuba
+__all__ = ["PLUGINS", "init", "register"]
 
 # Each has a function register(), which builds its class for the current variant and registers it.
-MODULES = (
-    "mitex.textures.vertex_field",
-    "mitex.textures.texel_field",
-    "mitex.integrators.feature",
-    "mitex.integrators.shell",
-)
-
-mi = load_mitsuba(needs_llvm=False)
+PLUGINS = (vertex_field, texel_field, feature, shell)
 
 
 def register() -> None:
     """Registers every plugin for the current variant; Mitsuba forgets them when the variant changes."""
-    for name in MODULES:
-        import_module(name).register()
+    for plugin in PLUGINS:
+        plugin.register()
 
 
 def _on_variant(_old: str | None, _new: str) -> None:

@@ -14,10 +14,10 @@ import scipy.sparse.linalg
 import torch
 
 from mitex.images import write_image
-from mitex.integrators.geometry import GeometryRenderer
 from mitex.mesh import Mesh, icosphere
-from mitex.methods.geometric.pictures import portrait
+from mitex.methods.geometric.portrait import portrait
 from mitex.scenes.cameras import orbit
+from mitex.scenes.geometry_renderer import GeometryRenderer
 from mitex.training.optim import Adam
 
 SMOOTHING = 20.0  # how far a vertex' gradient spreads over the surface

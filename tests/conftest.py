@@ -57,8 +57,8 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture
 def mi() -> Any:
-    """Mitsuba, started by Mitex."""
-    from mitex.runtime import init
+    """Mitsuba with the plugins of Mitex."""
+    from mitex.plugins import init
 
     return init()
 

@@ -9,7 +9,6 @@ import pytest
 from mitex.asset import Asset
 from mitex.errors import ConfigError, MeshError, OutputError
 from mitex.geometry.normal_maps import decode
-from mitex.geometry.tangents import split_at_seams
 from mitex.geometry.vectors import unit
 from mitex.mesh import icosphere
 from tests.export.common import wavy
@@ -92,8 +91,7 @@ def test_baked_normals_decode_to_those_of_the_source():
     asset = wavy().baked(128)
     assert asset.atlas is not None and asset.texture_maps is not None
     atlas = asset.atlas
-    frames = (unit(atlas.interpolate(v)) for v in split_at_seams(asset.mesh, atlas.uv).corner_frames())
-    seen = decode(asset.texture_maps["normal"], *frames)
+    seen = decode(asset.texture_maps["normal"], *atlas.shading_frames(asset.mesh))
     source = unit(atlas.interpolate(asset.detail_normals()[asset.mesh.faces]))
     assert (seen * source).sum(axis=2)[atlas.inside].min() > 1 - 1e-5
     np.testing.assert_array_equal(asset.texture_maps["normal"][atlas.face < 0][:1], [[0.5, 0.5, 1.0]])

@@ -8,7 +8,7 @@ import pytest
 
 from mitex import paths
 from mitex.errors import ConfigError, OutputError
-from mitex.paths import atomic_write, cache_dir, prepare_folder, prepare_output
+from mitex.paths import atomic_write, cache_dir, is_temporary, prepare_folder, prepare_output
 
 needs_permissions = pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 
@@ -59,6 +59,41 @@ def test_a_protected_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != target)
     with pytest.raises(OutputError, match="write-protected"):
         prepare_output(target)
+
+
+@pytest.mark.parametrize(
+    "spelling", ["mesh.obj", "sub/../mesh.obj", "soft.obj", "hard.obj", "folder/mesh.obj"]
+)
+def test_an_output_that_is_an_input_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, spelling: str
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sub").mkdir()
+    source = tmp_path / "mesh.obj"
+    source.write_text("v 0 0 0")
+    (tmp_path / "soft.obj").symlink_to("mesh.obj")
+    (tmp_path / "hard.obj").hardlink_to("mesh.obj")
+    (tmp_path / "folder").symlink_to(".")
+    for inputs in ([source], [None, "vase", "mesh.obj"], [tmp_path / "soft.obj"]):
+        with pytest.raises(OutputError, match=rf"'{spelling}' is an input.*; name another --out"):
+            prepare_output(spelling, (".obj",), inputs)
+    assert source.read_text() == "v 0 0 0"
+
+
+def test_an_input_in_another_spelling_is_refused(tmp_path: Path):
+    """On a file system that does not tell cases apart, both names lead to one file."""
+    (tmp_path / "Mesh.obj").touch()
+    (tmp_path / "mesh.OBJ").hardlink_to(tmp_path / "Mesh.obj")
+    with pytest.raises(OutputError, match="is an input"):
+        prepare_output(tmp_path / "mesh.OBJ", (".obj",), [tmp_path / "Mesh.obj"])
+
+
+def test_other_files_than_the_inputs_may_be_replaced(tmp_path: Path):
+    for name in ("in.obj", "out.obj"):
+        (tmp_path / name).touch()
+    inputs = [tmp_path / "in.obj", tmp_path, tmp_path / "missing.obj", "a\0b", None]
+    for name in ("out.obj", "new.obj"):
+        assert prepare_output(tmp_path / name, inputs=inputs) == tmp_path / name
 
 
 @needs_permissions
@@ -149,6 +184,15 @@ def test_the_file_is_synced_before_it_gets_its_name_and_the_folder_after(tmp_pat
     with atomic_write(tmp_path / "a.png") as temporary:
         temporary.write_text("x")
     assert events == ["file", "rename", "folder"]
+
+
+@pytest.mark.parametrize("name", ["a.png", "no_suffix", ".hidden", "ü" * 120 + ".png", "two.dots.tar"])
+def test_temporary_files_are_recognised(tmp_path: Path, name: str):
+    with atomic_write(tmp_path / name) as temporary:
+        assert not is_temporary(temporary)  # a file, that is
+        temporary.write_text("x")
+        assert is_temporary(temporary)
+    assert not is_temporary(tmp_path / name)
 
 
 def test_long_names_can_be_written(tmp_path: Path):

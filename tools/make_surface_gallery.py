@@ -31,9 +31,9 @@ from mitex.mesh import Mesh, embedded_names, grid, remesh, subdivide_midpoint, t
 from mitex.mesh.topology import welded
 from mitex.methods import surface
 from mitex.methods.surface.seams import seam_ratio
-from mitex.methods.surface.texture import NAME
 from mitex.render import sheet, still, tone
 from mitex.training import checkpoint
+from mitex.training.locate import NAME
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 SIDES = {"scene": (25, 65)}  # azimuths [degrees]

@@ -61,9 +61,10 @@ class Render:
 
     def run(self) -> None:
         self._check_ranges()
+        from mitex.mesh.files import mesh_files
         from mitex.paths import prepare_output
 
-        out = prepare_output(self.out, STILLS + MOVIES)
+        out = prepare_output(self.out, STILLS + MOVIES, inputs=mesh_files(self.asset))
         moving = out.suffix.lower() in MOVIES
         reject_unused("--frames", out, not moving and self.frames is not None)
         reject_unused("--fps", out, not moving and self.fps is not None)

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from mitex.asset import Asset
 from mitex.errors import MeshError
 from mitex.export.exr import read_exr, write_exr, write_textures, write_views
 from mitex.export.glb import read_glb, write_glb
-from mitex.export.obj import read_obj, write_obj
+from mitex.export.obj import check_side_files, read_obj, write_obj
 from mitex.export.ply import read_ply, write_ply
 from mitex.paths import prepare_output
 
 __all__ = [
     "SUFFIXES",
+    "prepare_export",
     "read_asset",
     "read_exr",
     "read_glb",
@@ -32,6 +34,23 @@ __all__ = [
 SUFFIXES = (".glb", ".obj", ".ply", ".exr")
 _WRITERS = {".glb": write_glb, ".obj": write_obj, ".ply": write_ply, ".exr": write_textures}
 _READERS = {".glb": read_glb, ".obj": read_obj, ".ply": read_ply}
+
+
+def prepare_export(
+    path: str | os.PathLike[str],
+    suffixes: Sequence[str] = SUFFIXES,
+    inputs: Iterable[str | os.PathLike[str] | None] = (),
+) -> Path:
+    """`prepare_output` for an asset: checks the files beside an OBJ too, before any long work.
+
+    Raises:
+        OutputError: as `prepare_output`, or a file beside it is an input or was not written by Mitex.
+    """
+    inputs = list(inputs)
+    target = prepare_output(path, suffixes, inputs)
+    if target.suffix.lower() == ".obj":
+        check_side_files(target, inputs=inputs)
+    return target
 
 
 def write_asset(asset: Asset, path: str | os.PathLike[str]) -> Path:

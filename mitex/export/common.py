@@ -5,10 +5,13 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
+from mitex import __version__
 from mitex.asset import Asset
 from mitex.atlas import Atlas
 from mitex.errors import MeshError
@@ -33,11 +36,22 @@ def plain_name(name: str) -> str:
 
 
 def png(image: np.ndarray) -> bytes:
-    """An (H, W, 1 or 3) image in [0, 1] as 8-bit PNG."""
+    """An (H, W, 1 or 3) image in [0, 1] as 8-bit PNG that names us as its `Software`."""
     pixels = np.round(image * 255.0).astype(np.uint8)
-    buffer = io.BytesIO()
-    Image.fromarray(pixels[..., 0] if pixels.shape[2] == 1 else pixels).save(buffer, "PNG")
+    buffer, mark = io.BytesIO(), PngInfo()
+    mark.add_text("Software", f"{GENERATOR} {__version__}")
+    picture = Image.fromarray(pixels[..., 0] if pixels.shape[2] == 1 else pixels)
+    picture.save(buffer, "PNG", pnginfo=mark)
     return buffer.getvalue()
+
+
+def is_png_of_ours(path: Path) -> bool:
+    """Whether a file is a PNG that `png` made, and that no other program has saved since."""
+    try:
+        with Image.open(path, formats=("PNG",)) as image:
+            return str(image.info.get("Software", "")).startswith(f"{GENERATOR} ")
+    except Exception:  # decoders raise anything on hostile bytes
+        return False
 
 
 def asset_from_textures(mesh: Mesh, uv: np.ndarray, textures: Mapping[str, np.ndarray], name: str) -> Asset:

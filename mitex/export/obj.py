@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
@@ -9,12 +10,20 @@ from pathlib import Path
 import numpy as np
 
 from mitex.asset import Asset
-from mitex.errors import ImageError, MeshError
+from mitex.errors import ImageError, MeshError, OutputError
 from mitex.exemplar import MAPS
-from mitex.export.common import DEFAULT_ALBEDO, GENERATOR, asset_from_textures, foreign, plain_name, png
+from mitex.export.common import (
+    DEFAULT_ALBEDO,
+    GENERATOR,
+    asset_from_textures,
+    foreign,
+    is_png_of_ours,
+    plain_name,
+    png,
+)
 from mitex.images import read_image
 from mitex.mesh import Mesh
-from mitex.paths import atomic_write
+from mitex.paths import atomic_write, prepare_output
 
 # Material keywords, the first one is read back. `norm` and `map_Pr` are the PBR extension of the format;
 # Blender reads the normal map from `map_Bump`. Nothing standard fits occlusion: ambient colour comes closest.
@@ -27,8 +36,40 @@ _KEYWORDS = {
 }
 
 
+def check_side_files(
+    path: Path, maps: Iterable[str] = MAPS, inputs: Iterable[str | os.PathLike[str] | None] = ()
+) -> None:
+    """Checks that the files beside the mesh `path` may be written: NAME.mtl and NAME_MAP.png for each map.
+
+    Raises:
+        OutputError: one of them exists and is not ours, is one of the inputs, or cannot be written.
+    """
+    stem = plain_name(path.stem)
+    for name in [f"{stem}.mtl", *(f"{stem}_{k}.png" for k in maps)]:
+        side = prepare_output(path.with_name(name), inputs=inputs)
+        is_ours = is_png_of_ours if side.suffix == ".png" else _is_material_of_ours
+        if os.path.lexists(side) and not is_ours(side):
+            raise OutputError(
+                f"'{path.name}' comes with '{side}', and a file of that name exists that Mitex did not write",
+                "name another --out",
+            )
+
+
+def _is_material_of_ours(path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            return file.readline(80).strip() == f"# {GENERATOR}".encode()
+    except OSError:
+        return False
+
+
 def write_obj(asset: Asset, path: Path) -> None:
-    """Writes NAME.obj, NAME.mtl and NAME_MAP.png, all or none; bakes the asset first if it is not."""
+    """Writes NAME.obj, NAME.mtl and NAME_MAP.png, all or none; bakes the asset first if it is not.
+
+    Raises:
+        OutputError: as `check_side_files`; nothing is written then.
+    """
+    check_side_files(path, asset.texture_maps or asset.vertex_maps)
     if asset.texture_maps is None:
         asset = asset.baked()
     stem = plain_name(path.stem)

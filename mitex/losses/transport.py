@@ -9,27 +9,18 @@ from __future__ import annotations
 import torch
 import torch.nn.functional as F
 
-# The authors' rows; colours multiply it from the left (x @ M).
-DECORRELATION = (
-    (0.57735, 0.57735, 0.57735),
-    (-0.57735, 0.78868, -0.21132),
-    (-0.57735, -0.21132, 0.78868),
-)
-
 # With fewer channels, rounding does not average out, and float32 costs little.
 LOW_PRECISION_CHANNELS = 32
 SQUARES = (1e-5, 1e5)  # between which a squared distance counts
-
-
-def decorrelate(colours: torch.Tensor) -> torch.Tensor:
-    """RGB (..., 3) in the orthogonal basis in which the authors compare colours."""
-    return colours @ colours.new_tensor(DECORRELATION)
 
 
 def relaxed_transport(
     a: torch.Tensor, b: torch.Tensor, euclidean: bool = False, low_precision: bool = False
 ) -> torch.Tensor:
     """max(W(a, b), W(b, a)) of equation 4, for each pair of sets of a batch.
+
+    The authors multiply colours by a decorrelating matrix first. It is orthogonal: neither cosines nor
+    distances change, so it is left out.
 
     Args:
         a: (K, n, C) feature vectors.

@@ -103,9 +103,9 @@ class ApplyOptions:
     def run(self) -> None:
         """Applies the texture, writes the file, and prints its path."""
         self.check()
-        from mitex.paths import prepare_output
+        from mitex.export import prepare_export
 
-        out = prepare_output(self.out, EXPORTS + PICTURES)
+        out = prepare_export(self.out, EXPORTS + PICTURES, self.inputs())
         self.check_output(out)
         applied = self.applied(out)
         if out.suffix.lower() in PICTURES:
@@ -116,6 +116,11 @@ class ApplyOptions:
 
     def check(self) -> None:
         """Refuses values out of range, before anything is read."""
+
+    def inputs(self) -> list[Path | str]:
+        """What is read, and must not be overwritten: the model, and whatever file an option names."""
+        files = [value for name, value in vars(self).items() if name != "out" and isinstance(value, Path)]
+        return [self.model, *files]
 
     def check_output(self, out: Path) -> None:
         """Refuses options that mean nothing for a file of this suffix."""
@@ -135,3 +140,8 @@ class MeshOptions(ApplyOptions):
 
     mesh: Annotated[str, arg(metavar="MESH|NAME")]
     """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
+
+    def inputs(self) -> list[Path | str]:
+        from mitex.mesh.files import mesh_files
+
+        return [*super().inputs(), *mesh_files(self.mesh)]

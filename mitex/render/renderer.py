@@ -118,7 +118,7 @@ class OrbitRenderer:
         return accumulated(self._scene, self.resolution, spp, seed)
 
     def _build(self, asset: Asset, mesh: Mesh, ao: bool) -> tuple[Any, Any]:
-        from mitex.runtime import init
+        from mitex.plugins import init
 
         mi = init()
         bsdf = _bsdf(mi, asset, ao)
@@ -136,7 +136,7 @@ class OrbitRenderer:
 
     def _turn(self, azimuth: float, view: View) -> None:
         """Updates the scene's parameters; a new `load_dict` per picture would leak memory."""
-        import mitsuba as mi
+        from mitex.runtime.jit import mi
 
         turn = rotation(azimuth).T
         positions, normals, detail = (a @ turn for a in (self._positions, self._normals, self._detail))
@@ -152,7 +152,7 @@ class OrbitRenderer:
 
 def accumulated(scene: Any, resolution: int, spp: int, seed: int) -> np.ndarray:
     """(N, N, 3) linear radiance of a scene with a film of `sensor`, over white where it is transparent."""
-    import mitsuba as mi
+    from mitex.runtime.jit import mi
 
     level = mi.log_level()
     mi.set_log_level(mi.LogLevel.Error)  # the sampler warns each time it rounds its count up

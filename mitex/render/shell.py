@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from mitex.integrators.march import RadianceField
 from mitex.mesh import Similarity
+from mitex.plugins import init
 from mitex.render.framing import fit_view, hull, rotation
 from mitex.render.picture import AZIMUTH, ELEVATION
 from mitex.render.renderer import MAX_DEPTH, accumulated, paper_sweep, sensor
 from mitex.render.studio import lights
-from mitex.runtime import init
+from mitex.textures.march import RadianceField
 
 
 def shell_still(

@@ -22,7 +22,7 @@ def lights() -> dict[str, Any]:
     A soft key light from the upper left, and a dome that brightens upwards. The dome is smooth on purpose:
     with the softboxes of `scenes.lights.environment` in it, the same picture takes twice the samples.
     """
-    import mitsuba as mi
+    from mitex.runtime.jit import mi
 
     key = key_and_fill(KEY, radius=KEY_DISTANCE)["key"]
     # Mitsuba's envmap wants more than one column; the dome does not depend on it.

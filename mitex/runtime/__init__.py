@@ -3,15 +3,9 @@
 from mitex.runtime.health import Check, doctor
 from mitex.runtime.memory import available_memory, keep_freed_memory
 from mitex.runtime.precision import bfloat16_is_fast
-from mitex.runtime.session import (
-    init,
-    load_mitsuba,
-    modest_workers,
-    seed_everything,
-    set_workers,
-    threads,
-    yield_cores,
-)
+from mitex.runtime.seeds import seed_everything
+from mitex.runtime.session import init, load_mitsuba
+from mitex.runtime.workers import let_idle_threads_sleep, lower_worker_priority, set_workers, threads
 
 __all__ = [
     "Check",
@@ -20,10 +14,10 @@ __all__ = [
     "doctor",
     "init",
     "keep_freed_memory",
+    "let_idle_threads_sleep",
     "load_mitsuba",
-    "modest_workers",
+    "lower_worker_priority",
     "seed_everything",
     "set_workers",
     "threads",
-    "yield_cores",
 ]

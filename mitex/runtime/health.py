@@ -99,5 +99,6 @@ def _weights() -> str:
 
 def _ffmpeg() -> str:
     program = import_module("imageio_ffmpeg").get_ffmpeg_exe()
-    done = subprocess.run([program, "-version"], capture_output=True, text=True, timeout=30, check=True)
-    return done.stdout.split("Copyright")[0].replace("ffmpeg version", "").strip()
+    command = [program, "-version"]
+    process = subprocess.run(command, capture_output=True, text=True, timeout=30, check=True)
+    return process.stdout.split("Copyright")[0].replace("ffmpeg version", "").strip()

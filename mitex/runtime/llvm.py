@@ -84,26 +84,26 @@ def find_llvm() -> tuple[Llvm, Verdict]:
     Raises:
         RuntimeUnavailable: None is usable; the message names what was found.
     """
-    refused = []
+    refusals = []
     for library in candidates():
         verdict = judge(library.path)
         if verdict.usable:
             return library, verdict
-        refused.append(f"{verdict.version or 'unknown version'} at {library.path} ({verdict.reason})")
+        refusals.append(f"{verdict.version or 'unknown version'} at {library.path} ({verdict.reason})")
         if library.origin == "user":
             raise RuntimeUnavailable(
-                f"the LLVM that {VARIABLE} names cannot be used: {refused[0]}",
+                f"the LLVM that {VARIABLE} names cannot be used: {refusals[0]}",
                 f"unset {VARIABLE} to let Mitex search, or: {REMEDY}",
             )
-    found = "found only " + ", ".join(refused[:6]) if refused else "found none"
-    raise RuntimeUnavailable(f"Mitsuba needs an LLVM of version {OLDEST} or newer and Mitex {found}", REMEDY)
+    result = "found only " + ", ".join(refusals[:6]) if refusals else "found none"
+    raise RuntimeUnavailable(f"Mitsuba needs an LLVM of version {OLDEST} or newer and Mitex {result}", REMEDY)
 
 
 def candidates() -> list[Llvm]:
     """Libraries in the order in which they are tried; the user's choice stands alone."""
-    chosen = os.environ.get(VARIABLE)
-    if chosen:
-        return [_selected if _selected and _selected.path == chosen else Llvm(chosen, "user")]
+    path = os.environ.get(VARIABLE)
+    if path:
+        return [_selected if _selected and _selected.path == path else Llvm(path, "user")]
     # The PyPI package puts its library beside the interpreter's other files.
     homes = dict.fromkeys([sys.prefix, site.getuserbase()])
     environment = [path for home in homes for path in _matches(f"{glob.escape(home)}/lib/libLLVM*.*")]
@@ -120,16 +120,16 @@ def judge(path: str) -> Verdict:
     """Whether Dr.Jit can use the library, from its name, the cache, or a probe in another process."""
     if os.sep in path and not os.path.isfile(path):
         return Verdict(False, "", "there is no such file")
-    named = named_version(path)
-    if named and named[0] < OLDEST:
-        return Verdict(False, ".".join(map(str, named)), f"older than {OLDEST}")
+    number = named_version(path)
+    if number and number[0] < OLDEST:
+        return Verdict(False, ".".join(map(str, number)), f"older than {OLDEST}")
     key = _cache_key(path)
-    known = _read_cache()
-    if key in known:
-        return known[key]
+    cache = _read_cache()
+    if key in cache:
+        return cache[key]
     verdict, lasting = probe(path)
     if key and lasting:
-        _write_cache({**known, key: verdict})
+        _write_cache({**cache, key: verdict})
     return verdict
 
 
@@ -155,33 +155,33 @@ def probe(path: str) -> tuple[Verdict, bool]:
         environment["PYTHONPATH"] = os.pathsep.join(entry for entry in sys.path if entry)
         command = [sys.executable or "python3", "-P", str(PROBE_SCRIPT), path, str(OLDEST)]
         try:
-            done = subprocess.run(
+            process = subprocess.run(
                 command, env=environment, capture_output=True, text=True, timeout=PROBE_SECONDS, check=False
             )
         except subprocess.TimeoutExpired:
             return Verdict(False, "", f"it did not answer within {PROBE_SECONDS} seconds"), False
         except OSError as e:
             return Verdict(False, "", f"it could not be tried: {e}"), False
-    return _read_probe(done)
+    return _read_probe(process)
 
 
-def _read_probe(done: "subprocess.CompletedProcess[str]") -> tuple[Verdict, bool]:
-    said: dict = {}
-    for line in done.stdout.splitlines():
+def _read_probe(process: "subprocess.CompletedProcess[str]") -> tuple[Verdict, bool]:
+    answer: dict = {}
+    for line in process.stdout.splitlines():
         with suppress(ValueError):
-            said.update(json.loads(line))
-    number = ".".join(map(str, said.get("version") or ()))
-    if said.get("usable") is True:
+            answer.update(json.loads(line))
+    number = ".".join(map(str, answer.get("version") or ()))
+    if answer.get("usable") is True:
         return Verdict(True, number), True
-    if "error" in said:
-        return Verdict(False, number, said["error"]), False
-    if "version" in said and said["version"] is None:
+    if "error" in answer:
+        return Verdict(False, number, answer["error"]), False
+    if "version" in answer and answer["version"] is None:
         return Verdict(False, "", "older than 16"), True
-    if done.returncode < 0:
-        return Verdict(False, number, f"it ends the process ({_signal_name(-done.returncode)})"), True
-    if done.returncode == 0 and number:
+    if process.returncode < 0:
+        return Verdict(False, number, f"it ends the process ({_signal_name(-process.returncode)})"), True
+    if process.returncode == 0 and number:
         return Verdict(False, number, f"older than {OLDEST}"), True
-    last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+    last = (process.stderr.strip().splitlines() or ["no message"])[-1]
     return Verdict(False, number, f"the probe failed: {last[:200]}"), False
 
 
@@ -214,13 +214,13 @@ def _cache_key(path: str) -> str:
 
 def _read_cache() -> dict[str, Verdict]:
     try:
-        stored = json.loads((cache_dir() / "llvm.json").read_text())
-        return {str(key): Verdict(**value) for key, value in stored.items()}
+        entries = json.loads((cache_dir() / "llvm.json").read_text())
+        return {str(key): Verdict(**value) for key, value in entries.items()}
     except (OSError, ValueError, TypeError, AttributeError):
         return {}
 
 
-def _write_cache(known: dict[str, Verdict]) -> None:
-    stored = {key: asdict(verdict) for key, verdict in known.items()}
+def _write_cache(verdicts: dict[str, Verdict]) -> None:
+    entries = {key: asdict(verdict) for key, verdict in verdicts.items()}
     with suppress(OutputError), atomic_write(cache_dir() / "llvm.json") as temporary:
-        temporary.write_text(json.dumps(stored, indent=1))
+        temporary.write_text(json.dumps(entries, indent=1))

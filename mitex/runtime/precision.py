@@ -19,10 +19,10 @@ def bfloat16_is_fast() -> bool:
     Raises:
         ConfigError: The variable has another value.
     """
-    chosen = os.environ.get(VARIABLE, "")
-    if chosen not in ("", "0", "1"):
-        raise ConfigError(f"{VARIABLE} is '{chosen}'", "set it to 0 or 1, or unset it")
-    return chosen == "1" if chosen else bool(bfloat16_flags())
+    setting = os.environ.get(VARIABLE, "")
+    if setting not in ("", "0", "1"):
+        raise ConfigError(f"{VARIABLE} is '{setting}'", "set it to 0 or 1, or unset it")
+    return setting == "1" if setting else bool(bfloat16_flags())
 
 
 @cache

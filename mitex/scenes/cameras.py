@@ -112,7 +112,7 @@ class Cameras:
         return [self._sensor(index) for index in range(len(self))]
 
     def _sensor(self, index: int) -> dict[str, Any]:
-        import mitsuba as mi
+        from mitex.runtime.jit import mi
 
         origin, target, up = (
             getattr(self, name)[index].astype(np.float64) for name in ("origin", "target", "up")

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from mitex.mesh import Mesh
 from mitex.mesh.topology import mesh_edges
-from mitex.runtime import init, load_mitsuba
+from mitex.runtime import init
+from mitex.runtime.jit import mi
 from mitex.scenes.stage import mesh_shape
-
-mi: Any = load_mitsuba(needs_llvm=False)
 
 PAST = 1e-4  # part of an edge by which a ray goes on behind a face that it may touch
 
@@ -38,7 +35,7 @@ def crossing_edges(mesh: Mesh) -> np.ndarray:
 
 
 def _first(
-    scene: Any, start: np.ndarray, end: np.ndarray, begun: np.ndarray
+    scene: mi.Scene, start: np.ndarray, end: np.ndarray, begun: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of edges, from the part `begun` on: whether a face is hit, which one, and at what part."""
     way = end - start

@@ -54,7 +54,7 @@ def environment(strength: float = 1.0, azimuth: float = math.pi / 2, height: int
             angle.
         height: rows of the image.
     """
-    import mitsuba as mi
+    from mitex.runtime.jit import mi
 
     return {
         "type": "envmap",
@@ -85,7 +85,7 @@ def _panel(
     position: tuple[float, ...], half: float, radiance: tuple[float, ...], strength: float, radius: float
 ):
     """A square that faces the origin and emits on that side."""
-    import mitsuba as mi
+    from mitex.runtime.jit import mi
 
     to_world = mi.ScalarTransform4f().look_at(
         origin=[radius * p for p in position], target=[0, 0, 0], up=[0, 1, 0]

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from typing import Any
-
 import numpy as np
 
 from mitex.mesh import Mesh
-from mitex.runtime import init, load_mitsuba
+from mitex.runtime import init
+from mitex.runtime.jit import dr, mi
 from mitex.scenes.stage import mesh_shape
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 RAYS = 1 << 23  # traced at once
 OFFSET = 1e-4  # of the mesh's extent: rays start so far above the surface
@@ -46,7 +41,7 @@ def ambient_occlusion(
     return openness
 
 
-def _open(scene: Any, origins: np.ndarray, normals: np.ndarray, samples: int, seed: int) -> np.ndarray:
+def _open(scene: mi.Scene, origins: np.ndarray, normals: np.ndarray, samples: int, seed: int) -> np.ndarray:
     count = len(origins)
     index = dr.arange(mi.UInt32, count) if samples == 1 else dr.repeat(dr.arange(mi.UInt32, count), samples)
     origin, normal = (
@@ -56,6 +51,6 @@ def _open(scene: Any, origins: np.ndarray, normals: np.ndarray, samples: int, se
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed % 2**32, count * samples)
     local = mi.warp.square_to_cosine_hemisphere(sampler.next_2d())
-    ray = mi.Ray3f(origin, mi.Frame3f(mi.Normal3f(normal)).to_world(local), math.inf, 0.0, [])
+    ray = mi.Ray3f(origin, mi.Frame3f(mi.Vector3f(normal)).to_world(local))
     free = dr.select(scene.ray_test(ray), 0.0, 1.0)
     return np.array(dr.block_sum(mi.Float(free), samples)) / samples

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import cast
 
 import numpy as np
 import torch
 
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh
-from mitex.runtime import init, load_mitsuba
+from mitex.plugins import init
+from mitex.runtime.jit import dr, mi
 from mitex.scenes.cameras import Cameras
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +122,7 @@ class Stage:
 
     def __init__(self, mesh: Mesh, channels: int = 3, background: Sequence[float] | float = 0.0) -> None:
         init()
-        if not mi.variant().startswith(("llvm", "cuda")):
+        if not dr.is_jit_v(mi.Float):
             raise ConfigError(f"the variant is '{mi.variant()}'", "set an llvm or cuda one, or none")
         if channels < 1:
             raise ConfigError(f"a field of {channels} channels", "use at least 1")
@@ -201,10 +199,15 @@ class Stage:
             hit, triangle, uv = hits.is_valid(), hits.prim_index, hits.prim_uv
             dr.eval(hit, triangle, uv)
             u, v = mi.Float(uv.x), mi.Float(uv.y)
-        return hit.torch(), triangle.torch().view(torch.int32), u.torch(), v.torch()
+        hit, triangle, u, v = (_tensor(array) for array in (hit, triangle, u, v))
+        return hit, triangle.view(torch.int32), u, v
 
 
-def mesh_shape(mesh: Mesh, bsdf: Any = None, smooth: bool = False) -> Any:
+def _tensor(array: dr.ArrayBase) -> torch.Tensor:
+    return cast(torch.Tensor, array.torch())
+
+
+def mesh_shape(mesh: Mesh, bsdf: mi.BSDF | None = None, smooth: bool = False) -> mi.Mesh:
     """A Mitsuba mesh with the vertices and faces of `mesh`, without UVs.
 
     Args:
@@ -223,7 +226,7 @@ def mesh_shape(mesh: Mesh, bsdf: Any = None, smooth: bool = False) -> Any:
     return shape
 
 
-def _rays(cameras: Cameras, n: int) -> Any:
+def _rays(cameras: Cameras, n: int) -> mi.Ray3f:
     """The cameras' rays with n x n samples per pixel, as one wavefront ordered by pixel."""
     count, height, width = cameras.shape
     index = dr.arange(mi.UInt32, count * height * width * n * n)
@@ -235,7 +238,7 @@ def _rays(cameras: Cameras, n: int) -> Any:
     x = (mi.Float(column) + (mi.Float(sample % side) + 0.5) / mi.Float(side)) * (2 / mi.Float(columns)) - 1
     y = 1 - (mi.Float(row) + (mi.Float(sample // side) + 0.5) / mi.Float(side)) * (2 / mi.Float(rows))
 
-    def affine(terms: np.ndarray) -> Any:
+    def affine(terms: np.ndarray) -> mi.Vector3f:
         flat = mi.Float(np.ascontiguousarray(terms).ravel())
         constant, along_x, along_y = (dr.gather(mi.Vector3f, flat, 3 * camera + term) for term in range(3))
         return constant + x * along_x + y * along_y

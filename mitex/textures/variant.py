@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
+
+if TYPE_CHECKING:
+    from mitex.runtime.jit import mi
+
+T = TypeVar("T", bool, int, str)
 
 
 def for_variant(name: str, base: Any, methods: type) -> Any:
     """A class called `name` with Mitsuba's `base` of the current variant and the members of `methods`.
 
     Every variant has its own base classes, and they allow neither a second base nor another metaclass, so the
-    members are copied, inherited ones too. They call the base as `mi.Texture.__init__(self, props)`, not
-    through `super()`.
+    members are copied, inherited ones too. They call the base's constructor through `init_base`, not through
+    `super()`.
     """
     members: dict[str, Any] = {}
     for cls in reversed(methods.__mro__[:-1]):  # without `object`
         members |= {key: value for key, value in vars(cls).items() if key not in ("__dict__", "__weakref__")}
     return type(name, (base,), members)
+
+
+def option(props: mi.Properties, name: str, default: T) -> T:
+    """The value of a plugin's property as the type of its default, which it has where it is not given."""
+    value: Any = props.get(name, default)
+    return type(default)(value)
+
+
+def init_base(base: Any, plugin: object, props: mi.Properties) -> None:
+    """Calls the constructor of Mitsuba's `base`, which a plugin class of the current variant derives from."""
+    base.__init__(plugin, props)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
@@ -11,7 +12,7 @@ from typing import Any
 
 from mitex import __version__
 from mitex.errors import CheckpointError, OutputError
-from mitex.paths import atomic_write, missing_folders, prepare_folder
+from mitex.paths import atomic_write, is_temporary, missing_folders, prepare_folder
 from mitex.training import checkpoint
 from mitex.training.metrics import Metrics
 from mitex.training.toml import to_toml
@@ -25,7 +26,8 @@ DIVERGED = "diverged.json"
 def check(out: str | os.PathLike[str], resume: bool = False) -> None:
     """Checks, before any long work, that a run can start or go on in a folder. Creates nothing.
 
-    Without `resume` the folder may be missing, empty, or of a run that never reached a checkpoint.
+    Without `resume` the folder may be missing, empty, or of a run that never reached a checkpoint: that its
+    config.toml tells, since other programs write files of the same names.
 
     Raises:
         OutputError: There is a run already, or other files.
@@ -34,8 +36,7 @@ def check(out: str | os.PathLike[str], resume: bool = False) -> None:
     folder = Path(out).expanduser()
     try:
         begun = any((folder / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
-        ours = begun or (folder / METRICS).exists()
-        foreign = not ours and folder.is_dir() and any(folder.iterdir())
+        foreign = not begun and folder.is_dir() and not (_is_run(folder) or _is_empty(folder))
     except (OSError, ValueError) as e:  # ValueError: a null byte in the name
         raise OutputError(f"cannot use '{out}' as a run folder ({e})", "name another --out") from e
     if resume and not begun:
@@ -77,9 +78,9 @@ def prepare(folder: Path, config: Any, metadata: Mapping[str, str]) -> None:
     """Sweeps up after a killed run, and writes config.toml with the tables `run` and `versions` below."""
     with suppress(OSError):
         (folder / DIVERGED).unlink(missing_ok=True)
-        for pattern in (".*.tmp*", ".tmp*", f"{PREVIEWS}/.*.tmp*"):  # ours, safetensors' own, ours
-            for leftover in folder.glob(pattern):
-                leftover.unlink(missing_ok=True)
+        for file in [*folder.iterdir(), *(folder / PREVIEWS).glob("*")]:
+            if is_temporary(file):
+                file.unlink(missing_ok=True)
     with atomic_write(folder / CONFIG) as temporary:
         temporary.write_text(to_toml(config, {"run": metadata, "versions": versions()}), encoding="utf-8")
 
@@ -98,6 +99,20 @@ def versions() -> dict[str, str]:
 def as_json(config: Any) -> dict[str, Any]:
     """The config's values as JSON gives them back (tuples become lists)."""
     return json.loads(json.dumps(asdict(config)))
+
+
+def _is_run(folder: Path) -> bool:
+    """Whether config.toml is one that `prepare` wrote."""
+    try:
+        content = tomllib.loads((folder / CONFIG).read_text(encoding="utf-8"))
+        return isinstance(content["run"], dict) and "mitex" in content["versions"]
+    except (OSError, ValueError, KeyError, TypeError):  # missing, not TOML, not ours
+        return False
+
+
+def _is_empty(folder: Path) -> bool:
+    """Whether a folder holds nothing, or what a run leaves that is killed before `prepare` is done."""
+    return all(is_temporary(file) or (file.name == METRICS and not _size(file)) for file in folder.iterdir())
 
 
 def _size(path: Path) -> int:

@@ -93,18 +93,18 @@ def safetensors(path: Path, **metadata: str) -> Path:
     return path
 
 
-def model(path: Path, hidden: int = 8, cut: int = 0, fill: float = 0.0) -> Path:
-    """A model file of an cell rule for the albedo; `cut` biases of its first layer are missing."""
+def model(path: Path, hidden: int = 8, cut: int = 0, fill: float = 0.0, condition: int = 0) -> Path:
+    """A model file of a cell rule for the albedo; `cut` biases of its first layer are missing."""
     from safetensors.numpy import save_file
 
     channels = 12
     shapes = {
-        "fc1.weight": (hidden, channels * 5),
+        "fc1.weight": (hidden, channels * 5 + condition),
         "fc1.bias": (hidden - cut,),
         "fc2.weight": (channels, hidden),
         "fc2.bias": (channels,),
     }
     tensors = {name: np.full(shape, fill, np.float32) for name, shape in shapes.items()}
     about = json.dumps({"name": path.stem, "maps": ["albedo"]})
-    save_file(tensors, path, {"format": "mitex-nca-1", "about": about})
+    save_file(tensors, path, {"format": "mitex-nca-1", "about": about, "degree": "1"})
     return path

@@ -275,3 +275,7 @@ class TestArchitectures:
     def test_weights_that_are_not_finite(self, files, capsys):
         bad.model(files / "nan.safetensors", fill=float("nan"))
         check_refused(files, apply(model="nan.safetensors"), "not finite", capsys)
+
+    def test_a_condition_that_no_option_gives(self, files, capsys):
+        bad.model(files / "graft.safetensors", condition=3)
+        check_refused(files, apply(model="graft.safetensors"), "'graft' needs a condition of 3", capsys)

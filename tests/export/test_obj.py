@@ -9,6 +9,7 @@ from PIL import Image
 
 from mitex.asset import Asset
 from mitex.errors import MeshError, OutputError
+from mitex.export import prepare_export
 from mitex.mesh import icosphere
 from tests.export.common import wavy
 
@@ -82,6 +83,52 @@ def test_all_or_nothing(baked, tmp_path, monkeypatch):
     with pytest.raises(OutputError, match="no space left"):
         baked.export(tmp_path / "a.obj")
     assert list(tmp_path.iterdir()) == []
+
+
+def _contents(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.mark.parametrize("name", ["a.mtl", "a_albedo.png", "a_normal.png"])
+@pytest.mark.parametrize("content", ["text", "image", "empty", "link"])
+def test_files_beside_it_that_others_wrote_are_kept(baked, tmp_path, name, content):
+    file = tmp_path / name
+    if content == "image":
+        Image.new("RGB", (4, 4)).save(file, "PNG")
+    elif content == "link":
+        file.symlink_to("nowhere")
+    else:
+        file.write_text("newmtl Mitex\n" if content == "text" else "")
+    before = {} if content == "link" else _contents(tmp_path)
+    for write in (baked.export, prepare_export):
+        with pytest.raises(OutputError, match=rf"'a.obj' comes with '.*{name}'.*; name another --out"):
+            write(tmp_path / "a.obj")
+    assert content == "link" or _contents(tmp_path) == before
+
+
+def test_files_of_ours_are_replaced(baked, tmp_path):
+    baked.export(tmp_path / "a.obj")
+    before = _contents(tmp_path)
+    (tmp_path / "a_other.png").write_text("not ours, and in nobody's way")
+    assert prepare_export(tmp_path / "a.obj") == tmp_path / "a.obj"
+    baked.export(tmp_path / "a.obj")
+    assert _contents(tmp_path) == before | {"a_other.png": b"not ours, and in nobody's way"}
+
+
+def test_a_map_that_was_painted_over_is_kept(baked, tmp_path):
+    baked.export(tmp_path / "a.obj")
+    Image.open(tmp_path / "a_albedo.png").rotate(90).save(tmp_path / "a_albedo.png")  # drops the mark
+    with pytest.raises(OutputError, match=r"a_albedo\.png"):
+        baked.export(tmp_path / "a.obj")
+
+
+def test_files_beside_it_may_be_inputs(baked, tmp_path):
+    baked.export(tmp_path / "a.obj")
+    (tmp_path / "guide.png").symlink_to("a_albedo.png")
+    for source in ("a.mtl", "guide.png"):
+        with pytest.raises(OutputError, match="is an input"):
+            prepare_export(tmp_path / "a.obj", inputs=[tmp_path / source])
+    assert prepare_export(tmp_path / "a.glb", inputs=[tmp_path / "a.mtl"]) == tmp_path / "a.glb"
 
 
 @pytest.mark.parametrize(

@@ -120,7 +120,7 @@ def test_background_of_three_numbers(mi, mesh, data):
 
 @pytest.mark.parametrize("antialias", [1, 2])
 def test_adjoint_equals_autograd_of_the_lookup(mi, mesh, data, rng, antialias: int):
-    import drjit as dr
+    from mitex.runtime.jit import dr
 
     views = cameras()
     world = scene(
@@ -160,7 +160,7 @@ def test_adjoint_equals_autograd_of_the_lookup(mi, mesh, data, rng, antialias: i
 
 
 def test_forward_mode(mi, mesh, data, rng):
-    import drjit as dr
+    from mitex.runtime.jit import dr
 
     views = cameras()
     world = scene(mi, mesh, views, {"field": field(mi, data)})
@@ -176,7 +176,7 @@ def test_forward_mode(mi, mesh, data, rng):
 
 
 def test_geometry_is_detached(mi, mesh, data):
-    import drjit as dr
+    from mitex.runtime.jit import dr
 
     bsdf = mi.load_dict({"type": "diffuse", "reflectance": field(mi, data)})
     world = scene(mi, mesh, cameras(), {"name": "reflectance"}, bsdf)

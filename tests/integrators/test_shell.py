@@ -11,9 +11,9 @@ import pytest
 from mitex.colour import srgb_to_linear
 from mitex.mesh import Similarity
 from mitex.runtime import init
+from mitex.runtime.jit import dr, mi
 
-mi: Any = init()
-import drjit as dr  # noqa: E402
+init()
 
 from mitex.render.framing import rotation  # noqa: E402
 from mitex.textures import shell_field as module  # noqa: E402
@@ -34,8 +34,11 @@ class Ball:
     def parameters(self):
         return {"density": self.density}
 
+    def parameters_changed(self):
+        pass
+
     def evaluate(self, points, view):
-        return self.found(dr.compress(dr.norm(points) < 0.5))
+        return self.found(mi.UInt32(dr.compress(dr.norm(points) < 0.5)))
 
     def found(self, index):
         if not dr.width(index):

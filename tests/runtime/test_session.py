@@ -4,11 +4,13 @@ import os
 import subprocess
 import sys
 import time
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import mitex.plugins
 import mitex.runtime
 from mitex.errors import ConfigError
 from mitex.runtime import llvm
@@ -52,11 +54,9 @@ def register():
 
 
 def test_plugins_are_registered_again_for_every_variant(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    import mitex.plugins
-
     (tmp_path / "mitex_test_grey.py").write_text(PLUGIN)
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(mitex.plugins, "MODULES", ("mitex_test_grey",))
+    monkeypatch.setattr(mitex.plugins, "PLUGINS", (import_module("mitex_test_grey"),))
     for variant in ("scalar_rgb", "llvm_ad_spectral", "llvm_ad_rgb", "scalar_rgb"):
         mi.set_variant(variant)
         assert f"Grey[{variant}]" in str(mi.load_dict({"type": "mitex_test_grey"}))
@@ -145,8 +145,9 @@ def test_seeds_out_of_range_are_refused(seed: int):
 
 
 def test_threads_reach_torch_and_drjit(mi):
-    import drjit as dr
     import torch
+
+    from mitex.runtime.jit import dr
 
     mitex.runtime.threads(1)
     assert torch.get_num_threads() == 1 and dr.thread_count() == 1
@@ -161,7 +162,7 @@ import os, mitex.runtime as r
 from pathlib import Path
 r.threads(3)
 r.init()
-r.modest_workers()
+r.lower_worker_priority()
 for task in sorted(Path("/proc/self/task").iterdir()):
     name = (task / "comm").read_text().strip()
     if name.startswith("nt") or int(task.name) == os.getpid():
@@ -171,7 +172,7 @@ for task in sorted(Path("/proc/self/task").iterdir()):
 
 
 def test_workers_rest_before_any_is_ended(mi, monkeypatch: pytest.MonkeyPatch):
-    import drjit as dr
+    from mitex.runtime.jit import dr
 
     seen = []
     mitex.runtime.set_workers(1)
@@ -190,10 +191,10 @@ def test_threads_chosen_before_the_start_are_kept():
 
 def test_torch_yields_cores_unless_the_user_says_otherwise(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("OMP_WAIT_POLICY", "ACTIVE")
-    mitex.runtime.yield_cores()
+    mitex.runtime.let_idle_threads_sleep()
     assert os.environ["OMP_WAIT_POLICY"] == "ACTIVE"
     monkeypatch.delenv("OMP_WAIT_POLICY")
-    mitex.runtime.yield_cores()
+    mitex.runtime.let_idle_threads_sleep()
     assert os.environ["OMP_WAIT_POLICY"] == "PASSIVE"
 
 

@@ -24,6 +24,6 @@ def gradient(tensor: torch.Tensor) -> np.ndarray:
 
 def live_variables() -> int:
     """Number of Dr.Jit variables, give or take a constant."""
-    import drjit as dr  # after Mitsuba, which chooses the LLVM
+    from mitex.runtime.jit import dr
 
     return len(str(dr.whos(as_string=True)).splitlines())

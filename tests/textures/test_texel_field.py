@@ -150,7 +150,7 @@ def test_uv_that_is_no_number_reads_no_memory_beyond(mi):
 @pytest.mark.parametrize("kind", ["bilinear", "nearest"])
 @pytest.mark.parametrize("masked", [False, True])
 def test_gradient_is_the_transposed_lookup(mi, rng, uv, charts, kind: str, masked: bool):
-    import drjit as dr
+    from mitex.runtime.jit import dr
 
     data, upstream = rng.uniform(0, 1, (6, 9, 2)), rng.normal(size=(len(uv), 2))
     texture = mi.load_dict(field(mi, data, charts if masked else None, filter=kind, scale=3.0))
@@ -179,7 +179,7 @@ def test_gradient_is_the_transposed_lookup(mi, rng, uv, charts, kind: str, maske
 @pytest.mark.parametrize("masked", [False, True])
 def test_slope_by_u_and_v(mi, rng, uv, charts, masked: bool):
     """`eval_1_grad` and the gradient to an attached uv against differences of the slow reference."""
-    import drjit as dr
+    from mitex.runtime.jit import dr
 
     data = rng.uniform(0, 1, (6, 9, 1))
     used = charts if masked else None

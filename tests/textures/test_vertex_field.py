@@ -137,7 +137,7 @@ def test_update_through_traverse_changes_the_picture(mi, points):
 
 def test_gradient_through_a_path_tracer(mi):
     """The picture is linear in a raw albedo seen directly: one finite difference is exact."""
-    import drjit as dr
+    from mitex.runtime.jit import dr
 
     shape = quad(mi, {"type": "diffuse", "reflectance": field(mi, np.full((4, 3), 0.5), raw=True)})
     to_world = mi.ScalarTransform4f().look_at(origin=[0.2, 0.1, 3], target=[0, 0, 0], up=[0, 1, 0])

@@ -63,15 +63,45 @@ def test_leftovers_of_a_killed_run_are_swept(tmp_path):
     (tmp_path / "previews").mkdir()
     for name in (
         ".checkpoint.0a1b2c3d.tmp.safetensors",
+        ".tmpA1b2C3",  # as safetensors names its own
         "previews/.000001.0a1b2c3d.tmp.png",
         "diverged.json",
     ):
         (tmp_path / name).touch()
-    for name in ("previews/000001.png", "notes.tmp.txt"):
+    foreign = [".notes.tmp", ".notes.tmp.txt", ".tmp", ".tmpfile.txt", "notes.0a1b2c3d.tmp.txt"]
+    for name in ("previews/000001.png", "previews/.x.tmp.png", *foreign):
         (tmp_path / name).touch()
+    (tmp_path / ".folder.0a1b2c3d.tmp").mkdir()
     run.prepare(tmp_path, SmallConfig(), {})
-    assert _files(tmp_path) == ["config.toml", "notes.tmp.txt", "previews"]
-    assert _files(tmp_path / "previews") == ["000001.png"]
+    assert _files(tmp_path) == sorted(["config.toml", ".folder.0a1b2c3d.tmp", "previews", *foreign])
+    assert _files(tmp_path / "previews") == [".x.tmp.png", "000001.png"]
+
+
+@pytest.mark.parametrize(
+    "config", [None, "", "learning_rate = 0.1\n", 'run = "seven"\n', "[run\n", b"\xff\xfe\0", "[versions]\n"]
+)
+def test_metrics_of_another_program_are_left_alone(tmp_path, config):
+    """`metrics.jsonl` is a common name; what makes a run ours is the table `run` in its config.toml."""
+    contents = {"metrics.jsonl": b'{"epoch": 1}\n', "thesis.tex": b"years of work", ".x.tmp": b"a draft"}
+    if config is not None:
+        contents["config.toml"] = config if isinstance(config, bytes) else config.encode()
+    for name, content in contents.items():
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(OutputError, match="holds other files"), run.opened(tmp_path, resume=False):
+        pass
+    assert {name: (tmp_path / name).read_bytes() for name in _files(tmp_path)} == contents
+
+
+def test_a_run_that_died_before_its_first_checkpoint_may_start_again(tmp_path):
+    """Whatever the moment: `opened` makes metrics.jsonl first, `prepare` config.toml, then come the steps."""
+    (tmp_path / "metrics.jsonl").touch()
+    run.check(tmp_path)
+    (tmp_path / ".config.0a1b2c3d.tmp.toml").write_text("step")
+    run.check(tmp_path)
+    run.prepare(tmp_path, SmallConfig(), {"method": "small"})
+    (tmp_path / "metrics.jsonl").write_text('{"step": 1}\n')
+    (tmp_path / "previews").mkdir()
+    run.check(tmp_path)
 
 
 @pytest.mark.parametrize("name", ["checkpoint.safetensors", "checkpoint.previous.safetensors"])

@@ -65,10 +65,12 @@ class Animate(GrowthOptions):
         in_range("--size", self.size, 16, 4096)
         in_range("--spp", self.spp, 1, 65536)
         in_range("--fps", self.fps, 1, 60)
+        from mitex.mesh.files import mesh_files
         from mitex.paths import prepare_folder, prepare_output
         from mitex.render import VIDEO_SUFFIXES, check_video, film
 
-        out = prepare_output(self.out, VIDEO_SUFFIXES)
+        inputs = [self.model, *mesh_files(self.mesh)]
+        out = prepare_output(self.out, VIDEO_SUFFIXES, inputs)
         from mitex.asset import clay
         from mitex.methods.geometric import GeometricTexture
         from mitex.render.progress import bar
@@ -82,8 +84,9 @@ class Animate(GrowthOptions):
         check_video(out, len(meshes), self.fps, self.size)
         if self.meshes is not None:
             folder = prepare_folder(self.meshes)
-            for k, frame in enumerate(meshes):
-                clay(frame).export(folder / f"{k:04}.ply")
+            places = [prepare_output(folder / f"{k:04}.ply", inputs=inputs) for k in range(len(meshes))]
+            for place, frame in zip(places, meshes, strict=True):
+                clay(frame).export(place)
         with bar("film") as progress:
             film(
                 map(clay, meshes),

@@ -22,7 +22,7 @@ class GeometricConfig(TrainingConfig):
     noise: float = key(0.1, "standard deviation of what is added to the vertices [mean edges]", 0, 10)
     reconstruction: float = key(5.0, "weight of the distance from the training mesh", 0)
     penalty: float = key(0.1, "weight of the gradient penalty", 0)
-    lr: float = key(5e-4, "learning rate at the beginning of each level", 0, 1)
+    lr: float = key(5e-4, "learning rate at the beginning of each level, halved after each quarter", 0, 1)
     beta1: float = key(0.5, "Adam's decay of the first moment", 0, 0.9999)
     beta2: float = key(0.99, "Adam's decay of the second moment", 0, 0.9999)
     remeasure: bool = key(False, "measure the mean edge on each level, instead of carrying it from the first")

@@ -128,8 +128,8 @@ class NcaTask:
         pictures = channel_triples(state_layout(self.maps), False, 0)
         exemplar = self.exemplar.resized(size)
         rows = []
-        shown = triple_images(exemplar, pictures, STATE_CHANNELS)
-        for image, channels in zip(shown, (list(p.channels) for p in pictures), strict=True):
+        images = triple_images(exemplar, pictures, STATE_CHANNELS)
+        for image, channels in zip(images, (list(p.channels) for p in pictures), strict=True):
             rows.append(_row(image, *(v[..., channels] for v in views)))
         return np.clip(np.concatenate(rows, 0), 0, 1)
 

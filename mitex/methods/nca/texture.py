@@ -85,9 +85,10 @@ class NcaTexture:
             An asset on the subdivided mesh, in the mesh's own units and place, with one map per learned map.
 
         Raises:
-            ConfigError: options out of range.
+            ConfigError: options out of range, or the model needs a condition.
             MeshError: the mesh cannot be remeshed.
         """
+        self._check_unconditioned()
         laid = mesh if resolution is None or scale != 1.0 else laid_out(mesh, resolution)
         dense = self._dense(laid, subdivide, scale)
         state = self.grow(dense, seed=seed, steps=STEPS if steps is None else steps, orientation=orientation)
@@ -104,6 +105,7 @@ class NcaTexture:
         """The state (V, C) after `steps` steps from the seed; held in [-clamp, clamp] as in the authors'
         demo.
         """
+        self._check_unconditioned()
         if steps < 0:
             raise ConfigError(f"{steps} steps", "give 0 or more")
         keep_freed_memory()
@@ -113,6 +115,14 @@ class NcaTexture:
         for _ in range(steps):
             state = self.model.evolve(state, seen, 1, generator).clamp_(-clamp, clamp)
         return state[0]
+
+    def _check_unconditioned(self) -> None:
+        if self.model.condition:
+            name, width = self.about.get("name", "the model"), self.model.condition
+            raise ConfigError(
+                f"'{name}' needs a condition of {width} values at each vertex, and has none here",
+                "use a model that was trained without, or give the condition to MeshNCA.evolve in Python",
+            )
 
     def _dense(self, mesh: Mesh, subdivide: int | str, scale: float) -> Mesh:
         if subdivide == "auto":

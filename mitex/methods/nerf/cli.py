@@ -42,9 +42,9 @@ class Fit(TrainingOptions):
 
     def run(self) -> None:
         options = self.run_options()
-        from mitex.runtime import yield_cores
+        from mitex.runtime import let_idle_threads_sleep
 
-        yield_cores()
+        let_idle_threads_sleep()
         from mitex.methods import nerf
 
         capture = nerf.load_capture(self.capture)

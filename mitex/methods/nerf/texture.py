@@ -34,9 +34,8 @@ from mitex.methods.nerf.synthesis.quilting import Quilt, quilt
 from mitex.methods.nerf.use.applied import AppliedTexture
 from mitex.methods.nerf.use.placement import EXTENT, UNWRAP_SIZE, in_scene_cube, uv_unit_length
 from mitex.methods.nerf.use.self_maps import self_maps
-from mitex.runtime import init, load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
+from mitex.runtime import init
+from mitex.runtime.jit import mi
 
 SIZE = 2048  # texels of a synthesized texture
 LARGEST = 8192  # that is quilted for a guide [texels]
@@ -107,6 +106,10 @@ class NerfTexture:
     @cached_property
     def decoder(self) -> Decoder:
         """The networks, packed."""
+        return self._new_decoder()
+
+    def _new_decoder(self) -> Decoder:
+        """With matrices of its own, which may change."""
         return Decoder([mi.TensorXf(weight.numpy()) for weight in self.model.weights], packed=True)
 
     @property
@@ -264,7 +267,7 @@ class NerfTexture:
         return AppliedTexture(
             mesh,
             maps,
-            self.decoder,
+            self._new_decoder(),
             light_coefficients,
             self.model.config,
             thickness=self.model.base.thickness,

@@ -7,15 +7,9 @@ from typing import Protocol
 
 import torch
 
-from mitex.features import Vgg16
+from mitex.features import Vgg16, normalise_colours
 from mitex.features.frozen import GramTap, Tap
-from mitex.losses import (
-    decorrelate,
-    gram_distance,
-    gram_matrix,
-    moment_distance,
-    relaxed_transport,
-)
+from mitex.losses import gram_distance, gram_matrix, moment_distance, relaxed_transport
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.statistics import exemplar_features
 
@@ -95,7 +89,7 @@ class TransportComparison:
     ) -> None:
         self.layers, self.samples, self.moment_weight = layers, samples, moment_weight
         self.low = network.dtype == torch.bfloat16
-        self.colours = [image.flatten(0, 1) for image in images]
+        self.colours = [normalise_colours(image.flatten(0, 1)) for image in images]
         self.targets = [exemplar_features(network, image, layers) for image in images]
 
     def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Taps:
@@ -108,7 +102,7 @@ class TransportComparison:
         self, features: Mapping[str, torch.Tensor], colours: torch.Tensor, k: int, generator: torch.Generator
     ) -> torch.Tensor:
         ours, theirs = (c[self._places(len(c), generator)][None] for c in (colours, self.colours[k]))
-        total = relaxed_transport(decorrelate(ours), decorrelate(theirs), euclidean=True).sum()
+        total = relaxed_transport(normalise_colours(ours), theirs, euclidean=True).sum()
         for layer, a in features.items():
             target = self.targets[k][layer]
             b = target[self._places(len(target), generator)][None]

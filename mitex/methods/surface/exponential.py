@@ -15,10 +15,10 @@ from mitex.errors import ConfigError
 from mitex.mesh import Mesh
 from mitex.methods.surface.unfolding import unfold
 from mitex.runtime import load_mitsuba
+from mitex.runtime.jit import dr
 
-load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
-from drjit.llvm import Array2f64, Array3f64, Bool, Float64, Int32, UInt32  # noqa: E402
+# isort: split
+from drjit.llvm import Array2f64, Array3f64, Bool, Float64, Int32, UInt32  # after Mitex's choice of LLVM
 
 # A bound for walks that turn around the tip of a needle-sharp cone; a great circle on a sphere of a million
 # even faces crosses about 2,600 of them.

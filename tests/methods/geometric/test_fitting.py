@@ -20,7 +20,7 @@ from mitex.methods.geometric.features import displaced, face_features
 from mitex.methods.geometric.gan import critic_loss
 from mitex.methods.geometric.hierarchy import Hierarchy
 from mitex.methods.geometric.network import FaceNetwork
-from mitex.methods.geometric.pictures import portrait
+from mitex.methods.geometric.portrait import portrait
 from mitex.methods.geometric.references import find_reference
 from mitex.methods.geometric.report import report
 from mitex.methods.geometric.task import GeometricTask, learning_rate
@@ -361,6 +361,18 @@ def test_the_learning_rate_is_halved_on_each_level():
     config = GeometricConfig(steps=30, level_steps=8, lr=1.0)
     rates = [learning_rate(config, step) for step in range(10)]
     assert rates == [1, 1, 0.5, 0.5, 0.25, 0.25, 0.125, 0.125, 1, 1]
+
+
+@pytest.mark.parametrize(("preset", "quarter"), [("fast", 500), ("paper", 1500)])
+def test_the_published_schedule(preset, quarter):
+    """From 5e-4, decayed by 0.5 "in intervals of 500 iterations" of the 2,000 on a level: three halvings.
+
+    An iteration has three steps of the generator in `paper`, and one in `fast`.
+    """
+    config = PRESETS[preset]
+    rates = np.array([learning_rate(config, step) for step in range(config.steps)])
+    expected = np.repeat([5e-4, 2.5e-4, 1.25e-4, 0.625e-4], quarter)
+    np.testing.assert_array_equal(rates.reshape(-1, 4 * quarter), np.tile(expected, (config.levels, 1)))
 
 
 def test_critics_learn_at_that_rate(monkeypatch):

@@ -29,7 +29,8 @@ def harmonics(d: list[float], degree: int) -> list[float]:
 def direction(mesh: Mesh, i: int, j: int, angle: float = 0.0) -> list[float]:
     """Of the edge j -> i, turned back by `angle` about the normal of i."""
     offset = mesh.vertices[j].astype(float) - mesh.vertices[i].astype(float)
-    d = offset / (math.sqrt(float(offset @ offset)) + 1e-8)
+    length = math.sqrt(float(offset @ offset))
+    d = offset / length if length else offset
     if angle:
         d = Rotation.from_rotvec(-angle * mesh.normals[i].astype(float)).apply(d)
     return d.tolist()

@@ -85,6 +85,17 @@ def test_place_and_size_of_the_mesh_do_not_matter(generator, degree):
     assert torch.allclose(perception(moved, degree)(state), perception(mesh, degree)(state), atol=1e-4)
 
 
+@pytest.mark.parametrize("radius", [10.0**k for k in range(-12, 13, 2)])
+@pytest.mark.parametrize("orientation", [0.0, 0.7])
+def test_no_size_is_too_small_or_too_large(generator, radius, orientation):
+    """The edges of the smallest one are 1e-13 long, far below any constant that looks small."""
+    mesh = icosphere(8)
+    state = _state(mesh, generator)
+    sized = mesh.with_vertices(radius * mesh.vertices.astype(float))
+    expected = perception(mesh, 2, orientation)(state)
+    assert torch.allclose(perception(sized, 2, orientation)(state), expected, rtol=1e-5, atol=1e-5)
+
+
 def test_a_constant_state_is_seen_as_no_change(generator):
     mesh = patchwork()
     seen = perception(mesh, 2)(torch.full((1, len(mesh.vertices), 2), 0.7))

@@ -206,3 +206,11 @@ def test_unusable_options(made, sphere, options, problem):
 def test_too_many_vertices_are_refused_before_they_are_made(made, options):
     with pytest.raises(ConfigError, match="more than 4,000,000 vertices"):
         made.apply(icosphere(16), **options)
+
+
+def test_a_model_with_a_condition_says_what_it_needs(sphere):
+    """Before any work: 200 million steps would not end."""
+    conditioned = texture(condition=3)
+    for use in (conditioned.apply, conditioned.grow):
+        with pytest.raises(ConfigError, match=r"'tiny' needs a condition of 3 values .*; .*MeshNCA\.evolve"):
+            use(sphere, steps=200_000_000)

@@ -22,11 +22,10 @@ from mitex.errors import ConfigError
 from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh, subdivide_midpoint
 from mitex.methods.baselines.displacement import METHOD
-from mitex.runtime import init, load_mitsuba
+from mitex.runtime import init
+from mitex.runtime.jit import mi
 from mitex.scenes.stage import mesh_shape
 from mitex.training import model_file
-
-mi: Any = load_mitsuba(needs_llvm=False)
 
 ATLAS = 1024  # resolution that the target's charts are packed for
 

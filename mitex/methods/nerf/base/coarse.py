@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
-from dataclasses import dataclass, replace
+import time
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mitex.cache import cached, content_key
-from mitex.integrators.march import composite
+from mitex.errors import CheckpointError
 from mitex.mesh import Mesh
 from mitex.methods.nerf.base.base_shape import base_shape, given_base, shell_thickness
 from mitex.methods.nerf.capture.capture import Capture
@@ -21,13 +24,11 @@ from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.field.rendering import batch_rays
 from mitex.methods.nerf.training.plain import PlainTask, train_plain_field
 from mitex.paths import cache_dir
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
+from mitex.textures.march import composite
 
 VERSION = 1  # of the base shapes in the cache
-COARSE = dict(  # what the coarse field needs less of
+COARSE: dict[str, Any] = dict(  # what the coarse field needs less of
     table=15,
     ray_steps=256,
     rays=1024,
@@ -43,6 +44,7 @@ VIEWS = 16  # that the surface is scanned from
 SCAN_SIDE = 200  # pixels of a scan along its longest side
 SOLID = 0.95  # opacity of a ray that has met the surface
 VOXEL = 0.01  # the scan keeps one point in each [scene units]
+ABANDONED = 7 * 24 * 3600.0  # a training that nobody has gone on with for so long is removed [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,37 +63,64 @@ class BaseShape:
 
 
 def find_base(
-    capture: Capture, config: NerfConfig, given: Mesh | None = None, quiet: bool = True
+    capture: Capture, config: NerfConfig, base_mesh: Mesh | None = None, quiet: bool = True
 ) -> BaseShape:
     """Trains a coarse field on a capture and takes the base shape from it; kept in the user's cache folder.
 
     Args:
         capture: the views to learn from.
         config: settings.
-        given: a base shape of the user's in the capture's world, or None.
+        base_mesh: a base shape of the user's in the capture's world, or None.
         quiet: show no progress.
 
     Raises:
         MeshError: there is nothing dense, or the given mesh cannot be used.
     """
-    steps = config.base_steps
-    coarse = replace(config, **COARSE, steps=steps, lr_steps=steps)
+    coarse = coarse_config(config)
     arrays = (*capture.images, capture.poses, capture.intrinsics, capture.distortion)
-    mesh = () if given is None else (given.vertices, given.faces)
-    settings = (config.seed, steps, config.lr, config.concavity, config.repulsion, config.neighbours)
-    place = cache_dir() / "nerf" / content_key(VERSION, *arrays, *mesh, *settings)
+    mesh = () if base_mesh is None else (base_mesh.vertices, base_mesh.faces)
+    folder = cache_dir() / "nerf"
+    # A training goes on under equal configs only, so its folder is named by all that is in them.
+    training = folder / f"{content_key(VERSION, *arrays, capture.name, coarse)}.run"
+    settings = (config.concavity, config.repulsion, config.neighbours)
+    place = folder / content_key(VERSION, *arrays, *mesh, coarse, *settings)
 
     def compute() -> BaseShape:
-        task = train_plain_field(coarse, capture, (capture, 0), place.with_suffix(".run"), quiet)
+        task = _trained(coarse, capture, training, quiet)
         _say("cutting the base shape out of the coarse field, about a minute", quiet)
-        base = _shape_of(task, config) if given is None else given_base(given)
+        base = _shape_of(task, config) if base_mesh is None else given_base(base_mesh)
         scan = scan_surface(task)
         projection = Projection(base, neighbours=config.neighbours, repulsion=config.repulsion)
         return BaseShape(base, scan, shell_thickness(scan, projection))
 
     base = cached(place, compute, _read, _write)
+    shutil.rmtree(training, ignore_errors=True)
+    _remove_abandoned(folder)
     _say(f"base shape of {len(base.mesh.faces):,} faces, shell of +-{base.thickness:.3f}", quiet)
     return base
+
+
+def coarse_config(config: NerfConfig) -> NerfConfig:
+    """Settings of the coarse field; of a fit's own there are only those in it that change this field."""
+    steps = config.base_steps
+    return NerfConfig(preset="coarse", seed=config.seed, lr=config.lr, steps=steps, lr_steps=steps, **COARSE)
+
+
+def _trained(coarse: NerfConfig, capture: Capture, folder: Path, quiet: bool) -> PlainTask:
+    """The coarse field; an interrupted training goes on, unless its checkpoints cannot be used."""
+    try:
+        return train_plain_field(coarse, capture, (capture, 0), folder, quiet)
+    except CheckpointError:
+        shutil.rmtree(folder)
+        return train_plain_field(coarse, capture, (capture, 0), folder, quiet)
+
+
+def _remove_abandoned(folder: Path) -> None:
+    """Removes interrupted trainings that nobody has gone on with for a week."""
+    for training in folder.glob("*.run"):
+        with suppress(OSError):
+            if time.time() - training.stat().st_mtime > ABANDONED:
+                shutil.rmtree(training)
 
 
 def _shape_of(task: PlainTask, config: NerfConfig) -> Mesh:

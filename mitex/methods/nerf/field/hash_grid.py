@@ -6,12 +6,10 @@ import itertools
 import math
 from typing import Any
 
-from mitex.methods.nerf.field.tensors import row_places
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 from drjit.hashgrid import HashGridEncoding  # noqa: E402
+
+from mitex.methods.nerf.field.tensors import row_places
+from mitex.runtime.jit import dr, mi
 
 CHANNELS = 2  # of a level
 PRIMES = 2654435761, 805459861  # for the second and the third axis
@@ -86,7 +84,7 @@ class HashGrid:
         side, first = (dr.gather(mi.UInt32, values, level) for values in (self._side, self._first))
         dense = dr.gather(mi.Bool, self._dense, level)
         low = mi.Point3u(dr.floor(place))
-        share = place - low
+        share = place - mi.Point3f(low)
         features = mi.Vector2f(0)
         for corner in itertools.product((0, 1), repeat=3):
             x, y, z = (low[k] + corner[k] for k in range(3))

@@ -16,10 +16,7 @@ import numpy as np
 from mitex.errors import ImageError
 from mitex.geometry.vectors import unit
 from mitex.methods.nerf.field.tensors import channels
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
 
 COEFFICIENTS = 16
 BANDS = 3  # of l that are rendered

@@ -17,11 +17,7 @@ from typing import Any, TypeVar
 import torch
 
 from mitex.methods.nerf.field.tensors import stack_rows, unstack_rows
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
-import drjit.nn as nn  # noqa: E402
+from mitex.runtime.jit import dr, mi
 
 T = TypeVar("T")
 Weights = Sequence[torch.Tensor]
@@ -118,11 +114,11 @@ def packed_networks(*nets: Sequence[Any]) -> list[Any]:
     for weights in nets:
         layers: list[Any] = []
         for weight in weights:
-            linear: Any = nn.Linear(weight.shape[1], weight.shape[0], bias=False)
+            linear: Any = dr.nn.Linear(weight.shape[1], weight.shape[0], bias=False)
             linear.weights = weight
-            layers += [linear, nn.ReLU()]
-        modules.append(nn.Sequential(*layers[:-1]))
-    return list(nn.pack(*modules))
+            layers += [linear, dr.nn.ReLU()]
+        modules.append(dr.nn.Sequential(*layers[:-1]))
+    return list(dr.nn.pack(*modules))
 
 
 def network_rows(net: Any, values: list[Any]) -> list[Any]:
@@ -132,8 +128,8 @@ def network_rows(net: Any, values: list[Any]) -> list[Any]:
         net: its matrices (out, in), or one of `packed_networks`.
         values: input channels.
     """
-    if isinstance(net, nn.Module):
-        return list(net(nn.CoopVec(*values)))
+    if isinstance(net, dr.nn.Module):
+        return list(net(dr.nn.CoopVec(*values)))
     return unstack_rows(evaluate(net, stack_rows(values)))
 
 

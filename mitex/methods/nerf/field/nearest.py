@@ -8,10 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import KDTree
 
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
 
 CELL = 1.5  # side of a cell [spacings]
 EXTRA = 3  # vertices looked up at a cell's corners beyond the K nearest

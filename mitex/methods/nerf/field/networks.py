@@ -10,10 +10,7 @@ from torch.nn import functional as F
 
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field import mlp
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
 
 OCTAVES = 12  # of the signed distance
 FINE = 2 * OCTAVES + 1

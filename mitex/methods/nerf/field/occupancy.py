@@ -11,9 +11,7 @@ from scipy import ndimage
 
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.visual_hull import View, visual_hull
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
+from mitex.runtime.jit import mi
 
 WARMUP = 16  # refreshes of all cells, before it is half of them
 DECAY = 0.95

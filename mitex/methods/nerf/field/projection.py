@@ -17,11 +17,9 @@ import torch
 from mitex.errors import ConfigError, MeshError
 from mitex.mesh import Mesh
 from mitex.methods.nerf.field.nearest import NearestVertices
-from mitex.runtime import init, load_mitsuba
+from mitex.runtime import init
+from mitex.runtime.jit import dr, mi
 from mitex.scenes.stage import mesh_shape
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 MISSED = 10.0  # the distance of points without a foot
 BACK = 1e-5  # of the mesh's extent: rays start so far behind the point, which may lie on the surface

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from mitex.mesh import Mesh
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.field.tensors import channels, rows
-from mitex.runtime import init, load_mitsuba
+from mitex.runtime import init
+from mitex.runtime.jit import mi
 from mitex.scenes.stage import mesh_shape
-
-mi: Any = load_mitsuba(needs_llvm=False)
 
 
 @dataclass(frozen=True, eq=False)

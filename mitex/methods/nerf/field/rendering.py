@@ -8,15 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from mitex.integrators.march import DIAGONAL, RadianceField, composite
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.pixels import Batch, Pixels
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field.tensors import channels, rows
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
+from mitex.textures.march import DIAGONAL, RadianceField, composite
 
 CHUNK = 1 << 16  # rays marched at a time
 REFINEMENT = 2  # steps of a picture for one of the training; the durian gains 0.4 dB by it

@@ -7,10 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
 
 
 def tensor(values: Any) -> Any:

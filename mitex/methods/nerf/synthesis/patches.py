@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -21,11 +20,9 @@ from mitex.geometry.vectors import orthonormal
 from mitex.mesh import Mesh
 from mitex.mesh.topology import mesh_edges
 from mitex.methods.nerf.synthesis.matching import HORIZONTAL, VERTICAL
-from mitex.runtime import init, load_mitsuba
+from mitex.runtime import init
+from mitex.runtime.jit import dr, mi
 from mitex.scenes.stage import mesh_shape
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 SIZE = 128  # side of a patch [texels]
 LIFT = 0.1  # of the plane that the rays start from above the tangent plane [scene units]

@@ -9,7 +9,6 @@ Ramamoorthi and Hanrahan 2001).
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -19,10 +18,7 @@ from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.field.lighting import BANDS, COEFFICIENTS, COSINE, POWER
 from mitex.methods.nerf.field.raycast import Raycaster
 from mitex.methods.nerf.field.tensors import channels
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
+from mitex.runtime.jit import dr, mi
 
 STRIDE = 4  # pixels
 SOLID = 0.5  # alpha of pixels that count
@@ -62,6 +58,21 @@ def estimated_light(mesh: Mesh, capture: Capture) -> np.ndarray:
         light[:count] = np.linalg.solve(gram + prior, bright) / ALBEDO
     light[0] = max(light[0], DARKEST / ALBEDO * math.sqrt(4 * math.pi))
     return _softened(light).astype(np.float32)
+
+
+def brightness(light: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Display values of a diffuse surface under a light, beside those in even light of the same strength.
+
+    Args:
+        light: (16,) spherical harmonics, see `lighting`.
+        normals: (N, 3) of length 1.
+
+    Returns:
+        (N,) factors; no side counts as darker than a quarter of the mean.
+    """
+    even = max(float(light[0]) / math.sqrt(4 * math.pi), DARKEST)
+    shades = _irradiance(normals) @ light[: BANDS**2]
+    return (np.maximum(shades, SHADE * even) / even) ** POWER
 
 
 def _softened(light: np.ndarray) -> np.ndarray:

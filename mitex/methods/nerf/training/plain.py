@@ -11,7 +11,6 @@ import numpy as np
 import torch
 
 from mitex.bridge import call
-from mitex.integrators.march import Samples, sum_rays, weights_of
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.pixels import Batch
 from mitex.methods.nerf.config import NerfConfig
@@ -22,11 +21,9 @@ from mitex.methods.nerf.field.occupancy import Occupancy, hull_cells
 from mitex.methods.nerf.field.rendering import batch_rays, render_step
 from mitex.methods.nerf.field.tensors import channels, tensor
 from mitex.methods.nerf.training.radiance import RadianceTask, Rendered, schedule
-from mitex.runtime import load_mitsuba
+from mitex.runtime.jit import dr, mi
+from mitex.textures.march import Samples, sum_rays, weights_of
 from mitex.training import checkpoint, train
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 LEVELS, COARSEST, FINEST = 16, 16, 2048
 CODE = 15
@@ -125,7 +122,7 @@ def train_plain_field(
     """Trains a plain field in a run folder, or continues there; arguments as of `RadianceTask`."""
     folder = Path(folder)
     task = PlainTask(config, capture, preview_view)
-    resume = (folder / checkpoint.NAME).exists()
+    resume = any((folder / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
     train(task, config, folder, resume=resume, quiet=quiet, **schedule(config))
     return task
 

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import torch
 
-from mitex.integrators.march import DIAGONAL, RadianceField, Samples, march, visible
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.pixels import Batch, Pixels
 from mitex.methods.nerf.config import NerfConfig
@@ -18,12 +17,11 @@ from mitex.methods.nerf.field.occupancy import Occupancy
 from mitex.methods.nerf.field.rendering import batch_rays, render_view
 from mitex.methods.nerf.field.tensors import rows
 from mitex.methods.nerf.training.losses import distortion
-from mitex.runtime import load_mitsuba, modest_workers
+from mitex.runtime import lower_worker_priority
+from mitex.runtime.jit import dr, mi
+from mitex.textures.march import DIAGONAL, RadianceField, Samples, march, visible
 from mitex.training import Change, Step
 from mitex.training.optim import Adam
-
-mi: Any = load_mitsuba(needs_llvm=False)
-import drjit as dr  # noqa: E402  (Mitsuba first: it decides which LLVM Dr.Jit opens)
 
 REFRESH = 16  # steps between refreshes of the occupancy, and between updates of the mean parameters
 BETAS, EPSILON = (0.9, 0.99), 1e-15  # of Adam
@@ -57,7 +55,7 @@ class RadianceTask(ABC):
         self.step_length = DIAGONAL / config.ray_steps
         self._commits = 0
         dr.set_expand_threshold(2**26)  # by default gradients of large tables are 2.5 times slower
-        modest_workers()
+        lower_worker_priority()
 
     @abstractmethod
     def metadata(self) -> dict[str, str]:

@@ -15,7 +15,6 @@ from mitex.atlas import laid_out
 from mitex.errors import ConfigError
 from mitex.export import SUFFIXES
 from mitex.images import write_image
-from mitex.integrators.march import DIAGONAL
 from mitex.mesh import Mesh
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field.decoder import Decoder
@@ -27,6 +26,7 @@ from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents, uv_fram
 from mitex.methods.nerf.use.extract import extract_mesh
 from mitex.methods.nerf.use.placement import UNWRAP_SIZE, in_scene_cube, uv_unit_length
 from mitex.paths import prepare_output
+from mitex.textures.march import DIAGONAL
 
 PICTURES = (".png", ".jpg", ".jpeg")
 NEIGHBOURS = 5  # vertices that make the coarse normal of a target
@@ -71,8 +71,10 @@ class AppliedTexture(Shell):
             )
         self.mesh, self._maps = laid_out(mesh, UNWRAP_SIZE), maps
         placed, self.similarity = in_scene_cube(self.mesh)
-        # One unit of the UVs shows so many textures that their elements have the requested size.
-        uv = np.asarray(placed.uv) * (uv_unit_length(placed) / (maps.size[1] * maps.gap * scale))
+        # One unit of the UVs shows so many textures, across and up, that elements have the requested size.
+        height, width = maps.size
+        lengths = maps.gap * scale * np.array([width, height], np.float32)
+        uv = np.asarray(placed.uv) * (uv_unit_length(placed) / lengths)
         raised = lift * scale * max(-ground, 0.0)
         thickness = thickness * scale
         projection = Projection(placed, neighbours=NEIGHBOURS, repulsion=None, reach=thickness + raised)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -17,9 +16,7 @@ from mitex.methods.nerf.field.lighting import COEFFICIENTS
 from mitex.methods.nerf.field.occupancy import sample_grid
 from mitex.methods.nerf.field.shell import Shell, appearance
 from mitex.methods.nerf.field.tensors import channels, rows
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
+from mitex.runtime.jit import mi
 
 CELLS = 3  # of the grid along a side of a cell of the occupancy grid
 FLOOR = -4.0  # logarithm of densities below [of the level]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from mitex.evaluation.elevations import HALF
@@ -14,9 +12,7 @@ from mitex.methods.nerf.field.rendering import render_rays
 from mitex.methods.nerf.field.shell import Shell
 from mitex.methods.nerf.use.applied import AppliedTexture
 from mitex.methods.nerf.use.placement import EXTENT
-from mitex.runtime import load_mitsuba
-
-mi: Any = load_mitsuba(needs_llvm=False)
+from mitex.runtime.jit import mi
 
 SIDE = 96  # squares along the plane
 SCALE = EXTENT / HALF  # of a texture on the plane, such that it keeps its size in the scene

@@ -18,9 +18,9 @@ from mitex.methods.nerf.field.mlp import weight_bound
 from mitex.methods.nerf.field.networks import FINE, weight_shapes
 from mitex.methods.nerf.field.tensors import rows, tensor
 from mitex.runtime import init
+from mitex.runtime.jit import dr, mi
 
-mi: Any = init()
-import drjit as dr  # noqa: E402
+init()
 
 SMALL = NerfConfig(table=10, coarsest=8, finest=16)
 POINTS = 300

@@ -13,9 +13,9 @@ from mitex.methods.nerf.field.encoding import Encoding
 from mitex.methods.nerf.field.hash_grid import HashGrid
 from mitex.methods.nerf.field.tensors import channels, stack_rows
 from mitex.runtime import init
+from mitex.runtime.jit import dr, mi
 
-mi = init()
-import drjit as dr  # noqa: E402
+init()
 
 CONFIG = NerfConfig(table=10, coarsest=8, finest=16)  # the first level is dense, the others are hashed
 

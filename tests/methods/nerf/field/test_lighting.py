@@ -217,7 +217,7 @@ def test_light_from_one_side_turns_with_the_object(mi, unit, rng):
 
 def test_gradients_are_finite_differences(mi, unit, rng):
     """Of a random sum of colours, with respect to everything; float32, so a wide central difference."""
-    import drjit as dr
+    from mitex.runtime.jit import dr
 
     count = 12
     light = np.zeros((16, 3))
@@ -265,7 +265,7 @@ def test_display_is_the_power_but_next_to_black(mi):
 
 
 def test_display_has_finite_gradients_everywhere(mi):
-    import drjit as dr
+    from mitex.runtime.jit import dr
 
     linear = mi.Float([-1.0, 0.0, 1e-20, 5e-5, TOE * 1.001, 0.18, 1.0])
     dr.enable_grad(linear)

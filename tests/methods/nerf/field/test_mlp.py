@@ -8,9 +8,9 @@ import torch
 
 from mitex.methods.nerf.field import mlp
 from mitex.runtime import init, threads
+from mitex.runtime.jit import dr, mi
 
-mi = init()
-import drjit as dr  # noqa: E402
+init()
 
 WIDTHS, POINTS = (5, 8, 7, 3), 50
 

@@ -17,9 +17,9 @@ from mitex.methods.nerf.field.shell import Shell, ShellCoords, appearance, shell
 from mitex.methods.nerf.field.tensors import channels, rows
 from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents
 from mitex.runtime import init
+from mitex.runtime.jit import dr, mi
 
-mi: Any = init()
-import drjit as dr  # noqa: E402
+init()
 
 
 def ball(frequency: int = 12) -> Mesh:
@@ -116,7 +116,7 @@ def test_density_is_zero_outside_and_evaluated_inside():
     assert rows(colour).shape == (3, 3) and (rows(colour) >= 0).all()
 
 
-def seen(view, light, theta=0.0, detach: bool = False) -> tuple[Any, Any]:
+def seen(view, light, theta: mi.Float | float = 0.0, detach: bool = False) -> tuple[Any, Any]:
     """Colour and normal of a surface of k_d = 0.2, k_s from 0.1 to 0.7 and this theta."""
 
     def surface(f, phase, distance):

@@ -5,9 +5,9 @@ import pytest
 import torch
 
 from mitex.errors import ConfigError
-from mitex.integrators.geometry import GeometryRenderer
 from mitex.mesh import icosphere
 from mitex.scenes.cameras import orbit
+from mitex.scenes.geometry_renderer import GeometryRenderer
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,75 @@
+"""The threads of torch and of Dr.Jit: how many, and which of the two gives way."""
+
+import os
+import sys
+import time
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+
+from mitex.errors import ConfigError
+
+WORKER_NAME = "nt ["  # what Dr.Jit calls its worker threads, with a number
+WORKER_NICENESS = 10  # added to the process's when they are to give way
+WORKER_IDLE_TIME = 0.05  # after which they sleep [s]
+
+_threads: int | None = None
+
+
+def threads(count: int) -> None:
+    """Lets torch and Dr.Jit use `count` threads each; with one thread results are bit-identical.
+
+    Raises:
+        ConfigError: `count` is below 1.
+    """
+    global _threads
+    if count < 1:
+        raise ConfigError(f"{count} threads cannot work", "use at least 1")
+    _threads = count
+    import_module("torch").set_num_threads(count)
+    if "drjit" in sys.modules:
+        set_workers(count)
+
+
+def apply_thread_count() -> None:
+    """Gives Dr.Jit, once it is loaded, the number of threads that `threads` was called with before."""
+    if _threads is not None and _threads != import_module("drjit").thread_count():
+        set_workers(_threads)
+
+
+def let_idle_threads_sleep() -> None:
+    """Lets torch's idle threads sleep, where they would spin on cores that Dr.Jit works on.
+
+    For what goes to and fro between the two, as `nerf` does: its training takes three quarters of the time.
+    Work that is mostly torch's gets slower: `nca` by a tenth to a fifth, `surface` by a fifth or far more.
+    To be called before torch is imported, later it has no effect; OMP_WAIT_POLICY has precedence.
+    """
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+
+
+def lower_worker_priority() -> None:
+    """Lets torch go before Dr.Jit's workers where both want a core (on Linux; elsewhere nothing happens).
+
+    They spin for 20 ms after each kernel, and torch's products on two cores take half as long again. At a
+    lower priority they take what is free. For work in which torch's idle threads sleep, see
+    `let_idle_threads_sleep`: beside threads that spin kernels would starve. To end workers while torch works
+    is as fast, but see `set_workers`.
+    """
+    drjit = import_module("drjit")
+    drjit.set_thread_count(drjit.thread_count())  # begins them if no kernel has run yet
+    for name in Path("/proc/self/task").glob("*/comm"):
+        with suppress(OSError):  # a thread that ends meanwhile
+            if name.read_text().startswith(WORKER_NAME):
+                os.setpriority(os.PRIO_PROCESS, int(name.parent.name), os.nice(0) + WORKER_NICENESS)
+
+
+def set_workers(count: int) -> None:
+    """Lets Dr.Jit use `count` threads.
+
+    A worker that is told to end just as it falls asleep may miss that, and is waited for forever (nanothread
+    of Dr.Jit 1.5). New ones sleep at once, others 20 ms after a kernel: they do so before any is ended.
+    """
+    drjit = import_module("drjit")
+    if count < drjit.thread_count():
+        time.sleep(WORKER_IDLE_TIME)
+    drjit.set_thread_count(count)
