@@ -13,7 +13,7 @@ from mitex.losses import gram_distance, gram_matrix, moment_distance, relaxed_tr
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.statistics import exemplar_features
 
-LEAST = 256  # feature vectors of a region
+MIN_VECTORS = 256  # feature vectors of a region
 Taps = dict[str, Tap | GramTap]
 
 
@@ -33,14 +33,14 @@ class GramComparison:
     """Squared distance of Gram matrices, averaged over layers (equation 4) and regions of the surface.
 
     One matrix for the whole surface says nothing of where its features are: a texture may be strong in one
-    place and faint elsewhere. Elements are numbered by groups, so a range of them is a region.
+    place and faint elsewhere. Regions are compact in space (`regions.bisect`).
 
     Args:
         network: of images.
         images: (P, H, W, 3) the exemplar's channel triples.
         layers: that are compared.
         region: texels of a region at the images' scale; None compares the whole surface, as the paper does.
-            Regions of deep layers are larger where that is needed for `LEAST` feature vectors in each.
+            Regions of deep layers are larger where that is needed for `MIN_VECTORS` feature vectors in each.
     """
 
     def __init__(
@@ -55,11 +55,12 @@ class GramComparison:
     def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Taps:
         return {layer: GramTap(network.place(layer), self._regions(network, layer)) for layer in self.layers}
 
-    def _regions(self, network: SurfaceVgg, layer: str) -> int:
+    def _regions(self, network: SurfaceVgg, layer: str) -> list[torch.Tensor] | None:
         if self.region is None:
-            return 1
-        most = network.counts[layer] // LEAST
-        return max(min(network.counts["relu1_1"] // self.region, most), 1)
+            return None
+        most = network.counts[layer] // MIN_VECTORS
+        count = min(network.counts["relu1_1"] // self.region, most)
+        return network.regions(layer, count) if count > 1 else None
 
     def cost(
         self, features: Mapping[str, torch.Tensor], colours: torch.Tensor, k: int, generator: torch.Generator
