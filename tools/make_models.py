@@ -40,8 +40,8 @@ EXEMPLARS = {
 def record(name: str) -> dict[str, object]:
     """What the file of a model trained by this table says of its training."""
     settings = resolve(PRESETS, overrides=SETTINGS[name])
-    about = {"name": name, "exemplar": EXEMPLARS[name], "preset": settings.preset, "steps": settings.steps}
-    about["density"] = settings.density
+    about: dict[str, object] = {"name": name, "exemplar": EXEMPLARS[name], "preset": settings.preset}
+    about |= {"steps": settings.steps, "density": settings.density}
     return about if name == PARENT else about | {"parent": PARENT}
 
 

@@ -1,19 +1,19 @@
 """`shell_field`: a volume that carries a radiance field, for the `shell` integrator.
 
 Mitsuba 3.9 registers no Python volumes, so a `shell_field` is not named in a scene's dictionary: it is made
-by `shell_field(...)` and given to the integrator as an object. That keeps the field's arrays as they are; as
-the integrator's parameters they would have to be named and copied one by one.
+by `shell_field(...)` and given to the integrator as an object. The parameters of a `DifferentiableField`
+are then those of the scene: `mi.traverse` lists them, and images have derivatives to them.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from mitex.mesh import Similarity
 from mitex.runtime.jit import dr, mi
-from mitex.textures.march import Composite, RadianceField, composite
+from mitex.textures.march import Composite, DifferentiableField, RadianceField, composite
 from mitex.textures.variant import for_variant, init_base
 
 CHUNK = 1 << 16  # rays that are marched at a time
@@ -33,7 +33,7 @@ class ShellFieldMethods:
         self.field, self.similarity = field, similarity
         self.turn = np.eye(3) if turn is None else turn
 
-    def bbox(self) -> Any:
+    def bbox(self) -> mi.ScalarBoundingBox3f:
         """Of the cube, in the world."""
         corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
         corners = (corners * self.similarity.scale + self.similarity.center) @ self.turn.T
@@ -43,7 +43,7 @@ class ShellFieldMethods:
         """No bound is known."""
         return float("inf")
 
-    def march(self, ray: Any, jitter: Any, active: Any) -> Composite:
+    def march(self, ray: mi.Ray3f, jitter: mi.Float, active: mi.Bool) -> Composite:
         """What rays gather up to their `maxt`, where `active`: as of `composite`, with depths in world
         units.
 
@@ -54,7 +54,7 @@ class ShellFieldMethods:
         """
         scale = float(self.similarity.scale)
         centre = mi.Vector3f(np.asarray(self.similarity.center, np.float32).tolist())
-        rays: Any = dr.compress(active)
+        rays = mi.UInt32(dr.compress(active))
         count = max(dr.width(ray.o), dr.width(active), dr.width(jitter))
         total = Composite(dr.zeros(mi.Color3f, count), dr.ones(mi.Float, count), dr.zeros(mi.Float, count))
         for start in range(0, dr.width(rays), CHUNK):
@@ -71,15 +71,19 @@ class ShellFieldMethods:
             dr.scatter(total.depth, pixels.depth * scale, index)
         return total
 
-    def traverse(self, callback: Any) -> None:
-        parameters = getattr(self.field, "parameters", None)
-        for name, value in (parameters() if parameters else {}).items():
-            callback.put(name, value, mi.ParamFlags.Differentiable)
+    def traverse(self, callback: mi.TraversalCallback) -> None:
+        if isinstance(self.field, DifferentiableField):
+            for name, value in self.field.parameters().items():
+                callback.put(name, value, mi.ParamFlags.Differentiable)
+
+    def parameters_changed(self, keys: Sequence[str] = ()) -> None:
+        if isinstance(self.field, DifferentiableField):
+            self.field.parameters_changed()
 
     def to_string(self) -> str:
         return f"ShellField[\n  bbox = {self.bbox()},\n  step = {self.field.step}\n]"
 
 
-def shell_field(field: RadianceField, similarity: Similarity, turn: np.ndarray | None = None) -> Any:
+def shell_field(field: RadianceField, similarity: Similarity, turn: np.ndarray | None = None) -> mi.Volume:
     """An `mi.Volume` of the current variant that carries a radiance field; see `ShellFieldMethods`."""
     return for_variant("ShellField", mi.Volume, ShellFieldMethods)(field, similarity, turn)

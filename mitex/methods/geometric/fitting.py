@@ -38,7 +38,7 @@ def fit(
 ) -> GeometricTexture:
     """Learns the geometric texture of a reference mesh; writes a run folder with the model in it.
 
-    The training meshes of the levels are found first and kept in the user's cache folder.
+    The training meshes of the levels are computed first and kept in the user's cache folder.
 
     Args:
         reference: a mesh, what `Mesh.load` takes, or a name of `REFERENCES`.
@@ -56,8 +56,8 @@ def fit(
     run = Run.of(PRESETS, out, **options)
     config = run.config
     shape = reference if isinstance(reference, Mesh) else find_reference(reference)
-    given = Mesh.load(template) if isinstance(template, str | Path) else template
-    shape, start = normalised(shape, find_template(shape, given))
+    template = Mesh.load(template) if isinstance(template, str | Path) else template
+    shape, start = normalised(shape, find_template(shape, template))
     keep_freed_memory()
     meshes, reports = training_meshes(shape, start, config, run.quiet)
     hierarchy = Hierarchy.of(start, config.levels)
@@ -76,7 +76,7 @@ def fit(
 def training_meshes(
     reference: Mesh, template: Mesh, config: GeometricConfig, quiet: bool = True
 ) -> tuple[list[torch.Tensor], list[FitReport]]:
-    """Vertices (V, 3) of the training mesh of each level, from the cache where known, and how they fit.
+    """Vertices (V, 3) of the training mesh of each level, from the cache where it has them, and how they fit.
 
     Args:
         reference, template: from `normalised`.
@@ -86,19 +86,19 @@ def training_meshes(
     hierarchy = Hierarchy.of(template, config.levels)
     options = [getattr(config, key) for key in vars(config) if key.startswith("fit_")]
     arrays = (reference.vertices, reference.faces, template.vertices, template.faces)
-    found, reports = [], []
+    meshes, reports = [], []
     for level, mesh in enumerate(hierarchy.meshes):
         place = cache_dir() / "geometric" / content_key(VERSION, *arrays, config.seed, *options, level)
-        start = hierarchy.finer(found[-1], level - 1) if found else torch.from_numpy(template.vertices)
+        start = hierarchy.finer(meshes[-1], level - 1) if meshes else torch.from_numpy(template.vertices)
 
-        def find(start: torch.Tensor = start, level: int = level) -> torch.Tensor:
+        def compute(start: torch.Tensor = start, level: int = level) -> torch.Tensor:
             return fit_level(reference, start, hierarchy.graphs[level], level, config)
 
-        found.append(cached(place, find, _read, _write))
-        reports.append(report(mesh.with_vertices(found[-1].numpy() / 2**level), reference))
+        meshes.append(cached(place, compute, _read, _write))
+        reports.append(report(mesh.with_vertices(meshes[-1].numpy() / 2**level), reference))
         if not quiet:
             print(f"training mesh {level}: {reports[-1]}", file=sys.stderr, flush=True)
-    return found, reports
+    return meshes, reports
 
 
 def _read(place: Path) -> torch.Tensor:

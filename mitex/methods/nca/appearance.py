@@ -8,7 +8,7 @@ from mitex.features import Vgg16, normalise_colours
 from mitex.losses import channel_transport, moment_distance, relaxed_transport
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.targets import Targets
-from mitex.pictures import CYCLE
+from mitex.triples import CYCLE
 
 
 class Appearance:
@@ -20,9 +20,9 @@ class Appearance:
 
     def __init__(self, config: NcaConfig, targets: Targets, network: Vgg16) -> None:
         self.config, self.targets, self.network = config, targets, network
-        shown = sorted({channel for p in targets.pictures for channel in p.channels})
-        self.channels = torch.tensor(shown, device=network.device)
-        table = [[shown.index(channel) for channel in p.channels] for p in targets.pictures]
+        channels = sorted({channel for p in targets.pictures for channel in p.channels})
+        self.channels = torch.tensor(channels, device=network.device)
+        table = [[channels.index(channel) for channel in p.channels] for p in targets.pictures]
         self._table = torch.tensor(table, device=network.device)
 
     def __call__(self, views: torch.Tensor, generator: torch.Generator) -> torch.Tensor:

@@ -50,13 +50,14 @@ def fit(
     run = Run.of(PRESETS, out, **options)
     config = run.config
     photos = capture if isinstance(capture, Capture) else load_capture(capture)
-    given = Mesh.load(base_mesh) if isinstance(base_mesh, str | Path) else base_mesh
-    if given is not None:
-        given = given.with_vertices(photos.similarity.apply(given.vertices))
+    if isinstance(base_mesh, str | Path):
+        base_mesh = Mesh.load(base_mesh)
+    if base_mesh is not None:
+        base_mesh = base_mesh.with_vertices(photos.similarity.apply(base_mesh.vertices))
     init()
     keep_freed_memory()
     training, held_out = photos.split()
-    base = find_base(training, config, given, run.quiet)
+    base = find_base(training, config, base_mesh, run.quiet)
     frames = face_frames(base.mesh)
     projection = Projection(
         base.mesh, neighbours=config.neighbours, repulsion=config.repulsion, reach=base.thickness

@@ -106,6 +106,10 @@ class NerfTexture:
     @cached_property
     def decoder(self) -> Decoder:
         """The networks, packed."""
+        return self._new_decoder()
+
+    def _new_decoder(self) -> Decoder:
+        """With matrices of its own, which may change."""
         return Decoder([mi.TensorXf(weight.numpy()) for weight in self.model.weights], packed=True)
 
     @property
@@ -263,7 +267,7 @@ class NerfTexture:
         return AppliedTexture(
             mesh,
             maps,
-            self.decoder,
+            self._new_decoder(),
             light_coefficients,
             self.model.config,
             thickness=self.model.base.thickness,

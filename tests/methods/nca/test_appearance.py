@@ -9,7 +9,7 @@ from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
 from mitex.methods.nca.appearance import Appearance, _places
 from mitex.methods.nca.targets import Targets, state_layout
-from mitex.pictures import pictures_of
+from mitex.triples import channel_triples
 from tests.losses import authors
 from tests.methods.nca.tiny import config
 
@@ -29,7 +29,7 @@ def exemplar():
 
 def _appearance(exemplar, network, settings, maps=None):
     shown = Exemplar({name: exemplar.maps[name] for name in maps}) if maps else exemplar
-    pictures = pictures_of(state_layout(sorted(shown.maps)), settings.blend, 0)
+    pictures = channel_triples(state_layout(sorted(shown.maps)), settings.blend, 0)
     return Appearance(settings, Targets(shown, pictures, network, settings.layers), network)
 
 
@@ -49,6 +49,8 @@ def _expected(images, pictures, settings):
         total = total + (naive.relaxed_transport(a, b) + moments).mean()
     a, b = (x.flatten(1, 2).numpy() for x in (images, pictures))
     colours = np.mean([authors.colour_cost(x, y) for x, y in zip(a, b, strict=True)])
+    if settings.colour_histogram:
+        colours += np.mean(np.abs(np.sort(a, 1) - np.sort(b, 1)) / authors.SPREAD)
     return settings.appearance_weight * (total + settings.colour_weight * colours)
 
 

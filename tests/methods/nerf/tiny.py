@@ -53,7 +53,7 @@ def captured(mesh: Mesh, views: int, side: int, spp: int, seed: int = 0) -> Capt
         mesh,
         mi.load_dict({"type": "diffuse", "reflectance": {"type": "mesh_attribute", "name": "vertex_color"}}),
     )
-    shape.add_attribute("vertex_color", 3, colours.astype(np.float32).ravel())
+    shape.add_attribute("vertex_color", 3, colours.astype(np.float32).ravel().tolist())
     images, poses = [], []
     for k in range(views):
         pose = _pose(k, views, rng)

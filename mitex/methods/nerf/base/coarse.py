@@ -63,14 +63,14 @@ class BaseShape:
 
 
 def find_base(
-    capture: Capture, config: NerfConfig, given: Mesh | None = None, quiet: bool = True
+    capture: Capture, config: NerfConfig, base_mesh: Mesh | None = None, quiet: bool = True
 ) -> BaseShape:
     """Trains a coarse field on a capture and takes the base shape from it; kept in the user's cache folder.
 
     Args:
         capture: the views to learn from.
         config: settings.
-        given: a base shape of the user's in the capture's world, or None.
+        base_mesh: a base shape of the user's in the capture's world, or None.
         quiet: show no progress.
 
     Raises:
@@ -78,7 +78,7 @@ def find_base(
     """
     coarse = coarse_config(config)
     arrays = (*capture.images, capture.poses, capture.intrinsics, capture.distortion)
-    mesh = () if given is None else (given.vertices, given.faces)
+    mesh = () if base_mesh is None else (base_mesh.vertices, base_mesh.faces)
     folder = cache_dir() / "nerf"
     # A training goes on under equal configs only, so its folder is named by all that is in them.
     training = folder / f"{content_key(VERSION, *arrays, capture.name, coarse)}.run"
@@ -88,7 +88,7 @@ def find_base(
     def compute() -> BaseShape:
         task = _trained(coarse, capture, training, quiet)
         _say("cutting the base shape out of the coarse field, about a minute", quiet)
-        base = _shape_of(task, config) if given is None else given_base(given)
+        base = _shape_of(task, config) if base_mesh is None else given_base(base_mesh)
         scan = scan_surface(task)
         projection = Projection(base, neighbours=config.neighbours, repulsion=config.repulsion)
         return BaseShape(base, scan, shell_thickness(scan, projection))

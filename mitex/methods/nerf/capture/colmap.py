@@ -106,13 +106,13 @@ def _largest(work: Path, one_camera: bool) -> Any:
         colmap.set_random_seed(0)
         colmap.extract_features(database, images, camera_mode=mode, device=colmap.Device.cpu)
         colmap.match_exhaustive(database, verification_options=verification, device=colmap.Device.cpu)
-        found = colmap.incremental_mapping(database, images, models, mapping)
+        reconstructions = colmap.incremental_mapping(database, images, models, mapping)
     except (RuntimeError, ValueError) as error:
         reason = " ".join(str(error).split())
         raise CaptureError(f"COLMAP failed ({reason})", "find the cameras with another program") from error
     finally:
         colmap.logging.minloglevel = level
-    return max(found.values(), key=lambda model: model.num_reg_images(), default=None)
+    return max(reconstructions.values(), key=lambda model: model.num_reg_images(), default=None)
 
 
 def _frame(name: str, image: Any, size: tuple[int, int]) -> dict[str, Any]:

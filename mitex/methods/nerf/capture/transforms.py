@@ -45,10 +45,10 @@ class Frame:
         Raises:
             CaptureError: The file tells another size, no focal length, or numbers that make no sense.
         """
-        given = (self._number("w", width), self._number("h", height))
-        if given != (width, height):
+        size = (self._number("w", width), self._number("h", height))
+        if size != (width, height):
             raise CaptureError(
-                f"{self.name} is {width} x {height}, but its camera {given[0]:g} x {given[1]:g} pixels",
+                f"{self.name} is {width} x {height}, but its camera {size[0]:g} x {size[1]:g} pixels",
                 "use the images that the cameras were computed from",
             )
         fx, fy = self._focal("x", width), self._focal("y", height)
@@ -117,32 +117,32 @@ def parse_frames(tree: Any, folder: Path, source: str) -> list[Frame]:
 
 
 def _frame(folder: Path, tree: dict[str, Any], frame: Any, where: str) -> Frame:
-    given = frame.get("file_path") if isinstance(frame, dict) else None
-    if not isinstance(given, str) or not given:
+    relative = frame.get("file_path") if isinstance(frame, dict) else None
+    if not isinstance(relative, str) or not relative:
         raise CaptureError(f"{where} has no file_path", "name its image")
-    image = _find(folder, given, where)
+    image = _find(folder, relative, where)
     name = image.relative_to(folder.resolve()).as_posix()
     lens = {k: v for k, v in (tree | frame).items() if k not in ("frames", "transform_matrix")}
     mask = _mask(folder, image, frame.get("mask_path"), where)
     return Frame(name, image, mask, _pose(frame.get("transform_matrix"), name), lens)
 
 
-def _find(folder: Path, given: str, where: str) -> Path:
+def _find(folder: Path, relative: str, where: str) -> Path:
     """The file that a frame names, with or without its suffix."""
     for suffix in ("", *SUFFIXES):
-        path = _inside(folder, given + suffix, where)
+        path = _inside(folder, relative + suffix, where)
         if path.is_file():
             return path
-    raise CaptureError(f"{where} names '{given}', which does not exist", "add the file or drop the frame")
+    raise CaptureError(f"{where} names '{relative}', which does not exist", "add the file or drop the frame")
 
 
-def _inside(folder: Path, given: str, where: str) -> Path:
+def _inside(folder: Path, relative: str, where: str) -> Path:
     try:
-        path = (folder / given).resolve()
+        path = (folder / relative).resolve()
     except (OSError, ValueError, RuntimeError) as error:
-        raise CaptureError(f"{where} names {given[:80]!r}, which is no path", "name a file") from error
+        raise CaptureError(f"{where} names {relative[:80]!r}, which is no path", "name a file") from error
     if not path.is_relative_to(folder.resolve()):
-        raise CaptureError(f"{where} names '{given}', outside of {folder}", "keep all files in the folder")
+        raise CaptureError(f"{where} names '{relative}', outside of {folder}", "keep all files in the folder")
     return path
 
 
@@ -162,12 +162,12 @@ def no_mask(image: Path) -> CaptureError:
     )
 
 
-def _mask(folder: Path, image: Path, given: Any, where: str) -> Path | None:
-    if given is None:
+def _mask(folder: Path, image: Path, relative: Any, where: str) -> Path | None:
+    if relative is None:
         return find_mask(folder, image)
-    if not isinstance(given, str):
+    if not isinstance(relative, str):
         raise CaptureError(f"{where} has a mask_path that is no text", "name the mask")
-    return _find(folder, given, where)
+    return _find(folder, relative, where)
 
 
 def _pose(matrix: Any, name: str) -> np.ndarray:

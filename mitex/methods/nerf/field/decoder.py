@@ -64,7 +64,7 @@ class Decoder:
 
     Args:
         weights: matrices (out, in) as of `weight_shapes`, each a `mi.TensorXf`.
-        packed: evaluate as cooperative vectors: fast forwards, slow backwards.
+        packed: evaluate as cooperative vectors where nothing has derivatives, which is faster.
         low_precision: gradients in bfloat16 where points stay; what is evaluated is the same.
     """
 
@@ -72,18 +72,30 @@ class Decoder:
         self._low_precision = low_precision
         remaining = iter(weights)
         self.weights = {name: [next(remaining) for _ in widths[1:]] for name, widths in LAYERS.items()}
-        self._packed = (
-            dict(zip(LAYERS, packed_networks(*self.weights.values()), strict=True)) if packed else {}
-        )
+        self._packed: dict[str, Any] | None = {} if packed else None
+        self.pack()
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The matrices by name, such as `density.0`."""
+        return {f"{name}.{k}": w for name, net in self.weights.items() for k, w in enumerate(net)}
+
+    def pack(self) -> None:
+        """Packs the matrices again, after they have changed."""
+        if self._packed is not None:
+            self._packed = dict(zip(LAYERS, packed_networks(*self.weights.values()), strict=True))
 
     def exponent(self, f: Sequence[Any], distance: Any) -> Any:
         """Only the logarithm of the density."""
-        return network_rows(self._net("density"), [*f, *frequency_encoding(distance)])[0]
+        fine = frequency_encoding(distance)
+        packed = self._packed_for(f, fine)
+        return network_rows((packed or self.weights)["density"], [*f, *fine])[0]
 
     def __call__(self, f: Sequence[Any], phase: Sequence[Any], distance: Any) -> Reflection:
         """Density and reflection for features f (16 arrays), f-hat (8) and signed distance [scene units]."""
-        run = self._cooperative if self._packed else self._together
-        exponent, *reflection, theta, phi = run([*f], [*phase], frequency_encoding(distance))
+        fine = frequency_encoding(distance)
+        run = self._cooperative if self._packed_for(f, phase, fine) else self._together
+        exponent, *reflection, theta, phi = run([*f], [*phase], fine)
         *diffuse, specular, glossiness = reflection[:REFLECTION]
         specular, grazing = sigmoid(specular), reflection[REFLECTION:]
         return Reflection(
@@ -97,6 +109,7 @@ class Decoder:
         )
 
     def _cooperative(self, f: list[Any], phase: list[Any], fine: list[Any]) -> list[Any]:
+        assert self._packed is not None
         exponent, *code = network_rows(self._packed["density"], f + fine)
         reflection = network_rows(self._packed["reflection"], code)
         theta = network_rows(self._packed["theta"], f + fine[:COARSE])
@@ -108,8 +121,10 @@ class Decoder:
         values = stack_rows(fine[COARSE:] + fine[:COARSE] + f + phase)
         return unstack_rows(dr.custom(Networks, values, nets, learning, moving, self._low_precision))
 
-    def _net(self, name: str) -> Any:
-        return self._packed.get(name, self.weights[name])
+    def _packed_for(self, *inputs: Sequence[Any]) -> dict[str, Any] | None:
+        """The packed networks, unless derivatives are asked for: their layout has none."""
+        attached = dr.grad_enabled([*self.weights.values()], [list(values) for values in inputs])
+        return None if attached else self._packed
 
 
 def frequency_encoding(distance: Any) -> list[Any]:

@@ -66,6 +66,11 @@ class Latents(Protocol):
         """Tangent, bitangent and normal that theta and phi refer to, `mi.Vector3f`s."""
         ...
 
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Arrays that features are looked up in, by name."""
+        ...
+
 
 class CapturedLatents:
     """Features of the captured base shape.
@@ -89,6 +94,10 @@ class CapturedLatents:
     def frame(self, coords: ShellCoords) -> tuple[Any, Any, Any]:
         rows = [dr.gather(mi.Vector3f, self.frames, coords.face * 3 + k) for k in range(3)]
         return rows[0], rows[1], rows[2]
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        return dict(zip(("tables.f", "tables.phase"), self.tables, strict=True))
 
 
 def appearance(
@@ -146,6 +155,25 @@ class Shell:
         self.projection, self.latents, self.decoder = projection, latents, decoder
         self.light, self.thickness, self.scale = light, thickness, scale
         self.mask, self.step, self.strength, self.lift = mask, step, strength, lift
+        self._shapes = {name: dr.shape(value) for name, value in self.parameters().items()}
+
+    def parameters(self) -> dict[str, Any]:
+        """Features, matrices of the networks and light, by name; images are differentiable in them."""
+        weights = {f"weights.{name}": value for name, value in self.decoder.parameters.items()}
+        return {**self.latents.parameters, **weights, "light": self.light}
+
+    def parameters_changed(self) -> None:
+        """Takes over new values; cells that were empty stay so.
+
+        Raises:
+            RuntimeError: a parameter has another shape than before.
+        """
+        for name, value in self.parameters().items():
+            if dr.shape(value) != self._shapes[name]:
+                raise RuntimeError(
+                    f"shell_field: '{name}' has shape {dr.shape(value)}; give {self._shapes[name]}"
+                )
+        self.decoder.pack()
 
     def locate(self, points: Any) -> tuple[Any, ShellCoords]:
         """Which of the points, `mi.Point3f`, are in the shell, as ascending `mi.UInt32`, and where."""

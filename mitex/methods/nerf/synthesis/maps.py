@@ -45,7 +45,7 @@ class MappedLatents:
     """Features of a mesh by its UVs.
 
     Attributes:
-        texels: flat values of the maps' features; derivatives reach them.
+        texels: `mi.TensorXf` (H, W, 24) of the maps' features; derivatives reach them.
 
     Args:
         maps: the texture.
@@ -55,7 +55,7 @@ class MappedLatents:
 
     def __init__(self, maps: LatentMaps, uv: np.ndarray, frames: np.ndarray) -> None:
         self.size = maps.size
-        self.texels = mi.Float(maps.features.ravel())
+        self.texels = mi.TensorXf(maps.features)
         self._which = mi.UInt32(maps.frame.astype(np.uint32).ravel())
         self._turns = mi.Float(np.ascontiguousarray(maps.frames, np.float32).ravel())
         self._uv = mi.Float(np.ascontiguousarray(uv, np.float32).ravel())
@@ -82,6 +82,10 @@ class MappedLatents:
             captured.append(axes[0] * parts[0] + axes[1] * parts[1] + axes[2] * parts[2])
         return captured[0], captured[1], captured[2]
 
+    @property
+    def parameters(self) -> dict[str, Any]:
+        return {"features": self.texels}
+
     def _place(self, coords: ShellCoords) -> tuple[Any, Any]:
         """Column and row of the foot [texels], of which whole numbers are centres."""
         height, width = self.size
@@ -104,7 +108,7 @@ class MappedLatents:
                 for k in range(0, count, PACKET):
                     packet = texel * (CHANNELS // PACKET) + k // PACKET
                     shape = (PACKET, dr.width(texel))
-                    values = dr.gather(mi.ArrayXf, self.texels, packet, shape=shape)
+                    values = dr.gather(mi.ArrayXf, self.texels.array, packet, shape=shape)
                     for j in range(PACKET):
                         total[k + j] = dr.fma(values[j], share, total[k + j])
         return total

@@ -71,8 +71,10 @@ class AppliedTexture(Shell):
             )
         self.mesh, self._maps = laid_out(mesh, UNWRAP_SIZE), maps
         placed, self.similarity = in_scene_cube(self.mesh)
-        # One unit of the UVs shows so many textures that their elements have the requested size.
-        uv = np.asarray(placed.uv) * (uv_unit_length(placed) / (maps.size[1] * maps.gap * scale))
+        # One unit of the UVs shows so many textures, across and up, that elements have the requested size.
+        height, width = maps.size
+        lengths = maps.gap * scale * np.array([width, height], np.float32)
+        uv = np.asarray(placed.uv) * (uv_unit_length(placed) / lengths)
         raised = lift * scale * max(-ground, 0.0)
         thickness = thickness * scale
         projection = Projection(placed, neighbours=NEIGHBOURS, repulsion=None, reach=thickness + raised)
