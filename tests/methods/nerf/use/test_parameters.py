@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -88,6 +89,7 @@ def test_gradients_are_those_of_finite_differences(field, name):
     scene = scene_of(FIELDS[field][0]())
     params, key = parameter(scene, name)
     value, rng = np.array(params[key]), np.random.default_rng(0)
+    kind: Any = type(params[key])
     pixels = rng.normal(size=(6, 6, 3)).astype(np.float32)
     along = rng.normal(size=value.shape).astype(np.float32)
 
@@ -103,7 +105,7 @@ def test_gradients_are_those_of_finite_differences(field, name):
     step = 5e-4 * np.abs(value).max()
     totals = []
     for sign in (1, -1):
-        params[key] = type(params[key])(value + sign * step * along)
+        params[key] = kind(value + sign * step * along)
         params.update()
         totals.append((picture(scene) * pixels).sum())
     slope = (totals[0] - totals[1]) / (2 * step)
