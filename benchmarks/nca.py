@@ -23,7 +23,8 @@ from rich.table import Table
 from benchmarks import naive
 from mitex import bridge
 from mitex.exemplar import Exemplar
-from mitex.losses import decorrelate, moment_distance, overflow_loss, relaxed_transport
+from mitex.features import normalise_colours
+from mitex.losses import moment_distance, overflow_loss, relaxed_transport
 from mitex.mesh import icosphere
 from mitex.methods.nca import PRESETS, NcaConfig, NcaTexture
 from mitex.methods.nca.model import FIRE_RATE
@@ -116,8 +117,8 @@ class Bench:
                 total + relaxed_transport(a, b, low_precision=low).mean() + moment_distance(a, b, low).mean()
             )
         colours = self._colours().requires_grad_()
-        b = decorrelate(self.targets["colour"])
-        total = total + relaxed_transport(decorrelate(colours), b, euclidean=True, low_precision=low).mean()
+        b = normalise_colours(self.targets["colour"])
+        total = total + relaxed_transport(normalise_colours(colours), b, euclidean=True).mean()
         total.backward()
 
     def visible(self) -> None:
@@ -171,8 +172,8 @@ class Bench:
         return state
 
     def _naive_loss(self, vectors: dict[str, torch.Tensor], colours: torch.Tensor) -> torch.Tensor:
-        b = decorrelate(self.targets["colour"])
-        total = naive.relaxed_transport(decorrelate(colours), b, euclidean=True).mean()
+        b = normalise_colours(self.targets["colour"])
+        total = naive.relaxed_transport(normalise_colours(colours), b, euclidean=True).mean()
         for layer, a in vectors.items():
             b = self.targets[layer]
             total = total + (naive.relaxed_transport(a, b) + naive.moment_distance(a, b)).mean()

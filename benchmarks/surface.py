@@ -22,15 +22,11 @@ from rich.table import Table
 
 from mitex.features.layers import CHANNELS, LAYERS
 from mitex.mesh import Mesh, icosphere
-from mitex.methods.surface.borders import Border
 from mitex.methods.surface.config import PRESETS
-from mitex.methods.surface.exponential import GeodesicTracer
+from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.fitting import with_layout
-from mitex.methods.surface.frames import tangent_frames
 from mitex.methods.surface.levels import Levels
 from mitex.methods.surface.network import ALL_LAYERS, SurfaceVgg
-from mitex.methods.surface.taps import Surroundings, build
-from mitex.methods.surface.texels import Texels
 from mitex.runtime import keep_freed_memory
 
 PREPARED = {(5_120, 256): 21, (5_120, 512): 42, (5_120, 1024): 104, (200_000, 1024): 150}  # the paper [s]
@@ -56,16 +52,11 @@ class Result:
 
 def measure(mesh: Mesh, resolution: int, repetitions: int) -> Result:
     """Prepares a mesh and times the best of some steps."""
-    config = replace(PRESETS["fast"], resolution=resolution)
+    config = replace(PRESETS["fast"], resolution=resolution, scales=0)
     begun = time.perf_counter()
-    laid = with_layout(mesh, config, keep_uvs=False)
-    assert laid.uv is not None
+    domain = SurfaceDomain.of(with_layout(mesh, config, keep_uvs=False), config)
     between = time.perf_counter()
-    texels = Texels.rasterize(laid, laid.uv, resolution)
-    frames = tangent_frames(laid, texels.face, texels.barycentric)
-    tracer = GeodesicTracer(laid)
-    border = Border.continued(laid, texels, tracer)
-    levels = build(Surroundings(texels, tracer, *frames, border=border))
+    levels = domain.compute_levels()
     prepared = time.perf_counter()
     network = SurfaceVgg(levels)
     values = torch.rand(len(levels.order), 3).requires_grad_()

@@ -12,6 +12,7 @@ import torch
 from torch.autograd.function import once_differentiable
 
 from mitex.errors import ConfigError
+from mitex.integrators.feature import FeatureMethods
 from mitex.runtime.jit import dr, mi
 from mitex.scenes.stage import Visibility, background_values
 from mitex.textures.field import Field
@@ -45,10 +46,10 @@ def lookup(
 
 
 def render(
-    scene: Any,
+    scene: mi.Scene,
     values: torch.Tensor | Mapping[str, torch.Tensor],
-    sensor: Any = 0,
-    integrator: Any = None,
+    sensor: mi.Sensor | int = 0,
+    integrator: mi.Integrator | None = None,
     spp: int = 0,
 ) -> torch.Tensor:
     """An image of a scene by its `feature` integrator, attached to the parameters that are given as tensors.
@@ -75,22 +76,22 @@ def render(
         ConfigError: for an unknown parameter, one of the wrong size, and a tensor that is not float32 on the
             CPU.
     """
-    integrator = integrator or scene.integrator()
-    if not hasattr(integrator, "fields"):
+    renderer: Any = integrator or scene.integrator()
+    if not hasattr(renderer, "fields"):
         raise ConfigError("the scene's integrator is not a `feature`", "give one as `integrator`")
     if isinstance(values, torch.Tensor):
-        targets, tensors = [_only_field(scene, integrator)], [values]
+        targets, tensors = [_only_field(scene, renderer)], [values]
     else:
-        table = _parameters(scene, integrator)
-        targets, tensors = [_found(table, name) for name in values], list(values.values())
+        table = _parameters(scene, renderer)
+        targets, tensors = [_parameter(table, name) for name in values], list(values.values())
     for target, tensor in zip(targets, tensors, strict=True):
         target.check(tensor)
 
-    def attached(*arrays: Any) -> Any:
+    def attached(*arrays: mi.TensorXf) -> mi.TensorXf:
         try:
             for target, array in zip(targets, arrays, strict=True):
                 target.assign(array)
-            return integrator.render(scene, sensor, spp=spp)
+            return renderer.render(scene, sensor, spp=spp)
         finally:
             # What stays in the scene must not keep this image's graph alive.
             for target, array in zip(targets, arrays, strict=True):
@@ -118,7 +119,7 @@ def call(function: Callable[..., Any], *tensors: torch.Tensor) -> Any:
 class _Target:
     """One parameter of a scene, by its key in `mi.SceneParameters`."""
 
-    params: Any
+    params: mi.SceneParameters
     key: str
     name: str
 
@@ -142,18 +143,18 @@ class _Target:
                 f"'{self.name}' has shape {tuple(tensor.shape)}", f"give a tensor of shape {shape}"
             )
 
-    def assign(self, array: Any) -> None:
+    def assign(self, array: mi.TensorXf) -> None:
         """Sets the parameter from an `mi.TensorXf`."""
-        kind = type(self.params[self.key])
-        if dr.depth_v(kind) > 1:
-            array = dr.unravel(kind, array.array)
-        elif not dr.is_tensor_v(kind):
-            array = kind(array.array)
+        array_type: Any = type(self.params[self.key])
+        if dr.depth_v(array_type) > 1:
+            array = dr.unravel(array_type, array.array)
+        elif not dr.is_tensor_v(array_type):
+            array = array_type(array.array)
         self.params[self.key] = array
         self.params.update()
 
 
-def _parameters(scene: Any, integrator: Any) -> dict[str, _Target]:
+def _parameters(scene: mi.Scene, integrator: mi.Integrator) -> dict[str, _Target]:
     """Parameters of the scene, and of the integrator if it is another than the scene's."""
     params = mi.traverse(scene)
     table = {name: _Target(params, name, name) for name in params.keys()}  # noqa: SIM118
@@ -163,7 +164,7 @@ def _parameters(scene: Any, integrator: Any) -> dict[str, _Target]:
     return table
 
 
-def _found(table: Mapping[str, _Target], name: str) -> _Target:
+def _parameter(table: Mapping[str, _Target], name: str) -> _Target:
     if name not in table:
         close = difflib.get_close_matches(name, table, n=1)
         remedy = f"did you mean '{close[0]}'?" if close else "print(mi.traverse(scene)) lists all"
@@ -171,7 +172,7 @@ def _found(table: Mapping[str, _Target], name: str) -> _Target:
     return table[name]
 
 
-def _only_field(scene: Any, integrator: Any) -> _Target:
+def _only_field(scene: mi.Scene, integrator: FeatureMethods) -> _Target:
     textures: list[mi.Texture] = [texture for _, texture in integrator.fields(scene)]
     fields = {id(texture): texture for texture in textures if isinstance(texture, Field)}
     if len(fields) != 1:

@@ -1,4 +1,4 @@
-"""Results on disk: found once, kept under a hash of everything that they follow from."""
+"""Results on disk: computed once, kept under a hash of everything that they follow from."""
 
 from __future__ import annotations
 
@@ -30,23 +30,23 @@ def content_key(*parts: object) -> str:
 
 def cached(
     place: Path,
-    find: Callable[[], Result],
+    compute: Callable[[], Result],
     read: Callable[[Path], Result],
     write: Callable[[Path, Result], None],
 ) -> Result:
-    """The result kept in the folder `place`, else the one that `find` finds, which is kept then.
+    """The result kept in the folder `place`, else that of `compute`, which is kept then.
 
-    A cache that cannot be read or written is no error: the result is found again.
+    A cache that cannot be read or written is no error: the result is computed again.
 
     Args:
         place: of this result alone.
-        find: the long computation.
+        compute: the long computation.
         read: gives the result from a folder; OSError, ValueError or KeyError if it is not whole.
         write: fills an empty folder, which is renamed afterwards, so that all files appear together.
     """
     with suppress(OSError, ValueError, KeyError):
         return read(place)
-    result = find()
+    result = compute()
     with suppress(OSError):
         place.parent.mkdir(parents=True, exist_ok=True)
         filling = Path(tempfile.mkdtemp(prefix=".filling-", dir=place.parent))

@@ -145,24 +145,24 @@ def _find_maps(folder: Path) -> dict[str, Path]:
         raise ImageError(f"{folder} cannot be read ({error.strerror})", "check its permissions") from error
     if not entries:
         raise ImageError(f"{folder} is empty", _wanted())
-    found: dict[str, Path] = {}
+    files: dict[str, Path] = {}
     for path in entries:
         name = map_of(path)
         if name is None or path.suffix.lower() not in SUFFIXES:
             continue
-        if name in found:
+        if name in files:
             raise ImageError(
-                f"{folder} holds {name} twice: {found[name].name} and {path.name}", "remove one of them"
+                f"{folder} holds {name} twice: {files[name].name} and {path.name}", "remove one of them"
             )
-        found[name] = path
-    if not found:
+        files[name] = path
+    if not files:
         others = [p.name for p in entries if p.suffix.lower() in _OTHER_IMAGES and map_of(p)]
         if others:
             raise ImageError(
                 f"{folder} holds {others[0]}, which Mitex does not read", "convert the maps to PNG"
             )
         raise ImageError(f"{folder} holds no map that Mitex knows", _wanted())
-    return found
+    return files
 
 
 def _one_size(arrays: dict[str, np.ndarray], folder: Path) -> dict[str, np.ndarray]:
@@ -201,9 +201,9 @@ def _wanted() -> str:
     return f"name the files {', '.join(f'{name}.png' for name in MAPS)} (any subset)"
 
 
-def _suggest(name: str, known: Iterable[str] | None = None) -> str:
-    known = list(names() if known is None else known)
-    close = difflib.get_close_matches(name, known, 1)
+def _suggest(name: str, candidates: Iterable[str] | None = None) -> str:
+    candidates = list(names() if candidates is None else candidates)
+    close = difflib.get_close_matches(name, candidates, 1)
     if close:
         return f"did you mean {close[0]}?"
-    return f"give an image, a folder of maps{' or one of ' + ', '.join(known) if known else ''}"
+    return f"give an image, a folder of maps{' or one of ' + ', '.join(candidates) if candidates else ''}"

@@ -15,7 +15,7 @@ import torch
 
 from mitex.images import write_image
 from mitex.mesh import Mesh, icosphere
-from mitex.methods.geometric.pictures import portrait
+from mitex.methods.geometric.portrait import portrait
 from mitex.scenes.cameras import orbit
 from mitex.scenes.geometry_renderer import GeometryRenderer
 from mitex.training.optim import Adam

@@ -51,15 +51,15 @@ def load_vase() -> mi.Mesh:
     vase = embedded("vase")
     atlas = Atlas.build(vase, RESOLUTION)
     split = split_at_seams(vase, atlas.uv)  # Mitsuba keeps one UV per vertex
-    mask = np.where(atlas.face >= 0, charts(split)[atlas.face], -1)
-    tints = np.random.default_rng(0).uniform(0.15, 1.0, (mask.max() + 2, 3))
+    chart = np.where(atlas.face >= 0, charts(split)[atlas.face], -1)
+    tints = np.random.default_rng(0).uniform(0.15, 1.0, (chart.max() + 2, 3))
     painted = zigzag(atlas.interpolate(vase.vertices[vase.faces]))
-    texels = np.concatenate((painted, tints[mask]), axis=-1)
+    texels = np.concatenate((painted, tints[chart]), axis=-1)
 
     shared = {
         "type": "texel_field",
         "data": mi.TensorXf(texels.astype(np.float32)),
-        "mask": mi.TensorXf(mask.astype(np.float32)),
+        "charts": mi.TensorXf(chart.astype(np.float32)),
     }
     material = {
         "type": "principled",

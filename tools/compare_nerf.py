@@ -56,12 +56,13 @@ def main() -> None:
 def elevations(name: str, texture: NerfTexture, capture) -> None:
     """Table 2, and its windows from top to bottom: photo, captured, ours, flat."""
     table = compare_elevations(texture, capture)
-    print(f"{name}: angle, captured, ours, 2D, photos")
-    for row in table:
-        distances = row.captured, row.ours, row.flat, row.photos
-        print(f"{row.angle:4.0f}  " + "  ".join(f"{d:.3f}" for d in distances), flush=True)
-    ratio = np.mean([row.ours for row in table]) / np.mean([row.flat for row in table])
-    print(f"{name}: ratio of the means {ratio:.2f}", flush=True)
+    rows = {"as captured": [row.captured for row in table], "ours": [row.ours for row in table]}
+    rows |= {flat: [row.flat[flat] for row in table] for flat in table[0].flat}
+    rows["photos"] = [row.photos for row in table]
+    print(f"{name}: " + ", ".join(f"{row.angle:.0f}" for row in table) + " degrees, mean")
+    for label, distances in rows.items():
+        values = "  ".join(f"{d:7.3f}" for d in (*distances, np.mean(distances)))
+        print(f"{label:28} {values}", flush=True)
     picture = np.concatenate([row.picture[:, : COLUMNS * row.picture.shape[0] // 4] for row in table])
     write_image(GALLERY / f"nerf-elevations-{name}.jpg", picture)
 

@@ -1,5 +1,7 @@
 """Trains the bundled models: the parent from scratch, the others from it, so that any two can be grafted.
 
+The settings are those of the models that ship, as far as their files tell, which a test compares.
+
 usage: python tools/make_models.py EXEMPLARS [NAME ...]
 
 EXEMPLARS is a folder with one folder of maps per exemplar. Each model takes about 20 minutes on two cores;
@@ -13,9 +15,9 @@ from pathlib import Path
 
 from mitex.images import write_image
 from mitex.mesh import embedded
-from mitex.methods.nca import NcaTexture, fit
+from mitex.methods.nca import PRESETS, NcaTexture, fit
 from mitex.render import still, tone
-from mitex.training import checkpoint
+from mitex.training import checkpoint, resolve
 
 RUNS = Path("runs/models")
 MODELS = Path(__file__).parents[1] / "mitex" / "data" / "models"
@@ -23,8 +25,8 @@ PARENT = "waffle"
 # The waffle's bars are coarse: fewer vertices to the exemplar leave more of them in a view.
 SETTINGS = {
     "waffle": ("density=64", "resolution=80"),
-    "pebbles": ("steps=1500", "milestones=1200,1400"),
-    "bricks": ("steps=2000", "milestones=1800,1950"),
+    "pebbles": ("steps=1450", "milestones=1200,1400"),
+    "bricks": ("steps=2050", "milestones=1800,1950"),
     "honeycomb": ("steps=900", "milestones=500,800"),
 }
 EXEMPLARS = {
@@ -33,6 +35,14 @@ EXEMPLARS = {
     "bricks": "Bricks_Terracotta_003",
     "honeycomb": "Honeycomb_002",
 }
+
+
+def record(name: str) -> dict[str, object]:
+    """What the file of a model trained by this table says of its training."""
+    settings = resolve(PRESETS, overrides=SETTINGS[name])
+    about: dict[str, object] = {"name": name, "exemplar": EXEMPLARS[name], "preset": settings.preset}
+    about |= {"steps": settings.steps, "density": settings.density}
+    return about if name == PARENT else about | {"parent": PARENT}
 
 
 def train(name: str, exemplars: Path) -> NcaTexture:

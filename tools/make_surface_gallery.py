@@ -9,7 +9,7 @@ and `scene` and `torus` are made up. RUNS is where the run folders go: finished 
 ones go on. The sheet is docs/gallery/SHEET.jpg, a row for each exemplar: itself, and the mesh from two sides,
 or one side of each of its meshes or variants, in the order that they are given; the ratio across seams is
 printed.
-Settings change the synthesis, of one MESH=EXEMPLAR or of all (`resolution=512`, `pictures=1`, ...);
+Settings change the synthesis, of one MESH=EXEMPLAR or of all (`resolution=512`, `triples=1`, ...);
 `maps=albedo` leaves out other maps, `content=ao` transfers the style.
 """
 

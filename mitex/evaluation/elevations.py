@@ -8,12 +8,14 @@ see the angle, and their light, would weigh more on planes than in photos.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mitex.colour import linear_to_srgb, srgb_to_linear
 from mitex.evaluation.metrics import single_image_frechet
+from mitex.evaluation.mip_map import MipMap
 from mitex.evaluation.windows import PLACES, WINDOW, Photos, Rendering, Surface, Window, select_windows
 
 HALF = 1.0  # half the side of the plane [scene units]
@@ -32,15 +34,15 @@ class Elevation:
         angle: between the view and the normal [degrees].
         captured: of the model where it was captured, seen as in the photos: the fit's own distance.
         ours: of the synthesized texture.
-        flat: of the flat texture that it is compared with.
+        flat: of the flat textures that it is compared with, by name.
         photos: of other photos under this angle: what is the least to be expected.
-        picture: (4 S, K S, 3) windows of K photos, below them captured, ours, and flat ones.
+        picture: (4 S, K S, 3) windows of K photos, below them captured, ours, and the last flat ones.
     """
 
     angle: float
     captured: float
     ours: float
-    flat: float
+    flat: dict[str, float]
     photos: float
     picture: np.ndarray
 
@@ -52,26 +54,63 @@ class FlatTexture:
         image: (T, T, 3) sRGB in [0, 1], tileable; row 0 is on top.
         gap: between texels [scene units].
         along: (3,) direction in the scene that its rows follow.
+        filtered: pixels show the mean light of what they cover, else the texel in their middle.
+        brightness: factor of its sRGB values where it faces a direction (3,) of the scene; 1 if None.
     """
 
-    def __init__(self, image: np.ndarray, gap: float, along: np.ndarray) -> None:
-        self.image, self.gap, self.along = image, gap, along
+    def __init__(
+        self,
+        image: np.ndarray,
+        gap: float,
+        along: np.ndarray,
+        filtered: bool = True,
+        brightness: Callable[[np.ndarray], float] | None = None,
+    ) -> None:
+        self.image, self.gap, self.along, self.brightness = image, gap, along, brightness
+        self._mip_map = MipMap(srgb_to_linear(image)) if filtered else None
 
     def __call__(self, window: Window) -> Rendering:
         _, origins, directions = window.to_plane(self.along)
-        hits = origins[:, :2] - directions[:, :2] * (origins[:, 2:] / directions[:, 2:])
-        size = len(self.image)
-        column, row = (np.floor(v / self.gap).astype(int) % size for v in (hits[:, 0], -hits[:, 1]))
+        steps = -origins[:, 2:] / directions[:, 2:]
+        hits = origins[:, :2] + steps * directions[:, :2]
         valid = (np.abs(hits).max(1) < HALF) & (directions[:, 2] < 0)
-        colours = np.where(valid[:, None], self.image[row, column], window.background)
+        footprints = _footprints(origins, directions, steps, window.mask.shape)
+        flip = np.array([1.0, -1.0]) / self.gap  # columns go along x, rows against y
+        colours = np.tile(window.background, (len(hits), 1)).astype(np.float64)
+        colours[valid] = self._colours(hits[valid] * flip, footprints[valid] * flip[:, None])
+        if self.brightness is not None:
+            colours[valid] *= self.brightness(window.normal)
         return window.rendering(colours, valid)
+
+    def _colours(self, places: np.ndarray, footprints: np.ndarray) -> np.ndarray:
+        """sRGB (N, 3) of pixels; arguments as of `MipMap`."""
+        if self._mip_map is not None:
+            return linear_to_srgb(self._mip_map(places, footprints))
+        column, row = np.floor(places.T).astype(np.int64) % len(self.image)
+        return self.image[row, column]
+
+
+def _footprints(
+    origins: np.ndarray, directions: np.ndarray, steps: np.ndarray, shape: tuple[int, ...]
+) -> np.ndarray:
+    """(N, 2, 2) how hits of rays in the plane z = 0 change (axis 1) to the pixel beside and below (axis 2).
+
+    Where the ends of rays of one length change by c, the hits do by c - d c_z / d_z: ray differentials
+    (Igehy 1999).
+    """
+    changes = []
+    for axis in (1, 0):
+        origin, direction = (np.gradient(a.reshape(*shape, 3), axis=axis) for a in (origins, directions))
+        ends = origin.reshape(-1, 3) + steps * direction.reshape(-1, 3)
+        changes.append(ends[:, :2] - directions[:, :2] * (ends[:, 2:] / directions[:, 2:]))
+    return np.stack(changes, axis=2)
 
 
 def elevation_table(
     photos: Photos,
     surfaces: Sequence[Surface],
     captured: Renderer,
-    syntheses: Iterable[tuple[Renderer, Renderer]],
+    syntheses: Iterable[tuple[Renderer, Mapping[str, Renderer]]],
     *,
     seed: int = 0,
     window: int = WINDOW,
@@ -83,8 +122,8 @@ def elevation_table(
         photos: of the surface.
         surfaces: of each photo.
         captured: shows the model where it was captured.
-        syntheses: of each synthesis, what shows our texture and a flat one, at least one pair: chance counts
-            for a lot in a single one.
+        syntheses: of each synthesis, what shows our texture, and flat ones by name, at least one of each:
+            chance counts for a lot in a single synthesis.
         seed: of the windows' places.
         window: side of the windows [pixels].
         places: windows for each angle that are rendered; as many again tell how much photos differ.
@@ -92,27 +131,33 @@ def elevation_table(
     windows = select_windows(photos, surfaces, np.random.default_rng(seed), window, places)
     tables = []
     for ours, flat in syntheses:
-        tables.append([_compare(group, angle, (captured, ours, flat)) for angle, group in windows.items()])
+        tables.append([_compare(group, angle, captured, ours, flat) for angle, group in windows.items()])
     return [_mean(rows) for rows in zip(*tables, strict=True)]
 
 
-def _compare(windows: list[Window], angle: float, renderers: Sequence[Renderer]) -> Elevation:
+def _compare(
+    windows: list[Window], angle: float, captured: Renderer, ours: Renderer, flat: Mapping[str, Renderer]
+) -> Elevation:
     """The first half of the windows is rendered, the other one tells how much photos differ."""
     half = (len(windows) + 1) // 2
     first, others = windows[:half], windows[half:]
     photo, mask = _strip([(window.photo, window.mask) for window in first])
-    strips = [_strip(list(map(render, first))) for render in renderers]
-    strips.append(_strip([(window.photo, window.mask) for window in others]))
-    distances = [single_image_frechet(image, photo, mask_a=on, mask_b=mask) for image, on in strips]
-    captured, ours, flat, photos = distances
-    picture = np.concatenate([photo, *(image for image, _ in strips[:3])])
-    return Elevation(angle, captured, ours, flat, photos, picture)
+
+    def distance(strip: Rendering) -> float:
+        return single_image_frechet(strip[0], photo, mask_a=strip[1], mask_b=mask)
+
+    strips = [_strip(list(map(render, first))) for render in (captured, ours, *flat.values())]
+    of_captured, of_ours, *of_flat = map(distance, strips)
+    of_photos = distance(_strip([(window.photo, window.mask) for window in others]))
+    picture = np.concatenate([photo, strips[0][0], strips[1][0], strips[-1][0]])
+    by_name = dict(zip(flat, of_flat, strict=True))
+    return Elevation(angle, of_captured, of_ours, by_name, of_photos, picture)
 
 
 def _mean(rows: Sequence[Elevation]) -> Elevation:
     """Of several syntheses."""
-    ours, flat = (float(np.mean([getattr(row, name) for row in rows])) for name in ("ours", "flat"))
-    return replace(rows[0], ours=ours, flat=flat)
+    flat = {name: float(np.mean([row.flat[name] for row in rows])) for name in rows[0].flat}
+    return replace(rows[0], ours=float(np.mean([row.ours for row in rows])), flat=flat)
 
 
 def _strip(views: list[Rendering]) -> Rendering:

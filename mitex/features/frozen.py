@@ -29,7 +29,7 @@ class Operation(Protocol):
 
     def forward(self, x: torch.Tensor) -> torch.Tensor: ...
 
-    def backward(self, gradient: torch.Tensor, known: torch.Tensor) -> torch.Tensor:
+    def backward(self, gradient: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
         """The input's gradient; may overwrite `gradient`."""
         ...
 
@@ -53,9 +53,9 @@ class FrozenConv:
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         return F.conv2d(x, self.weight, self.bias, padding=1).relu_().to(self.kept)
 
-    def backward(self, gradient: torch.Tensor, known: torch.Tensor) -> torch.Tensor:
+    def backward(self, gradient: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
         """Input gradient (K, I, H, W); overwrites `gradient` with its part behind the ReLU."""
-        torch.ops.aten.threshold_backward.grad_input(gradient, known, 0, grad_input=gradient)
+        torch.ops.aten.threshold_backward.grad_input(gradient, values, 0, grad_input=gradient)
         return F.conv2d(gradient, self.adjoint, padding=1)
 
 
@@ -70,14 +70,14 @@ class Pool:
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         return F.avg_pool2d(x, 2) if self.kind == "average" else F.max_pool2d(x, 2)
 
-    def backward(self, gradient: torch.Tensor, known: torch.Tensor) -> torch.Tensor:
+    def backward(self, gradient: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
         if self.kind == "average":
             spread = F.interpolate(gradient, scale_factor=2.0, mode="nearest").mul_(0.25)
-            missing = (known.shape[3] - spread.shape[3], known.shape[2] - spread.shape[2])
+            missing = (values.shape[3] - spread.shape[3], values.shape[2] - spread.shape[2])
             return F.pad(spread, (0, missing[0], 0, missing[1])) if any(missing) else spread
-        _, winners = F.max_pool2d(known, 2, return_indices=True)
+        _, winners = F.max_pool2d(values, 2, return_indices=True)
         return torch.ops.aten.max_pool2d_with_indices_backward(
-            gradient, known, [2, 2], [2, 2], [0, 0], [1, 1], False, winners
+            gradient, values, [2, 2], [2, 2], [0, 0], [1, 1], False, winners
         )
 
 
@@ -124,8 +124,8 @@ class GramTap:
         return total
 
     def add(self, flowing: torch.Tensor, gradient: torch.Tensor, x: torch.Tensor) -> None:
-        known, wanted = (rows.tensor_split(self.regions) for rows in (_rows(x), _shared_rows(flowing)))
-        for weight, region, changed in zip(gradient, known, wanted, strict=True):
+        values, gradients = (rows.tensor_split(self.regions) for rows in (_rows(x), _shared_rows(flowing)))
+        for weight, region, changed in zip(gradient, values, gradients, strict=True):
             weight = ((weight + weight.t()) / len(region)).to(x.dtype)
             for whole, part in zip(changed.split(GRAM_ROWS), region.split(GRAM_ROWS), strict=True):
                 whole.addmm_(part, weight)
@@ -161,8 +161,8 @@ class FrozenStack(torch.autograd.Function):
                 if tap.index == index and gradient is not None:
                     tap.add(flowing, gradient, outputs[index])
             operation = ctx.operations[index]
-            known = outputs[index - 1 if operation.needs_input else index]
-            flowing = operation.backward(flowing, known)
+            values = outputs[index - 1 if operation.needs_input else index]
+            flowing = operation.backward(flowing, values)
             outputs[index] = None
         ctx.outputs = None
         return flowing.float() if flowing is not None else None, None, None

@@ -10,13 +10,13 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file
 
 from mitex.features.layers import CHANNELS, LAYERS_19
+from mitex.features.normalisation import SPREAD
 from mitex.features.vgg import Weights
 from mitex.features.weights import WeightsError
 from mitex.paths import cache_dir
 
 VARIABLE = "MITEX_VGG19"
 FILE = "vgg19.safetensors"
-SPREAD_RGB = (0.229, 0.224, 0.225)  # torchvision's networks read (x - mean) / spread, x in [0, 1]
 
 
 def vgg19_path() -> Path:
@@ -67,7 +67,7 @@ def vgg19_convolutions(path: Path | None = None) -> Weights:
         inputs = outputs
     if torchvision:
         weight, bias = layers["relu1_1"]
-        layers["relu1_1"] = weight / (255 * torch.tensor(SPREAD_RGB))[:, None, None], bias
+        layers["relu1_1"] = weight / (255 * torch.tensor(SPREAD))[:, None, None], bias
     return layers
 
 

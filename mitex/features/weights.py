@@ -38,10 +38,10 @@ def verify(path: Path, sha256: str) -> None:
     """
     try:
         with path.open("rb") as file:
-            found = hashlib.file_digest(file, "sha256").hexdigest()
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as e:
         raise WeightsError(f"cannot read {path} ({e.strerror})", "check its permissions") from e
-    if found != sha256:
+    if digest != sha256:
         raise WeightsError(
-            f"{path} is not the expected file (SHA-256 {found[:12]}…)", "reinstall mitex or replace it"
+            f"{path} is not the expected file (SHA-256 {digest[:12]}…)", "reinstall mitex or replace it"
         )

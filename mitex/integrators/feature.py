@@ -7,7 +7,7 @@ from typing import Any
 
 from mitex.runtime.jit import dr, mi
 from mitex.textures.field import Field
-from mitex.textures.variant import for_variant, init_base
+from mitex.textures.variant import for_variant, init_base, option
 
 
 class FeatureMethods:
@@ -44,27 +44,26 @@ class FeatureMethods:
     attached parameters returns an attached image.
     """
 
-    def __init__(self, props: Any) -> None:
+    def __init__(self, props: mi.Properties) -> None:
         init_base(mi.CppADIntegrator, self, props)
         if not dr.is_jit_v(mi.Float):
             raise RuntimeError(f"feature: variant '{mi.variant()}' is not supported; use an llvm or cuda one")
-        self.field = props.get("field")
-        self.name = props.get("name", "")
-        if (self.field is None) == (not self.name):
+        field = props.get("field")
+        self.name = option(props, "name", "")
+        if (field is None) == (not self.name):
             raise RuntimeError(
                 "feature: give either a nested texture 'field' or the 'name' of each shape's texture"
             )
-        if self.field is not None and not isinstance(self.field, mi.Texture):
-            raise RuntimeError(f"feature: 'field' is a {type(self.field).__name__}; give a texture")
-        background = props.get("background", 0.0)
-        if isinstance(background, mi.TensorXf):
-            background = background.array
-        self.background = mi.Float(background)
-        self.antialias = int(props.get("antialias", 1))
+        if field is not None and not isinstance(field, mi.Texture):
+            raise RuntimeError(f"feature: 'field' is a {type(field).__name__}; give a texture")
+        self.field = field
+        background: Any = props.get("background", 0.0)
+        self.background = mi.Float(background.array if isinstance(background, mi.TensorXf) else background)
+        self.antialias = option(props, "antialias", 1)
         if self.antialias < 1:
             raise RuntimeError(f"feature: 'antialias' is {self.antialias}; use 1 or more")
 
-    def traverse(self, callback: Any) -> None:
+    def traverse(self, callback: mi.TraversalCallback) -> None:
         if self.field is not None:
             callback.put("field", self.field, mi.ParamFlags.Differentiable)
         callback.put("background", self.background, mi.ParamFlags.Differentiable)
@@ -82,13 +81,13 @@ class FeatureMethods:
 
     def render(
         self,
-        scene: Any,
-        sensor: Any = 0,
-        seed: Any = 0,
+        scene: mi.Scene,
+        sensor: mi.Sensor | int = 0,
+        seed: mi.UInt32 | int = 0,
         spp: int = 0,
         develop: bool = True,
         evaluate: bool = True,
-    ) -> Any:
+    ) -> mi.TensorXf:
         """The image, `mi.TensorXf` (H, W, C); attached where parameters and the AD mode are."""
         if not develop:
             raise RuntimeError("feature: the film holds no result, so develop=True is needed")
@@ -97,7 +96,14 @@ class FeatureMethods:
             dr.eval(image)
         return image
 
-    def render_forward(self, scene: Any, params: Any, sensor: Any = 0, seed: Any = 0, spp: int = 0) -> Any:
+    def render_forward(
+        self,
+        scene: mi.Scene,
+        params: Any,
+        sensor: mi.Sensor | int = 0,
+        seed: mi.UInt32 | int = 0,
+        spp: int = 0,
+    ) -> mi.TensorXf:
         """Derivative of the image along the gradients set on the parameters."""
         with dr.resume_grad():
             image = self._image(scene, sensor, spp)[1]
@@ -105,7 +111,13 @@ class FeatureMethods:
             return dr.grad(image)
 
     def render_backward(
-        self, scene: Any, params: Any, grad_in: Any, sensor: Any = 0, seed: Any = 0, spp: int = 0
+        self,
+        scene: mi.Scene,
+        params: Any,
+        grad_in: mi.TensorXf,
+        sensor: mi.Sensor | int = 0,
+        seed: mi.UInt32 | int = 0,
+        spp: int = 0,
     ) -> None:
         """Adds the gradient of the parameters for the image's gradient `grad_in` (H, W, C)."""
         with dr.resume_grad():
@@ -118,10 +130,12 @@ class FeatureMethods:
                 dr.enqueue(dr.ADMode.Backward, value)
         dr.traverse(dr.ADMode.Backward)
 
-    def _image(self, scene: Any, sensor: Any, spp: int) -> tuple[list[Any], Any]:
+    def _image(
+        self, scene: mi.Scene, sensor: mi.Sensor | int, spp: int
+    ) -> tuple[list[mi.Float], mi.TensorXf]:
         """Samples averaged into pixels."""
         values, n = self._samples(scene, sensor, spp)
-        width, height = _film(scene, sensor).crop_size()
+        width, height = _sensor(scene, sensor).film().crop_size()
         count = len(values)
         flat = dr.zeros(mi.Float, width * height * count)
         pixel = dr.arange(mi.UInt32, width * height)
@@ -130,14 +144,14 @@ class FeatureMethods:
             dr.scatter(flat, mean, pixel * count + channel)
         return values, mi.TensorXf(flat, (height, width, count))
 
-    def _samples(self, scene: Any, sensor: Any, spp: int) -> tuple[list[Any], int]:
+    def _samples(self, scene: mi.Scene, sensor: mi.Sensor | int, spp: int) -> tuple[list[mi.Float], int]:
         """C values per sample, ordered by pixel, and n for n x n samples per pixel."""
         n = self._side(spp)
         fields = self.fields(scene)
         with dr.suspend_grad():
             si = _first_hits(scene, sensor, n)
             hit = si.is_valid()
-        values: list[Any] = []
+        values: list[mi.Float] = []
         covered = mi.Bool(False)
         for shape, texture in fields:
             mask = hit if shape is None else hit & (si.shape == mi.ShapePtr(shape))
@@ -161,44 +175,44 @@ class FeatureMethods:
             )
         return side
 
-    def fields(self, scene: Any) -> list[tuple[Any, Any]]:
+    def fields(self, scene: mi.Scene) -> list[tuple[mi.Shape | None, mi.Texture]]:
         """The textures that are imaged, as (shape, texture) pairs; a shape of None stands for all shapes."""
         if self.field is not None:
             return [(None, self.field)]
-        found = [(shape, textures_named(shape, self.name)) for shape in scene.shapes()]
-        pairs = [(shape, textures[0]) for shape, textures in found if textures]
+        named = ((shape, textures_named(shape, self.name)) for shape in scene.shapes())
+        pairs = [(shape, textures[0]) for shape, textures in named if textures]
         if not pairs:
             raise RuntimeError(f"feature: no shape of the scene has a texture called '{self.name}'")
         return pairs
 
-    def _backgrounds(self, channels: int) -> list[Any]:
-        given = dr.width(self.background)
-        if given not in (1, channels):
+    def _backgrounds(self, channels: int) -> list[mi.Float]:
+        count = dr.width(self.background)
+        if count not in (1, channels):
             raise RuntimeError(
-                f"feature: 'background' has {given} values for {channels} channels; give 1 or {channels}"
+                f"feature: 'background' has {count} values for {channels} channels; give 1 or {channels}"
             )
-        return [dr.gather(mi.Float, self.background, c if given > 1 else 0) for c in range(channels)]
+        return [dr.gather(mi.Float, self.background, c if count > 1 else 0) for c in range(channels)]
 
 
-def textures_named(thing: Any, name: str) -> list[Any]:
+def textures_named(thing: mi.Shape | mi.BSDF, name: str) -> list[mi.Texture]:
     """Textures with the parameter name `name` in a shape or BSDF or nested in it, outermost first."""
-    found: list[Any] = []
-    nested: list[Any] = []
+    textures: list[mi.Texture] = []
+    nested: list[mi.BSDF] = []
 
     class Callback(mi.TraversalCallback):
-        def put(self, key: str, value: Any, *_flags: Any) -> None:
+        def put(self, key: str, value: object, *_flags: object) -> None:
             if isinstance(value, mi.Texture) and key == name:
-                found.append(value)
+                textures.append(value)
             elif isinstance(value, mi.BSDF):
                 nested.append(value)
 
     thing.traverse(Callback())
     for child in nested:
-        found += textures_named(child, name)
-    return found
+        textures += textures_named(child, name)
+    return textures
 
 
-def _evaluate(texture: Any, si: Any, active: Any) -> list[Any]:
+def _evaluate(texture: mi.Texture, si: mi.SurfaceInteraction3f, active: mi.Bool) -> list[mi.Float]:
     """All channels of a Mitex field, else those of a colour."""
     if isinstance(texture, Field):
         with dr.suspend_grad():
@@ -209,23 +223,22 @@ def _evaluate(texture: Any, si: Any, active: Any) -> list[Any]:
     return list(texture.eval(si, active))
 
 
-def _film(scene: Any, sensor: Any) -> Any:
-    return (scene.sensors()[sensor] if isinstance(sensor, int) else sensor).film()
+def _sensor(scene: mi.Scene, sensor: mi.Sensor | int) -> mi.Sensor:
+    return scene.sensors()[sensor] if isinstance(sensor, int) else sensor
 
 
-def _first_hits(scene: Any, sensor: Any, n: int) -> Any:
+def _first_hits(scene: mi.Scene, sensor: mi.Sensor | int, n: int) -> mi.SurfaceInteraction3f:
     """Surface interactions of n x n regularly spaced rays per pixel, ordered by pixel."""
-    if isinstance(sensor, int):
-        sensor = scene.sensors()[sensor]
-    width, height = sensor.film().crop_size()
+    camera = _sensor(scene, sensor)
+    width, height = camera.film().crop_size()
     index = dr.arange(mi.UInt32, width * height * n * n)
     sample, pixel = index % (n * n), index // (n * n)
     x = mi.Float(pixel % width) + (mi.Float(sample % n) + 0.5) / n
     y = mi.Float(pixel // width) + (mi.Float(sample // n) + 0.5) / n
     position = mi.Point2f(x / width, y / height)
-    ray, _ = sensor.sample_ray(sensor.shutter_open(), 0.5, position, mi.Point2f(0.5))
-    found = scene.ray_intersect_preliminary(ray, coherent=True)
-    return found.compute_surface_interaction(ray, mi.RayFlags.All | mi.RayFlags.DetachShape, found.is_valid())
+    ray, _ = camera.sample_ray(camera.shutter_open(), 0.5, position, mi.Point2f(0.5))
+    hit = scene.ray_intersect_preliminary(ray, coherent=True)
+    return hit.compute_surface_interaction(ray, mi.RayFlags.All | mi.RayFlags.DetachShape, hit.is_valid())
 
 
 def register() -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from mitex.runtime.jit import dr, mi
-from mitex.textures.variant import for_variant, init_base
+from mitex.textures.shell_field import ShellFieldMethods
+from mitex.textures.variant import for_variant, init_base, option
 
 TOE, SLOPE = 0.04045, 12.92  # of the sRGB curve
 
@@ -32,19 +33,20 @@ class ShellMethods:
     Images are differentiable in the field's parameters.
     """
 
-    def __init__(self, props: Any) -> None:
+    def __init__(self, props: mi.Properties) -> None:
         init_base(mi.SamplingIntegrator, self, props)
         if not dr.is_jit_v(mi.Float) or mi.is_spectral or mi.is_polarized:
             raise RuntimeError(f"shell: variant '{mi.variant()}' is not supported; use llvm_ad_rgb")
-        self.field = props.get("field")
-        if not hasattr(self.field, "march"):
+        field: Any = props.get("field")
+        if not hasattr(field, "march"):
             raise RuntimeError("shell: 'field' is not a shell_field; see mitex.textures.shell_field")
-        self.max_depth = int(props.get("max_depth", 6))
+        self.field: ShellFieldMethods = field
+        self.max_depth = option(props, "max_depth", 6)
         if self.max_depth < 1:
             raise RuntimeError(f"shell: 'max_depth' is {self.max_depth}; use 1 or more")
-        self.hidden = bool(props.get("hide_emitters", False))
+        self.hidden = option(props, "hide_emitters", False)
 
-    def traverse(self, callback: Any) -> None:
+    def traverse(self, callback: mi.TraversalCallback) -> None:
         callback.put("field", self.field, mi.ParamFlags.Differentiable)
 
     def aov_names(self) -> list[str]:
@@ -55,44 +57,57 @@ class ShellMethods:
         return f"ShellIntegrator[\n  field = {nested},\n  max_depth = {self.max_depth}\n]"
 
     def sample(
-        self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True
-    ) -> tuple[Any, Any, list[Any]]:
+        self,
+        scene: mi.Scene,
+        sampler: mi.Sampler,
+        ray: mi.Ray3f,
+        medium: mi.Medium | None = None,
+        active: mi.Bool | bool = True,
+    ) -> tuple[mi.Spectrum, mi.Bool, list[mi.Float]]:
         """Radiance along rays, as one wavefront: the march cannot be recorded into a symbolic loop."""
         count = dr.width(ray.o)
         ray = mi.Ray3f(ray)
-        active = mi.Bool(active) & dr.full(mi.Bool, True, count)
+        alive = mi.Bool(active) & dr.full(mi.Bool, True, count)
         radiance, throughput = dr.zeros(mi.Spectrum, count), dr.ones(mi.Spectrum, count)
         valid = dr.zeros(mi.Bool, count)
         context = mi.BSDFContext()
         # The density with which the last direction was drawn; light sources hit after a mirror count fully.
         pdf, delta, start = mi.Float(1), mi.Bool(True), dr.zeros(mi.Interaction3f, count)
         for depth in range(self.max_depth):
-            si = scene.ray_intersect(ray, active)
+            si = scene.ray_intersect(ray, alive)
             segment = mi.Ray3f(ray)
             segment.maxt = dr.select(si.is_valid(), si.t, dr.inf)
-            segment_light = self.field.march(segment, sampler.next_1d(active), active)
+            segment_light = self.field.march(segment, sampler.next_1d(alive), alive)
             radiance += throughput * _linear(segment_light.colour, 1 - segment_light.transmittance)
             throughput *= segment_light.transmittance
-            valid |= active & (si.is_valid() | (segment_light.transmittance < 0.5))
-            emitted = self._emitted(scene, si, start, pdf, delta, active & mi.Bool(depth or not self.hidden))
+            valid |= alive & (si.is_valid() | (segment_light.transmittance < 0.5))
+            emitted = self._emitted(scene, si, start, pdf, delta, alive & mi.Bool(depth or not self.hidden))
             radiance += throughput * emitted
-            active &= si.is_valid() & (dr.max(dr.detach(throughput)) > 0)
-            if depth + 1 == self.max_depth or not dr.any(active)[0]:
+            alive &= si.is_valid() & (dr.max(dr.detach(throughput)) > 0)
+            if depth + 1 == self.max_depth or dr.none(alive):
                 break
             bsdf = si.bsdf(ray)
-            radiance += throughput * self._direct(scene, sampler, context, bsdf, si, active)
+            radiance += throughput * self._direct(scene, sampler, context, bsdf, si, alive)
             scattered, weight = bsdf.sample(
-                context, si, sampler.next_1d(active), sampler.next_2d(active), active
+                context, si, sampler.next_1d(alive), sampler.next_2d(alive), alive
             )
-            throughput *= dr.select(active, weight, 0)
+            throughput *= dr.select(alive, weight, 0)
             start, pdf = mi.Interaction3f(si), scattered.pdf
             delta = mi.has_flag(scattered.sampled_type, mi.BSDFFlags.Delta)
             ray = si.spawn_ray(si.to_world(scattered.wo))
-            active &= dr.max(dr.detach(throughput)) > 0
-            dr.eval(ray, radiance, throughput, active, start, pdf, delta, valid)
+            alive &= dr.max(dr.detach(throughput)) > 0
+            dr.eval(ray, radiance, throughput, alive, start, pdf, delta, valid)
         return radiance, valid, []
 
-    def _direct(self, scene: Any, sampler: Any, context: Any, bsdf: Any, si: Any, active: Any) -> Any:
+    def _direct(
+        self,
+        scene: mi.Scene,
+        sampler: mi.Sampler,
+        context: mi.BSDFContext,
+        bsdf: mi.BSDFPtr,
+        si: mi.SurfaceInteraction3f,
+        active: mi.Bool,
+    ) -> mi.Spectrum:
         """Light from a sampled source, weighted against the BSDF's own sampling; the field casts shadows."""
         smooth = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
         ds, weight = scene.sample_emitter_direction(si, sampler.next_2d(smooth), True, smooth)
@@ -103,7 +118,15 @@ class ShellMethods:
         transmittance = self.field.march(si.spawn_ray_to(ds.p), sampler.next_1d(smooth), smooth).transmittance
         return dr.select(smooth, value * weight * share * transmittance, 0)
 
-    def _emitted(self, scene: Any, si: Any, start: Any, pdf: Any, delta: Any, active: Any) -> Any:
+    def _emitted(
+        self,
+        scene: mi.Scene,
+        si: mi.SurfaceInteraction3f,
+        start: mi.Interaction3f,
+        pdf: mi.Float,
+        delta: mi.Bool,
+        active: mi.Bool,
+    ) -> mi.Spectrum:
         """What a light source that was hit adds."""
         emitter = si.emitter(scene)
         ds = mi.DirectionSample3f(scene, si, start)
@@ -112,12 +135,12 @@ class ShellMethods:
         return dr.select(active, emitter.eval(si, active) * share, 0)
 
 
-def _heuristic(a: Any, b: Any) -> Any:
+def _heuristic(a: mi.Float, b: mi.Float) -> mi.Float:
     """The power heuristic of multiple importance sampling (Veach 1997)."""
     return dr.select(a > 0, a * a / (a * a + b * b), 0)
 
 
-def _linear(display: Any, opacity: Any) -> Any:
+def _linear(display: mi.Color3f, opacity: mi.Float) -> mi.Spectrum:
     """Linear radiance, times opacity, of display values times opacity: fields blend in display values."""
     safe = dr.maximum(opacity, 1e-6)
     value = dr.clip(display / safe, 0, 1)

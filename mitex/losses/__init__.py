@@ -2,11 +2,10 @@
 
 from mitex.losses.gram import gram_distance, gram_loss, gram_matrix
 from mitex.losses.overflow import overflow_loss
-from mitex.losses.transport import channel_transport, decorrelate, moment_distance, relaxed_transport
+from mitex.losses.transport import channel_transport, moment_distance, relaxed_transport
 
 __all__ = [
     "channel_transport",
-    "decorrelate",
     "gram_distance",
     "gram_loss",
     "gram_matrix",

@@ -28,13 +28,13 @@ def sample_surface(
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     crosses = torch.linalg.cross(b - a, c - a)
     areas = crosses.detach().norm(dim=1).double().cumsum(0)
-    drawn = torch.rand(count, generator=generator, dtype=torch.float64) * areas[-1]
-    chosen = torch.searchsorted(areas, drawn).clamp_max(len(faces) - 1)
+    position = torch.rand(count, generator=generator, dtype=torch.float64) * areas[-1]
+    index = torch.searchsorted(areas, position).clamp_max(len(faces) - 1)
     root, v = torch.rand(2, count, generator=generator)
     root = root.sqrt()[:, None]
     v = v[:, None]
-    points = (1 - root) * a[chosen] + root * (1 - v) * b[chosen] + root * v * c[chosen]
-    return Samples(points, torch.nn.functional.normalize(crosses[chosen], dim=1))
+    points = (1 - root) * a[index] + root * (1 - v) * b[index] + root * v * c[index]
+    return Samples(points, torch.nn.functional.normalize(crosses[index], dim=1))
 
 
 def chamfer(ours: Samples, theirs: Samples) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:

@@ -9,27 +9,18 @@ from __future__ import annotations
 import torch
 import torch.nn.functional as F
 
-# The authors' rows; colours multiply it from the left (x @ M).
-DECORRELATION = (
-    (0.57735, 0.57735, 0.57735),
-    (-0.57735, 0.78868, -0.21132),
-    (-0.57735, -0.21132, 0.78868),
-)
-
 # With fewer channels, rounding does not average out, and float32 costs little.
 LOW_PRECISION_CHANNELS = 32
 SQUARES = (1e-5, 1e5)  # between which a squared distance counts
-
-
-def decorrelate(colours: torch.Tensor) -> torch.Tensor:
-    """RGB (..., 3) in the orthogonal basis in which the authors compare colours."""
-    return colours @ colours.new_tensor(DECORRELATION)
 
 
 def relaxed_transport(
     a: torch.Tensor, b: torch.Tensor, euclidean: bool = False, low_precision: bool = False
 ) -> torch.Tensor:
     """max(W(a, b), W(b, a)) of equation 4, for each pair of sets of a batch.
+
+    The authors multiply colours by a decorrelating matrix first. It is orthogonal: neither cosines nor
+    distances change, so it is left out.
 
     Args:
         a: (K, n, C) feature vectors.
@@ -115,10 +106,10 @@ class _PairCost(torch.autograd.Function):
     @torch.autograd.function.once_differentiable
     def backward(ctx, gradient):
         x, y, index, x_length, y_length, cosine = ctx.saved_tensors
-        chosen = gradient.nonzero()[:, 0]
-        share = (gradient[chosen] / x.shape[1])[:, None, None]
-        left, right = x[chosen], _take(y[chosen], index[chosen])
-        cosine, lengths = cosine[chosen], (x_length[chosen], y_length[chosen])
+        active = gradient.nonzero()[:, 0]
+        share = (gradient[active] / x.shape[1])[:, None, None]
+        left, right = x[active], _take(y[active], index[active])
+        cosine, lengths = cosine[active], (x_length[active], y_length[active])
         across = -share / (lengths[0] * lengths[1])
         along = [share * cosine / length.square() for length in lengths]
         if ctx.euclidean:
@@ -126,16 +117,16 @@ class _PairCost(torch.autograd.Function):
             inside = (square >= SQUARES[0]) & (square <= SQUARES[1])
             pull = 2 / x.shape[-1] * share * inside
             across, along = across - pull, [a + pull for a in along]
-        found: list[torch.Tensor | None] = [None, None]
+        gradients: list[torch.Tensor | None] = [None, None]
         if ctx.needs_input_grad[0]:
-            found[0] = torch.zeros_like(x)
-            found[0][chosen] = torch.addcmul(left * along[0], right, across)
+            gradients[0] = torch.zeros_like(x)
+            gradients[0][active] = torch.addcmul(left * along[0], right, across)
         if ctx.needs_input_grad[1]:
-            found[1] = torch.zeros_like(y)
-            places = (index[chosen] + chosen[:, None] * y.shape[1]).reshape(-1)
+            gradients[1] = torch.zeros_like(y)
+            places = (index[active] + active[:, None] * y.shape[1]).reshape(-1)
             rows = torch.addcmul(right * along[1], left, across)
-            found[1].view(-1, y.shape[2]).index_add_(0, places, rows.view(-1, y.shape[2]))
-        return *found, None, None
+            gradients[1].view(-1, y.shape[2]).index_add_(0, places, rows.view(-1, y.shape[2]))
+        return *gradients, None, None
 
 
 @torch.no_grad()

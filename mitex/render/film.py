@@ -43,7 +43,7 @@ def film(
         view = None
         for asset in assets:
             renderer = OrbitRenderer(asset, resolution=resolution, like=like)
-            view = view or renderer.frame(azimuth, elevation)
+            view = view or renderer.fit_view(azimuth, elevation)
             yield tone(renderer.render(azimuth, view, spp))
 
     return write_video(target, pictures(), frames, fps, resolution, progress)

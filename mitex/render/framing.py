@@ -37,7 +37,7 @@ def hull(points: np.ndarray) -> np.ndarray:
         return points
 
 
-def frame(points: np.ndarray, elevation: float, fov: float = FOV) -> View:
+def fit_view(points: np.ndarray, elevation: float, fov: float = FOV) -> View:
     """A square view along -z, from `elevation` above, in which all points lie within the margin and touch it.
 
     Args:

@@ -62,7 +62,7 @@ def still(
     renderer = OrbitRenderer(
         asset, resolution=resolution, displacement=displacement, ao=ao, backdrop=backdrop
     )
-    return renderer.render(azimuth, renderer.frame(azimuth, elevation), spp, seed)
+    return renderer.render(azimuth, renderer.fit_view(azimuth, elevation), spp, seed)
 
 
 def render_still(asset: Asset, path: str | os.PathLike[str], *, exposure: float = 0.0, **options) -> Path:
@@ -121,7 +121,7 @@ def turntable(
         asset, resolution=resolution, displacement=displacement, ao=ao, backdrop=backdrop
     )
     angles = AZIMUTH + np.linspace(0.0, 2.0 * math.pi, frames, endpoint=False)
-    view = renderer.frame(angles.tolist(), elevation)
+    view = renderer.fit_view(angles.tolist(), elevation)
     # The same seed: noise that stands still compresses better and disturbs less.
     pictures = (tone(renderer.render(float(angle), view, spp), exposure) for angle in angles)
     return write_video(target, pictures, frames, fps, resolution, progress)

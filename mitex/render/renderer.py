@@ -18,7 +18,7 @@ from mitex.geometry.triangles import twice_area
 from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh
 from mitex.mesh.mesh import Similarity
-from mitex.render.framing import FOV, View, frame, hull, rotation
+from mitex.render.framing import FOV, View, fit_view, hull, rotation
 from mitex.render.studio import GREY, backdrop, lights
 
 MIN_ROUGHNESS = 0.05
@@ -82,7 +82,7 @@ class OrbitRenderer:
             mesh = Mesh(mesh.vertices[split.source], split.faces, split.uv[split.faces], mesh.name)
         self._scene, self._params = self._build(asset, mesh, ao)
 
-    def frame(self, azimuths: float | Sequence[float] = 0.0, elevation: float = math.radians(18)) -> View:
+    def fit_view(self, azimuths: float | Sequence[float] = 0.0, elevation: float = math.radians(18)) -> View:
         """The camera from which the object, at any of the azimuths [rad], fills the picture.
 
         Raises:
@@ -95,14 +95,14 @@ class OrbitRenderer:
                 f"use {math.degrees(lowest):.0f} to 85" + (", or no backdrop" if self._on_backdrop else ""),
             )
         angles = np.atleast_1d(np.asarray(azimuths, np.float64))
-        return frame(np.concatenate([self._hull @ rotation(a).T for a in angles]), elevation)
+        return fit_view(np.concatenate([self._hull @ rotation(a).T for a in angles]), elevation)
 
     def render(self, azimuth: float, view: View, spp: int = 64, seed: int = 0) -> np.ndarray:
         """One picture.
 
         Args:
             azimuth: from where the object is seen [rad], 0 is its +z side, pi / 2 its +x side.
-            view: the camera, from `frame`.
+            view: the camera, from `fit_view`.
             spp: samples per pixel, 1 to 65536.
             seed: of the noise.
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from mitex.mesh import Similarity
 from mitex.plugins import init
-from mitex.render.framing import frame, hull, rotation
+from mitex.render.framing import fit_view, hull, rotation
 from mitex.render.picture import AZIMUTH, ELEVATION
 from mitex.render.renderer import MAX_DEPTH, accumulated, paper_sweep, sensor
 from mitex.render.studio import lights
@@ -43,7 +43,7 @@ def shell_still(
     place = Similarity((similarity.center - centre) / radius, similarity.scale / radius)
     turn = rotation(azimuth)
     points = (outline - centre) / radius @ turn.T
-    view = frame(hull(points), elevation)
+    view = fit_view(hull(points), elevation)
     look_at = mi.ScalarTransform4f().look_at(view.origin.tolist(), view.target.tolist(), [0.0, 1.0, 0.0])
     scene = {
         "type": "scene",

@@ -66,7 +66,7 @@ class Cameras:
         """(K, H, W)."""
         return len(self), self.height, self.width
 
-    def frame(self) -> tuple[Array, Array, Array]:
+    def axes(self) -> tuple[Array, Array, Array]:
         """Orthonormal (right, up, forward) of every camera, (K, 3) float32 each."""
         forward = unit(self.target.astype(np.float64) - self.origin)
         right = unit(np.cross(forward, self.up.astype(np.float64)))
@@ -83,7 +83,7 @@ class Cameras:
         Returns:
             (o, d), (K, 3, 3) float32 each: [camera, term (constant, x, y), axis].
         """
-        right, up, forward = self.frame()
+        right, up, forward = self.axes()
         aspect = np.float32(self.width / self.height)
         zero = np.zeros_like(right)
         if self.kind == "perspective":
@@ -286,9 +286,9 @@ def _check(cameras: Cameras) -> None:
     shape = cameras.origin.shape
     vectors: Sequence[Array] = (cameras.origin, cameras.target, cameras.up)
     if len(shape) != 2 or shape[0] < 1 or shape[1] != 3 or any(v.shape != shape for v in vectors):
-        found = ", ".join(str(v.shape) for v in vectors)
+        shapes = ", ".join(str(v.shape) for v in vectors)
         raise ConfigError(
-            f"camera origin, target and up have shapes {found}", "give three arrays of one shape (K, 3)"
+            f"camera origin, target and up have shapes {shapes}", "give three arrays of one shape (K, 3)"
         )
     if not all(np.isfinite(v).all() for v in vectors):
         raise ConfigError("a camera has a coordinate that is not finite", "check distance, target and mesh")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from mitex.mesh import Mesh
@@ -37,13 +35,13 @@ def crossing_edges(mesh: Mesh) -> np.ndarray:
 
 
 def _first(
-    scene: Any, start: np.ndarray, end: np.ndarray, begun: np.ndarray
+    scene: mi.Scene, start: np.ndarray, end: np.ndarray, begun: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of edges, from the part `begun` on: whether a face is hit, which one, and at what part."""
     way = end - start
     origin = mi.Point3f(np.ascontiguousarray((start + begun[:, None] * way).T))
     ray = mi.Ray3f(origin, mi.Vector3f(np.ascontiguousarray(way.T)))
     ray.maxt = mi.Float(np.maximum(1 - PAST - begun, 0))
-    found = scene.ray_intersect_preliminary(ray)
-    hit, face, t = (np.asarray(a) for a in (found.is_valid(), found.prim_index, found.t))
+    hits = scene.ray_intersect_preliminary(ray)
+    hit, face, t = (np.asarray(a) for a in (hits.is_valid(), hits.prim_index, hits.t))
     return hit.astype(bool), face, begun + t

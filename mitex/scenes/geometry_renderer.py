@@ -76,29 +76,29 @@ class GeometryRenderer:
     def images(self, vertices: np.ndarray, seed: int) -> np.ndarray:
         """(K, H, W, 3) of vertices (V, 3), without derivatives."""
         self._move(mi.Float(vertices.ravel()))
-        made = [
+        images = [
             mi.render(self.scene, sensor=sensor, seed=seed + k, spp=self.samples)
             for k, sensor in enumerate(self.sensors)
         ]
-        return np.stack([np.asarray(image) for image in made])
+        return np.stack([np.asarray(image) for image in images])
 
     def pull_back(self, vertices: np.ndarray, gradient: np.ndarray, seed: int) -> np.ndarray:
         """(V, 3) gradient of the vertices, given that of the images (K, H, W, 3)."""
-        integrator, found = self.scene.integrator(), np.zeros(vertices.size, np.float32)
+        integrator, total = self.scene.integrator(), np.zeros(vertices.size, np.float32)
         for k, sensor in enumerate(self.sensors):
             # One leaf for each view: a backward pass clears the way from the normals to the positions.
             positions = mi.Float(vertices.ravel())
             dr.enable_grad(positions)
             self._move(positions)
-            given = mi.TensorXf(np.ascontiguousarray(gradient[k]))
+            adjoint = mi.TensorXf(np.ascontiguousarray(gradient[k]))
             integrator.render_backward(
-                self.scene, self._params, given, sensor, seed + k, self.gradient_samples
+                self.scene, self._params, adjoint, sensor, seed + k, self.gradient_samples
             )
-            found += np.asarray(dr.grad(positions))
+            total += np.asarray(dr.grad(positions))
             self._move(dr.detach(positions))
-        return found.reshape(vertices.shape)
+        return total.reshape(vertices.shape)
 
-    def _move(self, positions: Any) -> None:
+    def _move(self, positions: mi.Float) -> None:
         self._params[self._key] = positions
         self._params.update()
 
@@ -118,8 +118,8 @@ class _Render(torch.autograd.Function):
         (vertices,) = ctx.saved_tensors
         # Other samples than the images': a gradient must not correlate with their noise.
         seed = ctx.seed + len(ctx.renderer.sensors)
-        found = ctx.renderer.pull_back(vertices.detach().numpy(), gradients[0].numpy(), seed)
-        return torch.from_numpy(found), None, None
+        gradient = ctx.renderer.pull_back(vertices.detach().numpy(), gradients[0].numpy(), seed)
+        return torch.from_numpy(gradient), None, None
 
 
 def _with_border(sensor: dict[str, Any]) -> dict[str, Any]:

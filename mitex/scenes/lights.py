@@ -87,12 +87,12 @@ def _panel(
     """A square that faces the origin and emits on that side."""
     from mitex.runtime.jit import mi
 
-    frame = mi.ScalarTransform4f().look_at(
+    to_world = mi.ScalarTransform4f().look_at(
         origin=[radius * p for p in position], target=[0, 0, 0], up=[0, 1, 0]
     )
     return {
         "type": "rectangle",
-        "to_world": frame @ mi.ScalarTransform4f().scale(half * radius),
+        "to_world": to_world @ mi.ScalarTransform4f().scale(half * radius),
         "emitter": {"type": "area", "radiance": {"type": "rgb", "value": [strength * r for r in radiance]}},
     }
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from mitex.mesh import Mesh
@@ -33,17 +31,17 @@ def ambient_occlusion(
     init()
     scene = mi.load_dict({"type": "scene", "mesh": mesh_shape(mesh)})
     offset = OFFSET * float(np.ptp(mesh.vertices, axis=0).max())
-    found = np.empty(len(points), np.float32)
+    openness = np.empty(len(points), np.float32)
     count = max(RAYS // samples, 1)
     for start in range(0, len(points), count):
         part = slice(start, start + count)
-        found[part] = _open(
+        openness[part] = _open(
             scene, points[part] + offset * normals[part], normals[part], samples, seed + start
         )
-    return found
+    return openness
 
 
-def _open(scene: Any, origins: np.ndarray, normals: np.ndarray, samples: int, seed: int) -> np.ndarray:
+def _open(scene: mi.Scene, origins: np.ndarray, normals: np.ndarray, samples: int, seed: int) -> np.ndarray:
     count = len(origins)
     index = dr.arange(mi.UInt32, count) if samples == 1 else dr.repeat(dr.arange(mi.UInt32, count), samples)
     origin, normal = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import torch
@@ -195,8 +195,8 @@ class Stage:
         """Hit (bool), triangle (int32), barycentrics u and v of every sample, (K H W n n,) each."""
         with dr.suspend_grad():
             ray = _rays(cameras, n)
-            found = self.scene.ray_intersect_preliminary(ray, coherent=True)
-            hit, triangle, uv = found.is_valid(), found.prim_index, found.prim_uv
+            hits = self.scene.ray_intersect_preliminary(ray, coherent=True)
+            hit, triangle, uv = hits.is_valid(), hits.prim_index, hits.prim_uv
             dr.eval(hit, triangle, uv)
             u, v = mi.Float(uv.x), mi.Float(uv.y)
         hit, triangle, u, v = (_tensor(array) for array in (hit, triangle, u, v))
@@ -207,7 +207,7 @@ def _tensor(array: dr.ArrayBase) -> torch.Tensor:
     return cast(torch.Tensor, array.torch())
 
 
-def mesh_shape(mesh: Mesh, bsdf: Any = None, smooth: bool = False) -> Any:
+def mesh_shape(mesh: Mesh, bsdf: mi.BSDF | None = None, smooth: bool = False) -> mi.Mesh:
     """A Mitsuba mesh with the vertices and faces of `mesh`, without UVs.
 
     Args:
@@ -226,7 +226,7 @@ def mesh_shape(mesh: Mesh, bsdf: Any = None, smooth: bool = False) -> Any:
     return shape
 
 
-def _rays(cameras: Cameras, n: int) -> Any:
+def _rays(cameras: Cameras, n: int) -> mi.Ray3f:
     """The cameras' rays with n x n samples per pixel, as one wavefront ordered by pixel."""
     count, height, width = cameras.shape
     index = dr.arange(mi.UInt32, count * height * width * n * n)
@@ -238,7 +238,7 @@ def _rays(cameras: Cameras, n: int) -> Any:
     x = (mi.Float(column) + (mi.Float(sample % side) + 0.5) / mi.Float(side)) * (2 / mi.Float(columns)) - 1
     y = 1 - (mi.Float(row) + (mi.Float(sample // side) + 0.5) / mi.Float(side)) * (2 / mi.Float(rows))
 
-    def affine(terms: np.ndarray) -> Any:
+    def affine(terms: np.ndarray) -> mi.Vector3f:
         flat = mi.Float(np.ascontiguousarray(terms).ravel())
         constant, along_x, along_y = (dr.gather(mi.Vector3f, flat, 3 * camera + term) for term in range(3))
         return constant + x * along_x + y * along_y

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol, runtime_checkable
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol, runtime_checkable
 
 from mitex.runtime.jit import dr, mi
-from mitex.textures.variant import init_base
+from mitex.textures.variant import init_base, option
 
-# Rows of the data, their weights, and whether there are any, for each lookup.
-Located = tuple[tuple[Any, ...], tuple[Any, ...], Any]
+
+class Located(NamedTuple):
+    """Where lookups read: K rows of the data, their weights, and which of the lookups read any."""
+
+    rows: tuple[mi.UInt32, ...]
+    weights: tuple[mi.Float, ...]
+    active: mi.Bool
 
 
 @runtime_checkable
@@ -19,11 +25,11 @@ class Field(Protocol):
     adjoint is a scatter with the weights that `locate` returned.
     """
 
-    def locate(self, si: Any, active: Any = True) -> Located:
-        """Where the points `si` read: K rows (K UInt32), weights (K Float), and which read any (Bool)."""
+    def locate(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> Located:
+        """Where the points `si` read."""
         ...
 
-    def gather(self, located: Located, channels: range | None = None) -> list[Any]:
+    def gather(self, located: Located, channels: range | None = None) -> list[mi.Float]:
         """Interpolated `scale * data + offset` of the channels (default: all), one Float each."""
         ...
 
@@ -35,9 +41,9 @@ class FieldMethods:
     """
 
     plugin: str  # type of the plugin, for messages
-    data: Any
+    data: mi.TensorXf
 
-    def _read(self, props: Any) -> None:
+    def _read(self, props: mi.Properties) -> None:
         """Reads the properties that all fields have."""
         init_base(mi.Texture, self, props)
         if not dr.is_jit_v(mi.Float):
@@ -45,21 +51,21 @@ class FieldMethods:
                 f"{self.plugin}: variant '{mi.variant()}' is not supported; use an llvm or cuda one"
             )
         self.data = mi.TensorXf(props["data"])
-        self.channel = int(props.get("channel", 0))
+        self.channel = option(props, "channel", 0)
         self.scale = mi.Float(props.get("scale", 1.0))
         self.offset = mi.Float(props.get("offset", 0.0))
-        self.raw = bool(props.get("raw", False))
+        self.raw = option(props, "raw", False)
 
     @property
     def channel_count(self) -> int:
         """C, the number of channels of the data."""
         return self.data.shape[-1]
 
-    def traverse(self, callback: Any) -> None:
+    def traverse(self, callback: mi.TraversalCallback) -> None:
         for name in ("data", "scale", "offset"):
             callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
 
-    def parameters_changed(self, keys: Any = ()) -> None:
+    def parameters_changed(self, keys: Sequence[str] = ()) -> None:
         self._check()
 
     def _check(self) -> None:
@@ -75,14 +81,14 @@ class FieldMethods:
         """Raises a RuntimeError if the data has a wrong shape."""
         raise NotImplementedError
 
-    def _rows(self) -> Any:
+    def _rows(self) -> mi.UInt32:
         """Rows of the data (UInt32) over which `mean` and `max` go."""
         raise NotImplementedError
 
-    def locate(self, si: Any, active: Any = True) -> Located:
+    def locate(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> Located:
         raise NotImplementedError
 
-    def gather(self, located: Located, channels: range | None = None) -> list[Any]:
+    def gather(self, located: Located, channels: range | None = None) -> list[mi.Float]:
         """Interpolated `scale * data + offset` of the channels (default: all), one Float each."""
         _, weights, active = located
         values = []
@@ -92,21 +98,21 @@ class FieldMethods:
             values.append(dr.fma(dr.select(active, value, 0), self.scale, self.offset))
         return values
 
-    def _row_values(self, located: Located, channel: int) -> list[Any]:
+    def _row_values(self, located: Located, channel: int) -> list[mi.Float]:
         """The data of one channel at the K rows of the lookups."""
         index, _, active = located
         return [dr.gather(mi.Float, self.data.array, self.channel_count * i + channel, active) for i in index]
 
-    def eval(self, si: Any, active: Any = True) -> Any:
+    def eval(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Color3f | mi.Color1f:
         return self._color(self._three(si, active))
 
-    def eval_1(self, si: Any, active: Any = True) -> Any:
+    def eval_1(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Float:
         return self.gather(self.locate(si, active), range(self.channel, self.channel + 1))[0]
 
-    def eval_3(self, si: Any, active: Any = True) -> Any:
+    def eval_3(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Color3f:
         return self._three(si, active)
 
-    def mean(self) -> Any:
+    def mean(self) -> mi.Float:
         """Mean over the data's rows of what `eval` returns."""
         return dr.mean(dr.mean(self._row_colors()))
 
@@ -129,11 +135,11 @@ class FieldMethods:
         enough = self.channel + 3 <= self.channel_count
         return range(self.channel, self.channel + (3 if enough else 1))
 
-    def _three(self, si: Any, active: Any) -> Any:
+    def _three(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool) -> mi.Color3f:
         values = self.gather(self.locate(si, active), self._selection())
         return mi.Color3f(*values) if len(values) == 3 else mi.Color3f(values[0])
 
-    def _color(self, rgb: Any) -> Any:
+    def _color(self, rgb: mi.Color3f) -> mi.Color3f | mi.Color1f:
         if mi.is_spectral:
             raise RuntimeError(
                 f"{self.plugin}: colours need an rgb or mono variant; roughness and normals work in any"
@@ -142,7 +148,7 @@ class FieldMethods:
             rgb = mi.math.srgb_to_linear(dr.clip(rgb, 0, 1))
         return mi.Color1f(mi.luminance(rgb)) if mi.is_monochromatic else rgb
 
-    def _row_colors(self) -> Any:
+    def _row_colors(self) -> mi.Color3f | mi.Color1f:
         row = self._rows() * self.channel_count
         values = [
             dr.fma(dr.gather(mi.Float, self.data.array, row + c), self.scale, self.offset)

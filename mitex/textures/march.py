@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, TypeVar, runtime_checkable
 
 from mitex.runtime.jit import dr, mi
+
+A = TypeVar("A", bound=dr.ArrayBase)
 
 DIAGONAL = 2 * math.sqrt(3)  # of the scene cube [-1, 1]^3
 WINDOW = 48  # steps that are taken before the rays that have come to an end are dropped
@@ -26,23 +28,23 @@ class Samples:
         rays: R.
     """
 
-    ray: Any
-    t: Any
+    ray: mi.UInt32
+    t: mi.Float
     step: float
     rays: int
 
     def __len__(self) -> int:
         return dr.width(self.ray) if self.rays else 0
 
-    def subset(self, index: Any) -> Samples:
-        """The samples at ascending indices `mi.UInt32`."""
+    def subset(self, index: mi.UInt32) -> Samples:
+        """The samples at ascending indices."""
         ray, t = dr.gather(mi.UInt32, self.ray, index), dr.gather(mi.Float, self.t, index)
         return Samples(ray, t, self.step, self.rays)
 
-    def points(self, origin: Any, direction: Any) -> Any:
+    def points(self, origin: mi.Point3f, direction: mi.Vector3f) -> mi.Point3f:
         """(M,) `mi.Point3f` on rays of R origins and directions."""
-        start, along = (dr.gather(type(v), v, self.ray) for v in (origin, direction))
-        return mi.Point3f(start + along * self.t)
+        along = dr.gather(mi.Vector3f, direction, self.ray)
+        return dr.gather(mi.Point3f, origin, self.ray) + mi.Point3f(along * self.t)
 
 
 class RadianceField(Protocol):
@@ -53,10 +55,10 @@ class RadianceField(Protocol):
         step: between samples [scene units].
     """
 
-    mask: Any
+    mask: mi.TensorXu8
     step: float
 
-    def evaluate(self, points: Any, view: Any) -> tuple[Any, Any, Any]:
+    def evaluate(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, mi.Float, mi.Color3f]:
         """Of N points, and the unit directions in which they are seen: ascending indices of those that have
         matter (M,), their density [1 / scene units] and colour `mi.Color3f`."""
         ...
@@ -66,7 +68,7 @@ class RadianceField(Protocol):
 class DifferentiableField(RadianceField, Protocol):
     """A field with parameters that scenes list and change, and that images are differentiable in."""
 
-    def parameters(self) -> Mapping[str, Any]:
+    def parameters(self) -> Mapping[str, dr.ArrayBase]:
         """Dr.Jit arrays by name, the same objects with each call: they are changed in place."""
         ...
 
@@ -85,13 +87,17 @@ class Composite:
         depth: mean distance of the matter, times opacity, `mi.Float` [scene units].
     """
 
-    colour: Any
-    transmittance: Any
-    depth: Any
+    colour: mi.Color3f
+    transmittance: mi.Float
+    depth: mi.Float
 
 
 def composite(
-    field: RadianceField, origin: Any, direction: Any, jitter: Any, far: Any = math.inf
+    field: RadianceField,
+    origin: mi.Point3f,
+    direction: mi.Vector3f,
+    jitter: mi.Float,
+    far: mi.Float | float = math.inf,
 ) -> Composite:
     """Marches through a field from the front, until the rays are opaque.
 
@@ -104,24 +110,28 @@ def composite(
     result = Composite(dr.zeros(mi.Color3f, count), dr.ones(mi.Float, count), dr.zeros(mi.Float, count))
     near, leave = _box(origin, direction)
     leave = dr.minimum(leave, far)
-    alive: Any = dr.compress(near < leave)
+    alive = mi.UInt32(dr.compress(near < leave))
     while dr.width(alive):
-        o, d, j, first, last = (
-            dr.gather(type(v), v, alive) for v in (origin, direction, jitter, near, leave)
-        )
+        o, d = dr.gather(mi.Point3f, origin, alive), dr.gather(mi.Vector3f, direction, alive)
+        j, first, last = (dr.gather(mi.Float, v, alive) for v in (jitter, near, leave))
         end = first + WINDOW * field.step
         samples = march(o, d, field.mask, field.step, j, first, dr.minimum(last, end))
         if len(samples):
             _gather(field, samples, o, d, alive, result)
         dr.scatter(near, end, alive)
         transmittance = dr.gather(mi.Float, dr.detach(result.transmittance), alive)
-        unfinished: Any = dr.compress((transmittance > OPAQUE) & (end < last))
+        unfinished = mi.UInt32(dr.compress((transmittance > OPAQUE) & (end < last)))
         alive = dr.gather(mi.UInt32, alive, unfinished)
     return result
 
 
 def _gather(
-    field: RadianceField, samples: Samples, origin: Any, direction: Any, rays: Any, to: Composite
+    field: RadianceField,
+    samples: Samples,
+    origin: mi.Point3f,
+    direction: mi.Vector3f,
+    rays: mi.UInt32,
+    to: Composite,
 ) -> None:
     """Adds one window's samples to the results of the `rays` that they lie on."""
     along = dr.gather(mi.Vector3f, direction, samples.ray)
@@ -141,7 +151,13 @@ def _gather(
 
 
 def march(
-    origin: Any, direction: Any, grid: Any, step: float, jitter: Any, near: Any = 0.0, far: Any = math.inf
+    origin: mi.Point3f,
+    direction: mi.Vector3f,
+    grid: mi.TensorXu8,
+    step: float,
+    jitter: mi.Float,
+    near: mi.Float | float = 0.0,
+    far: mi.Float | float = math.inf,
 ) -> Samples:
     """Samples at even steps, where the ray is in an occupied cell.
 
@@ -170,10 +186,15 @@ def march(
     candidates = Samples(ray, t, step, count)
     cell = cells_of(candidates.points(origin, direction), side)
     occupied = dr.compress(before_exit & (dr.gather(mi.UInt8, grid.array, cell, before_exit) != 0))
-    return candidates.subset(occupied)
+    return candidates.subset(mi.UInt32(occupied))
 
 
-def visible(samples: Samples, origin: Any, direction: Any, density: Callable[[Any], Any]) -> Samples:
+def visible(
+    samples: Samples,
+    origin: mi.Point3f,
+    direction: mi.Vector3f,
+    density: Callable[[mi.Point3f], mi.Float],
+) -> Samples:
     """The samples that are seen: those before which the ray has not come to an end.
 
     In an opaque scene these are few, and only they are worth colours and derivatives.
@@ -187,21 +208,21 @@ def visible(samples: Samples, origin: Any, direction: Any, density: Callable[[An
     rank = dr.arange(mi.UInt32, len(samples)) - _first(samples)
     for part in (rank < FRONT, rank >= FRONT):
         transmittance = dr.exp(-sum_rays(depth, samples))
-        index = dr.compress(part & (dr.gather(mi.Float, transmittance, samples.ray) > OPAQUE))
+        index = mi.UInt32(dr.compress(part & (dr.gather(mi.Float, transmittance, samples.ray) > OPAQUE)))
         if dr.width(index):
             points = samples.subset(index).points(origin, direction)
             dr.scatter(depth, density(points) * samples.step, index)
     before = _sum_before(mi.Float64(depth), samples)
-    return samples.subset(dr.compress(dr.exp(-before) > OPAQUE))
+    return samples.subset(mi.UInt32(dr.compress(dr.exp(-before) > OPAQUE)))
 
 
-def cells_of(points: Any, side: int) -> Any:
+def cells_of(points: mi.Point3f, side: int) -> mi.UInt32:
     """Index of the cell of the scene cube, x slowest, for `mi.Point3f` inside."""
     x, y, z = (mi.UInt32(dr.clip((p + 1) * (0.5 * side), 0, side - 1)) for p in points)
     return (x * side + y) * side + z
 
 
-def weights_of(density: Any, samples: Samples) -> tuple[Any, Any]:
+def weights_of(density: mi.Float, samples: Samples) -> tuple[mi.Float, mi.Float]:
     """Compositing weight of each sample (M,), and transmittance of each ray (R,).
 
     Args:
@@ -219,26 +240,26 @@ class _Before(dr.CustomOp):
     Its own derivative: that of Dr.Jit's prefix sum needs a new kernel for each M.
     """
 
-    def eval(self, values: Any, samples: Samples) -> Any:
+    def eval(self, values: mi.Float64, samples: Samples) -> mi.Float64:
         self.samples = samples
         return _sum_before(values, samples)
 
     def forward(self) -> None:
-        self.set_grad_out(_sum_before(self.grad_in("values"), self.samples))
+        self.set_grad_out(_sum_before(mi.Float64(self.grad_in("values")), self.samples))
 
     def backward(self) -> None:
-        grad = self.grad_out()
+        grad = mi.Float64(self.grad_out())
         total = dr.gather(mi.Float64, sum_rays(grad, self.samples), self.samples.ray)
         self.set_grad_in("values", total - _sum_before(grad, self.samples) - grad)
 
 
-def _sum_before(values: Any, samples: Samples) -> Any:
+def _sum_before(values: mi.Float64, samples: Samples) -> mi.Float64:
     # In double precision: the sum runs over all rays, and differences of it must keep their digits.
     sums = dr.prefix_sum(values)
     return sums - dr.gather(mi.Float64, sums, _first(samples))
 
 
-def _first(samples: Samples) -> Any:
+def _first(samples: Samples) -> mi.UInt32:
     """Index of the first sample of each sample's ray."""
     index = dr.arange(mi.UInt32, len(samples))
     start = dr.full(mi.UInt32, 0xFFFFFFFF, samples.rays)
@@ -246,15 +267,16 @@ def _first(samples: Samples) -> Any:
     return dr.gather(mi.UInt32, start, samples.ray)
 
 
-def sum_rays(values: Any, samples: Samples) -> Any:
+def sum_rays(values: A, samples: Samples) -> A:
     """Sums over each ray (R,) of values (M,), `mi.Float` or an array of them."""
     total = dr.zeros(type(values), samples.rays)
     dr.scatter_add(total, values, samples.ray)
     return total
 
 
-def _box(origin: Any, direction: Any) -> tuple[Any, Any]:
+def _box(origin: mi.Point3f, direction: mi.Vector3f) -> tuple[mi.Float, mi.Float]:
     """Where rays enter and leave the scene cube; the entry is behind the exit where they miss it."""
     inverse = 1 / dr.select(direction == 0, 1e-12, direction)
-    a, b = (-1 - origin) * inverse, (1 - origin) * inverse
+    start = mi.Vector3f(origin)
+    a, b = (-1 - start) * inverse, (1 - start) * inverse
     return dr.maximum(dr.max(dr.minimum(a, b)), 0), dr.min(dr.maximum(a, b))

@@ -7,7 +7,7 @@ are then those of the scene: `mi.traverse` lists them, and images have derivativ
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -33,7 +33,7 @@ class ShellFieldMethods:
         self.field, self.similarity = field, similarity
         self.turn = np.eye(3) if turn is None else turn
 
-    def bbox(self) -> Any:
+    def bbox(self) -> mi.ScalarBoundingBox3f:
         """Of the cube, in the world."""
         corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
         corners = (corners * self.similarity.scale + self.similarity.center) @ self.turn.T
@@ -43,7 +43,7 @@ class ShellFieldMethods:
         """No bound is known."""
         return float("inf")
 
-    def march(self, ray: Any, jitter: Any, active: Any) -> Composite:
+    def march(self, ray: mi.Ray3f, jitter: mi.Float, active: mi.Bool) -> Composite:
         """What rays gather up to their `maxt`, where `active`: as of `composite`, with depths in world
         units.
 
@@ -54,7 +54,7 @@ class ShellFieldMethods:
         """
         scale = float(self.similarity.scale)
         centre = mi.Vector3f(np.asarray(self.similarity.center, np.float32).tolist())
-        rays: Any = dr.compress(active)
+        rays = mi.UInt32(dr.compress(active))
         count = max(dr.width(ray.o), dr.width(active), dr.width(jitter))
         total = Composite(dr.zeros(mi.Color3f, count), dr.ones(mi.Float, count), dr.zeros(mi.Float, count))
         for start in range(0, dr.width(rays), CHUNK):
@@ -71,12 +71,12 @@ class ShellFieldMethods:
             dr.scatter(total.depth, pixels.depth * scale, index)
         return total
 
-    def traverse(self, callback: Any) -> None:
+    def traverse(self, callback: mi.TraversalCallback) -> None:
         if isinstance(self.field, DifferentiableField):
             for name, value in self.field.parameters().items():
                 callback.put(name, value, mi.ParamFlags.Differentiable)
 
-    def parameters_changed(self, keys: Any = ()) -> None:
+    def parameters_changed(self, keys: Sequence[str] = ()) -> None:
         if isinstance(self.field, DifferentiableField):
             self.field.parameters_changed()
 
@@ -84,6 +84,6 @@ class ShellFieldMethods:
         return f"ShellField[\n  bbox = {self.bbox()},\n  step = {self.field.step}\n]"
 
 
-def shell_field(field: RadianceField, similarity: Similarity, turn: np.ndarray | None = None) -> Any:
+def shell_field(field: RadianceField, similarity: Similarity, turn: np.ndarray | None = None) -> mi.Volume:
     """An `mi.Volume` of the current variant that carries a radiance field; see `ShellFieldMethods`."""
     return for_variant("ShellField", mi.Volume, ShellFieldMethods)(field, similarity, turn)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 from mitex.runtime.jit import dr, mi
 from mitex.textures.field import FieldMethods, Located
-from mitex.textures.variant import for_variant
+from mitex.textures.variant import for_variant, option
 
 FILTERS = ("bilinear", "nearest")
 MAX_CHART = 2.0**24  # beyond, float32 skips integers
@@ -22,7 +23,7 @@ class TexelFieldMethods(FieldMethods):
        - |tensor|
        - `mi.TensorXf` of shape (H, W, C), finite. Row 0 is the top of the map, see below.
        - exposed, differentiable
-     * - mask
+     * - charts
        - |tensor|
        - `mi.TensorXf` of shape (H, W): the number of the chart that a texel belongs to (an integer from 0 on,
          a chart's padding included), or -1 where it is unused. (Default: one chart everywhere)
@@ -51,10 +52,10 @@ class TexelFieldMethods(FieldMethods):
 
     plugin = "texel_field"
 
-    def __init__(self, props: Any) -> None:
+    def __init__(self, props: mi.Properties) -> None:
         self._read(props)
-        self.mask = mi.TensorXf(props["mask"]) if "mask" in props else None
-        self.filter = str(props.get("filter", "bilinear"))
+        self.charts = mi.TensorXf(props["charts"]) if "charts" in props else None
+        self.filter = option(props, "filter", "bilinear")
         if self.filter not in FILTERS:
             raise RuntimeError(f"texel_field: 'filter' is '{self.filter}'; use {' or '.join(FILTERS)}")
         self._chart = self._charts()
@@ -62,13 +63,13 @@ class TexelFieldMethods(FieldMethods):
         if not dr.all(dr.isfinite(self.data.array)):
             raise RuntimeError("texel_field: 'data' has values that are not finite; unused texels may hold 0")
 
-    def traverse(self, callback: Any) -> None:
+    def traverse(self, callback: mi.TraversalCallback) -> None:
         FieldMethods.traverse(self, callback)
-        if self.mask is not None:
-            callback.put("mask", self.mask, mi.ParamFlags.NonDifferentiable)
+        if self.charts is not None:
+            callback.put("charts", self.charts, mi.ParamFlags.NonDifferentiable)
 
-    def parameters_changed(self, keys: Any = ()) -> None:
-        if not keys or "mask" in keys:  # not for every step of an optimisation
+    def parameters_changed(self, keys: Sequence[str] = ()) -> None:
+        if not keys or "charts" in keys:  # not for every step of an optimisation
             self._chart = self._charts()
         self._check()
 
@@ -76,45 +77,45 @@ class TexelFieldMethods(FieldMethods):
         shape = self.data.shape
         if len(shape) != 3 or 0 in shape:
             raise RuntimeError(f"texel_field: 'data' has shape {shape}; give one of shape (H, W, C)")
-        if self.mask is not None and self.mask.shape != shape[:2]:
+        if self.charts is not None and self.charts.shape != shape[:2]:
             raise RuntimeError(
-                f"texel_field: 'mask' has shape {self.mask.shape}; give {shape[:2]}, one number per texel"
+                f"texel_field: 'charts' has shape {self.charts.shape}; give {shape[:2]}, one number per texel"
             )
 
-    def _charts(self) -> Any:
-        """The mask as flat Int32, or None."""
-        if self.mask is None:
+    def _charts(self) -> mi.Int32 | None:
+        """The chart numbers as flat Int32, or None."""
+        if self.charts is None:
             return None
-        number = dr.detach(self.mask.array)
+        number = dr.detach(self.charts.array)
         if not dr.all((number >= -1) & (number < MAX_CHART) & (number == dr.round(number))):
-            raise RuntimeError("texel_field: 'mask' holds chart numbers, integers from 0 on, or -1 if unused")
+            raise RuntimeError("texel_field: 'charts' holds numbers that are no integers from 0 on, or -1")
         if not dr.any(number >= 0):
-            raise RuntimeError("texel_field: 'mask' is -1 everywhere; no texel is used")
+            raise RuntimeError("texel_field: 'charts' is -1 everywhere; no texel is used")
         chart = mi.Int32(number)
         dr.eval(chart)
         return chart
 
-    def _rows(self) -> Any:
+    def _rows(self) -> mi.UInt32:
         if self._chart is None:
             return dr.arange(mi.UInt32, self.data.shape[0] * self.data.shape[1])
-        return dr.compress(self._chart >= 0)
+        return mi.UInt32(dr.compress(self._chart >= 0))
 
-    def locate(self, si: Any, active: Any = True) -> Located:
+    def locate(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> Located:
         """Texels (flat indices) and weights of the points `si`: four each, or one if nearest."""
         footprint = self._footprint(si, active)
         if self.filter == "nearest":
-            return (footprint.nearest,), (mi.Float(1),), footprint.active
-        return footprint.texels, footprint.normalised(footprint.weights), footprint.active
+            return Located((footprint.nearest,), (mi.Float(1),), footprint.active)
+        return self._located(footprint)
 
-    def eval_1_grad(self, si: Any, active: Any = True) -> Any:
+    def eval_1_grad(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Vector2f:
         """Derivatives by u and v of the interpolant; 0 for the nearest texel."""
         if self.filter == "nearest":
             return mi.Vector2f(0)
         footprint = self._footprint(si, active)
-        weights = footprint.normalised(footprint.weights)
-        values = self._row_values((footprint.texels, weights, footprint.active), self.channel)
+        located = self._located(footprint)
+        values = self._row_values(located, self.channel)
         # (N / D)' = (N' - (N / D) D') / D for the weighted sum N and the sum of weights D.
-        mean = sum(w * v for w, v in zip(weights, values, strict=True))
+        mean = sum(w * v for w, v in zip(located.weights, values, strict=True))
         slopes = [
             sum(w * (v - mean) for w, v in zip(footprint.normalised(slope), values, strict=True))
             for slope in footprint.slopes
@@ -126,12 +127,15 @@ class TexelFieldMethods(FieldMethods):
     def to_string(self) -> str:
         height, width = self.data.shape[:2]
         own = {"resolution": f"[{width}, {height}]", "channels": self.channel_count, "filter": self.filter}
-        return self._description("TexelField", **own, masked=str(self.mask is not None).lower())
+        return self._description("TexelField", **own, masked=str(self.charts is not None).lower())
 
-    def resolution(self) -> Any:
+    def resolution(self) -> mi.ScalarVector2i:
         return mi.ScalarVector2i(self.data.shape[1], self.data.shape[0])
 
-    def _footprint(self, si: Any, active: Any) -> _Footprint:
+    def _located(self, footprint: _Footprint) -> Located:
+        return Located(footprint.texels, footprint.normalised(footprint.weights), footprint.active)
+
+    def _footprint(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool) -> _Footprint:
         height, width = self.data.shape[:2]
         return _Footprint.around(si.uv, width, height, self._chart, mi.Bool(active))
 
@@ -149,15 +153,17 @@ class _Footprint(NamedTuple):
         active: where there is one.
     """
 
-    texels: tuple[Any, ...]
-    counts: tuple[Any, ...]
-    weights: tuple[Any, ...]
-    slopes: tuple[tuple[Any, ...], tuple[Any, ...]]
-    nearest: Any
-    active: Any
+    texels: tuple[mi.UInt32, ...]
+    counts: tuple[mi.Bool, ...]
+    weights: tuple[mi.Float, ...]
+    slopes: tuple[tuple[mi.Float, ...], tuple[mi.Float, ...]]
+    nearest: mi.UInt32
+    active: mi.Bool
 
     @staticmethod
-    def around(uv: Any, width: int, height: int, chart: Any, active: Any) -> _Footprint:
+    def around(
+        uv: mi.Point2f, width: int, height: int, chart: mi.Int32 | None, active: mi.Bool
+    ) -> _Footprint:
         """The footprints of the points `uv`; `chart` has one number per texel or is None."""
         (c0, c1, a), (r0, r1, b) = _between(uv.x, width), _between(1 - uv.y, height)
         if chart is not None:
@@ -185,13 +191,13 @@ class _Footprint(NamedTuple):
             active=active & (own >= 0),
         )
 
-    def normalised(self, values: tuple[Any, ...]) -> tuple[Any, ...]:
+    def normalised(self, values: tuple[mi.Float, ...]) -> tuple[mi.Float, ...]:
         """Four values over the sum of the weights that count, 0 for texels that do not."""
         total = sum(dr.select(c, w, 0) for c, w in zip(self.counts, self.weights, strict=True))
         return tuple(dr.select(c, v / total, 0) for c, v in zip(self.counts, values, strict=True))
 
 
-def _between(t: Any, size: int) -> tuple[Any, Any, Any]:
+def _between(t: mi.Float, size: int) -> tuple[mi.UInt32, mi.UInt32, mi.Float]:
     """The two of `size` texels on both sides of t in [0, 1], and how far t is from the first [texel]."""
     position = dr.clip(t, 0, 1) * size - 0.5
     below = dr.floor(position)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from mitex.runtime.jit import mi
+
+T = TypeVar("T", bool, int, str)
 
 
 def for_variant(name: str, base: Any, methods: type) -> Any:
@@ -19,6 +21,12 @@ def for_variant(name: str, base: Any, methods: type) -> Any:
     for cls in reversed(methods.__mro__[:-1]):  # without `object`
         members |= {key: value for key, value in vars(cls).items() if key not in ("__dict__", "__weakref__")}
     return type(name, (base,), members)
+
+
+def option(props: mi.Properties, name: str, default: T) -> T:
+    """The value of a plugin's property as the type of its default, which it has where it is not given."""
+    value: Any = props.get(name, default)
+    return type(default)(value)
 
 
 def init_base(base: Any, plugin: object, props: mi.Properties) -> None:

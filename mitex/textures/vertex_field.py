@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
 
 from mitex.runtime.jit import dr, mi
 from mitex.textures.field import FieldMethods, Located
@@ -47,7 +47,7 @@ class VertexFieldMethods(FieldMethods):
 
     plugin = "vertex_field"
 
-    def __init__(self, props: Any) -> None:
+    def __init__(self, props: mi.Properties) -> None:
         self._read(props)
         if self.data.ndim == 1:
             self.data = mi.TensorXf(self.data.array, (self.data.shape[0], 1))
@@ -57,23 +57,24 @@ class VertexFieldMethods(FieldMethods):
         if self.data.ndim != 2 or 0 in self.data.shape:
             raise RuntimeError(f"vertex_field: 'data' has shape {self.data.shape}; give one of shape (V, C)")
 
-    def _rows(self) -> Any:
+    def _rows(self) -> mi.UInt32:
         return dr.arange(mi.UInt32, self.data.shape[0])
 
-    def locate(self, si: Any, active: Any = True) -> Located:
+    def locate(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> Located:
         """Vertices (3 indices) and barycentric weights (3) of the points `si`, and which have any."""
         mesh = mi.MeshPtr(si.shape)
         active = mi.Bool(active) & si.shape.is_mesh()
         index = mesh.face_indices(si.prim_index, active)
         active &= dr.max(index) < self.data.shape[0]
         p0, e1, e2 = _edges(mesh, index, active)
-        d1, d2 = dr.dot(e1, si.p - p0), dr.dot(e2, si.p - p0)
+        offset = mi.Vector3f(si.p - p0)
+        d1, d2 = dr.dot(e1, offset), dr.dot(e2, offset)
         u, v = _solve(e1, e2, d1, d2)
         has_uv = mesh.has_vertex_texcoords()
         u, v = dr.select(has_uv, u, si.uv.x), dr.select(has_uv, v, si.uv.y)
-        return tuple(index), (1 - u - v, u, v), active
+        return Located(tuple(index), (1 - u - v, u, v), active)
 
-    def eval_1_grad(self, si: Any, active: Any = True) -> Any:
+    def eval_1_grad(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Vector2f:
         """Derivatives along `si.dp_du` and `si.dp_dv`: the interpolant's surface gradient, projected on each.
 
         On a mesh without UVs those two are an orthonormal frame and `si.uv` has other units, so differences
@@ -91,13 +92,15 @@ class VertexFieldMethods(FieldMethods):
         return self._description("VertexField", vertices=self.data.shape[0], channels=self.channel_count)
 
 
-def _edges(mesh: Any, index: Any, active: Any) -> tuple[Any, Any, Any]:
+def _edges(
+    mesh: mi.MeshPtr, index: Iterable[mi.UInt32], active: mi.Bool
+) -> tuple[mi.Point3f, mi.Vector3f, mi.Vector3f]:
     """First corner of each triangle and the edges from it to the second and third."""
     p0, p1, p2 = (mesh.vertex_position(i, active) for i in index)
-    return p0, p1 - p0, p2 - p0
+    return p0, mi.Vector3f(p1 - p0), mi.Vector3f(p2 - p0)
 
 
-def _solve(e1: Any, e2: Any, d1: Any, d2: Any) -> tuple[Any, Any]:
+def _solve(e1: mi.Vector3f, e2: mi.Vector3f, d1: mi.Float, d2: mi.Float) -> tuple[mi.Float, mi.Float]:
     """The a, b for which the tangent vector a e1 + b e2 has the dot products d1 with e1 and d2 with e2."""
     a11, a12, a22 = dr.dot(e1, e1), dr.dot(e1, e2), dr.dot(e2, e2)
     determinant = dr.fma(a11, a22, -a12 * a12)

@@ -55,8 +55,8 @@ class Lbfgs:
 
     def _direction(self, gradient: torch.Tensor) -> torch.Tensor:
         """The approximate inverse Hessian times the gradient, by two loops over the pairs."""
-        kept = self.counts[1]
-        newest_first = [k % self.memory for k in range(kept - 1, max(kept - self.memory, 0) - 1, -1)]
+        pairs = self.counts[1]
+        newest_first = [k % self.memory for k in range(pairs - 1, max(pairs - self.memory, 0) - 1, -1)]
         direction, factors = gradient.clone(), {}
         for k in newest_first:
             factors[k] = (self.steps[k] @ direction) / (self.steps[k] @ self.changes[k])

@@ -39,8 +39,8 @@ class TrainResult:
 
     def about(self, name: str, preset: str) -> dict[str, Any]:
         """What a model file tells of its training, as JSON values; `name` is that of what was learned."""
-        told = {"name": name, "preset": preset, "steps": self.steps, "seconds": round(self.seconds, 1)}
-        return told | ({"loss": self.loss} if math.isfinite(self.loss) else {})
+        about = {"name": name, "preset": preset, "steps": self.steps, "seconds": round(self.seconds, 1)}
+        return about | ({"loss": self.loss} if math.isfinite(self.loss) else {})
 
 
 def train(
@@ -143,10 +143,11 @@ def _diverged(folder: Path, record: dict[str, Any], state: TrainState) -> Traini
         temporary.write_text(json.dumps(dump, indent=1) + "\n", encoding="utf-8")
     name = kind.replace("_", " ")
     newest = folder / checkpoint.NAME
-    kept = f"the last good checkpoint is '{newest}'" if newest.exists() else "no checkpoint had been reached"
-    again = "add --resume and set" if newest.exists() else "set"
+    last_good, again = "no checkpoint had been reached", "set"
+    if newest.exists():
+        last_good, again = f"the last good checkpoint is '{newest}'", "add --resume and set"
     return TrainingDiverged(
-        f"the {name} was not finite in {PATIENCE} steps in a row, up to step {state.step}; {kept}, and "
+        f"the {name} was not finite in {PATIENCE} steps in a row, up to step {state.step}; {last_good}, and "
         f"'{folder / run.DIVERGED}' has the step's numbers",
         f"{again} a smaller learning rate, or another seed for a new run",
     )

@@ -104,8 +104,8 @@ def copy_state(state: dict[str, torch.Tensor], own: dict[str, torch.Tensor]) -> 
     """Copies a saved state into an optimizer's own tensors; ValueError if a shape does not fit."""
     for name, tensor in own.items():
         if tensor.shape != state[name].shape:
-            found, wanted = tuple(state[name].shape), tuple(tensor.shape)
-            raise ValueError(f"parameter {name.rpartition('/')[2]} has shape {found} instead of {wanted}")
+            actual, expected = tuple(state[name].shape), tuple(tensor.shape)
+            raise ValueError(f"parameter {name.rpartition('/')[2]} has shape {actual} instead of {expected}")
     for name, tensor in own.items():
         tensor.copy_(state[name])
 

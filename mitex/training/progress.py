@@ -29,8 +29,8 @@ class Progress:
         self.title = title
         self.steps = steps
         self._stream = sys.stderr if stream is None else stream
-        self._shown = time.monotonic()
-        self._times: deque[tuple[float, int]] = deque([(self._shown, step)], maxlen=50)
+        self._last_shown = time.monotonic()
+        self._times: deque[tuple[float, int]] = deque([(self._last_shown, step)], maxlen=50)
         self._latest: tuple[int, float] | None = None
         self._bar: Any = None
         self._quiet = quiet
@@ -49,8 +49,8 @@ class Progress:
         if now - self._times[-1][0] >= REFRESH or step == self.steps:
             self._times.append((now, step))
         due = REFRESH if self._bar else LINE_EVERY
-        if now - self._shown >= due or step == self.steps:
-            self._shown = now
+        if now - self._last_shown >= due or step == self.steps:
+            self._last_shown = now
             self._show(step, loss)
 
     def __enter__(self) -> "Progress":

@@ -174,7 +174,7 @@ APPLIED = {
     "density": ("--density 0", "--density"),
     "guide": ("--guide no.png", "no.png"),
     "resolution": ("--resolution 64", "--resolution means nothing for .ply"),
-    "steps": ("--steps 10", "--steps means nothing"),
+    "steps": ("--steps 10", "--steps is no option"),
 }
 
 

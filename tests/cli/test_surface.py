@@ -119,7 +119,7 @@ def test_bad_applies(files, run, name, capsys):
 
 def test_a_resolution_beyond_memory(files, monkeypatch, capsys):
     bad.image(files / "good.png")
-    room = import_module("mitex.methods.surface.fit")
+    room = import_module("mitex.methods.surface.fitting")
     monkeypatch.setattr(room, "available_memory", lambda: 10**6)
     check_refused(files, fit("--resolution 512"), "GB of memory", capsys)
 

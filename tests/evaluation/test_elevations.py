@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from mitex.evaluation import elevations
 from mitex.evaluation.elevations import FlatTexture, elevation_table
 from mitex.evaluation.windows import TOLERANCE, select_windows
 
@@ -78,7 +79,7 @@ def test_a_flat_texture_shows_the_texels_that_the_rays_meet(angle):
     rng = np.random.default_rng(1)
     image, gap = rng.uniform(size=(20, 20, 3)).astype(np.float32), 0.05
     for window in select_windows(photos, surfaces, rng, 32, 8)[angle]:
-        colours, valid = FlatTexture(image, gap, ALONG)(window)
+        colours, valid = FlatTexture(image, gap, ALONG, filtered=False)(window)
         steps = -window.origins[:, 2] / window.directions[:, 2]
         hits = (window.origins + steps[:, None] * window.directions)[:, :2] - window.point[:2] + window.shift
         inner = (np.abs(hits / gap - np.round(hits / gap)) > 1e-3).all(1)  # not between two texels
@@ -87,6 +88,73 @@ def test_a_flat_texture_shows_the_texels_that_the_rays_meet(angle):
         on = inner & valid.ravel()
         assert on.mean() > 0.5
         np.testing.assert_allclose(colours.reshape(-1, 3)[on], expected[on], atol=1e-6)
+
+
+class PinholePhotos(Photos):
+    """The same from a point."""
+
+    def rays(self, view, pixels):
+        origins, directions = super().rays(view, pixels)
+        eye = origins.mean(0)
+        directions = origins + HEIGHT * directions - eye
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        return np.broadcast_to(eye, origins.shape).astype(np.float32), directions.astype(np.float32)
+
+
+@pytest.mark.parametrize("kind", [Photos, PinholePhotos])
+@pytest.mark.parametrize("angle", [0, 40])
+def test_pixels_are_filtered_over_what_they_cover(kind, angle, monkeypatch):
+    """Footprints are the distances of the hits of pixels side by side, in texels."""
+    photos, surfaces = scene([angle, angle])
+    photos = kind(photos.images, photos.angles)
+    image, gap, asked = np.zeros((20, 20, 3), np.float32), 0.05, []
+
+    def lookup(places, footprints):
+        asked.append((places, footprints))
+        return np.zeros((len(places), 3))
+
+    monkeypatch.setattr(elevations, "MipMap", lambda image: lookup)
+    for window in select_windows(photos, surfaces, np.random.default_rng(1), 32, 8)[angle]:
+        asked.clear()
+        valid = FlatTexture(image, gap, ALONG)(window)[1]
+        ((places, footprints),) = asked
+        assert valid.all()
+        grid = places.reshape(32, 32, 2)
+        expected = np.stack([np.gradient(grid, axis=1), np.gradient(grid, axis=0)], axis=-1)
+        inner = (slice(1, -1), slice(1, -1))
+        found = footprints.reshape(32, 32, 2, 2)
+        np.testing.assert_allclose(found[inner], expected[inner], atol=1e-3 * np.abs(expected).max())
+        assert np.abs(expected).max() > 0.1
+
+
+def test_a_checkerboard_that_no_pixel_resolves_shows_its_mean_light():
+    """Half of the light is 0.735 in sRGB, not 0.5."""
+    photos, surfaces = scene([40, 40])
+    rows, columns = np.mgrid[:64, :64]
+    image = np.repeat(((rows + columns) % 2)[..., None], 3, axis=2).astype(np.float32)
+    for window in select_windows(photos, surfaces, np.random.default_rng(1), 32, 8)[40]:
+        colours, valid = FlatTexture(image, 1 / SIDE / 8, ALONG)(window)
+        np.testing.assert_allclose(colours[valid], 0.7354, atol=1e-3)
+        raw, _ = FlatTexture(image, 1 / SIDE / 8, ALONG, filtered=False)(window)
+        assert set(np.unique(raw[valid])) <= {0.0, 1.0}
+
+
+def test_texels_as_large_as_many_pixels_stay_as_they_are(rng):
+    photos, surfaces = scene([0, 0])
+    image, gap = rng.uniform(size=(4, 4, 3)).astype(np.float32), 16 / SIDE
+    for window in select_windows(photos, surfaces, rng, 32, 8)[0]:
+        filtered, raw = (FlatTexture(image, gap, ALONG, on)(window)[0] for on in (True, False))
+        assert np.abs(filtered - raw).min(axis=(0, 1)).max() < 0.03  # in the middles of texels
+        assert filtered.min() >= image.min() - 1e-6 and filtered.max() <= image.max() + 1e-6
+
+
+def test_a_flat_texture_is_as_bright_as_its_side_is():
+    photos, surfaces = scene([20, 20])
+    image = np.full((8, 8, 3), 0.5, np.float32)
+    for window in select_windows(photos, surfaces, np.random.default_rng(1), 32, 8)[20]:
+        shown = FlatTexture(image, 0.05, ALONG, brightness=lambda normal: 1.0 + 0.5 * normal[2])
+        colours, valid = shown(window)
+        np.testing.assert_allclose(colours[valid], 0.75, atol=1e-6)
 
 
 def test_the_table_compares_renderings_with_photos():
@@ -102,12 +170,14 @@ def test_the_table_compares_renderings_with_photos():
     def grey(window):
         return window.rendering(np.full((window.mask.size, 3), 0.5))
 
-    pairs = [(grey, inverse), (exact, inverse)]
+    flat = {"inverse": inverse, "grey": grey}
+    pairs = [(grey, flat), (exact, flat)]
     table = elevation_table(photos, surfaces, exact, pairs, window=32, places=2)
     assert [row.angle for row in table] == [0, 20]
     for row, (first,) in zip(
         table, zip(elevation_table(photos, surfaces, exact, pairs[:1], window=32, places=2)), strict=True
     ):
         assert row.captured == pytest.approx(0, abs=1e-3) and row.flat == pytest.approx(first.flat)
+        assert list(row.flat) == ["inverse", "grey"] and row.flat["grey"] == pytest.approx(first.ours)
         assert row.ours == pytest.approx(first.ours / 2, rel=1e-2) and row.ours > 1e-2
-        assert row.picture.shape[0] == 4 * 32
+        assert row.picture.shape[0] == 4 * 32 and (row.picture[96:] == 0.5).all()  # the last flat one

@@ -7,8 +7,9 @@ from safetensors.torch import save_file
 
 from mitex.features import Vgg16
 from mitex.features.layers import LAYERS_19
+from mitex.features.normalisation import SPREAD
 from mitex.features.vgg import MEAN_RGB
-from mitex.features.vgg19 import SPREAD_RGB, vgg19_convolutions, vgg19_path
+from mitex.features.vgg19 import vgg19_convolutions, vgg19_path
 from mitex.features.weights import WeightsError
 
 WIDTHS = (64, 64, 128, 128, *(256,) * 4, *(512,) * 8)
@@ -50,7 +51,7 @@ def test_torchvisions_layout_gives_its_features(tmp_path):
         weights=vgg19_convolutions(saved(tmp_path, [f"features.{n}" for n in TORCHVISION])),
     )
     image = torch.rand(1, 48, 48, 3, generator=torch.Generator().manual_seed(1))
-    x = (image - torch.tensor(MEAN_RGB) / 255) / torch.tensor(SPREAD_RGB)
+    x = (image - torch.tensor(MEAN_RGB) / 255) / torch.tensor(SPREAD)
     x = x.permute(0, 3, 1, 2)
     for name, n in zip(LAYERS_19, TORCHVISION, strict=True):
         if name.endswith("_1") and n:

@@ -38,7 +38,7 @@ class Ball:
         pass
 
     def evaluate(self, points, view):
-        return self.found(dr.compress(dr.norm(points) < 0.5))
+        return self.found(mi.UInt32(dr.compress(dr.norm(points) < 0.5)))
 
     def found(self, index):
         if not dr.width(index):

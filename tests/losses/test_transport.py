@@ -5,9 +5,10 @@ import torch
 import torch.nn.functional as F
 from scipy.stats import wasserstein_distance
 
-from mitex.losses import channel_transport, decorrelate, moment_distance, relaxed_transport
+from mitex.features import normalise_colours
+from mitex.losses import channel_transport, moment_distance, relaxed_transport
 from mitex.losses.transport import _matches
-from tests.losses import brute_force
+from tests.losses import authors, brute_force
 
 SIZES = [(1, 1), (7, 5), (5, 7), (13, 13), (33, 64)]
 
@@ -203,14 +204,13 @@ def test_moments_in_low_precision(generator):
     assert F.cosine_similarity(exact_gradient, low_gradient, dim=0) > 0.99
 
 
-def test_colours_are_decorrelated_as_the_authors_do():
-    """x @ M: grey moves along the first axis only, and lengths stay."""
-    assert torch.allclose(decorrelate(torch.tensor([1.0, 0, 0])), torch.tensor([0.57735, 0.57735, 0.57735]))
-    matrix = decorrelate(torch.eye(3, dtype=torch.float64))
-    assert torch.allclose(matrix @ matrix.T, torch.eye(3, dtype=torch.float64), atol=1e-4)
-    colours = torch.rand(2, 5, 3)
-    expected = torch.stack([torch.stack([x @ matrix.float() for x in row]) for row in colours])
-    assert torch.allclose(decorrelate(colours), expected, atol=1e-6)
+def test_colours_cost_what_the_authors_compute(generator):
+    """Normalised, and without their matrix, which is orthogonal; black, as of a background, among them."""
+    a, b = _sets(generator, 40, 30)
+    a[:, :20] = 0
+    found = relaxed_transport(normalise_colours(a), normalise_colours(b), euclidean=True)
+    expected = [authors.colour_cost(x.numpy(), y.numpy()) for x, y in zip(a, b, strict=True)]
+    assert found.tolist() == pytest.approx(expected, rel=1e-4)
 
 
 def test_channels_are_transported_exactly(generator):

@@ -21,7 +21,7 @@ def picture(
     asset: Asset, azimuth: float = 0.0, elevation: float = 0.0, spp: int = 16, **options: Any
 ) -> np.ndarray:
     renderer = OrbitRenderer(asset, resolution=SIDE, **options)
-    return renderer.render(azimuth, renderer.frame(azimuth, elevation), spp)
+    return renderer.render(azimuth, renderer.fit_view(azimuth, elevation), spp)
 
 
 def east(mesh: Mesh) -> np.ndarray:
@@ -57,7 +57,7 @@ def test_paper_is_light_grey():
 def test_light_comes_from_the_upper_left_at_every_azimuth():
     renderer = OrbitRenderer(Asset(SPHERE, GREY), resolution=SIDE, backdrop=False)
     for azimuth in (0.0, 2.0, 4.0):
-        image = renderer.render(azimuth, renderer.frame(azimuth, 0.0), 16).mean(axis=2)
+        image = renderer.render(azimuth, renderer.fit_view(azimuth, 0.0), 16).mean(axis=2)
         assert image[5:9, 6:10].mean() > 2.0 * image[15:19, 14:18].mean()
 
 
@@ -65,7 +65,7 @@ def test_azimuth_shows_the_named_side():
     x, _, z = np.abs(SPHERE.vertices).T
     albedo = np.stack([x > 0.6, z > 0.6, 0 * x], axis=1).astype(np.float32) * 0.8
     renderer = OrbitRenderer(Asset(SPHERE, {"albedo": albedo}), resolution=SIDE, backdrop=False)
-    front, right = (middle(renderer.render(a, renderer.frame(a, 0.0), 16)) for a in (0.0, math.pi / 2))
+    front, right = (middle(renderer.render(a, renderer.fit_view(a, 0.0), 16)) for a in (0.0, math.pi / 2))
     assert front[1] > 5 * front[0] and right[0] > 5 * right[1]
 
 
@@ -124,7 +124,7 @@ def test_the_size_of_the_mesh_does_not_matter():
 
 def test_passes_add_up_to_the_same_picture(monkeypatch):
     renderer = OrbitRenderer(Asset(SPHERE, GREY), resolution=SIDE)
-    view = renderer.frame(0.0, 0.3)
+    view = renderer.fit_view(0.0, 0.3)
     once = renderer.render(0.0, view, 64)
     monkeypatch.setattr("mitex.render.renderer.SAMPLES_PER_PASS", SIDE * SIDE * 16)
     four = renderer.render(0.0, view, 64)
@@ -133,7 +133,7 @@ def test_passes_add_up_to_the_same_picture(monkeypatch):
 
 def test_seeds_make_the_noise():
     renderer = OrbitRenderer(Asset(SPHERE, GREY), resolution=SIDE)
-    view = renderer.frame(0.0, 0.3)
+    view = renderer.fit_view(0.0, 0.3)
     first, again, other = (renderer.render(0.0, view, 4, seed) for seed in (0, 0, 1))
     np.testing.assert_allclose(first, again, atol=1e-4)
     assert np.abs(first - other).max() > 1e-2
@@ -159,11 +159,11 @@ def test_wrong_views():
     renderer = OrbitRenderer(asset, resolution=16)
     for elevation in (-0.1, 1.55, math.nan):
         with pytest.raises(ConfigError, match="elevation"):
-            renderer.frame(0.0, elevation)
+            renderer.fit_view(0.0, elevation)
     for spp in (0, 70000):
         with pytest.raises(ConfigError, match="samples per pixel"):
-            renderer.render(0.0, renderer.frame(0.0), spp)
-    OrbitRenderer(asset, resolution=16, backdrop=False).frame(0.0, -1.0)
+            renderer.render(0.0, renderer.fit_view(0.0), spp)
+    OrbitRenderer(asset, resolution=16, backdrop=False).fit_view(0.0, -1.0)
 
 
 @pytest.mark.parametrize("lean", [(0.0, 0.0), (0.5, 0.2), (-0.4, 0.4)])

@@ -110,7 +110,7 @@ def test_patch_views_show_only_surface_on_a_sphere():
 def test_patch_views_look_along_the_inward_normal_with_y_up():
     mesh = icosphere(8)
     views = patch_views(generator(2), mesh, 200, half_width=0.3, resolution=9)
-    right, up, forward = views.frame()
+    right, up, forward = views.axes()
     # On a sphere the normal is the direction from the centre, up to the coarseness of the mesh.
     assert (np.sum(forward * views.target, axis=1) < -0.97).all()
     np.testing.assert_allclose(right[:, 1], 0, atol=1e-6)
@@ -131,8 +131,8 @@ def test_patch_views_sample_area_uniformly():
 def test_patch_views_at_the_pole_use_x_up():
     vertices = np.array([(0, 0, 0), (0, 0, 1), (1, 0, 0)], np.float32)  # faces +y
     views = patch_views(generator(), Mesh(vertices, np.array([(0, 1, 2)], np.int32)), 2, 0.1, 4)
-    np.testing.assert_allclose(views.frame()[2], np.broadcast_to((0, -1, 0), (2, 3)), atol=1e-6)
-    np.testing.assert_allclose(views.frame()[1], np.broadcast_to((1, 0, 0), (2, 3)), atol=1e-6)
+    np.testing.assert_allclose(views.axes()[2], np.broadcast_to((0, -1, 0), (2, 3)), atol=1e-6)
+    np.testing.assert_allclose(views.axes()[1], np.broadcast_to((1, 0, 0), (2, 3)), atol=1e-6)
 
 
 @pytest.mark.parametrize(

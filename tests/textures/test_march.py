@@ -25,7 +25,7 @@ class Slab:
 
     def evaluate(self, points, view):
         self.evaluated += dr.width(points)
-        index = dr.compress(dr.abs(points.x) < 0.5)
+        index = mi.UInt32(dr.compress(dr.abs(points.x) < 0.5))
         width = dr.width(index)
         return index, self.density + dr.zeros(mi.Float, width), self.colour + dr.zeros(mi.Color3f, width)
 
@@ -161,7 +161,7 @@ def test_what_is_behind_an_opaque_surface_is_not_visible():
     def dense(points):
         looked_at.append(dr.width(points))
         starts = dr.select(points.y < -0.1, -0.9, dr.select(points.y < 0.1, 0.4, 9.0))
-        return dr.select(points.x > starts, 60.0, 0.5)
+        return mi.Float(dr.select(points.x > starts, 60.0, 0.5))
 
     kept = visible(samples, origin, direction, dense)
     ray, t = np.array(samples.ray), np.array(samples.t)

@@ -13,9 +13,9 @@ from tests.textures.helpers import QUAD, quad, radiance, sphere_picture
 UNIT = (QUAD[:, :2] + 1) / 2  # uv of the quad whose map covers it once
 
 
-def field(mi, data: np.ndarray, mask: np.ndarray | None = None, **options) -> dict:
+def field(mi, data: np.ndarray, charts: np.ndarray | None = None, **options) -> dict:
     given = {"type": "texel_field", "data": mi.TensorXf(np.asarray(data, np.float32))} | options
-    return given if mask is None else given | {"mask": mi.TensorXf(np.asarray(mask, np.float32))}
+    return given if charts is None else given | {"charts": mi.TensorXf(np.asarray(charts, np.float32))}
 
 
 def at(mi, uv: np.ndarray):
@@ -31,7 +31,7 @@ def lookups(mi, given: dict, uv: np.ndarray) -> np.ndarray:
     return np.stack([value.numpy() for value in texture.gather(texture.locate(at(mi, uv)))], axis=1)
 
 
-def slow_weights(shape: tuple[int, int], uv: np.ndarray, mask=None, nearest: bool = False) -> np.ndarray:
+def slow_weights(shape: tuple[int, int], uv: np.ndarray, charts=None, nearest: bool = False) -> np.ndarray:
     """(N, H * W) weights of every texel in every lookup, point by point and texel by texel."""
     height, width = shape
     matrix = np.zeros((len(uv), height * width))
@@ -42,7 +42,7 @@ def slow_weights(shape: tuple[int, int], uv: np.ndarray, mask=None, nearest: boo
             for column in (np.floor(x), np.floor(x) + 1):
                 weight = (1 - abs(x - column)) * (1 - abs(y - row))
                 r, c = int(np.clip(row, 0, height - 1)), int(np.clip(column, 0, width - 1))
-                chart = 0 if mask is None else mask[r, c]
+                chart = 0 if charts is None else charts[r, c]
                 if chart >= 0:
                     around.append((np.hypot(x - column, y - row), chart, weight, r * width + c))
         if not around:
@@ -69,7 +69,7 @@ def uv(rng) -> np.ndarray:
 
 
 @pytest.fixture
-def mask(rng) -> np.ndarray:
+def charts(rng) -> np.ndarray:
     """(6, 9) three charts and unused texels in disorder, and nothing but unused ones in one place."""
     chart = rng.choice([-1, 0, 1, 7], (6, 9), p=[0.25, 0.35, 0.25, 0.15])
     chart[3:, 5:8] = -1
@@ -78,10 +78,10 @@ def mask(rng) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", ["bilinear", "nearest"])
 @pytest.mark.parametrize("masked", [False, True])
-def test_lookup_equals_the_slow_reference(mi, rng, uv, mask, kind: str, masked: bool):
+def test_lookup_equals_the_slow_reference(mi, rng, uv, charts, kind: str, masked: bool):
     data = rng.uniform(-1, 2, (6, 9, 5))
-    given = field(mi, data, mask if masked else None, filter=kind, scale=2.0, offset=-0.25)
-    weights = slow_weights((6, 9), uv, mask if masked else None, kind == "nearest")
+    given = field(mi, data, charts if masked else None, filter=kind, scale=2.0, offset=-0.25)
+    weights = slow_weights((6, 9), uv, charts if masked else None, kind == "nearest")
     np.testing.assert_allclose(lookups(mi, given, uv), 2 * weights @ data.reshape(54, 5) - 0.25, atol=2e-5)
     unread = weights.sum(axis=1) == 0
     assert unread.any() == masked  # some lookups see unused texels only
@@ -111,26 +111,26 @@ def test_charts_do_not_bleed(mi, rng, padded: bool):
     """Chart 0 is columns 0 to 3, chart 1 columns 5 to 8; the texel between is unused or belongs to one."""
     data = np.full((4, 9, 3), 99.0)
     data[:, :4], data[:, 5:] = (0.2, 0.4, 0.6), (0.9, 0.1, 0.3)
-    mask = np.full((4, 9), -1)
-    mask[:, :4], mask[:, 5:] = 0, 1
+    charts = np.full((4, 9), -1)
+    charts[:, :4], charts[:, 5:] = 0, 1
     if padded:
-        data[:, 4], mask[:, 4] = data[:, 3], 0
+        data[:, 4], charts[:, 4] = data[:, 3], 0
     left, right = rng.uniform(0, 1, (2, 200, 2))
     left[:, 0] *= 4 / 9
     right[:, 0] = (5 + 4 * right[:, 0]) / 9
     left[0], right[0], right[1] = (3.999 / 9, 0.3), (5.001 / 9, 0.3), (1, 1)
-    given = field(mi, data, mask)
+    given = field(mi, data, charts)
     np.testing.assert_allclose(lookups(mi, given, left), np.tile(data[0, 0], (200, 1)), atol=2e-7)
     np.testing.assert_allclose(lookups(mi, given, right), np.tile(data[0, 8], (200, 1)), atol=2e-7)
     plain = lookups(mi, field(mi, data), right)
-    assert np.abs(plain - data[0, 8]).max() > 0.1  # without a mask it bleeds
+    assert np.abs(plain - data[0, 8]).max() > 0.1  # without chart numbers it bleeds
 
 
 def test_other_charts_are_not_touched_at_all(mi, rng):
     """A value that is not finite would survive a weight of 0."""
-    data, mask = np.ones((2, 6, 1)), np.zeros((2, 6))
-    mask[:, 3:] = 1
-    texture = mi.load_dict(field(mi, data, mask))
+    data, charts = np.ones((2, 6, 1)), np.zeros((2, 6))
+    charts[:, 3:] = 1
+    texture = mi.load_dict(field(mi, data, charts))
     params = mi.traverse(texture)
     data[:, 3:] = np.nan
     params["data"] = mi.TensorXf(data.astype(np.float32))
@@ -149,11 +149,11 @@ def test_uv_that_is_no_number_reads_no_memory_beyond(mi):
 
 @pytest.mark.parametrize("kind", ["bilinear", "nearest"])
 @pytest.mark.parametrize("masked", [False, True])
-def test_gradient_is_the_transposed_lookup(mi, rng, uv, mask, kind: str, masked: bool):
+def test_gradient_is_the_transposed_lookup(mi, rng, uv, charts, kind: str, masked: bool):
     from mitex.runtime.jit import dr
 
     data, upstream = rng.uniform(0, 1, (6, 9, 2)), rng.normal(size=(len(uv), 2))
-    texture = mi.load_dict(field(mi, data, mask if masked else None, filter=kind, scale=3.0))
+    texture = mi.load_dict(field(mi, data, charts if masked else None, filter=kind, scale=3.0))
     params = mi.traverse(texture)
     dr.enable_grad(params["data"])
     params.update()
@@ -163,13 +163,13 @@ def test_gradient_is_the_transposed_lookup(mi, rng, uv, mask, kind: str, masked:
     )
     dr.backward(loss)
     gradient = dr.grad(params["data"]).numpy()
-    weights = slow_weights((6, 9), uv, mask if masked else None, kind == "nearest")
+    weights = slow_weights((6, 9), uv, charts if masked else None, kind == "nearest")
     np.testing.assert_allclose(gradient.reshape(54, 2), 3 * weights.T @ upstream, atol=1e-4)
 
     direction = rng.normal(size=data.shape)
 
     def total(shifted: np.ndarray) -> float:
-        given = field(mi, shifted, mask if masked else None, filter=kind, scale=3.0)
+        given = field(mi, shifted, charts if masked else None, filter=kind, scale=3.0)
         return float((lookups(mi, given, uv).astype(np.float64) * upstream).sum())
 
     slope = total(data + 0.5 * direction) - total(data - 0.5 * direction)  # linear: one step is exact
@@ -177,12 +177,12 @@ def test_gradient_is_the_transposed_lookup(mi, rng, uv, mask, kind: str, masked:
 
 
 @pytest.mark.parametrize("masked", [False, True])
-def test_slope_by_u_and_v(mi, rng, uv, mask, masked: bool):
+def test_slope_by_u_and_v(mi, rng, uv, charts, masked: bool):
     """`eval_1_grad` and the gradient to an attached uv against differences of the slow reference."""
     from mitex.runtime.jit import dr
 
     data = rng.uniform(0, 1, (6, 9, 1))
-    used = mask if masked else None
+    used = charts if masked else None
     texture = mi.load_dict(field(mi, data, used, scale=2.0))
     h = 1e-5
     x, y = uv[:, 0] * 9 - 0.5, (1 - uv[:, 1]) * 6 - 0.5
@@ -190,7 +190,7 @@ def test_slope_by_u_and_v(mi, rng, uv, mask, masked: bool):
     smooth = np.maximum(np.abs(x % 0.5 - 0.25), np.abs(y % 0.5 - 0.25)) < 0.24
     if masked:  # and from other changes of the nearest used one
         for step in ((h, 0), (-h, 0), (0, h), (0, -h)):
-            same = (slow_weights((6, 9), uv + step, mask) > 0) == (slow_weights((6, 9), uv, mask) > 0)
+            same = (slow_weights((6, 9), uv + step, charts) > 0) == (slow_weights((6, 9), uv, charts) > 0)
             smooth &= same.all(axis=1)
     chosen = uv[smooth].astype(np.float64)
     assert len(chosen) > 100
@@ -303,15 +303,15 @@ def feature_scene(mi, texture: dict, antialias: int, size: int = 12):
 
 
 @pytest.mark.parametrize("antialias", [1, 3])
-def test_feature_images_all_channels_with_their_adjoint(mi, rng, mask, antialias: int):
+def test_feature_images_all_channels_with_their_adjoint(mi, rng, charts, antialias: int):
     """Through the bridge: picture and gradient equal the averaged slow weights and their transpose."""
     size, n = 12, antialias
     center = (np.arange(size * n) + 0.5) / (size * n)
     u, v = np.meshgrid(center, 1 - center)
-    weights = slow_weights((6, 9), np.stack((u, v), axis=-1).reshape(-1, 2), mask)
+    weights = slow_weights((6, 9), np.stack((u, v), axis=-1).reshape(-1, 2), charts)
     weights = weights.reshape(size, n, size, n, 54).mean(axis=(1, 3))
     data = rng.uniform(0, 1, (6, 9, 5))
-    world = feature_scene(mi, field(mi, np.zeros((6, 9, 5)), mask), antialias)
+    world = feature_scene(mi, field(mi, np.zeros((6, 9, 5)), charts), antialias)
     values = torch.from_numpy(data.astype(np.float32)).requires_grad_()
     picture = render(world, values)
     clear = np.abs(weights @ data.reshape(54, 5) - picture.detach().numpy()).max(axis=-1) < 1e-4
@@ -334,12 +334,12 @@ def test_update_through_traverse(mi, points):
     np.testing.assert_allclose(radiance(mi, shape, *points), 0.35, atol=1e-6)
     chart = np.zeros((4, 4), np.float32)
     chart[:, 2:] = -1
-    params[key + "mask"] = mi.TensorXf(chart)
+    params[key + "charts"] = mi.TensorXf(chart)
     params.update()
     x, y = points
     far = x > 2 * (2.5 / 4) - 1  # none of the four texels is used
     np.testing.assert_allclose(radiance(mi, shape, x, y)[:, 0], np.where(far, 0, 0.35), atol=1e-6)
-    for name, bad in (("data", (4, 12)), ("data", (4, 5, 3)), ("mask", (4, 4, 1))):
+    for name, bad in (("data", (4, 12)), ("data", (4, 5, 3)), ("charts", (4, 4, 1))):
         good = mi.TensorXf(params[key + name])
         params[key + name] = mi.TensorXf(np.zeros(bad, np.float32))
         with pytest.raises(RuntimeError, match="shape"):
@@ -349,10 +349,10 @@ def test_update_through_traverse(mi, points):
 
 
 def test_mean_max_and_resolution(mi, rng):
-    data, mask = rng.uniform(0, 0.9, (5, 7, 4)), rng.integers(-1, 3, (5, 7))
-    data[mask < 0] = 1
-    texture = mi.load_dict(field(mi, data, mask))
-    used = srgb_to_linear(data[mask >= 0][:, :3])
+    data, charts = rng.uniform(0, 0.9, (5, 7, 4)), rng.integers(-1, 3, (5, 7))
+    data[charts < 0] = 1
+    texture = mi.load_dict(field(mi, data, charts))
+    used = srgb_to_linear(data[charts >= 0][:, :3])
     assert texture.mean()[0] == pytest.approx(used.mean(), rel=1e-4)
     assert texture.max() == pytest.approx(used.max(), rel=1e-4)
     plain = mi.load_dict(field(mi, data, raw=True, channel=3))
@@ -377,11 +377,11 @@ def test_to_string(mi):
         ({"data": np.zeros((4, 3))}, "shape"),
         ({"data": np.zeros((4, 0, 3))}, "shape"),
         ({"data": np.full((4, 4, 3), np.nan)}, "not finite"),
-        ({"mask": np.zeros((4, 5))}, "'mask' has shape"),
-        ({"mask": np.full((4, 4), 0.5)}, "chart numbers"),
-        ({"mask": np.full((4, 4), -2)}, "chart numbers"),
-        ({"mask": np.full((4, 4), np.nan)}, "chart numbers"),
-        ({"mask": np.full((4, 4), -1)}, "no texel"),
+        ({"charts": np.zeros((4, 5))}, "'charts' has shape"),
+        ({"charts": np.full((4, 4), 0.5)}, "no integers from 0 on"),
+        ({"charts": np.full((4, 4), -2)}, "no integers from 0 on"),
+        ({"charts": np.full((4, 4), np.nan)}, "no integers from 0 on"),
+        ({"charts": np.full((4, 4), -1)}, "no texel"),
     ],
 )
 def test_bad_properties_are_refused(mi, options: dict, problem: str):

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from mitex.errors import ConfigError
+from mitex.mesh import Mesh
 from mitex.methods.nerf.synthesis.matching import ArraySource
 from mitex.methods.nerf.synthesis.patches import Patches
 from mitex.methods.nerf.synthesis.quilting import quilt
+from mitex.methods.nerf.training.light_estimate import brightness
 
 
 def quilted_albedo(
@@ -16,8 +18,9 @@ def quilted_albedo(
     size: tuple[int, int],
     rng: np.random.Generator,
     tileable: bool = False,
+    evenness: float | None = None,
 ) -> np.ndarray:
-    """An image quilted as latent features are, as published (no evenness), with colours in their place.
+    """An image quilted as latent features are, with colours in their place.
 
     Args:
         patches: P squares on the base shape.
@@ -25,6 +28,7 @@ def quilted_albedo(
         size: height and width [texels].
         rng: of all choices.
         tileable: the image can be repeated.
+        evenness: how much patches are avoided that were used before; as of `quilt`.
 
     Returns:
         (height, width, 3) float32 sRGB in [0, 1], row 0 on top.
@@ -37,4 +41,22 @@ def quilted_albedo(
     if pictures.shape != expected:
         raise ConfigError(f"pictures of patches of shape {pictures.shape}", f"render {expected}")
     source = ArraySource(pictures, patches.centres, patches.length)
-    return np.clip(quilt(source, size, rng, tileable=tileable, evenness=0.0).features, 0.0, 1.0)
+    return np.clip(quilt(source, size, rng, tileable=tileable, evenness=evenness).features, 0.0, 1.0)
+
+
+def in_even_light(patches: Patches, pictures: np.ndarray, base: Mesh, light: np.ndarray) -> np.ndarray:
+    """Pictures of patches as if the light of the capture were even: every texel divided by its brightness.
+
+    That is what the light gives to a diffuse base shape. Highlights, and shades of what stands up from the
+    base shape, stay in the pictures.
+
+    Args:
+        patches, pictures: as of `quilted_albedo`.
+        base: the shape that the patches lie on.
+        light: (16,) spherical harmonics.
+
+    Returns:
+        As `pictures`.
+    """
+    factor = brightness(light, base.face_normals).astype(np.float32)[patches.faces]
+    return np.clip(pictures / factor[..., None], 0.0, 1.0)

@@ -46,10 +46,10 @@ def face_features(vertices: torch.Tensor, graph: FaceGraph) -> torch.Tensor:
     frames, lengths = side_frames(vertices, graph)
     corners = vertices[..., graph.faces, :]
     middles = 0.5 * (corners + corners.roll(-1, -2))
-    seen = (frames @ (vertices[..., graph.opposite, :] - middles)[..., None]).squeeze(-1)
-    mirrored = seen * seen.new_tensor([1.0, -1.0, 1.0])
-    seen = torch.where(graph.open[..., None], mirrored, seen)
-    return torch.cat([seen, lengths[..., None]], -1)
+    apex = (frames @ (vertices[..., graph.opposite, :] - middles)[..., None]).squeeze(-1)
+    mirrored = apex * apex.new_tensor([1.0, -1.0, 1.0])
+    apex = torch.where(graph.open[..., None], mirrored, apex)
+    return torch.cat([apex, lengths[..., None]], -1)
 
 
 def displaced(vertices: torch.Tensor, graph: FaceGraph, offsets: torch.Tensor) -> torch.Tensor:

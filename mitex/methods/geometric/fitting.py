@@ -86,19 +86,19 @@ def training_meshes(
     hierarchy = Hierarchy.of(template, config.levels)
     options = [getattr(config, key) for key in vars(config) if key.startswith("fit_")]
     arrays = (reference.vertices, reference.faces, template.vertices, template.faces)
-    found, reports = [], []
+    meshes, reports = [], []
     for level, mesh in enumerate(hierarchy.meshes):
         place = cache_dir() / "geometric" / content_key(VERSION, *arrays, config.seed, *options, level)
-        start = hierarchy.finer(found[-1], level - 1) if found else torch.from_numpy(template.vertices)
+        start = hierarchy.finer(meshes[-1], level - 1) if meshes else torch.from_numpy(template.vertices)
 
-        def find(start: torch.Tensor = start, level: int = level) -> torch.Tensor:
+        def compute(start: torch.Tensor = start, level: int = level) -> torch.Tensor:
             return fit_level(reference, start, hierarchy.graphs[level], level, config)
 
-        found.append(cached(place, find, _read, _write))
-        reports.append(report(mesh.with_vertices(found[-1].numpy() / 2**level), reference))
+        meshes.append(cached(place, compute, _read, _write))
+        reports.append(report(mesh.with_vertices(meshes[-1].numpy() / 2**level), reference))
         if not quiet:
             print(f"training mesh {level}: {reports[-1]}", file=sys.stderr, flush=True)
-    return found, reports
+    return meshes, reports
 
 
 def _read(place: Path) -> torch.Tensor:

@@ -32,14 +32,14 @@ class FaceNetwork:
     """
 
     def __init__(self, widths: Sequence[int], outputs: int, generator: torch.Generator) -> None:
-        def drawn(inputs: int, *shape: int) -> torch.Tensor:
+        def uniform(inputs: int, *shape: int) -> torch.Tensor:
             values = torch.rand(shape, generator=generator) * 2 - 1
             return (values / math.sqrt(inputs)).requires_grad_()
 
-        self.parameters = [drawn(CHANNELS, CHANNELS, widths[0])]
+        self.parameters = [uniform(CHANNELS, CHANNELS, widths[0])]
         for inputs, width in zip(widths, (*widths[1:], outputs), strict=True):
-            self.parameters += [drawn(2 * inputs, inputs, width), drawn(2 * inputs, inputs, width)]
-        self.parameters.append(drawn(2 * widths[-1], outputs))
+            self.parameters += [uniform(2 * inputs, inputs, width), uniform(2 * inputs, inputs, width)]
+        self.parameters.append(uniform(2 * widths[-1], outputs))
 
     def __call__(self, features: torch.Tensor, graph: FaceGraph) -> torch.Tensor:
         """Features (..., F, 3, 4) to (..., F, outputs)."""
@@ -60,8 +60,8 @@ class FaceNetwork:
 def largest(x: torch.Tensor, graph: FaceGraph) -> torch.Tensor:
     """(..., F, C): for each face the largest value of its three neighbours, each channel by itself.
 
-    Which one that is is found first, so that all derivatives are one gather or scatter: four times as fast,
-    both backward passes included, as torch's own derivative of a maximum.
+    The index of the largest comes first, so that all derivatives are one gather or scatter: four times as
+    fast, both backward passes included, as torch's own derivative of a maximum.
     """
     with torch.no_grad():
         first, second, third = (graph.neighbours[:, k, None] for k in range(3))

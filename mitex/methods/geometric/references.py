@@ -16,20 +16,20 @@ GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 
 def spikes() -> Mesh:
     """A ball with 90 pointed spikes."""
-    near = _near(_spread(90))
-    return _sphere(0.45 * np.clip(1 - near / 0.17, 0, 1) ** 1.4, "spikes")
+    angle = _nearest_angle(_spiral(90))
+    return _sphere(0.45 * np.clip(1 - angle / 0.17, 0, 1) ** 1.4, "spikes")
 
 
 def scales() -> Mesh:
     """A ball covered by 140 domed plates with grooves in between."""
-    first, second = _two_nearest(_spread(140))
+    first, second = _two_nearest(_spiral(140))
     inside = np.clip((second - first) / 0.14, 0, 1)  # 0 on the border between two plates
     return _sphere(0.16 * np.sqrt(inside * (2 - inside)), "scales")
 
 
 def knobs() -> Mesh:
     """A ball with 36 balls on it, more than half of each: they hang over, which no height map can say."""
-    points, centres = icosphere(FREQUENCY).vertices.astype(np.float64), _spread(36)
+    points, centres = icosphere(FREQUENCY).vertices.astype(np.float64), _spiral(36)
     index = np.argmax(points @ centres.T, axis=1)
     centre = centres[index]
     angle = np.arccos(np.clip((points * centre).sum(1), -1, 1))
@@ -41,9 +41,8 @@ def knobs() -> Mesh:
     radius = np.where(t < 0.2, np.interp(t, [0.0, 0.2], [rim, size * np.sin(neck)]), size * np.sin(around))
     height = np.where(t < 0.2, 0.0, up + size * np.cos(around))
     outwards = unit(across(points, centre))
-    placed = np.cos(radius)[:, None] * centre + np.sin(radius)[:, None] * outwards
-    moved = np.where((angle < rim)[:, None], placed * (1 + height)[:, None], points)
-    return _mesh(moved, "knobs")
+    knob = (np.cos(radius)[:, None] * centre + np.sin(radius)[:, None] * outwards) * (1 + height)[:, None]
+    return _mesh(np.where((angle < rim)[:, None], knob, points), "knobs")
 
 
 def ridges() -> Mesh:
@@ -57,9 +56,9 @@ def ridges() -> Mesh:
 
 def craters() -> Mesh:
     """A ball with 70 craters, each a bowl with a raised rim."""
-    near = _near(_spread(70)) / 0.17
-    bowl = np.where(near < 1, near**2 - 1, 0.0)
-    rim = np.exp(-(((near - 1.05) / 0.22) ** 2))
+    distance = _nearest_angle(_spiral(70)) / 0.17  # in units of a crater's radius
+    bowl = np.where(distance < 1, distance**2 - 1, 0.0)
+    rim = np.exp(-(((distance - 1.05) / 0.22) ** 2))
     return _sphere(0.17 * bowl + 0.09 * rim, "craters")
 
 
@@ -71,8 +70,8 @@ def warts() -> Mesh:
     around, across = 2 * np.pi * (k * 0.618034 % 1), 2 * np.pi * (k + 0.5) / 170
     reach = 1 + 0.45 * np.cos(across)
     centres = np.stack([reach * np.sin(around), 0.45 * np.sin(across), reach * np.cos(around)], 1)
-    near = np.linalg.norm(points[:, None] - centres, axis=2).min(1)
-    dome = np.sqrt(np.clip(1 - (near / 0.125) ** 2, 0, 1))
+    distance = np.linalg.norm(points[:, None] - centres, axis=2).min(1)
+    dome = np.sqrt(np.clip(1 - (distance / 0.125) ** 2, 0, 1))
     return Mesh(points + 0.11 * dome[:, None] * base.normals, base.faces, name="warts")
 
 
@@ -91,7 +90,7 @@ def find_reference(source: str | Path) -> Mesh:
     return REFERENCES[str(source)]() if str(source) in REFERENCES else Mesh.load(source)
 
 
-def _spread(count: int) -> np.ndarray:
+def _spiral(count: int) -> np.ndarray:
     """(count, 3) directions, evenly spread along a spiral."""
     y = 1 - (2 * np.arange(count) + 1) / count
     angle = GOLDEN * np.arange(count)
@@ -103,7 +102,7 @@ def _angles(centres: np.ndarray) -> np.ndarray:
     return np.arccos(np.clip(icosphere(FREQUENCY).vertices.astype(np.float64) @ centres.T, -1, 1))
 
 
-def _near(centres: np.ndarray) -> np.ndarray:
+def _nearest_angle(centres: np.ndarray) -> np.ndarray:
     """(V,) the angle from each vertex of the sphere to the nearest centre."""
     return _angles(centres).min(1)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -15,7 +14,7 @@ from mitex.methods.geometric.features import face_features
 from mitex.methods.geometric.gan import adversarial_loss, critic_loss, generate
 from mitex.methods.geometric.hierarchy import Hierarchy
 from mitex.methods.geometric.model import grow, network
-from mitex.methods.geometric.pictures import portrait
+from mitex.methods.geometric.portrait import portrait
 from mitex.training import Change, Step
 from mitex.training.optim import Adam, gradient_norms
 
@@ -51,10 +50,10 @@ class GeometricTask:
     ) -> None:
         self.config, self.hierarchy, self.template = config, hierarchy, template
         self.meshes, self.reference = meshes, reference
-        drawn = torch.Generator().manual_seed(config.seed)
-        self.generators = [network(level, 3, drawn) for level in range(MAX_LEVELS)]
-        self.critics = [network(level, 1, drawn) for level in range(MAX_LEVELS)]
-        self.fixed = config.noise * torch.randn(template.shape, generator=drawn)
+        rng = torch.Generator().manual_seed(config.seed)
+        self.generators = [network(level, 3, rng) for level in range(MAX_LEVELS)]
+        self.critics = [network(level, 1, rng) for level in range(MAX_LEVELS)]
+        self.fixed = config.noise * torch.randn(template.shape, generator=rng)
         self.optimizers = [Adam(critic.parameters, betas(config)) for critic in self.critics]
         with torch.no_grad():
             self.real = [face_features(v, g) for v, g in zip(meshes, hierarchy.graphs, strict=True)]
@@ -92,8 +91,9 @@ class GeometricTask:
         fake = self._sample(level, generator)
         adversarial = adversarial_loss(self.critics[level], fake, graph)
         noise = self.fixed if level == 0 else 0.0
-        rebuilt = generate(self.generators[level], self._rebuilt(level), graph, noise, self.config.remeasure)
-        error = (rebuilt - self.meshes[level]).square().mean()
+        start = self._reconstruction_start(level)
+        reconstruction = generate(self.generators[level], start, graph, noise, self.config.remeasure)
+        error = (reconstruction - self.meshes[level]).square().mean()
         metrics = {"level": level, "adversarial": adversarial.item(), "reconstruction": error.item()}
         return Step(adversarial + self.config.reconstruction * error, metrics)
 
@@ -140,12 +140,12 @@ class GeometricTask:
         """The reference, the training mesh of the level, its reconstruction, and two random samples."""
         level = self.level(step - 1)
         faces = self.hierarchy.graphs[level].faces.numpy()
-        drawn = torch.Generator().manual_seed(self.config.seed)
+        rng = torch.Generator().manual_seed(self.config.seed)
         with torch.no_grad():
-            *_, rebuilt = self._grown(level, [self.fixed])
-            samples = [self._sample(level, drawn) for _ in range(2)]
-        shown = [portrait(v.numpy(), faces) for v in (self.meshes[level], rebuilt, *samples)]
-        return np.hstack([portrait(self.reference.vertices, self.reference.faces), *shown])
+            reconstruction = self._reconstruction(level)
+            samples = [self._sample(level, rng) for _ in range(2)]
+        portraits = [portrait(v.numpy(), faces) for v in (self.meshes[level], reconstruction, *samples)]
+        return np.hstack([portrait(self.reference.vertices, self.reference.faces), *portraits])
 
     def metadata(self) -> dict[str, str]:
         return {"method": "geometric", "reference": self.reference.name}
@@ -185,22 +185,23 @@ class GeometricTask:
                 vertices = generate(self.generators[k], vertices, graph, noise, self.config.remeasure)
         return vertices
 
-    def _rebuilt(self, level: int) -> torch.Tensor:
+    def _reconstruction_start(self, level: int) -> torch.Tensor:
         """Where the reconstruction of a level starts from; the lower levels are finished and stay."""
         if self._start is None or self._start[0] != level:
             start = self.template
             if level:
                 with torch.no_grad():
-                    *_, below = self._grown(level - 1, [self.fixed])
+                    below = self._reconstruction(level - 1)
                 start = self.hierarchy.finer(below, level - 1)
             self._start = level, start
         return self._start[1]
 
-    def _grown(self, level: int, noises: list[torch.Tensor]) -> Iterator[torch.Tensor]:
-        """The meshes of levels 0 to `level`; noise 0 where none is given."""
-        count = level + 1
-        given = [*noises[:count], *[0.0] * (count - len(noises))]
-        return grow(self.generators[:count], self.hierarchy, self.template, given, self.config.remeasure)
+    def _reconstruction(self, level: int) -> torch.Tensor:
+        """The mesh of a level from the fixed noise: the reference, once the generators have learned it."""
+        noises = [self.fixed, *[0.0] * level]
+        generators = self.generators[: level + 1]
+        *_, vertices = grow(generators, self.hierarchy, self.template, noises, self.config.remeasure)
+        return vertices
 
 
 def _clones(state: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:

@@ -18,20 +18,21 @@ COARSE = 80  # faces of a simplified reference
 
 
 def find_template(reference: Mesh, template: Mesh | None = None) -> Mesh:
-    """The wanted template, if it fits, else an icosahedron, a torus, or the reference, simplified.
+    """The given template, if it fits, else an icosahedron, a torus, or the reference, simplified.
 
     Raises:
         ConfigError: its topology is not the reference's, or the reference's is not that of a surface.
     """
-    wanted = topology(reference)
+    expected = topology(reference)
     if template is None:
-        if wanted == (1, 0, 0):
+        if expected == (1, 0, 0):
             return _around(icosphere(1), reference)
-        template = _ring(reference) if wanted == (1, 1, 0) else _simplified(reference)
-    found = topology(template)
-    if found != wanted:
+        template = _ring(reference) if expected == (1, 1, 0) else _simplified(reference)
+    actual = topology(template)
+    if actual != expected:
         raise ConfigError(
-            f"template {template.name} has {_told(found)}, reference {reference.name} has {_told(wanted)}",
+            f"template {template.name} has {_description(actual)}, "
+            f"reference {reference.name} has {_description(expected)}",
             "give a --template of the same kind",
         )
     return template
@@ -64,7 +65,7 @@ def topology(mesh: Mesh) -> tuple[int, int, int]:
     return report.components, report.genus, boundary_loops(mesh.faces, len(mesh.vertices))
 
 
-def _told(kind: tuple[int, int, int]) -> str:
+def _description(kind: tuple[int, int, int]) -> str:
     return f"{kind[0]} pieces, genus {kind[1]}, {kind[2]} boundaries"
 
 
@@ -91,11 +92,11 @@ def _ring(reference: Mesh) -> Mesh:
     tube = float(np.sqrt(np.mean((reach - radius) ** 2 + (centred @ axes[:, 0]) ** 2)))
     edge = 2 * tube * np.sin(np.pi / SIDES)
     rings = max(2 * round(np.pi * radius / (edge * 0.75**0.5)), 4)
-    made = torus(rings, SIDES, radius, min(tube, 0.9 * radius))
+    ring = torus(rings, SIDES, radius, min(tube, 0.9 * radius))
     turn = np.stack([axes[:, 1], axes[:, 0], axes[:, 2]], 1)  # the torus has its axis along y
     if np.linalg.det(turn) < 0:
         turn[:, 0] *= -1
-    return replace(made, vertices=made.vertices @ turn.T + centre)
+    return replace(ring, vertices=ring.vertices @ turn.T + centre)
 
 
 def _simplified(reference: Mesh) -> Mesh:

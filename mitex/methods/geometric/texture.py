@@ -77,8 +77,8 @@ class GeometricTexture:
             ConfigError: levels out of range, or too many faces.
             MeshError: a face names a vertex twice.
         """
-        course = self.course(mesh, start_level, end_level)
-        *_, last = course.run(course.noise(seed))
+        rollout = self.rollout(mesh, start_level, end_level)
+        *_, last = rollout.run(rollout.noise(seed))
         return clay(last)
 
     def interpolate(
@@ -97,11 +97,11 @@ class GeometricTexture:
             seeds: of the first and the last mesh.
             frames: number of meshes, at least 2.
         """
-        course = self.course(mesh, start_level, end_level)
-        first, last = (course.noise(seed) for seed in seeds)
+        rollout = self.rollout(mesh, start_level, end_level)
+        first, last = (rollout.noise(seed) for seed in seeds)
         for t in np.linspace(0, 1, frames):
-            *_, made = course.run([slerp(a, b, float(t)) for a, b in zip(first, last, strict=True)])
-            yield made
+            *_, result = rollout.run([slerp(a, b, float(t)) for a, b in zip(first, last, strict=True)])
+            yield result
 
     def generate(self, seed: int = 0, start_level: int = 0, end_level: int | None = None) -> Mesh:
         """A variation of the reference itself, from the template.
@@ -110,11 +110,10 @@ class GeometricTexture:
             seed: of the noise from `start_level` on; below it the reference's own global shape is rebuilt.
             start_level, end_level: as in `apply`.
         """
-        course = self.course(self.template, 0, end_level)
-        rebuilt = [self.fixed, *[torch.zeros(())] * (len(course.generators) - 1)]
-        noises = [*rebuilt[:start_level], *course.noise(seed)[start_level:]]
-        *_, made = course.run(noises)
-        return made
+        rollout = self.rollout(self.template, 0, end_level)
+        reconstruction = [self.fixed, *[torch.zeros(())] * (len(rollout.generators) - 1)]
+        *_, result = rollout.run([*reconstruction[:start_level], *rollout.noise(seed)[start_level:]])
+        return result
 
     def growth(
         self,
@@ -126,9 +125,9 @@ class GeometricTexture:
         end_level: int | None = None,
     ) -> Iterator[Mesh]:
         """The texture growing on a mesh: `frames` meshes for each level, from undisplaced to displaced."""
-        course = self.course(mesh, start_level, end_level)
+        rollout = self.rollout(mesh, start_level, end_level)
         before = mesh
-        for level, after in enumerate(course.run(course.noise(seed))):
+        for level, after in enumerate(rollout.run(rollout.noise(seed))):
             start = subdivide_midpoint(before) if level else before
             for t in np.linspace(0, 1, frames + 1)[0 if level == 0 else 1 :]:
                 yield after.with_vertices(start.vertices + t * (after.vertices - start.vertices))
@@ -144,8 +143,8 @@ class GeometricTexture:
         faces = len(self.template.faces) * 4**start
         return (faces / len(mesh.faces)) ** 0.5, max(faces // 2, 12)
 
-    def course(self, mesh: Mesh, start_level: int | None, end_level: int | None) -> Course:
-        """What happens to a mesh between two levels.
+    def rollout(self, mesh: Mesh, start_level: int | None, end_level: int | None) -> Rollout:
+        """The generators of a range of levels, ready to run on a mesh.
 
         Raises:
             ConfigError: levels out of range, or too many faces.
@@ -167,23 +166,30 @@ class GeometricTexture:
         keep_freed_memory()
         generators = self.generators[start : end + 1]
         hierarchy = Hierarchy.of(mesh, len(generators))
-        return Course(generators, hierarchy, float(self.about["noise"]), bool(self.about["remeasure"]))
+        return Rollout(generators, hierarchy, float(self.about["noise"]), bool(self.about["remeasure"]))
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
-    """Generators about to be run on a mesh."""
+class Rollout:
+    """Generators of successive levels, to run on one mesh.
+
+    Attributes:
+        generators: of the levels.
+        hierarchy: of the mesh, with as many levels.
+        noise_scale: standard deviation of the noise [mean edges].
+        remeasure: as in `generate`.
+    """
 
     generators: Sequence[FaceNetwork]
     hierarchy: Hierarchy
-    spread: float
+    noise_scale: float
     remeasure: bool
 
     def noise(self, seed: int) -> list[torch.Tensor]:
         """Noise (V, 3) for each level."""
-        drawn = torch.Generator().manual_seed(seed)
+        rng = torch.Generator().manual_seed(seed)
         counts = [len(mesh.vertices) for mesh in self.hierarchy.meshes]
-        return [self.spread * torch.randn(count, 3, generator=drawn) for count in counts]
+        return [self.noise_scale * torch.randn(count, 3, generator=rng) for count in counts]
 
     @torch.no_grad()
     def run(self, noises: Sequence[torch.Tensor]) -> Iterator[Mesh]:
@@ -194,8 +200,8 @@ class Course:
         unit = float(mean_edge(centred, graph))
         steps = grow(self.generators, self.hierarchy, centred / unit, noises, self.remeasure)
         for level, vertices in enumerate(steps):
-            placed = vertices.numpy().astype(np.float64) * (unit / 2**level) + centre
-            yield self.hierarchy.meshes[level].with_vertices(placed)
+            positions = vertices.numpy().astype(np.float64) * (unit / 2**level) + centre
+            yield self.hierarchy.meshes[level].with_vertices(positions)
 
 
 def slerp(a: torch.Tensor, b: torch.Tensor, t: float) -> torch.Tensor:

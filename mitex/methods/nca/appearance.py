@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import torch
 
-from mitex.features import Vgg16
-from mitex.losses import channel_transport, decorrelate, moment_distance, relaxed_transport
+from mitex.features import Vgg16, normalise_colours
+from mitex.losses import channel_transport, moment_distance, relaxed_transport
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.targets import Targets
-from mitex.pictures import CYCLE
+from mitex.triples import CYCLE
 
 
 class Appearance:
@@ -20,9 +20,9 @@ class Appearance:
 
     def __init__(self, config: NcaConfig, targets: Targets, network: Vgg16) -> None:
         self.config, self.targets, self.network = config, targets, network
-        shown = sorted({channel for p in targets.pictures for channel in p.channels})
-        self.channels = torch.tensor(shown, device=network.device)
-        table = [[shown.index(channel) for channel in p.channels] for p in targets.pictures]
+        channels = sorted({channel for p in targets.pictures for channel in p.channels})
+        self.channels = torch.tensor(channels, device=network.device)
+        table = [[channels.index(channel) for channel in p.channels] for p in targets.pictures]
         self._table = torch.tensor(table, device=network.device)
 
     def __call__(self, views: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
@@ -71,10 +71,9 @@ class Appearance:
         n = min(pixels, self.targets.size("colour"), self.config.samples)
         here = _places(count, pixels, n, generator).to(images.device)
         there = _places(count, self.targets.size("colour"), n, generator).to(images.device)
-        a = images.flatten(1, 2).gather(1, here[:, :, None].expand(-1, -1, 3))
-        b = self.targets.sample("colour", which, there)
-        low = self.network.dtype == torch.bfloat16
-        cost = relaxed_transport(decorrelate(a), decorrelate(b), euclidean=True, low_precision=low).mean()
+        a = normalise_colours(images.flatten(1, 2).gather(1, here[:, :, None].expand(-1, -1, 3)))
+        b = normalise_colours(self.targets.sample("colour", which, there))
+        cost = relaxed_transport(a, b, euclidean=True).mean()
         return cost + channel_transport(a, b).mean() if self.config.colour_histogram else cost
 
 

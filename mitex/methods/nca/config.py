@@ -47,7 +47,7 @@ class NcaConfig(TrainingConfig):
     )
     pooling: Literal["average", "max"] = key("average", "of VGG-16")
     samples: int = key(1024, "feature vectors compared in each layer and view, at most", 1, 4096)
-    colour_weight: float = key(10.0, "of the comparison of colours, beside the layers", 0)
+    colour_weight: float = key(1.0, "of the comparison of colours, beside the layers", 0)
     colour_histogram: bool = key(True, "compare the histograms of the channels too")
     moment_weight: float = key(0.1, "of the moment terms, beside the transport terms", 0)
     appearance_weight: float = key(2.0, "of the appearance loss", 0)
@@ -86,7 +86,6 @@ PRESETS = {
         density=98.0,
         target_size=224,
         blend=False,
-        colour_weight=1.0,
         colour_histogram=False,
         milestones=(1000, 2000),
     ),

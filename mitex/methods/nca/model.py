@@ -75,15 +75,17 @@ class MeshNCA(nn.Module):
         Raises:
             ConfigError: shapes that do not fit.
         """
-        seen = mesh if isinstance(mesh, Perception) else perception(mesh, self.degree, device=state.device)
-        self._check(state, seen, mask, condition)
+        operator = mesh
+        if not isinstance(operator, Perception):
+            operator = perception(operator, self.degree, device=state.device)
+        self._check(state, operator, mask, condition)
         rows = None
         if mask is not None:
             rows = mask.expand(state.shape[:2]).reshape(-1).nonzero().squeeze(1)
         if condition is not None:
             condition = condition.expand(*state.shape[:2], self.condition)
         weights = (self.fc1.weight, self.fc1.bias, self.fc2.weight, self.fc2.bias)
-        return _Step.apply(state, condition, *weights, seen, rows)
+        return _Step.apply(state, condition, *weights, operator, rows)
 
     def evolve(
         self,
@@ -100,37 +102,41 @@ class MeshNCA(nn.Module):
         return state
 
     def _check(
-        self, state: torch.Tensor, seen: Perception, mask: torch.Tensor | None, condition: torch.Tensor | None
+        self,
+        state: torch.Tensor,
+        operator: Perception,
+        mask: torch.Tensor | None,
+        condition: torch.Tensor | None,
     ) -> None:
-        if state.ndim != 3 or state.shape[1:] != (seen.vertices, self.channels):
-            expected = f"(B, {seen.vertices}, {self.channels})"
+        if state.ndim != 3 or state.shape[1:] != (operator.vertices, self.channels):
+            expected = f"(B, {operator.vertices}, {self.channels})"
             raise ConfigError(f"a state of shape {tuple(state.shape)}", f"give {expected}")
-        if seen.blocks != HARMONICS[self.degree] + 1:
+        if operator.blocks != HARMONICS[self.degree] + 1:
             raise ConfigError(
                 "the perception's degree is not the model's", f"build it with degree={self.degree}"
             )
-        shapes = ((seen.vertices,), tuple(state.shape[:2]))
+        shapes = ((operator.vertices,), tuple(state.shape[:2]))
         if mask is not None and (mask.dtype != torch.bool or mask.shape not in shapes):
             raise ConfigError(
                 f"a mask of {mask.dtype}, shape {tuple(mask.shape)}", "give booleans (V,) or (B, V)"
             )
-        given = 0 if condition is None else condition.shape[-1]
-        if given != self.condition:
-            raise ConfigError(f"a condition of width {given}", f"this model takes {self.condition}")
+        width = 0 if condition is None else condition.shape[-1]
+        if width != self.condition:
+            raise ConfigError(f"a condition of width {width}", f"this model takes {self.condition}")
         if condition is not None and condition.shape[:-1] not in shapes:
             raise ConfigError(f"a condition of shape {tuple(condition.shape)}", "give (V, d) or (B, V, d)")
 
 
 class _Step(torch.autograd.Function):
-    """state + fc2(relu(fc1([perception(state), condition]))) in the chosen rows, backward written out.
+    """state + fc2(relu(fc1([perception(state), condition]))) in `rows`, with a backward pass of its own.
 
     Only the cells that update go through the network, half of them with the usual mask.
     """
 
     @staticmethod
-    def forward(ctx, state, condition, w1, b1, w2, b2, seen: Perception, rows):
+    def forward(ctx, state, condition, w1, b1, w2, b2, operator: Perception, rows):
         batch, vertices, channels = state.shape
-        inputs = seen(state).view(batch * vertices, -1)
+        inputs = operator(state).view(batch * vertices, -1)
         if condition is not None:
             inputs = torch.cat([inputs, condition.reshape(batch * vertices, -1)], 1)
         if rows is not None:
@@ -138,7 +144,7 @@ class _Step(torch.autograd.Function):
         hidden = dense.product(inputs, w1, b1).relu_()
         change = dense.product(hidden, w2, b2)
         ctx.save_for_backward(inputs, hidden, w1, w2, rows)
-        ctx.seen, ctx.shape = seen, state.shape
+        ctx.perception, ctx.shape = operator, state.shape
         if rows is None:
             return state + change.view_as(state)
         out = state.reshape(-1, channels).clone().index_add_(0, rows, change[: len(rows)])
@@ -160,9 +166,9 @@ class _Step(torch.autograd.Function):
             if rows is not None:
                 whole = into.new_zeros(batch * vertices, into.shape[1])
                 into = whole.index_copy_(0, rows, into[: len(rows)])
-            width = ctx.seen.blocks * channels
-            seen = into[:, :width].contiguous().view(batch, vertices, width)
-            states = gradient + ctx.seen.transposed(seen)
+            width = ctx.perception.blocks * channels
+            perceived = into[:, :width].contiguous().view(batch, vertices, width)
+            states = gradient + ctx.perception.transposed(perceived)
             condition = into[:, width:].view(batch, vertices, -1) if into.shape[1] > width else None
         return (
             states,

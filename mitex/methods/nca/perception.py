@@ -42,14 +42,14 @@ class Perception:
         """State (B, V, C) -> (B, V, blocks * C): harmonics in order, then the state."""
         batch, vertices, channels = state.shape
         flat = state.transpose(0, 1).reshape(vertices, batch * channels)
-        seen = (self.matrix @ flat).view(vertices, self.blocks, batch, channels)
-        return seen.permute(2, 0, 1, 3).reshape(batch, vertices, self.blocks * channels)
+        perceived = (self.matrix @ flat).view(vertices, self.blocks, batch, channels)
+        return perceived.permute(2, 0, 1, 3).reshape(batch, vertices, self.blocks * channels)
 
-    def transposed(self, seen: torch.Tensor) -> torch.Tensor:
+    def transposed(self, perceived: torch.Tensor) -> torch.Tensor:
         """The adjoint of `__call__`: (B, V, blocks * C) -> (B, V, C)."""
-        batch, vertices, width = seen.shape
+        batch, vertices, width = perceived.shape
         channels = width // self.blocks
-        flat = seen.view(batch, vertices, self.blocks, channels).permute(1, 2, 0, 3)
+        flat = perceived.view(batch, vertices, self.blocks, channels).permute(1, 2, 0, 3)
         flat = flat.reshape(vertices * self.blocks, batch * channels)
         return (self.adjoint @ flat).view(vertices, batch, channels).transpose(0, 1)
 
@@ -89,10 +89,10 @@ def perception(
     if not np.isfinite(orientation).all():
         raise ConfigError("an orientation that is not finite", "give angles in radians")
     key = (degree, np.asarray(orientation, np.float64).tobytes(), str(device))
-    known = _cache.setdefault(mesh, {})
-    if key not in known:
-        known[key] = _build(mesh, degree, orientation, device)
-    return known[key]
+    operators = _cache.setdefault(mesh, {})
+    if key not in operators:
+        operators[key] = _build(mesh, degree, orientation, device)
+    return operators[key]
 
 
 def _build(mesh: Mesh, degree: int, orientation: float | np.ndarray, device) -> Perception:

@@ -10,7 +10,7 @@ import torch.nn.functional as F
 
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
-from mitex.pictures import Picture, picture_images
+from mitex.triples import ChannelTriple, triple_images
 
 # Channels of the state, as in the authors' PBR checkpoints; 3 to 5 are hidden.
 STATE_CHANNELS: dict[str, tuple[int, ...]] = {
@@ -44,10 +44,10 @@ class Targets:
     """
 
     def __init__(
-        self, exemplar: Exemplar, pictures: list[Picture], network: Vgg16, layers: tuple[str, ...]
+        self, exemplar: Exemplar, pictures: list[ChannelTriple], network: Vgg16, layers: tuple[str, ...]
     ) -> None:
         self.pictures = pictures
-        images = picture_images(exemplar, pictures, STATE_CHANNELS)
+        images = triple_images(exemplar, pictures, STATE_CHANNELS)
         self.images = torch.from_numpy(images).to(network.device)
         self._vectors = {"colour": self.images.flatten(1, 2)}
         with torch.no_grad():

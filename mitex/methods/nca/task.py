@@ -18,11 +18,11 @@ from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.perception import perception
 from mitex.methods.nca.targets import OFFSET, STATE_CHANNELS, Targets, enlarged, state_layout
-from mitex.pictures import picture_images, pictures_of
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, orbit, patch_views, random_views
 from mitex.scenes.stage import Stage
 from mitex.training import Step
+from mitex.triples import channel_triples, triple_images
 
 
 class NcaTask:
@@ -47,7 +47,7 @@ class NcaTask:
         self.stage = Stage(self.mesh, channels=len(STATE_CHANNELS))
         network = Vgg16(config.pooling)
         target = enlarged(exemplar.resized(config.exemplar_size), config.target_size)
-        pictures = pictures_of(state_layout(self.maps), config.blend, config.seed)
+        pictures = channel_triples(state_layout(self.maps), config.blend, config.seed)
         self.appearance = Appearance(config, Targets(target, pictures, network, config.layers), network)
         self.pool = torch.zeros(config.pool, self.perception.vertices, config.channels)
         self._touched = torch.zeros(config.pool, dtype=torch.bool)
@@ -125,11 +125,11 @@ class NcaTask:
         whole = orbit(1, distance=2.05, resolution=2 * size)
         views = [bridge.lookup(state, self.stage.visibility(patches)).numpy()]
         views.append(bridge.lookup(state, self.stage.visibility(whole, antialias=2)).numpy())
-        pictures = pictures_of(state_layout(self.maps), False, 0)
+        pictures = channel_triples(state_layout(self.maps), False, 0)
         exemplar = self.exemplar.resized(size)
         rows = []
-        shown = picture_images(exemplar, pictures, STATE_CHANNELS)
-        for image, channels in zip(shown, (list(p.channels) for p in pictures), strict=True):
+        images = triple_images(exemplar, pictures, STATE_CHANNELS)
+        for image, channels in zip(images, (list(p.channels) for p in pictures), strict=True):
             rows.append(_row(image, *(v[..., channels] for v in views)))
         return np.clip(np.concatenate(rows, 0), 0, 1)
 

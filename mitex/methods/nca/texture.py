@@ -120,7 +120,7 @@ class NcaTexture:
         if self.model.condition:
             name, width = self.about.get("name", "the model"), self.model.condition
             raise ConfigError(
-                f"'{name}' needs a condition of {width} values at each vertex, which a texture has not",
+                f"'{name}' needs a condition of {width} values at each vertex, and has none here",
                 "use a model that was trained without, or give the condition to MeshNCA.evolve in Python",
             )
 

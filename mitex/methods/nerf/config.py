@@ -38,7 +38,7 @@ class NerfConfig(TrainingConfig):
     normals: float = key(0.05, "weight of the normal loss", 0)
     interior_weight: float = key(
         0.01,
-        "weight of the loss that gives the unseen interior the reflectance above it, in the second half; "
+        "weight of the loss that gives the unseen interior the reflectance above it, from lr_steps / 2 on; "
         "the paper: 0, and where a shell is cut any colour shows",
         0,
     )

@@ -61,13 +61,13 @@ class Border:
             return Border.none(count)
         shares = _resolved(_reads(mesh, texels, tracer, outside), inside, outside)
         total = np.asarray(shares.sum(axis=1))
-        known = total > LEAST
-        elements = np.sort(np.concatenate([inside, outside[~known]]))
+        continued = total > LEAST
+        elements = np.sort(np.concatenate([inside, outside[~continued]]))
         number = np.empty(count, np.int64)
         number[elements] = np.arange(len(elements))
         shares = shares.tocoo()
         line, column = shares.coords
-        used = known[line]
+        used = continued[line]
         line, column, data = line[used], column[used], shares.data[used]
         rows = np.concatenate([elements, outside[line]])
         columns = np.concatenate([number[elements], number[inside[column]]])

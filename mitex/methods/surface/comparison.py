@@ -7,15 +7,9 @@ from typing import Protocol
 
 import torch
 
-from mitex.features import Vgg16
+from mitex.features import Vgg16, normalise_colours
 from mitex.features.frozen import GramTap, Tap
-from mitex.losses import (
-    decorrelate,
-    gram_distance,
-    gram_matrix,
-    moment_distance,
-    relaxed_transport,
-)
+from mitex.losses import gram_distance, gram_matrix, moment_distance, relaxed_transport
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.statistics import exemplar_features
 
@@ -29,9 +23,9 @@ class Comparison(Protocol):
     def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Taps: ...
 
     def cost(
-        self, found: Mapping[str, torch.Tensor], colours: torch.Tensor, k: int, generator: torch.Generator
+        self, features: Mapping[str, torch.Tensor], colours: torch.Tensor, k: int, generator: torch.Generator
     ) -> torch.Tensor:
-        """Scalar distance from picture k, given what the taps read of the texels' colours (N, 3)."""
+        """Scalar distance from triple k, given what the taps read of the texels' colours (N, 3)."""
         ...
 
 
@@ -43,7 +37,7 @@ class GramComparison:
 
     Args:
         network: of images.
-        images: (P, H, W, 3) the exemplar's pictures.
+        images: (P, H, W, 3) the exemplar's channel triples.
         layers: that are compared.
         region: texels of a region at the images' scale; None compares the whole surface, as the paper does.
             Regions of deep layers are larger where that is needed for `LEAST` feature vectors in each.
@@ -68,9 +62,9 @@ class GramComparison:
         return max(min(network.counts["relu1_1"] // self.region, most), 1)
 
     def cost(
-        self, found: Mapping[str, torch.Tensor], colours: torch.Tensor, k: int, generator: torch.Generator
+        self, features: Mapping[str, torch.Tensor], colours: torch.Tensor, k: int, generator: torch.Generator
     ) -> torch.Tensor:
-        return gram_distance(found, self.targets[k]) / len(self.layers)
+        return gram_distance(features, self.targets[k]) / len(self.layers)
 
 
 class TransportComparison:
@@ -78,7 +72,7 @@ class TransportComparison:
 
     Args:
         network: of images, with layers of equal scale, as the moments are not scale free.
-        images: (P, H, W, 3) the exemplar's pictures.
+        images: (P, H, W, 3) the exemplar's channel triples.
         layers: that are compared.
         samples: feature vectors of each layer in a step.
         moment_weight: of the moments.
@@ -94,7 +88,7 @@ class TransportComparison:
     ) -> None:
         self.layers, self.samples, self.moment_weight = layers, samples, moment_weight
         self.low = network.dtype == torch.bfloat16
-        self.colours = [image.flatten(0, 1) for image in images]
+        self.colours = [normalise_colours(image.flatten(0, 1)) for image in images]
         self.targets = [exemplar_features(network, image, layers) for image in images]
 
     def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Taps:
@@ -104,11 +98,11 @@ class TransportComparison:
         }
 
     def cost(
-        self, found: Mapping[str, torch.Tensor], colours: torch.Tensor, k: int, generator: torch.Generator
+        self, features: Mapping[str, torch.Tensor], colours: torch.Tensor, k: int, generator: torch.Generator
     ) -> torch.Tensor:
         ours, theirs = (c[self._places(len(c), generator)][None] for c in (colours, self.colours[k]))
-        total = relaxed_transport(decorrelate(ours), decorrelate(theirs), euclidean=True).sum()
-        for layer, a in found.items():
+        total = relaxed_transport(normalise_colours(ours), theirs, euclidean=True).sum()
+        for layer, a in features.items():
             target = self.targets[k][layer]
             b = target[self._places(len(target), generator)][None]
             total = total + relaxed_transport(a, b, low_precision=self.low).sum()

@@ -52,7 +52,7 @@ class SurfaceConfig(TrainingConfig):
     content_weight: float = key(1000.0, "style transfer: how much that counts", 0)
     scales: int = key(2, "coarser pyramids of texels matched first, each half as fine", 0, 3)
     coarse_share: float = key(0.4, "of the steps, spent on the coarser scales together", 0, 0.95)
-    pictures: int = key(2, "pictures of the maps compared in a step, for several maps", 1, 16)
+    triples: int = key(2, "triples of channels compared in a step, for several maps", 1, 16)
     whitened: bool = key(
         True,
         "the optimizer works in the principal components of the exemplar's channels, each measured by its "
@@ -88,10 +88,10 @@ class SurfaceConfig(TrainingConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        known = with_poolings(LAYERS_19 if self.weights == "vgg19" else LAYERS)
-        unknown = [layer for layer in (*self.layers, self.content_layer) if layer not in known]
+        layers = with_poolings(LAYERS_19 if self.weights == "vgg19" else LAYERS)
+        unknown = [layer for layer in (*self.layers, self.content_layer) if layer not in layers]
         if unknown:
-            raise ConfigError(f"layers holds {', '.join(unknown)}", f"use some of {', '.join(known)}")
+            raise ConfigError(f"layers holds {', '.join(unknown)}", f"use some of {', '.join(layers)}")
         if self.optimizer == "lbfgs" and (self.loss != "gram" or self.scales):
             problem = "lbfgs needs a loss without randomness, the same throughout"
             raise ConfigError(problem, "set loss=gram and scales=0, or optimizer=adam")

@@ -10,23 +10,22 @@ from scipy.ndimage import map_coordinates
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import unit
 from mitex.images import read_image
-from mitex.mesh import Mesh
-from mitex.methods.surface.texels import Texels
+from mitex.methods.surface.domain import SurfaceDomain
 
 AO = "ao"
 
 
-def content_colours(content: str | Path, mesh: Mesh, texels: Texels) -> np.ndarray:
+def content_colours(content: str | Path, domain: SurfaceDomain) -> np.ndarray:
     """The colours (N, 3) float32, sRGB in [0, 1], of texels in a content texture.
 
     Args:
         content: an image on the mesh's UVs, or "ao" for the mesh's ambient occlusion as grey.
-        mesh: with UVs.
-        texels: of it.
+        domain: with the texels.
 
     Raises:
         ImageError: the image cannot be read.
     """
+    mesh, texels = domain.mesh, domain.texels
     if str(content) == AO:
         from mitex.scenes.occlusion import ambient_occlusion
 
@@ -36,5 +35,5 @@ def content_colours(content: str | Path, mesh: Mesh, texels: Texels) -> np.ndarr
     image = read_image(Path(content))
     uv = interpolate(texels.barycentric, texels.uv[texels.face].astype(np.float64))
     row, column = (1 - uv[:, 1]) * image.shape[0] - 0.5, uv[:, 0] * image.shape[1] - 0.5
-    looked = [map_coordinates(image[..., k], [row, column], order=1, mode="nearest") for k in range(3)]
-    return np.stack(looked, axis=1).astype(np.float32)
+    channels = [map_coordinates(image[..., k], [row, column], order=1, mode="nearest") for k in range(3)]
+    return np.stack(channels, axis=1).astype(np.float32)

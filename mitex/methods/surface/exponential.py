@@ -160,13 +160,13 @@ class _Planes:
     def step(self, walk: _Walk) -> tuple[_Walk]:
         """Goes to the end of the ray or to the next face."""
         way = _exit(walk)
-        found = way.side >= 0
-        inside = found & (way.distance >= walk.left)
-        leaves = found & ~inside
+        has_exit = way.side >= 0
+        inside = has_exit & (way.distance >= walk.left)
+        leaves = has_exit & ~inside
         target = dr.gather(Int32, self.glued, 3 * walk.face + way.side, walk.active & leaves)
         walk.crossings += 1
         last = dr.select(inside, walk.point + walk.left * walk.direction, way.point)
-        walk.point = dr.select(found, last, walk.point)
+        walk.point = dr.select(has_exit, last, walk.point)
         crosses = leaves & (target >= 0) & (walk.crossings <= MAX_CROSSINGS)
         self._enter(walk, way, target, crosses)
         walk.arrived |= inside
@@ -211,7 +211,7 @@ def _exit(walk: _Walk) -> _Exit:
     """
     corners = _corners(walk.shape)
     turns = [_cross(walk.direction, c - walk.point) for c in corners]  # > 0: to the left of the ray
-    chosen, fraction, least = Int32(-1), Float64(0.0), Float64(dr.inf)
+    side, fraction, least = Int32(-1), Float64(0.0), Float64(dr.inf)
     for k in range(3):
         right, left, edge = turns[k], turns[(k + 1) % 3], corners[(k + 1) % 3] - corners[k]
         along, outward = dr.dot(walk.direction, edge), _cross(walk.direction, edge)
@@ -221,13 +221,13 @@ def _exit(walk: _Walk) -> _Exit:
         met = _not_behind(-right / outward, offset, edge, along)
         miss = dr.maximum(right, 0.0) + dr.maximum(-left, 0.0)
         better = ahead & (miss < least)
-        chosen = dr.select(better, Int32(k), chosen)
+        side = dr.select(better, Int32(k), side)
         fraction, least = dr.select(better, met, fraction), dr.select(better, miss, least)
-    a, b = _side(walk.shape, chosen)
+    a, b = _side(walk.shape, side)
     point = a + fraction * (b - a)
     distance = dr.maximum(dr.dot(point - walk.point, walk.direction), 0.0)
     along, outward = dr.dot(walk.direction, b - a), _cross(walk.direction, b - a)
-    return _Exit(chosen, fraction, point, distance, along, outward)
+    return _Exit(side, fraction, point, distance, along, outward)
 
 
 def _not_behind(fraction: Float64, offset: Array2f64, edge: Array2f64, along: Float64) -> Float64:

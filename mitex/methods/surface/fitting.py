@@ -16,17 +16,11 @@ from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh
-from mitex.methods.surface.borders import Border
-from mitex.methods.surface.cache import VERSION, cached_levels
 from mitex.methods.surface.config import PRESETS, SurfaceConfig
 from mitex.methods.surface.content import AO, content_colours
-from mitex.methods.surface.exponential import GeodesicTracer
-from mitex.methods.surface.frames import tangent_frames
-from mitex.methods.surface.levels import POOLS, Levels
+from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.orientation import read_orientation
-from mitex.methods.surface.taps import Surroundings, build
 from mitex.methods.surface.task import SurfaceTask
-from mitex.methods.surface.texels import Texels
 from mitex.methods.surface.texture import SurfaceTexture
 from mitex.runtime import available_memory
 from mitex.training.fit import Run
@@ -35,7 +29,7 @@ from mitex.training.optim import Adam
 from mitex.training.settings import RunOptions
 
 # Peak over precomputation and steps, measured at 512^2 and 1024^2 with bfloat16 features.
-BYTES_PER_TEXEL, BYTES_PER_PICTURE = 3600, 900
+BYTES_PER_TEXEL, BYTES_PER_TRIPLE = 3600, 900
 PADDING = 2  # texels between charts: bilinear taps of one never see the other
 
 
@@ -73,24 +67,20 @@ def fit(
     presets = PRESETS if content is None else {"style": PRESETS["style"], **PRESETS}
     run = Run.of(presets, out, **options)
     settings = run.config
-    shown = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
+    target = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
     image = content is not None and str(content) != AO
     surface = with_layout(mesh if isinstance(mesh, Mesh) else Mesh.load(mesh), settings, keep_uvs or image)
     field = read_orientation(orientation, surface) if isinstance(orientation, str | Path) else orientation
-    assert surface.uv is not None
-    check_memory(surface, settings, len(shown.maps))
-    texels = Texels.rasterize(surface, surface.uv, settings.resolution)
-    start = None if content is None else content_colours(content, surface, texels)
-    levels = find_levels(surface, texels, settings, field)
-    known = {"content": content_key(start), "orientation": content_key(field)}
-    task = SurfaceTask(settings, shown, surface, texels, levels, start, known)
+    check_memory(surface, settings, len(target.maps))
+    domain = SurfaceDomain.of(surface, settings, field)
+    start = None if content is None else content_colours(content, domain)
+    inputs = {"content": content_key(start), "orientation": content_key(field)}
+    task = SurfaceTask(settings, target, domain, start, inputs)
     origin: dict[str, Any] = {key: getattr(settings, key) for key in ("resolution", "frames", "angle")}
     return run.train(
         task,
-        shown.name,
-        lambda about: SurfaceTexture(
-            surface, task.in_texel_order(), tuple(task.layout), about | origin, field
-        ),
+        target.name,
+        lambda about: SurfaceTexture(domain, task.in_texel_order(), tuple(task.layout), about | origin),
         lr=settings.lr,
         milestones=settings.milestones,
         decay=settings.decay,
@@ -124,7 +114,7 @@ def check_memory(mesh: Mesh, config: SurfaceConfig, maps: int = 1) -> None:
     """
     assert mesh.uv is not None
     share = 0.5 * np.abs(twice_area(mesh.uv)).sum()
-    each = BYTES_PER_TEXEL + BYTES_PER_PICTURE * (min(config.pictures, maps) - 1)
+    each = BYTES_PER_TEXEL + BYTES_PER_TRIPLE * (min(config.triples, maps) - 1)
     needed = each * share * config.resolution**2
     free = available_memory()
     if free is not None and needed > free:
@@ -134,21 +124,3 @@ def check_memory(mesh: Mesh, config: SurfaceConfig, maps: int = 1) -> None:
             f"and {free / 1e9:.1f} GB are free",
             f"set --resolution {max(fits, 1)} or less",
         )
-
-
-def find_levels(
-    mesh: Mesh, texels: Texels, config: SurfaceConfig, orientation: np.ndarray | None = None
-) -> Levels:
-    """The levels of a surface, from the cache if it has been seen before."""
-    assert mesh.uv is not None
-    angle = math.radians(config.angle)
-    frames, count = config.frames, POOLS + config.scales
-    options = (config.resolution, frames, angle, config.correct, config.continued, count, orientation)
-
-    def find() -> Levels:
-        right, up = tangent_frames(mesh, texels.face, texels.barycentric, config.frames, angle, orientation)
-        tracer = GeodesicTracer(mesh)
-        border = Border.continued(mesh, texels, tracer) if config.continued else None
-        return build(Surroundings(texels, tracer, right, up, config.correct, border), count)
-
-    return cached_levels(content_key(VERSION, mesh.vertices, mesh.faces, mesh.uv, *options), find)

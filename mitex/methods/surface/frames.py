@@ -60,7 +60,13 @@ def tangent_frames(
     """
     if not np.isfinite(angle):
         raise ConfigError(f"an orientation of {angle}", "give an angle in radians")
-    directions = vertex_directions(mesh, kind, field)
+    return interpolate_frames(mesh, face, barycentric, vertex_directions(mesh, kind, field), angle)
+
+
+def interpolate_frames(
+    mesh: Mesh, face: np.ndarray, barycentric: np.ndarray, directions: np.ndarray, angle: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """`tangent_frames` from the `vertex_directions` (V, 3)."""
     face = np.asarray(face)
     normal = unit_normals(mesh.face_crosses[face])
     right = interpolate(np.asarray(barycentric), directions[mesh.faces[face]])
@@ -81,9 +87,9 @@ def vertex_directions(mesh: Mesh, kind: str = "smooth", field: np.ndarray | None
     normals = unit_normals(scatter_add(corners.ravel(), np.repeat(mesh.face_crosses, 3, axis=0), count))
     directions = _fixed(normals)
     if field is not None:
-        wanted = scatter_add(place, _checked(field, len(place)), count)
-        wanted = _without_faint(across(wanted, normals))
-        directions = np.where(wanted.any(axis=1, keepdims=True), orthonormal(wanted, normals), directions)
+        target = scatter_add(place, _checked(field, len(place)), count)
+        target = _without_faint(across(target, normals))
+        directions = np.where(target.any(axis=1, keepdims=True), orthonormal(target, normals), directions)
     elif kind == "smooth":
         areas = np.linalg.norm(mesh.face_crosses, axis=1) / 6.0
         share = np.bincount(corners.ravel(), np.repeat(areas, 3), count)
@@ -116,8 +122,8 @@ def _smooth(normals: np.ndarray, areas: np.ndarray, edges: np.ndarray, spare: np
     weight = FIDELITY * np.maximum(areas / max(areas.sum(), np.finfo(np.float64).tiny), 1e-6 / count)
     upright = np.cross(UP, normals)
     tilt = np.linalg.norm(upright, axis=1, keepdims=True)
-    wanted = upright + LEVEL_PULL * np.maximum(1.0 - 2.0 * tilt, 0.0) * np.cross(SPARE_UP, normals)
-    q = dot(wanted, x) + 1j * dot(wanted, y)
+    target = upright + LEVEL_PULL * np.maximum(1.0 - 2.0 * tilt, 0.0) * np.cross(SPARE_UP, normals)
+    q = dot(target, x) + 1j * dot(target, y)
     u = _solve(edges, _transport(normals, x, y, edges), weight, q)
     solution = _without_faint(np.real(u)[:, None] * x + np.imag(u)[:, None] * y)
     return np.where(solution.any(axis=1, keepdims=True), orthonormal(solution, normals), spare)

@@ -77,10 +77,10 @@ class SurfaceVgg:
         """What taps give of texel colours, under their names, in one pass."""
         if texels.shape != (self.texels, 3):
             raise ConfigError(f"texels of shape {tuple(texels.shape)}", f"give ({self.texels}, 3)")
-        chosen = list(taps.values())
-        depth = max(tap.index for tap in chosen) + 1
+        outputs = list(taps.values())
+        depth = max(tap.index for tap in outputs) + 1
         centred = texels * 255 - torch.tensor(MEAN_RGB)
-        return dict(zip(taps, FrozenStack.apply(centred, self.operations[:depth], chosen), strict=True))
+        return dict(zip(taps, FrozenStack.apply(centred, self.operations[:depth], outputs), strict=True))
 
     def place(self, layer: str) -> int:
         """The operation that gives a layer.

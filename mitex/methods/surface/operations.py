@@ -86,8 +86,8 @@ class SurfaceConv:
             into.relu_()
         return out
 
-    def backward(self, gradient: torch.Tensor, known: torch.Tensor) -> torch.Tensor:
-        torch.ops.aten.threshold_backward.grad_input(gradient, known, 0, grad_input=gradient)
+    def backward(self, gradient: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
+        torch.ops.aten.threshold_backward.grad_input(gradient, values, 0, grad_input=gradient)
         around = self.around
         out = gradient.new_empty(len(gradient), self.adjoint.shape[1])
         for k, into in enumerate(out.split(self.back_rows)):
@@ -126,8 +126,8 @@ class BilinearConv:
         taps = (self.matrix @ x).view(len(x), -1)
         return F.linear(taps, self.weight, self.bias).relu_().to(self.kept)
 
-    def backward(self, gradient: torch.Tensor, known: torch.Tensor) -> torch.Tensor:
-        torch.ops.aten.threshold_backward.grad_input(gradient, known, 0, grad_input=gradient)
+    def backward(self, gradient: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
+        torch.ops.aten.threshold_backward.grad_input(gradient, values, 0, grad_input=gradient)
         taps = gradient.float() @ self.weight
         return self.adjoint @ taps.view(9 * len(taps), -1)
 
@@ -152,10 +152,10 @@ class SurfacePool:
             return (self.mean @ x.float()).to(x.dtype)
         return torch.segment_reduce(x.float(), "max", lengths=self.sizes).to(x.dtype)
 
-    def backward(self, gradient: torch.Tensor, known: torch.Tensor) -> torch.Tensor:
+    def backward(self, gradient: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
         if self.kind == "average":
             return gradient.index_select(0, self.parent).mul_(self.share.to(gradient.dtype))
-        best = known == self.forward(known).index_select(0, self.parent)
+        best = values == self.forward(values).index_select(0, self.parent)
         equals = (self.mean @ best.float()) * self.sizes[:, None]  # a draw is shared
         return (gradient / equals).to(gradient.dtype).index_select(0, self.parent).mul_(best)
 

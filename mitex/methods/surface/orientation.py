@@ -31,12 +31,12 @@ def read_orientation(path: str | Path, mesh: Mesh) -> np.ndarray:
         field = np.load(place, mmap_mode="r", allow_pickle=False)
     except (ValueError, OSError, EOFError) as e:
         raise ConfigError(f"'{place}' is not a NumPy array ({e})", "write it with numpy.save") from e
-    wanted = (len(mesh.vertices), 3)
-    if not isinstance(field, np.ndarray) or field.shape != wanted or field.dtype.kind not in "fiu":
-        found = f"{field.dtype} {field.shape}" if isinstance(field, np.ndarray) else "an archive"
+    shape = (len(mesh.vertices), 3)
+    if not isinstance(field, np.ndarray) or field.shape != shape or field.dtype.kind not in "fiu":
+        content = f"{field.dtype} {field.shape}" if isinstance(field, np.ndarray) else "an archive"
         raise ConfigError(
-            f"the orientation field in '{place}' is {found}",
-            f"give numbers of shape {wanted}, a vector for each vertex of '{mesh.name}'",
+            f"the orientation field in '{place}' is {content}",
+            f"give numbers of shape {shape}, a vector for each vertex of '{mesh.name}'",
         )
     values = np.array(field, np.float32)
     if not np.isfinite(values).all():

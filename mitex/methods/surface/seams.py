@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from mitex.methods.surface.exponential import GeodesicTracer
-from mitex.methods.surface.frames import tangent_frames
 from mitex.methods.surface.texture import SurfaceTexture
 
 
@@ -23,13 +21,13 @@ def seam_ratio(texture: SurfaceTexture, seed: int = 0) -> float:
     Returns:
         The ratio; NaN if there is no seam, or if nothing changes.
     """
-    mesh, texels = texture.mesh, texture.texels
+    texels = texture.domain.texels
     start = np.flatnonzero(texels.inside)
     face, barycentric = texels.face[start], texels.barycentric[start]
-    right, up = tangent_frames(mesh, face, barycentric)
+    right, up = (axis[start] for axis in texture.domain.tangent_frames)
     angle = np.random.default_rng(seed).uniform(0, 2 * np.pi, (len(start), 1))
     direction = np.cos(angle) * right + np.sin(angle) * up
-    end = GeodesicTracer(mesh).trace(face, barycentric, direction, texels.size)
+    end = texture.domain.tracer.trace(face, barycentric, direction, texels.size)
     index, weight = texels.bilinear(end.face, end.barycentric)
     neighbour = np.take_along_axis(index, weight.argmax(1)[:, None], 1)[:, 0]
     change = np.abs(texture.values[start] - texture.values[neighbour]).mean(1)

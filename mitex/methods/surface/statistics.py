@@ -1,4 +1,4 @@
-"""What the features of an exemplar are like, seen by the image network."""
+"""The feature vectors of an exemplar in the image network."""
 
 from __future__ import annotations
 
@@ -32,14 +32,16 @@ def exemplar_features(
     sources = {layer: _source(network, layer) for layer in layers}
     with torch.no_grad():
         maps = network.features(padded, dict.fromkeys(sources.values()))
-    found = {}
+    vectors = {}
     for layer, source in sources.items():
         features, shrunk = maps[source], 1 << (int(layer[4]) - 1)
         if layer != source:
             features, shrunk = _pooled(network, features), 2 * shrunk
         cut = min(MARGIN // shrunk, (features.shape[1] - 1) // 2, (features.shape[2] - 1) // 2)
-        found[layer] = features[0, cut : features.shape[1] - cut, cut : features.shape[2] - cut].flatten(0, 1)
-    return found
+        vectors[layer] = features[0, cut : features.shape[1] - cut, cut : features.shape[2] - cut].flatten(
+            0, 1
+        )
+    return vectors
 
 
 def _source(network: Vgg16, layer: str) -> str:

@@ -27,7 +27,7 @@ OUTER = (0, 1, 2, 3, 5, 6, 7, 8)
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What taps are found with.
+    """What taps are computed from.
 
     Attributes:
         texels: the texels of the surface.
@@ -223,12 +223,12 @@ def _reached(
     searching = np.arange(len(start))
     for part in range(BACKWARD, 0, -1):
         index, weight, arrived = around.arrivals(start[searching], tap, length * part / BACKWARD)
-        found = group[index]
+        read = group[index]
         if related is not None:
-            weight = np.where(related(searching[:, None], found), weight, 0.0)
+            weight = np.where(related(searching[:, None], read), weight, 0.0)
         best = np.argmax(weight, axis=1, keepdims=True)
         hit = arrived & (np.take_along_axis(weight, best, 1)[:, 0] > 0)
-        reached[searching[hit]] = np.take_along_axis(found, best, 1)[hit, 0]
+        reached[searching[hit]] = np.take_along_axis(read, best, 1)[hit, 0]
         searching = searching[arrived & ~hit]
         if not len(searching):
             break
@@ -243,7 +243,7 @@ def _related(labels: np.ndarray, edges: np.ndarray) -> Callable[[np.ndarray, np.
     keys = np.unique(np.concatenate([keys, own * count + own]))
 
     def related(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        wanted = a.astype(np.int64) * count + b
-        return keys[np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)] == wanted
+        key = a.astype(np.int64) * count + b
+        return keys[np.minimum(np.searchsorted(keys, key), len(keys) - 1)] == key
 
     return related

@@ -18,28 +18,26 @@ from mitex.features.frozen import Tap
 from mitex.features.layers import LAYERS
 from mitex.features.vgg import Weights, convolutions
 from mitex.features.vgg19 import vgg19_convolutions
-from mitex.mesh import Mesh
+from mitex.methods.surface.colour_space import ColourSpace
 from mitex.methods.surface.comparison import Comparison, GramComparison, TransportComparison
 from mitex.methods.surface.config import SurfaceConfig
-from mitex.methods.surface.levels import Levels
+from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.network import SurfaceVgg
-from mitex.methods.surface.space import Space
-from mitex.methods.surface.texels import Texels
 from mitex.methods.surface.texture import texel_layout
 from mitex.methods.surface.views import Views
-from mitex.pictures import CYCLE, picture_images, pictures_of
 from mitex.runtime import keep_freed_memory
 from mitex.sparse import csr_tensor
 from mitex.training import Step
+from mitex.triples import CYCLE, channel_triples, triple_images
 
-VIEW = 384  # side of a preview's pictures [px]
+VIEW = 384  # side of a preview's images [px]
 CONTENT = "content"
 
 
 class SurfaceTask:
     """Texels whose features shall have the Gram matrices of the exemplar's.
 
-    With several maps, a step looks at some pictures of them in turn (see `mitex.pictures`): the mixed ones
+    With several maps, a step compares some channel triples in turn (see `mitex.triples`): the mixed ones
     tie the maps together.
 
     Attributes:
@@ -49,11 +47,10 @@ class SurfaceTask:
     Args:
         config: settings.
         exemplar: maps to match.
-        mesh: the surface, with UVs,
-        texels, levels: and what is on it.
-        known: further things that a resumed run must share: name -> what tells it from others.
-        content: (N, 3) sRGB in [0, 1] in the order of `texels`, whose structure shall stay while the look
+        domain: the surface.
+        content: (N, 3) sRGB in [0, 1] in the order of the texels, whose structure shall stay while the look
             becomes the exemplar's (style transfer). The synthesis starts from it.
+        inputs: further inputs that a resumed run must share: name -> key of the content.
 
     Raises:
         ConfigError: a content for more than the albedo, or on several scales; L-BFGS for several maps.
@@ -63,16 +60,13 @@ class SurfaceTask:
         self,
         config: SurfaceConfig,
         exemplar: Exemplar,
-        mesh: Mesh,
-        texels: Texels,
-        levels: Levels,
+        domain: SurfaceDomain,
         content: np.ndarray | None = None,
-        known: Mapping[str, str] | None = None,
+        inputs: Mapping[str, str] | None = None,
     ) -> None:
         keep_freed_memory()
-        self.config, self.exemplar, self.texels, self.levels = config, exemplar, texels, levels
-        self.known = dict(known or {})
-        self.mesh, self.views = mesh, Views(mesh, texels, VIEW)
+        self.config, self.exemplar, self.domain, self.levels = config, exemplar, domain, domain.levels
+        self.inputs, self.views = dict(inputs or {}), Views(domain, VIEW)
         if content is not None and (list(exemplar.maps) != ["albedo"] or config.scales):
             raise ConfigError(
                 "style transfer takes one image and one scale", "give an image as --exemplar, and scales=0"
@@ -80,9 +74,11 @@ class SurfaceTask:
         self.layout = texel_layout(list(exemplar.maps))
         if config.optimizer == "lbfgs" and len(self.layout) > 1:
             raise ConfigError("lbfgs takes one map", "give an image as --exemplar, or set optimizer=adam")
-        self.pictures = pictures_of(self.layout, True, config.seed)
+        self.triples = channel_triples(self.layout, True, config.seed)
         generator = torch.Generator().manual_seed(config.seed)
-        self.space = Space.of(exemplar, self.layout) if config.whitened else Space.plain(self.channels)
+        self.space = (
+            ColourSpace.of(exemplar, self.layout) if config.whitened else ColourSpace.plain(self.channels)
+        )
         self.coordinates = self._start(generator).requires_grad_()
         weights = _weights(config, generator)
         # The image network has the same weights: what differs is only where it looks.
@@ -91,15 +87,15 @@ class SurfaceTask:
         self.comparisons: list[Comparison] = []
         for scale in range(config.scales + 1):
             network = SurfaceVgg(
-                levels, config.pooling, bilinear=config.bilinear, scale=scale, weights=weights
+                self.levels, config.pooling, bilinear=config.bilinear, scale=scale, weights=weights
             )
             self.networks.append(network)
             size = max(config.exemplar_size >> scale, 16)
-            images = torch.from_numpy(picture_images(exemplar.resized(size), self.pictures, self.layout))
+            images = torch.from_numpy(triple_images(exemplar.resized(size), self.triples, self.layout))
             self.comparisons.append(_comparison(config, image_network, images))
         self.content: torch.Tensor | None = None
         if content is not None:
-            start = torch.from_numpy(content[levels.order].astype(np.float32))
+            start = torch.from_numpy(content[self.levels.order].astype(np.float32))
             with torch.no_grad():
                 self.coordinates.copy_(self.space.coordinates(start))
                 self.content = self.networks[0].features(start, [config.content_layer])[config.content_layer]
@@ -122,25 +118,25 @@ class SurfaceTask:
         """Nothing changes before the loss."""
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
-        """Distance of features from the exemplar's, averaged over the pictures of the step."""
+        """Distance of features from the exemplar's, averaged over the triples of the step."""
         scale = self.scale(step)
         network, comparison = self.networks[scale], self.comparisons[scale]
-        chosen = self._chosen(step, generator)
+        triples = self._draw_triples(step, generator)
         total, values = torch.zeros(()), self.values
-        for k in chosen:
-            colours = values[:, self.pictures[k].channels]
+        for k in triples:
+            colours = values[:, self.triples[k].channels]
             taps = comparison.taps(network, generator)
             if self.content is not None:
                 taps[CONTENT] = Tap(network.place(self.config.content_layer))
-            found = network.read(colours, taps)
+            features = network.read(colours, taps)
             if self.content is not None:
-                difference = found.pop(CONTENT) - self.content
+                difference = features.pop(CONTENT) - self.content
                 total = total + self.config.content_weight * difference.square().mean()
-            total = total + comparison.cost(found, colours, k, generator)
-        return Step(total / len(chosen), {"scale": float(scale)}, self._diffuse_and_clamp)
+            total = total + comparison.cost(features, colours, k, generator)
+        return Step(total / len(triples), {"scale": float(scale)}, self._diffuse_and_clamp)
 
     def scale(self, step: int) -> int:
-        """How often the texels are pooled before the network sees them in a step."""
+        """How often the texels are pooled before they enter the network in a step."""
         coarse = round(self.config.coarse_share * self.config.steps) if self.config.scales else 0
         return 0 if step >= coarse else self.config.scales - step * self.config.scales // coarse
 
@@ -168,19 +164,18 @@ class SurfaceTask:
         return self.levels.spread @ self.values.detach().clamp(0, 1).numpy()
 
     def preview(self, step: int) -> np.ndarray:
-        """For each picture but the mixtures a row: the exemplar, and the mesh from two sides, unlit."""
+        """For each triple but the mixtures a row: the exemplar, and the mesh from two sides, unlit."""
         views = self.views.images(self.in_texel_order())
-        shown = [p for p in self.pictures if p.kind != "mix"]
-        exemplars = picture_images(self.exemplar.resized(VIEW), shown, self.layout)
-        pairs = zip(shown, exemplars, strict=True)
+        unmixed = [p for p in self.triples if p.kind != "mix"]
+        exemplars = triple_images(self.exemplar.resized(VIEW), unmixed, self.layout)
+        pairs = zip(unmixed, exemplars, strict=True)
         return np.concatenate([np.hstack([e, *views[..., list(p.channels)]]) for p, e in pairs])
 
     def metadata(self) -> dict[str, str]:
         maps = ",".join(self.layout)
-        assert self.mesh.uv is not None
-        key = content_key(self.mesh.vertices, self.mesh.faces, self.mesh.uv)
-        mesh = f"{self.mesh.name} {key}"
-        return {"method": "surface", "maps": maps, "exemplar": self.exemplar.name, "mesh": mesh} | self.known
+        key = content_key(self.domain.mesh.vertices, self.domain.mesh.faces, self.domain.uv)
+        mesh = f"{self.domain.mesh.name} {key}"
+        return {"method": "surface", "maps": maps, "exemplar": self.exemplar.name, "mesh": mesh} | self.inputs
 
     @cached_property
     def _mean_of_taps(self) -> torch.Tensor:
@@ -196,14 +191,14 @@ class SurfaceTask:
         noise = self.config.noise * (noise - 0.5 if self.config.whitened else noise)
         return self.space.coordinates(self.space.values(noise).clamp(0, 1))
 
-    def _chosen(self, step: int, generator: torch.Generator) -> list[int]:
-        """The pictures of a step: kinds in turn, any of a kind."""
-        kinds = [kind for kind in CYCLE if any(p.kind == kind for p in self.pictures)]
-        count = min(self.config.pictures, len(kinds))
-        return [self._one(kinds[(step * count + k) % len(kinds)], generator) for k in range(count)]
+    def _draw_triples(self, step: int, generator: torch.Generator) -> list[int]:
+        """The triples of a step: kinds in turn, any of a kind."""
+        kinds = [kind for kind in CYCLE if any(p.kind == kind for p in self.triples)]
+        count = min(self.config.triples, len(kinds))
+        return [self._draw(kinds[(step * count + k) % len(kinds)], generator) for k in range(count)]
 
-    def _one(self, kind: str, generator: torch.Generator) -> int:
-        of_kind = [k for k, p in enumerate(self.pictures) if p.kind == kind]
+    def _draw(self, kind: str, generator: torch.Generator) -> int:
+        of_kind = [k for k, p in enumerate(self.triples) if p.kind == kind]
         return of_kind[int(torch.randint(len(of_kind), (), generator=generator))]
 
 
@@ -225,9 +220,9 @@ def _comparison(config: SurfaceConfig, network: Vgg16, images: torch.Tensor) -> 
 
 def random_weights(generator: torch.Generator) -> Weights:
     """Weights of the network's shape, drawn as He et al. do, without biases (figure 5 b)."""
-    drawn = {}
+    weights = {}
     for name in LAYERS:
         weight, bias = convolutions("average", False)[name]
         scale = (2.0 / weight[0].numel()) ** 0.5
-        drawn[name] = torch.randn(weight.shape, generator=generator) * scale, torch.zeros_like(bias)
-    return drawn
+        weights[name] = torch.randn(weight.shape, generator=generator) * scale, torch.zeros_like(bias)
+    return weights

@@ -166,25 +166,25 @@ class Texels:
         number = self._of_chart(self.chart[face], column, row)
         away = (column - place[:, :1]) ** 2 + (row - place[:, 1:]) ** 2
         first = np.where(number >= 0, away, np.inf).argmin(axis=1)
-        found = np.take_along_axis(number, first[:, None], axis=1)[:, 0]
-        far = np.flatnonzero(found < 0)
+        texel = np.take_along_axis(number, first[:, None], axis=1)[:, 0]
+        far = np.flatnonzero(texel < 0)
         if len(far):
-            found[far] = self._nearest(self.chart[face[far]], place[far])
-        return found
+            texel[far] = self._nearest(self.chart[face[far]], place[far])
+        return texel
 
     def _nearest(self, chart: np.ndarray, place: np.ndarray) -> np.ndarray:
         """(M,) the texels of charts (M,) nearest to (M, 2) places, of any chart for charts without texels."""
         own = self.chart[self.face]
-        found = np.empty(len(chart), np.int64)
-        known = np.isin(chart, own)
+        texel = np.empty(len(chart), np.int64)
+        has_texels = np.isin(chart, own)
         # The chart as a third coordinate: with a spacing wider than the map, another is never nearer.
-        for chosen, spacing in ((known, 4.0 * self.resolution), (~known, 0.0)):
-            if chosen.any():
+        for group, spacing in ((has_texels, 4.0 * self.resolution), (~has_texels, 0.0)):
+            if group.any():
                 row, column = np.divmod(self.index, self.resolution)
                 tree = KDTree(np.stack([column, row, spacing * own], axis=1))
-                query = np.column_stack([place[chosen], spacing * chart[chosen]])
-                found[chosen] = tree.query(query)[1]
-        return found
+                query = np.column_stack([place[group], spacing * chart[group]])
+                texel[group] = tree.query(query)[1]
+        return texel
 
 
 def charts(mesh: Mesh, uv: np.ndarray) -> np.ndarray:

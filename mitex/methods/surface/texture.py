@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +20,7 @@ from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import rotate_about, unit_normals
 from mitex.mesh import Mesh
 from mitex.methods.surface import METHOD
-from mitex.methods.surface.frames import tangent_frames, vertex_directions
-from mitex.methods.surface.texels import Texels
+from mitex.methods.surface.domain import SurfaceDomain
 from mitex.training import model_file
 
 PADDING = 8  # texels by which charts are continued outwards
@@ -42,24 +40,21 @@ class SurfaceTexture:
     """A texture and the mesh that it was synthesized on.
 
     Attributes:
-        mesh: with the UVs of the texture.
-        values: (N, C) float32 in [0, 1], the maps' channels by `texel_layout`, in the order of `texels`.
+        domain: the mesh with the UVs of the texture, and its texels.
+        values: (N, C) float32 in [0, 1], the maps' channels by `texel_layout`, in the order of the texels.
         maps: their names.
-        about: how it was made; `resolution`, `frames` and `angle` [degrees] at least.
-        orientation: (V, 3) float32 where the exemplar's right was asked to point, in place of `frames`.
+        about: how it was made; the domain's `resolution`, `frames` and `angle` [degrees] at least.
     """
 
-    mesh: Mesh
+    domain: SurfaceDomain
     values: np.ndarray
     maps: tuple[str, ...]
     about: Mapping[str, Any] = field(default_factory=dict)
-    orientation: np.ndarray | None = None
 
-    @cached_property
-    def texels(self) -> Texels:
-        """The texels that `values` belong to."""
-        assert self.mesh.uv is not None
-        return Texels.rasterize(self.mesh, self.mesh.uv, int(self.about["resolution"]))
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh that the texture belongs to."""
+        return self.domain.mesh
 
     def apply(self, mesh: Mesh | None = None) -> Asset:
         """The asset: the mesh with baked maps.
@@ -75,30 +70,25 @@ class SurfaceTexture:
                 f"this texture belongs to mesh '{self.mesh.name}', not to '{mesh.name}'",
                 "synthesize it there: mitex fit surface --mesh NEW --config RUN/config.toml",
             )
-        texels, layout = self.texels, texel_layout(list(self.maps))
-        assert self.mesh.uv is not None
-        atlas = Atlas.from_uv(self.mesh.uv, texels.resolution, PADDING)
+        texels, layout = self.domain.texels, texel_layout(list(self.maps))
+        atlas = Atlas.from_uv(self.domain.uv, texels.resolution, PADDING)
         used = texels.image(np.ones((len(self.values), 1), np.float32))[..., 0] > 0
         textures = {}
         for name, channels in layout.items():
             textures[name] = spread(texels.image(self.values[:, channels]), used, PADDING)
-        angle = math.radians(float(self.about["angle"]))
-        kind = str(self.about["frames"])
         if "normal" in layout:
-            textures["normal"] = self._normals(atlas, layout["normal"], used, kind, angle)
+            textures["normal"] = self._normals(atlas, layout["normal"], used)
         at_vertices = self._at_vertices()
-        tangents = rotate_about(
-            vertex_directions(self.mesh, kind, self.orientation), self.mesh.normals, angle
-        )
+        angle = math.radians(self.domain.angle)
+        tangents = rotate_about(self.domain.directions, self.mesh.normals, angle)
         maps = {name: at_vertices[:, channels] for name, channels in layout.items()}
         return Asset(self.mesh, maps, tangents, atlas, textures, self.mesh.name)
 
     def save(self, path: str | Path) -> Path:
         """Writes mesh, texels and `about` as one safetensors file."""
-        assert self.mesh.uv is not None
-        arrays = {"vertices": self.mesh.vertices, "faces": self.mesh.faces, "uv": self.mesh.uv}
-        if self.orientation is not None:
-            arrays["orientation"] = self.orientation
+        arrays = {"vertices": self.mesh.vertices, "faces": self.mesh.faces, "uv": self.domain.uv}
+        if self.domain.orientation is not None:
+            arrays["orientation"] = self.domain.orientation
         tensors = {name: torch.from_numpy(np.ascontiguousarray(a)) for name, a in arrays.items()}
         tensors["values"] = torch.from_numpy(np.ascontiguousarray(self.values, np.float16))
         about = {**self.about, "maps": list(self.maps), "mesh": self.mesh.name}
@@ -114,27 +104,26 @@ class SurfaceTexture:
         with model_file.opened(source, METHOD.name) as (tensors, about):
             arrays = {key: tensor.numpy() for key, tensor in tensors.items()}
             mesh = Mesh(arrays["vertices"], arrays["faces"], arrays["uv"], str(about["mesh"]))
-            values, orientation = arrays["values"].astype(np.float32), arrays.get("orientation")
-            texture = cls(mesh, values, tuple(about["maps"]), about, orientation)
-            if len(texture.texels.index) != len(texture.values):
+            resolution, angle = int(about["resolution"]), float(about["angle"])
+            orientation = arrays.get("orientation")
+            domain = SurfaceDomain(mesh, resolution, str(about["frames"]), angle, orientation)
+            values = arrays["values"].astype(np.float32)
+            if len(domain.texels.index) != len(values):
                 raise ValueError("texels are missing")
-            return texture
+            return cls(domain, values, tuple(about["maps"]), about)
 
     def _at_vertices(self) -> np.ndarray:
         """(V, C) values at the vertices, from the first face around each; 0 without a face."""
         corners = self.mesh.faces.ravel()
         vertices, first = np.unique(corners, return_index=True)
-        index, weight = self.texels.bilinear(first // 3, np.eye(3)[first % 3])
+        index, weight = self.domain.texels.bilinear(first // 3, np.eye(3)[first % 3])
         values = np.zeros((len(self.mesh.vertices), self.values.shape[1]), np.float32)
         values[vertices] = interpolate(weight, self.values[index])
         return values
 
-    def _normals(
-        self, atlas: Atlas, channels: tuple[int, ...], used: np.ndarray, kind: str, angle: float
-    ) -> np.ndarray:
+    def _normals(self, atlas: Atlas, channels: tuple[int, ...], used: np.ndarray) -> np.ndarray:
         """The normal map, from the texels' frames into those of the atlas."""
-        texels = self.texels
-        right, up = tangent_frames(self.mesh, texels.face, texels.barycentric, kind, angle, self.orientation)
+        texels, (right, up) = self.domain.texels, self.domain.tangent_frames
         # Bumps are added to the smooth surface that viewers shade, not to its flat faces.
         corners = self.mesh.normals[self.mesh.faces[texels.face]]
         smooth = interpolate(texels.barycentric, corners)

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from mitex.errors import ConfigError
-from mitex.mesh import grid
-from mitex.methods.baselines.quilted import quilted_albedo
+from mitex.mesh import grid, icosphere
+from mitex.methods.baselines.quilted import in_even_light, quilted_albedo
 from mitex.methods.nerf.synthesis.patches import Patches, extract_patches
+from mitex.methods.nerf.synthesis.repetition import EVENNESS
 
 
 def checks(patches: Patches) -> np.ndarray:
@@ -47,6 +48,30 @@ def test_tileable(patches: Patches):
 def test_same_seed_same_image(patches: Patches):
     a, b = (quilted_albedo(patches, checks(patches), (40, 40), np.random.default_rng(3)) for _ in range(2))
     assert (a == b).all()
+
+
+def test_what_was_used_is_avoided_as_by_our_own_quilting(patches: Patches):
+    """With the same options and seed, the default is the one of features."""
+    images = [
+        quilted_albedo(patches, checks(patches), (96, 96), np.random.default_rng(3), evenness=evenness)
+        for evenness in (None, EVENNESS, 0.0)
+    ]
+    assert (images[0] == images[1]).all() and (images[0] != images[2]).any()
+
+
+def test_the_light_is_taken_off_patches_of_all_sides():
+    """A ball of one colour under a light from the side: in even light all of its patches are alike."""
+    ball = icosphere(24)
+    patches = extract_patches(ball, np.random.default_rng(0), count=60, size=16)
+    light = np.zeros(16)
+    light[0], light[3] = np.sqrt(4 * np.pi), -1.6  # brightest towards +x
+    normals = ball.face_normals[patches.faces]
+    shades = 1.0 + 1.6 * 2 / 3 * np.sqrt(3 / (4 * np.pi)) * normals[..., 0]
+    colour = np.array([0.5, 0.4, 0.3])
+    pictures = (shades ** (1 / 2.4))[..., None] * colour
+    assert pictures.std((0, 1, 2)).min() > 0.02
+    even = in_even_light(patches, pictures, ball, light)
+    np.testing.assert_allclose(even, np.broadcast_to(colour, even.shape), rtol=1e-4)
 
 
 def test_refusals(patches: Patches):

@@ -20,7 +20,7 @@ from mitex.methods.geometric.features import displaced, face_features
 from mitex.methods.geometric.gan import critic_loss
 from mitex.methods.geometric.hierarchy import Hierarchy
 from mitex.methods.geometric.network import FaceNetwork
-from mitex.methods.geometric.pictures import portrait
+from mitex.methods.geometric.portrait import portrait
 from mitex.methods.geometric.references import find_reference
 from mitex.methods.geometric.report import report
 from mitex.methods.geometric.task import GeometricTask, learning_rate

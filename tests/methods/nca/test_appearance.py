@@ -1,15 +1,16 @@
 """The appearance loss against its parts, put together by hand."""
 
+import numpy as np
 import pytest
 import torch
 
 from benchmarks import naive
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
-from mitex.losses import decorrelate
 from mitex.methods.nca.appearance import Appearance, _places
 from mitex.methods.nca.targets import Targets, state_layout
-from mitex.pictures import pictures_of
+from mitex.triples import channel_triples
+from tests.losses import authors
 from tests.methods.nca.tiny import config
 
 MAPS = ["albedo", "height", "normal", "roughness"]
@@ -28,7 +29,7 @@ def exemplar():
 
 def _appearance(exemplar, network, settings, maps=None):
     shown = Exemplar({name: exemplar.maps[name] for name in maps}) if maps else exemplar
-    pictures = pictures_of(state_layout(sorted(shown.maps)), settings.blend, 0)
+    pictures = channel_triples(state_layout(sorted(shown.maps)), settings.blend, 0)
     return Appearance(settings, Targets(shown, pictures, network, settings.layers), network)
 
 
@@ -46,11 +47,11 @@ def _expected(images, pictures, settings):
         a, b = ours[layer].flatten(1, 2), theirs[layer].flatten(1, 2)
         moments = settings.moment_weight * naive.moment_distance(a, b)
         total = total + (naive.relaxed_transport(a, b) + moments).mean()
-    a, b = images.flatten(1, 2), pictures.flatten(1, 2)
-    colours = naive.relaxed_transport(decorrelate(a), decorrelate(b), euclidean=True)
+    a, b = (x.flatten(1, 2).numpy() for x in (images, pictures))
+    colours = np.mean([authors.colour_cost(x, y) for x, y in zip(a, b, strict=True)])
     if settings.colour_histogram:
-        colours = colours + (a.sort(1).values - b.sort(1).values).abs().mean((1, 2))
-    return settings.appearance_weight * (total + settings.colour_weight * colours.mean())
+        colours += np.mean(np.abs(np.sort(a, 1) - np.sort(b, 1)) / authors.SPREAD)
+    return settings.appearance_weight * (total + settings.colour_weight * colours)
 
 
 def _scale():
@@ -61,7 +62,7 @@ def _scale():
 
 @pytest.mark.parametrize("preset", ["patch", "paper"])
 def test_loss_of_an_albedo(exemplar, network, preset):
-    settings = config("samples=4096", "views=patch", preset=preset)
+    settings = config("samples=4096", "views=patch", "colour_weight=3", preset=preset)
     appearance = _appearance(exemplar, network, settings, ["albedo"])
     assert appearance.channels.tolist() == [0, 1, 2]
     views = _views(3, 3)
@@ -131,11 +132,16 @@ def test_randomness_is_the_generators(exemplar, network):
 
 
 def test_a_sample_estimates_the_whole(exemplar, network):
-    """Each side draws its own places, so a sample of the exemplar against itself costs a little."""
-    whole, part = (_appearance(exemplar, network, config(f"samples={n}", "blend=false")) for n in (4096, 512))
+    """From above: of fewer vectors, the nearest is farther."""
     views = _views(4, 8)
-    everything = whole(views, torch.Generator().manual_seed(0)).item()
-    assert part(views, torch.Generator().manual_seed(0)).item() == pytest.approx(everything, rel=0.1)
+    whole, half, quarter = (
+        _appearance(exemplar, network, config(f"samples={n}", "blend=false"))(
+            views, torch.Generator().manual_seed(0)
+        ).item()
+        for n in (4096, 512, 256)
+    )
+    assert 1.01 * whole < half < 1.2 * whole
+    assert half < quarter < 1.5 * whole
 
 
 def test_places_do_not_repeat():
@@ -144,3 +150,23 @@ def test_places_do_not_repeat():
     for row in places.tolist():
         assert len(set(row)) == 40 and min(row) >= 0 and max(row) < 50
     assert not torch.equal(places[0], places[1])
+
+
+def test_black_has_a_direction(exemplar, network):
+    """A black background, more than half of a full view, is a colour like any other: with all else switched
+    off it costs what the authors compute, and the gradient leads towards the exemplar's colours."""
+    settings = config(
+        "samples=4096", "moment_weight=0", "layers=relu1_1", "colour_weight=1e4", preset="paper"
+    )
+    appearance = _appearance(exemplar, network, settings, ["albedo"])
+    black = torch.zeros(1, 32, 32, 3, requires_grad=True)
+    loss = appearance(black, torch.Generator().manual_seed(0))
+    target = appearance.targets.images[0].flatten(0, 1)
+    expected = 2e4 * authors.colour_cost(np.zeros((1024, 3)), target.numpy())
+    assert loss.item() == pytest.approx(expected, rel=1e-3)
+    (gradient,) = torch.autograd.grad(loss, black)
+    after = appearance(
+        black.detach() - 1e-2 * gradient / gradient.abs().max(), torch.Generator().manual_seed(0)
+    )
+    assert gradient.isfinite().all()
+    assert after < loss

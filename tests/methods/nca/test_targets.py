@@ -7,7 +7,7 @@ import torch
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
 from mitex.methods.nca.targets import Targets, enlarged, state_layout, state_maps
-from mitex.pictures import pictures_of
+from mitex.triples import channel_triples
 
 ALL = ["albedo", "ambient_occlusion", "height", "normal", "roughness"]
 
@@ -38,7 +38,7 @@ def test_maps_of_a_state():
 
 
 def test_targets_read_the_features_of_the_pictures(network, scales):
-    pictures = pictures_of(state_layout(ALL), True, 0)[:4]
+    pictures = channel_triples(state_layout(ALL), True, 0)[:4]
     targets = Targets(scales, pictures, network, ("relu1_1", "relu3_1"))
     grey = torch.from_numpy(
         np.concatenate([scales.maps[name] for name in ("ambient_occlusion", "height", "roughness")], 2)

@@ -149,29 +149,6 @@ def test_bad_requests_are_refused(texture, maps):
         texture.apply(mesh, maps).extract(cells=50)
 
 
-def test_a_resumed_run_continues_as_if_it_had_not_stopped(run, tmp_path, base, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(run.parent / "cache"))  # with the base shape
-    few = [s for s in SETTINGS if not s.startswith(("steps", "preview", "checkpoint"))]
-    few += ["preview_every=0", "checkpoint_every=4", "rays=128"]
-    before = torch.get_num_threads()
-    threads(1)
-    try:
-        whole = fit(tiny_capture(), tmp_path / "a", base_mesh=base, overrides=[*few, "steps=8"], quiet=True)
-        fit(tiny_capture(), tmp_path / "b", base_mesh=base, overrides=[*few, "steps=4"], quiet=True)
-        parts = fit(
-            tiny_capture(),
-            tmp_path / "b",
-            base_mesh=base,
-            overrides=["steps=8"],
-            resume=True,
-            quiet=True,
-        )
-    finally:
-        threads(before)
-    for a, b in zip(whole.model.weights, parts.model.weights, strict=True):
-        torch.testing.assert_close(a, b, rtol=0, atol=1e-6)
-
-
 def small_task(base: Mesh, **more) -> TextureTask:
     small = dict(rays=512, table=12, coarsest=8, finest=16, occupancy=32, ray_steps=128)
     settings = replace(PRESETS["fast"], **small, **more)
@@ -216,6 +193,14 @@ def test_a_refresh_that_finds_no_number_is_taken_back(base, monkeypatch):
 def test_the_loss_changes_nothing(base, step):
     threads(1)
     assert_loss_is_pure(small_task(base), step)
+
+
+def test_a_run_does_not_go_on_on_another_base_shape(base):
+    """Checkpoints tell it, so that the loop refuses them."""
+    moved = base.with_vertices(1.001 * base.vertices)
+    tasks = [small_task(mesh) for mesh in (base, base.with_vertices(base.vertices), moved)]
+    first, same, other = [task.metadata()["base"] for task in tasks]
+    assert first == same != other
 
 
 def test_fine_normals_start_near_those_of_the_faces(base):

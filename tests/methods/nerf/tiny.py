@@ -40,16 +40,20 @@ def bumpy(amplitude: float = 0.08, frequency: int = 24) -> Mesh:
 
 @cache
 def tiny_capture(views: int = 16, side: int = 48, spp: int = 16, seed: int = 0) -> Capture:
-    """`views` pictures from all around, side x side."""
+    """`views` pictures of the ball from all around, side x side."""
+    return captured(bumpy(), views, side, spp, seed)
+
+
+def captured(mesh: Mesh, views: int, side: int, spp: int, seed: int = 0) -> Capture:
+    """Pictures of a mesh with waves of colour, on which cameras all around look."""
     mi = init()
     rng = np.random.default_rng(seed)
-    mesh = bumpy()
     colours = 0.5 + 0.5 * np.sin(7 * mesh.vertices + np.array([0.0, 2.0, 4.0]))
     shape = mesh_shape(
         mesh,
         mi.load_dict({"type": "diffuse", "reflectance": {"type": "mesh_attribute", "name": "vertex_color"}}),
     )
-    shape.add_attribute("vertex_color", 3, colours.astype(np.float32).ravel())
+    shape.add_attribute("vertex_color", 3, colours.astype(np.float32).ravel().tolist())
     images, poses = [], []
     for k in range(views):
         pose = _pose(k, views, rng)

@@ -5,9 +5,10 @@ import torch
 
 from mitex.features import Vgg16
 from mitex.losses import gram_matrix
-from mitex.methods.surface.comparison import LEAST, GramComparison
+from mitex.methods.surface.comparison import LEAST, GramComparison, TransportComparison
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.statistics import exemplar_features
+from tests.losses import authors
 from tests.methods.surface.grids import grid_levels
 
 SIDE = 64
@@ -61,3 +62,15 @@ def test_regions_of_deep_layers_hold_enough_elements(network, image):
         SIDE**2 // 4 // LEAST,
         1,
     ]
+
+
+def test_transport_compares_colours_as_the_authors_do(image):
+    """Without features the colours are left; places are drawn of the texels first, then of the exemplar."""
+    comparison = TransportComparison(Vgg16(precision="float32"), image[None], (LAYER,), 500, 0.1)
+    colours = torch.rand(900, 3, generator=torch.Generator().manual_seed(2))
+    colours[::2] = 0  # black has a direction like any other colour
+    cost = comparison.cost({}, colours, 0, torch.Generator().manual_seed(5))
+    generator = torch.Generator().manual_seed(5)
+    ours, theirs = (torch.randint(n, (500,), generator=generator) for n in (900, SIDE**2))
+    expected = authors.colour_cost(colours[ours].numpy(), image.view(-1, 3)[theirs].numpy())
+    assert cost.item() == pytest.approx(expected, rel=1e-4)

@@ -18,11 +18,12 @@ from mitex.methods.registry import method_of
 from mitex.methods.surface import METHOD
 from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.content import content_colours
-from mitex.methods.surface.fitting import find_levels, with_layout
+from mitex.methods.surface.domain import SurfaceDomain
+from mitex.methods.surface.fitting import with_layout
 from mitex.methods.surface.network import ALL_LAYERS
 from mitex.methods.surface.orientation import read_orientation
 from mitex.methods.surface.task import VIEW, SurfaceTask
-from mitex.methods.surface.texels import Texels, charts
+from mitex.methods.surface.texels import charts
 from mitex.methods.surface.texture import SurfaceTexture
 from mitex.runtime import threads
 from mitex.training import resolve
@@ -106,7 +107,7 @@ def test_files_round_trip(made, mesh):
 
 @pytest.mark.parametrize("name", ["config.toml", "nothing", "metrics.jsonl"])
 def test_what_is_no_texture_is_refused(made, name):
-    with pytest.raises(CheckpointError, match="surface texture"):
+    with pytest.raises(CheckpointError, match="surface texture|there is no model"):
         SurfaceTexture.load(made[0] / name)
 
 
@@ -138,7 +139,7 @@ def test_resuming_on_another_mesh_is_refused(made, exemplar):
     ],
 )
 def test_options_run(mesh, exemplar, tmp_path, setting):
-    overrides = [*SMALL, "steps=3", "pictures=1", setting]
+    overrides = [*SMALL, "steps=3", "triples=1", setting]
     if setting == "scales=2":
         overrides.remove("scales=0")
     texture = surface.fit(exemplar, mesh, tmp_path / "run", overrides=overrides, quiet=True)
@@ -171,8 +172,8 @@ def test_transport_gives_the_exemplars_colours(mesh, exemplar, tmp_path):
         (["optimizer=lbfgs", "loss=transport"], "without randomness"),
         (["optimizer=lbfgs"], "one map"),
         (["optimizer=lbfgs", "scales=1"], "scales=0"),
-        (["optimizer=sgd"], "adam or lbfgs"),
-        (["loss=l2"], "gram or transport"),
+        (["optimizer=sgd"], "'adam', 'lbfgs'"),
+        (["loss=l2"], "'gram', 'transport'"),
         (["layers=relu3_4"], "relu3_4"),
         (["weights=vgg19", "layers=relu3_5"], "relu3_5"),
     ],
@@ -191,7 +192,7 @@ def test_vgg19_compares_its_own_layers():
 
 
 def test_more_than_the_memory_is_refused_with_the_estimate(mesh, monkeypatch):
-    room = import_module("mitex.methods.surface.fit")
+    room = import_module("mitex.methods.surface.fitting")
     config = resolve(PRESETS, None, None, ["resolution=2000"])
     half = replace(
         mesh, uv=np.tile(np.array([[0, 0], [1, 0], [0, 1]], np.float32), (1, 1, 1)), faces=mesh.faces[:1]
@@ -215,8 +216,8 @@ class TestOrientation:
         surface.fit(exemplar, mesh, tmp_path / "run", **given)
         made = SurfaceTexture.load(tmp_path / "run")
         tangents = made.apply().tangents
-        assert made.orientation is not None and tangents is not None
-        assert np.array_equal(made.orientation, down)
+        assert made.domain.orientation is not None and tangents is not None
+        assert np.array_equal(made.domain.orientation, down)
         around = np.abs(mesh.normals[:, 1]) < 0.5
         assert (tangents[around, 1] < -0.8).all()
 
@@ -255,9 +256,7 @@ class TestOrientation:
 def small_task(mesh, exemplar, *settings) -> SurfaceTask:
     config = resolve(PRESETS, None, None, [*SMALL, *settings])
     laid = with_layout(mesh, config, False)
-    assert laid.uv is not None
-    texels = Texels.rasterize(laid, laid.uv, 48)
-    return SurfaceTask(config, exemplar, laid, texels, find_levels(laid, texels, config))
+    return SurfaceTask(config, exemplar, SurfaceDomain.of(laid, config))
 
 
 DIFFUSION = "diffusion=0.01"  # so that `commit` changes the texels in every step
@@ -287,6 +286,22 @@ def test_previews_show_the_mesh_beside_the_exemplar(mesh, exemplar):
     sphere = picture[VIEW // 2, VIEW + VIEW // 2]
     assert sphere[0] > 0.9 and (sphere[1:] < 1e-4).all()
     assert (picture[0, VIEW] == 1).all()
+
+
+def test_a_fit_computes_its_domain_once(mesh, exemplar, tmp_path, monkeypatch):
+    """Synthesis, previews and texture work on one domain, for which each piece is computed once."""
+    room, calls = import_module("mitex.methods.surface.domain"), []
+    for name in ("vertex_directions", "build", "GeodesicTracer"):
+        original = getattr(room, name)
+        count = lambda *args, f=original, name=name: (calls.append(name), f(*args))[1]  # noqa: E731
+        monkeypatch.setattr(room, name, count)
+    rasterize = room.Texels.rasterize
+    monkeypatch.setattr(
+        room.Texels, "rasterize", staticmethod(lambda *args: (calls.append("texels"), rasterize(*args))[1])
+    )
+    overrides = [*SMALL, "resolution=47", "steps=2", "preview_every=1"]
+    surface.fit(exemplar, mesh, tmp_path / "run", overrides=overrides, quiet=True).apply()
+    assert sorted(calls) == ["GeodesicTracer", "build", "texels", "vertex_directions"]
 
 
 def test_noise_start_and_range(mesh, exemplar, tmp_path):
@@ -365,7 +380,7 @@ class TestStyleTransfer:
         mesh = embedded("mushrooms")
         image = Exemplar({"albedo": exemplar.maps["albedo"]})
         made = surface.fit(image, mesh, tmp_path / "run", content="ao", overrides=self.STYLE, quiet=True)
-        content = content_colours("ao", made.mesh, made.texels)
+        content = content_colours("ao", made.domain)
         assert content.std() > 0.05 and content.min() >= 0 and content.max() <= 1
         assert np.corrcoef(content.mean(1), made.values.mean(1))[0, 1] > 0.3
         assert np.abs(made.values - content).mean() > 0.02
@@ -375,17 +390,16 @@ class TestStyleTransfer:
         image = Exemplar({"albedo": exemplar.maps["albedo"]})
         overrides = [*self.STYLE, "content_weight=1e12", "lr=0.001", "steps=2"]
         made = surface.fit(image, mesh, tmp_path / "run", content="ao", overrides=overrides, quiet=True)
-        assert np.abs(made.values - content_colours("ao", made.mesh, made.texels)).max() < 0.02
+        assert np.abs(made.values - content_colours("ao", made.domain)).max() < 0.02
 
     def test_images_are_read_on_the_meshs_own_uvs(self, tmp_path):
         """A ramp in u and v; every texel gets its own uv as colour."""
         square = flat_square(4)
-        assert square.uv is not None
         u, v = np.meshgrid((np.arange(256) + 0.5) / 256, 1 - (np.arange(256) + 0.5) / 256)
         write_image(tmp_path / "ramp.png", np.stack([u, v, 0 * u], -1))
-        texels = Texels.rasterize(square, square.uv, 32)
-        found = content_colours(tmp_path / "ramp.png", square, texels)
-        assert np.abs(found[:, :2] - texels.position[:, :2]).max() < 0.01 and not found[:, 2].any()
+        domain = SurfaceDomain(square, 32)
+        found = content_colours(tmp_path / "ramp.png", domain)
+        assert np.abs(found[:, :2] - domain.texels.position[:, :2]).max() < 0.01 and not found[:, 2].any()
 
     def test_an_image_needs_uvs(self, mesh, exemplar, tmp_path):
         image = Exemplar({"albedo": exemplar.maps["albedo"]})

@@ -9,9 +9,9 @@ from mitex.exemplar import Exemplar
 from mitex.mesh import icosphere
 from mitex.methods import surface
 from mitex.methods.surface.config import PRESETS
+from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.fitting import with_layout
 from mitex.methods.surface.seams import seam_ratio
-from mitex.methods.surface.texels import Texels
 from mitex.methods.surface.texture import SurfaceTexture
 from mitex.training import resolve
 
@@ -19,22 +19,20 @@ from mitex.training import resolve
 @pytest.fixture(scope="module")
 def blank():
     """A texture of nothing on a sphere of several charts."""
-    mesh = with_layout(icosphere(12), resolve(PRESETS, None, None, ["resolution=96"]), False)
-    assert mesh.uv is not None
-    count = len(Texels.rasterize(mesh, mesh.uv, 96).index)
-    about = {"resolution": 96, "frames": "smooth", "angle": 0.0}
-    return SurfaceTexture(mesh, np.zeros((count, 3), np.float32), ("albedo",), about)
+    config = resolve(PRESETS, None, None, ["resolution=96"])
+    domain = SurfaceDomain.of(with_layout(icosphere(12), config, False), config)
+    return SurfaceTexture(domain, np.zeros((len(domain.texels.index), 3), np.float32), ("albedo",))
 
 
 def test_a_smooth_function_of_space_has_no_seams(blank):
-    waves = np.sin(9 * blank.texels.position + [0, 1, 2])
+    waves = np.sin(9 * blank.domain.texels.position + [0, 1, 2])
     found = seam_ratio(replace(blank, values=(0.5 + 0.5 * waves).astype(np.float32)))
     assert found == pytest.approx(1, abs=0.1)
 
 
 def test_a_colour_for_each_chart_is_all_seams(blank):
-    chart = blank.texels.chart[blank.texels.face]
-    smooth = np.sin(blank.texels.position)
+    chart = blank.domain.texels.chart[blank.domain.texels.face]
+    smooth = np.sin(blank.domain.texels.position)
     colours = np.random.default_rng(0).random((chart.max() + 1, 3))
     assert seam_ratio(replace(blank, values=(0.1 * smooth + colours[chart]).astype(np.float32))) > 20
 

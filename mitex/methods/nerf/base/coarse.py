@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
-from dataclasses import dataclass, replace
+import time
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from mitex.cache import cached, content_key
+from mitex.errors import CheckpointError
 from mitex.mesh import Mesh
 from mitex.methods.nerf.base.base_shape import base_shape, given_base, shell_thickness
 from mitex.methods.nerf.capture.capture import Capture
@@ -23,7 +28,7 @@ from mitex.runtime.jit import dr, mi
 from mitex.textures.march import composite
 
 VERSION = 1  # of the base shapes in the cache
-COARSE = dict(  # what the coarse field needs less of
+COARSE: dict[str, Any] = dict(  # what the coarse field needs less of
     table=15,
     ray_steps=256,
     rays=1024,
@@ -39,6 +44,7 @@ VIEWS = 16  # that the surface is scanned from
 SCAN_SIDE = 200  # pixels of a scan along its longest side
 SOLID = 0.95  # opacity of a ray that has met the surface
 VOXEL = 0.01  # the scan keeps one point in each [scene units]
+ABANDONED = 7 * 24 * 3600.0  # a training that nobody has gone on with for so long is removed [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,15 +76,17 @@ def find_base(
     Raises:
         MeshError: there is nothing dense, or the given mesh cannot be used.
     """
-    steps = config.base_steps
-    coarse = replace(config, **COARSE, steps=steps, lr_steps=steps)
+    coarse = coarse_config(config)
     arrays = (*capture.images, capture.poses, capture.intrinsics, capture.distortion)
     mesh = () if base_mesh is None else (base_mesh.vertices, base_mesh.faces)
-    settings = (config.seed, steps, config.lr, config.concavity, config.repulsion, config.neighbours)
-    place = cache_dir() / "nerf" / content_key(VERSION, *arrays, *mesh, *settings)
+    folder = cache_dir() / "nerf"
+    # A training goes on under equal configs only, so its folder is named by all that is in them.
+    training = folder / f"{content_key(VERSION, *arrays, capture.name, coarse)}.run"
+    settings = (config.concavity, config.repulsion, config.neighbours)
+    place = folder / content_key(VERSION, *arrays, *mesh, coarse, *settings)
 
     def compute() -> BaseShape:
-        task = train_plain_field(coarse, capture, (capture, 0), place.with_suffix(".run"), quiet)
+        task = _trained(coarse, capture, training, quiet)
         _say("cutting the base shape out of the coarse field, about a minute", quiet)
         base = _shape_of(task, config) if base_mesh is None else given_base(base_mesh)
         scan = scan_surface(task)
@@ -86,8 +94,33 @@ def find_base(
         return BaseShape(base, scan, shell_thickness(scan, projection))
 
     base = cached(place, compute, _read, _write)
+    shutil.rmtree(training, ignore_errors=True)
+    _remove_abandoned(folder)
     _say(f"base shape of {len(base.mesh.faces):,} faces, shell of +-{base.thickness:.3f}", quiet)
     return base
+
+
+def coarse_config(config: NerfConfig) -> NerfConfig:
+    """Settings of the coarse field; of a fit's own there are only those in it that change this field."""
+    steps = config.base_steps
+    return NerfConfig(preset="coarse", seed=config.seed, lr=config.lr, steps=steps, lr_steps=steps, **COARSE)
+
+
+def _trained(coarse: NerfConfig, capture: Capture, folder: Path, quiet: bool) -> PlainTask:
+    """The coarse field; an interrupted training goes on, unless its checkpoints cannot be used."""
+    try:
+        return train_plain_field(coarse, capture, (capture, 0), folder, quiet)
+    except CheckpointError:
+        shutil.rmtree(folder)
+        return train_plain_field(coarse, capture, (capture, 0), folder, quiet)
+
+
+def _remove_abandoned(folder: Path) -> None:
+    """Removes interrupted trainings that nobody has gone on with for a week."""
+    for training in folder.glob("*.run"):
+        with suppress(OSError):
+            if time.time() - training.stat().st_mtime > ABANDONED:
+                shutil.rmtree(training)
 
 
 def _shape_of(task: PlainTask, config: NerfConfig) -> Mesh:

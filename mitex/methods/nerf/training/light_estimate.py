@@ -60,6 +60,21 @@ def estimated_light(mesh: Mesh, capture: Capture) -> np.ndarray:
     return _softened(light).astype(np.float32)
 
 
+def brightness(light: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Display values of a diffuse surface under a light, beside those in even light of the same strength.
+
+    Args:
+        light: (16,) spherical harmonics, see `lighting`.
+        normals: (N, 3) of length 1.
+
+    Returns:
+        (N,) factors; no side counts as darker than a quarter of the mean.
+    """
+    even = max(float(light[0]) / math.sqrt(4 * math.pi), DARKEST)
+    shades = _irradiance(normals) @ light[: BANDS**2]
+    return (np.maximum(shades, SHADE * even) / even) ** POWER
+
+
 def _softened(light: np.ndarray) -> np.ndarray:
     """The light, nearer to an even one if it leaves a side too dark."""
     directions = unit(np.random.default_rng(0).normal(size=(DIRECTIONS, 3)))

@@ -122,7 +122,7 @@ def train_plain_field(
     """Trains a plain field in a run folder, or continues there; arguments as of `RadianceTask`."""
     folder = Path(folder)
     task = PlainTask(config, capture, preview_view)
-    resume = (folder / checkpoint.NAME).exists()
+    resume = any((folder / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
     train(task, config, folder, resume=resume, quiet=quiet, **schedule(config))
     return task
 

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 
 from mitex.bridge import call
+from mitex.cache import content_key
 from mitex.mesh import Mesh
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.pixels import Batch
@@ -76,7 +77,9 @@ class TextureTask(RadianceTask):
         super().__init__(config, capture, preview_view, Occupancy(config.occupancy, possible), parameters)
 
     def metadata(self) -> dict[str, str]:
-        return {"method": "nerf", "capture": self.pixels.capture.name}
+        mesh = self.projection.mesh
+        base = content_key(mesh.vertices, mesh.faces, self.thickness)
+        return {"method": "nerf", "capture": self.pixels.capture.name, "base": base}
 
     def with_cameras(self, batch: Batch) -> Batch:
         if not self.config.refine_cameras:
@@ -211,8 +214,11 @@ class TextureTask(RadianceTask):
         return 1 - dr.exp(-dr.exp(lowest) * self.step_length)
 
     def _uses_interior(self, step: int) -> bool:
-        """Only late: colours learn slower beside a loss that wants them the same at all depths."""
-        return self.config.interior_weight > 0 and 2 * step >= self.config.steps
+        """Only late: colours learn slower beside a loss that wants them the same at all depths.
+
+        `steps` has no say, or a run that goes on for more steps would not be that of one go.
+        """
+        return self.config.interior_weight > 0 and 2 * step >= self.config.lr_steps
 
     def _slope(self, arrays: Any, coords: ShellCoords) -> Any:
         """The direction in which the density falls, by equation 2 from its slopes in foot and distance."""

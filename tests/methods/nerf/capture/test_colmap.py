@@ -62,7 +62,6 @@ def photos(tmp_path_factory):
     return folder
 
 
-@pytest.mark.slow
 def test_cameras_are_found_up_to_a_similarity(photos, monkeypatch):
     capture = load_capture(photos)
     assert capture.names == tuple(f"p{k:02}.png" for k in range(COUNT))

@@ -6,7 +6,7 @@ import numpy as np
 
 from mitex.evaluation import elevations
 from mitex.evaluation.metrics import single_image_frechet
-from mitex.methods.baselines.elevations import compare_elevations
+from mitex.methods.baselines.elevations import FLAT, compare_elevations
 from tests.methods.nerf.tiny import tiny_capture
 
 
@@ -21,15 +21,18 @@ def test_elevations_compare_what_photos_show(texture, monkeypatch):
     monkeypatch.setattr(elevations, "single_image_frechet", distance)
     table = compare_elevations(texture, photos, size=256, patches=40, window=48, places=3, syntheses=2)
     assert [row.angle for row in table][:3] == [0, 20, 40]
-    each = np.reshape(distances, (2, len(table), 4))  # syntheses, angles; captured, ours, flat, photos
+    count = 3 + len(FLAT)  # captured, ours, flat ones, photos
+    each = np.reshape(distances, (2, len(table), count))  # by synthesis and angle
     for row, found in zip(table, each.swapaxes(0, 1), strict=True):
         assert np.isfinite(found).all() and found.min() > 0
-        assert np.allclose((row.captured, row.ours, row.flat, row.photos), found.mean(0), rtol=1e-3)
-        assert (found[0, 1:3] != found[1, 1:3]).all()  # the second synthesis is another one
+        values = row.captured, row.ours, *row.flat.values(), row.photos
+        assert np.allclose(values, found.mean(0), rtol=1e-3) and list(row.flat) == list(FLAT)
+        assert (found[0, 1:-1] != found[1, 1:-1]).all()  # the second synthesis is another one
+        assert len(set(found[0])) == count  # every option shows
         assert row.captured < row.ours or row.angle > 40
         assert row.picture.shape[0] == 4 * 48 and row.picture.shape[1] % 48 == 0
-    for textures in (masks[k : k + 3] for k in range(0, len(masks), 4)):  # the fourth are other photos
-        for mask, photo in textures:  # only pixels that count in the photo
+    for k in range(0, len(masks), count):
+        for mask, photo in masks[k : k + count - 1]:  # but for other photos: only pixels that count in both
             assert mask.any() and not (mask & ~photo).any()
     # Seen from above, a plane fills its windows; seen flat, there is but one colour above its horizon.
     flat = [np.diff(np.split(row.picture, 4)[3], axis=0) for row in table]

@@ -89,7 +89,6 @@ def test_gradients_are_those_of_finite_differences(field, name):
     scene = scene_of(FIELDS[field][0]())
     params, key = parameter(scene, name)
     value, rng = np.array(params[key]), np.random.default_rng(0)
-    kind: Any = type(params[key])
     pixels = rng.normal(size=(6, 6, 3)).astype(np.float32)
     along = rng.normal(size=value.shape).astype(np.float32)
 
@@ -105,7 +104,8 @@ def test_gradients_are_those_of_finite_differences(field, name):
     step = 5e-4 * np.abs(value).max()
     totals = []
     for sign in (1, -1):
-        params[key] = kind(value + sign * step * along)
+        array: Any = type(params[key])
+        params[key] = array(value + sign * step * along)
         params.update()
         totals.append((picture(scene) * pixels).sum())
     slope = (totals[0] - totals[1]) / (2 * step)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mitex.exemplar import Exemplar
-from mitex.pictures import Picture, picture_images, pictures_of
+from mitex.triples import ChannelTriple, channel_triples, triple_images
 
 LAYOUT = {
     "albedo": (0, 1, 2),
@@ -21,15 +21,15 @@ def layout(*maps):
 
 def test_pictures_of_the_paper():
     """One for each map, in alphabetical order; grey ones are shown three times."""
-    assert pictures_of(layout("roughness", "albedo", "normal"), blend=False, seed=0) == [
-        Picture("albedo", (0, 1, 2)),
-        Picture("normal", (7, 8, 9)),
-        Picture("roughness", (10, 10, 10)),
+    assert channel_triples(layout("roughness", "albedo", "normal"), blend=False, seed=0) == [
+        ChannelTriple("albedo", (0, 1, 2)),
+        ChannelTriple("normal", (7, 8, 9)),
+        ChannelTriple("roughness", (10, 10, 10)),
     ]
 
 
 def test_blended_pictures_of_all_maps():
-    pictures = pictures_of(LAYOUT, blend=True, seed=0)
+    pictures = channel_triples(LAYOUT, blend=True, seed=0)
     kinds = [p.kind for p in pictures]
     assert kinds == ["albedo", "normal", "grey", *["mix"] * 12]
     assert sorted(pictures[2].channels) == [6, 10, 11]
@@ -44,19 +44,19 @@ def test_blended_pictures_of_all_maps():
 )
 @pytest.mark.parametrize("blend", [False, True])
 def test_every_map_is_in_some_picture(maps, blend):
-    shown = {c for p in pictures_of(layout(*maps), blend, 0) for c in p.channels}
+    shown = {c for p in channel_triples(layout(*maps), blend, 0) for c in p.channels}
     assert shown == {c for name in maps for c in LAYOUT[name]}
 
 
 def test_mixes_follow_the_seed():
-    one, again, other = (pictures_of(LAYOUT, True, seed) for seed in (1, 1, 2))
+    one, again, other = (channel_triples(LAYOUT, True, seed) for seed in (1, 1, 2))
     assert one == again != other
-    assert [p.kind for p in pictures_of(layout("albedo"), True, 0)] == ["albedo"]
+    assert [p.kind for p in channel_triples(layout("albedo"), True, 0)] == ["albedo"]
 
 
 def test_images_show_the_channels():
     maps = Exemplar.load("scales").resized(32).maps
-    pictures = [Picture("mix", (10, 2, 8)), Picture("albedo", (0, 1, 2))]
-    images = picture_images(Exemplar(maps), pictures, LAYOUT)
+    pictures = [ChannelTriple("mix", (10, 2, 8)), ChannelTriple("albedo", (0, 1, 2))]
+    images = triple_images(Exemplar(maps), pictures, LAYOUT)
     expected = np.stack([maps["roughness"][..., 0], maps["albedo"][..., 2], maps["normal"][..., 1]], -1)
     assert images.dtype == np.float32 and np.array_equal(images, [expected, maps["albedo"]])

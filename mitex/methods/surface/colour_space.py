@@ -10,11 +10,11 @@ import torch
 
 from mitex.exemplar import Exemplar
 
-LEAST = 0.1  # of the largest spread: so much is left to directions in which the exemplar does not vary
+MIN_SPREAD = 0.1  # of the largest: so much is left to directions in which the exemplar does not vary
 
 
 @dataclass(frozen=True, eq=False)
-class Space:
+class ColourSpace:
     """Affine coordinates of channel values: values = mean + coordinates @ basis.
 
     A step that is as long in all coordinates is long in the directions in which the exemplar varies and short
@@ -30,7 +30,7 @@ class Space:
     basis: torch.Tensor
 
     @staticmethod
-    def of(exemplar: Exemplar, layout: Mapping[str, tuple[int, ...]]) -> Space:
+    def of(exemplar: Exemplar, layout: Mapping[str, tuple[int, ...]]) -> ColourSpace:
         """Principal components of an exemplar's pixels, as long as their standard deviations."""
         size = sum(map(len, layout.values()))
         pixels = np.empty((size, np.prod(exemplar.size)))
@@ -38,14 +38,14 @@ class Space:
             pixels[list(channels)] = exemplar.maps[name].reshape(-1, len(channels)).T
         variance, directions = np.linalg.eigh(np.atleast_2d(np.cov(pixels)))
         spread = np.sqrt(np.maximum(variance, 0))
-        spread = np.maximum(spread, max(LEAST * spread.max(), 1e-3))
+        spread = np.maximum(spread, max(MIN_SPREAD * spread.max(), 1e-3))
         basis = (directions * spread).T
-        return Space(torch.from_numpy(pixels.mean(1)).float(), torch.from_numpy(basis).float())
+        return ColourSpace(torch.from_numpy(pixels.mean(1)).float(), torch.from_numpy(basis).float())
 
     @staticmethod
-    def plain(channels: int) -> Space:
+    def plain(channels: int) -> ColourSpace:
         """The channels themselves."""
-        return Space(torch.zeros(channels), torch.eye(channels))
+        return ColourSpace(torch.zeros(channels), torch.eye(channels))
 
     def values(self, coordinates: torch.Tensor) -> torch.Tensor:
         """Channel values (..., C) of coordinates (..., C)."""

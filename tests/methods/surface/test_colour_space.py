@@ -4,7 +4,7 @@ import numpy as np
 import torch
 
 from mitex.exemplar import Exemplar
-from mitex.methods.surface.space import LEAST, Space
+from mitex.methods.surface.colour_space import MIN_SPREAD, ColourSpace
 from mitex.methods.surface.texture import texel_layout
 
 
@@ -19,7 +19,7 @@ def exemplar():
 def test_the_exemplar_is_white_but_for_the_floor():
     shown = exemplar()
     layout = texel_layout(list(shown.maps))
-    space = Space.of(shown, layout)
+    space = ColourSpace.of(shown, layout)
     pixels = torch.from_numpy(np.concatenate([shown.maps[name] for name in layout], 2)).view(-1, 4)
     found = space.coordinates(pixels)
     covariance = torch.cov(found.T)
@@ -27,17 +27,17 @@ def test_the_exemplar_is_white_but_for_the_floor():
     assert (covariance - covariance.diag().diag()).abs().max() < 1e-4
     assert covariance.diag().max() <= 1 + 1e-4 and abs(covariance[3, 3] - 1) < 1e-4
     lengths = space.basis.norm(dim=1)
-    assert lengths.min() >= LEAST * lengths.max() * (1 - 1e-5)
+    assert lengths.min() >= MIN_SPREAD * lengths.max() * (1 - 1e-5)
 
 
 def test_round_trips():
     shown = exemplar()
     x = torch.rand(7, 4, generator=torch.Generator().manual_seed(0))
-    for space in (Space.of(shown, texel_layout(list(shown.maps))), Space.plain(4)):
+    for space in (ColourSpace.of(shown, texel_layout(list(shown.maps))), ColourSpace.plain(4)):
         assert torch.allclose(space.values(space.coordinates(x)), x, atol=1e-5)
-    assert torch.equal(Space.plain(4).values(x), x)
+    assert torch.equal(ColourSpace.plain(4).values(x), x)
 
 
 def test_one_constant_map():
-    space = Space.of(Exemplar({"height": np.full((8, 8, 1), 0.5, np.float32)}), {"height": (0,)})
+    space = ColourSpace.of(Exemplar({"height": np.full((8, 8, 1), 0.5, np.float32)}), {"height": (0,)})
     assert torch.isfinite(space.coordinates(torch.rand(3, 1))).all()

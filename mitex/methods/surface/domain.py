@@ -1,0 +1,102 @@
+"""The surface that a texture is synthesized on: its mesh and layout, and what is computed of them, once."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mitex.cache import content_key
+from mitex.mesh import Mesh
+from mitex.methods.surface.borders import Border
+from mitex.methods.surface.cache import VERSION, cached_levels
+from mitex.methods.surface.config import SurfaceConfig
+from mitex.methods.surface.exponential import GeodesicTracer
+from mitex.methods.surface.frames import interpolate_frames, vertex_directions
+from mitex.methods.surface.levels import POOLS, Levels
+from mitex.methods.surface.taps import Surroundings, build
+from mitex.methods.surface.texels import Texels
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceDomain:
+    """A mesh with UVs, its texels, their tangent frames, and the levels of the network.
+
+    Attributes:
+        mesh: with the UVs of the texture.
+        resolution: side of the texture [texels].
+        frames: "smooth" or "fixed", see `tangent_frames`.
+        angle: turns the frames counter-clockwise, seen from outside [degrees].
+        orientation: (V, 3) float32 where the exemplar's right shall point, in place of `frames`.
+        correct, continued: how levels are computed, see `SurfaceConfig`.
+        depth: number of levels.
+    """
+
+    mesh: Mesh
+    resolution: int
+    frames: str = "smooth"
+    angle: float = 0.0
+    orientation: np.ndarray | None = None
+    correct: bool = True
+    continued: bool = True
+    depth: int = POOLS
+
+    @staticmethod
+    def of(mesh: Mesh, config: SurfaceConfig, orientation: np.ndarray | None = None) -> SurfaceDomain:
+        """The domain that a synthesis with these settings works on."""
+        return SurfaceDomain(
+            mesh,
+            config.resolution,
+            config.frames,
+            config.angle,
+            orientation,
+            config.correct,
+            config.continued,
+            POOLS + config.scales,
+        )
+
+    @property
+    def uv(self) -> np.ndarray:
+        """(F, 3, 2) the layout."""
+        assert self.mesh.uv is not None
+        return self.mesh.uv
+
+    @cached_property
+    def texels(self) -> Texels:
+        """The texels on the surface, N of them."""
+        return Texels.rasterize(self.mesh, self.uv, self.resolution)
+
+    @cached_property
+    def directions(self) -> np.ndarray:
+        """(V, 3) float64 where the exemplar's right points at the vertices, before `angle` turns it."""
+        return vertex_directions(self.mesh, self.frames, self.orientation)
+
+    @cached_property
+    def tangent_frames(self) -> tuple[np.ndarray, np.ndarray]:
+        """Right and up of the texels, (N, 3) float64 each; see `frames.tangent_frames`."""
+        texels, angle = self.texels, math.radians(self.angle)
+        return interpolate_frames(self.mesh, texels.face, texels.barycentric, self.directions, angle)
+
+    @cached_property
+    def tracer(self) -> GeodesicTracer:
+        """Geodesics of the mesh."""
+        return GeodesicTracer(self.mesh)
+
+    @cached_property
+    def levels(self) -> Levels:
+        """The levels of the network, from the cache on disk if they were computed before."""
+        options = (
+            *(self.resolution, self.frames, math.radians(self.angle), self.correct, self.continued),
+            *(self.depth, self.orientation),
+        )
+        return cached_levels(
+            content_key(VERSION, self.mesh.vertices, self.mesh.faces, self.uv, *options), self.compute_levels
+        )
+
+    def compute_levels(self) -> Levels:
+        """The levels, computed anew."""
+        border = Border.continued(self.mesh, self.texels, self.tracer) if self.continued else None
+        around = Surroundings(self.texels, self.tracer, *self.tangent_frames, self.correct, border)
+        return build(around, self.depth)

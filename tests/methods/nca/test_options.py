@@ -1,0 +1,249 @@
+"""Every key of the config does what it says: each check fails where its key is ignored."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+import torch
+
+from mitex.exemplar import Exemplar
+from mitex.methods import nca
+from mitex.methods.nca import NcaConfig
+from mitex.methods.nca.task import NcaTask
+from mitex.runtime import threads
+from tests.methods.nca.tiny import SETTINGS, config
+
+# As many samples as there are places: the loss depends on no choice of them.
+ALL_PLACES = ("samples=4096", "view_count=2", "pool=1", "blend=false", "min_steps=3", "max_steps=3")
+
+
+@pytest.fixture(scope="module")
+def exemplar():
+    maps = Exemplar.load("scales").maps
+    return Exemplar({name: maps[name] for name in ("albedo", "height")}, "scales")
+
+
+@pytest.fixture(scope="module")
+def build(exemplar):
+    """A task with some settings; the same task for the same settings."""
+    tasks: dict[tuple[str, ...], NcaTask] = {}
+
+    def build(*settings: str) -> NcaTask:
+        if settings not in tasks:
+            tasks[settings] = NcaTask(config(*settings), exemplar)
+        return tasks[settings]
+
+    return build
+
+
+def _loss(task, step=1, seed=0):
+    """(total, parts) of one step; step 1 does not inject the seed."""
+    result = task.loss(step, torch.Generator().manual_seed(seed))
+    return result.value, result.metrics
+
+
+def _appearance(task, seed=0):
+    return _loss(task, seed=seed)[1]["appearance"]
+
+
+def _cameras(task):
+    return task.cameras(torch.Generator().manual_seed(0))
+
+
+# One entry for each key that shapes the task: what tells that it counts.
+CHECKS = {}
+
+
+def check(*keys):
+    def register(function):
+        CHECKS.update(dict.fromkeys(keys, function))
+        return function
+
+    return register
+
+
+@check("channels", "hidden", "degree")
+def shape_of_the_model(build):
+    model = build("channels=13", "hidden=9", "degree=2").model
+    assert model.fc1.weight.shape == (9, (9 + 1) * 13) and model.fc2.weight.shape == (13, 9)
+
+
+@check("gain")
+def first_weights_are_proportional_to_the_gain(build):
+    small, large = (build(f"gain={gain}").model.fc2.weight for gain in (0.1, 0.3))
+    assert torch.allclose(3 * small, large)
+
+
+@check("seed")
+def seeds_give_other_weights(build):
+    assert not torch.equal(build("seed=1").model.fc1.weight, build("seed=2").model.fc1.weight)
+
+
+@check("frequency", "pool")
+def pool_of_states_on_the_sphere(build):
+    task = build("frequency=7", "pool=3", "density=7")
+    assert len(task.mesh.vertices) == 10 * 7**2 + 2
+    assert task.pool.shape == (3, 492, 16)
+
+
+@check("min_steps", "max_steps", "inject_every")
+def rollouts(build):
+    """All numbers of steps between the ends, both included, and the seed every so often."""
+    task = build("min_steps=5", "max_steps=7", "inject_every=4", "view_count=1")
+    task.pool.fill_(0.1)
+    calls = []
+
+    def evolve(state, perception, steps, generator):
+        calls.append((bool(state.any()), steps))
+        return state
+
+    task.model.evolve = evolve
+    for step in range(16):
+        _loss(task, step, seed=step)
+    assert {steps for _, steps in calls} == {5, 6, 7}
+    assert [any_ for any_, _ in calls] == [step % 4 != 0 for step in range(16)]
+
+
+@check("views", "view_count", "resolution")
+def cameras(build):
+    patch, full = (build(f"views={views}", "view_count=3", "resolution=24") for views in ("patch", "full"))
+    assert (_cameras(patch).kind, _cameras(patch).shape) == ("orthographic", (3, 24, 24))
+    assert (_cameras(full).kind, _cameras(full).shape) == ("perspective", (3, 24, 24))
+
+
+@check("distance", "fov")
+def full_views(build):
+    cameras = _cameras(build("views=full", "distance=3.5", "fov=40"))
+    assert np.linalg.norm(cameras.origin, axis=1) == pytest.approx(3.5, abs=1e-4)
+    assert cameras.fov == pytest.approx(np.radians(40))
+
+
+@check("density")
+def vertices_along_the_exemplar(build):
+    coarse, fine = build("density=5"), build("density=10")
+    assert fine.pixel == pytest.approx(2 * coarse.pixel)
+    assert _cameras(fine).half_width == pytest.approx(2 * _cameras(coarse).half_width)
+
+
+@check("exemplar_size")
+def pixels_of_the_exemplar(build):
+    """Fewer are wider on the sphere, and smoother when enlarged to the same size."""
+    coarse, fine = build("exemplar_size=16", "blend=false"), build("exemplar_size=32", "blend=false")
+    assert coarse.pixel == pytest.approx(2 * fine.pixel)
+    rough = [t.appearance.targets.images.diff(dim=1).square().mean() for t in (coarse, fine)]
+    assert rough[0] < 0.7 * rough[1]
+
+
+@check("target_size")
+def size_at_which_features_see_the_exemplar(build):
+    assert build("target_size=48").appearance.targets.images.shape[1:] == (48, 48, 3)
+
+
+@check("blend")
+def mixed_pictures(build):
+    kinds = [{p.kind for p in build(f"blend={b}").appearance.targets.pictures} for b in ("true", "false")]
+    assert "mix" in kinds[0] and "mix" not in kinds[1]
+
+
+@check("layers")
+def layers_add_up(build):
+    losses = [
+        _appearance(build(*ALL_PLACES, "colour_weight=0", f"layers={layers}"))
+        for layers in ("relu1_1", "relu2_1", "relu1_1,relu2_1")
+    ]
+    assert losses[0] + losses[1] == pytest.approx(losses[2], rel=1e-3)
+    assert min(losses) > 0.01
+
+
+@check("pooling")
+def pooling(build):
+    average, largest = (
+        _appearance(build(*ALL_PLACES, f"pooling={pooling}")) for pooling in ("average", "max")
+    )
+    assert average != pytest.approx(largest, rel=1e-3)
+
+
+@check("samples")
+def few_samples_are_random(build):
+    """All places give one loss, whichever views they come from; few give another for each choice."""
+    views = torch.rand(2, 32, 32, 4, generator=torch.Generator().manual_seed(0))
+    for samples, same in ((4096, True), (16, False)):
+        loss = build(*ALL_PLACES, f"samples={samples}").appearance
+        values = [loss(views, torch.Generator().manual_seed(seed)).item() for seed in (0, 1)]
+        assert (values[0] == pytest.approx(values[1], rel=1e-4)) == same
+
+
+@check("colour_weight", "moment_weight")
+def weights_of_terms(build):
+    """The loss is affine in either weight, and not constant."""
+    for key in ("colour_weight", "moment_weight"):
+        zero, one, three = (_appearance(build(*ALL_PLACES, f"{key}={weight}")) for weight in (0, 1, 3))
+        assert three - one == pytest.approx(2 * (one - zero), rel=1e-2)
+        assert one > zero + 0.01
+
+
+@check("colour_histogram")
+def histograms_cost_more(build):
+    without, with_ = (_appearance(build(*ALL_PLACES, f"colour_histogram={on}")) for on in ("false", "true"))
+    assert with_ > without + 0.01
+
+
+@check("appearance_weight", "overflow_weight")
+def weights_of_parts(build):
+    one, three = (
+        build(*ALL_PLACES, f"appearance_weight={weight}", f"overflow_weight={10 * weight}")
+        for weight in (1, 3)
+    )
+    for task in (one, three):
+        task.pool.fill_(2.0)
+    (total, parts), (total_3, parts_3) = _loss(one), _loss(three)
+    assert parts_3["appearance"] == pytest.approx(3 * parts["appearance"], rel=1e-3)
+    assert parts["overflow"] > 0.5
+    assert total.item() == pytest.approx(parts["appearance"] + 10 * parts["overflow"], rel=1e-4)
+    assert total_3.item() == pytest.approx(parts_3["appearance"] + 30 * parts_3["overflow"], rel=1e-4)
+
+
+@pytest.mark.parametrize("key", sorted(CHECKS))
+def test_a_key_counts(build, key):
+    CHECKS[key](build)
+
+
+OF_THE_FIT = {"lr", "milestones", "decay", "normalise_gradients"}
+OF_THE_LOOP = {"preset", "steps", "checkpoint_every", "preview_every"}  # tests/training
+
+
+def test_no_key_is_left_out():
+    assert {field.name for field in fields(NcaConfig)} == set(CHECKS) | OF_THE_FIT | OF_THE_LOOP
+
+
+@pytest.fixture
+def fitted(tmp_path, exemplar):
+    """The weights after a fit with some settings, as one vector."""
+    threads(1)
+
+    def fitted(*settings: str) -> torch.Tensor:
+        out = tmp_path / "-".join(settings)
+        texture = nca.fit(exemplar, out, overrides=[*SETTINGS, *settings], quiet=True)
+        return torch.cat([p.detach().flatten() for p in texture.model.parameters()])
+
+    return fitted
+
+
+def test_first_step_of_adam_is_as_long_as_the_learning_rate(fitted):
+    start = fitted("steps=0")
+    for lr in (1e-3, 4e-3):
+        assert (fitted("steps=1", f"lr={lr}") - start).abs().max().item() == pytest.approx(lr, rel=1e-2)
+
+
+def test_learning_rate_decays_at_the_milestones(fitted):
+    """To nothing after the first step, or not at all."""
+    once = fitted("steps=1")
+    assert torch.equal(fitted("steps=3", "milestones=1", "decay=0"), once)
+    assert not torch.equal(fitted("steps=3", "milestones=2", "decay=0"), once)
+    assert not torch.equal(fitted("steps=3", "milestones=1", "decay=0.5"), once)
+
+
+def test_normalised_gradients_give_another_fit(fitted):
+    """Adam forgets a constant scale, but not one that changes from step to step."""
+    weights = [fitted("steps=4", f"normalise_gradients={on}") for on in ("true", "false")]
+    assert (weights[0] - weights[1]).abs().max() > 1e-4
