@@ -145,7 +145,7 @@ def test_gram_matrices_and_their_gradient(levels, image, regions):
     features = ours.features(texels, names)
     total, expected = torch.zeros(()), torch.zeros(())
     for k, name in enumerate(names):
-        groups = [features[name]] if parts[name] is None else [features[name][i] for i in parts[name]]
+        groups = [features[name][i] for i in parts[name] or [slice(None)]]
         gram = torch.stack([f.T @ f / len(f) for f in groups])
         assert torch.allclose(grams[name], gram, rtol=1e-4, atol=1e-5)
         generator = torch.Generator().manual_seed(k)
