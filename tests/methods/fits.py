@@ -24,7 +24,7 @@ class TinyFit:
 
 
 SMALL_RUN = "checkpoint_every=1 preview_every=0"
-RADIANCE = "base_steps=150 rays=512 table=11 coarsest=8 finest=32 occupancy=32"
+RADIANCE = "rays=512 table=11 occupancy=32 ray_steps=96"
 FITS = {
     "checkerboard": TinyFit("--exemplar lava --steps 2", "--mesh cube.obj --offset 0.5"),
     "nca": TinyFit(
@@ -42,8 +42,13 @@ FITS = {
         "--mesh cube.obj --start-level 0",
     ),
     "nerf": TinyFit(
-        f"--capture photos --base-mesh base.obj --steps 2 --set ray_steps=96 {RADIANCE} {SMALL_RUN}",
+        f"--capture photos --base-mesh base.obj --steps 2 --set base_steps=150 coarsest=8 "
+        f"finest=32 {RADIANCE} {SMALL_RUN}",
         "--mesh ball.obj --size 128",
+    ),
+    "plain_field": TinyFit(
+        f"--capture photos --steps 2 --set {RADIANCE} {SMALL_RUN}",
+        "--density 200",  # so much of the fog of two steps is solid
     ),
     "displacement": TinyFit("--reference spikes --set resolution=16", "--mesh cube.obj", resume=""),
 }

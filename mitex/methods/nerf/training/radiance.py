@@ -12,7 +12,7 @@ import torch
 
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.pixels import Batch, Pixels
-from mitex.methods.nerf.config import NerfConfig
+from mitex.methods.nerf.config import RadianceConfig
 from mitex.methods.nerf.field.occupancy import Occupancy
 from mitex.methods.nerf.field.rendering import batch_rays, render_view
 from mitex.methods.nerf.field.tensors import rows
@@ -41,7 +41,7 @@ class RadianceTask(ABC):
 
     def __init__(
         self,
-        config: NerfConfig,
+        config: RadianceConfig,
         capture: Capture,
         preview_view: tuple[Capture, int],
         occupancy: Occupancy,
@@ -142,7 +142,7 @@ class RadianceTask(ABC):
         return np.hstack(render_view(self.field(self.mean), *self.preview_view, PREVIEW)[::-1])
 
 
-def schedule(config: NerfConfig) -> dict[str, Any]:
+def schedule(config: RadianceConfig) -> dict[str, Any]:
     """Options of `train`: Adam with a learning rate that falls to a tenth in `lr_steps`."""
     return {
         "lr": lambda step: config.lr * 0.1 ** (step / config.lr_steps),
