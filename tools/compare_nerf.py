@@ -17,7 +17,7 @@ import numpy as np
 from mitex.evaluation.views import view_quality
 from mitex.images import write_image
 from mitex.methods.baselines import plain_field
-from mitex.methods.baselines.elevations import compare_elevations
+from mitex.methods.baselines.quilted.elevations import compare_elevations
 from mitex.methods.nerf import NerfTexture, load_capture
 from mitex.methods.nerf.field.rendering import render_view, render_views
 from mitex.render import sheet

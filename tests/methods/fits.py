@@ -16,11 +16,13 @@ class TinyFit:
         fit: what is learned, and settings that make it quick.
         apply: on which mesh, and options that make it quick.
         resume: words with which the fit is resumed; empty if the method does not train.
+        source: method whose run it learns from, if any.
     """
 
     fit: str
     apply: str
     resume: str = "--resume --steps 3"
+    source: str = ""
 
 
 SMALL_RUN = "checkpoint_every=1 preview_every=0"
@@ -49,6 +51,12 @@ FITS = {
     "plain_field": TinyFit(
         f"--capture photos --steps 2 --set {RADIANCE} {SMALL_RUN}",
         "--density 200",  # so much of the fog of two steps is solid
+    ),
+    "quilted": TinyFit(
+        "--texture runs/nerf --set size=128 patches=4",
+        "--mesh cube.obj --resolution 128",
+        resume="",
+        source="nerf",
     ),
     "displacement": TinyFit("--reference spikes --set resolution=16", "--mesh cube.obj", resume=""),
 }

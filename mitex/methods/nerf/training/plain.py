@@ -92,7 +92,7 @@ def parameter_shapes(grid: HashGrid) -> dict[str, tuple[int, ...]]:
     return {"table": (grid.size,)} | {f"weights/{k}": shape for k, shape in enumerate(layers)}
 
 
-class PlainTask(RadianceTask):
+class PlainTask(RadianceTask[RadianceConfig]):
     """Trains a plain field; arguments as of `RadianceTask`."""
 
     def __init__(self, config: RadianceConfig, capture: Capture, preview_view: tuple[Capture, int]) -> None:
@@ -100,7 +100,7 @@ class PlainTask(RadianceTask):
         self.grid = hash_grid(config)
         parameters = {}
         for name, shape in parameter_shapes(self.grid).items():
-            bound = 1e-4 if name == "table" else weight_bound(shape)
+            bound = 1e-4 if name == "table" else weight_bound((shape[0], shape[-1]))
             parameters[name] = torch.empty(shape).uniform_(-bound, bound, generator=generator)
             parameters[name].requires_grad_()
         occupancy = Occupancy(config.occupancy, hull_cells(capture, config.occupancy))

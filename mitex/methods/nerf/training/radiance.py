@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import torch
@@ -27,8 +27,10 @@ REFRESH = 16  # steps between refreshes of the occupancy, and between updates of
 BETAS, EPSILON = (0.9, 0.99), 1e-15  # of Adam
 PREVIEW = 160  # pixels along the longest side
 
+Config = TypeVar("Config", bound=RadianceConfig)
 
-class RadianceTask(ABC):
+
+class RadianceTask(ABC, Generic[Config]):
     """A radiance field as a task of the training loop; the parameters that are kept are their running mean.
 
     Args:
@@ -41,7 +43,7 @@ class RadianceTask(ABC):
 
     def __init__(
         self,
-        config: RadianceConfig,
+        config: Config,
         capture: Capture,
         preview_view: tuple[Capture, int],
         occupancy: Occupancy,
