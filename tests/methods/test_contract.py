@@ -155,10 +155,11 @@ class TestRun:
         assert main(["apply", str(runs(name)), "--no-such-option", "--out", "a.glb"]) == 2
         assert f"no option of {name} textures" in capsys.readouterr().err
 
-    def test_the_same_seed_fits_the_same(self, name, runs, workplace, monkeypatch):
-        """And a run in place is not overwritten."""
+    def test_a_run_is_not_overwritten(self, name, runs, workplace, monkeypatch, capsys):
         monkeypatch.chdir(workplace)
+        before = (runs(name) / NAME).read_bytes()
         assert main(f"fit {name} --out runs/{name} --quiet {FITS[name].fit}".split()) == 2
+        assert "holds a" in capsys.readouterr().err and (runs(name) / NAME).read_bytes() == before
 
     def test_it_is_resumed(self, name, runs, workplace, monkeypatch):
         if not FITS[name].resume:

@@ -38,7 +38,7 @@ def save(
 
 
 def load(source: str | Path) -> tuple[list[FaceNetwork], Mesh, torch.Tensor, dict[str, Any]]:
-    """Reads a model by file, run folder or bundled name: generators, template, noise, what is known.
+    """Reads a model by file, run folder or bundled name: generators, template, noise, and `about`.
 
     Raises:
         CheckpointError: there is none, or it is damaged.

@@ -38,7 +38,7 @@ def fit(
 ) -> GeometricTexture:
     """Learns the geometric texture of a reference mesh; writes a run folder with the model in it.
 
-    The training meshes of the levels are found first and kept in the user's cache folder.
+    The training meshes of the levels are computed first and kept in the user's cache folder.
 
     Args:
         reference: a mesh, what `Mesh.load` takes, or a name of `REFERENCES`.
@@ -56,8 +56,8 @@ def fit(
     run = Run.of(PRESETS, out, **options)
     config = run.config
     shape = reference if isinstance(reference, Mesh) else find_reference(reference)
-    given = Mesh.load(template) if isinstance(template, str | Path) else template
-    shape, start = normalised(shape, find_template(shape, given))
+    template = Mesh.load(template) if isinstance(template, str | Path) else template
+    shape, start = normalised(shape, find_template(shape, template))
     keep_freed_memory()
     meshes, reports = training_meshes(shape, start, config, run.quiet)
     hierarchy = Hierarchy.of(start, config.levels)
@@ -76,7 +76,7 @@ def fit(
 def training_meshes(
     reference: Mesh, template: Mesh, config: GeometricConfig, quiet: bool = True
 ) -> tuple[list[torch.Tensor], list[FitReport]]:
-    """Vertices (V, 3) of the training mesh of each level, from the cache where known, and how they fit.
+    """Vertices (V, 3) of the training mesh of each level, from the cache where it has them, and how they fit.
 
     Args:
         reference, template: from `normalised`.

@@ -67,5 +67,5 @@ def gradient_penalty(critic: FaceNetwork, features: torch.Tensor, graph: FaceGra
 
 
 def adversarial_loss(critic: FaceNetwork, vertices: torch.Tensor, graph: FaceGraph) -> torch.Tensor:
-    """What the generator minimises: the negative score of what it made."""
+    """What the generator minimises: the negative score of its mesh."""
     return -critic(face_features(vertices, graph), graph).mean()
