@@ -47,6 +47,8 @@ def runs(workplace, toy, own_cache):
     folders = {}
 
     def run(name):
+        if FITS[name].source:
+            run(FITS[name].source)
         if name not in folders:
             with pytest.MonkeyPatch.context() as patch:
                 patch.chdir(workplace)

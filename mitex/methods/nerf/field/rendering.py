@@ -10,7 +10,7 @@ import numpy as np
 
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.pixels import Batch, Pixels
-from mitex.methods.nerf.config import NerfConfig
+from mitex.methods.nerf.config import RadianceConfig
 from mitex.methods.nerf.field.tensors import channels, rows
 from mitex.runtime.jit import dr, mi
 from mitex.textures.march import DIAGONAL, RadianceField, composite
@@ -20,7 +20,7 @@ REFINEMENT = 2  # steps of a picture for one of the training; the durian gains 0
 LONGEST = 400  # side of rendered photos [pixels]
 
 
-def render_step(config: NerfConfig) -> float:
+def render_step(config: RadianceConfig) -> float:
     """Length of the steps by which a trained field is rendered [scene units]."""
     return DIAGONAL / (REFINEMENT * config.ray_steps)
 

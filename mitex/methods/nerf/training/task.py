@@ -50,7 +50,7 @@ FLAT = 1e-2
 POSE = 1e-2  # unit of the cameras' corrections [rad, scene units]
 
 
-class TextureTask(RadianceTask):
+class TextureTask(RadianceTask[NerfConfig]):
     """Features, networks, light and cluster centres, trained on a capture around a base shape.
 
     Args:
