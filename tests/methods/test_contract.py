@@ -157,7 +157,7 @@ class TestRun:
         monkeypatch.chdir(workplace)
         before = (runs(name) / NAME).read_bytes()
         assert main(f"fit {name} --out runs/{name} --quiet {FITS[name].fit}".split()) == 2
-        assert "already" in capsys.readouterr().err and (runs(name) / NAME).read_bytes() == before
+        assert "holds a" in capsys.readouterr().err and (runs(name) / NAME).read_bytes() == before
 
     def test_it_is_resumed(self, name, runs, workplace, monkeypatch):
         if not FITS[name].resume:

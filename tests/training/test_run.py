@@ -112,6 +112,17 @@ def test_a_run_is_not_overwritten(tmp_path, name):
     run.check(tmp_path, resume=True)
 
 
+def test_a_finished_result_is_not_overwritten(tmp_path):
+    """Methods that train in one go leave no checkpoint, only their result."""
+    run.prepare(tmp_path, SmallConfig(), {"method": "small"})
+    run.check(tmp_path)
+    (tmp_path / "texture.safetensors").write_bytes(b"hours of work")
+    with pytest.raises(OutputError, match="holds a finished run; name another --out"):
+        run.check(tmp_path)
+    with pytest.raises(CheckpointError, match="no checkpoint"):
+        run.check(tmp_path, resume=True)
+
+
 def test_other_files_are_left_alone(tmp_path):
     (tmp_path / "thesis.tex").touch()
     with pytest.raises(OutputError, match="holds other files; name a new or empty folder"):
@@ -141,12 +152,3 @@ def test_a_second_run_leaves_the_first_alone(tmp_path):
             pass
         metrics.write({"step": 1})
         assert _files(folder) == ["config.toml", "metrics.jsonl"]
-
-
-def test_a_finished_texture_is_not_overwritten(tmp_path):
-    """A method that does not train leaves no checkpoint, but a texture."""
-    run.prepare(tmp_path, SmallConfig(), {"method": "small"})
-    run.check(tmp_path)
-    (tmp_path / "texture.safetensors").touch()
-    with pytest.raises(OutputError, match="holds a texture already"):
-        run.check(tmp_path)

@@ -14,13 +14,12 @@ from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.statistics import exemplar_features
 
 MIN_VECTORS = 256  # feature vectors of a region
-Taps = dict[str, Tap | GramTap]
 
 
 class Comparison(Protocol):
     """What a loss reads of the network, and what it makes of that."""
 
-    def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Taps: ...
+    def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Mapping[str, Tap | GramTap]: ...
 
     def cost(
         self, features: Mapping[str, torch.Tensor], colours: torch.Tensor, k: int, generator: torch.Generator
@@ -52,7 +51,7 @@ class GramComparison:
             features = exemplar_features(network, image, layers)
             self.targets.append({layer: gram_matrix(f) for layer, f in features.items()})
 
-    def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Taps:
+    def taps(self, network: SurfaceVgg, generator: torch.Generator) -> dict[str, GramTap]:
         return {layer: GramTap(network.place(layer), self._regions(network, layer)) for layer in self.layers}
 
     def _regions(self, network: SurfaceVgg, layer: str) -> list[torch.Tensor] | None:
@@ -92,7 +91,7 @@ class TransportComparison:
         self.colours = [normalise_colours(image.flatten(0, 1)) for image in images]
         self.targets = [exemplar_features(network, image, layers) for image in images]
 
-    def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Taps:
+    def taps(self, network: SurfaceVgg, generator: torch.Generator) -> dict[str, Tap]:
         return {
             layer: Tap(network.place(layer), self._places(network.counts[layer], generator)[None])
             for layer in self.layers
