@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -25,7 +24,7 @@ def render_step(config: RadianceConfig) -> float:
     return DIAGONAL / (REFINEMENT * config.ray_steps)
 
 
-def batch_rays(batch: Batch) -> tuple[Any, Any]:
+def batch_rays(batch: Batch) -> tuple[mi.Point3f, mi.Vector3f]:
     """Origins and directions as Dr.Jit arrays."""
     return channels(mi.Point3f, batch.origins), channels(mi.Vector3f, batch.directions)
 
