@@ -20,6 +20,7 @@ from mitex.training.locate import NAME
 from mitex.training.settings import FitConfig, meaning
 from tests.methods.fits import FITS, prepare
 
+SIDE = 48  # of pictures [pixels]
 TOY = Path(__file__).parents[1] / "toy"
 pytestmark = pytest.mark.usefixtures("own_cache", "toy")
 
@@ -143,13 +144,15 @@ class TestRun:
 
     def test_it_is_applied_exported_and_rendered(self, name, runs, workplace, monkeypatch, capsys):
         monkeypatch.chdir(workplace)
+        quick = {"resolution": SIDE, "spp": 4}
+        monkeypatch.setattr(methods()[name].load_apply(), "picture_options", lambda options: quick)
         for suffix in ("glb", "png"):
             out = f"out/{name}.{suffix}"
             assert main(f"apply {runs(name)} --out {out} {FITS[name].apply}".split()) == 0
             assert capsys.readouterr().out.splitlines()[-1] == out
         assert (workplace / f"out/{name}.glb").read_bytes()[:4] == b"glTF"
         picture = read_image(workplace / f"out/{name}.png")
-        assert picture.shape == (512, 512, 3) and picture.std() > 0.02
+        assert picture.shape == (SIDE, SIDE, 3) and picture.std() > 0.02
 
     def test_an_option_of_another_method_is_refused(self, name, runs, capsys):
         assert main(["apply", str(runs(name)), "--no-such-option", "--out", "a.glb"]) == 2
