@@ -1,6 +1,5 @@
 """The wheel: built from the tree without a network, imported outside the checkout."""
 
-import ast
 import os
 import re
 import subprocess
@@ -12,7 +11,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-IMPORT_NAMES = {"imageio-ffmpeg": "imageio_ffmpeg", "pillow": "PIL", "scikit-image": "skimage"}
 
 
 @pytest.fixture(scope="session")
@@ -89,31 +87,6 @@ def test_public_names_resolve_in_the_installed_copy(installed: Path, tmp_path: P
 def test_the_command_is_there(installed: Path, tmp_path: Path):
     assert "mitex = mitex.cli:main" in (next(installed.glob("*.dist-info")) / "entry_points.txt").read_text()
     assert run_installed(installed, tmp_path, "from mitex.cli import main; print(callable(main))") == "True"
-
-
-def declared() -> set[str]:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    wanted = project["dependencies"] + [
-        item for extra in project["optional-dependencies"].values() for item in extra
-    ]
-    names = {match[0] for item in wanted if (match := re.match(r"[\w.-]+", item))}
-    return {IMPORT_NAMES.get(name, name) for name in names}
-
-
-def imported(path: Path) -> set[str]:
-    names = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            names |= {alias.name.split(".")[0] for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names.add(node.module.split(".")[0])
-    return names - set(sys.stdlib_module_names) - {"mitex"}
-
-
-def test_every_import_of_the_package_is_a_declared_dependency():
-    found = {name: path for path in sorted((ROOT / "mitex").rglob("*.py")) for name in imported(path)}
-    assert found.keys() >= {"mitsuba", "torch"}
-    assert {name: str(path) for name, path in found.items() if name not in declared()} == {}
 
 
 def test_pins_agree_with_the_declared_ranges():

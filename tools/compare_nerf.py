@@ -16,11 +16,12 @@ import numpy as np
 
 from mitex.evaluation.views import view_quality
 from mitex.images import write_image
-from mitex.methods.baselines.elevations import compare_elevations
-from mitex.methods.baselines.plain_field import fit_plain
-from mitex.methods.nerf import PRESETS, NerfTexture, load_capture
+from mitex.methods.baselines import plain_field
+from mitex.methods.baselines.quilted.elevations import compare_elevations
+from mitex.methods.nerf import NerfTexture, load_capture
 from mitex.methods.nerf.field.rendering import render_view, render_views
 from mitex.render import sheet
+from mitex.training import checkpoint
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 CELL = 320  # side of a picture [px]
@@ -34,17 +35,16 @@ def main() -> None:
         texture = NerfTexture.load(Path(runs) / name)
         capture = load_capture(Path(captures) / name).within(texture.similarity)
         elevations(name, texture, capture)
-        training, held_out = capture.split()
-        about = texture.model.about
-        plain = fit_plain(
-            training,
-            Path(runs) / f"plain-{name}",
-            PRESETS[about["preset"]],
-            about["seconds"],
-            (held_out, 0),
-            quiet=False,
+        about, folder = texture.about, Path(runs) / f"plain-{name}"
+        plain = plain_field.fit(
+            capture,
+            folder,
+            preset=about["preset"],
+            overrides=[f"seconds={about['seconds']}"],
+            resume=(folder / checkpoint.NAME).exists(),
         )
-        fields = {"ours": texture.shell, "plain": plain.field(plain.mean)}
+        held_out = capture.split()[1]
+        fields = {"ours": texture.shell, "plain": plain.field}
         for label, field in fields.items():
             print(f"{name}, {label}: {view_quality(render_views(field, held_out))}", flush=True)
         pairs = [render_view(field, held_out, 0) for field in fields.values()]

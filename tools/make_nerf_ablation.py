@@ -17,7 +17,7 @@ import numpy as np
 from make_nerf_gallery import CELL, GALLERY, picture, plane
 
 from mitex.images import write_image
-from mitex.methods.baselines.elevations import compare_elevations
+from mitex.methods.baselines.quilted.elevations import compare_elevations
 from mitex.methods.nerf import NerfTexture, load_capture
 from mitex.methods.nerf.field.networks import FEATURES
 from mitex.render import sheet

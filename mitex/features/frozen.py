@@ -8,7 +8,7 @@ node: taps (feature maps, or samples of them) add their gradient to the map that
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -107,28 +107,34 @@ class Tap:
 class GramTap:
     """Gram matrices (regions, C, C) of the map's feature vectors, each divided by how many there are.
 
-    The vectors are cut into regions of (nearly) equal numbers in the order in which they come. Products are
-    taken in the map's type and summed in float32, without a copy of the map: bfloat16 maps give it to 1e-3.
+    Products are taken in the map's type and summed in float32, without a copy of the map: bfloat16 maps give
+    it to 1e-3.
+
+    Attributes:
+        index: of the operation.
+        regions: int64 indices of the vectors of each region; one region of all vectors if None.
     """
 
     index: int
-    regions: int = 1
+    regions: Sequence[torch.Tensor] | None = None
 
     def read(self, x: torch.Tensor) -> torch.Tensor:
         rows = _rows(x)
-        total = torch.zeros(self.regions, rows.shape[1], rows.shape[1])
-        for gram, region in zip(total, rows.tensor_split(self.regions), strict=True):
-            for part in region.split(GRAM_ROWS):
-                gram += part.t() @ part
-            gram /= len(region)
-        return total
+        if self.regions is None:
+            return _gram(rows.split(GRAM_ROWS), rows)[None]
+        return torch.stack([_gram((rows[i] for i in r.split(GRAM_ROWS)), rows) for r in self.regions])
 
     def add(self, flowing: torch.Tensor, gradient: torch.Tensor, x: torch.Tensor) -> None:
-        values, gradients = (rows.tensor_split(self.regions) for rows in (_rows(x), _shared_rows(flowing)))
-        for weight, region, changed in zip(gradient, values, gradients, strict=True):
-            weight = ((weight + weight.t()) / len(region)).to(x.dtype)
-            for whole, part in zip(changed.split(GRAM_ROWS), region.split(GRAM_ROWS), strict=True):
-                whole.addmm_(part, weight)
+        rows, total = _rows(x), _shared_rows(flowing)
+        for weight, region in zip(gradient, self.regions or [None], strict=True):
+            count = len(rows) if region is None else len(region)
+            weight = ((weight + weight.t()) / count).to(x.dtype)
+            if region is None:
+                for whole, part in zip(total.split(GRAM_ROWS), rows.split(GRAM_ROWS), strict=True):
+                    whole.addmm_(part, weight)
+                continue
+            for part in region.split(GRAM_ROWS):
+                total.index_add_(0, part, rows[part] @ weight)
 
 
 class FrozenStack(torch.autograd.Function):
@@ -166,6 +172,15 @@ class FrozenStack(torch.autograd.Function):
             outputs[index] = None
         ctx.outputs = None
         return flowing.float() if flowing is not None else None, None, None
+
+
+def _gram(parts: Iterable[torch.Tensor], rows: torch.Tensor) -> torch.Tensor:
+    """(C, C) float32 mean outer product of the vectors (n, C) in some parts of `rows`."""
+    total, count = torch.zeros(rows.shape[1], rows.shape[1]), 0
+    for part in parts:
+        total += part.t() @ part
+        count += len(part)
+    return total / count
 
 
 def _rows(x: torch.Tensor) -> torch.Tensor:

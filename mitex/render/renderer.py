@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from mitex.mesh import Mesh
 from mitex.mesh.mesh import Similarity
 from mitex.render.framing import FOV, View, fit_view, hull, rotation
 from mitex.render.studio import GREY, backdrop, lights
+
+if TYPE_CHECKING:
+    from mitex.runtime.jit import mi
 
 MIN_ROUGHNESS = 0.05
 MAX_DEPTH = 4
@@ -117,20 +120,21 @@ class OrbitRenderer:
         self._turn(azimuth, view)
         return accumulated(self._scene, self.resolution, spp, seed)
 
-    def _build(self, asset: Asset, mesh: Mesh, ao: bool) -> tuple[Any, Any]:
+    def _build(self, asset: Asset, mesh: Mesh, ao: bool) -> tuple[mi.Scene, mi.SceneParameters]:
         from mitex.plugins import init
+        from mitex.runtime.jit import mi
 
-        mi = init()
-        bsdf = _bsdf(mi, asset, ao)
+        init()
+        bsdf = _bsdf(asset, ao)
         scene = {
             "type": "scene",
             "integrator": {"type": "path", "max_depth": MAX_DEPTH, "rr_depth": 99, "hide_emitters": True},
-            "sensor": sensor(mi, self.resolution),
-            "object": shape(mi, "object", mesh, {"type": "twosided", "bsdf": bsdf}, normals=True),
+            "sensor": sensor(self.resolution),
+            "object": shape("object", mesh, {"type": "twosided", "bsdf": bsdf}, normals=True),
             **lights(),
         }
         if self._on_backdrop:
-            scene["backdrop"] = paper_sweep(mi, self._floor)
+            scene["backdrop"] = paper_sweep(self._floor)
         loaded = mi.load_dict(scene)
         return loaded, mi.traverse(loaded)
 
@@ -150,7 +154,7 @@ class OrbitRenderer:
         self._params.update()
 
 
-def accumulated(scene: Any, resolution: int, spp: int, seed: int) -> np.ndarray:
+def accumulated(scene: mi.Scene, resolution: int, spp: int, seed: int) -> np.ndarray:
     """(N, N, 3) linear radiance of a scene with a film of `sensor`, over white where it is transparent."""
     from mitex.runtime.jit import mi
 
@@ -184,8 +188,10 @@ def _surface(
     return (mesh.vertices.astype(np.float64), mesh.normals.astype(np.float64), detail.astype(np.float64))
 
 
-def _bsdf(mi: Any, asset: Asset, ao: bool) -> dict[str, Any]:
+def _bsdf(asset: Asset, ao: bool) -> dict[str, Any]:
     """The material, from textures if the asset has them, else from vertex maps."""
+    from mitex.runtime.jit import mi
+
     maps, kind = asset.vertex_maps, "vertex_field"
     if asset.texture_maps is not None:
         maps, kind = asset.texture_maps, "texel_field"
@@ -236,14 +242,16 @@ def _facing(detail: np.ndarray, normals: np.ndarray, to_camera: np.ndarray) -> n
     return unit(detail + np.maximum(VIEW_MARGIN - cosine, 0.0) * side * to_camera)
 
 
-def paper_sweep(mi: Any, floor: float) -> Any:
+def paper_sweep(floor: float) -> mi.Mesh:
     """The backdrop at height `floor` as a Mitsuba shape."""
     paper = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [GREY] * 3}}
-    return shape(mi, "backdrop", backdrop(floor), {"type": "twosided", "bsdf": paper})
+    return shape("backdrop", backdrop(floor), {"type": "twosided", "bsdf": paper})
 
 
-def shape(mi: Any, name: str, mesh: Mesh, bsdf: dict[str, Any], normals: bool = False) -> Any:
+def shape(name: str, mesh: Mesh, bsdf: dict[str, Any], normals: bool = False) -> mi.Mesh:
     """A Mitsuba mesh, with UVs if the mesh has a vertex for each."""
+    from mitex.runtime.jit import mi
+
     props = mi.Properties()
     props["bsdf"] = mi.load_dict(bsdf)
     counts = len(mesh.vertices), len(mesh.faces)
@@ -260,8 +268,10 @@ def shape(mi: Any, name: str, mesh: Mesh, bsdf: dict[str, Any], normals: bool = 
     return shape
 
 
-def sensor(mi: Any, resolution: int) -> dict[str, Any]:
+def sensor(resolution: int) -> dict[str, Any]:
     """A scene's entry for the camera of all pictures: square, with a portrait lens."""
+    from mitex.runtime.jit import mi
+
     return {
         "type": "perspective",
         "fov": math.degrees(FOV),

@@ -10,6 +10,7 @@ from mitex.render.framing import fit_view, hull, rotation
 from mitex.render.picture import AZIMUTH, ELEVATION
 from mitex.render.renderer import MAX_DEPTH, accumulated, paper_sweep, sensor
 from mitex.render.studio import lights
+from mitex.runtime.jit import mi
 from mitex.textures.march import RadianceField
 
 
@@ -35,7 +36,7 @@ def shell_still(
     Returns:
         (H, W, 3) float32 linear radiance.
     """
-    mi = init()
+    init()
     from mitex.textures.shell_field import shell_field
 
     centre = outline.mean(0)
@@ -53,9 +54,9 @@ def shell_still(
             "max_depth": MAX_DEPTH,
             "hide_emitters": True,
         },
-        "sensor": sensor(mi, resolution) | {"to_world": look_at},
+        "sensor": sensor(resolution) | {"to_world": look_at},
         **lights(),
     }
     if backdrop:
-        scene["backdrop"] = paper_sweep(mi, float(points[:, 1].min()))
+        scene["backdrop"] = paper_sweep(float(points[:, 1].min()))
     return accumulated(mi.load_dict(scene), resolution, spp, seed)

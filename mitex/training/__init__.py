@@ -1,4 +1,4 @@
-"""The training room: one loop, its config, checkpoints, metrics and progress.
+"""Training: one loop, its config, checkpoints, metrics and progress.
 
 Names are resolved on first use: configs and errors are wanted where torch is not.
 """
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 __all__ = [
     "Change",
     "Interrupted",
+    "ParameterTask",
     "Step",
     "Task",
     "TrainResult",
@@ -20,6 +21,7 @@ __all__ = [
 _HOMES = {
     "Change": "task",
     "Interrupted": "errors",
+    "ParameterTask": "task",
     "Step": "task",
     "Task": "task",
     "TrainResult": "loop",
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
     from mitex.training.config import resolve
     from mitex.training.errors import Interrupted, TrainingDiverged
     from mitex.training.loop import TrainResult, train
-    from mitex.training.task import Change, Step, Task
+    from mitex.training.task import Change, ParameterTask, Step, Task
 
 
 def __getattr__(name: str) -> Any:

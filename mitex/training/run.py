@@ -14,6 +14,7 @@ from mitex import __version__
 from mitex.errors import CheckpointError, OutputError
 from mitex.paths import atomic_write, is_temporary, missing_folders, prepare_folder
 from mitex.training import checkpoint
+from mitex.training.locate import NAME as RESULT
 from mitex.training.metrics import Metrics
 from mitex.training.toml import to_toml
 
@@ -36,6 +37,7 @@ def check(out: str | os.PathLike[str], resume: bool = False) -> None:
     folder = Path(out).expanduser()
     try:
         begun = any((folder / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
+        finished = not begun and _is_run(folder) and (folder / RESULT).exists()
         foreign = not begun and folder.is_dir() and not (_is_run(folder) or _is_empty(folder))
     except (OSError, ValueError) as e:  # ValueError: a null byte in the name
         raise OutputError(f"cannot use '{out}' as a run folder ({e})", "name another --out") from e
@@ -47,6 +49,8 @@ def check(out: str | os.PathLike[str], resume: bool = False) -> None:
         raise OutputError(
             f"'{out}' holds a run already", "add --resume to continue it, or name another --out"
         )
+    if finished:  # by a method that leaves no checkpoint
+        raise OutputError(f"'{out}' holds a finished run", "name another --out")
     if foreign:
         raise OutputError(f"'{out}' holds other files", "name a new or empty folder with --out")
 

@@ -88,3 +88,37 @@ class Task(Protocol):
     def metadata(self) -> dict[str, str]:
         """What is trained (`method`, exemplar, ...), the same throughout; a resumed run must match it."""
         ...
+
+
+class ParameterTask:
+    """The parts of a task whose state is its parameters alone; a subclass adds `loss` and `metadata`.
+
+    Args:
+        named: Leaf tensors by name, in a fixed order; they are made to require gradients.
+
+    Attributes:
+        named: The same.
+    """
+
+    def __init__(self, named: Mapping[str, torch.Tensor]) -> None:
+        self.named = {name: value.requires_grad_() for name, value in named.items()}
+
+    @property
+    def parameters(self) -> Sequence[torch.Tensor]:
+        return list(self.named.values())
+
+    def begin(self, step: int, generator: torch.Generator) -> Change | None:
+        """Changes nothing."""
+
+    def state(self) -> dict[str, torch.Tensor]:
+        return {name: value.detach() for name, value in self.named.items()}
+
+    def load_state(self, state: dict[str, torch.Tensor]) -> None:
+        with torch.no_grad():
+            for name, value in self.named.items():
+                if state[name].shape != value.shape:
+                    raise ValueError(f"{name} of shape {tuple(state[name].shape)}")
+                value.copy_(state[name])
+
+    def preview(self, step: int) -> np.ndarray | None:
+        """No picture."""

@@ -16,15 +16,17 @@ class TinyFit:
         fit: what is learned, and settings that make it quick.
         apply: on which mesh, and options that make it quick.
         resume: words with which the fit is resumed; empty if the method does not train.
+        source: method whose run it learns from, if any.
     """
 
     fit: str
     apply: str
     resume: str = "--resume --steps 3"
+    source: str = ""
 
 
 SMALL_RUN = "checkpoint_every=1 preview_every=0"
-RADIANCE = "base_steps=150 rays=512 table=11 coarsest=8 finest=32 occupancy=32"
+RADIANCE = "rays=512 table=11 occupancy=32 ray_steps=96"
 FITS = {
     "checkerboard": TinyFit("--exemplar lava --steps 2", "--mesh cube.obj --offset 0.5"),
     "nca": TinyFit(
@@ -42,8 +44,19 @@ FITS = {
         "--mesh cube.obj --start-level 0",
     ),
     "nerf": TinyFit(
-        f"--capture photos --base-mesh base.obj --steps 2 --set ray_steps=96 {RADIANCE} {SMALL_RUN}",
-        "--mesh ball.obj --size 128",
+        f"--capture photos --base-mesh base.obj --steps 2 --set base_steps=150 coarsest=8 "
+        f"finest=32 {RADIANCE} {SMALL_RUN}",
+        "--mesh ball.obj --size 128 --density 200",
+    ),
+    "plain_field": TinyFit(
+        f"--capture photos --steps 2 --set {RADIANCE} {SMALL_RUN}",
+        "--density 200",  # so much of the fog of two steps is solid
+    ),
+    "quilted": TinyFit(
+        "--texture runs/nerf --set size=128 patches=4",
+        "--mesh cube.obj --resolution 128",
+        resume="",
+        source="nerf",
     ),
     "displacement": TinyFit("--reference spikes --set resolution=16", "--mesh cube.obj", resume=""),
 }

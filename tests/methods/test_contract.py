@@ -20,6 +20,7 @@ from mitex.training.locate import NAME
 from mitex.training.settings import FitConfig, meaning
 from tests.methods.fits import FITS, prepare
 
+SIDE = 48  # of pictures [pixels]
 TOY = Path(__file__).parents[1] / "toy"
 pytestmark = pytest.mark.usefixtures("own_cache", "toy")
 
@@ -47,6 +48,8 @@ def runs(workplace, toy, own_cache):
     folders = {}
 
     def run(name):
+        if FITS[name].source:
+            run(FITS[name].source)
         if name not in folders:
             with pytest.MonkeyPatch.context() as patch:
                 patch.chdir(workplace)
@@ -141,22 +144,25 @@ class TestRun:
 
     def test_it_is_applied_exported_and_rendered(self, name, runs, workplace, monkeypatch, capsys):
         monkeypatch.chdir(workplace)
+        quick = {"resolution": SIDE, "spp": 4}
+        monkeypatch.setattr(methods()[name].load_apply(), "picture_options", lambda options: quick)
         for suffix in ("glb", "png"):
             out = f"out/{name}.{suffix}"
             assert main(f"apply {runs(name)} --out {out} {FITS[name].apply}".split()) == 0
             assert capsys.readouterr().out.splitlines()[-1] == out
         assert (workplace / f"out/{name}.glb").read_bytes()[:4] == b"glTF"
         picture = read_image(workplace / f"out/{name}.png")
-        assert picture.shape == (512, 512, 3) and picture.std() > 0.02
+        assert picture.shape == (SIDE, SIDE, 3) and picture.std() > 0.02
 
     def test_an_option_of_another_method_is_refused(self, name, runs, capsys):
         assert main(["apply", str(runs(name)), "--no-such-option", "--out", "a.glb"]) == 2
         assert f"no option of {name} textures" in capsys.readouterr().err
 
-    def test_the_same_seed_fits_the_same(self, name, runs, workplace, monkeypatch):
-        """And a run in place is not overwritten."""
+    def test_a_run_is_not_overwritten(self, name, runs, workplace, monkeypatch, capsys):
         monkeypatch.chdir(workplace)
+        before = (runs(name) / NAME).read_bytes()
         assert main(f"fit {name} --out runs/{name} --quiet {FITS[name].fit}".split()) == 2
+        assert "holds a" in capsys.readouterr().err and (runs(name) / NAME).read_bytes() == before
 
     def test_it_is_resumed(self, name, runs, workplace, monkeypatch):
         if not FITS[name].resume:

@@ -112,6 +112,17 @@ def test_a_run_is_not_overwritten(tmp_path, name):
     run.check(tmp_path, resume=True)
 
 
+def test_a_finished_result_is_not_overwritten(tmp_path):
+    """Methods that train in one go leave no checkpoint, only their result."""
+    run.prepare(tmp_path, SmallConfig(), {"method": "small"})
+    run.check(tmp_path)
+    (tmp_path / "texture.safetensors").write_bytes(b"hours of work")
+    with pytest.raises(OutputError, match="holds a finished run; name another --out"):
+        run.check(tmp_path)
+    with pytest.raises(CheckpointError, match="no checkpoint"):
+        run.check(tmp_path, resume=True)
+
+
 def test_other_files_are_left_alone(tmp_path):
     (tmp_path / "thesis.tex").touch()
     with pytest.raises(OutputError, match="holds other files; name a new or empty folder"):

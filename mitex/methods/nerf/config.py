@@ -9,23 +9,33 @@ from mitex.training.settings import TrainingConfig, key
 
 
 @dataclass(frozen=True)
-class NerfConfig(TrainingConfig):
-    """Settings of a fit; every key can be set from a TOML file or with `--set`."""
+class RadianceConfig(TrainingConfig):
+    """What every radiance field that learns from photos is told."""
 
     preset: str = "fast"
     steps: int = 6_000
     rays: int = key(4096, "rays in a step", 1, 1 << 20)
     one_view: bool = key(False, "all rays of a step from one photo (the paper), instead of from all")
     ray_steps: int = key(512, "steps of a ray along the diagonal of the scene cube", 16, 8192)
-    # Tables of 2^17 entries have room for the surface's cells at 64 to 512; with the published resolutions
-    # these share entries, and colours learn half as fast.
     table: int = key(17, "binary logarithm of the entries of a level's hash table", 8, 24)
-    coarsest: int = key(64, "resolution of the first level of features [per scene cube]", 2, 8192)
-    finest: int = key(512, "resolution of the last level of features [per scene cube]", 2, 8192)
-    density_width: int = key(64, "channels of the density network's hidden layer", 1, 1024)
     lr: float = key(1e-2, "learning rate", 0, 1)
     lr_steps: int = key(6_000, "steps in which it falls to a tenth", 1)
     average: float = key(0.95, "decay of the parameters' running mean per 16 steps: it is kept", 0, 0.9999)
+    distortion: float = key(1e-2, "weight of the distortion loss", 0)
+    occupancy: int = key(128, "cells of the occupancy grid along a side", 8, 512)
+    checkpoint_every: int = 500
+    preview_every: int = 1_000
+
+
+@dataclass(frozen=True)
+class NerfConfig(RadianceConfig):
+    """Settings of a fit; every key can be set from a TOML file or with `--set`."""
+
+    # Tables of 2^17 entries have room for the surface's cells at 64 to 512; with the published resolutions
+    # these share entries, and colours learn half as fast.
+    coarsest: int = key(64, "resolution of the first level of features [per scene cube]", 2, 8192)
+    finest: int = key(512, "resolution of the last level of features [per scene cube]", 2, 8192)
+    density_width: int = key(64, "channels of the density network's hidden layer", 1, 1024)
     learn_light: bool = key(
         False, "learn the light with the field (the paper), instead of estimating it beforehand"
     )
@@ -34,7 +44,6 @@ class NerfConfig(TrainingConfig):
         False, "fine normals learn from the density alone (the paper), instead of from colours too"
     )
     clustering: float = key(1e-5, "weight of the clustering loss", 0)
-    distortion: float = key(1e-2, "weight of the distortion loss", 0)
     normals: float = key(0.05, "weight of the normal loss", 0)
     interior_weight: float = key(
         0.01,
@@ -46,7 +55,6 @@ class NerfConfig(TrainingConfig):
     normal_rays: float = key(0.25, "share of the rays whose normals are compared", 0, 1)
     repulsion: float = key(0.05, "pseudo-distance that keeps projections from the nearest vertex", 1e-6)
     neighbours: int = key(8, "vertices whose normals make the coarse normal", 1, 64)
-    occupancy: int = key(128, "cells of the occupancy grid along a side", 8, 512)
     refine_cameras: bool = key(False, "optimize the poses too")
     base_steps: int = key(1_000, "of the coarse field that the base shape is taken from", 1)
     concavity: float = key(
@@ -56,8 +64,6 @@ class NerfConfig(TrainingConfig):
         0.01,
         1,
     )
-    checkpoint_every: int = 500
-    preview_every: int = 1_000
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -104,7 +104,7 @@ def load(source: str | Path) -> Model:
 
 
 def _check(model: Model) -> None:
-    shapes: Mapping[str, tuple[Any, Any]] = {
+    shapes: Mapping[str, tuple[object, object]] = {
         "weights": ([tuple(w.shape) for w in model.weights], weight_shapes(model.config)),
         "tables": ([len(t) for t in model.tables], Encoding(model.config).sizes),
         "frames": (model.frames.shape, (len(model.base.mesh.faces), 3, 3)),

@@ -113,7 +113,7 @@ class NerfTexture:
         return Decoder([mi.TensorXf(weight.numpy()) for weight in self.model.weights], packed=True)
 
     @property
-    def light(self) -> Any:
+    def light(self) -> mi.TensorXf:
         """`mi.TensorXf` (16,), learned with the texture."""
         return mi.TensorXf(self.model.light.numpy())
 

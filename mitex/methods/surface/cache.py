@@ -12,7 +12,7 @@ from mitex.cache import cached
 from mitex.methods.surface.levels import Level, Levels
 from mitex.paths import cache_dir
 
-VERSION = "2"  # part of the keys; to be raised when levels are found in another way
+VERSION = "3"  # part of the keys; to be raised when levels are found in another way
 
 
 def cached_levels(key: str, find: Callable[[], Levels], folder: Path | None = None) -> Levels:
@@ -34,18 +34,18 @@ def _read(place: Path) -> Levels:
     if not count:
         raise KeyError(place)
     levels = tuple(Level(array(f"taps{n}"), array(f"sizes{n}")) for n in range(count))
-    order = array("order")
+    order, position = array("order"), array("position")
 
     def matrix(name: str, rows: int) -> csr_array:
         parts = tuple(array(f"{name}_{part}") for part in ("data", "indices", "indptr"))
         return csr_array(parts, shape=(rows, len(order)))
 
     spread = matrix("spread", len(array("spread_indptr")) - 1)
-    return Levels(order, matrix("lookup", 9 * len(order)), spread, levels)
+    return Levels(order, position, matrix("lookup", 9 * len(order)), spread, levels)
 
 
 def _write(folder: Path, levels: Levels) -> None:
-    arrays = {"order": levels.order}
+    arrays = {"order": levels.order, "position": levels.position}
     for name, matrix in (("lookup", levels.lookup), ("spread", levels.spread)):
         arrays |= {f"{name}_{part}": getattr(matrix, part) for part in ("data", "indices", "indptr")}
     for n, level in enumerate(levels.levels):

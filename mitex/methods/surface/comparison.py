@@ -13,14 +13,13 @@ from mitex.losses import gram_distance, gram_matrix, moment_distance, relaxed_tr
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.statistics import exemplar_features
 
-LEAST = 256  # feature vectors of a region
-Taps = dict[str, Tap | GramTap]
+MIN_VECTORS = 256  # feature vectors of a region
 
 
 class Comparison(Protocol):
     """What a loss reads of the network, and what it makes of that."""
 
-    def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Taps: ...
+    def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Mapping[str, Tap | GramTap]: ...
 
     def cost(
         self, features: Mapping[str, torch.Tensor], colours: torch.Tensor, k: int, generator: torch.Generator
@@ -33,14 +32,14 @@ class GramComparison:
     """Squared distance of Gram matrices, averaged over layers (equation 4) and regions of the surface.
 
     One matrix for the whole surface says nothing of where its features are: a texture may be strong in one
-    place and faint elsewhere. Elements are numbered by groups, so a range of them is a region.
+    place and faint elsewhere. Regions are compact in space (`regions.bisect`).
 
     Args:
         network: of images.
         images: (P, H, W, 3) the exemplar's channel triples.
         layers: that are compared.
         region: texels of a region at the images' scale; None compares the whole surface, as the paper does.
-            Regions of deep layers are larger where that is needed for `LEAST` feature vectors in each.
+            Regions of deep layers are larger where that is needed for `MIN_VECTORS` feature vectors in each.
     """
 
     def __init__(
@@ -52,14 +51,15 @@ class GramComparison:
             features = exemplar_features(network, image, layers)
             self.targets.append({layer: gram_matrix(f) for layer, f in features.items()})
 
-    def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Taps:
+    def taps(self, network: SurfaceVgg, generator: torch.Generator) -> dict[str, GramTap]:
         return {layer: GramTap(network.place(layer), self._regions(network, layer)) for layer in self.layers}
 
-    def _regions(self, network: SurfaceVgg, layer: str) -> int:
+    def _regions(self, network: SurfaceVgg, layer: str) -> list[torch.Tensor] | None:
         if self.region is None:
-            return 1
-        most = network.counts[layer] // LEAST
-        return max(min(network.counts["relu1_1"] // self.region, most), 1)
+            return None
+        most = network.counts[layer] // MIN_VECTORS
+        count = min(network.counts["relu1_1"] // self.region, most)
+        return network.regions(layer, count) if count > 1 else None
 
     def cost(
         self, features: Mapping[str, torch.Tensor], colours: torch.Tensor, k: int, generator: torch.Generator
@@ -91,7 +91,7 @@ class TransportComparison:
         self.colours = [normalise_colours(image.flatten(0, 1)) for image in images]
         self.targets = [exemplar_features(network, image, layers) for image in images]
 
-    def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Taps:
+    def taps(self, network: SurfaceVgg, generator: torch.Generator) -> dict[str, Tap]:
         return {
             layer: Tap(network.place(layer), self._places(network.counts[layer], generator)[None])
             for layer in self.layers

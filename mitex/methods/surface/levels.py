@@ -50,12 +50,23 @@ class Levels:
 
     Attributes:
         order: (n,) int32, the number in `Texels` of each element of level 0.
+        position: (n, 3) float32 of the elements of level 0 [mesh units].
         lookup: (9 n, n) CSR float32, the bilinear taps of the first convolution: row 9 i + k is tap k of i.
         spread: (N, n) CSR float32, the values of all `Texels` from those of the elements.
         levels: level 0 first; `POOLS` of them, and more if coarser scales of the texture are looked at.
     """
 
     order: np.ndarray
+    position: np.ndarray
     lookup: csr_array
     spread: csr_array
     levels: tuple[Level, ...]
+
+    @cached_property
+    def positions(self) -> list[np.ndarray]:
+        """(m, 3) positions of each level's elements, and of the last groups: means of those they join."""
+        positions = [self.position]
+        for level in self.levels:
+            starts = np.cumsum(level.sizes) - level.sizes
+            positions.append(np.add.reduceat(positions[-1], starts) / level.sizes[:, None])
+        return positions

@@ -12,6 +12,7 @@ from mitex.features.layers import LAYERS, with_poolings
 from mitex.features.vgg import MEAN_RGB, Weights, convolutions
 from mitex.methods.surface.levels import Levels
 from mitex.methods.surface.operations import BilinearConv, SurfaceConv, SurfacePool
+from mitex.methods.surface.regions import bisect
 from mitex.runtime import bfloat16_is_fast
 
 POOLED = tuple(f"pool{n}" for n in range(1, 6))
@@ -51,6 +52,9 @@ class SurfaceVgg:
         self.operations: list[Operation] = []
         self.index: dict[str, int] = {}
         self.counts: dict[str, int] = {}
+        self._levels = levels
+        self._depth: dict[str, int] = {}
+        self._regions: dict[tuple[str, int], list[torch.Tensor]] = {}
         layers = convolutions(pool, normalised=False) if weights is None else weights
         for level in levels.levels[:scale]:
             self.operations.append(SurfacePool("average", level.sizes))
@@ -58,11 +62,11 @@ class SurfaceVgg:
             around, count = level.neighbourhood, len(level.taps)
             for name in (name for name in layers if name.startswith(f"relu{n + 1}_")):
                 if name != "relu1_1":
-                    self._append(name, SurfaceConv(*layers[name], self.dtype, around), count)
+                    self._append(name, SurfaceConv(*layers[name], self.dtype, around), count, scale + n)
                     continue
                 lookup = level.nearest if scale or not bilinear else levels.lookup
-                self._append(name, BilinearConv(*layers[name], self.dtype, lookup), count)
-            self._append(POOLED[n], SurfacePool(pool, level.sizes), len(level.sizes))
+                self._append(name, BilinearConv(*layers[name], self.dtype, lookup), count, scale + n)
+            self._append(POOLED[n], SurfacePool(pool, level.sizes), len(level.sizes), scale + n + 1)
 
     def features(self, texels: torch.Tensor, layers: Iterable[str]) -> dict[str, torch.Tensor]:
         """Layer -> (n, C) float32 of texel colours (N, 3), sRGB in [0, 1], in the order of `Levels`."""
@@ -92,7 +96,14 @@ class SurfaceVgg:
             raise ConfigError(f"there is no layer {layer!r}", f"use {', '.join(self.index)}")
         return self.index[layer]
 
-    def _append(self, name: str, operation: Operation, count: int) -> None:
+    def regions(self, layer: str, count: int) -> list[torch.Tensor]:
+        """The elements of a layer cut into `count` compact parts of the surface: int64 indices of each."""
+        if (layer, count) not in self._regions:
+            parts = bisect(self._levels.positions[self._depth[layer]], count)
+            self._regions[layer, count] = [torch.from_numpy(part) for part in parts]
+        return self._regions[layer, count]
+
+    def _append(self, name: str, operation: Operation, count: int, level: int) -> None:
         self.index[name] = len(self.operations)
         self.operations.append(operation)
-        self.counts[name] = count
+        self.counts[name], self._depth[name] = count, level

@@ -86,7 +86,8 @@ def build(around: Surroundings, count: int = POOLS) -> Levels:
         first = np.concatenate([[True], labels[n][1:] != labels[n][:-1]])
         levels.append(Level(taps[n], np.bincount(labels[n + 1][first]).astype(np.int32)))
     lookup = _renamed(lookup[(9 * order[:, None] + np.arange(9)).ravel()], rank)
-    return Levels(own, lookup, _renamed(border.spread, rank), tuple(levels))
+    position = texels.position[own].astype(np.float32)
+    return Levels(own, position, lookup, _renamed(border.spread, rank), tuple(levels))
 
 
 def _bilinear_taps(around: Surroundings, elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

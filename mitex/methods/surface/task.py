@@ -125,7 +125,7 @@ class SurfaceTask:
         total, values = torch.zeros(()), self.values
         for k in triples:
             colours = values[:, self.triples[k].channels]
-            taps = comparison.taps(network, generator)
+            taps = dict(comparison.taps(network, generator))
             if self.content is not None:
                 taps[CONTENT] = Tap(network.place(self.config.content_layer))
             features = network.read(colours, taps)

@@ -117,7 +117,7 @@ def test_a_fit_that_goes_on_for_more_steps_is_that_of_one_go(whole, base, tmp_pa
 
 def test_a_plain_field_that_goes_on_is_that_of_one_go(tmp_path):
     capture = tiny_capture()
-    settings = replace(resolve(PRESETS, overrides=SMALL), preview_every=0, refine_cameras=False)
+    settings = replace(resolve(PRESETS, overrides=SMALL), preview_every=0)
     for name, parts in (("whole", (STEPS,)), ("parts", (BEFORE, STEPS))):
         for steps in parts:
             train_plain_field(

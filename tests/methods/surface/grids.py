@@ -31,6 +31,7 @@ def grid_levels(side: int) -> Levels:
         levels.append(Level(taps, np.full(len(here) // 4, 4, np.int32)))
     return Levels(
         order=(place[:, 0] * side + place[:, 1]).astype(np.int32),
+        position=np.pad(place[:, ::-1] * [1.0, -1.0], ((0, 0), (0, 1))).astype(np.float32),
         lookup=levels[0].nearest,
         spread=Border.none(side * side).spread[place[:, 0] * side + place[:, 1]].T.tocsr(),
         levels=tuple(levels),

@@ -22,6 +22,7 @@ def test_levels_are_found_once(tmp_path, levels):
     again = cached_levels("key", unwanted, tmp_path)
     assert first is levels and calls == [1]
     assert np.array_equal(again.order, levels.order)
+    assert np.array_equal(again.position, levels.position)
     for a, b in ((again.lookup, levels.lookup), (again.spread, levels.spread)):
         assert a.shape == b.shape and abs(a - b).max() == 0
     assert len(again.levels) == len(levels.levels)

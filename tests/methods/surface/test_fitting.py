@@ -131,21 +131,6 @@ def test_resuming_on_another_mesh_is_refused(made, exemplar):
         surface.fit(exemplar, icosphere(7), made[0], overrides=["steps=14"], resume=True, quiet=True)
 
 
-@pytest.mark.parametrize(
-    "setting",
-    [
-        *("frames=fixed", "weights=random", "bilinear=false", "correct=false", "scales=2", "pooling=max"),
-        *("loss=transport", "shared_moment=false", "whitened=false", "layers=relu1_1,pool2"),
-    ],
-)
-def test_options_run(mesh, exemplar, tmp_path, setting):
-    overrides = [*SMALL, "steps=3", "triples=1", setting]
-    if setting == "scales=2":
-        overrides.remove("scales=0")
-    texture = surface.fit(exemplar, mesh, tmp_path / "run", overrides=overrides, quiet=True)
-    assert np.isfinite(texture.values).all() and np.ptp(texture.values) > 0.1
-
-
 def test_optimizers_and_spaces(mesh, exemplar, tmp_path):
     """After the same steps principal components are nearer than channels, and L-BFGS than Adam."""
     colours, last = Exemplar({"albedo": exemplar.maps["albedo"]}), {}
@@ -364,12 +349,17 @@ def test_one_triangle_is_enough(exemplar, tmp_path):
     assert np.isfinite(texture.values).all()
 
 
-@pytest.mark.parametrize("factor", [1e-6, 1e6])
-def test_size_does_not_matter(mesh, exemplar, tmp_path, factor):
-    large = mesh.with_vertices(mesh.vertices * factor)
-    a = surface.fit(exemplar, mesh, tmp_path / "a", overrides=[*SMALL, "steps=2"], quiet=True)
-    b = surface.fit(exemplar, large, tmp_path / "b", overrides=[*SMALL, "steps=2"], quiet=True)
-    assert np.isfinite(b.values).all() and abs(len(a.values) - len(b.values)) < 0.2 * len(a.values)
+@pytest.mark.parametrize("power", [-20, 20])
+def test_size_does_not_matter(mesh, exemplar, tmp_path, power):
+    """Scaled by a power of two, which changes no digits, the texture is the same but for rounding."""
+    threads(1)
+    large = mesh.with_vertices(mesh.vertices * 2.0**power)
+    a, b = (
+        surface.fit(exemplar, m, tmp_path / name, overrides=[*SMALL, "steps=3"], quiet=True)
+        for name, m in (("a", mesh), ("b", large))
+    )
+    assert np.array_equal(a.domain.uv, b.domain.uv)
+    assert np.abs(a.values - b.values).max() < 1e-2
 
 
 class TestStyleTransfer:

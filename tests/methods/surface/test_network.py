@@ -16,6 +16,7 @@ from mitex.methods.surface.levels import Level
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.operations import Neighbourhood, SurfaceConv, SurfacePool
 from mitex.methods.surface.taps import Surroundings, build
+from mitex.methods.surface.task import random_weights
 from mitex.methods.surface.texels import Texels
 from tests.methods.surface.grids import flat_square, grid_levels
 
@@ -139,11 +140,13 @@ def test_gram_matrices_and_their_gradient(levels, image, regions):
     ours = SurfaceVgg(levels, precision="float32")
     names = ("relu1_1", "pool1", "relu2_2", "relu3_1")
     texels = image.view(-1, 3)[levels.order].clone().requires_grad_()
-    grams = ours.read(texels, {name: GramTap(ours.place(name), regions) for name in names})
+    parts = {name: None if regions == 1 else ours.regions(name, regions) for name in names}
+    grams = ours.read(texels, {name: GramTap(ours.place(name), parts[name]) for name in names})
     features = ours.features(texels, names)
     total, expected = torch.zeros(()), torch.zeros(())
     for k, name in enumerate(names):
-        gram = torch.stack([f.T @ f / len(f) for f in features[name].tensor_split(regions)])
+        groups = [features[name][i] for i in parts[name] or [slice(None)]]
+        gram = torch.stack([f.T @ f / len(f) for f in groups])
         assert torch.allclose(grams[name], gram, rtol=1e-4, atol=1e-5)
         generator = torch.Generator().manual_seed(k)
         pull = torch.randn(gram.shape, generator=generator)
@@ -185,11 +188,26 @@ def test_bfloat16_agrees(levels, image):
     assert torch.cosine_similarity(gradient.flatten(), close.flatten(), dim=0) > 0.999
 
 
-def test_random_weights_are_an_option(levels, image):
-    texels = image.view(-1, 3)[levels.order]
-    weights = {name: (torch.zeros_like(w), b) for name, (w, b) in convolutions("average", True).items()}
-    features = SurfaceVgg(levels, weights=weights).features(texels, ["relu2_1"])["relu2_1"]
-    assert torch.allclose(features, weights["relu2_1"][1].relu().expand_as(features), rtol=1e-2)
+def test_random_weights_are_used_as_they_are(levels, image):
+    """Features are those of the image network with the same weights, and not the trained ones."""
+    weights = random_weights(torch.Generator().manual_seed(0))
+    features = SurfaceVgg(levels, precision="float32", weights=weights).features(
+        image.view(-1, 3)[levels.order], ["relu2_1"]
+    )
+    expected = Vgg16(precision="float32", weights=weights).features(image[None], ["relu2_1"])["relu2_1"][0]
+    inner = slice(MARGIN[2], -MARGIN[2])
+    a, b = as_image(levels, features["relu2_1"], "relu2_1")[inner, inner], expected[inner, inner]
+    assert (a - b).abs().max() < 1e-4 * b.abs().max()
+    trained = Vgg16(precision="float32", normalised=False).features(image[None], ["relu2_1"])["relu2_1"][0]
+    assert (trained[inner, inner] - b).norm() > 0.5 * b.norm()
+
+
+def test_random_weights_are_those_of_he():
+    """Zero mean, variance 2 over the inputs of an output, no biases: signals neither fade nor grow."""
+    for name, (weight, bias) in random_weights(torch.Generator().manual_seed(0)).items():
+        assert not bias.any() and weight.shape == convolutions("average", False)[name][0].shape
+        deviation = (2 / weight[0].numel()) ** 0.5
+        assert abs(float(weight.std()) / deviation - 1) < 0.05 and abs(float(weight.mean())) < 0.1 * deviation
 
 
 def test_wrong_input_is_refused(levels, image):

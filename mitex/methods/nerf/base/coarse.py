@@ -18,7 +18,7 @@ from mitex.mesh import Mesh
 from mitex.methods.nerf.base.base_shape import base_shape, given_base, shell_thickness
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.pixels import Pixels
-from mitex.methods.nerf.config import NerfConfig
+from mitex.methods.nerf.config import NerfConfig, RadianceConfig
 from mitex.methods.nerf.field.occupancy import sample_grid
 from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.field.rendering import batch_rays
@@ -33,11 +33,8 @@ COARSE: dict[str, Any] = dict(  # what the coarse field needs less of
     ray_steps=256,
     rays=1024,
     occupancy=64,
-    one_view=False,
-    distortion=1e-2,
     average=0.8,
     preview_every=0,
-    refine_cameras=False,
 )
 GRID = 256  # samples of the density along a side of the scene cube
 VIEWS = 16  # that the surface is scanned from
@@ -100,13 +97,15 @@ def find_base(
     return base
 
 
-def coarse_config(config: NerfConfig) -> NerfConfig:
+def coarse_config(config: NerfConfig) -> RadianceConfig:
     """Settings of the coarse field; of a fit's own there are only those in it that change this field."""
     steps = config.base_steps
-    return NerfConfig(preset="coarse", seed=config.seed, lr=config.lr, steps=steps, lr_steps=steps, **COARSE)
+    return RadianceConfig(
+        preset="coarse", seed=config.seed, lr=config.lr, steps=steps, lr_steps=steps, **COARSE
+    )
 
 
-def _trained(coarse: NerfConfig, capture: Capture, folder: Path, quiet: bool) -> PlainTask:
+def _trained(coarse: RadianceConfig, capture: Capture, folder: Path, quiet: bool) -> PlainTask:
     """The coarse field; an interrupted training goes on, unless its checkpoints cannot be used."""
     try:
         return train_plain_field(coarse, capture, (capture, 0), folder, quiet)

@@ -37,7 +37,7 @@ class Frame:
     image: Path
     mask: Path | None
     pose: np.ndarray
-    lens: Mapping[str, Any]
+    lens: Mapping[str, object]
 
     def intrinsics(self, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
         """(fx, fy, cx, cy) [pixels] and (k1, k2, p1, p2) for an image of that size, float64.
@@ -162,7 +162,7 @@ def no_mask(image: Path) -> CaptureError:
     )
 
 
-def _mask(folder: Path, image: Path, relative: Any, where: str) -> Path | None:
+def _mask(folder: Path, image: Path, relative: object, where: str) -> Path | None:
     if relative is None:
         return find_mask(folder, image)
     if not isinstance(relative, str):
@@ -189,5 +189,5 @@ def _pose(matrix: Any, name: str) -> np.ndarray:
     return np.concatenate([rotation, pose[:3, 3:]], axis=1)
 
 
-def _is_number(value: Any) -> bool:
+def _is_number(value: object) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e12

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from mitex.methods.nerf.field.mlp import network_rows, packed_networks
 from mitex.methods.nerf.field.networks import COARSE, LAYERS, OCTAVES, REFLECTION, Networks
@@ -31,28 +30,28 @@ class Reflection:
         theta, phi: elevation and azimuth of the fine normal in the frame of the face [rad], unbounded.
     """
 
-    exponent: Any
-    diffuse: Any
-    specular: Any
-    grazing: Any
-    glossiness: Any
-    theta: Any
-    phi: Any
+    exponent: mi.Float
+    diffuse: mi.Color3f
+    specular: mi.Float
+    grazing: mi.Float
+    glossiness: mi.Float
+    theta: mi.Float
+    phi: mi.Float
 
     @property
-    def density(self) -> Any:
+    def density(self) -> mi.Float:
         return dr.exp(dr.minimum(self.exponent, HIGHEST))
 
     @property
-    def reflectances(self) -> list[Any]:
+    def reflectances(self) -> list[mi.Float]:
         """k_d (3) and k_s at both ends of its range, all in [0, 1]."""
         return [*self.diffuse, self.specular, self.grazing]
 
-    def specular_at(self, cosine: Any) -> Any:
+    def specular_at(self, cosine: mi.Float | float) -> mi.Float:
         """k_s under an angle to the normal, by Schlick's law with both ends learned (Hoffman 2019)."""
         return self.specular + (self.grazing - self.specular) * (1 - cosine) ** 5
 
-    def normal(self, tangent: Any, bitangent: Any, normal: Any) -> Any:
+    def normal(self, tangent: mi.Vector3f, bitangent: mi.Vector3f, normal: mi.Vector3f) -> mi.Vector3f:
         """R(theta, phi) of equation 4 in a frame of `mi.Vector3f`s."""
         sin_theta, cos_theta = dr.sincos(self.theta)
         sin_phi, cos_phi = dr.sincos(self.phi)
@@ -68,15 +67,17 @@ class Decoder:
         low_precision: gradients in bfloat16 where points stay; what is evaluated is the same.
     """
 
-    def __init__(self, weights: Sequence[Any], packed: bool = False, low_precision: bool = False) -> None:
+    def __init__(
+        self, weights: Sequence[mi.TensorXf], packed: bool = False, low_precision: bool = False
+    ) -> None:
         self._low_precision = low_precision
         remaining = iter(weights)
         self.weights = {name: [next(remaining) for _ in widths[1:]] for name, widths in LAYERS.items()}
-        self._packed: dict[str, Any] | None = {} if packed else None
+        self._packed: dict[str, dr.nn.Module] | None = {} if packed else None
         self.pack()
 
     @property
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self) -> dict[str, mi.TensorXf]:
         """The matrices by name, such as `density.0`."""
         return {f"{name}.{k}": w for name, net in self.weights.items() for k, w in enumerate(net)}
 
@@ -85,13 +86,13 @@ class Decoder:
         if self._packed is not None:
             self._packed = dict(zip(LAYERS, packed_networks(*self.weights.values()), strict=True))
 
-    def exponent(self, f: Sequence[Any], distance: Any) -> Any:
+    def exponent(self, f: Sequence[mi.Float], distance: mi.Float) -> mi.Float:
         """Only the logarithm of the density."""
         fine = frequency_encoding(distance)
         packed = self._packed_for(f, fine)
         return network_rows((packed or self.weights)["density"], [*f, *fine])[0]
 
-    def __call__(self, f: Sequence[Any], phase: Sequence[Any], distance: Any) -> Reflection:
+    def __call__(self, f: Sequence[mi.Float], phase: Sequence[mi.Float], distance: mi.Float) -> Reflection:
         """Density and reflection for features f (16 arrays), f-hat (8) and signed distance [scene units]."""
         fine = frequency_encoding(distance)
         run = self._cooperative if self._packed_for(f, phase, fine) else self._together
@@ -108,26 +109,26 @@ class Decoder:
             phi,
         )
 
-    def _cooperative(self, f: list[Any], phase: list[Any], fine: list[Any]) -> list[Any]:
+    def _cooperative(self, f: list[mi.Float], phase: list[mi.Float], fine: list[mi.Float]) -> list[mi.Float]:
         assert self._packed is not None
         exponent, *code = network_rows(self._packed["density"], f + fine)
         reflection = network_rows(self._packed["reflection"], code)
         theta = network_rows(self._packed["theta"], f + fine[:COARSE])
         return [exponent, *reflection, *theta, *network_rows(self._packed["phi"], phase + fine[:COARSE])]
 
-    def _together(self, f: list[Any], phase: list[Any], fine: list[Any]) -> list[Any]:
+    def _together(self, f: list[mi.Float], phase: list[mi.Float], fine: list[mi.Float]) -> list[mi.Float]:
         nets = list(self.weights.values())
         learning, moving = any(map(dr.grad_enabled, nets)), dr.grad_enabled(fine)
         values = stack_rows(fine[COARSE:] + fine[:COARSE] + f + phase)
         return unstack_rows(dr.custom(Networks, values, nets, learning, moving, self._low_precision))
 
-    def _packed_for(self, *inputs: Sequence[Any]) -> dict[str, Any] | None:
+    def _packed_for(self, *inputs: Sequence[mi.Float]) -> dict[str, dr.nn.Module] | None:
         """The packed networks, unless derivatives are asked for: their layout has none."""
         attached = dr.grad_enabled([*self.weights.values()], [list(values) for values in inputs])
         return None if attached else self._packed
 
 
-def frequency_encoding(distance: Any) -> list[Any]:
+def frequency_encoding(distance: mi.Float) -> list[mi.Float]:
     """The signed distance itself, then its sine and cosine at 12 octaves from 1 rad per scene unit on."""
     values = [distance]
     for octave in range(OCTAVES):
@@ -135,9 +136,9 @@ def frequency_encoding(distance: Any) -> list[Any]:
     return values
 
 
-def sigmoid(x: Any) -> Any:
+def sigmoid(x: mi.Float) -> mi.Float:
     return 0.5 * dr.tanh(0.5 * x) + 0.5
 
 
-def _softplus(x: Any) -> Any:
+def _softplus(x: mi.Float) -> mi.Float:
     return dr.maximum(x, 0) + dr.log(1 + dr.exp(-dr.abs(x)))

@@ -5,11 +5,10 @@ The tables belong to whoever trains them, and come in with each call.
 
 from __future__ import annotations
 
-from typing import Any
-
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field.hash_grid import HashGrid
 from mitex.methods.nerf.field.networks import FEATURES, PHASES
+from mitex.runtime.jit import mi
 
 
 class Encoding:
@@ -32,6 +31,6 @@ class Encoding:
         """Where the levels lie in a table, 0 of f or 1 of f-hat."""
         return self.grids[which].levels
 
-    def __call__(self, which: int, foot: Any, table: Any) -> list[Any]:
+    def __call__(self, which: int, foot: mi.Point3f, table: mi.Float) -> list[mi.Float]:
         """Features at foot points, `mi.Point3f` in the cube: 0 for f (16 channels), 1 for f-hat (8)."""
         return self.grids[which](foot, table)

@@ -29,7 +29,7 @@ class HashGrid:
     def __init__(self, levels: int, coarsest: int, finest: int, size: int) -> None:
         growth = math.log2(finest / coarsest) / max(levels - 1, 1)
         self.cells = [coarsest * 2.0 ** (growth * level) for level in range(levels)]
-        self._grid: Any = HashGridEncoding(
+        self._grid: Any = HashGridEncoding(  # its stubs leave out `data`
             mi.Float,
             3,
             n_levels=levels,
@@ -62,7 +62,7 @@ class HashGrid:
     def _firsts(self) -> list[int]:
         return [self._grid.level_offset(level) for level in range(len(self.cells) + 1)]
 
-    def __call__(self, points: Any, table: Any) -> list[Any]:
+    def __call__(self, points: mi.Point3f, table: mi.Float) -> list[mi.Float]:
         """Features at `mi.Point3f`s, two arrays for each level; a flat `mi.Float` is the table."""
         place = dr.clip(points * 0.5 + 0.5, 0, 1)  # beyond its unit cube the grid returns garbage
         if dr.grad_enabled(table):
@@ -72,7 +72,7 @@ class HashGrid:
         self._grid.data = None
         return features
 
-    def _level_by_level(self, points: Any, table: Any) -> list[Any]:
+    def _level_by_level(self, points: mi.Point3f, table: mi.Float) -> list[mi.Float]:
         """The same in one array over levels and points: the entries of a level stay in the cache.
 
         `drjit.hashgrid` goes point by point: with gradients that takes half as long again.

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from mitex.geometry.vectors import unit
 from mitex.methods.nerf.field.tensors import channels
 from mitex.runtime.jit import dr, mi
 
+A = TypeVar("A", bound=dr.ArrayBase)
 COEFFICIENTS = 16
 BANDS = 3  # of l that are rendered
 COSINE = (1.0, 2 / 3, 1 / 4, 0.0)  # of max(cos, 0) / pi, by l
@@ -25,7 +26,15 @@ POWER = 1 / 2.4
 TOE = 1e-4  # radiance below which the display curve is a line, of slope 215
 
 
-def shade(normal: Any, view: Any, kd: Any, ks: Any, glossiness: Any, light: Any, bands: int = BANDS) -> Any:
+def shade(
+    normal: mi.Vector3f,
+    view: mi.Vector3f,
+    kd: mi.Color3f | mi.Float,
+    ks: mi.Color3f | mi.Float,
+    glossiness: mi.Float,
+    light: mi.TensorXf,
+    bands: int = BANDS,
+) -> mi.Color3f:
     """Radiance that points, at least one, send back along view rays; differentiable in all but `bands`.
 
     The diffuse part is kd times the light convolved with the clamped cosine over pi, exactly; the specular
@@ -51,7 +60,7 @@ def shade(normal: Any, view: Any, kd: Any, ks: Any, glossiness: Any, light: Any,
     return dr.maximum(mi.Color3f(diffuse + specular), 0)
 
 
-def to_display(linear: Any) -> Any:
+def to_display(linear: A) -> A:
     """Values for a display: the power 1/2.4 of linear ones, at least 0.
 
     Below `TOE` a line to the origin replaces the power, whose derivative is infinite there; that is 1.6 / 255
@@ -102,29 +111,37 @@ def rotated(light: np.ndarray, turn: np.ndarray) -> np.ndarray:
         As `light`, float32: what it was in direction d, it is in direction turn d.
     """
     ways = unit(np.random.default_rng(0).normal(size=(8 * COEFFICIENTS, 3)))
-    now, before = (  # the first harmonic is one number
-        np.stack([np.broadcast_to(y, len(ways)) for y in dr.sh_eval(channels(mi.Vector3f, v), 3)], axis=1)
-        for v in (ways, ways @ turn)
-    )
+    now, before = (_harmonics(v) for v in (ways, ways @ turn))
     return np.linalg.lstsq(now, before @ light, rcond=None)[0].astype(np.float32)
 
 
-def _coefficients(light: Any, bands: int, count: int) -> list[Any]:
+def _harmonics(directions: np.ndarray) -> np.ndarray:
+    """(N, 16) real spherical harmonics of unit directions (N, 3)."""
+    values = dr.sh_eval(channels(mi.Vector3f, directions), 3)
+    # The first harmonic is one number.
+    return np.stack([np.broadcast_to(np.array(y), len(directions)) for y in values], axis=1)
+
+
+def _coefficients(light: mi.TensorXf, bands: int, count: int) -> list[mi.Float | mi.Color3f]:
     """The first `bands` squared coefficients for `count` points, `mi.Float`s or `mi.Color3f`s."""
     kind = mi.Color3f if light.shape[-1] == 3 else mi.Float
     # One index a point, not one for all: the gradients are then summed where they arise, five times as fast.
     return [dr.gather(kind, light.array, dr.full(mi.UInt32, k, count)) for k in range(bands * bands)]
 
 
-def _expand(radiance: Sequence[Any], weights: Sequence[Any], direction: Any) -> Any:
+def _expand(
+    radiance: Sequence[mi.Float | mi.Color3f],
+    weights: Sequence[float] | Sequence[mi.Float],
+    direction: mi.Vector3f,
+) -> mi.Float | mi.Color3f:
     """sum_lm weight_l L_lm Y_lm(direction)."""
     basis = dr.sh_eval(direction, len(weights) - 1)
     terms = [y * coefficient for y, coefficient in zip(basis, radiance, strict=True)]
-    total = 0.0
+    total: mi.Float | mi.Color3f = mi.Float(0.0)
     for degree, weight in enumerate(weights):
         total += weight * sum(terms[degree * degree : (degree + 1) ** 2])
     return total
 
 
-def _flat(values: np.ndarray) -> Any:
+def _flat(values: np.ndarray) -> mi.Float:
     return mi.Float(np.ascontiguousarray(values, np.float32).ravel())

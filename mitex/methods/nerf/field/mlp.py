@@ -12,11 +12,11 @@ import math
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import torch
 
-from mitex.methods.nerf.field.tensors import stack_rows, unstack_rows
+from mitex.methods.nerf.field.tensors import as_torch, stack_rows, unstack_rows
 from mitex.runtime.jit import dr, mi
 
 T = TypeVar("T")
@@ -108,20 +108,20 @@ def weight_bound(shape: tuple[int, int]) -> float:
     return math.sqrt(6 / sum(shape))
 
 
-def packed_networks(*nets: Sequence[Any]) -> list[Any]:
+def packed_networks(*nets: Sequence[mi.TensorXf]) -> list[dr.nn.Module]:
     """Networks for cooperative vectors, of the matrices (out, in) of each."""
     modules = []
     for weights in nets:
-        layers: list[Any] = []
+        layers: list[dr.nn.Module] = []
         for weight in weights:
             linear: Any = dr.nn.Linear(weight.shape[1], weight.shape[0], bias=False)
-            linear.weights = weight
+            linear.weights = weight  # which the stubs leave out
             layers += [linear, dr.nn.ReLU()]
         modules.append(dr.nn.Sequential(*layers[:-1]))
-    return list(dr.nn.pack(*modules))
+    return list(cast(tuple[dr.nn.Module, ...], dr.nn.pack(*modules)))
 
 
-def network_rows(net: Any, values: list[Any]) -> list[Any]:
+def network_rows(net: Sequence[mi.TensorXf] | dr.nn.Module, values: list[mi.Float]) -> list[mi.Float]:
     """Evaluates a network on N points: from its input channels, (N,) each, to its output channels.
 
     Args:
@@ -133,15 +133,15 @@ def network_rows(net: Any, values: list[Any]) -> list[Any]:
     return unstack_rows(evaluate(net, stack_rows(values)))
 
 
-def evaluate(weights: Sequence[Any], values: Any) -> Any:
+def evaluate(weights: Sequence[mi.TensorXf], values: mi.TensorXf) -> mi.TensorXf:
     """Outputs (M, N) for inputs (K, N), all `mi.TensorXf`; differentiable backwards."""
     return dr.custom(_Network, values, [*weights], dr.grad_enabled(weights))
 
 
 class _Network(dr.CustomOp):
-    def eval(self, values: Any, weights: list[Any], learning: bool) -> Any:
-        self.weights, self.learning = [weight.torch() for weight in weights], learning
-        self.values = values.torch()
+    def eval(self, values: mi.TensorXf, weights: list[mi.TensorXf], learning: bool) -> mi.TensorXf:
+        self.weights, self.learning = [as_torch(weight) for weight in weights], learning
+        self.values = as_torch(values)
         count = self.values.shape[1]
         self.between = room(self.weights, count)
         outputs = torch.empty(len(self.weights[-1]), count)
@@ -154,8 +154,7 @@ class _Network(dr.CustomOp):
         return mi.TensorXf(outputs)
 
     def backward(self) -> None:
-        gradient: Any = self.grad_out()
-        of_outputs = gradient.torch()
+        of_outputs = as_torch(mi.TensorXf(self.grad_out()))
         of_values = torch.empty_like(self.values)
 
         def work(parts: Iterator[slice]) -> Weights:

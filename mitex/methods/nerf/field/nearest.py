@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -106,7 +105,7 @@ class NearestVertices:
         return np.asarray(index).reshape(-1, self.count)
 
     @dr.syntax
-    def _nearest(self, x: Any, slot: Any) -> list[Any]:
+    def _nearest(self, x: mi.Point3f, slot: mi.UInt32) -> list[mi.UInt32]:
         """K `mi.UInt32`, from the nearest on, for points `mi.Point3f` with lists `mi.UInt32`."""
         distances = [mi.Float(dr.inf) for _ in range(self.count)]
         nearest = [mi.UInt32(0) for _ in range(self.count)]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import torch
 from torch.nn import functional as F
 
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field import mlp
+from mitex.methods.nerf.field.tensors import as_torch
 from mitex.runtime.jit import dr, mi
 
 OCTAVES = 12  # of the signed distance
@@ -58,12 +58,17 @@ class Networks(dr.CustomOp):
     """
 
     def eval(
-        self, values: Any, nets: list[list[Any]], learning: bool, moving: bool, low_precision: bool
-    ) -> Any:
-        self.learning, self.values = learning, values.torch()
+        self,
+        values: mi.TensorXf,
+        nets: list[list[mi.TensorXf]],
+        learning: bool,
+        moving: bool,
+        low_precision: bool,
+    ) -> mi.TensorXf:
+        self.learning, self.values = learning, as_torch(values)
         self.first = 0 if moving else FINE  # of the inputs that get a gradient
         self.kind = torch.bfloat16 if low_precision and not moving else torch.float32
-        self.nets = _join(*([weight.torch() for weight in net] for net in nets))
+        self.nets = _join(*([as_torch(weight) for weight in net] for net in nets))
         count = self.values.shape[1]
         self.between = {name: mlp.room(weights, count, self.kind) for name, weights in self.nets.items()}
         self.code = torch.empty(CODE + 1, count)
@@ -81,8 +86,7 @@ class Networks(dr.CustomOp):
         return mi.TensorXf(results)
 
     def backward(self) -> None:
-        gradient: Any = self.grad_out()
-        of_results = gradient.torch()
+        of_results = as_torch(mi.TensorXf(self.grad_out()))
         of_values = torch.empty_like(self.values)
         of_values[: self.first] = 0
         kinds = {kind: self._of_kind(kind) for kind in (self.kind, torch.float32)}

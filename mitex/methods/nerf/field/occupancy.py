@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import torch
@@ -63,10 +62,10 @@ class Occupancy:
         self.cells = np.flatnonzero(where)
         self.values = torch.zeros(len(self.cells))
         self.refreshes = 0
-        self._mask: Any = None
+        self._mask: mi.TensorXu8 | None = None
 
     @property
-    def mask(self) -> Any:
+    def mask(self) -> mi.TensorXu8:
         """(side, side, side) `mi.TensorXu8` of 0 and 1; before the first refresh all possible cells."""
         if self._mask is None:
             self._mask = mi.TensorXu8(self.occupied)

@@ -117,10 +117,10 @@ class Projection:
             normal = self._coarse_normal(x, mi.UInt32(index.ravel()))
             ahead, behind = self._first(x, normal), self._first(x, -normal)
             is_inside = dr.abs(ahead[1]) < dr.abs(behind[1])
-            hits, t = (dr.select(is_inside, a, b) for a, b in zip(ahead, behind, strict=True))
+            hits, t = dr.select(is_inside, ahead[0], behind[0]), dr.select(is_inside, ahead[1], behind[1])
             hit, face, distance = hits.is_valid(), mi.Int32(hits.prim_index), dr.select(is_inside, -t, t)
             results = [
-                x - dr.select(hit, distance, 0.0) * normal,
+                x - mi.Point3f(dr.select(hit, distance, 0.0) * normal),
                 dr.select(hit, distance, MISSED),
                 dr.select(hit, normal, 0.0),
                 dr.select(hit, face, -1),
@@ -133,7 +133,7 @@ class Projection:
             arrays[0].reshape(-1, 3), arrays[1], arrays[2].reshape(-1, 3), arrays[3], arrays[4].reshape(-1, 2)
         )
 
-    def _coarse_normal(self, x: Any, index: Any) -> Any:
+    def _coarse_normal(self, x: mi.Point3f, index: mi.UInt32) -> mi.Vector3f:
         """Equation 1 at points x, given the flat indices of their nearest vertices."""
         first = dr.arange(mi.UInt32, dr.width(x)) * self._count
         total, away, weights = mi.Vector3f(0.0), mi.Vector3f(0.0), mi.Float(0.0)
@@ -141,7 +141,7 @@ class Projection:
         for k in range(self._count):
             vertex = dr.gather(mi.UInt32, index, first + k)
             normal = dr.gather(mi.Vector3f, self._normals, vertex)
-            offset = x - dr.gather(mi.Point3f, self._vertices, vertex)
+            offset = mi.Vector3f(x - dr.gather(mi.Point3f, self._vertices, vertex))
             weight = dr.rcp(dr.maximum(dr.norm(offset), NEAREST))
             total += weight * normal
             away += (weight * weight) * offset
@@ -153,10 +153,10 @@ class Projection:
         length = dr.norm(total)
         return dr.select(length > CANCELLED * weights, total / length, nearest)
 
-    def _first(self, x: Any, direction: Any) -> tuple[Any, Any]:
+    def _first(self, x: mi.Point3f, direction: mi.Vector3f) -> tuple[mi.PreliminaryIntersection3f, mi.Float]:
         """The first intersection from x, and how far along the direction it is; slightly behind counts."""
         back = dr.opaque(mi.Float, self._back)
-        ray = mi.Ray3f(x - back * direction, direction)
+        ray = mi.Ray3f(x - mi.Point3f(back * direction), direction)
         if self.reach is not None:
             ray.maxt = dr.opaque(mi.Float, self.reach + self._back)
         hit = self._scene.ray_intersect_preliminary(ray, coherent=False)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.pixels import Batch, Pixels
-from mitex.methods.nerf.config import NerfConfig
+from mitex.methods.nerf.config import RadianceConfig
 from mitex.methods.nerf.field.tensors import channels, rows
 from mitex.runtime.jit import dr, mi
 from mitex.textures.march import DIAGONAL, RadianceField, composite
@@ -20,12 +19,12 @@ REFINEMENT = 2  # steps of a picture for one of the training; the durian gains 0
 LONGEST = 400  # side of rendered photos [pixels]
 
 
-def render_step(config: NerfConfig) -> float:
+def render_step(config: RadianceConfig) -> float:
     """Length of the steps by which a trained field is rendered [scene units]."""
     return DIAGONAL / (REFINEMENT * config.ray_steps)
 
 
-def batch_rays(batch: Batch) -> tuple[Any, Any]:
+def batch_rays(batch: Batch) -> tuple[mi.Point3f, mi.Vector3f]:
     """Origins and directions as Dr.Jit arrays."""
     return channels(mi.Point3f, batch.origins), channels(mi.Vector3f, batch.directions)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from scipy import ndimage
@@ -29,11 +29,11 @@ class ShellCoords:
         normal: `mi.Vector3f`, the coarse normal n_c.
     """
 
-    foot: Any
-    distance: Any
-    face: Any
-    barycentric: Any
-    normal: Any
+    foot: mi.Point3f
+    distance: mi.Float
+    face: mi.UInt32
+    barycentric: mi.Point2f
+    normal: mi.Vector3f
 
     @staticmethod
     def of(projections: Projections, scale: float = 1.0) -> ShellCoords:
@@ -46,7 +46,7 @@ class ShellCoords:
             channels(mi.Vector3f, projections.normal),
         )
 
-    def subset(self, index: Any) -> ShellCoords:
+    def subset(self, index: mi.UInt32) -> ShellCoords:
         """The points at `index`, detached."""
         return ShellCoords(*(dr.gather(type(v), dr.detach(v), index) for v in vars(self).values()))
 
@@ -54,20 +54,20 @@ class ShellCoords:
 class Latents(Protocol):
     """Where features come from: hash grids on the captured shape, or synthesized maps on another one."""
 
-    def __call__(self, coords: ShellCoords) -> tuple[list[Any], list[Any]]:
+    def __call__(self, coords: ShellCoords) -> tuple[list[mi.Float], list[mi.Float]]:
         """f (16 arrays) and f-hat (8)."""
         ...
 
-    def features(self, coords: ShellCoords) -> list[Any]:
+    def features(self, coords: ShellCoords) -> list[mi.Float]:
         """f alone, which the density needs."""
         ...
 
-    def frame(self, coords: ShellCoords) -> tuple[Any, Any, Any]:
+    def frame(self, coords: ShellCoords) -> tuple[mi.Vector3f, mi.Vector3f, mi.Vector3f]:
         """Tangent, bitangent and normal that theta and phi refer to, `mi.Vector3f`s."""
         ...
 
     @property
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self) -> dict[str, dr.ArrayBase]:
         """Arrays that features are looked up in, by name."""
         ...
 
@@ -81,28 +81,33 @@ class CapturedLatents:
         frames: (F, 3, 3) rows t, b, n of its faces.
     """
 
-    def __init__(self, encoding: Encoding, tables: list[Any], frames: np.ndarray) -> None:
+    def __init__(self, encoding: Encoding, tables: list[mi.Float], frames: np.ndarray) -> None:
         self.encoding, self.tables = encoding, tables
         self.frames = mi.Float(np.ascontiguousarray(frames, np.float32).ravel())
 
-    def __call__(self, coords: ShellCoords) -> tuple[list[Any], list[Any]]:
+    def __call__(self, coords: ShellCoords) -> tuple[list[mi.Float], list[mi.Float]]:
         return self.features(coords), self.encoding(1, coords.foot, self.tables[1])
 
-    def features(self, coords: ShellCoords) -> list[Any]:
+    def features(self, coords: ShellCoords) -> list[mi.Float]:
         return self.encoding(0, coords.foot, self.tables[0])
 
-    def frame(self, coords: ShellCoords) -> tuple[Any, Any, Any]:
+    def frame(self, coords: ShellCoords) -> tuple[mi.Vector3f, mi.Vector3f, mi.Vector3f]:
         rows = [dr.gather(mi.Vector3f, self.frames, coords.face * 3 + k) for k in range(3)]
         return rows[0], rows[1], rows[2]
 
     @property
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self) -> dict[str, dr.ArrayBase]:
         return dict(zip(("tables.f", "tables.phase"), self.tables, strict=True))
 
 
 def appearance(
-    latents: Latents, decoder: Decoder, light: Any, coords: ShellCoords, view: Any, detach: bool = False
-) -> tuple[Any, Any, Any]:
+    latents: Latents,
+    decoder: Decoder,
+    light: mi.TensorXf,
+    coords: ShellCoords,
+    view: mi.Vector3f,
+    detach: bool = False,
+) -> tuple[mi.Float, mi.Color3f, mi.Vector3f]:
     """Density, colour and fine normal of points in the shell (section 3.1.5).
 
     Args:
@@ -144,9 +149,9 @@ class Shell:
         projection: Projection,
         latents: Latents,
         decoder: Decoder,
-        light: Any,
+        light: mi.TensorXf,
         thickness: float,
-        mask: Any,
+        mask: mi.TensorXu8,
         step: float,
         scale: float = 1.0,
         strength: float = 1.0,
@@ -157,7 +162,7 @@ class Shell:
         self.mask, self.step, self.strength, self.lift = mask, step, strength, lift
         self._shapes = {name: dr.shape(value) for name, value in self.parameters().items()}
 
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self) -> dict[str, dr.ArrayBase]:
         """Features, matrices of the networks and light, by name; images are differentiable in them."""
         weights = {f"weights.{name}": value for name, value in self.decoder.parameters.items()}
         return {**self.latents.parameters, **weights, "light": self.light}
@@ -175,7 +180,7 @@ class Shell:
                 )
         self.decoder.pack()
 
-    def locate(self, points: Any) -> tuple[Any, ShellCoords]:
+    def locate(self, points: mi.Point3f) -> tuple[mi.UInt32, ShellCoords]:
         """Which of the points, `mi.Point3f`, are in the shell, as ascending `mi.UInt32`, and where."""
         index, projections = within(self.projection(rows(points)), self.thickness, self.lift)
         return mi.UInt32(index.astype(np.uint32)), ShellCoords.of(projections, self.scale)
@@ -190,7 +195,7 @@ class Shell:
             result[index] = np.array(dr.exp(dr.minimum(exponent, HIGHEST))) * (self.strength / self.scale)
         return result
 
-    def evaluate(self, points: Any, view: Any) -> tuple[Any, Any, Any]:
+    def evaluate(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, mi.Float, mi.Color3f]:
         """Where in the shell, which of N points are; their density and colour.
 
         Args:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TypeVar, cast
 
 import numpy as np
+import torch
 
 from mitex.runtime.jit import dr, mi
 
+A = TypeVar("A", bound=dr.ArrayBase)
 
-def tensor(values: Any) -> Any:
+
+def tensor(values: dr.ArrayBase) -> mi.TensorXf:
     """`mi.TensorXf` (N,) of a `mi.Float`, (N, C) of an array of C of them."""
     count = dr.width(values)
     if dr.depth_v(values) == 1:
@@ -18,18 +21,23 @@ def tensor(values: Any) -> Any:
     return mi.TensorXf(dr.ravel(values), (count, len(values)))
 
 
-def channels(kind: Any, values: np.ndarray) -> Any:
+def channels(kind: type[A], values: np.ndarray) -> A:
     """A Dr.Jit array such as `mi.Point3f` of values (N, C); N is no part of the kernel."""
     return dr.unravel(kind, mi.Float(np.ascontiguousarray(values, np.float32).ravel()))
 
 
-def rows(values: Any) -> np.ndarray:
+def as_torch(values: mi.TensorXf) -> torch.Tensor:
+    """The same memory as a torch tensor."""
+    return cast(torch.Tensor, values.torch())
+
+
+def rows(values: dr.ArrayBase) -> np.ndarray:
     """(N, C) float32 of an array of C channels."""
     return np.array(dr.ravel(values)).reshape(-1, len(values))
 
 
 # Slices of tensors would have N as a literal, and so would need new kernels for each N. An opaque N does not.
-def stack_rows(values: Sequence[Any]) -> Any:
+def stack_rows(values: Sequence[mi.Float]) -> mi.TensorXf:
     """`mi.TensorXf` (C, N) of C arrays, of width N or 1."""
     count = max(dr.width(value) for value in values)
     flat = dr.zeros(mi.Float, count * len(values))
@@ -39,13 +47,13 @@ def stack_rows(values: Sequence[Any]) -> Any:
     return mi.TensorXf(flat, (len(values), count))
 
 
-def unstack_rows(tensor: Any) -> list[Any]:
+def unstack_rows(tensor: mi.TensorXf) -> list[mi.Float]:
     """The rows of a tensor (C, N)."""
     rows, count = tensor.shape
     places = [row_places(k, count) for k in range(rows)]
     return [dr.gather(mi.Float, tensor.array, place, mode=dr.ReduceMode.Permute) for place in places]
 
 
-def row_places(k: int, count: int) -> Any:
+def row_places(k: int, count: int) -> mi.UInt32:
     """Where the elements of row k are in a flat tensor of rows of `count`."""
     return dr.arange(mi.UInt32, count) + dr.opaque(mi.UInt32, k * count)

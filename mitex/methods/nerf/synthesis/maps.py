@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -61,15 +60,15 @@ class MappedLatents:
         self._uv = mi.Float(np.ascontiguousarray(uv, np.float32).ravel())
         self._frames = mi.Float(np.ascontiguousarray(frames, np.float32).ravel())
 
-    def __call__(self, coords: ShellCoords) -> tuple[list[Any], list[Any]]:
+    def __call__(self, coords: ShellCoords) -> tuple[list[mi.Float], list[mi.Float]]:
         values = self._blended(coords, CHANNELS)
         return values[:FEATURES], values[FEATURES:]
 
-    def features(self, coords: ShellCoords) -> list[Any]:
+    def features(self, coords: ShellCoords) -> list[mi.Float]:
         """f alone, which the density needs."""
         return self._blended(coords, FEATURES)
 
-    def frame(self, coords: ShellCoords) -> tuple[Any, Any, Any]:
+    def frame(self, coords: ShellCoords) -> tuple[mi.Vector3f, mi.Vector3f, mi.Vector3f]:
         """The captured frame's axes, laid on the mesh: equation 4 of each."""
         x, y = self._place(coords)
         height, width = self.size
@@ -83,10 +82,10 @@ class MappedLatents:
         return captured[0], captured[1], captured[2]
 
     @property
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self) -> dict[str, dr.ArrayBase]:
         return {"features": self.texels}
 
-    def _place(self, coords: ShellCoords) -> tuple[Any, Any]:
+    def _place(self, coords: ShellCoords) -> tuple[mi.Float, mi.Float]:
         """Column and row of the foot [texels], of which whole numbers are centres."""
         height, width = self.size
         corner = [dr.gather(mi.Point2f, self._uv, coords.face * 3 + k) for k in range(3)]
@@ -94,13 +93,13 @@ class MappedLatents:
         uv = corner[0] * (1 - b - c) + corner[1] * b + corner[2] * c
         return uv.x * width - 0.5, (1 - uv.y) * height - 0.5
 
-    def _blended(self, coords: ShellCoords, count: int) -> list[Any]:
+    def _blended(self, coords: ShellCoords, count: int) -> list[mi.Float]:
         """The first `count` channels, bilinear."""
         x, y = self._place(coords)
         height, width = self.size
         left, top = dr.floor(x), dr.floor(y)
         across, down = x - left, y - top
-        total: list[Any] = [mi.Float(0)] * count
+        total = [mi.Float(0)] * count
         for right in (0, 1):
             for below in (0, 1):
                 share = (across if right else 1 - across) * (down if below else 1 - down)
@@ -114,7 +113,7 @@ class MappedLatents:
         return total
 
     @staticmethod
-    def _index(column: Any, row: Any, height: int, width: int) -> Any:
+    def _index(column: mi.Int32, row: mi.Int32, height: int, width: int) -> mi.UInt32:
         """Of texels, repeated beyond the borders."""
         return mi.UInt32(_wrapped(row, height) * width + _wrapped(column, width))
 
@@ -127,6 +126,6 @@ def uv_frames(mesh: Mesh) -> np.ndarray:
     return frames
 
 
-def _wrapped(index: Any, size: int) -> Any:
+def _wrapped(index: mi.Int32, size: int) -> mi.Int32:
     rest = index % size
     return dr.select(rest < 0, rest + size, rest)

@@ -3,7 +3,7 @@ and what the paper compares view synthesis with."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import torch
 from mitex.bridge import call
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.pixels import Batch
-from mitex.methods.nerf.config import NerfConfig
+from mitex.methods.nerf.config import RadianceConfig
 from mitex.methods.nerf.field.decoder import HIGHEST, sigmoid
 from mitex.methods.nerf.field.hash_grid import HashGrid
 from mitex.methods.nerf.field.mlp import network_rows, packed_networks, weight_bound
@@ -56,6 +56,12 @@ class PlainField:
         self._nets = packed_networks(*nets) if packed else nets
         self.mask, self.step = mask, step
 
+    @staticmethod
+    def of(parameters: Mapping[str, torch.Tensor], grid: HashGrid, mask: Any, step: float) -> PlainField:
+        """The field of a table and matrices in the order of `parameter_shapes`, packed."""
+        table, *weights = (mi.TensorXf(value.detach().numpy()) for value in parameters.values())
+        return PlainField(grid, table.array, weights, mask, step, packed=True)
+
     def density(self, points: Any) -> tuple[Any, list[Any]]:
         """Density [1 / scene units] of `mi.Point3f`, and a code for the colour."""
         exponent, *code = network_rows(self._nets[0], self.grid(points, self.table))
@@ -75,24 +81,33 @@ class PlainField:
         return dr.arange(mi.UInt32, dr.width(points)), density, self.colour(code, view)
 
 
-class PlainTask(RadianceTask):
+def hash_grid(config: RadianceConfig) -> HashGrid:
+    """Of the features, as published but for the size of its tables."""
+    return HashGrid(LEVELS, COARSEST, FINEST, config.table)
+
+
+def parameter_shapes(grid: HashGrid) -> dict[str, tuple[int, ...]]:
+    """Of what is learned: the grid's table, and the matrices of both networks."""
+    layers = [(o, i) for w in (DENSITY, COLOUR) for i, o in zip(w[:-1], w[1:], strict=True)]
+    return {"table": (grid.size,)} | {f"weights/{k}": shape for k, shape in enumerate(layers)}
+
+
+class PlainTask(RadianceTask[RadianceConfig]):
     """Trains a plain field; arguments as of `RadianceTask`."""
 
-    def __init__(self, config: NerfConfig, capture: Capture, preview_view: tuple[Capture, int]) -> None:
+    def __init__(self, config: RadianceConfig, capture: Capture, preview_view: tuple[Capture, int]) -> None:
         generator = torch.Generator().manual_seed(config.seed)
-        self.grid = HashGrid(LEVELS, COARSEST, FINEST, config.table)  # as published
-        table = torch.empty(self.grid.size).uniform_(-1e-4, 1e-4, generator=generator)
-        parameters = {"table": table}
-        for k, shape in enumerate(_shapes()):
-            bound = weight_bound(shape)
-            parameters[f"weights/{k}"] = torch.empty(shape).uniform_(-bound, bound, generator=generator)
-        for value in parameters.values():
-            value.requires_grad_()
+        self.grid = hash_grid(config)
+        parameters = {}
+        for name, shape in parameter_shapes(self.grid).items():
+            bound = 1e-4 if name == "table" else weight_bound((shape[0], shape[-1]))
+            parameters[name] = torch.empty(shape).uniform_(-bound, bound, generator=generator)
+            parameters[name].requires_grad_()
         occupancy = Occupancy(config.occupancy, hull_cells(capture, config.occupancy))
         super().__init__(config, capture, preview_view, occupancy, parameters)
 
     def metadata(self) -> dict[str, str]:
-        return {"method": "plain", "capture": self.pixels.capture.name}
+        return {"method": "plain_field", "capture": self.pixels.capture.name}
 
     def render(self, step: int, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
         origin, direction = batch_rays(batch)
@@ -107,17 +122,19 @@ class PlainTask(RadianceTask):
         colour, transmittance, weights = call(run, *self.named.values())
         return Rendered(colour, transmittance, weights, samples)
 
-    def field(self, parameters: dict[str, torch.Tensor], packed: bool = True) -> PlainField:
-        table, *weights = (mi.TensorXf(value.detach().numpy()) for value in parameters.values())
-        mask, step = self.occupancy.mask, render_step(self.config)
-        return PlainField(self.grid, table.array, weights, mask, step, packed)
+    def field(self, parameters: dict[str, torch.Tensor]) -> PlainField:
+        return PlainField.of(parameters, self.grid, self.occupancy.mask, render_step(self.config))
 
     def density(self, points: np.ndarray) -> np.ndarray:
         return self.field(self.named).density_at(points)
 
 
 def train_plain_field(
-    config: NerfConfig, capture: Capture, preview_view: tuple[Capture, int], folder: str | Path, quiet: bool
+    config: RadianceConfig,
+    capture: Capture,
+    preview_view: tuple[Capture, int],
+    folder: str | Path,
+    quiet: bool,
 ) -> PlainTask:
     """Trains a plain field in a run folder, or continues there; arguments as of `RadianceTask`."""
     folder = Path(folder)
@@ -125,7 +142,3 @@ def train_plain_field(
     resume = any((folder / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
     train(task, config, folder, resume=resume, quiet=quiet, **schedule(config))
     return task
-
-
-def _shapes() -> list[tuple[int, int]]:
-    return [(o, i) for w in (DENSITY, COLOUR) for i, o in zip(w[:-1], w[1:], strict=True)]

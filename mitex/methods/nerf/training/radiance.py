@@ -5,14 +5,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import torch
 
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.pixels import Batch, Pixels
-from mitex.methods.nerf.config import NerfConfig
+from mitex.methods.nerf.config import RadianceConfig
 from mitex.methods.nerf.field.occupancy import Occupancy
 from mitex.methods.nerf.field.rendering import batch_rays, render_view
 from mitex.methods.nerf.field.tensors import rows
@@ -27,8 +27,10 @@ REFRESH = 16  # steps between refreshes of the occupancy, and between updates of
 BETAS, EPSILON = (0.9, 0.99), 1e-15  # of Adam
 PREVIEW = 160  # pixels along the longest side
 
+Config = TypeVar("Config", bound=RadianceConfig)
 
-class RadianceTask(ABC):
+
+class RadianceTask(ABC, Generic[Config]):
     """A radiance field as a task of the training loop; the parameters that are kept are their running mean.
 
     Args:
@@ -41,7 +43,7 @@ class RadianceTask(ABC):
 
     def __init__(
         self,
-        config: NerfConfig,
+        config: Config,
         capture: Capture,
         preview_view: tuple[Capture, int],
         occupancy: Occupancy,
@@ -142,7 +144,7 @@ class RadianceTask(ABC):
         return np.hstack(render_view(self.field(self.mean), *self.preview_view, PREVIEW)[::-1])
 
 
-def schedule(config: NerfConfig) -> dict[str, Any]:
+def schedule(config: RadianceConfig) -> dict[str, Any]:
     """Options of `train`: Adam with a learning rate that falls to a tenth in `lr_steps`."""
     return {
         "lr": lambda step: config.lr * 0.1 ** (step / config.lr_steps),

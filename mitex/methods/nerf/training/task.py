@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import torch
@@ -50,7 +50,7 @@ FLAT = 1e-2
 POSE = 1e-2  # unit of the cameras' corrections [rad, scene units]
 
 
-class TextureTask(RadianceTask):
+class TextureTask(RadianceTask[NerfConfig]):
     """Features, networks, light and cluster centres, trained on a capture around a base shape.
 
     Args:
@@ -97,7 +97,13 @@ class TextureTask(RadianceTask):
         interior = int(INTERIOR_RAYS * samples.rays) if self._uses_interior(step) else 0
         depths = torch.rand(interior, generator=generator).numpy()
 
-        def run(foot: Any, distance: Any, along: Any, light: Any, *arrays: Any) -> Any:
+        def run(
+            foot: mi.TensorXf,
+            distance: mi.TensorXf,
+            along: mi.TensorXf,
+            light: mi.TensorXf,
+            *arrays: mi.TensorXf,
+        ) -> tuple[mi.TensorXf, ...]:
             coords = ShellCoords.of(projections)
             coords.foot, coords.distance = dr.unravel(mi.Point3f, foot.array), distance.array
             latents, decoder = self._model(arrays)
@@ -134,13 +140,13 @@ class TextureTask(RadianceTask):
 
     def model(
         self, parameters: dict[str, torch.Tensor], packed: bool
-    ) -> tuple[CapturedLatents, Decoder, Any]:
+    ) -> tuple[CapturedLatents, Decoder, mi.TensorXf]:
         """Latents, networks and light with given parameters, constant."""
         arrays = [mi.TensorXf(v.detach().numpy()) for k, v in parameters.items() if "/" in k and k[0] in "tw"]
         latents, decoder = self._model(arrays, packed)
         return latents, decoder, mi.TensorXf(parameters["light"].detach().numpy())
 
-    def _model(self, arrays: Any, packed: bool = False) -> tuple[CapturedLatents, Decoder]:
+    def _model(self, arrays: Sequence[mi.TensorXf], packed: bool = False) -> tuple[CapturedLatents, Decoder]:
         tables, weights = [a.array for a in arrays[:2]], arrays[2:]
         decoder = Decoder(weights, packed, low_precision=bfloat16_is_fast())
         return CapturedLatents(self.encoding, tables, self.frames), decoder
@@ -165,11 +171,17 @@ class TextureTask(RadianceTask):
         return *attach(points, projections), directions[ray]
 
     def _normals(
-        self, arrays: Any, coords: ShellCoords, normal: Any, weights: Any, samples: Samples, rays: int
-    ) -> tuple[Any, Any]:
+        self,
+        arrays: Sequence[mi.TensorXf],
+        coords: ShellCoords,
+        normal: mi.Vector3f,
+        weights: mi.Float,
+        samples: Samples,
+        rays: int,
+    ) -> tuple[mi.Vector3f, mi.Vector3f]:
         """Fine normals and the density's directions of descent, gathered along the first `rays` rays."""
         compared = samples.ray < rays
-        index: Any = dr.compress(compared)
+        index = mi.UInt32(dr.compress(compared))
         weights = dr.detach(weights)
         fine = sum_rays(normal * dr.select(compared, weights, 0), samples)
         if not dr.width(index):
@@ -180,13 +192,20 @@ class TextureTask(RadianceTask):
         weights = dr.gather(mi.Float, weights, index)
         return fine, sum_rays(target * weights, samples.subset(index))
 
-    def _interior(self, arrays: Any, coords: ShellCoords, weights: Any, samples: Samples, depths: Any) -> Any:
+    def _interior(
+        self,
+        arrays: Sequence[mi.TensorXf],
+        coords: ShellCoords,
+        weights: mi.Float,
+        samples: Samples,
+        depths: mi.Float,
+    ) -> mi.Float:
         """L1 between the reflectances of buried points below the ends of rays, and of the surface above.
 
         `depths` are, for each of these rays, shares of the way down to the shell's bottom. Places
         near a surface are no part of it: photos may see them from elsewhere.
         """
-        index: Any = dr.compress((samples.ray < dr.width(depths)) & (dr.detach(weights) > SURFACE))
+        index = mi.UInt32(dr.compress((samples.ray < dr.width(depths)) & (dr.detach(weights) > SURFACE)))
         if not dr.width(index):
             return mi.Float()
         latents, decoder = self._model([*map(dr.detach, arrays[:2]), *arrays[2:]])
@@ -202,13 +221,13 @@ class TextureTask(RadianceTask):
             dr.abs(a - b) for a, b in zip(below.reflectances, above.reflectances, strict=True)
         )
 
-    def _buried(self, latents: CapturedLatents, decoder: Decoder, coords: ShellCoords) -> Any:
+    def _buried(self, latents: CapturedLatents, decoder: Decoder, coords: ShellCoords) -> mi.Float:
         """The least opacity of a step at places, a bit above them, and a bit to four sides of them."""
         across, along = mi.coordinate_system(coords.normal)
         reach = BURIED * self.thickness
         lowest = mi.Float(math.inf)
         for x, y, z in AROUND:
-            foot = coords.foot + reach * (x * across + y * along)
+            foot = coords.foot + mi.Point3f(reach * (x * across + y * along))
             moved = replace(coords, foot=foot, distance=coords.distance + reach * z)
             lowest = dr.minimum(lowest, decoder.exponent(latents.features(moved), moved.distance))
         return 1 - dr.exp(-dr.exp(lowest) * self.step_length)
@@ -220,7 +239,7 @@ class TextureTask(RadianceTask):
         """
         return self.config.interior_weight > 0 and 2 * step >= self.config.lr_steps
 
-    def _slope(self, arrays: Any, coords: ShellCoords) -> Any:
+    def _slope(self, arrays: Sequence[mi.TensorXf], coords: ShellCoords) -> mi.Vector3f:
         """The direction in which the density falls, by equation 2 from its slopes in foot and distance."""
         latents, decoder = self._model(arrays)
         coords = ShellCoords(**vars(coords))
@@ -229,7 +248,7 @@ class TextureTask(RadianceTask):
             dr.enable_grad(foot, distance)
             coords.foot, coords.distance = foot, distance
             dr.backward(decoder.exponent(latents.features(coords), distance))
-        along, n = dr.grad(foot), coords.normal
+        along, n = mi.Vector3f(dr.grad(foot)), coords.normal
         slope = along - n * dr.dot(along, n) + n * dr.grad(distance)
         return dr.normalize(-slope)
 

@@ -26,6 +26,7 @@ from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents, uv_fram
 from mitex.methods.nerf.use.extract import extract_mesh
 from mitex.methods.nerf.use.placement import UNWRAP_SIZE, in_scene_cube, uv_unit_length
 from mitex.paths import prepare_output
+from mitex.runtime.jit import mi
 from mitex.textures.march import DIAGONAL
 
 PICTURES = (".png", ".jpg", ".jpeg")
@@ -55,7 +56,7 @@ class AppliedTexture(Shell):
         mesh: Mesh,
         maps: LatentMaps,
         decoder: Decoder,
-        light: Any,
+        light: mi.TensorXf,
         config: NerfConfig,
         *,
         thickness: float,

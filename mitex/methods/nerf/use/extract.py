@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -40,23 +41,36 @@ def extract_mesh(shell: Shell, similarity: Similarity, name: str, cells: int | N
         ConfigError: `cells` is out of range.
         MeshError: nothing is so dense.
     """
-    side = shell.mask.shape[0]
-    count = CELLS * side if cells is None else cells
-    if count % side or not side <= count <= 8 * side:
-        raise ConfigError(f"a grid of {count} cells", f"use a multiple of {side}, up to {8 * side}")
-    level = math.log(2) * count / 2
-    density = sample_grid(shell.density, np.array(shell.mask).astype(bool), count)
-    if not (density > level).any():
-        raise MeshError("nothing in the shell is solid", "raise the density, or train the texture for longer")
-    # In logarithms, so that the surface lies well between samples whose densities differ by orders.
-    values = np.maximum(np.log(np.maximum(density, 1e-6) / level), FLOOR)
-    cell = 2 / count
-    mesh = isosurface(values, 0.0, low=np.full(3, 0.5 * cell - 1), cell=cell, name=name)
+    mesh = solid_surface(shell.density, np.array(shell.mask).astype(bool), name, cells)
     albedo, normals = _albedo_and_normals(shell, mesh)
     placed = mesh.with_vertices(similarity.inverse(mesh.vertices))
     tangents = orthonormal(np.broadcast_to(np.array([1.0, 0.0, 0.0]), normals.shape), mesh.normals)
     detail = encode(normals, tangents, np.cross(mesh.normals, tangents), mesh.normals)
     return Asset(placed, {"albedo": albedo, "normal": detail}, tangents.astype(np.float32), name=name)
+
+
+def solid_surface(
+    density: Callable[[np.ndarray], np.ndarray], occupied: np.ndarray, name: str, cells: int | None = None
+) -> Mesh:
+    """The surface where the density takes half of the light within a cell, in the scene cube.
+
+    Args:
+        density: of points (N, 3), (N,) [1 / scene units].
+        occupied: (G, G, G) bool, cells outside of which it is 0.
+        name, cells: as of `extract_mesh`, which says what is raised.
+    """
+    side = len(occupied)
+    count = CELLS * side if cells is None else cells
+    if count % side or not side <= count <= 8 * side:
+        raise ConfigError(f"a grid of {count} cells", f"use a multiple of {side}, up to {8 * side}")
+    level = math.log(2) * count / 2
+    values = sample_grid(density, occupied, count)
+    if not (values > level).any():
+        raise MeshError(f"nothing in '{name}' is solid", "raise the density, or train it for longer")
+    # In logarithms, so that the surface lies well between samples whose densities differ by orders.
+    values = np.maximum(np.log(np.maximum(values, 1e-6) / level), FLOOR)
+    cell = 2 / count
+    return isosurface(values, 0.0, low=np.full(3, 0.5 * cell - 1), cell=cell, name=name)
 
 
 def _albedo_and_normals(shell: Shell, mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:

@@ -55,7 +55,8 @@ def _columns(x):
 
 def said(**values: Any) -> Reflection:
     """A reflection of which no more is known."""
-    return Reflection(**dict.fromkeys(f.name for f in fields(Reflection)) | values)
+    unknown: dict[str, Any] = dict.fromkeys(f.name for f in fields(Reflection))
+    return Reflection(**unknown | values)
 
 
 @pytest.mark.parametrize("preset", PRESETS)

@@ -6,7 +6,7 @@ import numpy as np
 
 from mitex.evaluation import elevations
 from mitex.evaluation.metrics import single_image_frechet
-from mitex.methods.baselines.elevations import FLAT, compare_elevations
+from mitex.methods.baselines.quilted.elevations import FLAT, compare_elevations
 from tests.methods.nerf.tiny import tiny_capture
 
 

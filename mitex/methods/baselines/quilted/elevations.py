@@ -9,7 +9,7 @@ import numpy as np
 
 from mitex.evaluation.elevations import Elevation, FlatTexture, elevation_table
 from mitex.evaluation.windows import PLACES, WINDOW
-from mitex.methods.baselines.quilted import in_even_light, quilted_albedo
+from mitex.methods.baselines.quilted.albedo import in_even_light, quilted_albedo
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.field.raycast import Raycaster
 from mitex.methods.nerf.synthesis.patch_images import render_patches

@@ -1,0 +1,93 @@
+"""`AppliedField`: a plain field as a picture or as a mesh, in the world of its capture."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mitex.asset import Asset
+from mitex.export import SUFFIXES
+from mitex.images import write_image
+from mitex.mesh import Similarity
+from mitex.methods.nerf.field.tensors import channels, rows
+from mitex.methods.nerf.training.plain import PlainField
+from mitex.methods.nerf.use.extract import CHUNK, solid_surface
+from mitex.paths import prepare_output
+from mitex.runtime.jit import mi
+
+PICTURES = (".png", ".jpg", ".jpeg")
+
+
+class AppliedField:
+    """The object of a capture: a `RadianceField` in the scene cube, and what leaves it.
+
+    Args:
+        field: as it was learned.
+        similarity: the capture's world -> scene cube.
+        name: of the object.
+        strength: factor of the density.
+    """
+
+    def __init__(self, field: PlainField, similarity: Similarity, name: str, strength: float = 1.0) -> None:
+        self.field, self.similarity, self.name, self.strength = field, similarity, name, strength
+        self.mask, self.step = field.mask, field.step
+
+    def evaluate(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, mi.Float, mi.Color3f]:
+        """As of `RadianceField`."""
+        index, density, colour = self.field.evaluate(points, view)
+        return index, density * self.strength, colour
+
+    def density(self, points: np.ndarray) -> np.ndarray:
+        """Density [1 / scene units] of points (N, 3) of the scene cube, (N,)."""
+        return self.field.density_at(points) * np.float32(self.strength)
+
+    @property
+    def maps(self) -> Mapping[str, np.ndarray]:
+        """Colours of the surface's vertices, as `export` writes them."""
+        return self.surface.maps
+
+    def export(self, path: str | os.PathLike[str]) -> Path:
+        """Writes what is solid as a coloured mesh, as of `Asset.export`.
+
+        Raises:
+            OutputError: unknown suffix or unwritable place.
+            MeshError: nothing is solid.
+        """
+        return self.surface.export(prepare_output(path, SUFFIXES))
+
+    def render(self, path: str | os.PathLike[str], *, exposure: float = 0.0, **options: Any) -> Path:
+        """Path-traces the object in the studio, y upwards: PNG or JPEG; options as of `shell_still`.
+
+        Raises:
+            OutputError: unknown suffix or unwritable place.
+        """
+        from mitex.render import tone
+        from mitex.render.shell import shell_still
+
+        target = prepare_output(path, PICTURES)
+        picture = shell_still(self, self.similarity, self.outline, **options)
+        return write_image(target, tone(picture, exposure))
+
+    @cached_property
+    def surface(self) -> Asset:
+        """A mesh of what is solid in the capture's world, see `solid_surface`; its colours are those that are
+        seen along the normals."""
+        mesh = solid_surface(self.density, np.array(self.mask).astype(bool), self.name)
+        colours = np.empty((len(mesh.vertices), 3), np.float32)
+        for start in range(0, len(colours), CHUNK):
+            part = slice(start, start + CHUNK)
+            view = channels(mi.Vector3f, -mesh.normals[part])
+            colours[part] = rows(self.field.evaluate(channels(mi.Point3f, mesh.vertices[part]), view)[2])
+        placed = mesh.with_vertices(self.similarity.inverse(mesh.vertices))
+        return Asset(placed, {"albedo": colours.clip(0, 1)}, name=self.name)
+
+    @property
+    def outline(self) -> np.ndarray:
+        """(N, 3) middles of the occupied cells, in the capture's world."""
+        cells = np.argwhere(np.array(self.mask))
+        return self.similarity.inverse((cells + 0.5) * (2 / self.mask.shape[0]) - 1)

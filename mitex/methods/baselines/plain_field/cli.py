@@ -1,0 +1,84 @@
+"""The command-line options of plain radiance fields."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import arg
+
+from mitex.methods.checks import in_range, reject_unused
+from mitex.methods.options import PICTURES, ApplyOptions, TrainingOptions
+
+if TYPE_CHECKING:
+    from mitex.methods.baselines.plain_field.applied import AppliedField
+
+RESOLUTION = 512  # of a picture [pixels]
+
+
+@dataclass(kw_only=True)
+class Fit(TrainingOptions):
+    """Train a plain hash-grid radiance field on photos, to compare a captured texture with.
+
+    The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the field;
+    `mitex apply RUN --out ASSET` writes the object. Ctrl-C saves, and --resume goes on.
+
+    examples:
+      mitex fit plain_field --capture durian/ --out runs/plain-durian
+      mitex fit plain_field --capture durian/ --set seconds=600
+      mitex fit plain_field --capture durian/ --out runs/plain-durian --resume
+    """
+
+    capture: Annotated[Path, arg(metavar="DIR")]
+    """Folder with transforms.json and photos with masks (alpha), or with plain photos."""
+
+    preset: Annotated[str | None, arg(metavar="fast|paper", help_behavior_hint="(default: fast)")] = None
+    """Settings to start from: those of the texture that it is compared with."""
+
+    def run(self) -> None:
+        options = self.run_options()
+        from mitex.runtime import let_idle_threads_sleep
+
+        let_idle_threads_sleep()
+        from mitex.methods.baselines import plain_field
+        from mitex.methods.nerf import load_capture
+
+        capture = load_capture(self.capture)
+        out = self.folder(f"{capture.name}-plain_field")
+        plain_field.fit(capture, out, **options)
+        print(out)
+
+
+@dataclass(kw_only=True)
+class Apply(ApplyOptions):
+    """Write the object of a plain field: a picture (.png .jpg), or what is solid as a mesh.
+
+    It takes no mesh: a plain field is of one object, which lies as in its photos' world.
+
+    examples:
+      mitex apply runs/plain-durian --out durian.png
+      mitex apply runs/plain-durian --out durian.glb
+    """
+
+    density: Annotated[float, arg(metavar="X")] = 1.0
+    """Factor of the density; more makes thin parts solid."""
+
+    resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {RESOLUTION})")] = None
+    """Side of a picture [pixels]."""
+
+    def check(self) -> None:
+        in_range("--density", self.density, 0.001, 1000.0)
+        in_range("--resolution", self.resolution, 64, 8192)
+
+    def check_output(self, out: Path) -> None:
+        picture = out.suffix.lower() in PICTURES
+        reject_unused("--resolution", out, self.resolution is not None and not picture)
+
+    def picture_options(self) -> dict[str, object]:
+        return {"resolution": self.resolution or RESOLUTION}
+
+    def applied(self, out: Path) -> AppliedField:
+        from mitex.methods.baselines.plain_field import PlainFieldTexture
+
+        return PlainFieldTexture.load(self.model).apply(density=self.density)

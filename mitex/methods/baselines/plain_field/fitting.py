@@ -1,0 +1,93 @@
+"""Training a plain field: from photos to a model file, for so many steps or for so long."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Unpack
+
+from mitex.methods.baselines.plain_field.config import PRESETS, PlainFieldConfig
+from mitex.methods.baselines.plain_field.texture import SETTINGS, PlainFieldTexture
+from mitex.methods.nerf.capture.capture import Capture, load_capture
+from mitex.methods.nerf.training.plain import PlainTask, train_plain_field
+from mitex.methods.nerf.training.radiance import schedule
+from mitex.runtime import init, keep_freed_memory
+from mitex.training import Interrupted, run
+from mitex.training.fit import Run
+from mitex.training.settings import RunOptions
+
+PROBED, LAST = 1000, 200  # steps of the training that tells the pace, and of those the ones that tell it
+
+
+def fit(capture: Capture | str | Path, out: str | Path, **options: Unpack[RunOptions]) -> PlainFieldTexture:
+    """Learns a plain field from photos; writes a run folder with the model in it.
+
+    Every eighth view is held out; previews show the first of these.
+
+    Args:
+        capture: photos with masks and cameras, or the folder that `load_capture` takes.
+        out: run folder; must be new or empty, or hold a run to resume.
+        options: preset ("fast" or "paper", as of the texture that it is compared with), config, overrides
+            ("seconds=..." for equal time), resume, quiet, as of `RunOptions`. A run that is resumed keeps the
+            number of steps that its time was enough for.
+
+    Returns:
+        The field, also saved as `texture.safetensors` in `out`.
+
+    Raises:
+        MitexError: bad input of any kind; nothing has been written then.
+        Interrupted: a checkpoint has been saved.
+    """
+    training_run = Run.of(PRESETS, out, **options)
+    photos = capture if isinstance(capture, Capture) else load_capture(capture)
+    init()
+    keep_freed_memory()
+    training, held_out = photos.split()
+    if training_run.config.seconds and not training_run.resume:
+        config = for_its_time(training_run.config, training, training_run.quiet)
+        training_run = replace(training_run, config=config)
+    config = training_run.config
+    task = PlainTask(config, training, (held_out, 0))
+    origin: dict[str, Any] = {key: getattr(config, key) for key in SETTINGS}
+    origin |= {"centre": photos.similarity.center.tolist(), "scale": float(photos.similarity.scale)}
+    return training_run.train(
+        task,
+        photos.name,
+        lambda about: PlainFieldTexture(task.mean, task.occupancy.occupied, about | origin),
+        **schedule(config),
+    )
+
+
+def for_its_time(config: PlainFieldConfig, capture: Capture, quiet: bool) -> PlainFieldConfig:
+    """The settings with as many steps as `seconds` are enough for, by a short training before.
+
+    The first steps are slow, since nothing hides anything yet.
+    """
+    short = replace(config, steps=PROBED, preview_every=0, checkpoint_every=PROBED)
+    with tempfile.TemporaryDirectory() as folder:
+        probe = Path(folder) / "run"
+        try:
+            train_plain_field(short, capture, (capture, 0), probe, quiet)
+        except Interrupted as e:
+            raise KeyboardInterrupt("interrupted before the first step; nothing is kept") from e
+        lines = (probe / run.METRICS).read_text().splitlines()
+    steps = steps_within(config.seconds, [json.loads(line)["seconds"] for line in lines])
+    return replace(config, steps=steps, lr_steps=steps)
+
+
+def steps_within(seconds: float, clock: Sequence[float]) -> int:
+    """How many steps a time is enough for, at least one.
+
+    Args:
+        seconds: that there are.
+        clock: seconds that had passed after each of the first steps, increasing; the last 200 tell the pace
+            of those that follow.
+    """
+    if seconds <= clock[-1]:
+        return max(1, bisect_right(clock, seconds))
+    last = min(LAST, len(clock) - 1)
+    return len(clock) + int((seconds - clock[-1]) * last / (clock[-1] - clock[-1 - last]))

@@ -1,0 +1,104 @@
+"""`PlainFieldTexture`: density and colours of the object in photos, which cannot leave it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from mitex.errors import ConfigError
+from mitex.mesh import Mesh, Similarity
+from mitex.methods.baselines.plain_field import METHOD
+from mitex.methods.baselines.plain_field.applied import AppliedField
+from mitex.methods.baselines.plain_field.config import PlainFieldConfig
+from mitex.methods.nerf.field.rendering import render_step
+from mitex.methods.nerf.training.plain import PlainField, hash_grid, parameter_shapes
+from mitex.runtime import init
+from mitex.runtime.jit import mi
+from mitex.training import model_file
+
+SETTINGS = ("table", "ray_steps", "occupancy")  # that the model depends on
+
+
+@dataclass(frozen=True, eq=False)
+class PlainFieldTexture:
+    """A plain radiance field, learned by `fit`.
+
+    Attributes:
+        parameters: table and matrices, as of `parameter_shapes`.
+        occupied: (G, G, G) uint8, cells of the scene cube with matter.
+        about: how it was made: name, preset, steps, `SETTINGS`, and how the capture was placed.
+    """
+
+    parameters: Mapping[str, torch.Tensor]
+    occupied: np.ndarray
+    about: Mapping[str, Any]
+
+    @classmethod
+    def load(cls, source: str | Path) -> PlainFieldTexture:
+        """Reads a run folder or a model file.
+
+        Raises:
+            CheckpointError: there is none, or it is damaged.
+        """
+        init()
+        with model_file.opened(source, METHOD.name) as (tensors, about):
+            packed, side = tensors.pop("occupied").numpy(), int(about["occupancy"])
+            occupied = np.unpackbits(packed, count=side**3).reshape((side,) * 3)
+            texture = cls(tensors, occupied, about)
+            shapes = parameter_shapes(hash_grid(texture.config))
+            if {name: tuple(value.shape) for name, value in tensors.items()} != shapes:
+                raise ValueError("parameters of another shape")
+            if not all(value.isfinite().all() for value in tensors.values()):
+                raise ValueError("values that are not finite")
+            return cls({name: tensors[name] for name in shapes}, occupied, about)
+
+    def save(self, path: str | Path) -> Path:
+        """Writes the model file (safetensors).
+
+        Raises:
+            OutputError: the place is not writable.
+        """
+        tensors = {**self.parameters, "occupied": torch.from_numpy(np.packbits(self.occupied))}
+        return model_file.save(path, tensors, METHOD.name, self.about)
+
+    @property
+    def config(self) -> PlainFieldConfig:
+        """As far as the model depends on it."""
+        return PlainFieldConfig(**{key: self.about[key] for key in SETTINGS})
+
+    @cached_property
+    def field(self) -> PlainField:
+        """The field in the scene cube, ready to be marched."""
+        init()
+        mask = mi.TensorXu8(self.occupied)
+        return PlainField.of(self.parameters, hash_grid(self.config), mask, render_step(self.config))
+
+    @property
+    def similarity(self) -> Similarity:
+        """The capture's world -> scene cube."""
+        return Similarity(np.array(self.about["centre"]), self.about["scale"])
+
+    def apply(self, mesh: Mesh | None = None, *, density: float = 1.0) -> AppliedField:
+        """The object itself, in the capture's world.
+
+        Args:
+            mesh: None; there is no other object that a plain field can be put on.
+            density: factor of the density; more makes thin parts solid.
+
+        Raises:
+            ConfigError: a mesh was given, or the density is out of range.
+        """
+        if mesh is not None:
+            raise ConfigError(
+                f"a plain field cannot be put on '{mesh.name}'",
+                "leave out the mesh, or learn a texture with mitex fit nerf",
+            )
+        if not 0 < density <= 1000:
+            raise ConfigError(f"{density} times the density", "use densities up to 1000")
+        return AppliedField(self.field, self.similarity, str(self.about["name"]), density)

@@ -1,0 +1,112 @@
+"""`QuiltedTexture`: a tileable picture of a captured texture, put on meshes as a flat texture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from mitex.asset import Asset
+from mitex.atlas import MAX_RESOLUTION, laid_out
+from mitex.colour import linear_to_srgb, srgb_to_linear
+from mitex.errors import ConfigError
+from mitex.evaluation.mip_map import MipMap
+from mitex.export.common import asset_from_textures
+from mitex.mesh import Mesh
+from mitex.methods.baselines.quilted import METHOD
+from mitex.methods.nerf.use.placement import UNWRAP_SIZE, in_scene_cube, uv_unit_length
+from mitex.training import model_file
+
+CHUNK = 1 << 18  # texels looked up at a time
+
+
+@dataclass(frozen=True, eq=False)
+class QuiltedTexture:
+    """A picture that repeats beyond its borders.
+
+    Attributes:
+        image: (T, T, 3) float32 sRGB in [0, 1], row 0 on top.
+        gap: between texels [scene units of the capture].
+        about: how it was made.
+    """
+
+    image: np.ndarray
+    gap: float
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def load(cls, source: str | Path) -> QuiltedTexture:
+        """Reads a run folder or a model file.
+
+        Raises:
+            CheckpointError: there is none, or it is damaged.
+        """
+        with model_file.opened(source, METHOD.name) as (tensors, about):
+            image, gap = tensors["image"].numpy(), float(tensors["gap"])
+            if image.ndim != 3 or image.shape[0] != image.shape[1] or image.shape[2] != 3:
+                raise ValueError(f"an image of shape {image.shape}")
+            if not np.isfinite(image).all() or not 0 < gap < np.inf:
+                raise ValueError("values that mean nothing")
+            return cls(image, gap, about)
+
+    def save(self, path: str | Path) -> Path:
+        """Writes the model file (safetensors).
+
+        Raises:
+            OutputError: the place is not writable.
+        """
+        tensors = {
+            "image": torch.from_numpy(self.image),
+            "gap": torch.tensor(self.gap, dtype=torch.float64),
+        }
+        return model_file.save(path, tensors, METHOD.name, self.about)
+
+    def apply(self, mesh: Mesh, *, scale: float = 1.0, resolution: int = 1024) -> Asset:
+        """Puts the picture on any mesh, repeated over its UVs.
+
+        Args:
+            mesh: its own UVs are used if they do not overlap, else new ones.
+            scale: size of the texture's elements beside the whole mesh, against that on the captured object.
+            resolution: side of the asset's albedo [texels], 16 to 8192.
+
+        Returns:
+            The mesh with an albedo texture, whose texels show the mean light of what they cover. Where charts
+            meet, the pattern breaks.
+
+        Raises:
+            MeshError: the mesh has no area.
+            ConfigError: a number is out of range.
+        """
+        if not 0.05 <= scale <= 20 or not 16 <= resolution <= MAX_RESOLUTION:
+            raise ConfigError(
+                f"a texture of {scale} times the size and {resolution} texels",
+                f"use sizes from 0.05 to 20, and 16 to {MAX_RESOLUTION} texels",
+            )
+        mesh = laid_out(mesh, UNWRAP_SIZE)
+        assert mesh.uv is not None
+        unit_length = uv_unit_length(in_scene_cube(mesh)[0])
+        albedo = self._repeated(unit_length / (self.gap * scale), resolution)
+        return asset_from_textures(mesh, mesh.uv, {"albedo": albedo}, mesh.name)
+
+    def _repeated(self, length: float, resolution: int) -> np.ndarray:
+        """(N, N, 3) sRGB, the unit square of UVs.
+
+        Args:
+            length: texels of the picture along its side.
+            resolution: N.
+        """
+        step = length / resolution
+        along = (np.arange(resolution) + 0.5) * step
+        column, row = np.meshgrid(along, along - length)  # the lower left corner is that of the picture
+        places = np.stack([column.ravel(), row.ravel()], axis=1)
+        look_up, footprint = MipMap(srgb_to_linear(self.image)), step * np.eye(2)
+        colours = np.empty((len(places), 3), np.float32)
+        for start in range(0, len(places), CHUNK):
+            part = slice(start, start + CHUNK)
+            footprints = np.broadcast_to(footprint, (len(places[part]), 2, 2))
+            colours[part] = linear_to_srgb(look_up(places[part], footprints)).clip(0, 1)
+        return colours.reshape(resolution, resolution, 3)
