@@ -1,14 +1,15 @@
-"""Filtered lookup of images: a mip map (Williams 1983), read along the longer axis of a pixel's footprint.
+"""Filtered lookup of images: a mip map (Williams 1983), read all over a pixel's footprint.
 
-A pixel that covers many texels shows their mean; one texel in its place is noise. Where a surface is seen
-flat, footprints are long: several squares side by side cover them (Feline, McCormack et al. 1999).
+A pixel that covers many texels shows their mean; one texel in its place is noise. A single read of a mip map
+blurs, 1.7 times as wide as the box of a pixel: here several reads of finer levels fill the footprint.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-PROBES = 64  # squares that a footprint is covered with, at most
+FINER = 4  # reads along the shorter extent of a footprint
+READS = 64  # along each side of a footprint, at most
 
 
 class MipMap:
@@ -37,17 +38,18 @@ class MipMap:
         Returns:
             (N, C) float64.
         """
-        axes, lengths, _ = np.linalg.svd(footprints)
-        long, short = lengths[:, 0], np.maximum(lengths[:, 1], 1.0)
-        count = np.clip(np.ceil(long / short), 1, PROBES).astype(np.int64)
-        level = np.log2(np.maximum(long / count, short))
-        along = axes[:, :, 0] * long[:, None]
+        narrow = np.linalg.svd(footprints, compute_uv=False)[:, 1:]
+        sides = np.linalg.norm(footprints, axis=1)
+        counts = np.clip(np.ceil(sides / np.maximum(narrow / FINER, 1.0)), 1, READS).astype(np.int64)
+        level = np.log2(np.maximum((sides / counts).max(1), 1.0))
         total = np.zeros((len(places), self.levels[0].shape[2]))
-        for k in range(count.max(initial=0)):
-            part = np.flatnonzero(count > k)
-            offset = ((k + 0.5) / count[part] - 0.5)[:, None] * along[part]
-            total[part] += self._trilinear(places[part] + offset, level[part])
-        return total / count[:, None]
+        for index in np.ndindex(*counts.max(0, initial=0)):
+            part = np.flatnonzero((counts > index).all(1))
+            offset = (np.array(index) + 0.5) / counts[part] - 0.5  # in pixels
+            total[part] += self._trilinear(
+                places[part] + (footprints[part] @ offset[:, :, None])[..., 0], level[part]
+            )
+        return total / counts.prod(1)[:, None]
 
     def _trilinear(self, places: np.ndarray, level: np.ndarray) -> np.ndarray:
         level = np.clip(level, 0, len(self.levels) - 1)
