@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
-__all__ = ["Asset", "Exemplar", "Mesh", "__version__", "init", "methods"]
+__all__ = ["Asset", "Exemplar", "Mesh", "__version__", "init", "load", "methods"]
 
 _HOMES = {
     "Asset": ("mitex.asset", "Asset"),
     "Exemplar": ("mitex.exemplar", "Exemplar"),
     "Mesh": ("mitex.mesh", "Mesh"),
     "init": ("mitex.plugins", "init"),
+    "load": ("mitex.methods.registry", "load"),
     "methods": ("mitex.methods", None),
 }
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from mitex.asset import Asset
     from mitex.exemplar import Exemplar
     from mitex.mesh import Mesh
+    from mitex.methods.registry import load
     from mitex.plugins import init
 
 

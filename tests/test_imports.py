@@ -58,7 +58,6 @@ COMPARED = {
     "displacement": {"geometric"},
     "quilted": {"nerf"},
     "plain_field": {"nerf"},
-    "elevations": {"nerf", "quilted"},
 }
 SHARED = {"baselines", *(file.stem for file in (ROOT / "mitex" / "methods").glob("*.py"))}
 

@@ -182,7 +182,8 @@ class TestUsage:
             ),
             (
                 ["fit", "nac", "--settings"],
-                "there is no method 'nac'; use one of geometric, nca, nerf, surface",
+                "there is no method 'nac'; use one of geometric, nca, nerf, surface, displacement, "
+                "plain_field, quilted",
             ),
             (["fit", "nca", "--settings", "--preset", "papr"], "there is no preset 'papr'; use 'paper'"),
             (

@@ -134,7 +134,7 @@ def test_demo(folder, monkeypatch, capsys):
 
     monkeypatch.setattr(nca, "fit", tiny_fit)
     monkeypatch.setattr(nca.NcaTexture, "apply", lambda *a, **o: grow(*a, **o, subdivide=1, steps=2))
-    monkeypatch.setattr(Asset, "baked", lambda self, resolution: bake(self, 64))
+    monkeypatch.setattr(Asset, "baked", lambda self, resolution, **o: bake(self, 64, **o))
     monkeypatch.setattr(demo, "_parent", lambda: None)
     monkeypatch.setattr(demo, "MESHES", ("cube.obj",))
     monkeypatch.setattr(demo, "SIZE", 16)

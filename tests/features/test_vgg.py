@@ -66,10 +66,10 @@ def test_normalisation_divides_each_layer_by_its_mean(networks, pictures, pool):
 
 @pytest.mark.parametrize("pool", ["average", "max"])
 def test_normalised_layers_are_near_one_on_textures(networks, pool):
-    """The recorded means hold for pictures that they were not taken from."""
+    """The recorded means hold for pictures that they were not taken from, within what pictures differ by."""
     means = networks[pool, "float32"].features(exemplars(128), LAYERS)
     for layer in LAYERS:
-        assert 0.25 < means[layer].mean() < 4, layer
+        assert 0.9 < means[layer].mean() < (1.2 if int(layer[4]) < 4 else 1.65), layer
 
 
 def _transport_loss(vectors, targets):

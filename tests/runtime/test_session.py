@@ -200,10 +200,10 @@ def test_torch_yields_cores_unless_the_user_says_otherwise(monkeypatch: pytest.M
 
 def test_fitting_radiance_fields_asks_torch_to_yield_before_it_is_loaded():
     code = (
-        "import os, sys, mitex.cli.fit_nerf as c\n"
+        "import os, sys, mitex.methods.nerf.cli as c\n"
         "from pathlib import Path\n"
         "assert 'torch' not in sys.modules\n"
-        "try:\n    c.FitNerf(capture=Path('nowhere')).run()\nexcept Exception:\n    pass\n"
+        "try:\n    c.Fit(capture=Path('nowhere')).run()\nexcept Exception:\n    pass\n"
         "print(os.environ['OMP_WAIT_POLICY'])"
     )
     assert run(code).stdout.strip() == "PASSIVE"

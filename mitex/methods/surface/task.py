@@ -27,14 +27,14 @@ from mitex.methods.surface.texture import texel_layout
 from mitex.methods.surface.views import Views
 from mitex.runtime import keep_freed_memory
 from mitex.sparse import csr_tensor
-from mitex.training import Step
+from mitex.training import ParameterTask, Step
 from mitex.triples import CYCLE, channel_triples, triple_images
 
 VIEW = 384  # side of a preview's images [px]
 CONTENT = "content"
 
 
-class SurfaceTask:
+class SurfaceTask(ParameterTask):
     """Texels whose features shall have the Gram matrices of the exemplar's.
 
     With several maps, a step compares some channel triples in turn (see `mitex.triples`): the mixed ones
@@ -79,7 +79,8 @@ class SurfaceTask:
         self.space = (
             ColourSpace.of(exemplar, self.layout) if config.whitened else ColourSpace.plain(self.channels)
         )
-        self.coordinates = self._start(generator).requires_grad_()
+        super().__init__({"coordinates": self._start(generator)})
+        self.coordinates = self.named["coordinates"]
         weights = _weights(config, generator)
         # The image network has the same weights: what differs is only where it looks.
         image_network = Vgg16(config.pooling, weights=weights)
@@ -101,10 +102,6 @@ class SurfaceTask:
                 self.content = self.networks[0].features(start, [config.content_layer])[config.content_layer]
 
     @property
-    def parameters(self) -> list[torch.Tensor]:
-        return [self.coordinates]
-
-    @property
     def channels(self) -> int:
         """C."""
         return sum(map(len, self.layout.values()))
@@ -113,9 +110,6 @@ class SurfaceTask:
     def values(self) -> torch.Tensor:
         """(n, C) the maps' channels by `layout`, in the order of `levels`, in [0, 1]."""
         return self.space.values(self.coordinates)
-
-    def begin(self, step: int, generator: torch.Generator) -> None:
-        """Nothing changes before the loss."""
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
         """Distance of features from the exemplar's, averaged over the triples of the step."""
@@ -149,15 +143,6 @@ class SurfaceTask:
             inside = values.clamp(0.0, 1.0)
             if not torch.equal(values, inside):
                 self.coordinates.copy_(self.space.coordinates(inside))
-
-    def state(self) -> dict[str, torch.Tensor]:
-        return {"coordinates": self.coordinates}
-
-    def load_state(self, state: dict[str, torch.Tensor]) -> None:
-        with torch.no_grad():
-            if state["coordinates"].shape != self.coordinates.shape:
-                raise ValueError(f"texels of shape {tuple(state['coordinates'].shape)}")
-            self.coordinates.copy_(state["coordinates"])
 
     def in_texel_order(self) -> np.ndarray:
         """(N, C) values in the order of `Texels`."""

@@ -181,7 +181,7 @@ def test_training_meshes_are_kept(monkeypatch):
     def unwanted(*_):
         raise AssertionError("found again")
 
-    monkeypatch.setattr(import_module("mitex.methods.geometric.fit"), "fit_level", unwanted)
+    monkeypatch.setattr(import_module("mitex.methods.geometric.fitting"), "fit_level", unwanted)
     again, _ = training_meshes(reference, template, replace(QUICK, steps=1, fit_steps=3))
     assert torch.equal(first[0], again[0])
     for other in ({"fit_steps": 4}, {"seed": 1}):
