@@ -40,8 +40,8 @@ def prepare_output(
     target = _absolute(path)
     if suffixes and target.suffix.lower() not in suffixes:
         allowed = ", ".join(suffixes)
-        found = f"'{target.suffix}'" if target.suffix else "no suffix"
-        raise OutputError(f"cannot write '{path}' with {found}", f"use one of {allowed}")
+        ending = f"'{target.suffix}'" if target.suffix else "no suffix"
+        raise OutputError(f"cannot write '{path}' with {ending}", f"use one of {allowed}")
     try:
         if target.is_dir():
             raise OutputError(f"'{path}' is a folder", "name a file")
@@ -96,9 +96,9 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     target = _absolute(path)
     temporary = target.with_name(f".{target.stem[:40]}.{secrets.token_hex(4)}.tmp{target.suffix}")
-    made: list[Path] = []
+    created: list[Path] = []
     try:
-        made = missing_folders(target.parent)
+        created = missing_folders(target.parent)
         target.parent.mkdir(parents=True, exist_ok=True)
         temporary.touch()
         mode = temporary.stat().st_mode  # safetensors would leave it readable for its owner only
@@ -113,7 +113,7 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
     except BaseException as e:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
-        for folder in reversed(made):
+        for folder in reversed(created):
             with suppress(OSError):
                 folder.rmdir()
         if isinstance(e, OSError):

@@ -106,9 +106,9 @@ def _check_file(source: Path, max_bytes: int) -> None:
     if not os.path.isfile(source):
         raise MeshError(f"{source} is not a regular file", f"name a mesh file ({formats})")
     if source.suffix.lower() not in SUFFIXES:
-        found = f"'{source.suffix}'" if source.suffix else "no suffix"
+        ending = f"'{source.suffix}'" if source.suffix else "no suffix"
         raise MeshError(
-            f"{source} has {found}, which is no mesh format Mitex reads", f"convert it to {formats}"
+            f"{source} has {ending}, which is no mesh format Mitex reads", f"convert it to {formats}"
         )
     size = source.stat().st_size
     if not size:

@@ -59,10 +59,10 @@ def check(out: str | os.PathLike[str], resume: bool = False) -> None:
 def opened(out: str | os.PathLike[str], resume: bool) -> Iterator[tuple[Path, Metrics]]:
     """Checks, makes and locks a run folder; yields its absolute path and its open metrics.jsonl.
 
-    If the run fails before its first step, what was made is removed again.
+    If the run fails before its first step, what was created is removed again.
     """
     check(out, resume)
-    made = missing_folders(out)
+    created = missing_folders(out)
     folder = prepare_folder(out)
     fresh = [name for name in (METRICS, CONFIG) if not (folder / name).exists()]
     try:
@@ -73,7 +73,7 @@ def opened(out: str | os.PathLike[str], resume: bool) -> Iterator[tuple[Path, Me
             if METRICS in fresh and not _size(folder / METRICS):  # no step was done
                 for name in fresh:
                     (folder / name).unlink(missing_ok=True)
-                for empty in reversed(made):
+                for empty in reversed(created):
                     empty.rmdir()  # refuses when something else is in it
         raise
 
@@ -91,13 +91,13 @@ def prepare(folder: Path, config: Any, metadata: Mapping[str, str]) -> None:
 
 def versions() -> dict[str, str]:
     """Versions of Mitex and of what it computes with, read without importing them."""
-    found = {"mitex": __version__}
+    numbers = {"mitex": __version__}
     for package in ("torch", "mitsuba", "drjit"):
         try:
-            found[package] = version(package)
+            numbers[package] = version(package)
         except PackageNotFoundError:
-            found[package] = "missing"
-    return found
+            numbers[package] = "missing"
+    return numbers
 
 
 def as_json(config: Any) -> dict[str, Any]:

@@ -90,9 +90,9 @@ def table(config: FitConfig) -> str:
     kinds = typing.get_type_hints(type(config))
     for one in fields(config):
         value = getattr(config, one.name)
-        shown = ",".join(map(str, value)) if isinstance(value, tuple) else str(value).lower()
+        text = ",".join(map(str, value)) if isinstance(value, tuple) else str(value).lower()
         allowed = _allowed(kinds[one.name], *bounds(type(config), one))
-        rows.append((f"{one.name} = {shown}", allowed, meaning(type(config), one)))
+        rows.append((f"{one.name} = {text}", allowed, meaning(type(config), one)))
     width = min(max(len(row[0]) for row in rows), 30)
     return "\n".join(
         f"{setting:{width}}  {text}{f' ({allowed})' if allowed else ''}" for setting, allowed, text in rows
@@ -102,9 +102,9 @@ def table(config: FitConfig) -> str:
 def _metadata(config: type, one: Field) -> Any:
     """The metadata of a key, which a class that only gives it another default inherits."""
     for base in config.__mro__:
-        known = vars(base).get("__dataclass_fields__", {}).get(one.name)
-        if known is not None and known.metadata:
-            return known.metadata
+        declared = vars(base).get("__dataclass_fields__", {}).get(one.name)
+        if declared is not None and declared.metadata:
+            return declared.metadata
     raise TypeError(f"{config.__name__}.{one.name} is not declared with `key`")
 
 

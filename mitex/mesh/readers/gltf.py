@@ -110,20 +110,20 @@ def _fetch(name: str, uri: str, folder: Path, max_bytes: int) -> bytes:
             return base64.b64decode(uri.partition("base64,")[2], validate=True)
         except binascii.Error as error:
             raise MeshError(f"{name} has a damaged embedded buffer", DAMAGED) from error
-    shown = uri[:80]
+    excerpt = uri[:80]
     remedy = "keep the buffers beside the .gltf file, or export a .glb"
     root = folder.resolve()
     try:
         path = (root / unquote(uri)).resolve()
         if urlsplit(uri).scheme or not path.is_relative_to(root):
-            raise MeshError(f"{name} refers to '{shown}', which is outside its folder", remedy)
+            raise MeshError(f"{name} refers to '{excerpt}', which is outside its folder", remedy)
         if not path.is_file():
-            raise MeshError(f"{name} refers to '{shown}', which does not exist", remedy)
+            raise MeshError(f"{name} refers to '{excerpt}', which does not exist", remedy)
         if path.stat().st_size > max_bytes:
-            raise MeshError(f"the buffer '{shown}' of {name} is too large", "simplify the mesh")
+            raise MeshError(f"the buffer '{excerpt}' of {name} is too large", "simplify the mesh")
         return path.read_bytes()
     except (OSError, ValueError) as error:
-        raise MeshError(f"{name} refers to '{shown}', which cannot be read", remedy) from error
+        raise MeshError(f"{name} refers to '{excerpt}', which cannot be read", remedy) from error
 
 
 def _instances(tree: dict):

@@ -98,11 +98,11 @@ def _model(tensors: dict[str, torch.Tensor], degree: object, path: Path) -> Mesh
     if set(tensors) != PARAMETERS or any(tensors[k].ndim != 2 - k.endswith("bias") for k in PARAMETERS):
         raise problem
     (channels, hidden), inputs = tensors["fc2.weight"].shape, tensors["fc1.weight"].shape[1]
-    known = _degree(degree, channels, inputs)
-    if known is None or not channels:
+    rule_degree = _degree(degree, channels, inputs)
+    if rule_degree is None or not channels:
         raise problem
-    condition = inputs - (HARMONICS[known] + 1) * channels
-    model = MeshNCA(channels, hidden, condition, known)
+    condition = inputs - (HARMONICS[rule_degree] + 1) * channels
+    model = MeshNCA(channels, hidden, condition, rule_degree)
     try:
         model.load_state_dict({name: value.float() for name, value in tensors.items()})
     except RuntimeError as e:

@@ -109,11 +109,11 @@ class NcaTexture:
         if steps < 0:
             raise ConfigError(f"{steps} steps", "give 0 or more")
         keep_freed_memory()
-        seen = perception(mesh, self.model.degree, orientation)
+        operator = perception(mesh, self.model.degree, orientation)
         generator = torch.Generator().manual_seed(seed)
-        state = self.model.seed(seen)
+        state = self.model.seed(operator)
         for _ in range(steps):
-            state = self.model.evolve(state, seen, 1, generator).clamp_(-clamp, clamp)
+            state = self.model.evolve(state, operator, 1, generator).clamp_(-clamp, clamp)
         return state[0]
 
     def _check_unconditioned(self) -> None:

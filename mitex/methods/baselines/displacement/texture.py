@@ -127,6 +127,6 @@ def _depth(mesh: Mesh, start: np.ndarray) -> np.ndarray:
     init()
     scene = mi.load_dict({"type": "scene", "mesh": mesh_shape(mesh)})
     rays = mi.Ray3f(mi.Point3f(np.ascontiguousarray(start.T, np.float32)), mi.Vector3f(0, 0, -1))
-    found = scene.ray_intersect_preliminary(rays)
-    hit, t = np.asarray(found.is_valid()).astype(bool), np.asarray(found.t)
+    hits = scene.ray_intersect_preliminary(rays)
+    hit, t = np.asarray(hits.is_valid()).astype(bool), np.asarray(hits.t)
     return np.where(hit, t, np.inf).astype(np.float64)
