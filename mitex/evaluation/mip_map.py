@@ -10,6 +10,7 @@ import numpy as np
 
 FINER = 4  # reads along the shorter extent of a footprint
 READS = 64  # along each side of a footprint, at most
+TOLERANCE = 1e-3  # of a read: rounding adds none to a footprint of one texel
 
 
 class MipMap:
@@ -40,7 +41,8 @@ class MipMap:
         """
         narrow = np.linalg.svd(footprints, compute_uv=False)[:, 1:]
         sides = np.linalg.norm(footprints, axis=1)
-        counts = np.clip(np.ceil(sides / np.maximum(narrow / FINER, 1.0)), 1, READS).astype(np.int64)
+        reads = np.ceil(sides / np.maximum(narrow / FINER, 1.0) - TOLERANCE)
+        counts = np.clip(reads, 1, READS).astype(np.int64)
         level = np.log2(np.maximum((sides / counts).max(1), 1.0))
         total = np.zeros((len(places), self.levels[0].shape[2]))
         for index in np.ndindex(*counts.max(0, initial=0)):
