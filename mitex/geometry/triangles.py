@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mitex.geometry.vectors import cross_2d
+from mitex.geometry.vectors import cross_2d, dot
 
 
 def triangle_crosses(p: np.ndarray) -> np.ndarray:
@@ -48,6 +48,33 @@ def nearest_on_border(triangles: np.ndarray, points: np.ndarray) -> tuple[np.nda
         t = np.clip((to * along).sum(axis=1) / length2, 0.0, 1.0)
         distance = np.linalg.norm(to - t[:, None] * along, axis=1)
         closer = np.flatnonzero(distance < best)
+        best[closer] = distance[closer]
+        barycentric[closer] = 0.0
+        barycentric[closer, k], barycentric[closer, end] = 1.0 - t[closer], t[closer]
+    return barycentric, best
+
+
+def nearest_on_triangles(triangles: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The points of triangles (M, 3, 3) nearest to points (M, 3).
+
+    Returns:
+        (M, 3) barycentric coordinates, and (M,) distances.
+    """
+    crosses = triangle_crosses(triangles)
+    square = np.maximum(dot(crosses, crosses), np.finfo(np.float64).tiny)[:, None]
+    corners = triangles - points[:, None]
+    parts = [np.cross(corners[:, k - 2], corners[:, k - 1]) for k in range(3)]
+    barycentric = np.stack([dot(part, crosses) for part in parts], axis=1) / square
+    inside = (barycentric >= 0).all(axis=1) & (dot(crosses, crosses) > 0)
+    barycentric[~inside] = 0.0
+    best = np.where(inside, 0.0, np.inf)
+    best[inside] = np.linalg.norm(np.einsum("mk,mkd->md", barycentric, corners)[inside], axis=1)
+    for k, end in ((0, 1), (1, 2), (2, 0)):
+        along = corners[:, end] - corners[:, k]
+        length2 = np.maximum(dot(along, along), np.finfo(np.float64).tiny)
+        t = np.clip(-dot(corners[:, k], along) / length2, 0.0, 1.0)
+        distance = np.linalg.norm(corners[:, k] + t[:, None] * along, axis=1)
+        closer = np.flatnonzero(~inside & (distance < best))
         best[closer] = distance[closer]
         barycentric[closer] = 0.0
         barycentric[closer, k], barycentric[closer, end] = 1.0 - t[closer], t[closer]

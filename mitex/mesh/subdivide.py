@@ -39,6 +39,26 @@ def subdivide_midpoint(mesh: Mesh, times: int = 1) -> Mesh:
     return _repeat(mesh, times, _midpoints)
 
 
+def child_points(face: np.ndarray, barycentric: np.ndarray, times: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where points of a mesh are on the mesh that `subdivide_midpoint` makes of it in `times` rounds.
+
+    Args:
+        face: (P,) faces of the mesh.
+        barycentric: (P, 3) on them; points a little outside stay outside.
+        times: rounds.
+
+    Returns:
+        (P,) faces and (P, 3) barycentric coordinates on the subdivided mesh, in the types that were given.
+    """
+    for _ in range(times):
+        corner = np.where(barycentric.max(axis=1) >= 0.5, barycentric.argmax(axis=1), 3)
+        outer = 2 * barycentric - (np.arange(3) == corner[:, None])
+        middle = 1 - 2 * np.roll(barycentric, 1, axis=1)
+        barycentric = np.where(corner[:, None] == 3, middle, outer).astype(barycentric.dtype)
+        face = (4 * face + corner).astype(face.dtype)
+    return face, barycentric
+
+
 def _repeat(mesh: Mesh, times: int, rule) -> Mesh:
     if times < 0:
         raise MeshError(f"a mesh cannot be subdivided {times} times", "use 0 or more")

@@ -12,21 +12,14 @@ from mitex.triples import CYCLE
 
 
 class Appearance:
-    """Compares views with pictures of the exemplar, at random places of each feature layer.
-
-    Attributes:
-        channels: the state's channels that views must have, in this order: those that any picture shows.
-    """
+    """Compares views with pictures of the exemplar, at random places of each feature layer."""
 
     def __init__(self, config: NcaConfig, targets: Targets, network: Vgg16) -> None:
         self.config, self.targets, self.network = config, targets, network
-        channels = sorted({channel for p in targets.pictures for channel in p.channels})
-        self.channels = torch.tensor(channels, device=network.device)
-        table = [[channels.index(channel) for channel in p.channels] for p in targets.pictures]
-        self._table = torch.tensor(table, device=network.device)
+        self._table = torch.tensor([p.channels for p in targets.pictures], device=network.device)
 
     def __call__(self, views: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
-        """Loss of views (K, H, W, C) of the `channels` as map values; scalar.
+        """Loss of views (K, H, W, C) of the maps' values; scalar.
 
         Averaged over views, and over maps where each view shows all of them; summed over layers.
         """

@@ -7,6 +7,7 @@ from typing import Literal
 
 from mitex.errors import ConfigError
 from mitex.features.layers import LAYERS
+from mitex.methods.nca.decoder.shape import COORDINATES, DecoderShape
 from mitex.training.settings import TrainingConfig, key
 
 
@@ -20,40 +21,51 @@ class NcaConfig(TrainingConfig):
     hidden: int = key(128, "width of the hidden layer", 1, 4096)
     degree: int = key(1, "highest degree of the spherical harmonics of the perception", 0, 2)
     gain: float = key(0.1, "gain of the initial weights of the last layer (the authors: 1.2)", 0)
-    frequency: int = key(48, "of the icosphere that is trained on; 10 f^2 + 2 vertices", 1, 4096)
+    frequency: int = key(32, "of the icosphere that is trained on; 10 f^2 + 2 vertices", 1, 4096)
     pool: int = key(64, "states kept between steps", 1, 4096)
+    aggregation: Literal["mean", "sum"] = key(
+        "mean", "of what a cell perceives of its neighbours: six times the mean, or the sum (the paper)"
+    )
     inject_every: int = key(16, "steps after which the drawn state is replaced by the seed", 1, 4096)
-    min_steps: int = key(20, "fewest automaton steps in a training step", 1, 4096)
-    max_steps: int = key(32, "most automaton steps in a training step", 1, 4096)
+    min_steps: int = key(24, "fewest automaton steps in a training step", 1, 4096)
+    max_steps: int = key(48, "most automaton steps in a training step", 1, 4096)
     views: Literal["patch", "full"] = key(
         "patch", "orthographic close-ups, or perspective views of the whole sphere (the paper)"
     )
-    view_count: int = key(8, "views in a step", 1, 4096)
-    resolution: int = key(64, "side of a view [px]", 16, 2048)
+    view_count: int = key(4, "views in a step, of each zoom", 1, 4096)
+    resolution: int = key(128, "side of a view [px]", 16, 2048)
+    zooms: int = key(3, "sizes at which views are compared, each half of the next", 1, 6)
     distance: float = key(2.5, "of the camera of a full view [normalised mesh units]", 1.01, 100)
     fov: float = key(60.0, "field of view of a full view [degrees]", 1, 170)
-    density: float = key(96.0, "vertices along the exemplar's width in a patch: the size on a mesh", 4, 4096)
-    exemplar_size: int = key(128, "side that the exemplar is resized to [px]", 16, 2048)
-    target_size: int = key(128, "side that it is enlarged to for the features [px]", 16, 2048)
+    density: float = key(32.0, "vertices along the exemplar's width in a patch: the size on a mesh", 4, 4096)
+    exemplar_size: int = key(512, "side that a larger exemplar is resized to [px]", 16, 2048)
+    target_size: int = key(0, "side that it is enlarged to for the features [px]; 0: its own", 0, 2048)
     blend: bool = key(
         True, "a view shows one picture of several maps, mixed, so that they are learned in register"
     )
-    layers: tuple[str, ...] = key(
-        (
-            *("relu1_1", "relu1_2", "relu2_1", "relu2_2", "relu3_1", "relu3_2", "relu3_3"),
-            *("relu4_3", "relu5_3"),
-        ),
-        "of VGG-16",
-    )
-    pooling: Literal["average", "max"] = key("average", "of VGG-16")
+    layers: tuple[str, ...] = key(("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "of VGG-16")
+    pooling: Literal["average", "max"] = key("max", "of VGG-16")
     samples: int = key(1024, "feature vectors compared in each layer and view, at most", 1, 4096)
     colour_weight: float = key(1.0, "of the comparison of colours, beside the layers", 0)
     colour_histogram: bool = key(True, "compare the histograms of the channels too")
     moment_weight: float = key(0.1, "of the moment terms, beside the transport terms", 0)
     appearance_weight: float = key(2.0, "of the appearance loss", 0)
-    overflow_weight: float = key(1e4, "of the overflow loss", 0)
+    overflow_weight: float = key(100.0, "of the overflow loss", 0)
+    decoder: bool = key(
+        True, "decode the maps from the states; false: they are channels of the state (the paper)"
+    )
+    interpolation: Literal["smooth", "linear"] = key("smooth", "of the states between the vertices")
+    coordinates: tuple[str, ...] = key(
+        ("waves",), "local coordinates, of waves, barycentrics, polynomials; or none"
+    )
+    waves: int = key(8, "number of waves of the solid noise", 1, 256)
+    wave_frequencies: tuple[float, ...] = key((2.0, 3.0), "of the waves [cycles per edge]", 0)
+    wave_amplitude: float = key(0.3, "of the waves", 0)
+    decoder_width: int = key(32, "of the decoder's hidden layers", 1, 1024)
+    decoder_depth: int = key(3, "number of the decoder's hidden layers", 1, 16)
+    omega: float = key(10.0, "factor in the decoder's sines", 0)
     lr: float = key(1e-3, "Adam's learning rate", 0)
-    milestones: tuple[int, ...] = key((750, 900), "steps at which the learning rate falls", 0)
+    milestones: tuple[int, ...] = key((500, 800), "steps at which the learning rate falls", 0)
     decay: float = key(0.3, "factor of the learning rate at a milestone", 0)
     normalise_gradients: bool = key(True, "divide each parameter tensor's gradient by its norm")
 
@@ -66,6 +78,23 @@ class NcaConfig(TrainingConfig):
         unknown = [layer for layer in self.layers if layer not in LAYERS]
         if unknown or not self.layers:
             raise ConfigError(f"layers holds {unknown or 'nothing'}", f"use some of {', '.join(LAYERS)}")
+        unknown = [name for name in self.coordinates if name not in COORDINATES]
+        if unknown:
+            raise ConfigError(f"coordinates holds {unknown}", f"use some of {', '.join(COORDINATES)}")
+
+    @property
+    def decoder_shape(self) -> DecoderShape:
+        """What the decoder is built from."""
+        return DecoderShape(
+            self.interpolation,
+            self.coordinates,
+            self.waves,
+            self.wave_frequencies,
+            self.wave_amplitude,
+            self.decoder_width,
+            self.decoder_depth,
+            self.omega,
+        )
 
 
 DEFAULT = NcaConfig()
@@ -83,8 +112,19 @@ PRESETS = {
         views="full",
         view_count=6,
         resolution=320,
+        zooms=1,
         density=98.0,
+        exemplar_size=128,
         target_size=224,
+        layers=(
+            *("relu1_1", "relu1_2", "relu2_1", "relu2_2", "relu3_1", "relu3_2", "relu3_3"),
+            *("relu4_3", "relu5_3"),
+        ),
+        pooling="average",
+        aggregation="sum",
+        overflow_weight=1e4,
+        decoder=False,
+        interpolation="linear",
         blend=False,
         colour_histogram=False,
         milestones=(1000, 2000),

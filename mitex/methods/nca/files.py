@@ -1,12 +1,15 @@
-"""Model files: the weights of a cell rule and what it was trained on, as safetensors.
+"""Model files: the weights of a look and what it was trained on, as safetensors.
 
 Both our own files (metadata says what the maps are) and the authors' weights (tensors fc1 and fc2, converted
-to safetensors; all five maps are assumed) can be read, and a run folder stands for its newest model.
+to safetensors; all five maps are assumed, without a decoder) can be read, and a run folder stands for its
+newest model.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -15,48 +18,93 @@ from safetensors import SafetensorError
 
 from mitex.errors import CheckpointError
 from mitex.methods.nca import METHOD
+from mitex.methods.nca.config import NcaConfig
+from mitex.methods.nca.decoder.decoder import Decoder
+from mitex.methods.nca.decoder.shape import DecoderShape
+from mitex.methods.nca.look import STATE_CHANNELS, Look
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.perception import HARMONICS
-from mitex.methods.nca.targets import STATE_CHANNELS
 from mitex.training import checkpoint, model_file
 from mitex.training.locate import CHECKPOINT, NAME, PREVIOUS, locate
 
-PARAMETERS = METHOD.tensors
+RULE = METHOD.tensors
+DECODER = "decoder."
 
 
-def save(path: Path, model: MeshNCA, about: dict[str, Any]) -> Path:
-    """Writes weights and `about` (JSON values; `maps` and `name` at least).
+def save(path: Path, look: Look, about: Mapping[str, Any]) -> Path:
+    """Writes weights and `about` (JSON values; `name` at least).
 
     Raises:
         OutputError: the place is not writable.
     """
-    return model_file.save(path, model.state_dict(), METHOD.name, about, degree=str(model.degree))
+    tensors = dict(look.rule.state_dict())
+    metadata = {"degree": str(look.rule.degree), "aggregation": "mean" if look.mean else "sum"}
+    if isinstance(look.decoder, Decoder):
+        tensors |= {DECODER + name: value for name, value in look.decoder.state_dict().items()}
+        metadata["decoder"] = json.dumps(asdict(look.decoder.shape))
+    return model_file.save(path, tensors, METHOD.name, {**about, "maps": list(look.maps)}, **metadata)
 
 
-def load(source: str | Path) -> tuple[MeshNCA, dict[str, Any]]:
-    """Reads a model by file, run folder or bundled name.
+def load(source: str | Path) -> tuple[Look, dict[str, Any]]:
+    """Reads a look by file, run folder or bundled name.
 
     Returns:
-        The model, and what is known about it; `maps` and `name` are always there.
+        The look, and what is known about it; `maps` and `name` are always there.
 
     Raises:
         CheckpointError: nothing there, not a model, or weights of an impossible shape.
     """
     path = _newest(source)
     if path.name in (CHECKPOINT, PREVIOUS):
-        state = checkpoint.load(path.parent)
-        tensors = {k[6:]: v for k, v in state.task.items() if k.startswith("model.")}
-        maps = state.metadata.get("maps", "albedo").split(",")
-        about: dict[str, Any] = {"name": state.metadata.get("exemplar", path.parent.name), "maps": maps}
-        about |= {"steps": state.step, "preset": state.config.get("preset")}
-        model = _model(tensors, state.config.get("degree"), path)
-        return model, about | {"maps": _maps(maps, model, path)}
+        return _from_checkpoint(path)
     try:
         tensors, metadata = model_file.read(path)
     except (SafetensorError, OSError, ValueError) as e:
         raise CheckpointError(f"'{path}' is not a model ({e})", "give a model file or a run folder") from e
-    model = _model(tensors, metadata.get("degree"), path)
-    return model, _about(metadata, model, path)
+    about = _about(metadata, path)
+    rule = _rule(
+        {k: v for k, v in tensors.items() if not k.startswith(DECODER)}, metadata.get("degree"), path
+    )
+    shape = _shape(metadata["decoder"], path) if "decoder" in metadata else None
+    look = Look(rule, _maps(about["maps"], rule, shape, path), shape, metadata.get("aggregation") == "mean")
+    if shape is not None:
+        _fill(
+            look.decoder,
+            {k.removeprefix(DECODER): v for k, v in tensors.items() if k.startswith(DECODER)},
+            path,
+        )
+    return look, about
+
+
+def _from_checkpoint(path: Path) -> tuple[Look, dict[str, Any]]:
+    state = checkpoint.load(path.parent)
+    maps = state.metadata.get("maps", "albedo").split(",")
+    about: dict[str, Any] = {"name": state.metadata.get("exemplar", path.parent.name), "maps": maps}
+    about |= {"steps": state.step, "preset": state.config.get("preset")}
+    names = {field.name for field in fields(NcaConfig)}
+    tuples = {k: tuple(v) if isinstance(v, list) else v for k, v in state.config.items() if k in names}
+    look = Look.of(NcaConfig(**tuples), maps)
+    _fill(look, {k[6:]: v for k, v in state.task.items() if k.startswith("model.")}, path)
+    return look, about
+
+
+def _shape(text: str, path: Path) -> DecoderShape:
+    try:
+        values = {k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(text).items()}
+        return DecoderShape(**values)
+    except (ValueError, TypeError, AttributeError) as e:
+        raise CheckpointError(f"the decoder in '{path}' is damaged ({e})", "save the model again") from e
+
+
+def _fill(module: torch.nn.Module, tensors: dict[str, torch.Tensor], path: Path) -> None:
+    try:
+        module.load_state_dict({name: value.float() for name, value in tensors.items()})
+    except RuntimeError as e:
+        raise CheckpointError(
+            f"'{path}' does not hold a MeshNCA model", "give a file written by mitex fit nca"
+        ) from e
+    if not all(torch.isfinite(value).all() for value in module.state_dict().values()):
+        raise CheckpointError(f"the weights in '{path}' are not finite", "train the model again")
 
 
 def _newest(source: str | Path) -> Path:
@@ -67,49 +115,44 @@ def _newest(source: str | Path) -> Path:
     return first
 
 
-def _about(metadata: dict[str, str], model: MeshNCA, path: Path) -> dict[str, Any]:
+def _about(metadata: dict[str, str], path: Path) -> dict[str, Any]:
     """What a file says about itself; without any maps they are the authors' five."""
     try:
         about = json.loads(metadata.get("about", "{}"))
         maps = sorted(about.get("maps", STATE_CHANNELS))
     except (ValueError, TypeError, AttributeError) as e:
         raise CheckpointError(f"the description in '{path}' is damaged ({e})", "save the model again") from e
-    return {"name": path.stem} | about | {"maps": _maps(maps, model, path)}
+    return {"name": path.stem} | about | {"maps": maps}
 
 
-def _maps(maps: list[str], model: MeshNCA, path: Path) -> list[str]:
-    """The names, once it is sure that the model's state shows these maps."""
+def _maps(maps: list[str], rule: MeshNCA, shape: DecoderShape | None, path: Path) -> list[str]:
+    """The names, once it is sure that the look can have these maps."""
     unknown = [name for name in maps if name not in STATE_CHANNELS]
     if unknown or not maps:
         raise CheckpointError(f"'{path}' has unknown maps {unknown}", "it was written by another version")
-    needed = 1 + max(channel for name in maps for channel in STATE_CHANNELS[name])
-    if needed > model.channels:
+    channels = 1 + max(channel for name in maps for channel in STATE_CHANNELS[name])
+    if shape is None and channels > rule.channels:
         raise CheckpointError(
-            f"the model in '{path}' has {model.channels} channels, its maps need {needed}", "train it again"
+            f"the model in '{path}' has {rule.channels} channels, its maps need {channels}", "train it again"
         )
     return maps
 
 
-def _model(tensors: dict[str, torch.Tensor], degree: object, path: Path) -> MeshNCA:
-    """The model whose shape the tensors have; `degree` of the harmonics if the file tells."""
+def _rule(tensors: dict[str, torch.Tensor], degree: object, path: Path) -> MeshNCA:
+    """The rule whose shape the tensors have; `degree` of the harmonics if the file tells."""
     problem = CheckpointError(
         f"'{path}' does not hold a MeshNCA model", "give a file written by mitex fit nca"
     )
-    if set(tensors) != PARAMETERS or any(tensors[k].ndim != 2 - k.endswith("bias") for k in PARAMETERS):
+    if set(tensors) != RULE or any(tensors[k].ndim != 2 - k.endswith("bias") for k in RULE):
         raise problem
     (channels, hidden), inputs = tensors["fc2.weight"].shape, tensors["fc1.weight"].shape[1]
     rule_degree = _degree(degree, channels, inputs)
     if rule_degree is None or not channels:
         raise problem
     condition = inputs - (HARMONICS[rule_degree] + 1) * channels
-    model = MeshNCA(channels, hidden, condition, rule_degree)
-    try:
-        model.load_state_dict({name: value.float() for name, value in tensors.items()})
-    except RuntimeError as e:
-        raise problem from e
-    if not all(torch.isfinite(value).all() for value in model.state_dict().values()):
-        raise CheckpointError(f"the weights in '{path}' are not finite", "train the model again")
-    return model
+    rule = MeshNCA(channels, hidden, condition, rule_degree)
+    _fill(rule, tensors, path)
+    return rule
 
 
 def _degree(told: object, channels: int, inputs: int) -> int | None:

@@ -9,7 +9,7 @@ from mitex.errors import CheckpointError
 from mitex.exemplar import Exemplar
 from mitex.methods.nca import files
 from mitex.methods.nca.config import PRESETS, NcaConfig
-from mitex.methods.nca.model import MeshNCA
+from mitex.methods.nca.look import Look
 from mitex.methods.nca.task import NcaTask
 from mitex.methods.nca.texture import NcaTexture
 from mitex.training.fit import Run
@@ -44,13 +44,13 @@ def fit(
     origin: dict[str, Any] = {"exemplar": maps.name, "density": config.density}
     parent = None
     if init is not None:
-        parent, about = _parent(init, config)
+        parent, about = _parent(init, config, sorted(maps.maps))
         origin["parent"] = str(about["name"])
     task = NcaTask(config, maps, parent)
     return run.train(
         task,
         maps.name,
-        lambda about: NcaTexture(task.model, tuple(task.maps), about | origin),
+        lambda about: NcaTexture(task.look, about | origin),
         lr=config.lr,
         milestones=config.milestones,
         decay=config.decay,
@@ -58,13 +58,16 @@ def fit(
     )
 
 
-def _parent(init: str | Path, config: NcaConfig) -> tuple[MeshNCA, dict[str, Any]]:
-    model, about = files.load(init)
-    expected = (config.channels, config.hidden, config.degree, 0)
-    shape = (model.channels, model.hidden, model.degree, model.condition)
-    if shape != expected:
-        raise CheckpointError(
-            f"model '{about['name']}' has channels, hidden, degree, condition {shape}, the config {expected}",
-            "set channels, hidden and degree alike",
+def _parent(init: str | Path, config: NcaConfig, maps: list[str]) -> tuple[Look, dict[str, Any]]:
+    parent, about = files.load(init)
+    look = Look.of(config, maps)
+    shapes = [{name: tuple(t.shape) for name, t in one.state_dict().items()} for one in (parent, look)]
+    if shapes[0] != shapes[1] or parent.maps != look.maps:
+        differing = sorted(
+            name for name in shapes[0] | shapes[1] if shapes[0].get(name) != shapes[1].get(name)
         )
-    return model, about
+        raise CheckpointError(
+            f"model '{about['name']}' differs from the config in {', '.join(differing) or 'its maps'}",
+            "set channels, hidden, degree and the decoder alike, for an exemplar with the same maps",
+        )
+    return parent, about

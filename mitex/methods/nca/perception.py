@@ -19,6 +19,7 @@ from mitex.geometry.vectors import rotate_about, scatter_add
 from mitex.mesh import Mesh
 from mitex.sparse import csr_tensor
 
+REGULAR = 6.0  # valence of a regular mesh
 HARMONICS = {0: 1, 1: 4, 2: 9}  # highest degree -> number of harmonics
 
 
@@ -68,7 +69,11 @@ _cache: weakref.WeakKeyDictionary[Mesh, dict[tuple, Perception]] = weakref.WeakK
 
 
 def perception(
-    mesh: Mesh, degree: int = 1, orientation: float | np.ndarray = 0.0, device: torch.device | str = "cpu"
+    mesh: Mesh,
+    degree: int = 1,
+    orientation: float | np.ndarray = 0.0,
+    device: torch.device | str = "cpu",
+    mean: bool = False,
 ) -> Perception:
     """The perception operator of a mesh; kept as long as the mesh lives.
 
@@ -78,6 +83,8 @@ def perception(
         orientation: turns the texture about the vertex normals by this angle [rad], one or (V,): edge
             directions are turned back by it before the harmonics are evaluated.
         device: of the matrices.
+        mean: six times the mean over the neighbours instead of their sum (Cells2Pixels): the same on a
+            regular mesh, and of the same size at any valence.
 
     Raises:
         ConfigError: unknown degree, orientations that do not fit the mesh or are not finite.
@@ -88,14 +95,16 @@ def perception(
         raise ConfigError(f"orientations of shape {np.shape(orientation)}", "give one angle, or one a vertex")
     if not np.isfinite(orientation).all():
         raise ConfigError("an orientation that is not finite", "give angles in radians")
-    key = (degree, np.asarray(orientation, np.float64).tobytes(), str(device))
+    key = (degree, np.asarray(orientation, np.float64).tobytes(), str(device), mean)
     operators = _cache.setdefault(mesh, {})
     if key not in operators:
-        operators[key] = _build(mesh, degree, orientation, device)
+        operators[key] = _build(mesh, degree, orientation, device, mean)
     return operators[key]
 
 
-def _build(mesh: Mesh, degree: int, orientation: float | np.ndarray, device) -> Perception:
+def _build(
+    mesh: Mesh, degree: int, orientation: float | np.ndarray, device: torch.device | str, mean: bool
+) -> Perception:
     import scipy.sparse
 
     count, blocks = len(mesh.vertices), HARMONICS[degree] + 1
@@ -110,6 +119,8 @@ def _build(mesh: Mesh, degree: int, orientation: float | np.ndarray, device) -> 
         angle = np.broadcast_to(orientation, (count,))[receivers]
         directions = rotate_about(directions, mesh.normals.astype(np.float64)[receivers], -angle)
     weights = harmonics(directions, degree)
+    if mean:
+        weights *= (REGULAR / np.maximum(np.diff(mesh.edges.indptr), 1))[receivers, None]
     centre = scatter_add(receivers, weights, count)
     own = np.arange(count)
     first_rows = receivers[:, None] * blocks + np.arange(blocks - 1)

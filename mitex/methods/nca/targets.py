@@ -8,29 +8,20 @@ import numpy as np
 import torch
 import torch.nn.functional as F
 
-from mitex.exemplar import Exemplar
+from mitex.exemplar import MAPS, Exemplar
 from mitex.features import Vgg16
-from mitex.triples import ChannelTriple, triple_images
+from mitex.triples import ChannelTriple, Layout, triple_images
 
-# Channels of the state, as in the authors' PBR checkpoints; 3 to 5 are hidden.
-STATE_CHANNELS: dict[str, tuple[int, ...]] = {
-    "albedo": (0, 1, 2),
-    "height": (6,),
-    "normal": (7, 8, 9),
-    "roughness": (10,),
-    "ambient_occlusion": (11,),
-}
-OFFSET = 0.5  # value = state + OFFSET
+MOST = 1 << 15  # feature vectors kept of a picture and layer
 
 
-def state_maps(state: np.ndarray, maps: list[str]) -> dict[str, np.ndarray]:
-    """The maps that a state (V, C) shows: name -> (V, c), clipped to [0, 1]; the albedo is sRGB."""
-    return {name: np.clip(state[:, STATE_CHANNELS[name]] + OFFSET, 0, 1) for name in maps}
-
-
-def state_layout(maps: Iterable[str]) -> dict[str, tuple[int, ...]]:
-    """Where a state shows the maps: name -> channels."""
-    return {name: STATE_CHANNELS[name] for name in maps}
+def value_layout(maps: Iterable[str]) -> dict[str, tuple[int, ...]]:
+    """Where the values of decoded points hold the maps: name -> columns, in the maps' order."""
+    layout, column = {}, 0
+    for name in maps:
+        layout[name] = tuple(range(column, column + MAPS[name]))
+        column += MAPS[name]
+    return layout
 
 
 class Targets:
@@ -39,21 +30,28 @@ class Targets:
     Args:
         exemplar: maps at the size at which the features see them.
         pictures: what the features look at.
+        layout: channels of the maps in the pictures.
         network: frozen features.
         layers: of the network.
     """
 
     def __init__(
-        self, exemplar: Exemplar, pictures: list[ChannelTriple], network: Vgg16, layers: tuple[str, ...]
+        self,
+        exemplar: Exemplar,
+        pictures: list[ChannelTriple],
+        layout: Layout,
+        network: Vgg16,
+        layers: tuple[str, ...],
     ) -> None:
         self.pictures = pictures
-        images = triple_images(exemplar, pictures, STATE_CHANNELS)
-        self.images = torch.from_numpy(images).to(network.device)
-        self._vectors = {"colour": self.images.flatten(1, 2)}
+        images = torch.from_numpy(triple_images(exemplar, pictures, layout)).to(network.device)
+        generator = torch.Generator().manual_seed(0)
+        self._vectors = {"colour": _some(images.flatten(1, 2), generator)}
         with torch.no_grad():
             for one in layers:
-                maps = [network.features(image[None], [one])[one] for image in self.images]
-                self._vectors[one] = torch.cat(maps).flatten(1, 2).to(network.dtype)
+                vectors = [network.features(image[None], [one])[one].flatten(1, 2) for image in images]
+                kept = [_some(v.to(network.dtype), generator) for v in vectors]
+                self._vectors[one] = torch.cat(kept)
 
     def size(self, layer: str) -> int:
         """Number of feature vectors of a picture in a layer ("colour": its pixels)."""
@@ -62,6 +60,14 @@ class Targets:
     def sample(self, layer: str, which: torch.Tensor, positions: torch.Tensor) -> torch.Tensor:
         """Vectors (K, n, C) float32 of pictures `which` (K,) at `positions` (K, n)."""
         return self._vectors[layer][which[:, None], positions].float()
+
+
+def _some(vectors: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
+    """At most `MOST` of the vectors (P, n, C), at random places: large exemplars would fill the memory."""
+    count = vectors.shape[1]
+    if count <= MOST:
+        return vectors
+    return vectors[:, torch.randperm(count, generator=generator)[:MOST].to(vectors.device)]
 
 
 def enlarged(exemplar: Exemplar, size: int) -> Exemplar:

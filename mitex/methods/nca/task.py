@@ -1,4 +1,4 @@
-"""The image-guided training as a task for the loop (MeshNCA, section 4.1 and supplementary E)."""
+"""The image-guided training as a task for the loop (MeshNCA, section 4.1; Cells2Pixels, section 3.3)."""
 
 from __future__ import annotations
 
@@ -8,53 +8,74 @@ from functools import partial
 import numpy as np
 import torch
 
-from mitex import bridge
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
 from mitex.losses import overflow_loss
 from mitex.mesh import icosphere
 from mitex.methods.nca.appearance import Appearance
 from mitex.methods.nca.config import NcaConfig
-from mitex.methods.nca.model import MeshNCA
+from mitex.methods.nca.decoder.surface import Surface
+from mitex.methods.nca.look import Look
 from mitex.methods.nca.perception import perception
-from mitex.methods.nca.targets import OFFSET, STATE_CHANNELS, Targets, enlarged, state_layout
+from mitex.methods.nca.targets import Targets, enlarged
+from mitex.methods.nca.views import render_views
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, orbit, patch_views, random_views
 from mitex.scenes.stage import Stage
 from mitex.training import Step
 from mitex.triples import channel_triples, triple_images
 
+SMALLEST = 64  # side of the exemplar at the coarsest zoom [px], at least
+PREVIEW = 256  # side of a preview's pictures [px]
+WIDEST = 0.65  # half the side of a patch of the unit sphere: wider ones would look past it
+
 
 class NcaTask:
-    """Pool of states on an icosphere, random steps, views, loss.
+    """Pool of states on an icosphere, random steps, views at several zooms, loss.
 
     Args:
         config: settings.
         exemplar: maps to learn.
-        init: starting weights, from a model of the same shape; None draws new ones from the seed.
+        init: what to start from; None draws new weights from the seed.
     """
 
-    def __init__(self, config: NcaConfig, exemplar: Exemplar, init: MeshNCA | None = None) -> None:
+    def __init__(self, config: NcaConfig, exemplar: Exemplar, init: Look | None = None) -> None:
         keep_freed_memory()
-        self.config, self.exemplar = config, exemplar
+        self.config = config
+        self.exemplar = exemplar.resized(min(config.exemplar_size, *exemplar.size))
         self.maps = sorted(exemplar.maps)
-        self.model = MeshNCA(config.channels, config.hidden, degree=config.degree)
-        self.model.initialise(torch.Generator().manual_seed(config.seed), config.gain)
-        if init is not None:
-            self.model.load_state_dict(init.state_dict())
+        self.look = Look.of(config, self.maps)
+        if init is None:
+            self.look.initialise(torch.Generator().manual_seed(config.seed), config.gain)
+        else:
+            self.look.load_state_dict(init.state_dict())
         self.mesh = icosphere(config.frequency)
-        self.perception = perception(self.mesh, config.degree)
-        self.stage = Stage(self.mesh, channels=len(STATE_CHANNELS))
-        network = Vgg16(config.pooling)
-        target = enlarged(exemplar.resized(config.exemplar_size), config.target_size)
-        pictures = channel_triples(state_layout(self.maps), config.blend, config.seed)
-        self.appearance = Appearance(config, Targets(target, pictures, network, config.layers), network)
+        self.perception = perception(self.mesh, config.degree, mean=config.aggregation == "mean")
+        self.surface = Surface(self.mesh, self.look.interpolation)
+        self.stage = Stage(self.mesh)
+        self.zooms = self._appearances()
         self.pool = torch.zeros(config.pool, self.perception.vertices, config.channels)
         self._touched = torch.zeros(config.pool, dtype=torch.bool)
 
+    def _appearances(self) -> dict[int, Appearance]:
+        """Size of the exemplar [px] -> comparison with it at that size; from the coarsest on."""
+        config, network = self.config, Vgg16(self.config.pooling)
+        layout = self.look.layout
+        pictures = channel_triples(layout, config.blend, config.seed)
+        finest = self.exemplar.size[0]
+        zooms = {}
+        for halvings in reversed(range(config.zooms)):
+            size = finest >> halvings
+            if size < SMALLEST and halvings:
+                continue
+            target = enlarged(self.exemplar.resized(size), config.target_size or size)
+            targets = Targets(target, pictures, layout, network, config.layers)
+            zooms[size] = Appearance(config, targets, network)
+        return zooms
+
     @property
     def parameters(self) -> list[torch.nn.Parameter]:
-        return list(self.model.parameters())
+        return list(self.look.parameters())
 
     def begin(self, step: int, generator: torch.Generator) -> None:
         """Nothing changes before the loss."""
@@ -67,10 +88,13 @@ class NcaTask:
         if step % config.inject_every == 0:
             state = torch.zeros_like(state)
         steps = int(torch.randint(config.min_steps, config.max_steps + 1, (), generator=generator))
-        state = self.model.evolve(state, self.perception, steps, generator)
-        visibility = self.stage.visibility(self.cameras(generator))
-        views = bridge.lookup(state[0].index_select(1, self.appearance.channels) + OFFSET, visibility)
-        appearance, overflow = self.appearance(views, generator), overflow_loss(state)
+        state = self.look.rule.evolve(state, self.perception, steps, generator)
+        losses = []
+        for size, appearance in self.zooms.items():
+            cameras = self.cameras(size, generator)
+            views = render_views(self.look.decoder, state[0], self.surface, self.stage, cameras)
+            losses.append(appearance(views, generator))
+        appearance, overflow = torch.stack(losses).mean(), overflow_loss(state)
         return Step(
             appearance + config.overflow_weight * overflow,
             {"appearance": appearance.item(), "overflow": overflow.item()},
@@ -80,67 +104,55 @@ class NcaTask:
     def _put_back(self, index: int, state: torch.Tensor) -> None:
         self.pool[index], self._touched[index] = state, True
 
-    def cameras(self, generator: torch.Generator) -> Cameras:
-        """The views of one step."""
+    def cameras(self, size: int, generator: torch.Generator) -> Cameras:
+        """The views of one step in which the exemplar is `size` [px] wide."""
         config = self.config
         if config.views == "full":
             fov = math.radians(config.fov)
             return random_views(generator, config.view_count, config.distance, fov, config.resolution)
-        return patch_views(generator, self.mesh, config.view_count, self.half_width, config.resolution)
+        half = min(0.5 * self.width * config.resolution / size, WIDEST)
+        return patch_views(generator, self.mesh, config.view_count, half, config.resolution)
 
     @property
-    def pixel(self) -> float:
-        """Width of an exemplar's pixel on the sphere [mesh units], from the wanted `density`."""
+    def width(self) -> float:
+        """Of the exemplar on the sphere [mesh units], from the `density`."""
         edge = math.sqrt(8 * math.pi / math.sqrt(3) / len(self.mesh.vertices))  # of equilateral faces
-        return self.config.density * edge / self.config.exemplar_size
-
-    @property
-    def half_width(self) -> float:
-        """Half the width of a patch view [mesh units]."""
-        return 0.5 * self.pixel * self.config.resolution
+        return self.config.density * edge
 
     def state(self) -> dict[str, torch.Tensor]:
         """Weights, and the pool's states that are no longer the seed."""
-        weights = {f"model.{name}": value for name, value in self.model.state_dict().items()}
+        weights = {f"model.{name}": value for name, value in self.look.state_dict().items()}
         return weights | {"pool.touched": self._touched, "pool.states": self.pool[self._touched]}
 
     def load_state(self, state: dict[str, torch.Tensor]) -> None:
         weights = {name[6:]: value for name, value in state.items() if name.startswith("model.")}
-        self.model.load_state_dict(weights)
+        self.look.load_state_dict(weights)
         self._touched = state["pool.touched"]
         self.pool.zero_()
         self.pool[self._touched] = state["pool.states"]
 
     @torch.no_grad()
     def preview(self, step: int) -> np.ndarray:
-        """For each map a row: the exemplar, two patches at its scale, and the whole sphere of an evolved
-        state.
+        """For each map a row: the exemplar, a patch as wide, a quarter of that, and the whole sphere of an
+        evolved state.
         """
         generator = torch.Generator().manual_seed(step)
         state = self.pool[int(torch.randint(self.config.pool, (), generator=generator))][None]
-        state = self.model.evolve(state, self.perception, self.config.max_steps, generator)[0] + OFFSET
-        size = self.config.exemplar_size
-        side = min(size, max(int(1.2 / self.pixel), 1))  # wider patches would look past the sphere
-        patches = patch_views(generator, self.mesh, 2, 0.5 * self.pixel * side, side)
-        whole = orbit(1, distance=2.05, resolution=2 * size)
-        views = [bridge.lookup(state, self.stage.visibility(patches)).numpy()]
-        views.append(bridge.lookup(state, self.stage.visibility(whole, antialias=2)).numpy())
-        pictures = channel_triples(state_layout(self.maps), False, 0)
-        exemplar = self.exemplar.resized(size)
-        rows = []
-        images = triple_images(exemplar, pictures, STATE_CHANNELS)
-        for image, channels in zip(images, (list(p.channels) for p in pictures), strict=True):
-            rows.append(_row(image, *(v[..., channels] for v in views)))
-        return np.clip(np.concatenate(rows, 0), 0, 1)
+        state = self.look.rule.evolve(state, self.perception, self.config.max_steps, generator)[0]
+        wide = min(0.5 * self.width, WIDEST)
+        cameras = [patch_views(generator, self.mesh, 1, half, PREVIEW) for half in (wide, wide / 4)]
+        cameras.append(orbit(1, distance=2.05, resolution=PREVIEW))
+        views = [
+            render_views(self.look.decoder, state, self.surface, self.stage, c, antialias=2)[0].numpy()
+            for c in cameras
+        ]
+        triples = channel_triples(self.look.layout, False, 0)
+        images = triple_images(self.exemplar.resized(PREVIEW), triples, self.look.layout)
+        rows = [
+            np.concatenate([image, *(view[..., triple.channels] for view in views)], 1)
+            for image, triple in zip(images, triples, strict=True)
+        ]
+        return np.clip(np.concatenate(rows), 0, 1)
 
     def metadata(self) -> dict[str, str]:
         return {"method": "nca", "maps": ",".join(self.maps), "exemplar": self.exemplar.name}
-
-
-def _row(exemplar: np.ndarray, patches: np.ndarray, whole: np.ndarray) -> np.ndarray:
-    """Exemplar twice, two patches (white around them) and the sphere, side by side."""
-    space = len(exemplar) - patches.shape[1]
-    margin = (space // 2, space - space // 2)
-    padded = np.pad(patches, ((0, 0), margin, margin, (0, 0)), constant_values=1.0)
-    columns = [np.concatenate([exemplar, exemplar]), np.concatenate(list(padded)), whole[0]]
-    return np.concatenate(columns, 1)

@@ -1,0 +1,95 @@
+"""The maps of a grown state: at the vertices of a mesh, and on the texels of its UV layout."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from mitex.asset import Asset
+from mitex.atlas import Atlas
+from mitex.exemplar import MAPS
+from mitex.geometry.triangles import interpolate
+from mitex.geometry.vectors import orthonormal, rotate_about, unit
+from mitex.mesh import Mesh
+from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.decoder.surface import Points, Surface
+from mitex.methods.nca.look import Look
+
+CHUNK = 1 << 18  # points that are decoded at a time
+
+
+class Grown:
+    """A state on an automaton's mesh, and what it shows at points of the mesh that the texture is for.
+
+    Args:
+        look: the decoder and the maps.
+        state: (V, C).
+        cells: the automaton's mesh.
+        orientation: of the texture [rad].
+    """
+
+    def __init__(self, look: Look, state: torch.Tensor, cells: Cells, orientation: float = 0.0) -> None:
+        self.look, self.cells, self.orientation = look, cells, orientation
+        self.surface = Surface(cells.mesh, look.interpolation)
+        self.table = self.surface.table(state)
+
+    @torch.no_grad()
+    def values(self, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """Values (P, K) float32, clipped to [0, 1], at points of the given mesh; columns as `look.layout`."""
+        parts = [np.empty((0, sum(MAPS[name] for name in self.look.maps)), np.float32)]
+        for start in range(0, len(face), CHUNK):
+            chunk = slice(start, start + CHUNK)
+            arrays = self.cells.locate(face[chunk], barycentric[chunk])
+            points = Points(*(torch.from_numpy(np.ascontiguousarray(a)) for a in arrays))
+            parts.append(self.look.decoder(self.surface, self.table, points).clamp_(0, 1).numpy())
+        return np.concatenate(parts)
+
+    def at_vertices(self) -> dict[str, np.ndarray]:
+        """Maps (V, c) at the vertices of the given mesh."""
+        mesh = self.cells.given
+        face, corner = np.zeros(len(mesh.vertices), np.int32), np.zeros(len(mesh.vertices), np.int64)
+        for k in range(3):
+            face[mesh.faces[:, k]], corner[mesh.faces[:, k]] = np.arange(len(mesh.faces)), k
+        return self._maps(self.values(face, np.eye(3, dtype=np.float32)[corner]))
+
+    def asset(self) -> Asset:
+        """The given mesh with the maps at its vertices."""
+        mesh = self.cells.given
+        return Asset(mesh, self.at_vertices(), tangents(mesh, self.orientation), name=mesh.name)
+
+    def textures(self, atlas: Atlas) -> dict[str, np.ndarray]:
+        """Maps (N, N, c) on the texels of a layout of the given mesh; the mean where there is no chart."""
+        used = atlas.face >= 0
+        face, barycentric = atlas.face[used], atlas.barycentric[used].clip(0)
+        barycentric /= barycentric.sum(axis=1, keepdims=True)
+        maps = {}
+        for name, values in self._maps(self.values(face, barycentric)).items():
+            image = np.empty((*used.shape, values.shape[1]), np.float32)
+            image[used] = self._detail(values, face, barycentric) if name == "normal" else values
+            image[~used] = image[used].mean(axis=0) if len(values) else 0.0
+            maps[name] = atlas.normal_map(self.cells.given, image) if name == "normal" else image
+        return maps
+
+    def _maps(self, values: np.ndarray) -> dict[str, np.ndarray]:
+        return {name: values[:, list(columns)] for name, columns in self.look.layout.items()}
+
+    def _detail(self, encoded: np.ndarray, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """Normals in object space (P, 3) of a normal map's values at points of the given mesh."""
+        mesh = self.cells.given
+        normals = unit(interpolate(barycentric, mesh.normals[mesh.faces[face]]))
+        right = _right(normals, self.orientation)
+        x, y, z = (encoded * 2 - 1).T[..., None]
+        return x * right + y * np.cross(normals, right) + z * normals
+
+
+def tangents(mesh: Mesh, orientation: float = 0.0) -> np.ndarray:
+    """Where the exemplar's right points on the surface, (V, 3) unit.
+
+    Training views have +y up, so right is y x normal; `orientation` turns it about the normal [rad].
+    """
+    return _right(mesh.normals, orientation)
+
+
+def _right(normals: np.ndarray, orientation: float) -> np.ndarray:
+    right = orthonormal(np.cross(np.array([0, 1, 0], normals.dtype), normals), normals)
+    return unit(rotate_about(right, normals, orientation)).astype(np.float32)

@@ -1,0 +1,97 @@
+"""The mesh that an automaton runs on, beside the mesh that its texture is for.
+
+A cell sits at each vertex, and the size of a pattern follows their density. So a mesh is subdivided, or meshed
+anew, for the automaton alone; points of the given mesh are looked up on it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mitex.errors import ConfigError
+from mitex.geometry.triangles import nearest_on_triangles
+from mitex.mesh import Mesh, remesh, subdivide_loop, subdivide_midpoint
+from mitex.mesh.subdivide import child_points
+
+ENOUGH_VERTICES = 24_000  # "auto" subdivides until a mesh has them
+MOST_LEVELS = 6
+MOST_VERTICES = 4_000_000  # a gigabyte of states
+CANDIDATES = 8  # faces whose distance is computed
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """An automaton's mesh.
+
+    Attributes:
+        mesh: with a cell at each vertex.
+        levels: rounds of midpoint subdivision that made it of the given mesh; None if it was meshed anew.
+        given: the mesh that the texture is for.
+    """
+
+    mesh: Mesh
+    levels: int | None
+    given: Mesh
+
+    @staticmethod
+    def of(mesh: Mesh, subdivide: int | str = "auto", scale: float = 1.0) -> Cells:
+        """The cells of a mesh; arguments and errors as of `NcaTexture.apply`."""
+        levels = check(mesh, subdivide, scale)
+        fine = subdivide_midpoint(mesh, levels)
+        if scale == 1.0:
+            return Cells(fine, levels, mesh)
+        return Cells(remesh(fine, max(int(len(fine.vertices) / scale**2), 12)), None, mesh)
+
+    @staticmethod
+    def dense(mesh: Mesh, subdivide: int | str = "auto", scale: float = 1.0) -> Cells:
+        """Cells at the vertices of a finer, rounder mesh, which is then the one that the texture is for."""
+        levels = check(mesh, subdivide, scale)
+        fine = subdivide_loop(mesh, levels)
+        if scale != 1.0:
+            fine = remesh(fine, max(int(len(fine.vertices) / scale**2), 12))
+        return Cells(fine, 0, fine)
+
+    def locate(self, face: np.ndarray, barycentric: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Faces (P,) and barycentrics (P, 3) on the automaton's mesh of points of the given one."""
+        if self.levels is not None:
+            return child_points(face, barycentric, self.levels)
+        corners = self.given.vertices[self.given.faces[face]]
+        return _nearest(self.mesh, np.einsum("pk,pkd->pd", barycentric, corners))
+
+
+def check(mesh: Mesh, subdivide: int | str, scale: float) -> int:
+    """The number of subdivisions, once it is sure that they are possible.
+
+    Raises:
+        ConfigError: an option is out of range, or there would be too many cells.
+    """
+    if subdivide == "auto":
+        levels = 0
+        while len(mesh.vertices) * 4**levels < ENOUGH_VERTICES and levels < MOST_LEVELS:
+            levels += 1
+    else:
+        levels = subdivide if isinstance(subdivide, int) else -1
+    if not 0 <= levels <= MOST_LEVELS:
+        raise ConfigError(f"subdivide = {subdivide}", f"use 'auto' or 0 to {MOST_LEVELS}")
+    if not 0.05 <= scale <= 20:
+        raise ConfigError(f"scale = {scale}", "use 0.05 to 20")
+    if len(mesh.vertices) * 4**levels * max(1 / scale**2, 1) > MOST_VERTICES:
+        raise ConfigError(f"a mesh of more than {MOST_VERTICES:,} vertices", "subdivide less")
+    return levels
+
+
+def _nearest(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The points of a mesh that are nearest to points (P, 3), among the faces with the nearest centres."""
+    corners = mesh.vertices[mesh.faces].astype(np.float64)
+    count = min(CANDIDATES, len(corners))
+    _, faces = cKDTree(corners.mean(axis=1)).query(points, k=count, workers=-1)
+    faces = np.asarray(faces).reshape(len(points), count)
+    best, face, barycentric = np.full(len(points), np.inf), faces[:, 0].copy(), np.zeros((len(points), 3))
+    for candidate in faces.T:
+        weights, distance = nearest_on_triangles(corners[candidate], points)
+        closer = distance < best
+        best[closer], face[closer], barycentric[closer] = distance[closer], candidate[closer], weights[closer]
+    return face.astype(np.int32), barycentric.astype(np.float32)

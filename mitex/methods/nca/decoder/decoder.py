@@ -1,0 +1,58 @@
+"""What a surface shows at its points, read from the states of the cells around them."""
+
+from __future__ import annotations
+
+import torch
+from torch import nn
+
+from mitex.methods.nca.decoder.coordinates import Waves, sorted_barycentrics, symmetric_polynomials
+from mitex.methods.nca.decoder.network import SineNetwork
+from mitex.methods.nca.decoder.shape import DecoderShape
+from mitex.methods.nca.decoder.surface import Points, Surface
+
+OFFSET = 0.5  # value = what is read + OFFSET
+
+
+class Readout(nn.Module):
+    """Channels of the state are the values (MeshNCA).
+
+    Args:
+        channels: of the state, in the order of the values.
+    """
+
+    def __init__(self, channels: list[int]) -> None:
+        super().__init__()
+        self.channels = channels
+
+    def forward(self, surface: Surface, table: torch.Tensor, points: Points) -> torch.Tensor:
+        """Values (P, K), about in [0, 1], at points of a surface; `table` is its table of the state."""
+        return surface.read(table[:, self.channels], points) + OFFSET
+
+
+class Decoder(nn.Module):
+    """value(p) = g(s(p), u(p)): the interpolated state, local coordinates, and a small sine network
+    (Cells2Pixels, section 3.2). The same rule and decoder give detail at any resolution.
+
+    Args:
+        channels: of the state.
+        outputs: K, number of values.
+        shape: the decoder's parts.
+    """
+
+    def __init__(self, channels: int, outputs: int, shape: DecoderShape) -> None:
+        super().__init__()
+        self.shape, self.outputs = shape, outputs
+        self.network = SineNetwork(channels + shape.extra, outputs, shape.width, shape.depth, shape.omega)
+        self.waves = Waves.draw(shape.waves, shape.frequencies, shape.amplitude)
+
+    def forward(self, surface: Surface, table: torch.Tensor, points: Points) -> torch.Tensor:
+        """Values (P, K), about in [0, 1], at points of a surface; `table` is its table of the state."""
+        inputs = [surface.read(table, points)]
+        for name in self.shape.coordinates:
+            if name == "waves":
+                inputs.append(self.waves(*surface.place(points)))
+            elif name == "barycentrics":
+                inputs.append(sorted_barycentrics(points.barycentric))
+            else:
+                inputs.append(symmetric_polynomials(points.barycentric))
+        return self.network(torch.cat(inputs, 1)) + OFFSET

@@ -1,0 +1,46 @@
+"""The decoder's network: a sine network from a state and local coordinates to the values of the maps."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import nn
+
+from mitex.methods.nca.dense import product
+
+
+class SineNetwork(nn.Module):
+    """Layers sin(omega (W x + b)), then a linear one (Sitzmann et al. 2020; Cells2Pixels, section 3.2).
+
+    Args:
+        inputs: width of x.
+        outputs: width of the result.
+        width: of the hidden layers.
+        depth: number of hidden layers.
+        omega: the factor.
+    """
+
+    def __init__(
+        self, inputs: int, outputs: int, width: int = 32, depth: int = 3, omega: float = 10.0
+    ) -> None:
+        super().__init__()
+        self.omega = omega
+        widths = [inputs, *[width] * depth, outputs]
+        self.layers = nn.ModuleList(nn.Linear(a, b) for a, b in zip(widths, widths[1:], strict=False))
+
+    def initialise(self, generator: torch.Generator) -> None:
+        """Uniform weights: within 1 / inputs in the first layer, sqrt(6 / inputs) / omega in the others."""
+        for k, layer in enumerate(self.layers):
+            count = layer.in_features
+            bound = 1 / count if k == 0 else math.sqrt(6 / count) / self.omega
+            nn.init.uniform_(layer.weight, -bound, bound, generator=generator)
+            bound = count**-0.5
+            nn.init.uniform_(layer.bias, -bound, bound, generator=generator)
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """(P, inputs) -> (P, outputs)."""
+        *hidden, last = self.layers
+        for layer in hidden:
+            x = torch.sin(product(x, self.omega * layer.weight, self.omega * layer.bias))
+        return product(x, last.weight, last.bias)

@@ -1,0 +1,66 @@
+"""What a fit learns: the rule by which cells grow, and what their states look like."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from torch import nn
+
+from mitex.methods.nca.config import NcaConfig
+from mitex.methods.nca.decoder.decoder import Decoder, Readout
+from mitex.methods.nca.decoder.shape import DecoderShape
+from mitex.methods.nca.model import MeshNCA
+from mitex.methods.nca.targets import value_layout
+from mitex.textures.interpolation import Kind
+
+# Channels of the state that are the maps without a decoder, as in the authors' PBR checkpoints; 3 to 5 are
+# hidden.
+STATE_CHANNELS: dict[str, tuple[int, ...]] = {
+    "albedo": (0, 1, 2),
+    "height": (6,),
+    "normal": (7, 8, 9),
+    "roughness": (10,),
+    "ambient_occlusion": (11,),
+}
+
+
+class Look(nn.Module):
+    """A cell rule and its decoder.
+
+    Args:
+        rule: the rule.
+        maps: names of the maps that the look has, sorted.
+        shape: of the decoder; None reads the maps from the state's own channels.
+        mean: whether cells perceive the mean of their neighbours (see `perception`).
+    """
+
+    def __init__(
+        self, rule: MeshNCA, maps: Sequence[str], shape: DecoderShape | None, mean: bool = True
+    ) -> None:
+        super().__init__()
+        self.rule, self.maps, self.mean = rule, tuple(maps), mean
+        self.layout = value_layout(maps)
+        if shape is None:
+            self.decoder: Decoder | Readout = Readout([c for name in maps for c in STATE_CHANNELS[name]])
+        else:
+            outputs = sum(len(columns) for columns in self.layout.values())
+            self.decoder = Decoder(rule.channels, outputs, shape)
+
+    @staticmethod
+    def of(config: NcaConfig, maps: Sequence[str]) -> Look:
+        """With the shapes of a config, and no weights yet."""
+        rule = MeshNCA(config.channels, config.hidden, degree=config.degree)
+        shape = config.decoder_shape if config.decoder else None
+        return Look(rule, maps, shape, config.aggregation == "mean")
+
+    @property
+    def interpolation(self) -> Kind:
+        """Of the states between the vertices."""
+        return self.decoder.shape.interpolation if isinstance(self.decoder, Decoder) else "linear"
+
+    def initialise(self, generator: torch.Generator, gain: float) -> None:
+        """Draws weights: the rule's with `gain` in its last layer, then the decoder's."""
+        self.rule.initialise(generator, gain)
+        if isinstance(self.decoder, Decoder):
+            self.decoder.network.initialise(generator)
