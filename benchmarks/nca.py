@@ -188,14 +188,14 @@ class Bench:
 
     def checked(self) -> None:
         """Both ways compute the same: the gradients of the automaton, and those of the lookup."""
-        pull = torch.randn(self.state.shape, generator=torch.Generator().manual_seed(5))
+        upstream = torch.randn(self.state.shape, generator=torch.Generator().manual_seed(5))
         ours = self.model.evolve(self.state, self.task.perception, 3, torch.Generator().manual_seed(1))
         generator, theirs = torch.Generator().manual_seed(1), self.state
         for _ in range(3):
             mask = torch.rand(theirs.shape[:2], generator=generator) < FIRE_RATE
             theirs = self.passing.step(self.model, theirs, mask)
         for a, b in zip(
-            *(torch.autograd.grad(x, self.task.parameters, pull) for x in (ours, theirs)), strict=True
+            *(torch.autograd.grad(x, self.task.parameters, upstream) for x in (ours, theirs)), strict=True
         ):
             assert (a - b).norm() < 1e-3 * b.norm()
         assert torch.allclose(self.images, naive.lookup(self.field, self.visibility), atol=1e-5)

@@ -70,42 +70,46 @@ def parameters(config: NerfConfig, encoding: Encoding) -> list[torch.Tensor]:
 
 
 def ours(
-    encoding: Encoding, points: torch.Tensor, distance: torch.Tensor, given: list[torch.Tensor], packed: bool
+    encoding: Encoding,
+    points: torch.Tensor,
+    distance: torch.Tensor,
+    tensors: list[torch.Tensor],
+    packed: bool,
 ):
     """All outputs of the field, (N, 9), by Dr.Jit."""
 
     def run(points, distance, f, phase, *weights):
         foot = dr.unravel(mi.Point3f, points.array)
         features, phases = (encoding(k, foot, table.array) for k, table in enumerate((f, phase)))
-        found = Decoder(weights, packed, bfloat16_is_fast())(features, phases, distance.array)
-        return tensor(mi.ArrayXf(*torch_field.outputs(found)))
+        reflection = Decoder(weights, packed, bfloat16_is_fast())(features, phases, distance.array)
+        return tensor(mi.ArrayXf(*torch_field.outputs(reflection)))
 
-    return call(run, points, distance, *given)
+    return call(run, points, distance, *tensors)
 
 
 def theirs(
-    encoding: Encoding, points: torch.Tensor, distance: torch.Tensor, given: list[torch.Tensor]
+    encoding: Encoding, points: torch.Tensor, distance: torch.Tensor, tensors: list[torch.Tensor]
 ) -> torch.Tensor:
     """The same by torch."""
-    features, phases = (torch_field.encoded(encoding, k, points, given[k]) for k in range(2))
-    return torch_field.decoded(features, phases, distance, given[2:])
+    features, phases = (torch_field.encoded(encoding, k, points, tensors[k]) for k in range(2))
+    return torch_field.decoded(features, phases, distance, tensors[2:])
 
 
-def trained(result: torch.Tensor, given: list[torch.Tensor]) -> None:
+def backward(result: torch.Tensor, tensors: list[torch.Tensor]) -> None:
     """Backwards to tables and weights."""
-    torch.autograd.grad(result.sum(), given)
+    torch.autograd.grad(result.sum(), tensors)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="fewer points")
     parser.add_argument("--run", metavar="RUN", help="a captured texture")
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     keep_freed_memory()  # these two as in a fit
     lower_worker_priority()
-    Console(width=100).print(rates(1 << (14 if given.quick else 16)))
-    if given.run:
-        Console(width=100).print(uses(NerfTexture.load(given.run)))
+    Console(width=100).print(rates(1 << (14 if arguments.quick else 16)))
+    if arguments.run:
+        Console(width=100).print(uses(NerfTexture.load(arguments.run)))
 
 
 def uses(texture: NerfTexture) -> Table:
@@ -144,17 +148,17 @@ def rates(count: int) -> Table:
     for preset in ("fast", "paper"):
         config: NerfConfig = replace(PRESETS[preset], table=TABLE)
         encoding = Encoding(config)
-        given = parameters(config, encoding)
-        fixed = [value.detach() for value in given]
+        tensors = parameters(config, encoding)
+        fixed = [value.detach() for value in tensors]
         scene = encoding, points, distance
         forwards, backwards, *our_rates = rates_of(
             count,
             [
                 lambda s=scene, f=fixed: theirs(*s, f),
-                lambda s=scene, g=given: trained(theirs(*s, g), g),
+                lambda s=scene, g=tensors: backward(theirs(*s, g), g),
                 lambda s=scene, f=fixed: ours(*s, f, False),
                 lambda s=scene, f=fixed: ours(*s, f, True),
-                lambda s=scene, g=given: trained(ours(*s, g, False), g),
+                lambda s=scene, g=tensors: backward(ours(*s, g, False), g),
             ],
         )
         table.add_row(f"{preset}, torch", f"{forwards / 1e6:.2f}", "", f"{backwards / 1e6:.3f}")

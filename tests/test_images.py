@@ -107,8 +107,8 @@ class TestBytes:
         for channels in (3, 4):
             data = pixels(channels=channels)
             Image.fromarray(data).save(tmp_path / "a.png")
-            found = read_bytes(tmp_path / "a.png")
-            assert found.dtype == np.uint8 and np.array_equal(found, data)
+            image = read_bytes(tmp_path / "a.png")
+            assert image.dtype == np.uint8 and np.array_equal(image, data)
 
     def test_grey_and_16_bit_grey(self, tmp_path):
         grey = pixels(channels=1)[:, :, 0]

@@ -150,8 +150,8 @@ def test_references_that_are_learned(files, name):
     write(files / "mesh.obj", mesh)
     assert main(fit(reference="mesh.obj")) == 0
     assert main(apply(mesh="template")) == 0
-    made = quality(Mesh.load(files / "out" / "a.ply"))
-    assert (made.components, made.boundary_edges > 0) == (1 + (name == "two components"), name == "open")
+    report = quality(Mesh.load(files / "out" / "a.ply"))
+    assert (report.components, report.boundary_edges > 0) == (1 + (name == "two components"), name == "open")
 
 
 BAD_FITS = {

@@ -122,8 +122,8 @@ def test_pixels_are_filtered_over_what_they_cover(kind, angle, monkeypatch):
         grid = places.reshape(32, 32, 2)
         expected = np.stack([np.gradient(grid, axis=1), np.gradient(grid, axis=0)], axis=-1)
         inner = (slice(1, -1), slice(1, -1))
-        found = footprints.reshape(32, 32, 2, 2)
-        np.testing.assert_allclose(found[inner], expected[inner], atol=1e-3 * np.abs(expected).max())
+        actual = footprints.reshape(32, 32, 2, 2)
+        np.testing.assert_allclose(actual[inner], expected[inner], atol=1e-3 * np.abs(expected).max())
         assert np.abs(expected).max() > 0.1
 
 

@@ -40,8 +40,8 @@ def test_shared_meshes_match_their_table(name):
         warnings.simplefilter("always")
         mesh = Mesh.load(SHARED / f"{name}.obj")
     report = quality(mesh)
-    found = (report.vertices, report.faces, report.euler, report.boundary_edges, report.valence[::2])
-    assert found == TABLE[name]
+    counts = (report.vertices, report.faces, report.euler, report.boundary_edges, report.valence[::2])
+    assert counts == TABLE[name]
     assert report.components == 1
     assert [str(w.message).split(": ")[1] for w in caught] == (
         ["kept edges of more than two faces (non-manifold)"] if name == "chair" else []

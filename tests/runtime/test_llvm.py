@@ -72,9 +72,9 @@ def test_environment_comes_before_the_system_newest_first_without_repetition(san
     folder = library(sandbox / "llvm-100/lib/libLLVM.so")
     own = library(sandbox / "env/lib/libLLVM.so.18.1")
     library(sandbox / "env/lib/libLLVM.txt")
-    found = [(item.origin, os.path.realpath(item.path)) for item in llvm.candidates()]
+    order = [(item.origin, os.path.realpath(item.path)) for item in llvm.candidates()]
     system = [("system", path) for path in (folder, nine, old, unknown)]
-    assert found == [("environment", own), *system]
+    assert order == [("environment", own), *system]
 
 
 def test_users_choice_stands_alone(sandbox: Path, monkeypatch: pytest.MonkeyPatch):

@@ -197,9 +197,9 @@ def test_vector_is_one_channel(mi):
     ],
 )
 def test_bad_properties_are_refused(mi, options: dict, problem: str):
-    given = {k: v for k, v in (field(mi, np.zeros((4, 3))) | options).items() if v is not None}
+    plugin = {k: v for k, v in (field(mi, np.zeros((4, 3))) | options).items() if v is not None}
     with pytest.raises(RuntimeError, match=problem):
-        mi.load_dict(given)
+        mi.load_dict(plugin)
 
 
 def test_too_few_rows_and_other_shapes_read_nothing(mi, points):

@@ -146,9 +146,9 @@ def test_the_learning_rate_may_change(tmp_path):
 
 
 def test_lr_may_be_a_function(tmp_path):
-    seen = []
-    _train(tmp_path, lr=lambda step: seen.append(step) or 0.0)
-    assert seen == list(range(20))
+    steps = []
+    _train(tmp_path, lr=lambda step: steps.append(step) or 0.0)
+    assert steps == list(range(20))
 
 
 def test_folders_are_not_overwritten(tmp_path):

@@ -82,10 +82,10 @@ def _maps(maps: list[str], model: MeshNCA, path: Path) -> list[str]:
     unknown = [name for name in maps if name not in STATE_CHANNELS]
     if unknown or not maps:
         raise CheckpointError(f"'{path}' has unknown maps {unknown}", "it was written by another version")
-    needed = 1 + max(channel for name in maps for channel in STATE_CHANNELS[name])
-    if needed > model.channels:
+    channels = 1 + max(channel for name in maps for channel in STATE_CHANNELS[name])
+    if channels > model.channels:
         raise CheckpointError(
-            f"the model in '{path}' has {model.channels} channels, its maps need {needed}", "train it again"
+            f"the model in '{path}' has {model.channels} channels, its maps need {channels}", "train it again"
         )
     return maps
 

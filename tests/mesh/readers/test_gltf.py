@@ -52,8 +52,8 @@ def test_nodes_agree_with_trimesh(tmp_path):
         mesh = load(tmp_path, tree, blob)
     scene = trimesh.load_scene(tmp_path / "a.glb", process=False, maintain_order=True)
     reference = scene.to_mesh()
-    found = np.sort(corners(mesh).reshape(-1, 9).round(4), axis=0)
-    np.testing.assert_allclose(found, np.sort(reference.triangles.reshape(-1, 9), axis=0), atol=2e-4)
+    triangles = np.sort(corners(mesh).reshape(-1, 9).round(4), axis=0)
+    np.testing.assert_allclose(triangles, np.sort(reference.triangles.reshape(-1, 9), axis=0), atol=2e-4)
     assert len(mesh.vertices) == 4 + 6 + 6
 
 

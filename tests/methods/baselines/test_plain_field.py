@@ -56,17 +56,17 @@ def test_the_presets_are_those_of_the_texture():
 def trained(tmp_path_factory):
     """A run for twelve seconds, which a probe of three steps took for those that 120 steps need."""
     folder = tmp_path_factory.mktemp("plain") / "run"
-    given = []
+    calls = []
 
     def steps_within(seconds, clock):
-        given.append((seconds, len(clock)))
+        calls.append((seconds, len(clock)))
         return STEPS
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fitting, "PROBED", 3)
         patch.setattr(fitting, "steps_within", steps_within)
         fit(tiny_capture(), folder, overrides=[*SMALL, "seconds=12"], quiet=True)
-    assert given == [(12.0, 3)]
+    assert calls == [(12.0, 3)]
     return folder
 
 
@@ -154,16 +154,16 @@ def test_the_density_says_what_is_solid(ball, tmp_path):
 
 
 def test_pictures_show_the_occupied_part_of_the_world(ball, tmp_path, monkeypatch):
-    given = []
+    calls = []
 
     def still(field, similarity, outline, **options):
-        given.append((field, similarity, outline, options))
+        calls.append((field, similarity, outline, options))
         return np.full((8, 8, 3), 0.5, np.float32)
 
     monkeypatch.setattr(shell, "shell_still", still)
     applied = ball.apply(density=2.0)
     assert applied.render(tmp_path / "ball.png", resolution=64, azimuth=1.0).is_file()
-    ((field, similarity, outline, options),) = given
+    ((field, similarity, outline, options),) = calls
     assert field is applied and options == {"resolution": 64, "azimuth": 1.0}
     assert similarity.scale == 4.0 and similarity.center.tolist() == [10.0, 0.0, -3.0]
     low, high = outline.min(0), outline.max(0)

@@ -66,9 +66,9 @@ def test_loss_of_an_albedo(exemplar, network, preset):
     appearance = _appearance(exemplar, network, settings, ["albedo"])
     assert appearance.channels.tolist() == [0, 1, 2]
     views = _views(3, 3)
-    found = appearance(views, torch.Generator().manual_seed(0))
+    loss = appearance(views, torch.Generator().manual_seed(0))
     expected = _expected(views, appearance.targets.images.expand(3, -1, -1, -1), settings)
-    assert found.item() == pytest.approx(expected.item(), rel=1e-4)
+    assert loss.item() == pytest.approx(expected.item(), rel=1e-4)
 
 
 def test_every_view_shows_every_map_in_the_paper(exemplar, network):
@@ -80,8 +80,8 @@ def test_every_view_shows_every_map_in_the_paper(exemplar, network):
     columns = ([0, 1, 2], [3, 3, 3], [4, 5, 6], [7, 7, 7])
     images = torch.cat([views[..., c] for c in columns])
     pictures = appearance.targets.images.repeat_interleave(2, 0)
-    found = appearance(views, torch.Generator().manual_seed(0))
-    assert found.item() == pytest.approx(_expected(images, pictures, settings).item(), rel=1e-4)
+    loss = appearance(views, torch.Generator().manual_seed(0))
+    assert loss.item() == pytest.approx(_expected(images, pictures, settings).item(), rel=1e-4)
 
 
 def test_the_exemplar_itself_costs_nothing(exemplar, network):

@@ -39,8 +39,8 @@ def encoding() -> Encoding:
 def test_features_are_those_of_loops(encoding, which, trained):
     points, table = drawn(200, 3), drawn(encoding.sizes[which], seed=1)
     expected = torch_field.encoded(encoding, which, points, table)
-    found = features(encoding.grids[which], points, table.requires_grad_(trained))
-    np.testing.assert_allclose(found.detach().T, expected, atol=2e-4)
+    actual = features(encoding.grids[which], points, table.requires_grad_(trained))
+    np.testing.assert_allclose(actual.detach().T, expected, atol=2e-4)
 
 
 def test_some_levels_of_that_are_dense_and_some_are_hashed(encoding):
