@@ -37,7 +37,7 @@ from mitex.runtime.jit import dr, mi
 
 init()
 
-TURNS, TURN = 6, 0.6  # of each that is timed, and their length [s]
+TURNS, TURN = 6, 0.6  # of each that is measure, and their length [s]
 TABLE = 17
 
 
@@ -51,19 +51,19 @@ def rates_of(points: int, works: Sequence[Callable[[], object]]) -> list[float]:
         work()
     for _ in range(TURNS):
         for work, own in zip(works, times, strict=True):
-            begun = time.perf_counter()
-            while (started := time.perf_counter()) < begun + TURN:
+            start = time.perf_counter()
+            while (now := time.perf_counter()) < start + TURN:
                 work()
-                own.append(time.perf_counter() - started)
+                own.append(time.perf_counter() - now)
     return [points / statistics.median(own) for own in times]
 
 
 def parameters(config: NerfConfig, encoding: Encoding) -> list[torch.Tensor]:
     """Tables and weights, attached."""
-    drawn = torch.Generator().manual_seed(0)
-    tables = [torch.empty(size).uniform_(-0.1, 0.1, generator=drawn) for size in encoding.sizes]
+    generator = torch.Generator().manual_seed(0)
+    tables = [torch.empty(size).uniform_(-0.1, 0.1, generator=generator) for size in encoding.sizes]
     weights = [
-        torch.empty(shape).uniform_(-weight_bound(shape), weight_bound(shape), generator=drawn)
+        torch.empty(shape).uniform_(-weight_bound(shape), weight_bound(shape), generator=generator)
         for shape in weight_shapes(config)
     ]
     return [value.requires_grad_() for value in tables + weights]
@@ -115,33 +115,33 @@ def main() -> None:
 def uses(texture: NerfTexture) -> Table:
     """Seconds for 1024 x 1024 texels, and for pictures of 512 x 512 rays with them on a mesh."""
     table = Table("seconds", "", title=f"{texture}")
-    maps = timed(table, "1024 x 1024 texels quilted", lambda: texture.synthesize(1024, tileable=True))
-    applied = timed(table, "put on the vase", lambda: texture.apply(embedded("vase"), maps))
+    maps = measure(table, "1024 x 1024 texels quilted", lambda: texture.synthesize(1024, tileable=True))
+    applied = measure(table, "put on the vase", lambda: texture.apply(embedded("vase"), maps))
 
     def frame():
         return shell_still(applied, applied.similarity, applied.outline, resolution=512, spp=1)
 
-    timed(table, "first path-traced frame, with its kernels", frame)
-    timed(table, "another one", frame)
+    measure(table, "first path-traced frame, with its kernels", frame)
+    measure(table, "another one", frame)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     table.add_row(f"{peak:.1f}", "GiB of memory at most")
     return table
 
 
-def timed(table: Table, what: str, work: Callable[[], Any]) -> Any:
+def measure(table: Table, what: str, work: Callable[[], Any]) -> Any:
     """The result of `work`; a row tells how long it took."""
-    begun = time.perf_counter()
+    start = time.perf_counter()
     result = work()
-    table.add_row(f"{time.perf_counter() - begun:.1f}", what)
+    table.add_row(f"{time.perf_counter() - start:.1f}", what)
     return result
 
 
 def rates(count: int) -> Table:
     """Points per second."""
     dr.set_expand_threshold(2**26)
-    drawn = torch.Generator().manual_seed(1)
-    points = torch.empty(count, 3).uniform_(-0.9, 0.9, generator=drawn)
-    distance = torch.empty(count).uniform_(-0.1, 0.1, generator=drawn)
+    generator = torch.Generator().manual_seed(1)
+    points = torch.empty(count, 3).uniform_(-0.9, 0.9, generator=generator)
+    distance = torch.empty(count).uniform_(-0.1, 0.1, generator=generator)
     table = Table(title=f"{count:,} points, tables of 2^{TABLE} entries [million points a second]")
     for name in ("", "forwards", "packed", "and backwards"):
         table.add_column(name)

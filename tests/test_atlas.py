@@ -61,9 +61,9 @@ def test_each_texel_shows_the_point_with_its_own_uv():
     mesh = icosphere(8)
     uv = unwrap(mesh, 128, 4)
     atlas = Atlas.from_uv(uv, 128, 4)
-    shown = atlas.interpolate(uv)
+    image = atlas.interpolate(uv)
     assert atlas.inside.sum() > 4000
-    np.testing.assert_allclose(shown[atlas.inside], texel_uv(128)[atlas.inside], atol=1e-5)
+    np.testing.assert_allclose(image[atlas.inside], texel_uv(128)[atlas.inside], atol=1e-5)
     np.testing.assert_allclose(atlas.barycentric[atlas.face >= 0].sum(axis=1), 1.0, atol=1e-5)
     assert atlas.barycentric[atlas.inside].min() > -1e-4
 

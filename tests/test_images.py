@@ -32,11 +32,11 @@ def png_claiming(width, height, depth=8, kind=2):
 
 
 def assert_refused(path, *words, **options):
-    with pytest.raises(ImageError) as caught:
+    with pytest.raises(ImageError) as error:
         read_image(path, **options)
-    message = str(caught.value)
+    message = str(error.value)
     assert "\n" not in message
-    assert "; " in message and caught.value.remedy
+    assert "; " in message and error.value.remedy
     for word in words:
         assert word in message
     return message

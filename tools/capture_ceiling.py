@@ -22,7 +22,7 @@ from scipy.spatial import KDTree
 
 NEAR, POOL, ALIKE = 16, 64, 8
 EVERY = 8  # as `Capture.split` has it
-DRAWN = 8000  # pixels of a held-out view
+SAMPLES = 8000  # pixels of a held-out view
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ def ceilings(folder: Path, rng: np.random.Generator) -> tuple[float, float]:
     frames = json.loads((folder / "transforms.json").read_text())["frames"]
     training, _ = visible_pixels(folder, [frame for k, frame in enumerate(frames) if k % EVERY])
     held_out, share = visible_pixels(folder, frames[::EVERY])
-    some = rng.choice(len(held_out.points), DRAWN * len(frames[::EVERY]))
+    some = rng.choice(len(held_out.points), SAMPLES * len(frames[::EVERY]))
     near = np.asarray(KDTree(training.points).query(held_out.points[some], POOL, workers=-1)[1])
     alike = np.einsum("pkd,pd->pk", training.rays[near], held_out.rays[some]).argsort(1)[:, -ALIKE:]
     neighbours = near[:, :NEAR], np.take_along_axis(near, alike, 1)

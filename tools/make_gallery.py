@@ -48,8 +48,8 @@ def maps_of(asset: Asset) -> list[np.ndarray]:
 def one(texture: NcaTexture, exemplar: Exemplar, meshes: Path) -> np.ndarray:
     """The sheet of a model, (H, W, 3) sRGB in [0, 1]."""
     sphere = texture.apply(icosphere(64))
-    shown = [sphere, *(texture.apply(Mesh.load(meshes / f"{mesh}.obj")) for mesh in UNSEEN)]
-    lit = [tone(still(asset, resolution=CELL, spp=96)) for asset in shown]
+    assets = [sphere, *(texture.apply(Mesh.load(meshes / f"{mesh}.obj")) for mesh in UNSEEN)]
+    lit = [tone(still(asset, resolution=CELL, spp=96)) for asset in assets]
     square = exemplar.resized(CELL).maps
     exemplar_maps = [np.broadcast_to(square[m], (CELL, CELL, 3)) for m in sphere.vertex_maps]
     rows = [square["albedo"], *lit, *exemplar_maps, *maps_of(sphere)]

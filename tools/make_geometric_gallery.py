@@ -57,20 +57,21 @@ def displaced(texture: GeometricTexture, reference: Mesh, mesh: Mesh, mapped: bo
 
 def level_sheet(texture: GeometricTexture, reference: str, meshes: Path, words: list[str]) -> np.ndarray:
     """The sheet of start levels."""
-    learned = texture.generate(start_level=texture.levels)
-    shown = [find_reference(reference), *(texture.generate(start_level=k) for k in LEVELS)]
+    reconstruction = texture.generate(start_level=texture.levels)
+    results = [find_reference(reference), *(texture.generate(start_level=k) for k in LEVELS)]
     for word in words:
         name, faces = word.split("~")
-        shown.append(find_mesh(name, meshes))
+        results.append(find_mesh(name, meshes))
         for k in LEVELS:
             coarse = find_mesh(f"{name}~{int(4.0 ** (k - START) * int(faces))}", meshes)
-            shown.append(texture.apply(coarse, start_level=k).mesh)
-            told = ", ".join(f"{key} {d:.3f}" for key, d in statistic_distances(shown[-1], learned).items())
-            counts = f"{len(coarse.vertices):,} to {len(shown[-1].vertices):,} vertices"
-            print(f"{reference} on {name} from level {k}, {counts}: {told}", flush=True)
+            results.append(texture.apply(coarse, start_level=k).mesh)
+            distances = statistic_distances(results[-1], reconstruction)
+            summary = ", ".join(f"{key} {d:.3f}" for key, d in distances.items())
+            counts = f"{len(coarse.vertices):,} to {len(results[-1].vertices):,} vertices"
+            print(f"{reference} on {name} from level {k}, {counts}: {summary}", flush=True)
     names = [reference, *(word.split("~")[0] for word in words)]
     labels = [text for name in names for text in (name, *(f"from level {k}" for k in LEVELS))]
-    return sheet([picture(mesh) for mesh in shown], columns=1 + len(LEVELS), labels=labels, cell=CELL)
+    return sheet([picture(mesh) for mesh in results], columns=1 + len(LEVELS), labels=labels, cell=CELL)
 
 
 def main() -> None:
@@ -87,20 +88,21 @@ def main() -> None:
     for word in references.split(","):
         reference, *mapped = word.split(":")
         texture = GeometricTexture.load(Path(runs) / reference)
-        learned = texture.generate(
-            start_level=texture.levels
-        )  # the reference with edges as long as the results'
+        # The reference with edges as long as the results'.
+        reconstruction = texture.generate(start_level=texture.levels)
         cells.append(picture(find_reference(reference)))
         labels.append(" ".join([reference, *mapped]))
         for mesh, even in zip(originals, coarse, strict=True):
-            begun = time.perf_counter()
+            start = time.perf_counter()
             grown = displaced(texture, find_reference(reference), even, bool(mapped))
-            seconds = time.perf_counter() - begun
+            seconds = time.perf_counter() - start
             key = mesh.name, len(grown.vertices)
             fine.setdefault(key, remesh(mesh, key[1]))
-            ours, theirs = statistic_distances(grown, learned), statistic_distances(fine[key], learned)
-            told = ", ".join(f"{k} {ours[k]:.3f} of {theirs[k]:.3f}" for k in ours)
-            print(f"{word} on {mesh.name}, {len(grown.faces):,} faces, {seconds:.1f} s: {told}", flush=True)
+            ours, theirs = (statistic_distances(m, reconstruction) for m in (grown, fine[key]))
+            summary = ", ".join(f"{k} {ours[k]:.3f} of {theirs[k]:.3f}" for k in ours)
+            print(
+                f"{word} on {mesh.name}, {len(grown.faces):,} faces, {seconds:.1f} s: {summary}", flush=True
+            )
             cells.append(picture(grown))
             labels.append(mesh.name)
     write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=1 + len(originals), labels=labels, cell=CELL))

@@ -138,8 +138,8 @@ def main() -> None:
             cells.append(exemplar.resized(side).maps["albedo"])
             labels.append(f"exemplar {exemplar.name}")
         cells += pictures(result, 1 if several else 2, side)
-        shown = own if variants else [mesh.name, *own[:1]]
-        labels += [" ".join(shown) or "default", *["the other side"] * (not several)]
+        words = own if variants else [mesh.name, *own[:1]]
+        labels += [" ".join(words) or "default", *["the other side"] * (not several)]
         last = exemplar_name
     write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=columns, labels=labels, cell=side))
 

@@ -23,7 +23,7 @@ def fit(words=QUICK, reference="good.obj", out="out/run"):
 
 
 @pytest.fixture(scope="module")
-def trained(tmp_path_factory, own_cache):
+def source(tmp_path_factory, own_cache):
     folder = tmp_path_factory.mktemp("trained")
     bad.text(folder / "good.obj", bad.CUBE)
     assert main(fit(reference=folder / "good.obj", out=folder / "run")) == 0
@@ -31,8 +31,8 @@ def trained(tmp_path_factory, own_cache):
 
 
 @pytest.fixture
-def run(files, trained):
-    return Path(copytree(trained, files / "out" / "run"))
+def run(files, source):
+    return Path(copytree(source, files / "out" / "run"))
 
 
 def apply(words="", mesh="good.obj"):

@@ -182,8 +182,8 @@ def test_loading_gives_the_asset_back(bake, baked, tmp_path):
     if bake:
         np.testing.assert_allclose(loaded.atlas.uv, asset.atlas.uv, atol=1e-6)
         for name, image in asset.texture_maps.items():
-            shown = asset.atlas.inside
-            assert np.abs(loaded.texture_maps[name] - image)[shown].max() <= 0.5 / 255 + 1e-5
+            inside = asset.atlas.inside
+            assert np.abs(loaded.texture_maps[name] - image)[inside].max() <= 0.5 / 255 + 1e-5
 
 
 def test_unused_vertices_are_left_out(tmp_path):

@@ -65,9 +65,9 @@ def test_films_show_assets_in_turn_without_moving_the_camera(tmp_path):
     dark = {"albedo": np.zeros((92, 3))}
     assets = [Asset(mesh, dark) for mesh in (ball, small, ball)]
     path = film(assets, tmp_path / "a.gif", frames=3, like=ball, resolution=64, spp=4)
-    shown = (iio.imread(path).mean(axis=3) < 60).sum(axis=(1, 2))
-    assert shown[0] == shown[2] > 800
-    assert shown[1] / shown[0] == pytest.approx(0.25, abs=0.05)
+    areas = (iio.imread(path).mean(axis=3) < 60).sum(axis=(1, 2))
+    assert areas[0] == areas[2] > 800
+    assert areas[1] / areas[0] == pytest.approx(0.25, abs=0.05)
 
 
 def test_gifs_loop_forever(tmp_path):

@@ -232,13 +232,13 @@ def test_reflectance_decodes_srgb(mi, points):
     np.testing.assert_allclose(radiance(mi, shape, middle, 0 * middle), encoded.clip(0, 1), atol=1e-5)
 
 
-@pytest.mark.parametrize(("channel", "shown"), [(0, (0, 1, 2)), (2, (2, 3, 4)), (3, (3, 3, 3))])
-def test_channel_selects(mi, rng, points, channel: int, shown: tuple[int, ...]):
+@pytest.mark.parametrize(("channel", "channels"), [(0, (0, 1, 2)), (2, (2, 3, 4)), (3, (3, 3, 3))])
+def test_channel_selects(mi, rng, points, channel: int, channels: tuple[int, ...]):
     values = rng.uniform(0.1, 0.9, 5)
     data = np.broadcast_to(values, (3, 4, 5))
     bsdf = {"type": "diffuse", "reflectance": field(mi, data, raw=True, channel=channel)}
     result = radiance(mi, quad(mi, bsdf, UNIT), *points)
-    np.testing.assert_allclose(result, np.broadcast_to(values[list(shown)], (50, 3)), atol=1e-6)
+    np.testing.assert_allclose(result, np.broadcast_to(values[list(channels)], (50, 3)), atol=1e-6)
 
 
 LIGHT = np.array([0.3, 0.2, -1.0]) / np.linalg.norm([0.3, 0.2, -1.0])

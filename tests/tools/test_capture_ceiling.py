@@ -44,8 +44,8 @@ def capture(studio, folder: Path, colour) -> float:
 
 def test_nobody_tells_noise(tools, tmp_path):
     ceiling, studio = tools
-    drawn = np.random.default_rng(0)
-    share = capture(studio, tmp_path, lambda points: drawn.random((len(points), 3)))
+    rng = np.random.default_rng(0)
+    share = capture(studio, tmp_path, lambda points: rng.random((len(points), 3)))
     ceilings = ceiling.ceilings(tmp_path, np.random.default_rng(0))
     for db, count in zip(ceilings, (ceiling.NEAR, ceiling.ALIKE), strict=True):
         # A pixel's own variance, and that of the mean of `count` others.

@@ -131,9 +131,9 @@ def test_photos_are_made_again(script, shape, folder, capture):
 
 def test_unknown_names_are_refused(script, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["make_captures.py", "moss"])
-    with pytest.raises(SystemExit) as caught:
+    with pytest.raises(SystemExit) as error:
         script.main()
-    assert caught.value.code == 2 and "no such capture: moss" in capsys.readouterr().err
+    assert error.value.code == 2 and "no such capture: moss" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

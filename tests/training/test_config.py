@@ -36,9 +36,9 @@ PRESETS = {"patch": Config(), "paper": Config(steps=900, preset="paper", lr=0.5)
 
 
 def _error(*overrides, file=None, preset=None):
-    with pytest.raises(ConfigError) as caught:
+    with pytest.raises(ConfigError) as error:
         resolve(PRESETS, preset, file, overrides)
-    return str(caught.value)
+    return str(error.value)
 
 
 def test_the_first_preset_is_the_default():

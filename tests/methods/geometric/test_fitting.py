@@ -76,9 +76,9 @@ def small_task(**changes) -> GeometricTask:
     config = replace(GeometricConfig(steps=9, level_steps=3), **changes)
     ball = icosphere(1)
     hierarchy = Hierarchy.of(ball, config.levels)
-    drawn = torch.Generator().manual_seed(4)
+    generator = torch.Generator().manual_seed(4)
     meshes = [
-        torch.from_numpy(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=drawn)
+        torch.from_numpy(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=generator)
         for k, mesh in enumerate(hierarchy.meshes)
     ]
     return GeometricTask(config, hierarchy, torch.from_numpy(ball.vertices), meshes, bumpy())
@@ -224,20 +224,20 @@ def test_too_many_faces(run):
 
 def test_growth_starts_at_the_mesh_and_ends_at_the_result(run):
     mesh = icosphere(3)
-    shown = list(run[1].growth(mesh, frames=4, seed=2, start_level=1))
-    assert [len(m.faces) for m in shown] == [180] * 5 + [720] * 4
-    assert np.array_equal(shown[0].vertices, mesh.vertices)
-    assert np.allclose(shown[2].vertices, (shown[0].vertices + shown[4].vertices) / 2, atol=1e-6)
-    assert np.allclose(shown[-1].vertices, run[1].apply(mesh, seed=2, start_level=1).mesh.vertices)
+    meshes = list(run[1].growth(mesh, frames=4, seed=2, start_level=1))
+    assert [len(m.faces) for m in meshes] == [180] * 5 + [720] * 4
+    assert np.array_equal(meshes[0].vertices, mesh.vertices)
+    assert np.allclose(meshes[2].vertices, (meshes[0].vertices + meshes[4].vertices) / 2, atol=1e-6)
+    assert np.allclose(meshes[-1].vertices, run[1].apply(mesh, seed=2, start_level=1).mesh.vertices)
 
 
 def test_interpolation_joins_two_seeds(run):
     mesh = icosphere(3)
-    shown = list(run[1].interpolate(mesh, (0, 1), 5))
+    meshes = list(run[1].interpolate(mesh, (0, 1), 5))
     ends = [run[1].apply(mesh, seed=seed).mesh.vertices for seed in (0, 1)]
-    assert np.allclose(shown[0].vertices, ends[0], atol=1e-5)
-    assert np.allclose(shown[-1].vertices, ends[1], atol=1e-5)
-    assert not np.allclose(shown[2].vertices, ends[0], atol=1e-4)
+    assert np.allclose(meshes[0].vertices, ends[0], atol=1e-5)
+    assert np.allclose(meshes[-1].vertices, ends[1], atol=1e-5)
+    assert not np.allclose(meshes[2].vertices, ends[0], atol=1e-4)
 
 
 def test_the_great_circle_keeps_the_variance():
@@ -274,24 +274,24 @@ def test_resuming_changes_nothing(tmp_path):
 
 def test_each_step_trains_the_generator_of_its_level():
     task = small_task()
-    drawn = torch.Generator().manual_seed(0)
+    generator = torch.Generator().manual_seed(0)
     for step, level in ((0, 0), (2, 0), (3, 1), (8, 2)):
         for parameter in task.parameters:
             parameter.grad = None
-        result = task.loss(step, drawn)
+        result = task.loss(step, generator)
         result.value.backward()
         assert result.metrics["level"] == level
-        for k, generator in enumerate(task.generators):
-            assert all((p.grad is not None) == (k == level) for p in generator.parameters)
+        for k, network in enumerate(task.generators):
+            assert all((p.grad is not None) == (k == level) for p in network.parameters)
 
 
 def test_the_loss_by_hand():
     """The critic's score of a random mesh, and the distance of the one from the fixed noise (section 3.3)."""
     task = small_task(reconstruction=7.0)
     result = task.loss(0, torch.Generator().manual_seed(1))
-    graph, drawn = task.hierarchy.graphs[0], torch.Generator().manual_seed(1)
+    graph, generator = task.hierarchy.graphs[0], torch.Generator().manual_seed(1)
     vertices = []
-    for noise in (task.config.noise * torch.randn(task.template.shape, generator=drawn), task.fixed):
+    for noise in (task.config.noise * torch.randn(task.template.shape, generator=generator), task.fixed):
         offsets = task.generators[0](face_features(task.template + noise, graph), graph)
         vertices.append(displaced(task.template, graph, offsets))
     score = task.critics[0](face_features(vertices[0], graph), graph).mean()
@@ -306,12 +306,12 @@ def metrics_of(change: Change | None) -> Mapping[str, float]:
 
 def test_critics_take_turns():
     task = small_task(critic_steps=2, generator_steps=3)
-    drawn = torch.Generator().manual_seed(0)
-    trained = ["critic" in metrics_of(task.begin(step, drawn)) for step in range(6)]
+    generator = torch.Generator().manual_seed(0)
+    trained = ["critic" in metrics_of(task.begin(step, generator)) for step in range(6)]
     assert sum(trained) == 4 and trained[:3] == trained[3:]
     often = small_task(critic_steps=5, generator_steps=1)
     before = often.critics[0].parameters[0].clone()
-    often.begin(0, drawn)
+    often.begin(0, generator)
     assert often.optimizers[0].counts == [5] * len(often.critics[0].parameters)
     assert not torch.equal(before, often.critics[0].parameters[0])
 
@@ -333,11 +333,11 @@ def test_critics_prefer_the_training_mesh():
 
 def test_weights_are_carried_up():
     task = small_task(steps=5, level_steps=1, carried=3)
-    drawn = torch.Generator().manual_seed(0)
+    generator = torch.Generator().manual_seed(0)
     second = [p.detach().clone() for p in task.generators[2].parameters]
-    task.begin(2, drawn)
+    task.begin(2, generator)
     assert all(torch.equal(p, q) for p, q in zip(task.generators[2].parameters, second, strict=True))
-    assert "critic" not in metrics_of(task.begin(3, drawn))  # trained, it would be another one
+    assert "critic" not in metrics_of(task.begin(3, generator))  # trained, it would be another one
     for networks in (task.generators, task.critics):
         for p, q in zip(networks[3].parameters, networks[2].parameters, strict=True):
             assert torch.equal(p, q)
@@ -346,12 +346,12 @@ def test_weights_are_carried_up():
 def test_the_reconstruction_comes_near():
     """Without a critic's pull the generator learns the one mesh from the fixed noise."""
     task = small_task(steps=300, level_steps=300, reconstruction=100.0, lr=5e-3)
-    optimizer, drawn = Adam(task.parameters), torch.Generator().manual_seed(0)
+    optimizer, generator = Adam(task.parameters), torch.Generator().manual_seed(0)
     errors = []
     for step in range(120):
         optimizer.clear()
-        task.begin(step, drawn)
-        result = task.loss(step, drawn)
+        task.begin(step, generator)
+        result = task.loss(step, generator)
         result.value.backward()
         optimizer.step(5e-3)
         errors.append(result.metrics["reconstruction"])
@@ -379,9 +379,9 @@ def test_the_published_schedule(preset, quarter):
 def test_critics_learn_at_that_rate(monkeypatch):
     rates = []
     monkeypatch.setattr(Adam, "step", lambda self, rate: rates.append(rate))
-    task, drawn = small_task(steps=8, level_steps=8, critic_steps=1, generator_steps=1), torch.Generator()
+    task, generator = small_task(steps=8, level_steps=8, critic_steps=1, generator_steps=1), torch.Generator()
     for step in range(8):
-        task.begin(step, drawn)
+        task.begin(step, generator)
     assert rates == [learning_rate(task.config, step) for step in range(8)] and len(set(rates)) == 4
 
 

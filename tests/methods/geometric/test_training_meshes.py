@@ -134,9 +134,9 @@ def test_the_distance_by_brute_force(fitting):
     """Section 3.1: the weights of both directions, and normals in both."""
     fit, mesh = fitting
     vertices = torch.from_numpy(mesh.vertices)
-    drawn = torch.Generator().manual_seed(3)
-    ours = sample_surface(vertices, fit.graph.faces, 200, drawn)
-    theirs = sample_surface(fit.target, fit.target_faces, 200, drawn)
+    generator = torch.Generator().manual_seed(3)
+    ours = sample_surface(vertices, fit.graph.faces, 200, generator)
+    theirs = sample_surface(fit.target, fit.target_faces, 200, generator)
     apart = torch.cdist(ours.points, theirs.points)
     cosines = ours.normals @ theirs.normals.T
     to = cosines.gather(1, apart.argmin(1)[:, None])

@@ -28,9 +28,9 @@ def exemplar():
 
 
 def _appearance(exemplar, network, settings, maps=None):
-    shown = Exemplar({name: exemplar.maps[name] for name in maps}) if maps else exemplar
-    pictures = channel_triples(state_layout(sorted(shown.maps)), settings.blend, 0)
-    return Appearance(settings, Targets(shown, pictures, network, settings.layers), network)
+    subset = Exemplar({name: exemplar.maps[name] for name in maps}) if maps else exemplar
+    pictures = channel_triples(state_layout(sorted(subset.maps)), settings.blend, 0)
+    return Appearance(settings, Targets(subset, pictures, network, settings.layers), network)
 
 
 def _views(count, channels, seed=0):
@@ -101,8 +101,8 @@ def test_blended_views_share_the_kinds(exemplar, network):
     for _ in range(10):
         view, which = appearance._assignment(8, generator)
         assert view.tolist() == list(range(8))
-        shown = [kinds[i] for i in which.tolist()]
-        assert sorted(shown) == sorted(2 * ["albedo", "grey", "mix", "normal"])
+        view_kinds = [kinds[i] for i in which.tolist()]
+        assert sorted(view_kinds) == sorted(2 * ["albedo", "grey", "mix", "normal"])
         mixes |= {i for i in which.tolist() if kinds[i] == "mix"}
     assert len(mixes) > 6
 
@@ -112,8 +112,8 @@ def test_a_few_blended_views_take_turns(exemplar, network):
     appearance = _appearance(exemplar, network, config("blend=true"))
     generator = torch.Generator().manual_seed(0)
     kinds = [p.kind for p in appearance.targets.pictures]
-    shown = {kinds[i] for _ in range(40) for i in appearance._assignment(1, generator)[1].tolist()}
-    assert shown == {"albedo", "grey", "mix", "normal"}
+    view_kinds = {kinds[i] for _ in range(40) for i in appearance._assignment(1, generator)[1].tolist()}
+    assert view_kinds == {"albedo", "grey", "mix", "normal"}
 
 
 @pytest.mark.parametrize("blend", ["true", "false"])

@@ -308,11 +308,11 @@ def test_buried_is_what_has_matter_above_and_beside_it(run, base):
 def test_wrong_cameras_find_back(run, base):
     """In a field that is right, cameras turned by half a degree turn back, or move so that it is the same."""
     capture, rng = tiny_capture(), np.random.default_rng(0)
-    learned, _ = capture.split()
-    turns = np.radians(0.5) * rng.normal(size=(len(learned), 3))
-    poses = learned.poses.copy()
+    training, _ = capture.split()
+    turns = np.radians(0.5) * rng.normal(size=(len(training), 3))
+    poses = training.poses.copy()
     poses[:, :, :3] = Rotation.from_rotvec(turns).as_matrix() @ poses[:, :, :3]
-    wrong = replace(learned, poses=poses.astype(np.float32))
+    wrong = replace(training, poses=poses.astype(np.float32))
     task = trained_task(run, base, wrong, "refine_cameras=true")
     generator, optimizer = torch.Generator().manual_seed(0), torch.optim.Adam([task.named["poses"]], lr=0.03)
     for step in range(150):
@@ -320,7 +320,7 @@ def test_wrong_cameras_find_back(run, base):
         (task.named["poses"].grad,) = torch.autograd.grad(loss, [task.named["poses"]])
         optimizer.step()
     corrections = POSE * task.named["poses"].detach().numpy()
-    centres = learned.poses[:, :, 3]
+    centres = training.poses[:, :, 3]
 
     def miss(turn, shift):
         """How far rays to the middle of the object are off there."""

@@ -31,9 +31,9 @@ def test_the_exemplar_is_white_but_for_the_floor():
 
 
 def test_round_trips():
-    shown = exemplar()
+    picture = exemplar()
     x = torch.rand(7, 4, generator=torch.Generator().manual_seed(0))
-    for space in (ColourSpace.of(shown, texel_layout(list(shown.maps))), ColourSpace.plain(4)):
+    for space in (ColourSpace.of(picture, texel_layout(list(picture.maps))), ColourSpace.plain(4)):
         assert torch.allclose(space.values(space.coordinates(x)), x, atol=1e-5)
     assert torch.equal(ColourSpace.plain(4).values(x), x)
 

@@ -137,8 +137,8 @@ def test_bending_changes_no_feature_before_pooling():
         assert mesh.uv is not None
         around = surroundings(mesh, mesh.uv, 96)
         levels = build(around)
-        shown = colours[torch.from_numpy(around.texels.index[levels.order]).long()]
-        features = SurfaceVgg(levels, precision="float32").features(shown, ["relu1_1", "relu1_2"])
+        texels = colours[torch.from_numpy(around.texels.index[levels.order]).long()]
+        features = SurfaceVgg(levels, precision="float32").features(texels, ["relu1_1", "relu1_2"])
         back = np.argsort(levels.order)
         results.append({name: f[torch.from_numpy(back)] for name, f in features.items()})
         row, column = np.divmod(around.texels.index, 96)

@@ -94,9 +94,9 @@ def test_border_texels_show_the_nearest_point_of_their_face(scattered):
     texels = rasterize(scattered, 29)
     assert texels.barycentric.min() >= 0.0
     np.testing.assert_allclose(texels.barycentric.sum(axis=1), 1.0, rtol=0, atol=1e-14)
-    shown = np.einsum("nk,nkc->nc", texels.barycentric, scattered[texels.face].astype(np.float64))
+    points = np.einsum("nk,nkc->nc", texels.barycentric, scattered[texels.face].astype(np.float64))
     centres = np.array([centre(i, 29) for i in texels.index])
-    away = np.linalg.norm(shown - centres, axis=1)
+    away = np.linalg.norm(points - centres, axis=1)
     assert away[texels.inside].max() < 1e-9
     border = np.flatnonzero(~texels.inside)
     expected = [border_distance(scattered[texels.face[k]], centres[k]) for k in border]

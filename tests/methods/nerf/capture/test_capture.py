@@ -390,9 +390,9 @@ def set_alpha(folder, views, alpha):
 
 
 def assert_refused(folder: Path, words: str, kind: type[Exception] = CaptureError):
-    with pytest.raises(kind, match=re.escape(words)) as caught:
+    with pytest.raises(kind, match=re.escape(words)) as error:
         load_capture(folder)
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(error.value)
 
 
 def assert_on_rays(points, origins, rays):

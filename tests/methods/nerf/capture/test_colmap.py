@@ -184,6 +184,6 @@ def test_without_pycolmap(photos, monkeypatch):
 
 
 def assert_refused(folder, words):
-    with pytest.raises(CaptureError, match=re.escape(words)) as caught:
+    with pytest.raises(CaptureError, match=re.escape(words)) as error:
         load_capture(folder)
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(error.value)

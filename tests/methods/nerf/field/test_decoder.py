@@ -27,17 +27,17 @@ POINTS = 300
 
 
 def weights(preset: str, seed: int = 0) -> list[torch.Tensor]:
-    drawn = torch.Generator().manual_seed(seed)
+    generator = torch.Generator().manual_seed(seed)
     return [
-        torch.empty(s).uniform_(-weight_bound(s), weight_bound(s), generator=drawn)
+        torch.empty(s).uniform_(-weight_bound(s), weight_bound(s), generator=generator)
         for s in weight_shapes(PRESETS[preset])
     ]
 
 
 def inputs(seed: int = 0) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    drawn = torch.Generator().manual_seed(seed)
-    f, phase = torch.randn(POINTS, 16, generator=drawn), torch.randn(POINTS, 8, generator=drawn)
-    return f, phase, 0.1 * torch.randn(POINTS, generator=drawn)
+    generator = torch.Generator().manual_seed(seed)
+    f, phase = torch.randn(POINTS, 16, generator=generator), torch.randn(POINTS, 8, generator=generator)
+    return f, phase, 0.1 * torch.randn(POINTS, generator=generator)
 
 
 def decoded(f, phase, distance, *matrices, packed=False, low_precision=False):

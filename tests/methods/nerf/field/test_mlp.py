@@ -18,9 +18,9 @@ WIDTHS, POINTS = (5, 8, 7, 3), 50
 @pytest.fixture
 def arguments() -> list[torch.Tensor]:
     """Inputs, then the matrices."""
-    drawn = torch.Generator().manual_seed(0)
+    generator = torch.Generator().manual_seed(0)
     shapes = [(WIDTHS[0], POINTS), *((o, i) for i, o in zip(WIDTHS[:-1], WIDTHS[1:], strict=True))]
-    return [torch.randn(shape, generator=drawn, requires_grad=True) for shape in shapes]
+    return [torch.randn(shape, generator=generator, requires_grad=True) for shape in shapes]
 
 
 @pytest.mark.parametrize(("chunk", "cores"), [(mlp.CHUNK, 2), (16, 1), (7, 3)])

@@ -21,24 +21,24 @@ def centres(side: int) -> np.ndarray:
 
 def test_cells_with_matter_are_found_and_others_are_not():
     grid = Occupancy(16)
-    drawn = torch.Generator().manual_seed(0)
+    generator = torch.Generator().manual_seed(0)
     assert grid.occupied.all() and grid.share == 1
     for _ in range(3):
-        grid.refresh(ball, drawn)
+        grid.refresh(ball, generator)
     distance = centres(16)
     assert grid.occupied[distance < 0.4].all() and not grid.occupied[distance > 0.62].any()
 
 
 def test_what_goes_away_is_forgotten_slowly_and_what_comes_is_seen():
     grid = Occupancy(8)
-    drawn = torch.Generator().manual_seed(0)
-    grid.refresh(ball, drawn)
+    generator = torch.Generator().manual_seed(0)
+    grid.refresh(ball, generator)
     before = grid.occupied.sum()
     for _ in range(WARMUP + 60):
-        grid.refresh(lambda p: np.zeros(len(p), np.float32), drawn)
+        grid.refresh(lambda p: np.zeros(len(p), np.float32), generator)
     assert grid.values.max() < 50 * 0.95 ** (WARMUP + 50) * 1.1 and before > 0
     for _ in range(40):  # of half the cells each
-        grid.refresh(ball, drawn)
+        grid.refresh(ball, generator)
     assert grid.occupied[centres(8) < 0.3].all()
 
 

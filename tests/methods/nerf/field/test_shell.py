@@ -54,9 +54,9 @@ def at(barycentric) -> ShellCoords:
 
 
 def shell(strength: float = 1.0, scale: float = 1.0) -> Shell:
-    drawn = np.random.default_rng(0)
+    rng = np.random.default_rng(0)
     weights = [
-        mi.TensorXf(drawn.uniform(-1, 1, s).astype(np.float32) * weight_bound(s))
+        mi.TensorXf(rng.uniform(-1, 1, s).astype(np.float32) * weight_bound(s))
         for s in weight_shapes(PRESETS["fast"])
     ]
     mesh = ball()

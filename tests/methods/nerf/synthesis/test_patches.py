@@ -174,16 +174,16 @@ def test_same_seed_same_patches():
 
 def test_features_come_when_asked(rng: np.random.Generator):
     patches = extract_patches(plane(), rng, count=10, size=8)
-    asked = []
+    counts = []
 
     def features(points: np.ndarray) -> np.ndarray:
-        asked.append(len(points))
+        counts.append(len(points))
         return points @ np.arange(12.0).reshape(3, 4)
 
     source = FeatureSource(patches, features, matched=2)
-    assert not asked
+    assert not counts
     assert np.allclose(source.patch(3), patches.points[3] @ np.arange(12.0).reshape(3, 4))
-    assert asked == [64] and source.length == patches.length
+    assert counts == [64] and source.length == patches.length
 
 
 @pytest.mark.parametrize("flip", [0, 1, 2, 3])

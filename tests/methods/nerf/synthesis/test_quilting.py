@@ -175,9 +175,9 @@ def test_chances_fall_with_the_cube(rng: np.random.Generator):
     matcher = Matcher(noise_source(8), (0,), ("left",))
     costs = np.array([[4.0, 0.0, 9.0, 1.0, 2.0, 3.0, 8.0, 7.0]])
     everyone = np.ones(8, bool)
-    drawn = [matcher.choose(costs, everyone, rng, 5)[0] for _ in range(6000)]
+    choices = [matcher.choose(costs, everyone, rng, 5)[0] for _ in range(6000)]
     weights = np.array([0.0, 1.0, 0.0, 0.75**3, 0.5**3, 0.25**3, 0.0, 0.0])
-    assert np.bincount(drawn, minlength=8) / 6000 == pytest.approx(weights / weights.sum(), abs=0.02)
+    assert np.bincount(choices, minlength=8) / 6000 == pytest.approx(weights / weights.sum(), abs=0.02)
     # Four are looked at until one is allowed.
     allowed = np.zeros(8, bool)
     allowed[[7, 2]] = True

@@ -23,13 +23,13 @@ from tests.methods.nerf.tiny import tiny_capture
 
 def test_on_its_own_base_shape_it_gives_the_training_views_back(texture):
     """The promise is 1 dB less than the fit."""
-    learned, _ = tiny_capture().split()
+    training, _ = tiny_capture().split()
     again = texture.on_base_shape(512)
     thickness = again.thickness * again.similarity.scale
     np.testing.assert_allclose(thickness, texture.model.base.thickness, rtol=1e-5)
     losses = []
-    for view in range(0, len(learned), 4):
-        batch, shape = Pixels(learned).image(view, 48)
+    for view in range(0, len(training), 4):
+        batch, shape = Pixels(training).image(view, 48)
         photo = (batch.colours * batch.alpha + 1 - batch.alpha).numpy()
         moved = replace(batch, origins=again.similarity.apply(batch.origins).astype(np.float32))
         images = [render_batch(field, rays) for field, rays in ((texture.shell, batch), (again, moved))]
