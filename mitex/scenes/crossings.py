@@ -37,7 +37,7 @@ def crossing_edges(mesh: Mesh) -> np.ndarray:
 def _first(
     scene: mi.Scene, start: np.ndarray, end: np.ndarray, offset: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of edges, from the fraction `offset` of their length on: whether a face is hit, which one, and where."""
+    """Of edges, from the fraction `offset` of their length on: whether a face is hit, which, and where."""
     way = end - start
     origin = mi.Point3f(np.ascontiguousarray((start + offset[:, None] * way).T))
     ray = mi.Ray3f(origin, mi.Vector3f(np.ascontiguousarray(way.T)))
