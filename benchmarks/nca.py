@@ -76,7 +76,7 @@ class Bench:
         self.places, self.targets = self._targets(generator)
         with torch.no_grad():
             self.vectors = self.network.samples(self.images, self.places)
-        self.pulls = {k: torch.randn(v.shape, generator=generator) for k, v in self.vectors.items()}
+        self.upstream = {k: torch.randn(v.shape, generator=generator) for k, v in self.vectors.items()}
         self.plain, self.passing = naive.vgg_weights(), naive.MessagePassing.of(self.task.mesh)
 
     def _targets(self, generator: torch.Generator) -> tuple[dict[str, torch.Tensor], dict[str, torch.Tensor]]:
@@ -105,7 +105,7 @@ class Bench:
     def vgg(self) -> None:
         images = self.images.clone().requires_grad_()
         samples = self.network.samples(images, self.places)
-        torch.autograd.grad(list(samples.values()), images, [self.pulls[k] for k in samples])
+        torch.autograd.grad(list(samples.values()), images, [self.upstream[k] for k in samples])
 
     def losses(self) -> None:
         low = self.network.dtype == torch.bfloat16
@@ -144,7 +144,7 @@ class Bench:
     def naive_vgg(self) -> None:
         images = self.images.clone().requires_grad_()
         samples = naive.vectors(naive.vgg(images, self.plain), self.places)
-        torch.autograd.grad(list(samples.values()), images, [self.pulls[k] for k in samples])
+        torch.autograd.grad(list(samples.values()), images, [self.upstream[k] for k in samples])
 
     def naive_losses(self) -> None:
         vectors = {k: v.clone().requires_grad_() for k, v in self.vectors.items()}
