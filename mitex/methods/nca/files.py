@@ -155,11 +155,11 @@ def _rule(tensors: dict[str, torch.Tensor], degree: object, path: Path) -> MeshN
     return rule
 
 
-def _degree(told: object, channels: int, inputs: int) -> int | None:
+def _degree(stated: object, channels: int, inputs: int) -> int | None:
     """Of the harmonics: what the file tells, else one that leaves no condition, else the authors' 1."""
     widths = {degree: (count + 1) * channels for degree, count in HARMONICS.items()}
     exact = [degree for degree, width in widths.items() if width == inputs]
     fitting = [degree for degree, width in widths.items() if width <= inputs]
-    if told is not None:
-        return next((degree for degree in fitting if str(degree) == str(told)), None)
+    if stated is not None:
+        return next((degree for degree in fitting if str(degree) == str(stated)), None)
     return next(iter(exact or [degree for degree in (1, 0) if degree in fitting]), None)
