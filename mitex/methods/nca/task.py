@@ -70,7 +70,7 @@ class NcaTask:
                 continue
             target = enlarged(self.exemplar.resized(size), config.target_size or size)
             targets = Targets(target, pictures, layout, network, config.layers)
-            zooms[size] = Appearance(config, targets, network)
+            zooms[size] = Appearance(config, targets, network, ordered=not zooms)
         return zooms
 
     @property
@@ -103,6 +103,7 @@ class NcaTask:
 
     def _put_back(self, index: int, state: torch.Tensor) -> None:
         self.pool[index], self._touched[index] = state, True
+        self.look.track(state)
 
     def cameras(self, size: int, generator: torch.Generator) -> Cameras:
         """The views of one step in which the exemplar is `size` [px] wide."""
