@@ -22,6 +22,9 @@ class NcaConfig(TrainingConfig):
     degree: int = key(1, "highest degree of the spherical harmonics of the perception", 0, 2)
     gain: float = key(0.1, "gain of the initial weights of the last layer (the authors: 1.2)", 0)
     frequency: int = key(32, "of the icosphere that is trained on; 10 f^2 + 2 vertices", 1, 4096)
+    sphere: Literal["both", "even", "uneven"] = key(
+        "both", "triangles of the sphere: the icosphere's, or of scattered vertices, or both in turns"
+    )
     pool: int = key(64, "states kept between steps", 1, 4096)
     aggregation: Literal["mean", "sum"] = key(
         "mean", "of what a cell perceives of its neighbours: six times the mean, or the sum (the paper)"
@@ -126,6 +129,7 @@ PRESETS = {
         pooling="average",
         aggregation="sum",
         overflow_weight=1e4,
+        sphere="even",
         decoder=False,
         interpolation="linear",
         blend=False,
