@@ -180,7 +180,7 @@ class TestEmbedded:
         assert len(exemplar.names()) >= 3
         for name in exemplar.names():
             loaded = Exemplar.load(name)
-            assert loaded.name == name and set(loaded.maps) == set(MAPS) and loaded.size == (256, 256)
+            assert loaded.name == name and set(loaded.maps) == set(MAPS) and loaded.size == (512, 512)
             for key, array in loaded.maps.items():
                 assert array.std() > 0.01, (name, key)
                 for axis in (0, 1):
