@@ -14,6 +14,7 @@ import numpy as np
 from mitex.errors import ImageError
 from mitex.geometry.vectors import unit
 from mitex.images import SUFFIXES, read_image, resize
+from mitex.paths import expanded
 
 MAPS = {"albedo": 3, "ambient_occlusion": 1, "height": 1, "normal": 3, "roughness": 1}
 MIN_SIDE = 16
@@ -83,7 +84,7 @@ class Exemplar:
         Raises:
             ImageError: nothing there, no known map, a map twice, aspect ratios that differ, unreadable image.
         """
-        source = Path(path)
+        source = expanded(path)
         if not os.path.exists(source) and str(path) in names():
             source = DATA / str(path)
         if os.path.isdir(source):

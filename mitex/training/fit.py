@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar, Unpack
 
+from mitex.paths import expanded
 from mitex.training import run
 from mitex.training.config import resolve
 from mitex.training.locate import NAME
@@ -56,7 +57,7 @@ class Run(Generic[Config]):
             OutputError, CheckpointError: As `run.check`.
             ConfigError: As `resolve`.
         """
-        folder, resume = Path(out).expanduser(), options.get("resume", False)
+        folder, resume = expanded(out), options.get("resume", False)
         run.check(folder, resume)
         own, file = folder / run.CONFIG, options.get("config")
         if resume and file is None and own.is_file():
