@@ -41,10 +41,10 @@ def cached(
     Args:
         place: of this result alone.
         compute: the long computation.
-        read: gives the result from a folder; OSError, ValueError or KeyError if it is not whole.
+        read: gives the result from a folder; OSError, EOFError, ValueError or KeyError if it is not whole.
         write: fills an empty folder, which is renamed afterwards, so that all files appear together.
     """
-    with suppress(OSError, ValueError, KeyError):
+    with suppress(OSError, EOFError, ValueError, KeyError):  # EOFError: numpy's of an empty file
         return read(place)
     result = compute()
     with suppress(OSError):
