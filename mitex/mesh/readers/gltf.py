@@ -45,18 +45,20 @@ def read_gltf(name: str, data: bytes, max_vertices: int, folder: Path, max_bytes
     version = str(tree.get("asset", {}).get("version", "?"))
     if not version.startswith("2"):
         raise MeshError(f"{name} is glTF version {version}", "export it as glTF 2.0")
-    used = set(tree.get("extensionsRequired", []))
-    for extension in COMPRESSIONS:
-        if extension in used:
-            raise MeshError(f"{name} is compressed with {extension}", "export it without mesh compression")
     try:
+        required = tree.get("extensionsRequired", [])
+        for extension in COMPRESSIONS:
+            if extension in required:
+                raise MeshError(
+                    f"{name} is compressed with {extension}", "export it without mesh compression"
+                )
         instances = list(_instances(tree))
         total = sum(tree["accessors"][p["attributes"]["POSITION"]]["count"] for p, _ in instances)
         check_budget(name, total, max_vertices)
         buffers = _buffers(name, tree, chunk, folder, max_bytes)
         source = _Accessors(tree, buffers, 6 * max_vertices)
         return _join(name, [(source, p, matrix) for p, matrix in instances])
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError, struct.error) as error:
+    except (LookupError, TypeError, ValueError, OverflowError, AttributeError) as error:
         detail = f"{type(error).__name__}: {error}"
         raise MeshError(f"{name} is not valid glTF ({detail})", DAMAGED) from error
 
