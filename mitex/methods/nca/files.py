@@ -18,6 +18,7 @@ from mitex.methods.nca import METHOD
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.perception import HARMONICS
 from mitex.methods.nca.targets import STATE_CHANNELS
+from mitex.paths import expanded
 from mitex.training import checkpoint, model_file
 from mitex.training.locate import CHECKPOINT, NAME, PREVIOUS, locate
 
@@ -44,7 +45,9 @@ def load(source: str | Path) -> tuple[MeshNCA, dict[str, Any]]:
     """
     path = _newest(source)
     if path.name in (CHECKPOINT, PREVIOUS):
-        state = checkpoint.load(path.parent)
+        # Of a run folder any readable checkpoint will do; a file is read as it was named.
+        folder = expanded(source).is_dir()
+        state = checkpoint.load(path.parent) if folder else checkpoint.read(path)
         tensors = {k[6:]: v for k, v in state.task.items() if k.startswith("model.")}
         maps = state.metadata.get("maps", "albedo").split(",")
         about: dict[str, Any] = {"name": state.metadata.get("exemplar", path.parent.name), "maps": maps}
