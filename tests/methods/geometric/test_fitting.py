@@ -231,6 +231,13 @@ def test_growth_starts_at_the_mesh_and_ends_at_the_result(made):
     assert np.allclose(shown[-1].vertices, made[1].apply(mesh, seed=2, start_level=1).mesh.vertices)
 
 
+def test_the_advice_is_for_the_levels_that_grow(made):
+    """A growth that ends below the usual first level starts at its end."""
+    mesh, texture = icosphere(3), made[1]
+    assert texture.relative_size(mesh, end_level=1) == texture.relative_size(mesh, start_level=1)
+    assert texture.relative_size(mesh, end_level=1) != texture.relative_size(mesh)
+
+
 def test_interpolation_joins_two_seeds(made):
     mesh = icosphere(3)
     shown = list(made[1].interpolate(mesh, (0, 1), 5))
