@@ -51,9 +51,15 @@ class FaceNetwork:
         return x + bias
 
     def load(self, parameters: Sequence[torch.Tensor]) -> None:
-        """Takes over other values of all parameters."""
+        """Takes over other values of all parameters.
+
+        Raises:
+            ValueError: there are more or fewer, or one has another shape.
+        """
         with torch.no_grad():
             for mine, theirs in zip(self.parameters, parameters, strict=True):
+                if mine.shape != theirs.shape:  # `copy_` would broadcast
+                    raise ValueError(f"a parameter of shape {tuple(theirs.shape)}, not {tuple(mine.shape)}")
                 mine.copy_(theirs)
 
 

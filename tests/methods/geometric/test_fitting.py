@@ -102,7 +102,7 @@ def test_models_round_trip(made):
         assert np.array_equal(a, b)
 
 
-@pytest.mark.parametrize("damage", ["cut", "foreign", "nan", "noise", "missing"])
+@pytest.mark.parametrize("damage", ["cut", "foreign", "nan", "noise", "shape", "missing"])
 def test_what_is_no_model_is_refused(made, tmp_path, damage):
     from safetensors.torch import load_file, save_file
 
@@ -121,6 +121,10 @@ def test_what_is_no_model_is_refused(made, tmp_path, damage):
     elif damage == "noise":
         texture = GeometricTexture.load(source)
         replace(texture, fixed=texture.fixed[1:]).save(path)
+    elif damage == "shape":
+        texture = GeometricTexture.load(source)
+        texture.generators[0].parameters[0] = texture.generators[0].parameters[0][:1, :1]
+        texture.save(path)
     message = "there is no model in" if damage == "missing" else "geometric texture"
     with pytest.raises(CheckpointError, match=message):
         GeometricTexture.load(tmp_path)
