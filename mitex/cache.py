@@ -17,7 +17,10 @@ Result = TypeVar("Result")
 
 
 def content_key(*parts: object) -> str:
-    """A hash of arrays (dtype, shape and content) and of anything else by its `repr`."""
+    """A hash of arrays (dtype, shape and content) and of anything else by its `repr`.
+
+    Numbers that follow each other belong into one tuple: by themselves 1, 23 has the key of 12, 3.
+    """
     digest = hashlib.sha256()
     for part in parts:
         if isinstance(part, np.ndarray):
