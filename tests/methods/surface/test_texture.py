@@ -22,7 +22,9 @@ def test_maps_and_channels_that_agree(tmp_path):
     assert loaded.maps == ("albedo", "height") and loaded.values.shape == (256, 4)
 
 
-@pytest.mark.parametrize(("maps", "channels"), [(("albedo", "height"), 3), (("albedo",), 4), (("colour",), 3)])
+@pytest.mark.parametrize(
+    ("maps", "channels"), [(("albedo", "height"), 3), (("albedo",), 4), (("colour",), 3)]
+)
 def test_maps_and_channels_that_do_not(tmp_path, maps, channels):
     path = _saved(tmp_path / "a.safetensors", maps, channels)
     with pytest.raises(CheckpointError, match="not a surface texture"):
