@@ -110,8 +110,8 @@ class GeometricTexture:
 
         Args:
             seed: of the noise.
-            start_level: the first level with random noise; below it the reference's own global shape is rebuilt,
-                and above the last level all of the reference.
+            start_level: the first level with random noise; below it the reference's own global shape is
+                rebuilt. Above the last level, the reference as a whole is rebuilt.
             end_level: as in `apply`.
         """
         rollout = self.rollout(self.template, 0, end_level)
