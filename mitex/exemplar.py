@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import os
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,14 +22,13 @@ DATA = Path(__file__).parent / "data" / "exemplars"
 
 # File names, lower case without separators, as the usual texture sites write them.
 ALIASES = {
-    "albedo": "albedo",
+    "albedo": "albedo basecolor basecolour color colour diffuse diff col",
     "ambient_occlusion": "ambientocclusion ao occlusion occ",
     "height": "height heightmap displacement disp bump depth",
     "normal": "normal normals normalmap normalgl normalopengl norgl nor nrm",
     "normal_dx": "normaldx normaldirectx nordx",
     "roughness": "roughness rough",
 }
-ALIASES["albedo"] += " basecolor basecolour color colour diffuse diff col"
 _BY_ALIAS = {alias: name for name, aliases in ALIASES.items() for alias in aliases.split()}
 _OTHER_IMAGES = (".tif", ".tiff", ".webp", ".exr", ".tga", ".bmp", ".gif", ".psd", ".hdr")
 
@@ -202,9 +200,8 @@ def _wanted() -> str:
     return f"name the files {', '.join(f'{name}.png' for name in MAPS)} (any subset)"
 
 
-def _suggest(name: str, candidates: Iterable[str] | None = None) -> str:
-    candidates = list(names() if candidates is None else candidates)
-    close = difflib.get_close_matches(name, candidates, 1)
+def _suggest(name: str) -> str:
+    close = difflib.get_close_matches(name, names(), 1)
     if close:
         return f"did you mean {close[0]}?"
-    return f"give an image, a folder of maps{' or one of ' + ', '.join(candidates) if candidates else ''}"
+    return f"give an image, a folder of maps or one of {', '.join(names())}"

@@ -16,7 +16,11 @@ def csr_tensor(matrix: Any, device: torch.device | str = "cpu") -> torch.Tensor:
     """
     indptr, indices, data = (
         torch.from_numpy(values.astype(dtype)).to(device)
-        for values, dtype in ((matrix.indptr, np.int32), (matrix.indices, np.int32), (matrix.data, np.float32))
+        for values, dtype in (
+            (matrix.indptr, np.int32),
+            (matrix.indices, np.int32),
+            (matrix.data, np.float32),
+        )
     )
     return csr(indptr, indices, data, matrix.shape)
 
