@@ -63,7 +63,7 @@ def load(source: str | Path) -> tuple[MeshNCA, dict[str, Any]]:
 
 
 def _newest(source: str | Path) -> Path:
-    """A resumed run's checkpoint is newer than the model of its first part."""
+    """The file to read; of a resumed run the checkpoint, which is newer than the model of its first part."""
     first, *others = locate(source)
     if first.name == NAME and others and others[0].name == CHECKPOINT:
         return max(first, others[0], key=lambda file: file.stat().st_mtime_ns)
@@ -101,11 +101,11 @@ def _model(tensors: dict[str, torch.Tensor], degree: object, path: Path) -> Mesh
     if set(tensors) != PARAMETERS or any(tensors[k].ndim != 2 - k.endswith("bias") for k in PARAMETERS):
         raise problem
     (channels, hidden), inputs = tensors["fc2.weight"].shape, tensors["fc1.weight"].shape[1]
-    rule_degree = _degree(degree, channels, inputs)
-    if rule_degree is None or not channels:
+    highest = _degree(degree, channels, inputs)
+    if highest is None or not channels:
         raise problem
-    condition = inputs - (HARMONICS[rule_degree] + 1) * channels
-    model = MeshNCA(channels, hidden, condition, rule_degree)
+    condition = inputs - (HARMONICS[highest] + 1) * channels
+    model = MeshNCA(channels, hidden, condition, highest)
     try:
         model.load_state_dict({name: value.float() for name, value in tensors.items()})
     except RuntimeError as e:

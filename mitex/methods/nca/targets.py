@@ -34,13 +34,16 @@ def state_layout(maps: Iterable[str]) -> dict[str, tuple[int, ...]]:
 
 
 class Targets:
-    """Features of the exemplar's pictures, kept, and read at random places.
+    """The features of the exemplar's pictures, computed once and read at random places.
 
     Args:
         exemplar: maps at the size at which the features see them.
-        pictures: what the features look at.
+        pictures: the channel triples that the network looks at.
         network: frozen features.
         layers: of the network.
+
+    Attributes:
+        images: (P, H, W, 3) float32 in [0, 1], the pictures.
     """
 
     def __init__(

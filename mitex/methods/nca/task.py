@@ -26,7 +26,7 @@ from mitex.triples import channel_triples, triple_images
 
 
 class NcaTask:
-    """Pool of states on an icosphere, random steps, views, loss.
+    """Trains a cell rule: states from a pool evolve on an icosphere, and their views are compared.
 
     Args:
         config: settings.

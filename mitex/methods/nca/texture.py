@@ -102,8 +102,20 @@ class NcaTexture:
     def grow(
         self, mesh: Mesh, *, seed: int = 0, steps: int = STEPS, orientation: float = 0.0, clamp: float = 1.0
     ) -> torch.Tensor:
-        """The state (V, C) after `steps` steps from the seed; held in [-clamp, clamp] as in the authors'
-        demo.
+        """The state of the automaton after some steps.
+
+        Args:
+            mesh: any mesh.
+            seed: of the random updates.
+            steps: from the initial state, which is zero.
+            orientation: as in `apply` [rad].
+            clamp: after each step the state is clamped to [-clamp, clamp], as in the authors' demo.
+
+        Returns:
+            (V, C) float32.
+
+        Raises:
+            ConfigError: steps below 0, or the model needs a condition.
         """
         self._check_unconditioned()
         if steps < 0:
@@ -137,13 +149,15 @@ class NcaTexture:
             raise ConfigError(f"scale = {scale}", "use 0.05 to 20")
         count = len(mesh.vertices) * 4**levels
         if count * max(1 / scale**2, 1) > MOST_VERTICES:
-            raise ConfigError(f"a mesh of more than {MOST_VERTICES:,} vertices", "subdivide less")
+            raise ConfigError(
+                f"a mesh of more than {MOST_VERTICES:,} vertices", "subdivide less, or take a larger scale"
+            )
         dense = subdivide_loop(mesh, levels) if levels else mesh
         return dense if scale == 1.0 else remesh(dense, max(int(len(dense.vertices) / scale**2), 12))
 
 
 def tangents(mesh: Mesh, orientation: float = 0.0) -> np.ndarray:
-    """Where the exemplar's right points on the surface, (V, 3) unit.
+    """Where the exemplar's right points on the surface, (V, 3) float32 unit vectors across the normals.
 
     Training views have +y up, so right is y x normal; `orientation` turns it about the normal [rad].
     """
