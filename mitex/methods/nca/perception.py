@@ -3,7 +3,7 @@
 Vertex i perceives z_i = sum_j w(d_ij) (s_j - s_i) for each harmonic w, where the sum goes over its neighbours
 j, and d_ij = (p_j - p_i) / |p_j - p_i|. That is linear in the states s: one sparse matrix of shape
 (V * blocks, V) gives all harmonics, and the state itself as a last block; row i * blocks + k is block k of
-vertex i. Its transpose is kept too: it is the backward pass. No tensor of edges times channels is ever formed.
+vertex i. Its transpose is kept too: it is the backward pass. No tensor of edges times channels is formed.
 """
 
 from __future__ import annotations
