@@ -20,9 +20,11 @@ Config = TypeVar("Config", bound=FitConfig)
 
 
 class Saved(Protocol):
-    """A texture, as far as a fit cares."""
+    """What a fit needs of a texture."""
 
-    def save(self, path: str | Path) -> Path: ...
+    def save(self, path: str | Path) -> Path:
+        """Writes the model file."""
+        ...
 
 
 Learned = TypeVar("Learned", bound=Saved)
@@ -30,7 +32,7 @@ Learned = TypeVar("Learned", bound=Saved)
 
 @dataclass(frozen=True)
 class Run(Generic[Config]):
-    """A fit that may begin.
+    """A fit whose folder and settings have been checked.
 
     Attributes:
         folder: The run folder.
@@ -52,6 +54,9 @@ class Run(Generic[Config]):
             presets: Of the method; the first one is the default.
             out: Run folder: new, empty, or one with a run to `resume`.
             options: As of `RunOptions`.
+
+        Returns:
+            A fit; one that resumes has the settings of its own config.toml, if no other file is named.
 
         Raises:
             OutputError, CheckpointError: As `run.check`.

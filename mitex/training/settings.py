@@ -15,7 +15,7 @@ LARGEST_SEED = 2**32 - 1
 
 
 class RunOptions(TypedDict, total=False):
-    """What every `fit` takes beside what it learns from.
+    """What every `fit` takes besides what it learns from.
 
     Attributes:
         preset: Name of the preset to start from; the first one if None.

@@ -24,8 +24,8 @@ class FaceNetwork:
 
     Args:
         widths: channels of the hidden layers.
-        outputs: channels of the last one: 3 of a generator, 1 of a discriminator.
-        generator: of the first weights, uniform in +-1 / sqrt(inputs).
+        outputs: channels of the last layer: 3 of a generator, 1 of a critic.
+        generator: source of the first weights, uniform in +-1 / sqrt(inputs).
 
     Attributes:
         parameters: [side (4, C1); across, own (C, C') for each further layer; bias (outputs,)].
