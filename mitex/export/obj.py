@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -92,7 +93,7 @@ def _material(asset: Asset, stem: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _write_mesh(file, asset: Asset, stem: str) -> None:
+def _write_mesh(file: BinaryIO, asset: Asset, stem: str) -> None:
     mesh, atlas = asset.mesh, asset.atlas
     assert atlas is not None
     pairs, uv_index = np.unique(atlas.uv.reshape(-1, 2), axis=0, return_inverse=True)

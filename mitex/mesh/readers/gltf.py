@@ -11,6 +11,7 @@ import binascii
 import json
 import math
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -128,7 +129,7 @@ def _fetch(name: str, uri: str, folder: Path, max_bytes: int) -> bytes:
         raise MeshError(f"{name} refers to '{excerpt}', which cannot be read", remedy) from error
 
 
-def _instances(tree: dict):
+def _instances(tree: dict[str, Any]) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
     """Yields (primitive, 4x4 matrix) of every triangle primitive in the scene."""
     nodes = tree.get("nodes", [])
     scenes = tree.get("scenes", [])
