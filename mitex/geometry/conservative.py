@@ -16,7 +16,7 @@ class _EdgeFunctions:
     """The edge functions of triangles: twice the areas that a point spans with each edge, positive inside.
 
     Unlike barycentric coordinates they are not divided by the triangle's area. So the test whether a triangle
-    touches a square is exact where coordinates are short binary fractions, as on layouts that are aligned with
+    touches a square is exact where coordinates are short binary fractions, as on layouts aligned with
     the texels.
 
     Args:
