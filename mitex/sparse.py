@@ -12,8 +12,8 @@ import torch
 def csr_tensor(matrix: Any, device: torch.device | str = "cpu") -> torch.Tensor:
     """A scipy CSR array or matrix (N, M) as a sparse float32 tensor with 32-bit indices.
 
-    Torch's own conversion gives 64-bit indices, with which products take twice the time. (`Any`, since a scipy
-    array's `shape` may be None to type checkers.)
+    Torch's own conversion gives 64-bit indices, with which products take twice the time. (`Any`, because type
+    checkers take the `shape` of a scipy array for None.)
     """
     indptr, indices, data = (
         torch.from_numpy(values.astype(dtype)).to(device)
