@@ -59,9 +59,9 @@ class MipMap:
         upper = np.minimum(lower + 1, len(self.levels) - 1)
         share = (level - lower)[:, None]
         values = np.empty((2, len(places), self.levels[0].shape[2]))
-        for row, chosen in zip(values, (lower, upper), strict=True):
-            for k in np.unique(chosen):
-                row[chosen == k] = self._bilinear(places[chosen == k], self.levels[k])
+        for row, index in zip(values, (lower, upper), strict=True):
+            for k in np.unique(index):
+                row[index == k] = self._bilinear(places[index == k], self.levels[k])
         return (1 - share) * values[0] + share * values[1]
 
     def _bilinear(self, places: np.ndarray, level: np.ndarray) -> np.ndarray:

@@ -107,10 +107,10 @@ class Matcher:
         self.flips, self.centres = tuple(flips), np.asarray(source.centres, np.float64)
         self.apart = APART * source.length
         self.shape = _checked_shape(source)
-        needed = {_source_side(side, flip) for side in sides for flip in self.flips}
+        source_sides = {_source_side(side, flip) for side in sides for flip in self.flips}
         side = self.shape[0]
         length = side // BLOCK * overlap(side) * source.matched
-        self._strips = {side: np.empty((count, length), np.float32) for side in needed}
+        self._strips = {side: np.empty((count, length), np.float32) for side in source_sides}
         for index in range(count):
             square = source.patch(index)[..., : source.matched]
             for name, rows in self._strips.items():
