@@ -23,8 +23,8 @@ def test_a_run_in_the_folder_is_continued(tmp_path, monkeypatch, left):
         (run / left).touch()
     options = {}
 
-    def fit(exemplar, out, **given):
-        options.update(given, out=out)
+    def fit(exemplar, out, **keywords):
+        options.update(keywords, out=out)
         raise Stopped
 
     monkeypatch.setattr(nca, "fit", fit)
