@@ -63,6 +63,11 @@ class TestLoad:
         assert loaded.name == "moss" and list(loaded.maps) == ["albedo"] and loaded.size == (32, 32)
         np.testing.assert_allclose(loaded.maps["albedo"][3, 4], [1, 0, 0.2], atol=1e-6)
 
+    def test_a_path_below_home(self, tmp_path, monkeypatch):
+        monkeypatch.setenv("HOME", str(tmp_path))
+        save(tmp_path / "moss.png", (255, 0, 51))
+        assert Exemplar.load("~/moss.png").name == "moss"
+
     @pytest.mark.parametrize("names", [["height"], ["albedo", "roughness"], list(MAPS)])
     def test_any_subset(self, tmp_path, names):
         for name in names:

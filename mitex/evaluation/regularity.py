@@ -13,8 +13,8 @@ LUMINANCE = np.array([0.299, 0.587, 0.114], np.float32)  # of sRGB values
 def regularity(image: np.ndarray) -> float:
     """The highest peak of an image's autocorrelation beside the one at no shift: 1 for perfect repetition.
 
-    Peaks count from the radius on at which the autocorrelation has fallen to its first minimum in the mean over
-    all directions: nearer by, anything smooth resembles itself. Shifts go up to half the image's sides.
+    Peaks count from the radius on at which the autocorrelation, averaged over all directions, has its first
+    minimum: nearer by, anything smooth resembles itself. Shifts go up to half the image's sides.
 
     Args:
         image: (H, W, 3) or (H, W, 1), several repetitions wide.

@@ -24,6 +24,7 @@ from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.methods.nca.look import STATE_CHANNELS, Look
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.perception import HARMONICS
+from mitex.paths import expanded
 from mitex.training import checkpoint, model_file
 from mitex.training.locate import CHECKPOINT, NAME, PREVIOUS, locate
 
@@ -54,7 +55,9 @@ def load(source: str | Path) -> tuple[Look, dict[str, Any]]:
     """
     path = _newest(source)
     if path.name in (CHECKPOINT, PREVIOUS):
-        return _from_checkpoint(path)
+        # Of a run folder any readable checkpoint will do; a file is read as it was named.
+        folder = expanded(source).is_dir()
+        return _from_checkpoint(checkpoint.load(path.parent) if folder else checkpoint.read(path), path)
     try:
         tensors, metadata = model_file.read(path)
     except (SafetensorError, OSError, ValueError) as e:
@@ -69,8 +72,7 @@ def load(source: str | Path) -> tuple[Look, dict[str, Any]]:
     return look, about
 
 
-def _from_checkpoint(path: Path) -> tuple[Look, dict[str, Any]]:
-    state = checkpoint.load(path.parent)
+def _from_checkpoint(state: checkpoint.Checkpoint, path: Path) -> tuple[Look, dict[str, Any]]:
     maps = state.metadata.get("maps", "albedo").split(",")
     about: dict[str, Any] = {"name": state.metadata.get("exemplar", path.parent.name), "maps": maps}
     about |= {"steps": state.step, "preset": state.config.get("preset")}
@@ -101,7 +103,7 @@ def _fill(module: torch.nn.Module, tensors: dict[str, torch.Tensor], path: Path)
 
 
 def _newest(source: str | Path) -> Path:
-    """A resumed run's checkpoint is newer than the model of its first part."""
+    """The file to read; of a resumed run the checkpoint, which is newer than the model of its first part."""
     first, *others = locate(source)
     if first.name == NAME and others and others[0].name == CHECKPOINT:
         return max(first, others[0], key=lambda file: file.stat().st_mtime_ns)
@@ -140,10 +142,10 @@ def _rule(tensors: dict[str, torch.Tensor], degree: object, path: Path) -> MeshN
     if any(weight is None or weight.ndim != 2 for weight in weights):
         raise problem
     (channels, hidden), inputs = tensors["fc2.weight"].shape, tensors["fc1.weight"].shape[1]
-    rule_degree = _degree(degree, channels, inputs)
-    if rule_degree is None or not channels:
+    highest = _degree(degree, channels, inputs)
+    if highest is None or not channels:
         raise problem
-    return MeshNCA(channels, hidden, inputs - (HARMONICS[rule_degree] + 1) * channels, rule_degree)
+    return MeshNCA(channels, hidden, inputs - (HARMONICS[highest] + 1) * channels, highest)
 
 
 def _degree(stated: object, channels: int, inputs: int) -> int | None:

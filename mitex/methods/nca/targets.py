@@ -25,11 +25,11 @@ def value_layout(maps: Iterable[str]) -> dict[str, tuple[int, ...]]:
 
 
 class Targets:
-    """Features of the exemplar's pictures, kept, and read at random places.
+    """The features of the exemplar's pictures, computed once and read at random places.
 
     Args:
         exemplar: maps at the size at which the features see them.
-        pictures: what the features look at.
+        pictures: the channel triples that the network looks at.
         layout: channels of the maps in the pictures.
         network: frozen features.
         layers: of the network.
