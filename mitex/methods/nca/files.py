@@ -77,7 +77,9 @@ def _from_checkpoint(state: checkpoint.Checkpoint, path: Path) -> tuple[Look, di
     about: dict[str, Any] = {"name": state.metadata.get("exemplar", path.parent.name), "maps": maps}
     about |= {"steps": state.step, "preset": state.config.get("preset")}
     names = {field.name for field in fields(NcaConfig)}
-    tuples: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in state.config.items() if k in names}
+    tuples: dict[str, Any] = {
+        k: tuple(v) if isinstance(v, list) else v for k, v in state.config.items() if k in names
+    }
     look = Look.of(NcaConfig(**tuples), maps)
     _fill(look, {k[6:]: v for k, v in state.task.items() if k.startswith("model.")}, path)
     return look, about
@@ -85,7 +87,9 @@ def _from_checkpoint(state: checkpoint.Checkpoint, path: Path) -> tuple[Look, di
 
 def _shape(text: str, path: Path) -> DecoderShape:
     try:
-        values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(text).items()}
+        values: dict[str, Any] = {
+            k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(text).items()
+        }
         return DecoderShape(**values)
     except (ValueError, TypeError, AttributeError) as e:
         raise CheckpointError(f"the decoder in '{path}' is damaged ({e})", "save the model again") from e
