@@ -6,9 +6,8 @@ import shutil
 import sys
 import time
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -28,7 +27,9 @@ from mitex.runtime.jit import dr, mi
 from mitex.textures.march import composite
 
 VERSION = 1  # of the base shapes in the cache
-COARSE: dict[str, Any] = dict(  # what the coarse field needs less of
+# Settings of the coarse field: it needs less of all this than the texture.
+COARSE = RadianceConfig(
+    preset="coarse",
     table=15,
     ray_steps=256,
     rays=1024,
@@ -100,9 +101,7 @@ def find_base(
 def coarse_config(config: NerfConfig) -> RadianceConfig:
     """Settings of the coarse field; of a fit's own there are only those in it that change this field."""
     steps = config.base_steps
-    return RadianceConfig(
-        preset="coarse", seed=config.seed, lr=config.lr, steps=steps, lr_steps=steps, **COARSE
-    )
+    return replace(COARSE, seed=config.seed, lr=config.lr, steps=steps, lr_steps=steps)
 
 
 def _trained(coarse: RadianceConfig, capture: Capture, folder: Path, quiet: bool) -> PlainTask:

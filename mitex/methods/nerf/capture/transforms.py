@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard, TypeVar
 
 import numpy as np
 
@@ -18,6 +18,8 @@ ONE_FILE = "transforms.json"
 SPLIT_FILES = ("transforms_train.json", "transforms_val.json", "transforms_test.json")
 FOCAL = (0.02, 1e4)  # focal lengths that a lens may have [image sizes]
 FARTHEST = 1e9  # coordinate of a camera that float64 can work with
+D = TypeVar("D", float, None)
+
 ASPECT = 0.01  # singular values of a rotation may differ by this ratio
 
 
@@ -76,9 +78,11 @@ class Frame:
             )
         return focal
 
-    def _number(self, key: str, default: Any) -> Any:
+    def _number(self, key: str, default: D) -> float | D:
         value = self.lens.get(key, default)
-        if value is not default and not _is_number(value):
+        if value is default:
+            return default
+        if not _is_number(value):
             raise CaptureError(f"{self.name} has {key} {str(value)[:40]!r}", "give a finite number")
         return value
 
@@ -189,5 +193,5 @@ def _pose(matrix: Any, name: str) -> np.ndarray:
     return np.concatenate([rotation, pose[:3, 3:]], axis=1)
 
 
-def _is_number(value: object) -> bool:
+def _is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e12

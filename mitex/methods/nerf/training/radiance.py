@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypedDict, TypeVar
 
 import numpy as np
 import torch
@@ -21,7 +21,7 @@ from mitex.runtime import lower_worker_priority
 from mitex.runtime.jit import dr, mi
 from mitex.textures.march import DIAGONAL, RadianceField, Samples, march, visible
 from mitex.training import Change, Step
-from mitex.training.optim import Adam
+from mitex.training.optim import Adam, Optimizer
 
 REFRESH = 16  # steps between refreshes of the occupancy, and between updates of the mean parameters
 BETAS, EPSILON = (0.9, 0.99), 1e-15  # of Adam
@@ -144,8 +144,15 @@ class RadianceTask(ABC, Generic[Config]):
         return np.hstack(render_view(self.field(self.mean), *self.preview_view, PREVIEW)[::-1])
 
 
-def schedule(config: RadianceConfig) -> dict[str, Any]:
-    """Options of `train`: Adam with a learning rate that falls to a tenth in `lr_steps`."""
+class Schedule(TypedDict):
+    """Options of `train` that all radiance fields are trained with."""
+
+    lr: Callable[[int], float]
+    optimizer: Callable[[Sequence[torch.Tensor]], Optimizer]
+
+
+def schedule(config: RadianceConfig) -> Schedule:
+    """Adam with a learning rate that falls to a tenth in `lr_steps`."""
     return {
         "lr": lambda step: config.lr * 0.1 ** (step / config.lr_steps),
         "optimizer": partial(Adam, betas=BETAS, eps=EPSILON),
