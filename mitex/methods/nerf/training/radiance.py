@@ -167,18 +167,17 @@ class Rendered:
         transmittance: (R,) in [0, 1].
         weights, t: (M,) compositing weight of each sample, and its distance along the ray [scene units].
         ray: (M,) int64.
-        terms: further losses, weighted.
+        terms: further losses by name, weighted; none at first.
+
+    Args:
+        colour, transmittance, weights: see above.
+        samples: the M samples.
     """
 
     def __init__(
-        self,
-        colour: torch.Tensor,
-        transmittance: torch.Tensor,
-        weights: torch.Tensor,
-        samples: Samples,
-        terms: dict[str, torch.Tensor] | None = None,
+        self, colour: torch.Tensor, transmittance: torch.Tensor, weights: torch.Tensor, samples: Samples
     ) -> None:
         self.colour, self.transmittance, self.weights = colour, transmittance, weights
         self.t = torch.from_numpy(np.array(samples.t))
         self.ray = torch.from_numpy(np.array(samples.ray).astype(np.int64))
-        self.terms = terms or {}
+        self.terms: dict[str, torch.Tensor] = {}
