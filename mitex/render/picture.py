@@ -28,9 +28,14 @@ def tone(linear: np.ndarray, exposure: float = 0.0) -> np.ndarray:
     Raises:
         ConfigError: the exposure is beyond +-10 stops.
     """
+    check_exposure(exposure)
+    return linear_to_srgb(np.clip(linear * 2.0**exposure, 0.0, 1.0)).astype(np.float32)
+
+
+def check_exposure(exposure: float) -> None:
+    """Raises a ConfigError if `tone` would refuse an exposure [stops], before anything is rendered."""
     if not -10.0 <= exposure <= 10.0:
         raise ConfigError(f"exposure {exposure} is out of range", "use -10 to 10 stops")
-    return linear_to_srgb(np.clip(linear * 2.0**exposure, 0.0, 1.0)).astype(np.float32)
 
 
 def still(
@@ -76,7 +81,7 @@ def render_still(asset: Asset, path: str | os.PathLike[str], *, exposure: float 
         ConfigError: an option out of range.
     """
     target = prepare_output(path, STILL_SUFFIXES)
-    tone(np.zeros(3), exposure)
+    check_exposure(exposure)
     linear = still(asset, **options)
     if target.suffix.lower() == ".exr":
         return write_exr(target, dict(zip("RGB", np.moveaxis(linear, 2, 0) * 2.0**exposure, strict=True)))
@@ -116,7 +121,7 @@ def turntable(
         ConfigError: an option out of range.
     """
     target = check_video(path, frames, fps, resolution)
-    tone(np.zeros(3), exposure)
+    check_exposure(exposure)
     renderer = OrbitRenderer(
         asset, resolution=resolution, displacement=displacement, ao=ao, backdrop=backdrop
     )

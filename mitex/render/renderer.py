@@ -91,12 +91,7 @@ class OrbitRenderer:
         Raises:
             ConfigError: the elevation [rad] is beyond +-85 degrees, or below the floor of the backdrop.
         """
-        lowest = 0.0 if self._on_backdrop else -math.radians(85)
-        if not lowest <= elevation <= math.radians(85):
-            raise ConfigError(
-                f"camera elevation {math.degrees(elevation):.0f} degrees is out of range",
-                f"use {math.degrees(lowest):.0f} to 85" + (", or no backdrop" if self._on_backdrop else ""),
-            )
+        check_elevation(elevation, self._on_backdrop)
         angles = np.atleast_1d(np.asarray(azimuths, np.float64))
         return fit_view(np.concatenate([self._hull @ rotation(a).T for a in angles]), elevation)
 
@@ -115,8 +110,6 @@ class OrbitRenderer:
         Raises:
             ConfigError: spp out of range.
         """
-        if not 1 <= spp <= 65536:
-            raise ConfigError(f"{spp} samples per pixel are not possible", "use 1 to 65536")
         self._turn(azimuth, view)
         return accumulated(self._scene, self.resolution, spp, seed)
 
@@ -154,10 +147,26 @@ class OrbitRenderer:
         self._params.update()
 
 
+def check_elevation(elevation: float, backdrop: bool) -> None:
+    """Raises a ConfigError if a camera at this elevation [rad] would look from below the floor."""
+    lowest = 0.0 if backdrop else -math.radians(85)
+    if not lowest <= elevation <= math.radians(85):
+        raise ConfigError(
+            f"camera elevation {math.degrees(elevation):.0f} degrees is out of range",
+            f"use {math.degrees(lowest):.0f} to 85" + (", or no backdrop" if backdrop else ""),
+        )
+
+
 def accumulated(scene: mi.Scene, resolution: int, spp: int, seed: int) -> np.ndarray:
-    """(N, N, 3) linear radiance of a scene with a film of `sensor`, over white where it is transparent."""
+    """(N, N, 3) linear radiance of a scene with a film of `sensor`, over white where it is transparent.
+
+    Raises:
+        ConfigError: the samples per pixel are not 1 to 65536.
+    """
     from mitex.runtime.jit import mi
 
+    if not 1 <= spp <= 65536:
+        raise ConfigError(f"{spp} samples per pixel are not possible", "use 1 to 65536")
     level = mi.log_level()
     mi.set_log_level(mi.LogLevel.Error)  # the sampler warns each time it rounds its count up
     per_pass = max(1, min(spp, SAMPLES_PER_PASS // resolution**2))

@@ -14,7 +14,6 @@ from mitex.asset import Asset
 from mitex.atlas import laid_out
 from mitex.errors import ConfigError
 from mitex.export import SUFFIXES
-from mitex.images import write_image
 from mitex.mesh import Mesh
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field.decoder import Decoder
@@ -29,7 +28,6 @@ from mitex.paths import prepare_output
 from mitex.runtime.jit import mi
 from mitex.textures.march import DIAGONAL
 
-PICTURES = (".png", ".jpg", ".jpeg")
 NEIGHBOURS = 5  # vertices that make the coarse normal of a target
 OCCUPANCY_SAMPLES = 6  # of the density in each cell, to find which ones are occupied
 FINEST = 2048  # steps across the scene cube, at most
@@ -117,14 +115,11 @@ class AppliedTexture(Shell):
 
         Raises:
             OutputError: unknown suffix or unwritable place.
+            ConfigError: an option out of range.
         """
-        from mitex.render import tone
-        from mitex.render.shell import shell_still
+        from mitex.render.shell import render_shell
 
-        target = prepare_output(path, PICTURES)
-        return write_image(
-            target, tone(shell_still(self, self.similarity, self.outline, **options), exposure)
-        )
+        return render_shell(self, self.similarity, self.outline, path, exposure=exposure, **options)
 
     def extract(self, cells: int | None = None) -> Asset:
         """A coloured mesh of what is solid, in the mesh's space; see `extract_mesh`."""
