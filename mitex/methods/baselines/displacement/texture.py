@@ -84,6 +84,8 @@ class DisplacementMap:
             heights, side = tensors["heights"].numpy(), float(tensors["side"])
             if heights.ndim != 2 or heights.shape[0] != heights.shape[1]:
                 raise ValueError(f"heights of shape {heights.shape}")
+            if not np.isfinite(heights).all() or not 0 < side < np.inf:
+                raise ValueError("values that are not finite, or a square without a side")
             return cls(heights, side, about)
 
     def save(self, path: str | Path) -> Path:
@@ -108,7 +110,15 @@ class DisplacementMap:
 
         Returns:
             The displaced mesh in light grey; where charts meet, heights are averaged and the pattern breaks.
+
+        Raises:
+            ConfigError: a number is out of range.
         """
+        if not 0.05 <= scale <= 20 or not 0 <= levels <= 6:
+            raise ConfigError(
+                f"a relief of {scale} times the size, on faces split {levels} times",
+                "use sizes from 0.05 to 20, and 0 to 6 splits",
+            )
         fine = subdivide_midpoint(laid_out(mesh, ATLAS), levels)
         assert fine.uv is not None
         area = float(fine.face_areas.sum(dtype=np.float64))
