@@ -58,12 +58,17 @@ class Frame:
             raise CaptureError(f"{self.name} has no focal length", "add fl_x or camera_angle_x to its file")
         fx, fy = fx or fy, fy or fx
         centre = self._number("cx", width / 2), self._number("cy", height / 2)
-        if self.lens.get("is_fisheye") or any(self._number(k, 0.0) for k in ("k3", "k4")):
+        if self._is_fisheye or any(self._number(k, 0.0) for k in ("k3", "k4")):
             raise CaptureError(
                 f"{self.name} has a lens other than k1, k2, p1, p2", "undistort the images beforehand"
             )
         distortion = [self._number(k, 0.0) for k in ("k1", "k2", "p1", "p2")]
         return np.array([fx, fy, *centre], np.float64), np.array(distortion, np.float64)
+
+    @property
+    def _is_fisheye(self) -> bool:
+        """Whether the file says so: by the flag of instant-ngp, or the camera model of Nerfstudio."""
+        return bool(self.lens.get("is_fisheye")) or "FISHEYE" in str(self.lens.get("camera_model")).upper()
 
     def _focal(self, axis: str, size: int) -> float | None:
         if (focal := self._number(f"fl_{axis}", None)) is None:
