@@ -16,7 +16,6 @@ from mitex.errors import CheckpointError
 from mitex.mesh import Mesh
 from mitex.methods.nerf.base.base_shape import base_shape, given_base, shell_thickness
 from mitex.methods.nerf.capture.capture import Capture
-from mitex.methods.nerf.capture.pixels import Pixels
 from mitex.methods.nerf.config import NerfConfig, RadianceConfig
 from mitex.methods.nerf.field.occupancy import sample_grid
 from mitex.methods.nerf.field.projection import Projection
@@ -134,10 +133,10 @@ def _say(line: str, quiet: bool) -> None:
 
 def scan_surface(task: PlainTask) -> np.ndarray:
     """(M, 3) float32 points where rays of views from all around become solid."""
-    capture, field = task.pixels.capture, task.field(task.mean)
+    field = task.field(task.mean)
     points = []
-    for view in _farthest(capture.poses[:, :, 3], VIEWS):
-        batch, _ = Pixels(capture).image(int(view), SCAN_SIDE)
+    for view in _farthest(task.pixels.capture.poses[:, :, 3], VIEWS):
+        batch, _ = task.pixels.image(int(view), SCAN_SIDE)
         origin, direction = batch_rays(batch)
         pixels = composite(field, origin, direction, dr.full(mi.Float, 0.5, dr.width(origin)))
         opacity = 1 - np.array(pixels.transmittance)
