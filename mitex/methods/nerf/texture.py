@@ -15,6 +15,7 @@ from mitex.mesh import Mesh, Similarity
 from mitex.methods.nerf import files
 from mitex.methods.nerf.field.decoder import Decoder
 from mitex.methods.nerf.field.encoding import Encoding
+from mitex.methods.nerf.field.lighting import COEFFICIENTS
 from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.field.rendering import render_step
 from mitex.methods.nerf.field.shell import CapturedLatents, Shell
@@ -31,7 +32,7 @@ from mitex.methods.nerf.synthesis.patches import (
     texel_gap,
 )
 from mitex.methods.nerf.synthesis.quilting import Quilt, quilt
-from mitex.methods.nerf.use.applied import AppliedTexture
+from mitex.methods.nerf.use.applied import AppliedTexture, check_ranges
 from mitex.methods.nerf.use.placement import EXTENT, UNWRAP_SIZE, in_scene_cube, uv_unit_length
 from mitex.methods.nerf.use.self_maps import self_maps
 from mitex.runtime import init
@@ -114,7 +115,7 @@ class NerfTexture:
 
     @property
     def light(self) -> mi.TensorXf:
-        """`mi.TensorXf` (16,), learned with the texture."""
+        """`mi.TensorXf` (16,), the light of the capture: estimated from its photos, or learned."""
         return mi.TensorXf(self.model.light.numpy())
 
     @property
@@ -172,8 +173,9 @@ class NerfTexture:
 
         Raises:
             MeshError: the mesh has no area.
-            ConfigError: no such texture can be layout.
+            ConfigError: the scale is out of range, or the side is smaller than a patch or larger than 8192.
         """
+        check_ranges(scale, density=1.0, lift=1.0)
         gap = texel_gap(self.model.base.mesh, pattern_rate) * scale
         texels = round(uv_unit_length(in_scene_cube(laid_out(mesh, UNWRAP_SIZE))[0]) / gap)
         if not PATCH <= texels <= LARGEST:
@@ -251,19 +253,20 @@ class NerfTexture:
             density: factor of the density.
             lift: 1 puts the mesh under the texture's ground, 0 where the base shape was, as published: there
                 the texture is carved into the mesh, and thin parts of this leave no room for its ground.
-            light: (16,) or (16, 3) spherical harmonics instead of the learned light.
+            light: (16,) or (16, 3) spherical harmonics, see `lighting`, in place of the capture's light.
             guide: without `maps`, a picture that lies once over the unit square of the mesh's UVs, as of
                 `synthesize`; `size` is then as the mesh and `scale` ask.
 
         Raises:
             MeshError: the mesh has no area.
-            ConfigError: a number is out of range.
+            ConfigError: a number is out of range, or the light has another shape or is not finite.
         """
+        check_ranges(scale, density, lift)
+        light_coefficients = self.light if light is None else _checked_light(light)
         mesh = laid_out(mesh, UNWRAP_SIZE)
         if maps is None:
             side = size if guide is None else self.covering(mesh, scale)
             maps = self.synthesize(side, seed, tileable=True, guide=guide)
-        light_coefficients = self.light if light is None else mi.TensorXf(np.asarray(light, np.float32))
         return AppliedTexture(
             mesh,
             maps,
@@ -280,3 +283,13 @@ class NerfTexture:
     def __repr__(self) -> str:
         about = self.model.about
         return f"NerfTexture({about['name']}, {about['steps']} steps)"
+
+
+def _checked_light(light: np.ndarray) -> mi.TensorXf:
+    coefficients = np.asarray(light, np.float32)
+    if coefficients.shape not in ((COEFFICIENTS,), (COEFFICIENTS, 3)) or not np.isfinite(coefficients).all():
+        raise ConfigError(
+            f"a light of shape {coefficients.shape}",
+            f"give finite spherical harmonics, ({COEFFICIENTS},) or ({COEFFICIENTS}, 3)",
+        )
+    return mi.TensorXf(coefficients)
