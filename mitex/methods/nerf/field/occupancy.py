@@ -48,6 +48,18 @@ def sample_grid(density: Callable[[np.ndarray], np.ndarray], occupied: np.ndarra
     return grid
 
 
+def packed_cells(occupied: np.ndarray) -> torch.Tensor:
+    """(ceil(G^3 / 8),) uint8, one bit for each of the cells (G, G, G), as model files hold them."""
+    return torch.from_numpy(np.packbits(occupied))
+
+
+def unpacked_cells(packed: torch.Tensor, side: int) -> np.ndarray:
+    """(side, side, side) uint8, the inverse of `packed_cells`; ValueError if they are of another grid."""
+    if packed.shape != (-(-(side**3) // 8),):
+        raise ValueError("occupied cells of another grid")
+    return np.unpackbits(packed.numpy(), count=side**3).reshape((side,) * 3)
+
+
 class Occupancy:
     """A running maximum of the density in each cell, and where it is above the threshold.
 
