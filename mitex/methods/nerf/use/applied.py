@@ -19,7 +19,7 @@ from mitex.methods.nerf.field.decoder import Decoder
 from mitex.methods.nerf.field.occupancy import Occupancy
 from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.field.rendering import render_step
-from mitex.methods.nerf.field.shell import Shell, shell_cells
+from mitex.methods.nerf.field.shell import Shell, shell_cells, shell_reach
 from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents, uv_frames
 from mitex.methods.nerf.use.extract import extract_mesh
 from mitex.methods.nerf.use.placement import in_scene_cube, uv_unit_length
@@ -80,8 +80,9 @@ class AppliedTexture(Shell):
         uv = np.asarray(placed.uv) * (uv_unit_length(placed) / lengths)
         raised = lift * scale * max(-ground, 0.0)
         thickness = thickness * scale
-        projection = Projection(placed, neighbours=NEIGHBOURS, repulsion=None, reach=thickness + raised)
         cells = config.occupancy
+        reach = shell_reach(thickness, cells, raised)
+        projection = Projection(placed, neighbours=NEIGHBOURS, repulsion=None, reach=reach)
         possible = shell_cells(projection, thickness, np.ones((cells,) * 3, bool), raised)
         occupancy = Occupancy(cells, possible)
         super().__init__(
