@@ -143,7 +143,7 @@ def _large_components(mesh: Mesh) -> Mesh:
 
 
 def _laplacian(mesh: Mesh, rounds: int) -> Mesh:
-    """Every vertex moves to the mean of its neighbours, some times."""
+    """Laplacian smoothing: in each of some rounds, every vertex moves to the mean of its neighbours."""
     edges = mesh.edges
     size = (len(mesh.vertices),) * 2
     matrix = csr_array((1.0 / edges.valence[edges.rows], edges.indices, edges.indptr), size)
@@ -163,7 +163,7 @@ def _into_box(mesh: Mesh, other: Mesh) -> Mesh:
 
 
 def _even(mesh: Mesh, length: float) -> Mesh:
-    """Remeshed so that edges have a length."""
+    """The mesh with equilateral faces, nearly, whose edges are about as long as `length`."""
     area = float(mesh.face_areas.sum(dtype=np.float64))
     return remesh(mesh, max(12, round(2.0 * area / (math.sqrt(3.0) * length**2))))
 

@@ -62,12 +62,14 @@ class BaseShape:
 def find_base(
     capture: Capture, config: NerfConfig, base_mesh: Mesh | None = None, quiet: bool = True
 ) -> BaseShape:
-    """Trains a coarse field on a capture and takes the base shape from it; kept in the user's cache folder.
+    """Trains a coarse field on a capture, and takes base shape, scan and thickness of the shell from it.
+
+    The result is kept in the user's cache folder.
 
     Args:
         capture: the views to learn from.
         config: settings.
-        base_mesh: a base shape of the user's in the capture's world, or None.
+        base_mesh: a base shape of the user's in the scene cube; None takes it from the coarse field.
         quiet: show no progress.
 
     Raises:
@@ -98,7 +100,8 @@ def find_base(
 
 
 def coarse_config(config: NerfConfig) -> RadianceConfig:
-    """Settings of the coarse field; of a fit's own there are only those in it that change this field."""
+    """Settings of the coarse field. Of a fit's settings they depend on seed, `lr` and `base_steps` alone, so
+    that a fit with others finds its base shape in the cache."""
     steps = config.base_steps
     return replace(COARSE, seed=config.seed, lr=config.lr, steps=steps, lr_steps=steps)
 
@@ -121,6 +124,7 @@ def _remove_abandoned(folder: Path) -> None:
 
 
 def _shape_of(task: PlainTask, config: NerfConfig) -> Mesh:
+    """The base shape of a trained coarse field."""
     occupied = task.occupancy.occupied.astype(bool)
     density = sample_grid(task.field(task.mean).density_at, occupied, GRID)
     return base_shape(density, concavity=config.concavity)
@@ -149,7 +153,7 @@ def scan_surface(task: PlainTask) -> np.ndarray:
 
 
 def _farthest(points: np.ndarray, count: int) -> np.ndarray:
-    """Indices of `count` points, each as far as can be from those before it."""
+    """Indices of `count` points, the first and then always the one farthest from those before it."""
     index = [0]
     distance = np.linalg.norm(points - points[0], axis=1)
     for _ in range(min(count, len(points)) - 1):

@@ -12,14 +12,14 @@ from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.visual_hull import View, visual_hull
 from mitex.runtime.jit import mi
 
-WARMUP = 16  # refreshes of all cells, before it is half of them
-DECAY = 0.95
+WARMUP = 16  # refreshes of all cells; later ones are of half of them
+DECAY = 0.95  # of the running maximum, for each refresh
 OPAQUE = 128  # alpha of the object in a mask
 CEILING = 10.0  # of the threshold [1 / scene units]
 
 
 def hull_cells(capture: Capture, side: int) -> np.ndarray:
-    """(side, side, side) bool, cells of the scene cube that the masks leave, and their neighbours."""
+    """(side, side, side) bool, cells of the scene cube that the masks leave, and two layers around them."""
     lenses = zip(capture.images, capture.poses, capture.intrinsics, capture.distortion, strict=True)
     hull = visual_hull([View(image[..., 3] >= OPAQUE, *camera) for image, *camera in lenses])
     if hull is None:
@@ -124,6 +124,7 @@ class Occupancy:
         return self.values.mean().item()
 
     def state(self) -> dict[str, torch.Tensor]:
+        """What a resumed run needs."""
         return {"occupancy": self.values, "refreshes": torch.tensor(self.refreshes)}
 
     def load_state(self, state: dict[str, torch.Tensor]) -> None:

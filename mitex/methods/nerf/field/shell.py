@@ -169,7 +169,7 @@ class Shell:
         return {**self.latents.parameters, **weights, "light": self.light}
 
     def parameters_changed(self) -> None:
-        """Takes over new values; cells that were empty stay so.
+        """Takes over new values of the parameters; cells of the mask that were empty stay empty.
 
         Raises:
             RuntimeError: a parameter has another shape than before.
@@ -197,7 +197,7 @@ class Shell:
         return result
 
     def evaluate(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, mi.Float, mi.Color3f]:
-        """Where in the shell, which of N points are; their density and colour.
+        """Density and colour of those of N points that are in the shell.
 
         Args:
             points, view: `mi.Point3f` and the unit directions of the rays, `mi.Vector3f`.

@@ -1,8 +1,8 @@
 """Which patch continues a texture: candidates by their strips, and a random choice among the nearest.
 
 A square is compared by its overlap strips, in which blocks of texels along the strip are summed. That leaves
-24,576 numbers a strip of 16 channels; a search tree has no use in so many dimensions, so all distances are
-found, by one matrix product. Mirrored patches need no strips of their own: the place is mirrored instead.
+24,576 numbers for a strip of 16 channels. In so many dimensions no search tree helps, so all distances are
+computed, by one matrix product. Mirrored patches need no strips of their own: the place is mirrored instead.
 """
 
 from __future__ import annotations

@@ -24,9 +24,9 @@ from mitex.runtime.jit import dr, mi
 from mitex.textures.march import Samples, sum_rays, weights_of
 from mitex.training import checkpoint, train
 
-LEVELS, COARSEST, FINEST = 16, 16, 2048
-CODE = 15
-DENSITY, COLOUR = (2 * LEVELS, 64, CODE + 1), (CODE + 16, 64, 64, 3)
+LEVELS, COARSEST, FINEST = 16, 16, 2048  # of the hash grid
+CODE = 15  # channels that the density network hands to that of the colour
+DENSITY, COLOUR = (2 * LEVELS, 64, CODE + 1), (CODE + 16, 64, 64, 3)  # widths of the networks' layers
 
 
 class PlainField:
@@ -35,9 +35,9 @@ class PlainField:
     Args:
         grid: of features.
         table: its values, flat.
-        weights: matrices of the networks.
+        weights: matrices (out, in) of the density network and of that of the colour.
         mask, step: as `RadianceField` has them.
-        packed: evaluate as cooperative vectors, fast forwards.
+        packed: evaluate as cooperative vectors, which is faster but has no derivatives.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class PlainField:
         return PlainField(grid, table.array, weights, mask, step, packed=True)
 
     def density(self, points: mi.Point3f) -> tuple[mi.Float, list[mi.Float]]:
-        """Density [1 / scene units] of `mi.Point3f`, and a code for the colour."""
+        """Density [1 / scene units] of points in the scene cube, and a code for the colour (15 arrays)."""
         exponent, *code = network_rows(self._nets[0], self.grid(points, self.table))
         return dr.exp(dr.minimum(exponent, HIGHEST)), code
 
@@ -73,7 +73,7 @@ class PlainField:
         return np.array(self.density(channels(mi.Point3f, points))[0])
 
     def colour(self, code: Sequence[mi.Float], view: mi.Vector3f) -> mi.Color3f:
-        """`mi.Color3f` in display values, seen in the unit directions `view`."""
+        """Display values in [0, 1] for codes, seen along rays in the unit directions `view`."""
         rows = network_rows(self._nets[1], [*code, *dr.sh_eval(view, 3)])
         return mi.Color3f(*(sigmoid(row) for row in rows))
 
@@ -84,12 +84,12 @@ class PlainField:
 
 
 def hash_grid(config: RadianceConfig) -> HashGrid:
-    """Of the features, as published but for the size of its tables."""
+    """The grid of the features, as published but for the size of its tables."""
     return HashGrid(LEVELS, COARSEST, FINEST, config.table)
 
 
 def parameter_shapes(grid: HashGrid) -> dict[str, tuple[int, ...]]:
-    """Of what is learned: the grid's table, and the matrices of both networks."""
+    """Shapes of what is learned, by name: the grid's table, and the matrices of both networks."""
     layers = [(o, i) for w in (DENSITY, COLOUR) for i, o in zip(w[:-1], w[1:], strict=True)]
     return {"table": (grid.size,)} | {f"weights/{k}": shape for k, shape in enumerate(layers)}
 

@@ -61,7 +61,7 @@ class RadianceTask(ABC, Generic[Config]):
 
     @abstractmethod
     def metadata(self) -> dict[str, str]:
-        """What checkpoints tell."""
+        """What a checkpoint tells of the run that it belongs to."""
 
     def with_cameras(self, batch: Batch) -> Batch:
         """The batch with rays of the refined cameras."""
@@ -77,14 +77,14 @@ class RadianceTask(ABC, Generic[Config]):
 
     @abstractmethod
     def density(self, points: np.ndarray) -> np.ndarray:
-        """Density (N,) of points (N, 3) with the parameters of now."""
+        """Density (N,) [1 / scene units] of points (N, 3) of the scene cube, with the current parameters."""
 
     @property
     def parameters(self) -> Sequence[torch.Tensor]:
         return list(self.named.values())
 
     def begin(self, step: int, generator: torch.Generator) -> Change | None:
-        """Now and then a refresh of the occupancy."""
+        """Refreshes the occupancy, every `REFRESH` steps."""
         if step % REFRESH:
             return None
         undo = partial(self.occupancy.load_state, self.occupancy.state())
@@ -118,7 +118,7 @@ class RadianceTask(ABC, Generic[Config]):
         return Step(total, metrics, self._average)
 
     def _average(self) -> None:
-        """Every `REFRESH` updates the mean parameters move towards those of now."""
+        """Every `REFRESH` updates the mean parameters move towards the current ones."""
         self._commits += 1
         if self._commits % REFRESH:
             return
