@@ -82,8 +82,10 @@ def given_base(mesh: Mesh, edge: float = EDGE) -> Mesh:
         edge: length of the edges [diagonals of the bounding box].
 
     Raises:
-        MeshError: it is not in the scene cube.
+        MeshError: it has no faces, or is not in the scene cube.
     """
+    if not len(mesh.faces):
+        raise MeshError(f"{mesh.name} has no faces", "give a surface as the base mesh")
     if np.abs(mesh.vertices).max(initial=0.0) > CUBE:
         problem = f"{mesh.name} reaches out of the scene cube [-1, 1]^3"
         raise MeshError(problem, "scale and move it to where the cameras see the object")

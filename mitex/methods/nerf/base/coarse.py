@@ -85,9 +85,11 @@ def find_base(
     place = folder / content_key(VERSION, *arrays, *mesh, coarse, *settings)
 
     def compute() -> BaseShape:
+        base = None if base_mesh is None else given_base(base_mesh)  # which may be refused
         task = _trained(coarse, capture, training, quiet)
-        _say("cutting the base shape out of the coarse field, about a minute", quiet)
-        base = _shape_of(task, config) if base_mesh is None else given_base(base_mesh)
+        if base is None:
+            _say("cutting the base shape out of the coarse field, about a minute", quiet)
+            base = _shape_of(task, config)
         scan = scan_surface(task)
         projection = Projection(base, neighbours=config.neighbours, repulsion=config.repulsion)
         return BaseShape(base, scan, shell_thickness(scan, projection))
