@@ -8,20 +8,19 @@ import numpy as np
 import torch
 from scipy import ndimage
 
-from mitex.methods.nerf.capture.capture import Capture
+from mitex.methods.nerf.capture.capture import Capture, object_mask
 from mitex.methods.nerf.capture.visual_hull import View, visual_hull
 from mitex.runtime.jit import mi
 
 WARMUP = 16  # refreshes of all cells; later ones are of half of them
 DECAY = 0.95  # of the running maximum, for each refresh
-OPAQUE = 128  # alpha of the object in a mask
 CEILING = 10.0  # of the threshold [1 / scene units]
 
 
 def hull_cells(capture: Capture, side: int) -> np.ndarray:
     """(side, side, side) bool, cells of the scene cube that the masks leave, and two layers around them."""
     lenses = zip(capture.images, capture.poses, capture.intrinsics, capture.distortion, strict=True)
-    hull = visual_hull([View(image[..., 3] >= OPAQUE, *camera) for image, *camera in lenses])
+    hull = visual_hull([View(object_mask(image), *camera) for image, *camera in lenses])
     if hull is None:
         return np.ones((side,) * 3, bool)
     centres = (np.arange(side) + 0.5) * (2 / side) - 1
