@@ -107,16 +107,16 @@ class Matcher:
         self.flips, self.centres = tuple(flips), np.asarray(source.centres, np.float64)
         self.apart = APART * source.length
         self.shape = _checked_shape(source)
-        needed = {_source_side(side, flip) for side in sides for flip in self.flips}
+        names = {_source_side(name, flip) for name in sides for flip in self.flips}
         side = self.shape[0]
         length = side // BLOCK * overlap(side) * source.matched
-        self._strips = {side: np.empty((count, length), np.float32) for side in needed}
+        self._strips = {name: np.empty((count, length), np.float32) for name in names}
         for index in range(count):
             square = source.patch(index)[..., : source.matched]
             for name, rows in self._strips.items():
                 rows[index] = _block_sums(strip(square, name), name)
         # |a - b|^2 = |a|^2 - 2 a b + |b|^2 loses the fewest digits around the mean.
-        self._means = {side: rows.mean(0) for side, rows in self._strips.items()}
+        self._means = {name: rows.mean(0) for name, rows in self._strips.items()}
         self._squares = {name: _centre(rows, self._means[name]) for name, rows in self._strips.items()}
 
     def distances(self, strips: Mapping[str, np.ndarray]) -> np.ndarray:
