@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -70,7 +71,9 @@ def still(
     return renderer.render(azimuth, renderer.fit_view(azimuth, elevation), spp, seed)
 
 
-def render_still(asset: Asset, path: str | os.PathLike[str], *, exposure: float = 0.0, **options) -> Path:
+def render_still(
+    asset: Asset, path: str | os.PathLike[str], *, exposure: float = 0.0, **options: Any
+) -> Path:
     """Renders `still` and writes it: .png and .jpg in sRGB after `tone`, .exr linear (R, G, B, float16).
 
     Returns:

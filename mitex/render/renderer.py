@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -197,7 +197,7 @@ def _surface(
     return (mesh.vertices.astype(np.float64), mesh.normals.astype(np.float64), detail.astype(np.float64))
 
 
-def _bsdf(asset: Asset, ao: bool) -> dict[str, Any]:
+def _bsdf(asset: Asset, ao: bool) -> dict[str, object]:
     """The material, from textures if the asset has them, else from vertex maps."""
     from mitex.runtime.jit import mi
 
@@ -205,7 +205,7 @@ def _bsdf(asset: Asset, ao: bool) -> dict[str, Any]:
     if asset.texture_maps is not None:
         maps, kind = asset.texture_maps, "texel_field"
 
-    def texture(values: np.ndarray) -> dict[str, Any]:
+    def texture(values: np.ndarray) -> dict[str, object]:
         return {"type": kind, "data": mi.TensorXf(np.ascontiguousarray(values, np.float32)), "raw": True}
 
     albedo, roughness = _material(maps, ao)
@@ -257,7 +257,7 @@ def paper_sweep(floor: float) -> mi.Mesh:
     return shape("backdrop", backdrop(floor), {"type": "twosided", "bsdf": paper})
 
 
-def shape(name: str, mesh: Mesh, bsdf: dict[str, Any], normals: bool = False) -> mi.Mesh:
+def shape(name: str, mesh: Mesh, bsdf: dict[str, object], normals: bool = False) -> mi.Mesh:
     """A Mitsuba mesh, with UVs if the mesh has a vertex for each."""
     from mitex.runtime.jit import mi
 
@@ -277,7 +277,7 @@ def shape(name: str, mesh: Mesh, bsdf: dict[str, Any], normals: bool = False) ->
     return shape
 
 
-def sensor(resolution: int) -> dict[str, Any]:
+def sensor(resolution: int) -> dict[str, object]:
     """A scene's entry for the camera of all pictures: square, with a portrait lens."""
     from mitex.runtime.jit import mi
 
