@@ -17,7 +17,7 @@ def for_variant(name: str, base: type[B], methods: type) -> Callable[..., B]:
 
     Every variant has its own base classes, and they allow neither a second base nor another metaclass, so the
     members are copied, inherited ones too. They call the base's constructor through `init_base`, not through
-    `super()`.
+    `super()`. What the class is called with are the arguments of the constructor in `methods`.
     """
     members: dict[str, Any] = {}
     for cls in reversed(methods.__mro__[:-1]):  # without `object`

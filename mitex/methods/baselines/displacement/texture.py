@@ -35,8 +35,8 @@ class DisplacementMap:
     """Heights of a square piece of a surface.
 
     Attributes:
-        heights: (N, N) float64, mean 0 [parts of the root of the reference's area].
-        side: of the square [parts of the root of the reference's area].
+        heights: (N, N) float64, mean 0; rows go along v, columns along u [roots of the reference's area].
+        side: of the square [roots of the reference's area].
         about: how it was made.
     """
 
@@ -54,7 +54,7 @@ class DisplacementMap:
             window: side of the square that is taken off [of the reference's extent].
 
         Raises:
-            ConfigError: nothing of it lies in a part of the window.
+            ConfigError: the reference does not fill the window.
         """
         low, high = reference.vertices.min(0), reference.vertices.max(0)
         extent, centre = float((high - low).max()), 0.5 * (low + high)
@@ -133,7 +133,7 @@ class DisplacementMap:
 
 
 def _depth(mesh: Mesh, start: np.ndarray) -> np.ndarray:
-    """(N,) how far along -z the mesh is first met; infinite where it is not."""
+    """(N,) float64 how far along -z from points (N, 3) the mesh is first met; infinite where it is not."""
     init()
     scene = mi.load_dict({"type": "scene", "mesh": mesh_shape(mesh)})
     rays = mi.Ray3f(mi.Point3f(np.ascontiguousarray(start.T, np.float32)), mi.Vector3f(0, 0, -1))
