@@ -8,7 +8,7 @@ import numpy as np
 import xatlas
 from scipy.ndimage import distance_transform_edt
 
-from mitex.errors import ConfigError
+from mitex.errors import ConfigError, MeshError
 from mitex.geometry.normal_maps import FLAT, encode
 from mitex.geometry.raster import covered_texels, rasterize
 from mitex.geometry.tangents import split_at_seams
@@ -226,7 +226,12 @@ def laid_out(mesh: Mesh, resolution: int, padding: int = 8) -> Mesh:
     """The mesh with UVs for a map of `resolution` [texels]: its own if they are usable, else new ones.
 
     Subdivision keeps UVs, and laying out the coarse mesh takes a tenth of the time.
+
+    Raises:
+        MeshError: the mesh has no area.
     """
+    if not mesh.face_areas.sum() > 0.0:
+        raise MeshError(f"{mesh.name} has no area to put a texture on", "give a surface")
     if mesh.uv is not None and usable_uv(mesh, mesh.uv):
         return mesh
     return replace(mesh, uv=unwrap(mesh, resolution, padding))

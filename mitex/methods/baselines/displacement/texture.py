@@ -112,6 +112,7 @@ class DisplacementMap:
             The displaced mesh in light grey; where charts meet, heights are averaged and the pattern breaks.
 
         Raises:
+            MeshError: the mesh has no area.
             ConfigError: a number is out of range.
         """
         if not 0.05 <= scale <= 20 or not 0 <= levels <= 6:
