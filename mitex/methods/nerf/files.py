@@ -21,7 +21,7 @@ from mitex.methods.nerf.field.occupancy import packed_cells, unpacked_cells
 from mitex.runtime import init
 from mitex.training import model_file
 
-SETTINGS = (
+SETTINGS = (  # that the model depends on
     "table",
     "coarsest",
     "finest",

@@ -74,7 +74,7 @@ def fit(
 
 
 def _model(base: BaseShape, frames: np.ndarray, task: TextureTask, about: dict[str, Any]) -> files.Model:
-    """What a training leaves: the running mean of its parameters."""
+    """The model of a training: base shape, running mean of the parameters, and occupied cells."""
     mean = task.mean
     return files.Model(
         base,

@@ -23,14 +23,15 @@ from mitex.methods.nerf.field.tensors import channels
 from mitex.methods.nerf.synthesis.guide import WEIGHT, Guide
 from mitex.methods.nerf.synthesis.maps import LatentMaps
 from mitex.methods.nerf.synthesis.patch_images import render_patches
-from mitex.methods.nerf.synthesis.patches import SIZE as PATCH
 from mitex.methods.nerf.synthesis.patches import (
+    PATTERN_RATE,
     FeatureSource,
     Patches,
     extract_patches,
     mirror_frames,
     texel_gap,
 )
+from mitex.methods.nerf.synthesis.patches import SIZE as PATCH
 from mitex.methods.nerf.synthesis.quilting import Quilt, quilt
 from mitex.methods.nerf.use.applied import AppliedTexture, check_ranges
 from mitex.methods.nerf.use.placement import EXTENT, UNWRAP_SIZE, in_scene_cube, uv_unit_length
@@ -38,11 +39,10 @@ from mitex.methods.nerf.use.self_maps import self_maps
 from mitex.runtime import init
 from mitex.runtime.jit import mi
 
-SIZE = 2048  # texels of a synthesized texture
-LARGEST = 8192  # that is quilted for a guide [texels]
-GOOD_RATE = 1 / 8  # gap between texels, of the mean edge of the base shape
+SIZE = 2048  # side of a synthesized texture [texels]
+LARGEST = 8192  # side of a texture under a guide, at most [texels]
 BLOCK = PATCH // 16  # a guide is compared with patches in 16 x 16 blocks
-DEEPEST = 2.0  # percentile of the scan's distances
+DEEPEST = 2.0  # percentile of the scan's distances that counts as the ground
 
 
 class NerfTexture:
@@ -130,7 +130,7 @@ class NerfTexture:
         seed: int = 0,
         *,
         patches: int = 2000,
-        pattern_rate: float = GOOD_RATE,
+        pattern_rate: float = PATTERN_RATE,
         flips: bool = False,
         tileable: bool = False,
         guide: np.ndarray | None = None,
@@ -164,7 +164,7 @@ class NerfTexture:
         layout = quilt(source, shape, rng, flips=flips, tileable=tileable, guide=target, evenness=evenness)
         return self.maps(squares, layout)
 
-    def covering(self, mesh: Mesh, scale: float = 1.0, pattern_rate: float = GOOD_RATE) -> int:
+    def covering(self, mesh: Mesh, scale: float = 1.0, pattern_rate: float = PATTERN_RATE) -> int:
         """Side of the texture that the unit square of a mesh's UVs shows once, as a guide asks for [texels].
 
         Args:
@@ -186,7 +186,7 @@ class NerfTexture:
         return texels
 
     def patches(
-        self, rng: np.random.Generator, count: int = 2000, pattern_rate: float = GOOD_RATE
+        self, rng: np.random.Generator, count: int = 2000, pattern_rate: float = PATTERN_RATE
     ) -> Patches:
         """Squares of the base shape (section 3.2.1); arguments as of `synthesize`."""
         base = self.model.base

@@ -26,7 +26,7 @@ SMALL = 0.2  # of the largest component's faces: smaller components are dropped
 FACES = 5_000  # of the mesh that is cut into convex pieces
 CELLS = 2.0  # edges of the base shape that make a cell of the grid on which the pieces are united
 FINE = 2.0  # edges may be so many times longer than asked for, or a given base mesh is remeshed
-PERCENTILE = 70.0
+PERCENTILE = 70.0  # of the scan's distances, see `shell_thickness`
 CUBE = 1.001  # the scene cube with a little room for rounding
 
 
