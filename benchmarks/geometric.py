@@ -36,17 +36,17 @@ def step_seconds(task: GeometricTask, level: int) -> float:
     generator = torch.Generator().manual_seed(0)
     first = level * task.config.level_steps
 
-    def turn(start: int) -> None:
-        for step in range(start, start + TURN):
+    def turn(first_step: int) -> None:
+        for step in range(first_step, first_step + TURN):
             task.begin(step, generator)
             torch.autograd.grad(task.loss(step, generator).value, task.generators[level].parameters)
 
     turn(first)
-    begun, turns = time.perf_counter(), 0
-    while not turns or time.perf_counter() - begun < ENOUGH:
+    start, turns = time.perf_counter(), 0
+    while not turns or time.perf_counter() - start < ENOUGH:
         turns += 1
         turn(first + TURN)
-    return (time.perf_counter() - begun) / (turns * TURN)
+    return (time.perf_counter() - start) / (turns * TURN)
 
 
 def toy(levels: int) -> GeometricTask:
@@ -54,9 +54,9 @@ def toy(levels: int) -> GeometricTask:
     config = GeometricConfig(steps=levels * 2_000, level_steps=2_000)
     ball = icosphere(1)
     hierarchy = Hierarchy.of(ball, levels)
-    drawn = torch.Generator().manual_seed(0)
+    generator = torch.Generator().manual_seed(0)
     meshes = [
-        torch.from_numpy(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=drawn)
+        torch.from_numpy(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=generator)
         for k, mesh in enumerate(hierarchy.meshes)
     ]
     return GeometricTask(config, hierarchy, torch.from_numpy(ball.vertices), meshes, ball)
@@ -88,11 +88,11 @@ def main() -> None:
     texture = GeometricTexture(
         task.generators[:levels], icosphere(1), task.fixed, {"noise": 0.1, "remeasure": False}
     )
-    begun = time.perf_counter()
+    start = time.perf_counter()
     grown = texture.apply(replace(mesh, name="ball"), end_level=min(4, levels - 1)).mesh
     console.print(
         f"applied to {len(mesh.faces):,} faces, {len(grown.faces):,} at the end: "
-        f"{time.perf_counter() - begun:.1f} s"
+        f"{time.perf_counter() - start:.1f} s"
     )
 
 

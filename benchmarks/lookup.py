@@ -66,10 +66,10 @@ def view_by_view(stage: Stage, cameras: Cameras, field: torch.Tensor) -> torch.T
 def compare(stage: Stage, cameras: Cameras, channels: int) -> list[tuple[str, float, float]]:
     """(way, milliseconds, times faster than the naive one of its group) of forward plus backward."""
     field = torch.rand(len(stage.mesh.vertices), channels)
-    seen, sensor = stage.visibility(cameras), batch_sensor(cameras)
+    visibility, sensor = stage.visibility(cameras), batch_sensor(cameras)
     lookups: dict[str, Callable[[torch.Tensor], torch.Tensor]] = {
-        "lookup: torch gather + autograd": lambda f: gather(f, seen),
-        "lookup: bridge.lookup": lambda f: lookup(f, seen),
+        "lookup: torch gather + autograd": lambda f: gather(f, visibility),
+        "lookup: bridge.lookup": lambda f: lookup(f, visibility),
     }
     wholes: dict[str, Callable[[torch.Tensor], torch.Tensor]] = {
         "whole: view by view, torch gather": lambda f: view_by_view(stage, cameras, f),

@@ -34,7 +34,7 @@ from mitex.runtime.precision import bfloat16_flags
 from mitex.training.optim import Adam, gradient_norms, normalise_gradients
 
 STEPS = 20
-SHOWN = slice(0, 3)  # channels of the albedo
+ALBEDO = slice(0, 3)  # channels of the albedo
 
 
 @dataclass
@@ -71,12 +71,12 @@ class Bench:
         self.task._touched.fill_(True)
         self.state = self.task.pool[:1].clone()
         self.visibility = self.task.stage.visibility(self.task.cameras(generator))
-        self.field = self.state[0, :, SHOWN].contiguous() + OFFSET
+        self.field = self.state[0, :, ALBEDO].contiguous() + OFFSET
         self.images = bridge.lookup(self.field, self.visibility).contiguous()
         self.places, self.targets = self._targets(generator)
         with torch.no_grad():
             self.vectors = self.network.samples(self.images, self.places)
-        self.pulls = {k: torch.randn(v.shape, generator=generator) for k, v in self.vectors.items()}
+        self.upstream = {k: torch.randn(v.shape, generator=generator) for k, v in self.vectors.items()}
         self.plain, self.passing = naive.vgg_weights(), naive.MessagePassing.of(self.task.mesh)
 
     def _targets(self, generator: torch.Generator) -> tuple[dict[str, torch.Tensor], dict[str, torch.Tensor]]:
@@ -105,7 +105,7 @@ class Bench:
     def vgg(self) -> None:
         images = self.images.clone().requires_grad_()
         samples = self.network.samples(images, self.places)
-        torch.autograd.grad(list(samples.values()), images, [self.pulls[k] for k in samples])
+        torch.autograd.grad(list(samples.values()), images, [self.upstream[k] for k in samples])
 
     def losses(self) -> None:
         low = self.network.dtype == torch.bfloat16
@@ -144,7 +144,7 @@ class Bench:
     def naive_vgg(self) -> None:
         images = self.images.clone().requires_grad_()
         samples = naive.vectors(naive.vgg(images, self.plain), self.places)
-        torch.autograd.grad(list(samples.values()), images, [self.pulls[k] for k in samples])
+        torch.autograd.grad(list(samples.values()), images, [self.upstream[k] for k in samples])
 
     def naive_losses(self) -> None:
         vectors = {k: v.clone().requires_grad_() for k, v in self.vectors.items()}
@@ -159,7 +159,7 @@ class Bench:
         generator = torch.Generator().manual_seed(3)
         state = self._naive_evolve(self.task.pool[:1].clone(), generator)
         visibility = self.task.stage.visibility(self.task.cameras(generator))
-        images = naive.lookup(state[0, :, SHOWN] + OFFSET, visibility)
+        images = naive.lookup(state[0, :, ALBEDO] + OFFSET, visibility)
         vectors = naive.vectors(naive.vgg(images, self.plain), self.places)
         loss = self._naive_loss(vectors, images.flatten(1, 2)[:, : self.config.samples])
         (loss + self.config.overflow_weight * overflow_loss(state)).backward()
@@ -186,16 +186,16 @@ class Bench:
         normalise_gradients(self.adam.parameters, gradient_norms(self.adam.parameters))
         self.adam.step(1e-9)  # so small that all repetitions compute the same
 
-    def checked(self) -> None:
+    def check(self) -> None:
         """Both ways compute the same: the gradients of the automaton, and those of the lookup."""
-        pull = torch.randn(self.state.shape, generator=torch.Generator().manual_seed(5))
+        upstream = torch.randn(self.state.shape, generator=torch.Generator().manual_seed(5))
         ours = self.model.evolve(self.state, self.task.perception, 3, torch.Generator().manual_seed(1))
         generator, theirs = torch.Generator().manual_seed(1), self.state
         for _ in range(3):
             mask = torch.rand(theirs.shape[:2], generator=generator) < FIRE_RATE
             theirs = self.passing.step(self.model, theirs, mask)
         for a, b in zip(
-            *(torch.autograd.grad(x, self.task.parameters, pull) for x in (ours, theirs)), strict=True
+            *(torch.autograd.grad(x, self.task.parameters, upstream) for x in (ours, theirs)), strict=True
         ):
             assert (a - b).norm() < 1e-3 * b.norm()
         assert torch.allclose(self.images, naive.lookup(self.field, self.visibility), atol=1e-5)
@@ -241,7 +241,7 @@ def measure(bench: Bench, apply_frequency: int) -> tuple[list[Row], float]:
     memory = peak_memory()
     applied = Row(f"apply, a step at {10 * apply_frequency**2 + 2:,} vertices", 0.0, goal="<= 3 ms")
     applied.mitex = apply_step(apply_frequency, bench.repetitions)
-    bench.checked()
+    bench.check()
     ways = (bench.naive_nca, bench.naive_vgg, bench.naive_losses, None, bench.naive_lookup, bench.naive_step)
     for row, way in zip(parts, ways, strict=True):
         row.naive = None if way is None else bench.time(way)

@@ -37,7 +37,7 @@ from mitex.runtime.jit import dr, mi
 
 init()
 
-TURNS, TURN = 6, 0.6  # of each that is timed, and their length [s]
+TURNS, TURN = 6, 0.6  # of each that is measure, and their length [s]
 TABLE = 17
 
 
@@ -51,110 +51,114 @@ def rates_of(points: int, works: Sequence[Callable[[], object]]) -> list[float]:
         work()
     for _ in range(TURNS):
         for work, own in zip(works, times, strict=True):
-            begun = time.perf_counter()
-            while (started := time.perf_counter()) < begun + TURN:
+            start = time.perf_counter()
+            while (now := time.perf_counter()) < start + TURN:
                 work()
-                own.append(time.perf_counter() - started)
+                own.append(time.perf_counter() - now)
     return [points / statistics.median(own) for own in times]
 
 
 def parameters(config: NerfConfig, encoding: Encoding) -> list[torch.Tensor]:
     """Tables and weights, attached."""
-    drawn = torch.Generator().manual_seed(0)
-    tables = [torch.empty(size).uniform_(-0.1, 0.1, generator=drawn) for size in encoding.sizes]
+    generator = torch.Generator().manual_seed(0)
+    tables = [torch.empty(size).uniform_(-0.1, 0.1, generator=generator) for size in encoding.sizes]
     weights = [
-        torch.empty(shape).uniform_(-weight_bound(shape), weight_bound(shape), generator=drawn)
+        torch.empty(shape).uniform_(-weight_bound(shape), weight_bound(shape), generator=generator)
         for shape in weight_shapes(config)
     ]
     return [value.requires_grad_() for value in tables + weights]
 
 
 def ours(
-    encoding: Encoding, points: torch.Tensor, distance: torch.Tensor, given: list[torch.Tensor], packed: bool
+    encoding: Encoding,
+    points: torch.Tensor,
+    distance: torch.Tensor,
+    tensors: list[torch.Tensor],
+    packed: bool,
 ):
     """All outputs of the field, (N, 9), by Dr.Jit."""
 
     def run(points, distance, f, phase, *weights):
         foot = dr.unravel(mi.Point3f, points.array)
         features, phases = (encoding(k, foot, table.array) for k, table in enumerate((f, phase)))
-        found = Decoder(weights, packed, bfloat16_is_fast())(features, phases, distance.array)
-        return tensor(mi.ArrayXf(*torch_field.outputs(found)))
+        reflection = Decoder(weights, packed, bfloat16_is_fast())(features, phases, distance.array)
+        return tensor(mi.ArrayXf(*torch_field.outputs(reflection)))
 
-    return call(run, points, distance, *given)
+    return call(run, points, distance, *tensors)
 
 
 def theirs(
-    encoding: Encoding, points: torch.Tensor, distance: torch.Tensor, given: list[torch.Tensor]
+    encoding: Encoding, points: torch.Tensor, distance: torch.Tensor, tensors: list[torch.Tensor]
 ) -> torch.Tensor:
     """The same by torch."""
-    features, phases = (torch_field.encoded(encoding, k, points, given[k]) for k in range(2))
-    return torch_field.decoded(features, phases, distance, given[2:])
+    features, phases = (torch_field.encoded(encoding, k, points, tensors[k]) for k in range(2))
+    return torch_field.decoded(features, phases, distance, tensors[2:])
 
 
-def trained(result: torch.Tensor, given: list[torch.Tensor]) -> None:
+def backward(result: torch.Tensor, tensors: list[torch.Tensor]) -> None:
     """Backwards to tables and weights."""
-    torch.autograd.grad(result.sum(), given)
+    torch.autograd.grad(result.sum(), tensors)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="fewer points")
     parser.add_argument("--run", metavar="RUN", help="a captured texture")
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     keep_freed_memory()  # these two as in a fit
     lower_worker_priority()
-    Console(width=100).print(rates(1 << (14 if given.quick else 16)))
-    if given.run:
-        Console(width=100).print(uses(NerfTexture.load(given.run)))
+    Console(width=100).print(rates(1 << (14 if arguments.quick else 16)))
+    if arguments.run:
+        Console(width=100).print(uses(NerfTexture.load(arguments.run)))
 
 
 def uses(texture: NerfTexture) -> Table:
     """Seconds for 1024 x 1024 texels, and for pictures of 512 x 512 rays with them on a mesh."""
     table = Table("seconds", "", title=f"{texture}")
-    maps = timed(table, "1024 x 1024 texels quilted", lambda: texture.synthesize(1024, tileable=True))
-    applied = timed(table, "put on the vase", lambda: texture.apply(embedded("vase"), maps))
+    maps = measure(table, "1024 x 1024 texels quilted", lambda: texture.synthesize(1024, tileable=True))
+    applied = measure(table, "put on the vase", lambda: texture.apply(embedded("vase"), maps))
 
     def frame():
         return shell_still(applied, applied.similarity, applied.outline, resolution=512, spp=1)
 
-    timed(table, "first path-traced frame, with its kernels", frame)
-    timed(table, "another one", frame)
+    measure(table, "first path-traced frame, with its kernels", frame)
+    measure(table, "another one", frame)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     table.add_row(f"{peak:.1f}", "GiB of memory at most")
     return table
 
 
-def timed(table: Table, what: str, work: Callable[[], Any]) -> Any:
+def measure(table: Table, what: str, work: Callable[[], Any]) -> Any:
     """The result of `work`; a row tells how long it took."""
-    begun = time.perf_counter()
+    start = time.perf_counter()
     result = work()
-    table.add_row(f"{time.perf_counter() - begun:.1f}", what)
+    table.add_row(f"{time.perf_counter() - start:.1f}", what)
     return result
 
 
 def rates(count: int) -> Table:
     """Points per second."""
     dr.set_expand_threshold(2**26)
-    drawn = torch.Generator().manual_seed(1)
-    points = torch.empty(count, 3).uniform_(-0.9, 0.9, generator=drawn)
-    distance = torch.empty(count).uniform_(-0.1, 0.1, generator=drawn)
+    generator = torch.Generator().manual_seed(1)
+    points = torch.empty(count, 3).uniform_(-0.9, 0.9, generator=generator)
+    distance = torch.empty(count).uniform_(-0.1, 0.1, generator=generator)
     table = Table(title=f"{count:,} points, tables of 2^{TABLE} entries [million points a second]")
     for name in ("", "forwards", "packed", "and backwards"):
         table.add_column(name)
     for preset in ("fast", "paper"):
         config: NerfConfig = replace(PRESETS[preset], table=TABLE)
         encoding = Encoding(config)
-        given = parameters(config, encoding)
-        fixed = [value.detach() for value in given]
+        tensors = parameters(config, encoding)
+        fixed = [value.detach() for value in tensors]
         scene = encoding, points, distance
         forwards, backwards, *our_rates = rates_of(
             count,
             [
                 lambda s=scene, f=fixed: theirs(*s, f),
-                lambda s=scene, g=given: trained(theirs(*s, g), g),
+                lambda s=scene, g=tensors: backward(theirs(*s, g), g),
                 lambda s=scene, f=fixed: ours(*s, f, False),
                 lambda s=scene, f=fixed: ours(*s, f, True),
-                lambda s=scene, g=given: trained(ours(*s, g, False), g),
+                lambda s=scene, g=tensors: backward(ours(*s, g, False), g),
             ],
         )
         table.add_row(f"{preset}, torch", f"{forwards / 1e6:.2f}", "", f"{backwards / 1e6:.3f}")

@@ -29,7 +29,7 @@ from mitex.methods.surface.levels import Levels
 from mitex.methods.surface.network import ALL_LAYERS, SurfaceVgg
 from mitex.runtime import keep_freed_memory
 
-PREPARED = {(5_120, 256): 21, (5_120, 512): 42, (5_120, 1024): 104, (200_000, 1024): 150}  # the paper [s]
+PREPARATION = {(5_120, 256): 21, (5_120, 512): 42, (5_120, 1024): 104, (200_000, 1024): 150}  # the paper [s]
 STEP = {256: 0.46, 512: 1.5, 1024: 5.7}  # the paper [s]
 
 
@@ -53,7 +53,7 @@ class Result:
 def measure(mesh: Mesh, resolution: int, repetitions: int) -> Result:
     """Prepares a mesh and times the best of some steps."""
     config = replace(PRESETS["fast"], resolution=resolution, scales=0)
-    begun = time.perf_counter()
+    start = time.perf_counter()
     domain = SurfaceDomain.of(with_layout(mesh, config, keep_uvs=False), config)
     between = time.perf_counter()
     levels = domain.compute_levels()
@@ -67,7 +67,7 @@ def measure(mesh: Mesh, resolution: int, repetitions: int) -> Result:
         faces=len(mesh.faces),
         resolution=resolution,
         texels=len(levels.order),
-        layout=between - begun,
+        layout=between - start,
         prepared=prepared - between,
         step=step,
         operations=operations(levels),
@@ -77,11 +77,11 @@ def measure(mesh: Mesh, resolution: int, repetitions: int) -> Result:
 
 
 def _step(network: SurfaceVgg, values: torch.Tensor) -> float:
-    begun = time.perf_counter()
+    start = time.perf_counter()
     grams = network.gram_matrices(values, ALL_LAYERS)
     torch.stack([gram.square().mean() for gram in grams.values()]).sum().backward()
     values.grad = None
-    return time.perf_counter() - begun
+    return time.perf_counter() - start
 
 
 def operations(levels: Levels) -> float:
@@ -99,9 +99,9 @@ def product_rate() -> float:
     a = torch.rand(4096, 4096).bfloat16()
     times = []
     for _ in range(4):
-        begun = time.perf_counter()
+        start = time.perf_counter()
         torch.mm(a, a)
-        times.append(time.perf_counter() - begun)
+        times.append(time.perf_counter() - start)
     return 2 * 4096**3 / min(times)
 
 
@@ -116,7 +116,7 @@ def show(results: list[Result], console: Console) -> None:
         "faces", "side", "texels", "layout", "prepared", "paper", "step", "paper", "GF/s", "of products"
     )
     for r in results:
-        paper = PREPARED.get((r.faces, r.resolution), "")
+        paper = PREPARATION.get((r.faces, r.resolution), "")
         rate = r.operations / r.step
         share = f"{rate / 1e9:.0f}", f"{100 * rate / r.products:.0f} %"
         times = (

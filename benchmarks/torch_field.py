@@ -27,21 +27,28 @@ def decoded(
     for octave in range(12):
         angle = distance[:, None] * 2**octave
         waves += [torch.sin(angle), torch.cos(angle)]
-    fine, given = torch.cat(waves, 1), iter(weights)
-    density = _network(2, torch.cat([f, fine], 1), given)
-    reflection = _network(3, density[:, 1:], given)
-    theta = _network(3, torch.cat([f, fine[:, :COARSE]], 1), given)
-    phi = _network(3, torch.cat([phase, fine[:, :COARSE]], 1), given)
+    fine, matrices = torch.cat(waves, 1), iter(weights)
+    density = _network(2, torch.cat([f, fine], 1), matrices)
+    reflection = _network(3, density[:, 1:], matrices)
+    theta = _network(3, torch.cat([f, fine[:, :COARSE]], 1), matrices)
+    phi = _network(3, torch.cat([phase, fine[:, :COARSE]], 1), matrices)
     gloss = F.softplus(reflection[:, 4:5]) + 1
     facing = reflection[:, :4].sigmoid()
     grazing = (reflection[:, 5:] - DULL).sigmoid() if reflection.shape[1] > 5 else facing[:, 3:]
     return torch.cat([density[:, :1].exp(), facing, grazing, gloss, theta, phi], 1)
 
 
-def outputs(found: Reflection) -> list[Any]:
+def outputs(reflection: Reflection) -> list[Any]:
     """The same nine of the field's own networks."""
-    ends = found.specular, found.grazing
-    return [found.density, *found.diffuse, *ends, found.glossiness, found.theta, found.phi]
+    ends = reflection.specular, reflection.grazing
+    return [
+        reflection.density,
+        *reflection.diffuse,
+        *ends,
+        reflection.glossiness,
+        reflection.theta,
+        reflection.phi,
+    ]
 
 
 def encoded(encoding: Encoding, which: int, points: torch.Tensor, table: torch.Tensor) -> torch.Tensor:

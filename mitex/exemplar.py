@@ -144,7 +144,7 @@ def _find_maps(folder: Path) -> dict[str, Path]:
     except OSError as error:
         raise ImageError(f"{folder} cannot be read ({error.strerror})", "check its permissions") from error
     if not entries:
-        raise ImageError(f"{folder} is empty", _wanted())
+        raise ImageError(f"{folder} is empty", _remedy())
     files: dict[str, Path] = {}
     for path in entries:
         name = map_of(path)
@@ -161,7 +161,7 @@ def _find_maps(folder: Path) -> dict[str, Path]:
             raise ImageError(
                 f"{folder} holds {others[0]}, which Mitex does not read", "convert the maps to PNG"
             )
-        raise ImageError(f"{folder} holds no map that Mitex knows", _wanted())
+        raise ImageError(f"{folder} holds no map that Mitex knows", _remedy())
     return files
 
 
@@ -197,7 +197,7 @@ def _check_side(array: np.ndarray, path: Path) -> np.ndarray:
     return array
 
 
-def _wanted() -> str:
+def _remedy() -> str:
     return f"name the files {', '.join(f'{name}.png' for name in MAPS)} (any subset)"
 
 

@@ -91,9 +91,9 @@ def test_baked_normals_decode_to_those_of_the_source():
     asset = wavy().baked(128)
     assert asset.atlas is not None and asset.texture_maps is not None
     atlas = asset.atlas
-    seen = decode(asset.texture_maps["normal"], *atlas.shading_frames(asset.mesh))
+    normals = decode(asset.texture_maps["normal"], *atlas.shading_frames(asset.mesh))
     source = unit(atlas.interpolate(asset.detail_normals()[asset.mesh.faces]))
-    assert (seen * source).sum(axis=2)[atlas.inside].min() > 1 - 1e-5
+    assert (normals * source).sum(axis=2)[atlas.inside].min() > 1 - 1e-5
     np.testing.assert_array_equal(asset.texture_maps["normal"][atlas.face < 0][:1], [[0.5, 0.5, 1.0]])
 
 

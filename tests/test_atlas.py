@@ -61,9 +61,9 @@ def test_each_texel_shows_the_point_with_its_own_uv():
     mesh = icosphere(8)
     uv = unwrap(mesh, 128, 4)
     atlas = Atlas.from_uv(uv, 128, 4)
-    shown = atlas.interpolate(uv)
+    image = atlas.interpolate(uv)
     assert atlas.inside.sum() > 4000
-    np.testing.assert_allclose(shown[atlas.inside], texel_uv(128)[atlas.inside], atol=1e-5)
+    np.testing.assert_allclose(image[atlas.inside], texel_uv(128)[atlas.inside], atol=1e-5)
     np.testing.assert_allclose(atlas.barycentric[atlas.face >= 0].sum(axis=1), 1.0, atol=1e-5)
     assert atlas.barycentric[atlas.inside].min() > -1e-4
 
@@ -75,8 +75,8 @@ def test_linear_functions_are_looked_up_exactly_up_to_the_border():
     edge = np.linspace(0, 1, 41)
     border = np.concatenate([np.stack([edge, e + 0 * edge], axis=1) for e in (0.0, 1.0)])
     points = np.concatenate([border, border[:, ::-1]])
-    found = lookup(image, 0.2 + 0.6 * points)
-    np.testing.assert_allclose(found[:, :2], points, atol=1e-4)
+    values = lookup(image, 0.2 + 0.6 * points)
+    np.testing.assert_allclose(values[:, :2], points, atol=1e-4)
 
 
 def test_row_0_is_the_top():
@@ -94,11 +94,11 @@ def test_no_seam_shows_under_bilinear_lookup():
     corners, flat = mesh.faces.ravel(), uv.reshape(-1, 2)
     seam = np.array([len(np.unique(flat[corners == v], axis=0)) > 1 for v in range(len(mesh.vertices))])
     assert seam.sum() > 50
-    chosen = np.flatnonzero(seam[corners])
-    found = lookup(image, flat[chosen])
+    on_seam = np.flatnonzero(seam[corners])
+    values = lookup(image, flat[on_seam])
     texel = np.sqrt(4 * np.pi / atlas.inside.sum())  # [mesh units]
     # Every side of a seam finds the vertex where it is.
-    assert np.abs(found - mesh.vertices[corners[chosen]]).max() < 0.25 * texel
+    assert np.abs(values - mesh.vertices[corners[on_seam]]).max() < 0.25 * texel
 
 
 def test_padding_reaches_as_far_as_asked():
@@ -212,10 +212,10 @@ def test_spreading_continues_the_used_texels():
     used = np.zeros((20, 20), bool)
     used[6:9, 5:12] = True
     image = np.where(used[..., None], rng.random((20, 20, 2)), 7.0)
-    found = spread(image, used, 3)
-    assert np.array_equal(found[used], image[used])
-    assert np.array_equal(found[4, 8], image[6, 8]) and np.array_equal(found[7, 2], image[7, 5])
-    assert np.allclose(found[19, 19], image[used].mean(0)) and np.allclose(found[7, 1], image[used].mean(0))
+    result = spread(image, used, 3)
+    assert np.array_equal(result[used], image[used])
+    assert np.array_equal(result[4, 8], image[6, 8]) and np.array_equal(result[7, 2], image[7, 5])
+    assert np.allclose(result[19, 19], image[used].mean(0)) and np.allclose(result[7, 1], image[used].mean(0))
 
 
 @pytest.mark.parametrize(

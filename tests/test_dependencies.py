@@ -80,8 +80,8 @@ def test_of_the_package():
 
 def test_of_the_tests():
     # Tests import the files of tools, and modules that they write, which are called mitex_....
-    needed = {name for name in imports(ROOT / "tests", ROOT / "tools") if not name.startswith("mitex_")}
-    assert faults(modules(EXTRAS["test"]), needed - imports(ROOT / "mitex")) == []
+    packages = {name for name in imports(ROOT / "tests", ROOT / "tools") if not name.startswith("mitex_")}
+    assert faults(modules(EXTRAS["test"]), packages - imports(ROOT / "mitex")) == []
 
 
 @pytest.mark.parametrize("folder", ["tools", "benchmarks", "scenes"])

@@ -18,11 +18,11 @@ def save(path: Path, value: int | tuple[int, ...] = 128, size=(32, 32), mode="RG
 
 
 def assert_refused(path, *words):
-    with pytest.raises(ImageError) as caught:
+    with pytest.raises(ImageError) as error:
         Exemplar.load(path)
     for word in words:
-        assert word in str(caught.value)
-    assert caught.value.remedy
+        assert word in str(error.value)
+    assert error.value.remedy
 
 
 class TestNames:

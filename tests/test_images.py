@@ -32,11 +32,11 @@ def png_claiming(width, height, depth=8, kind=2):
 
 
 def assert_refused(path, *words, **options):
-    with pytest.raises(ImageError) as caught:
+    with pytest.raises(ImageError) as error:
         read_image(path, **options)
-    message = str(caught.value)
+    message = str(error.value)
     assert "\n" not in message
-    assert "; " in message and caught.value.remedy
+    assert "; " in message and error.value.remedy
     for word in words:
         assert word in message
     return message
@@ -107,8 +107,8 @@ class TestBytes:
         for channels in (3, 4):
             data = pixels(channels=channels)
             Image.fromarray(data).save(tmp_path / "a.png")
-            found = read_bytes(tmp_path / "a.png")
-            assert found.dtype == np.uint8 and np.array_equal(found, data)
+            image = read_bytes(tmp_path / "a.png")
+            assert image.dtype == np.uint8 and np.array_equal(image, data)
 
     def test_grey_and_16_bit_grey(self, tmp_path):
         grey = pixels(channels=1)[:, :, 0]

@@ -161,9 +161,9 @@ def test_no_circles_but_the_lazy_ones():
 
 @pytest.mark.parametrize("site", LAZY)
 def test_each_lazy_import_is_there_and_needed(site):
-    kept = [link for link in links() if link.site == site or not is_lazy(link)]
-    assert any(is_lazy(link) for link in kept)
-    assert circle(kept)
+    rest = [link for link in links() if link.site == site or not is_lazy(link)]
+    assert any(is_lazy(link) for link in rest)
+    assert circle(rest)
 
 
 def test_only_the_command_line_imports_methods():
@@ -185,7 +185,7 @@ def test_imports_follow_the_order():
     assert [link for link in upwards if not is_lazy(link)] == []
 
 
-def made_up(folder: Path, **files: str) -> set[Import]:
+def imports_in(folder: Path, **files: str) -> set[Import]:
     (folder / "mitex").mkdir()
     for name, text in files.items():
         (folder / "mitex" / f"{name}.py").write_text(text)
@@ -205,7 +205,7 @@ def test_imports_are_read_from_the_source(tmp_path):
             def load(self):
                 import mitex.d
         """
-    assert made_up(tmp_path, __init__="", a=dedent(text), b="", c="", d="") == {
+    assert imports_in(tmp_path, __init__="", a=dedent(text), b="", c="", d="") == {
         Import("mitex.a", "", "mitex"),
         Import("mitex.a", "", "mitex.b"),
         Import("mitex.a", "", "mitex.c"),
@@ -215,7 +215,9 @@ def test_imports_are_read_from_the_source(tmp_path):
 
 def test_a_circle_through_functions_is_seen(tmp_path):
     late = "def f():\n    from mitex.{} import g\n"
-    links = made_up(tmp_path, a="import mitex.b", b=late.format("c"), c=late.format("a"), d="import mitex.a")
+    links = imports_in(
+        tmp_path, a="import mitex.b", b=late.format("c"), c=late.format("a"), d="import mitex.a"
+    )
     assert set(circle(links)) == {"mitex.a", "mitex.b", "mitex.c"}
     assert circle(link for link in links if link.site != "mitex.c.f") == []
 

@@ -41,9 +41,9 @@ def test_prepare_output_makes_nothing_and_answers_absolute(tmp_path: Path, monke
 def test_prepare_output_refuses(tmp_path: Path, name: str, words: str):
     (tmp_path / "folder.png").mkdir()
     (tmp_path / "file").touch()
-    with pytest.raises(OutputError) as caught:
+    with pytest.raises(OutputError) as error:
         prepare_output(f"{tmp_path}/{name}" if name else "", (".png", ".exr"))
-    assert words.format(tmp_path) in str(caught.value)
+    assert words.format(tmp_path) in str(error.value)
 
 
 @pytest.mark.parametrize("prepare", [prepare_output, prepare_folder])
@@ -127,10 +127,10 @@ def test_the_old_file_stays_until_the_block_ends(tmp_path: Path):
 def test_an_error_leaves_the_old_file_and_nothing_else(tmp_path: Path, error: BaseException):
     target = tmp_path / "a.png"
     target.write_text("old")
-    with pytest.raises(type(error)) as caught, atomic_write(target) as temporary:
+    with pytest.raises(type(error)) as info, atomic_write(target) as temporary:
         temporary.write_text("half")
         raise error
-    assert caught.value is error
+    assert info.value is error
     assert target.read_text() == "old" and listing(tmp_path) == ["a.png"]
 
 

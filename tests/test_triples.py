@@ -44,8 +44,8 @@ def test_blended_pictures_of_all_maps():
 )
 @pytest.mark.parametrize("blend", [False, True])
 def test_every_map_is_in_some_picture(maps, blend):
-    shown = {c for p in channel_triples(layout(*maps), blend, 0) for c in p.channels}
-    assert shown == {c for name in maps for c in LAYOUT[name]}
+    channels = {c for p in channel_triples(layout(*maps), blend, 0) for c in p.channels}
+    assert channels == {c for name in maps for c in LAYOUT[name]}
 
 
 def test_mixes_follow_the_seed():

@@ -22,11 +22,11 @@ from scipy.spatial import KDTree
 
 NEAR, POOL, ALIKE = 16, 64, 8
 EVERY = 8  # as `Capture.split` has it
-DRAWN = 8000  # pixels of a held-out view
+SAMPLES = 8000  # pixels of a held-out view
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class Pixels:
     """The P pixels of views that see the object: points, colours in [0, 1], unit rays, (P, 3) each."""
 
     points: np.ndarray
@@ -34,30 +34,32 @@ class Seen:
     rays: np.ndarray
 
 
-def seen(folder: Path, frames: list[dict]) -> tuple[Seen, float]:
+def visible_pixels(folder: Path, frames: list[dict]) -> tuple[Pixels, float]:
     """What frames see, and the share of their pixels that see it."""
-    found, share = [], []
+    views, share = [], []
     for frame in frames:
         path, pose = folder / frame["file_path"], np.array(frame["transform_matrix"])
         depth = np.load(folder / "truth" / f"{path.stem}.npz")["depth"]
         hit = np.isfinite(depth)
         rays = pixel_rays(pose, len(depth))[hit]
         image = np.asarray(Image.open(path), np.float32)[hit, :3] / 255
-        found.append((pose[:3, 3] + rays * depth[hit, None], image, rays))
+        views.append((pose[:3, 3] + rays * depth[hit, None], image, rays))
         share.append(hit.mean())
-    return Seen(*(np.concatenate(values) for values in zip(*found, strict=True))), float(np.mean(share))
+    return Pixels(*(np.concatenate(values) for values in zip(*views, strict=True))), float(np.mean(share))
 
 
 def ceilings(folder: Path, rng: np.random.Generator) -> tuple[float, float]:
     """PSNR of whole pictures from near pixels, and from near pixels seen from a similar side [dB]."""
     frames = json.loads((folder / "transforms.json").read_text())["frames"]
-    known, _ = seen(folder, [frame for k, frame in enumerate(frames) if k % EVERY])
-    held, share = seen(folder, frames[::EVERY])
-    some = rng.choice(len(held.points), DRAWN * len(frames[::EVERY]))
-    near = np.asarray(KDTree(known.points).query(held.points[some], POOL, workers=-1)[1])
-    alike = np.einsum("pkd,pd->pk", known.rays[near], held.rays[some]).argsort(1)[:, -ALIKE:]
-    chosen = near[:, :NEAR], np.take_along_axis(near, alike, 1)
-    errors = [((known.colours[k].mean(1) - held.colours[some]) ** 2).mean() * share for k in chosen]
+    training, _ = visible_pixels(folder, [frame for k, frame in enumerate(frames) if k % EVERY])
+    held_out, share = visible_pixels(folder, frames[::EVERY])
+    some = rng.choice(len(held_out.points), SAMPLES * len(frames[::EVERY]))
+    near = np.asarray(KDTree(training.points).query(held_out.points[some], POOL, workers=-1)[1])
+    alike = np.einsum("pkd,pd->pk", training.rays[near], held_out.rays[some]).argsort(1)[:, -ALIKE:]
+    neighbours = near[:, :NEAR], np.take_along_axis(near, alike, 1)
+    errors = [
+        ((training.colours[k].mean(1) - held_out.colours[some]) ** 2).mean() * share for k in neighbours
+    ]
     return -10 * float(np.log10(errors[0])), -10 * float(np.log10(errors[1]))
 
 

@@ -227,8 +227,8 @@ def woven(rng: np.random.Generator) -> tuple[Base, Part]:
         height = lift * _waves(turn * len(used) / (2.0 * np.pi), np.append(over[used, row], over[0, row]))
         parts.append(_strand(base, rng, at(row, turn), height, 0.46 * pitch, closed=True))
     for strand in k:
-        kept = np.flatnonzero(strand % 2**level == 0)
-        row = np.linspace(kept[0] - 0.5, kept[-1] + 0.5, 10 * len(kept))
+        rings = np.flatnonzero(strand % 2**level == 0)
+        row = np.linspace(rings[0] - 0.5, rings[-1] + 0.5, 10 * len(rings))
         ends = pitch * np.minimum(row - row[0], row[-1] - row)
         height = -lift * _waves(row, over[strand]) - 0.03 * step(0.05, 0.0, ends) * (strand % 8 != 0)
         foot = at(row, 2.0 * np.pi * strand / strands)

@@ -48,11 +48,11 @@ def maps_of(asset: Asset) -> list[np.ndarray]:
 def one(texture: NcaTexture, exemplar: Exemplar, meshes: Path) -> np.ndarray:
     """The sheet of a model, (H, W, 3) sRGB in [0, 1]."""
     sphere = texture.apply(icosphere(64))
-    shown = [sphere, *(texture.apply(Mesh.load(meshes / f"{mesh}.obj")) for mesh in UNSEEN)]
-    lit = [tone(still(asset, resolution=CELL, spp=96)) for asset in shown]
+    assets = [sphere, *(texture.apply(Mesh.load(meshes / f"{mesh}.obj")) for mesh in UNSEEN)]
+    lit = [tone(still(asset, resolution=CELL, spp=96)) for asset in assets]
     square = exemplar.resized(CELL).maps
-    given = [np.broadcast_to(square[m], (CELL, CELL, 3)) for m in sphere.vertex_maps]
-    rows = [square["albedo"], *lit, *given, *maps_of(sphere)]
+    exemplar_maps = [np.broadcast_to(square[m], (CELL, CELL, 3)) for m in sphere.vertex_maps]
+    rows = [square["albedo"], *lit, *exemplar_maps, *maps_of(sphere)]
     labels = [f"exemplar {exemplar.name}", "sphere", *UNSEEN]
     labels += [f"exemplar: {m}" for m in sphere.vertex_maps] + [f"grown: {m}" for m in sphere.vertex_maps]
     return sheet(rows, columns=5, labels=labels, cell=CELL)
@@ -71,8 +71,8 @@ def main() -> None:
     if len(sys.argv) == 3:
         write_image(GALLERY / "teaser.jpg", teaser())
     for word in sys.argv[3:] or EXEMPLARS:
-        name, given, source = word.split("=") if "=" in word else (word, EXEMPLARS[word], word)
-        exemplar = Exemplar.load(exemplars / given)
+        name, folder, source = word.split("=") if "=" in word else (word, EXEMPLARS[word], word)
+        exemplar = Exemplar.load(exemplars / folder)
         write_image(GALLERY / f"{name}.jpg", one(NcaTexture.load(source), exemplar, meshes))
 
 

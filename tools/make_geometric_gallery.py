@@ -55,55 +55,57 @@ def displaced(texture: GeometricTexture, reference: Mesh, mesh: Mesh, mapped: bo
     return DisplacementMap.bake(reference).apply(mesh, scale=size, levels=texture.levels - 1 - START).mesh
 
 
-def level_sheet(texture: GeometricTexture, reference: str, meshes: Path, wanted: list[str]) -> np.ndarray:
+def level_sheet(texture: GeometricTexture, reference: str, meshes: Path, words: list[str]) -> np.ndarray:
     """The sheet of start levels."""
-    learned = texture.generate(start_level=texture.levels)
-    shown = [find_reference(reference), *(texture.generate(start_level=k) for k in LEVELS)]
-    for word in wanted:
+    reconstruction = texture.generate(start_level=texture.levels)
+    results = [find_reference(reference), *(texture.generate(start_level=k) for k in LEVELS)]
+    for word in words:
         name, faces = word.split("~")
-        shown.append(find_mesh(name, meshes))
+        results.append(find_mesh(name, meshes))
         for k in LEVELS:
             coarse = find_mesh(f"{name}~{int(4.0 ** (k - START) * int(faces))}", meshes)
-            shown.append(texture.apply(coarse, start_level=k).mesh)
-            told = ", ".join(f"{key} {d:.3f}" for key, d in statistic_distances(shown[-1], learned).items())
-            counts = f"{len(coarse.vertices):,} to {len(shown[-1].vertices):,} vertices"
-            print(f"{reference} on {name} from level {k}, {counts}: {told}", flush=True)
-    names = [reference, *(word.split("~")[0] for word in wanted)]
+            results.append(texture.apply(coarse, start_level=k).mesh)
+            distances = statistic_distances(results[-1], reconstruction)
+            summary = ", ".join(f"{key} {d:.3f}" for key, d in distances.items())
+            counts = f"{len(coarse.vertices):,} to {len(results[-1].vertices):,} vertices"
+            print(f"{reference} on {name} from level {k}, {counts}: {summary}", flush=True)
+    names = [reference, *(word.split("~")[0] for word in words)]
     labels = [text for name in names for text in (name, *(f"from level {k}" for k in LEVELS))]
-    return sheet([picture(mesh) for mesh in shown], columns=1 + len(LEVELS), labels=labels, cell=CELL)
+    return sheet([picture(mesh) for mesh in results], columns=1 + len(LEVELS), labels=labels, cell=CELL)
 
 
 def main() -> None:
-    runs, meshes, name, references, *wanted = sys.argv[1:]
+    runs, meshes, name, references, *words = sys.argv[1:]
     if references.endswith(":levels"):
         reference = references.removesuffix(":levels")
-        made = level_sheet(GeometricTexture.load(Path(runs) / reference), reference, Path(meshes), wanted)
-        write_image(GALLERY / f"{name}.jpg", made)
+        image = level_sheet(GeometricTexture.load(Path(runs) / reference), reference, Path(meshes), words)
+        write_image(GALLERY / f"{name}.jpg", image)
         return
-    found = [find_mesh(word.split("~")[0], Path(meshes)) for word in wanted]
-    coarse = [find_mesh(word, Path(meshes)) for word in wanted]
+    originals = [find_mesh(word.split("~")[0], Path(meshes)) for word in words]
+    coarse = [find_mesh(word, Path(meshes)) for word in words]
     fine: dict[tuple[str, int], Mesh] = {}
-    cells, labels = [np.ones((CELL, CELL, 3)), *map(picture, found)], ["", *(m.name for m in found)]
+    cells, labels = [np.ones((CELL, CELL, 3)), *map(picture, originals)], ["", *(m.name for m in originals)]
     for word in references.split(","):
         reference, *mapped = word.split(":")
         texture = GeometricTexture.load(Path(runs) / reference)
-        learned = texture.generate(
-            start_level=texture.levels
-        )  # the reference with edges as long as the results'
+        # The reference with edges as long as the results'.
+        reconstruction = texture.generate(start_level=texture.levels)
         cells.append(picture(find_reference(reference)))
         labels.append(" ".join([reference, *mapped]))
-        for mesh, even in zip(found, coarse, strict=True):
-            begun = time.perf_counter()
+        for mesh, even in zip(originals, coarse, strict=True):
+            start = time.perf_counter()
             grown = displaced(texture, find_reference(reference), even, bool(mapped))
-            seconds = time.perf_counter() - begun
+            seconds = time.perf_counter() - start
             key = mesh.name, len(grown.vertices)
             fine.setdefault(key, remesh(mesh, key[1]))
-            ours, theirs = statistic_distances(grown, learned), statistic_distances(fine[key], learned)
-            told = ", ".join(f"{k} {ours[k]:.3f} of {theirs[k]:.3f}" for k in ours)
-            print(f"{word} on {mesh.name}, {len(grown.faces):,} faces, {seconds:.1f} s: {told}", flush=True)
+            ours, theirs = (statistic_distances(m, reconstruction) for m in (grown, fine[key]))
+            summary = ", ".join(f"{k} {ours[k]:.3f} of {theirs[k]:.3f}" for k in ours)
+            print(
+                f"{word} on {mesh.name}, {len(grown.faces):,} faces, {seconds:.1f} s: {summary}", flush=True
+            )
             cells.append(picture(grown))
             labels.append(mesh.name)
-    write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=1 + len(found), labels=labels, cell=CELL))
+    write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=1 + len(originals), labels=labels, cell=CELL))
 
 
 if __name__ == "__main__":

@@ -62,19 +62,19 @@ def main() -> None:
         _, held_out = load_capture(Path(captures) / texture_name).within(texture.similarity).split()
         print(f"{texture_name}: {view_quality(render_views(texture.shell, held_out))}", flush=True)
         image, photo = render_view(texture.shell, held_out, 0)
-        begun = time.perf_counter()
+        start = time.perf_counter()
         maps = texture.synthesize(1024, seed=0, tileable=True)
-        print(f"{texture_name}: synthesized in {time.perf_counter() - begun:.0f} s", flush=True)
+        print(f"{texture_name}: synthesized in {time.perf_counter() - start:.0f} s", flush=True)
         cells += [photo, image]
         labels += [f"{texture_name}, held out", "seen"]
         flat = texture.apply(plane(), maps)
         cells += [picture(flat, elevation) for elevation in ELEVATIONS]
         labels += [f"from {elevation} degrees" for elevation in ELEVATIONS]
         for mesh in targets:
-            begun = time.perf_counter()
+            start = time.perf_counter()
             cells.append(picture(texture.apply(find_mesh(mesh, Path(meshes)), maps), 18))
             labels.append(mesh.split("~")[0])
-            print(f"{texture_name} on {mesh}: {time.perf_counter() - begun:.0f} s", flush=True)
+            print(f"{texture_name} on {mesh}: {time.perf_counter() - start:.0f} s", flush=True)
     columns = 2 + len(ELEVATIONS) + len(targets)
     write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=columns, labels=labels, cell=CELL))
 

@@ -69,8 +69,8 @@ def scene(meshes: Path) -> Mesh:
     vertices = vertices + rng.normal(0, 0.002, vertices.shape)[welded(vertices)]
     centres = vertices[faces].mean(1)
     holes = centres[rng.integers(len(centres), size=14)]
-    kept = (np.linalg.norm(centres[:, None] - holes, axis=2) > rng.uniform(0.04, 0.12, 14)).all(1)
-    return Mesh(vertices.astype(np.float32), faces[kept], name="scene")
+    outside = (np.linalg.norm(centres[:, None] - holes, axis=2) > rng.uniform(0.04, 0.12, 14)).all(1)
+    return Mesh(vertices.astype(np.float32), faces[outside], name="scene")
 
 
 def find_mesh(name: str, meshes: Path) -> Mesh:
@@ -110,9 +110,9 @@ def texture(exemplar: Exemplar, mesh: Mesh, run: Path, settings: dict[str, str])
     )
 
 
-def pictures(made: surface.SurfaceTexture, count: int, side: int) -> list[np.ndarray]:
+def pictures(result: surface.SurfaceTexture, count: int, side: int) -> list[np.ndarray]:
     """The mesh from `count` of its sides, each picture with `side` pixels in rows and columns."""
-    asset, sides = made.apply(), SIDES.get(made.mesh.name, OTHER_SIDES)[:count]
+    asset, sides = result.apply(), SIDES.get(result.mesh.name, OTHER_SIDES)[:count]
     return [tone(still(asset, resolution=side, spp=64, azimuth=math.radians(a))) for a in sides]
 
 
@@ -132,14 +132,14 @@ def main() -> None:
         maps = settings.pop("maps", None)
         mesh, exemplar = find_mesh(mesh_name, meshes), find_exemplar(exemplar_name, exemplars, maps)
         run = runs / "-".join([name, mesh_name, exemplar_name, *(word.replace("=", "") for word in own)])
-        made = texture(exemplar, mesh, run, settings)
-        print(f"{run.name}: {made.about['seconds']} s, seams {seam_ratio(made):.3f}", flush=True)
+        result = texture(exemplar, mesh, run, settings)
+        print(f"{run.name}: {result.about['seconds']} s, seams {seam_ratio(result):.3f}", flush=True)
         if exemplar_name != last:
             cells.append(exemplar.resized(side).maps["albedo"])
             labels.append(f"exemplar {exemplar.name}")
-        cells += pictures(made, 1 if several else 2, side)
-        shown = own if variants else [mesh.name, *own[:1]]
-        labels += [" ".join(shown) or "default", *["the other side"] * (not several)]
+        cells += pictures(result, 1 if several else 2, side)
+        words = own if variants else [mesh.name, *own[:1]]
+        labels += [" ".join(words) or "default", *["the other side"] * (not several)]
         last = exemplar_name
     write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=columns, labels=labels, cell=side))
 

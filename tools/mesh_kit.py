@@ -89,7 +89,7 @@ def trace(field: Field, low: tuple[float, ...], high: tuple[float, ...], cells: 
 def _cut_tetrahedra(corners: np.ndarray, values: np.ndarray) -> np.ndarray:
     """(N, 4) grid points -> (T, 3, 2) triangles between edges (pairs of grid points), facing outwards."""
     inside = values[corners] < 0.0
-    found = []
+    pieces = []
     for code in range(1, 15):
         which = corners[(inside * [1, 2, 4, 8]).sum(axis=1) == code]
         low = [k for k in range(4) if code >> k & 1]
@@ -103,8 +103,8 @@ def _cut_tetrahedra(corners: np.ndarray, values: np.ndarray) -> np.ndarray:
             triangles = [[(low[0], h) for h in high]]
         else:
             triangles = [[(k, high[0]) for k in low]]
-        found += [which[:, np.array(t if even else t[::-1])] for t in triangles]
-    return np.concatenate(found)
+        pieces += [which[:, np.array(t if even else t[::-1])] for t in triangles]
+    return np.concatenate(pieces)
 
 
 def _sampled(field: Field, points: np.ndarray, step: float, stride: int = 6) -> np.ndarray:

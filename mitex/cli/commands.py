@@ -106,7 +106,7 @@ def _no_such_command(words: Sequence[str]) -> UsageError:
     group = list(lines(words[0]))
     if group and not words[1:]:
         return UsageError(f"`mitex {words[0]}` needs a method", f"try `mitex {group[0]} --help`")
-    given = " ".join(words[:2]) if group else words[0]
-    close = difflib.get_close_matches(given, group or lines(), 1)
+    command = " ".join(words[:2]) if group else words[0]
+    close = difflib.get_close_matches(command, group or lines(), 1)
     remedy = f"try `mitex {close[0]}`" if close else "see `mitex --help`"
-    return UsageError(f"there is no command '{given}'", remedy)
+    return UsageError(f"there is no command '{command}'", remedy)

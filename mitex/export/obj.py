@@ -130,8 +130,8 @@ def read_obj(path: Path) -> Asset:
 
 
 def _rows(lines: Iterable[str], start: str, width: int, dtype: type) -> np.ndarray:
-    chosen = [line[len(start) :] for line in lines if line.startswith(start)]
-    return np.array(" ".join(chosen).split(), dtype).reshape(len(chosen), width)
+    rows = [line[len(start) :] for line in lines if line.startswith(start)]
+    return np.array(" ".join(rows).split(), dtype).reshape(len(rows), width)
 
 
 def _textures(path: Path, material: Path) -> dict[str, np.ndarray]:

@@ -37,21 +37,21 @@ class Operation(Protocol):
 class FrozenConv:
     """A 3x3 convolution with bias and ReLU; weights (O, I, 3, 3).
 
-    The product runs in the input's `dtype`; output and gradient are kept as `kept`.
+    The product runs in the input's `dtype`; output and gradient are of `output_dtype`.
     """
 
     needs_input = False
 
     def __init__(
-        self, weight: torch.Tensor, bias: torch.Tensor, dtype: torch.dtype, kept: torch.dtype
+        self, weight: torch.Tensor, bias: torch.Tensor, dtype: torch.dtype, output_dtype: torch.dtype
     ) -> None:
         last = torch.channels_last
         self.weight = weight.to(dtype).contiguous(memory_format=last)
-        self.bias, self.kept = bias.to(dtype), kept
-        self.adjoint = weight.flip(2, 3).transpose(0, 1).to(kept).contiguous(memory_format=last)
+        self.bias, self.output_dtype = bias.to(dtype), output_dtype
+        self.adjoint = weight.flip(2, 3).transpose(0, 1).to(output_dtype).contiguous(memory_format=last)
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
-        return F.conv2d(x, self.weight, self.bias, padding=1).relu_().to(self.kept)
+        return F.conv2d(x, self.weight, self.bias, padding=1).relu_().to(self.output_dtype)
 
     def backward(self, gradient: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
         """Input gradient (K, I, H, W); overwrites `gradient` with its part behind the ReLU."""

@@ -202,8 +202,8 @@ def _summed(
     behind = unit(across(np.roll(p, 1, axis=1) - p, n))
     angle = np.arccos(np.clip((ahead * behind).sum(axis=2), -1.0, 1.0))
     tangents = unit(across(triangles.tangents[:, None], n)) * angle[..., None]
-    given = np.repeat(~(triangles.flat | triangles.collapsed), 3)
-    tangents, fan = tangents.reshape(-1, 3)[given], fans[given]
+    regular = np.repeat(~(triangles.flat | triangles.collapsed), 3)
+    tangents, fan = tangents.reshape(-1, 3)[regular], fans[regular]
     count = int(fans.max(initial=0)) + 1
     return unit(scatter_add(fan, tangents, count))[fans], (np.bincount(fan, minlength=count) > 0)[fans]
 

@@ -115,8 +115,8 @@ class _PairCost(torch.autograd.Function):
         if ctx.euclidean:
             square = (left - right).square().sum(-1, keepdim=True)
             inside = (square >= SQUARES[0]) & (square <= SQUARES[1])
-            pull = 2 / x.shape[-1] * share * inside
-            across, along = across - pull, [a + pull for a in along]
+            slope = 2 / x.shape[-1] * share * inside
+            across, along = across - slope, [a + slope for a in along]
         gradients: list[torch.Tensor | None] = [None, None]
         if ctx.needs_input_grad[0]:
             gradients[0] = torch.zeros_like(x)

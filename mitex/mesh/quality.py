@@ -103,16 +103,16 @@ def _advice(report: QualityReport, target: int):
     uneven = report.edge_variation > UNEVEN
     irregular = report.valence[1] < MIN_MEAN_VALENCE or report.odd_valence > MAX_ODD_VALENCE
     if uneven or irregular:
-        found = []
+        flaws = []
         if uneven:
-            found.append(f"edge lengths vary by {report.edge_variation:.0%} (uniform ones are best)")
+            flaws.append(f"edge lengths vary by {report.edge_variation:.0%} (uniform ones are best)")
         if irregular:
-            found.append(
+            flaws.append(
                 f"{report.odd_valence:.0%} of the vertices have fewer than 5 or more than 7 neighbours, "
                 f"{report.valence[1]:.1f} in the mean (6 is best)"
             )
         yield (
-            f"{' and '.join(found)}: remesh with mitex.mesh.remesh(mesh, {target // 4}) "
+            f"{' and '.join(flaws)}: remesh with mitex.mesh.remesh(mesh, {target // 4}) "
             "(extra mitex[remesh]), or patterns will be stretched and uneven"
         )
     if report.subdivisions:

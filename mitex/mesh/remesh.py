@@ -47,10 +47,10 @@ def remesh(mesh: Mesh, vertices: int, feature_angle: float = math.radians(60.0))
         source = subdivide_midpoint(source)
     best, best_error = mesh, math.inf
     for _ in range(ROUNDS):
-        made = _isotropic(source, length, feature_angle)
-        ratio = len(made.vertices) / vertices
+        candidate = _isotropic(source, length, feature_angle)
+        ratio = len(candidate.vertices) / vertices
         if abs(math.log(ratio)) < best_error:
-            best, best_error = made, abs(math.log(ratio))
+            best, best_error = candidate, abs(math.log(ratio))
         if best_error < CLOSE_ENOUGH:
             break
         length *= math.sqrt(ratio)
@@ -94,12 +94,12 @@ def _filtered(mesh: Mesh, change: Callable[[Any], None]) -> Mesh:
     try:
         meshes.add_mesh(pymeshlab.Mesh(mesh.vertices.astype(np.float64), mesh.faces))
         change(meshes)
-        made = meshes.current_mesh()
-        points, found = made.vertex_matrix(), made.face_matrix()
+        result = meshes.current_mesh()
+        points, faces = result.vertex_matrix(), result.face_matrix()
     except pymeshlab.PyMeshLabException as error:
         reason = " ".join(str(error).split())
         raise MeshError(f"{mesh.name} could not be remeshed ({reason})", "repair it in a modeller") from error
-    return validate(points, found, name=mesh.name)
+    return validate(points, faces, name=mesh.name)
 
 
 def _pymeshlab() -> Any:

@@ -51,9 +51,9 @@ def merged_settings(groups: Sequence[Sequence[str]], **flags: object) -> list[st
     """
     words = [word for group in groups for word in group]
     words += [f"{key}={value}" for key, value in flags.items() if value is not None]
-    seen: dict[str, str] = {}
+    values: dict[str, str] = {}
     for word in words:
         key, _, value = (part.strip() for part in word.partition("="))
-        if seen.setdefault(key, value) != value:
-            raise ConfigError(f"{key} is set to {seen[key]} and to {value}", "give it once")
+        if values.setdefault(key, value) != value:
+            raise ConfigError(f"{key} is set to {values[key]} and to {value}", "give it once")
     return words

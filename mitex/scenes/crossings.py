@@ -23,25 +23,25 @@ def crossing_edges(mesh: Mesh) -> np.ndarray:
     pairs, _ = mesh_edges(mesh.faces, len(mesh.vertices))
     start, end = (mesh.vertices[pairs[:, k]] for k in range(2))
     crossing = np.zeros(len(pairs), bool)
-    left, begun = np.arange(len(pairs)), np.full(len(pairs), PAST, np.float32)
-    while len(left):
-        hit, face, t = _first(scene, start[left], end[left], begun)
+    rest, offset = np.arange(len(pairs)), np.full(len(pairs), PAST, np.float32)
+    while len(rest):
+        hit, face, t = _first(scene, start[rest], end[rest], offset)
         face, t = face[hit], t[hit]
         corners = mesh.faces[face]
-        own = (corners[:, :, None] == pairs[left[hit]][:, None]).any((1, 2))
-        crossing[left[hit][~own]] = True
-        left, begun = left[hit][own], np.nextafter(t[own] + PAST, np.float32(2))
+        own = (corners[:, :, None] == pairs[rest[hit]][:, None]).any((1, 2))
+        crossing[rest[hit][~own]] = True
+        rest, offset = rest[hit][own], np.nextafter(t[own] + PAST, np.float32(2))
     return pairs[crossing]
 
 
 def _first(
-    scene: mi.Scene, start: np.ndarray, end: np.ndarray, begun: np.ndarray
+    scene: mi.Scene, start: np.ndarray, end: np.ndarray, offset: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of edges, from the part `begun` on: whether a face is hit, which one, and at what part."""
+    """Of edges, from the fraction `offset` of their length on: whether a face is hit, which, and where."""
     way = end - start
-    origin = mi.Point3f(np.ascontiguousarray((start + begun[:, None] * way).T))
+    origin = mi.Point3f(np.ascontiguousarray((start + offset[:, None] * way).T))
     ray = mi.Ray3f(origin, mi.Vector3f(np.ascontiguousarray(way.T)))
-    ray.maxt = mi.Float(np.maximum(1 - PAST - begun, 0))
+    ray.maxt = mi.Float(np.maximum(1 - PAST - offset, 0))
     hits = scene.ray_intersect_preliminary(ray)
     hit, face, t = (np.asarray(a) for a in (hits.is_valid(), hits.prim_index, hits.t))
-    return hit.astype(bool), face, begun + t
+    return hit.astype(bool), face, offset + t

@@ -187,8 +187,8 @@ class Stage:
             raise ConfigError(f"antialias {antialias}", "use 1 for one sample per pixel, or n for n x n")
         hit, face, u, v = self._trace(cameras, antialias)
         if not bool(hit.all()):
-            kept = hit.nonzero().view(-1)
-            face, u, v = face[kept], u[kept], v[kept]
+            index = hit.nonzero().view(-1)
+            face, u, v = face[index], u[index], v[index]
         return Hits(hit, face, torch.stack((1 - u - v, u, v), dim=1))
 
     def _trace(self, cameras: Cameras, n: int) -> tuple[torch.Tensor, ...]:

@@ -77,25 +77,27 @@ def test_fit_apply_render(folder, capsys):
 
 def test_options_reach_the_library(folder, monkeypatch, capsys):
     """Degrees become radians; what is not given keeps the library's default."""
-    seen = {}
+    options = {}
     bad_files.model(folder / "m.safetensors")
     from mitex.methods.nca import NcaTexture
 
     real = NcaTexture.apply
-    monkeypatch.setattr(NcaTexture, "apply", lambda self, mesh, **o: seen.update(o) or real(self, mesh, **o))
+    monkeypatch.setattr(
+        NcaTexture, "apply", lambda self, mesh, **o: options.update(o) or real(self, mesh, **o)
+    )
     words = (
         "apply m.safetensors --mesh cube.obj --out a.ply --subdivide 0 --steps 1 --orientation 90 --seed 5"
     )
     assert main(words.split()) == 0
-    given = {"seed": 5, "steps": 1, "subdivide": 0, "orientation": np.pi / 2, "scale": 1.0}
-    assert seen == given | {"resolution": None}
+    expected = {"seed": 5, "steps": 1, "subdivide": 0, "orientation": np.pi / 2, "scale": 1.0}
+    assert options == expected | {"resolution": None}
 
     monkeypatch.setattr(
-        "mitex.render.picture.still", lambda asset, **o: seen.update(o) or np.zeros((4, 4, 3))
+        "mitex.render.picture.still", lambda asset, **o: options.update(o) or np.zeros((4, 4, 3))
     )
-    seen.clear()
+    options.clear()
     assert main(["render", "a.ply", "--out", "a.png", "--azimuth", "180", "--size", "32"]) == 0
-    assert seen == {"resolution": 32, "azimuth": np.pi, "displacement": 0.0, "backdrop": True}
+    assert options == {"resolution": 32, "azimuth": np.pi, "displacement": 0.0, "backdrop": True}
 
 
 def test_models(folder, monkeypatch, capsys):
@@ -142,8 +144,8 @@ def test_demo(folder, monkeypatch, capsys):
     for start in ("nothing", "the run in the folder"):
         assert main(["demo", "--out", "shown", "--steps", "2"]) == 0
         assert f"starting from {start}" in capsys.readouterr().out
-    made = {path.name for path in (folder / "shown").iterdir()}
-    assert made == {"run", "cube.glb", "cube.png", "demo.png"}
+    names = {path.name for path in (folder / "shown").iterdir()}
+    assert names == {"run", "cube.glb", "cube.png", "demo.png"}
     assert read_image(folder / "shown" / "demo.png").shape == (16, 32, 3)
 
 

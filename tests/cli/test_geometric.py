@@ -23,7 +23,7 @@ def fit(words=QUICK, reference="good.obj", out="out/run"):
 
 
 @pytest.fixture(scope="module")
-def trained(tmp_path_factory, own_cache):
+def source(tmp_path_factory, own_cache):
     folder = tmp_path_factory.mktemp("trained")
     bad.text(folder / "good.obj", bad.CUBE)
     assert main(fit(reference=folder / "good.obj", out=folder / "run")) == 0
@@ -31,8 +31,8 @@ def trained(tmp_path_factory, own_cache):
 
 
 @pytest.fixture
-def run(files, trained):
-    return Path(copytree(trained, files / "out" / "run"))
+def run(files, source):
+    return Path(copytree(source, files / "out" / "run"))
 
 
 def apply(words="", mesh="good.obj"):
@@ -150,8 +150,8 @@ def test_references_that_are_learned(files, name):
     write(files / "mesh.obj", mesh)
     assert main(fit(reference="mesh.obj")) == 0
     assert main(apply(mesh="template")) == 0
-    made = quality(Mesh.load(files / "out" / "a.ply"))
-    assert (made.components, made.boundary_edges > 0) == (1 + (name == "two components"), name == "open")
+    report = quality(Mesh.load(files / "out" / "a.ply"))
+    assert (report.components, report.boundary_edges > 0) == (1 + (name == "two components"), name == "open")
 
 
 BAD_FITS = {

@@ -44,7 +44,7 @@ def save(mesh, path):
 
 
 @pytest.fixture(scope="module")
-def trained(tmp_path_factory, own_cache):
+def source(tmp_path_factory, own_cache):
     folder = tmp_path_factory.mktemp("trained")
     save(holed(), folder / "base.obj")
     write(folder / "photos", 16)
@@ -61,16 +61,16 @@ def photos(files):
 
 
 @pytest.fixture
-def run(files, trained):
+def run(files, source):
     save(icosphere(6), files / "ball.obj")
-    return Path(copytree(trained, files / "out" / "run"))
+    return Path(copytree(source, files / "out" / "run"))
 
 
-def test_a_base_mesh_with_holes_is_fitted(trained):
-    assert (trained / "texture.safetensors").is_file() and (trained / "metrics.jsonl").is_file()
+def test_a_base_mesh_with_holes_is_fitted(source):
+    assert (source / "texture.safetensors").is_file() and (source / "metrics.jsonl").is_file()
 
 
-def test_views_given_twice_are_left_out(photos, trained, capsys):
+def test_views_given_twice_are_left_out(photos, source, capsys):
     """So the base shape is that of the fixture's run, from the cache."""
     path = photos / "transforms.json"
     tree = json.loads(path.read_text())

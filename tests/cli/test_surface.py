@@ -154,8 +154,8 @@ def test_hard_meshes_get_a_texture(files, name, capsys):
     bad.text(files / "hard.obj", HARD[name])
     assert main(fit(mesh="hard.obj")) == 0
     assert main(["apply", "out/run", "--mesh", "hard.obj", "--out", "out/a.glb"]) == 0
-    captured = capsys.readouterr()
-    assert all(line.startswith("warning: ") for line in captured.err.splitlines())
+    output = capsys.readouterr()
+    assert all(line.startswith("warning: ") for line in output.err.splitlines())
 
 
 def test_one_texel(files):

@@ -107,23 +107,23 @@ def test_pixels_are_filtered_over_what_they_cover(kind, angle, monkeypatch):
     """Footprints are the distances of the hits of pixels side by side, in texels."""
     photos, surfaces = scene([angle, angle])
     photos = kind(photos.images, photos.angles)
-    image, gap, asked = np.zeros((20, 20, 3), np.float32), 0.05, []
+    image, gap, lookups = np.zeros((20, 20, 3), np.float32), 0.05, []
 
     def lookup(places, footprints):
-        asked.append((places, footprints))
+        lookups.append((places, footprints))
         return np.zeros((len(places), 3))
 
     monkeypatch.setattr(elevations, "MipMap", lambda image: lookup)
     for window in select_windows(photos, surfaces, np.random.default_rng(1), 32, 8)[angle]:
-        asked.clear()
+        lookups.clear()
         valid = FlatTexture(image, gap, ALONG)(window)[1]
-        ((places, footprints),) = asked
+        ((places, footprints),) = lookups
         assert valid.all()
         grid = places.reshape(32, 32, 2)
         expected = np.stack([np.gradient(grid, axis=1), np.gradient(grid, axis=0)], axis=-1)
         inner = (slice(1, -1), slice(1, -1))
-        found = footprints.reshape(32, 32, 2, 2)
-        np.testing.assert_allclose(found[inner], expected[inner], atol=1e-3 * np.abs(expected).max())
+        actual = footprints.reshape(32, 32, 2, 2)
+        np.testing.assert_allclose(actual[inner], expected[inner], atol=1e-3 * np.abs(expected).max())
         assert np.abs(expected).max() > 0.1
 
 
@@ -152,8 +152,8 @@ def test_a_flat_texture_is_as_bright_as_its_side_is():
     photos, surfaces = scene([20, 20])
     image = np.full((8, 8, 3), 0.5, np.float32)
     for window in select_windows(photos, surfaces, np.random.default_rng(1), 32, 8)[20]:
-        shown = FlatTexture(image, 0.05, ALONG, brightness=lambda normal: 1.0 + 0.5 * normal[2])
-        colours, valid = shown(window)
+        texture = FlatTexture(image, 0.05, ALONG, brightness=lambda normal: 1.0 + 0.5 * normal[2])
+        colours, valid = texture(window)
         np.testing.assert_allclose(colours[valid], 0.75, atol=1e-6)
 
 

@@ -171,8 +171,8 @@ def test_frechet_distance_is_that_of_the_matrix_square_root(rng, rank):
     regular = [m + 1e-10 * np.eye(12) for m in (a, b)]
     root = scipy.linalg.sqrtm(regular[0] @ regular[1])
     expected = ((mean_a - mean_b) ** 2).sum() + np.trace(a + b - 2 * np.real(root))
-    found = gaussian_frechet(*_as_tensors(mean_a, a, mean_b, b))
-    assert found == pytest.approx(expected, rel=1e-4 if rank < 12 else 1e-8)
+    distance = gaussian_frechet(*_as_tensors(mean_a, a, mean_b, b))
+    assert distance == pytest.approx(expected, rel=1e-4 if rank < 12 else 1e-8)
 
 
 def test_frechet_distance_of_singular_gaussians_has_no_rounding_to_speak_of(rng):

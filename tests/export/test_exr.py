@@ -27,14 +27,14 @@ def baked() -> Any:
 def test_textures_come_back_by_name(half, baked, tmp_path):
     write_textures(baked, tmp_path / "a.exr", half=half)
     with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
-        found = {k: v.pixels for k, v in file.channels().items()}
-    assert set(found) == ALL
-    assert {v.dtype for v in found.values()} == {np.dtype(np.float16 if half else np.float32)}
+        channels = {k: v.pixels for k, v in file.channels().items()}
+    assert set(channels) == ALL
+    assert {v.dtype for v in channels.values()} == {np.dtype(np.float16 if half else np.float32)}
     tolerance = 1e-3 if half else 0
     maps = baked.texture_maps
-    np.testing.assert_allclose(found["normal.Y"], maps["normal"][..., 1], atol=tolerance)
-    np.testing.assert_allclose(found["height.Y"], maps["height"][..., 0], atol=tolerance)
-    np.testing.assert_allclose(found["albedo.G"], srgb_to_linear(maps["albedo"])[..., 1], atol=tolerance)
+    np.testing.assert_allclose(channels["normal.Y"], maps["normal"][..., 1], atol=tolerance)
+    np.testing.assert_allclose(channels["height.Y"], maps["height"][..., 0], atol=tolerance)
+    np.testing.assert_allclose(channels["albedo.G"], srgb_to_linear(maps["albedo"])[..., 1], atol=tolerance)
 
 
 def test_export_writes_float16_and_bakes_first(baked, tmp_path, monkeypatch):
@@ -44,17 +44,19 @@ def test_export_writes_float16_and_bakes_first(baked, tmp_path, monkeypatch):
 
 def test_views_are_layers(tmp_path, rng):
     images = rng.random((2, 8, 6, 5)).astype(np.float32)
-    found = read_exr(write_views(tmp_path / "v.exr", images, ["height", "albedo", "roughness"], half=False))
-    assert len(found) == 10
-    np.testing.assert_array_equal(found["view1.height.Y"], images[1, ..., 0])
-    np.testing.assert_array_equal(found["view0.roughness.Y"], images[0, ..., 4])
-    np.testing.assert_array_equal(found["view1.albedo.B"], srgb_to_linear(images[1, ..., 3]))
+    channels = read_exr(
+        write_views(tmp_path / "v.exr", images, ["height", "albedo", "roughness"], half=False)
+    )
+    assert len(channels) == 10
+    np.testing.assert_array_equal(channels["view1.height.Y"], images[1, ..., 0])
+    np.testing.assert_array_equal(channels["view0.roughness.Y"], images[0, ..., 4])
+    np.testing.assert_array_equal(channels["view1.albedo.B"], srgb_to_linear(images[1, ..., 3]))
 
 
 def test_values_beyond_float16_are_clipped(tmp_path):
     image = np.array([[1e9, -1e9, 0.5]], np.float32)
-    found = read_exr(write_exr(tmp_path / "a.exr", {"R": image}))["R"]
-    np.testing.assert_array_equal(found, [[65504, -65504, 0.5]])
+    red = read_exr(write_exr(tmp_path / "a.exr", {"R": image}))["R"]
+    np.testing.assert_array_equal(red, [[65504, -65504, 0.5]])
 
 
 def test_wrong_input(tmp_path):

@@ -46,10 +46,10 @@ def test_khronos_validator_finds_nothing(baked, tmp_path):
         "degenerate": wavy(flawed).baked(64),
     }
     paths = [asset.export(tmp_path / f"{name}.glb") for name, asset in assets.items()]
-    found = {name: r["issues"]["messages"] for name, r in zip(assets, reports(paths), strict=True)}
-    assert found["baked"] == [] and found["vertices"] == []
+    issues = {name: r["issues"]["messages"] for name, r in zip(assets, reports(paths), strict=True)}
+    assert issues["baked"] == [] and issues["vertices"] == []
     # Severity 2 is information: an unused UV, a degenerate triangle that the mesh had before.
-    serious = {name: [m for m in messages if m["severity"] < 2] for name, messages in found.items()}
+    serious = {name: [m for m in messages if m["severity"] < 2] for name, messages in issues.items()}
     assert serious == {name: [] for name in assets}
 
 
@@ -182,8 +182,8 @@ def test_loading_gives_the_asset_back(bake, baked, tmp_path):
     if bake:
         np.testing.assert_allclose(loaded.atlas.uv, asset.atlas.uv, atol=1e-6)
         for name, image in asset.texture_maps.items():
-            shown = asset.atlas.inside
-            assert np.abs(loaded.texture_maps[name] - image)[shown].max() <= 0.5 / 255 + 1e-5
+            inside = asset.atlas.inside
+            assert np.abs(loaded.texture_maps[name] - image)[inside].max() <= 0.5 / 255 + 1e-5
 
 
 def test_unused_vertices_are_left_out(tmp_path):

@@ -25,8 +25,8 @@ def test_trimesh_reads_positions_uvs_and_colours(baked, tmp_path):
         loaded.vertices.astype(np.float32)[loaded.faces], baked.mesh.vertices[baked.mesh.faces]
     )
     np.testing.assert_allclose(loaded.visual.uv[loaded.faces], baked.atlas.uv, atol=1e-7)
-    seen = np.asarray(loaded.visual.material.image.convert("RGB")) / 255.0
-    assert np.abs(seen - baked.texture_maps["albedo"]).max() <= 0.5 / 255 + 1e-6
+    albedo = np.asarray(loaded.visual.material.image.convert("RGB")) / 255.0
+    assert np.abs(albedo - baked.texture_maps["albedo"]).max() <= 0.5 / 255 + 1e-6
 
 
 def test_all_files_and_nothing_else(baked, tmp_path):

@@ -53,24 +53,24 @@ def test_outputs_and_gradient_are_those_of_autograd(generator, pool, size):
     x = _images(generator, *size).requires_grad_()
     outputs = FrozenStack.apply(x, operations, [Tap(i) for i in range(4)])
     expected = plain(x)
-    pull = [torch.randn(e.shape, generator=generator) for e in expected]
+    upstream = [torch.randn(e.shape, generator=generator) for e in expected]
     for output, reference in zip(outputs, expected, strict=True):
         assert relative_error(output, reference) < 1e-6
-    ours = torch.autograd.grad(outputs, x, pull)[0]
-    theirs = torch.autograd.grad(expected, x, pull)[0]
+    ours = torch.autograd.grad(outputs, x, upstream)[0]
+    theirs = torch.autograd.grad(expected, x, upstream)[0]
     assert relative_error(ours, theirs) < 1e-6
 
 
 @pytest.mark.parametrize("pool", ["average", "max"])
 def test_each_tap_alone(generator, pool):
-    """The gradient starts at the deepest tap that is pulled, wherever it is."""
+    """The gradient starts at the deepest tap that has one, wherever it is."""
     operations, plain = _network(generator, pool)
     x = _images(generator).requires_grad_()
     for index in range(4):
         outputs = FrozenStack.apply(x, operations, [Tap(i) for i in range(4)])
-        pull = torch.randn(outputs[index].shape, generator=generator)
-        ours = torch.autograd.grad(outputs[index], x, pull)[0]
-        theirs = torch.autograd.grad(plain(x)[index], x, pull)[0]
+        upstream = torch.randn(outputs[index].shape, generator=generator)
+        ours = torch.autograd.grad(outputs[index], x, upstream)[0]
+        theirs = torch.autograd.grad(plain(x)[index], x, upstream)[0]
         assert relative_error(ours, theirs) < 1e-6
 
 
@@ -83,9 +83,9 @@ def test_bfloat16_stack(generator, all_open, least):
     expected = plain(x)[3]
     assert output.dtype == torch.float32
     assert relative_error(output, expected) < 1e-2
-    pull = torch.randn(expected.shape, generator=generator)
-    ours = torch.autograd.grad(output, x, pull)[0]
-    assert cosine(ours, torch.autograd.grad(expected, x, pull)[0]) > least
+    upstream = torch.randn(expected.shape, generator=generator)
+    ours = torch.autograd.grad(output, x, upstream)[0]
+    assert cosine(ours, torch.autograd.grad(expected, x, upstream)[0]) > least
 
 
 def test_sampled_taps_are_places_of_whole_ones(generator):
@@ -106,11 +106,11 @@ def test_taps_of_one_layer_add_up(generator):
     two = torch.tensor([[5, 40], [7, 0]])
     taps = [Tap(1, one), Tap(1), Tap(1, two)]
     together = FrozenStack.apply(x, operations, taps)
-    pull = [torch.randn(o.shape, generator=generator) for o in together]
-    total = torch.autograd.grad(together, x, pull)[0]
-    # The ReLU's mask is the same for all of them, so that the pulls themselves may be added up.
-    dense = pull[1].clone()
-    for where, p in ((one, pull[0]), (two, pull[2])):
+    upstream = [torch.randn(o.shape, generator=generator) for o in together]
+    total = torch.autograd.grad(together, x, upstream)[0]
+    # The ReLU's mask is the same for all of them, so that the upstream gradients themselves may be added up.
+    dense = upstream[1].clone()
+    for where, p in ((one, upstream[0]), (two, upstream[2])):
         for k in range(2):
             for n, place in enumerate(where[k].tolist()):
                 dense[k, :, place // 7, place % 7] += p[k, n]
@@ -128,22 +128,22 @@ def test_operations_after_the_last_tap_do_not_matter(generator):
 
 def test_max_pool_breaks_ties_as_torch_does():
     x = torch.ones(1, 3, 4, 4)
-    pull = torch.arange(12.0).view(1, 3, 2, 2)
+    upstream = torch.arange(12.0).view(1, 3, 2, 2)
     expected = x.clone().requires_grad_()
-    F.max_pool2d(expected, 2).backward(pull)
+    F.max_pool2d(expected, 2).backward(upstream)
     assert expected.grad is not None
-    assert torch.equal(Pool("max").backward(pull, x), expected.grad)
+    assert torch.equal(Pool("max").backward(upstream, x), expected.grad)
 
 
 def test_returned_maps_belong_to_the_caller(generator):
     operations, plain = _network(generator, "average")
     x = _images(generator).requires_grad_()
     output = FrozenStack.apply(x, operations, [Tap(0)])[0]
-    pull = torch.randn(output.shape, generator=generator)
+    upstream = torch.randn(output.shape, generator=generator)
     with torch.no_grad():
         output.zero_()
-    ours = torch.autograd.grad(output, x, pull)[0]
-    assert relative_error(ours, torch.autograd.grad(plain(x)[0], x, pull)[0]) < 1e-6
+    ours = torch.autograd.grad(output, x, upstream)[0]
+    assert relative_error(ours, torch.autograd.grad(plain(x)[0], x, upstream)[0]) < 1e-6
 
 
 def test_maps_are_freed_without_a_backward_pass(generator):

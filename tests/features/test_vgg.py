@@ -108,9 +108,9 @@ def test_gradient_of_a_style_loss(networks, pictures, pool, precision, loss, los
     expected = loss(vectors(plain_vgg(reference, pool, MEAN_ACTIVATION[pool]), here), targets)
     expected.backward()
     images = pictures[:2].clone().requires_grad_()
-    found = loss(network.samples(images, here), targets)
-    found.backward()
-    assert found.item() == pytest.approx(expected.item(), rel=loss_error)
+    actual = loss(network.samples(images, here), targets)
+    actual.backward()
+    assert actual.item() == pytest.approx(expected.item(), rel=loss_error)
     assert reference.grad is not None and images.grad is not None
     assert cosine(images.grad, reference.grad) > least
     assert images.grad.norm().item() == pytest.approx(reference.grad.norm().item(), rel=0.02)

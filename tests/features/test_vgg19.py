@@ -18,15 +18,15 @@ TORCHVISION = (0, 2, 5, 7, 10, 12, 14, 16, 19, 21, 23, 25, 28, 30, 32, 34)
 
 def tensors(names):
     generator = torch.Generator().manual_seed(0)
-    found, inputs = {}, 3
+    weights, inputs = {}, 3
     for name, outputs in zip(names, WIDTHS, strict=True):
         weight = torch.randn(outputs, inputs, 3, 3, generator=generator) * (2 / (9 * inputs)) ** 0.5
-        found[f"{name}.weight"], found[f"{name}.bias"] = (
+        weights[f"{name}.weight"], weights[f"{name}.bias"] = (
             weight,
             0.1 * torch.randn(outputs, generator=generator),
         )
         inputs = outputs
-    return found
+    return weights
 
 
 def saved(tmp_path, names):
@@ -37,14 +37,14 @@ def saved(tmp_path, names):
 
 def test_own_layout_is_taken_as_it_is(tmp_path):
     names = [layer.replace("relu", "conv") for layer in LAYERS_19]
-    found = vgg19_convolutions(saved(tmp_path, names))
-    assert list(found) == list(LAYERS_19) and len(found) == 16
-    assert torch.equal(found["relu5_4"][0], tensors(names)["conv5_4.weight"])
+    convolutions = vgg19_convolutions(saved(tmp_path, names))
+    assert list(convolutions) == list(LAYERS_19) and len(convolutions) == 16
+    assert torch.equal(convolutions["relu5_4"][0], tensors(names)["conv5_4.weight"])
 
 
 def test_torchvisions_layout_gives_its_features(tmp_path):
     """The reference normalises the image as torchvision does, and runs its list of modules."""
-    given = tensors([f"features.{n}" for n in TORCHVISION])
+    parameters = tensors([f"features.{n}" for n in TORCHVISION])
     network = Vgg16(
         precision="float32",
         pool="max",
@@ -56,9 +56,11 @@ def test_torchvisions_layout_gives_its_features(tmp_path):
     for name, n in zip(LAYERS_19, TORCHVISION, strict=True):
         if name.endswith("_1") and n:
             x = F.max_pool2d(x, 2)
-        x = F.conv2d(x, given[f"features.{n}.weight"], given[f"features.{n}.bias"], padding=1).relu()
-    found = network.features(image, ["relu5_4"])["relu5_4"].permute(0, 3, 1, 2)
-    assert (found - x).abs().max() < 1e-4 * x.abs().max()
+        x = F.conv2d(
+            x, parameters[f"features.{n}.weight"], parameters[f"features.{n}.bias"], padding=1
+        ).relu()
+    features = network.features(image, ["relu5_4"])["relu5_4"].permute(0, 3, 1, 2)
+    assert (features - x).abs().max() < 1e-4 * x.abs().max()
 
 
 def test_what_is_not_vgg19_is_refused(tmp_path, monkeypatch):

@@ -36,8 +36,8 @@ def test_nearest_points_of_the_border_against_dense_samples(rng):
     barycentric, distance = nearest_on_border(triangles, points)
     np.testing.assert_allclose(barycentric.sum(1), 1.0)
     assert (barycentric.min(1) == 0.0).all()
-    found = interpolate(barycentric, triangles)
-    np.testing.assert_allclose(np.linalg.norm(found - points, axis=1), distance, atol=1e-12)
+    border_points = interpolate(barycentric, triangles)
+    np.testing.assert_allclose(np.linalg.norm(border_points - points, axis=1), distance, atol=1e-12)
     t = np.linspace(0, 1, 2001)[:, None]
     for triangle, point, value in zip(triangles, points, distance, strict=True):
         sides = np.concatenate([(1 - t) * triangle[k] + t * triangle[k - 1] for k in range(3)])

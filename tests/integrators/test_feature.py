@@ -106,9 +106,9 @@ def test_crop_is_a_part_of_the_picture(mi, mesh, data):
 
 @pytest.mark.parametrize("value", [0.3, [0.1, 0.2, 0.3, 0.4, 0.5]], ids=["one", "each"])
 def test_background(mi, mesh, data, value):
-    given = value if isinstance(value, float) else mi.TensorXf(np.array([value], np.float32))
+    background = value if isinstance(value, float) else mi.TensorXf(np.array([value], np.float32))
     views = cameras()
-    world = scene(mi, mesh, views, {"field": field(mi, data), "background": given})
+    world = scene(mi, mesh, views, {"field": field(mi, data), "background": background})
     expected = images(mesh, views, data, np.array(value))[0]
     np.testing.assert_allclose(np.array(mi.render(world)), expected, atol=1e-5)
 

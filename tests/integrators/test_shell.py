@@ -38,9 +38,9 @@ class Ball:
         pass
 
     def evaluate(self, points, view):
-        return self.found(mi.UInt32(dr.compress(dr.norm(points) < 0.5)))
+        return self.values(mi.UInt32(dr.compress(dr.norm(points) < 0.5)))
 
-    def found(self, index):
+    def values(self, index):
         if not dr.width(index):
             return index, mi.Float(), mi.Color3f()
         zero = dr.zeros(mi.Float, dr.width(index))
@@ -71,9 +71,9 @@ BRIGHT = {"emitter": {"type": "area", "radiance": {"type": "rgb", "value": [0.7,
 
 
 def test_an_opaque_field_shows_its_colour_before_what_is_behind():
-    found = picture(Ball(), wall=wall(-1, **BRIGHT))
-    np.testing.assert_allclose(found[16, 16], srgb_to_linear(np.array(COLOUR, np.float32)), atol=5e-3)
-    np.testing.assert_allclose(found[1, 1], [0.7, 0.1, 0.3], atol=1e-4)
+    image = picture(Ball(), wall=wall(-1, **BRIGHT))
+    np.testing.assert_allclose(image[16, 16], srgb_to_linear(np.array(COLOUR, np.float32)), atol=5e-3)
+    np.testing.assert_allclose(image[1, 1], [0.7, 0.1, 0.3], atol=1e-4)
 
 
 def test_what_is_in_front_covers_the_field():
@@ -82,11 +82,11 @@ def test_what_is_in_front_covers_the_field():
 
 def test_a_wall_through_the_middle_leaves_the_front_half():
     """Beer: the ray's way through the field ends at the wall."""
-    found = picture(Ball(2.0), spp=256, wall=wall(0, **BRIGHT))[16, 16]
+    colour = picture(Ball(2.0), spp=256, wall=wall(0, **BRIGHT))[16, 16]
     passes = math.exp(-2.0 * 0.5)
     own = srgb_to_linear(np.array(COLOUR, np.float32))
     expected = (1 - passes) * own + passes * np.array([0.7, 0.1, 0.3])
-    np.testing.assert_allclose(found, expected, atol=1e-2)
+    np.testing.assert_allclose(colour, expected, atol=1e-2)
 
 
 def test_the_field_casts_its_shadow():
@@ -115,12 +115,12 @@ def test_the_field_casts_its_shadow():
 def test_a_field_can_be_moved_scaled_and_turned():
     class Half(Ball):
         def evaluate(self, points, view):
-            return self.found(dr.compress((dr.norm(points) < 0.5) & (points.x > 0)))
+            return self.values(dr.compress((dr.norm(points) < 0.5) & (points.x > 0)))
 
     half = math.radians(90)
     up = np.array([[math.cos(half), -math.sin(half), 0], [math.sin(half), math.cos(half), 0], [0, 0, 1]])
-    found = picture(Half(), turn=up, wall=wall(-1, **BRIGHT))  # x turns to y: the upper half
-    assert found[14, 16, 0] < 0.1 < found[18, 16, 0]
+    upper = picture(Half(), turn=up, wall=wall(-1, **BRIGHT))  # x turns to y: the upper half
+    assert upper[14, 16, 0] < 0.1 < upper[18, 16, 0]
     small = picture(Ball(), place=Similarity(np.array([0.0, 0.0, 0.0]), 0.5), wall=wall(-1, **BRIGHT))
     large = picture(Ball(), wall=wall(-1, **BRIGHT))
     covered = [(image[..., 1] > 0.2).mean() for image in (small, large)]
@@ -160,9 +160,9 @@ def test_without_matter_it_is_a_path_tracer():
 def test_it_is_seen_through_glass():
     pane = {"type": "cube", "bsdf": {"type": "thindielectric"}}
     pane["to_world"] = mi.ScalarTransform4f().translate([0, 0, 1.5]).scale([2, 2, 0.01])
-    found = picture(Ball(), spp=256, pane=pane, sky={"type": "constant", "radiance": 0.5})[16, 16]
+    colour = picture(Ball(), spp=256, pane=pane, sky={"type": "constant", "radiance": 0.5})[16, 16]
     bare = srgb_to_linear(np.array(COLOUR, np.float32))
-    assert (np.abs(found - bare) < 0.12).all() and found[1] > 2 * found[0]
+    assert (np.abs(colour - bare) < 0.12).all() and colour[1] > 2 * colour[0]
 
 
 def test_gradients_reach_the_fields_parameters():
@@ -200,9 +200,9 @@ def test_gradients_reach_the_fields_parameters():
     [({"field": {"type": "constvolume", "value": 1.0}}, "shell_field"), ({"max_depth": 0}, "max_depth")],
 )
 def test_wrong_parameters_are_refused(wrong, message):
-    given = {"type": "shell", "field": shell_field(Ball(), Similarity(np.zeros(3), 1.0))}
+    integrator = {"type": "shell", "field": shell_field(Ball(), Similarity(np.zeros(3), 1.0))}
     with pytest.raises(RuntimeError, match=message):
-        mi.load_dict(given | wrong)
+        mi.load_dict(integrator | wrong)
 
 
 def test_one_mask_stands_for_all_rays():

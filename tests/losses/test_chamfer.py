@@ -36,8 +36,8 @@ def test_nearest_by_brute_force():
         1 - (a.normals * b.normals[to]).sum(1).mean(),
         1 - (b.normals * a.normals[back]).sum(1).mean(),
     )
-    for found, wanted in zip(chamfer(a, b), expected, strict=True):
-        assert float(found) == pytest.approx(float(wanted), abs=1e-5)
+    for term, reference in zip(chamfer(a, b), expected, strict=True):
+        assert float(term) == pytest.approx(float(reference), abs=1e-5)
 
 
 def test_both_normal_terms_work():

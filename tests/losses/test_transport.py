@@ -132,8 +132,8 @@ def test_far_colours_are_matched(generator):
     a = 40 * a - 20
     expected = torch.stack([brute_force.transport(x, y, True) for x, y in zip(a, b, strict=True)])
     for low_precision in (False, True):
-        found = relaxed_transport(a.float(), b.float(), True, low_precision)
-        assert found.tolist() == pytest.approx(expected.tolist(), rel=1e-4)
+        costs = relaxed_transport(a.float(), b.float(), True, low_precision)
+        assert costs.tolist() == pytest.approx(expected.tolist(), rel=1e-4)
 
 
 @pytest.mark.parametrize(("n", "m", "channels"), [(300, 200, 64), (1024, 1024, 128), (196, 64, 512)])
@@ -150,10 +150,10 @@ def test_the_search_is_exact_where_costs_differ(generator):
     """Against torch's argmin, in both directions, with a count that is no power of two."""
     a, b = _features(generator, 700, 999, 16)
     cost = 1 - F.normalize(a.double(), dim=-1) @ F.normalize(b.double(), dim=-1).mT
-    for found, dim in zip(_matches(a, b, False, False), (2, 1), strict=True):
-        picked = cost.gather(dim, found.unsqueeze(dim)).squeeze(dim)
+    for match, dim in zip(_matches(a, b, False, False), (2, 1), strict=True):
+        picked = cost.gather(dim, match.unsqueeze(dim)).squeeze(dim)
         assert (picked <= cost.amin(dim) * 1.001 + 1e-6).all()
-        assert (found == cost.argmin(dim)).float().mean() > 0.99
+        assert (match == cost.argmin(dim)).float().mean() > 0.99
 
 
 def test_low_precision_gradient(generator):
@@ -208,9 +208,9 @@ def test_colours_cost_what_the_authors_compute(generator):
     """Normalised, and without their matrix, which is orthogonal; black, as of a background, among them."""
     a, b = _sets(generator, 40, 30)
     a[:, :20] = 0
-    found = relaxed_transport(normalise_colours(a), normalise_colours(b), euclidean=True)
+    costs = relaxed_transport(normalise_colours(a), normalise_colours(b), euclidean=True)
     expected = [authors.colour_cost(x.numpy(), y.numpy()) for x, y in zip(a, b, strict=True)]
-    assert found.tolist() == pytest.approx(expected, rel=1e-4)
+    assert costs.tolist() == pytest.approx(expected, rel=1e-4)
 
 
 def test_channels_are_transported_exactly(generator):

@@ -36,14 +36,14 @@ TABLE = {
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the shared meshes are not here")
 @pytest.mark.parametrize("name", TABLE)
 def test_shared_meshes_match_their_table(name):
-    with warnings.catch_warnings(record=True) as caught:
+    with warnings.catch_warnings(record=True) as record:
         warnings.simplefilter("always")
         mesh = Mesh.load(SHARED / f"{name}.obj")
     report = quality(mesh)
-    found = (report.vertices, report.faces, report.euler, report.boundary_edges, report.valence[::2])
-    assert found == TABLE[name]
+    counts = (report.vertices, report.faces, report.euler, report.boundary_edges, report.valence[::2])
+    assert counts == TABLE[name]
     assert report.components == 1
-    assert [str(w.message).split(": ")[1] for w in caught] == (
+    assert [str(w.message).split(": ")[1] for w in record] == (
         ["kept edges of more than two faces (non-manifold)"] if name == "chair" else []
     )
 
@@ -150,13 +150,13 @@ def test_order_of_welded_vertices(tmp_path):
 
 
 def assert_refused(path, words, **options):
-    with pytest.raises(MeshError) as caught, warnings.catch_warnings():
+    with pytest.raises(MeshError) as error, warnings.catch_warnings():
         warnings.simplefilter("error")
         Mesh.load(path, **options)
-    assert words in caught.value.problem
-    assert Path(path).name[:40] in caught.value.problem
-    assert caught.value.remedy
-    assert "\n" not in str(caught.value)
+    assert words in error.value.problem
+    assert Path(path).name[:40] in error.value.problem
+    assert error.value.remedy
+    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(

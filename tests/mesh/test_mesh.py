@@ -33,11 +33,11 @@ def test_arrays_are_float32_and_int32():
     ],
 )
 def test_refuses_wrong_arrays(vertices, faces, uv, words):
-    with pytest.raises(MeshError) as caught:
+    with pytest.raises(MeshError) as error:
         Mesh(vertices, faces, uv, "thing")
-    assert words in caught.value.problem
-    assert caught.value.problem.startswith("thing: ")
-    assert caught.value.remedy
+    assert words in error.value.problem
+    assert error.value.problem.startswith("thing: ")
+    assert error.value.remedy
 
 
 def test_indices_that_overflow_int32_are_refused():

@@ -48,20 +48,20 @@ def test_edge_lists_equal_brute_force(mesh):
 def test_components_equal_flooding(mesh):
     count, label = components(mesh.edges)
     graph = mesh.edges
-    seen = -np.ones(len(mesh.vertices), int)
-    found = 0
-    for start in range(len(seen)):
-        if seen[start] >= 0:
+    reference = -np.ones(len(mesh.vertices), int)
+    number = 0
+    for start in range(len(reference)):
+        if reference[start] >= 0:
             continue
         queue = [start]
         while queue:
             i = queue.pop()
-            if seen[i] < 0:
-                seen[i] = found
+            if reference[i] < 0:
+                reference[i] = number
                 queue += graph.indices[graph.indptr[i] : graph.indptr[i + 1]].tolist()
-        found += 1
-    assert count == found
-    assert len(set(zip(label.tolist(), seen.tolist(), strict=True))) == found
+        number += 1
+    assert count == number
+    assert len(set(zip(label.tolist(), reference.tolist(), strict=True))) == number
 
 
 @pytest.mark.parametrize(

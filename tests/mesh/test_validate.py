@@ -37,11 +37,11 @@ def test_a_sound_mesh_passes_silently():
     ],
 )
 def test_refuses(vertices, faces, words):
-    with pytest.raises(MeshError) as caught:
+    with pytest.raises(MeshError) as error:
         quiet(vertices, faces, name="thing")
-    assert words in caught.value.problem
-    assert "thing" in caught.value.problem
-    assert caught.value.remedy
+    assert words in error.value.problem
+    assert "thing" in error.value.problem
+    assert error.value.remedy
 
 
 def test_refuses_what_is_over_budget():
@@ -51,10 +51,10 @@ def test_refuses_what_is_over_budget():
 
 
 def mended(vertices, faces, words, uv=None):
-    with pytest.warns(MeshWarning, match=words) as caught:
+    with pytest.warns(MeshWarning, match=words) as record:
         mesh = validate(vertices, faces, uv, name="thing")
-    assert len(caught) == 1
-    assert str(caught[0].message).startswith("thing: ")
+    assert len(record) == 1
+    assert str(record[0].message).startswith("thing: ")
     return mesh
 
 

@@ -24,15 +24,15 @@ def project(points: np.ndarray, view: View) -> np.ndarray:
 @pytest.mark.parametrize("stretch", [(1, 1, 1), (0.1, 1, 1), (1, 0.05, 1), (0.05, 0.05, 1), (3, 0.2, 0.2)])
 def test_all_points_are_inside_and_some_touch(elevation, stretch, rng):
     points = rng.normal(size=(200, 3)) * stretch + [0.3, -2.0, 1.0]
-    seen = np.abs(project(points, fit_view(points, elevation)))
-    assert seen.max() <= 1 - MARGIN + 1e-6
-    assert seen.max() > 1 - MARGIN - 0.01 or stretch == (0.05, 0.05, 1)
+    screen = np.abs(project(points, fit_view(points, elevation)))
+    assert screen.max() <= 1 - MARGIN + 1e-6
+    assert screen.max() > 1 - MARGIN - 0.01 or stretch == (0.05, 0.05, 1)
 
 
 def test_the_fuller_axis_is_centred(rng):
     points = rng.normal(size=(200, 3)) * [2.0, 0.5, 0.5]
-    seen = project(points, fit_view(points, 0.2))[:, 0]
-    np.testing.assert_allclose([seen.min(), seen.max()], [MARGIN - 1, 1 - MARGIN], atol=1e-6)
+    screen = project(points, fit_view(points, 0.2))[:, 0]
+    np.testing.assert_allclose([screen.min(), screen.max()], [MARGIN - 1, 1 - MARGIN], atol=1e-6)
 
 
 def test_azimuth_turns_the_named_side_to_the_camera():

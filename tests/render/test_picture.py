@@ -40,7 +40,7 @@ def test_stills_of_all_formats_agree(tmp_path):
 @pytest.mark.parametrize("name", ["a.mp4", "a.gif"])
 def test_turntables_have_all_frames_and_turn(name, tmp_path):
     albedo = np.where(ASSET.mesh.vertices[:, :1] > 0, [[0.9, 0.1, 0.1]], [[0.1, 0.1, 0.9]])
-    seen = []
+    calls = []
     path = turntable(
         Asset(ASSET.mesh, {"albedo": albedo}),
         tmp_path / name,
@@ -48,11 +48,11 @@ def test_turntables_have_all_frames_and_turn(name, tmp_path):
         fps=10,
         resolution=32,
         spp=4,
-        progress=lambda done, of: seen.append((done, of)),
+        progress=lambda done, of: calls.append((done, of)),
     )
     frames = iio.imread(path)
     assert frames.shape == (4, 32, 32, 3)
-    assert seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
     red = frames[:, 12:20, 12:20].mean(axis=(1, 2))
     assert red[1, 0] > 2 * red[1, 2] and red[3, 2] > 2 * red[3, 0]  # from +x, then from -x
     assert [p.name for p in tmp_path.iterdir()] == [name]
@@ -65,9 +65,9 @@ def test_films_show_assets_in_turn_without_moving_the_camera(tmp_path):
     dark = {"albedo": np.zeros((92, 3))}
     assets = [Asset(mesh, dark) for mesh in (ball, small, ball)]
     path = film(assets, tmp_path / "a.gif", frames=3, like=ball, resolution=64, spp=4)
-    shown = (iio.imread(path).mean(axis=3) < 60).sum(axis=(1, 2))
-    assert shown[0] == shown[2] > 800
-    assert shown[1] / shown[0] == pytest.approx(0.25, abs=0.05)
+    areas = (iio.imread(path).mean(axis=3) < 60).sum(axis=(1, 2))
+    assert areas[0] == areas[2] > 800
+    assert areas[1] / areas[0] == pytest.approx(0.25, abs=0.05)
 
 
 def test_gifs_loop_forever(tmp_path):

@@ -72,9 +72,9 @@ def test_environment_comes_before_the_system_newest_first_without_repetition(san
     folder = library(sandbox / "llvm-100/lib/libLLVM.so")
     own = library(sandbox / "env/lib/libLLVM.so.18.1")
     library(sandbox / "env/lib/libLLVM.txt")
-    found = [(item.origin, os.path.realpath(item.path)) for item in llvm.candidates()]
+    order = [(item.origin, os.path.realpath(item.path)) for item in llvm.candidates()]
     system = [("system", path) for path in (folder, nine, old, unknown)]
-    assert found == [("environment", own), *system]
+    assert order == [("environment", own), *system]
 
 
 def test_users_choice_stands_alone(sandbox: Path, monkeypatch: pytest.MonkeyPatch):
@@ -94,9 +94,9 @@ def test_known_bad_versions_are_refused_without_trying(sandbox: Path, monkeypatc
 
 def test_error_names_everything_found_and_the_remedy(sandbox: Path):
     first, second = library(sandbox / "lib/libLLVM-14.so.1"), library(sandbox / "lib/libLLVM-15.so.1")
-    with pytest.raises(RuntimeUnavailable) as caught:
+    with pytest.raises(RuntimeUnavailable) as error:
         llvm.find_llvm()
-    text = str(caught.value)
+    text = str(error.value)
     assert first in text and second in text and "14" in text and "older than 17" in text
     assert "karellen-llvm-core" in text and "libllvm19" in text and "\n" not in text
 

@@ -35,16 +35,16 @@ def _run(mode, **variables):
     clean = {k: v for k, v in os.environ.items() if not k.startswith("MALLOC_") and k != "GLIBC_TUNABLES"}
     command = [sys.executable, "-c", PROGRAM, mode]
     result = subprocess.run(command, env=clean | variables, capture_output=True, text=True, check=True)
-    said, faults = result.stdout.rsplit(maxsplit=1)
-    return said, int(faults)
+    answers, faults = result.stdout.rsplit(maxsplit=1)
+    return answers, int(faults)
 
 
 @pytest.mark.skipif(not GLIBC, reason="glibc only")
 def test_memory_is_not_asked_for_again():
     _, usual = _run("leave")
-    said, kept = _run("keep")
-    assert said == "[True, True]"
-    assert kept < usual / 5
+    answers, faults = _run("keep")
+    assert answers == "[True, True]"
+    assert faults < usual / 5
 
 
 @pytest.mark.skipif(not GLIBC, reason="glibc only")
@@ -53,8 +53,8 @@ def test_memory_is_not_asked_for_again():
     [{"MALLOC_TRIM_THRESHOLD_": "131072"}, {"GLIBC_TUNABLES": "glibc.malloc.mmap_threshold=131072"}],
 )
 def test_the_user_decides(variables):
-    said, faults = _run("keep", **variables)
-    assert said == "[False, False]"
+    answers, faults = _run("keep", **variables)
+    assert answers == "[False, False]"
     assert faults > 20 * 16
 
 

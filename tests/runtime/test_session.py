@@ -174,14 +174,14 @@ for task in sorted(Path("/proc/self/task").iterdir()):
 def test_workers_rest_before_any_is_ended(mi, monkeypatch: pytest.MonkeyPatch):
     from mitex.runtime.jit import dr
 
-    seen = []
+    sleeps = []
     mitex.runtime.set_workers(1)
-    monkeypatch.setattr(time, "sleep", lambda seconds: seen.append((seconds, dr.thread_count())))
+    monkeypatch.setattr(time, "sleep", lambda seconds: sleeps.append((seconds, dr.thread_count())))
     for count in (3, 3, 4, 2):
         mitex.runtime.set_workers(count)
         assert dr.thread_count() == count
-    before = seen.pop()
-    assert not seen and before[0] > 0.02 and before[1] == 4
+    before = sleeps.pop()
+    assert not sleeps and before[0] > 0.02 and before[1] == 4
 
 
 def test_threads_chosen_before_the_start_are_kept():

@@ -24,8 +24,8 @@ def test_two_spheres_cross_along_a_circle():
     ball = icosphere(3)
     points = np.concatenate([ball.vertices, ball.vertices + [0.9, 0.17, 0.31]])
     mesh = Mesh(points, np.concatenate([ball.faces, ball.faces + len(ball.vertices)]))
-    found = {tuple(pair) for pair in crossing_edges(mesh).tolist()}
-    assert found == brute_force(mesh) and len(found) > 20
+    edges = {tuple(pair) for pair in crossing_edges(mesh).tolist()}
+    assert edges == brute_force(mesh) and len(edges) > 20
 
 
 def test_a_crossing_behind_a_face_that_is_touched():
@@ -39,7 +39,7 @@ def brute_force(mesh: Mesh) -> set[tuple[int, int]]:
     """By solving start + t way = a + u (b - a) + v (c - a) for every edge and face."""
     corners = mesh.vertices[mesh.faces].astype(float)
     sides = {tuple(sorted((int(f[k]), int(f[k - 1])))) for f in mesh.faces for k in range(3)}
-    found = set()
+    edges = set()
     for i, j in sides:
         start, way = mesh.vertices[i].astype(float), (mesh.vertices[j] - mesh.vertices[i]).astype(float)
         for face, (a, b, c) in zip(mesh.faces, corners, strict=True):
@@ -50,5 +50,5 @@ def brute_force(mesh: Mesh) -> set[tuple[int, int]]:
                 continue
             t, u, v = np.linalg.solve(matrix, start - a)
             if 0 < t < 1 and u > 0 and v > 0 and u + v < 1:
-                found.add((i, j))
-    return found
+                edges.add((i, j))
+    return edges

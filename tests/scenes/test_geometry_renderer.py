@@ -36,11 +36,11 @@ def test_derivatives_by_finite_differences(renderer, name):
     vertices = start.clone().requires_grad_()
     weighted(renderer.render(vertices, seed=3)).backward()
     assert vertices.grad is not None
-    found = float((vertices.grad * way).sum())
+    derivative = float((vertices.grad * way).sum())
     values = [float(weighted(renderer.render(start + sign * step * way, seed=3))) for sign in (1, -1)]
     expected = (values[0] - values[1]) / (2 * step)
     assert abs(expected) > 5e-3
-    assert found == pytest.approx(expected, rel=0.08)
+    assert derivative == pytest.approx(expected, rel=0.08)
 
 
 def test_images_come_without_a_graph_too(renderer):

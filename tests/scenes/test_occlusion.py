@@ -34,9 +34,9 @@ def test_the_foot_of_a_wall(distance):
     size, height = 60.0, 2.0
     mesh = wall(size)
     mesh = mesh.with_vertices(mesh.vertices * [1, height / size, 1])
-    found = ambient_occlusion(mesh, np.array([[distance, 0.0, 0.0]]), UP[None], 1 << 16)
+    occlusion = ambient_occlusion(mesh, np.array([[distance, 0.0, 0.0]]), UP[None], 1 << 16)
     hidden = 0.5 * (1 - distance / np.hypot(distance, height))
-    assert found[0] == pytest.approx(1 - hidden, abs=0.01)
+    assert occlusion[0] == pytest.approx(1 - hidden, abs=0.01)
 
 
 def test_points_in_parts_are_the_same(monkeypatch):

@@ -163,7 +163,7 @@ def test_what_is_behind_an_opaque_surface_is_not_visible():
         starts = dr.select(points.y < -0.1, -0.9, dr.select(points.y < 0.1, 0.4, 9.0))
         return mi.Float(dr.select(points.x > starts, 60.0, 0.5))
 
-    kept = visible(samples, origin, direction, dense)
+    visible_samples = visible(samples, origin, direction, dense)
     ray, t = np.array(samples.ray), np.array(samples.t)
     density = np.array(dense(samples.points(origin, direction)))
     transmittance, expected = np.ones(3), []
@@ -171,7 +171,7 @@ def test_what_is_behind_an_opaque_surface_is_not_visible():
         if transmittance[ray[k]] > OPAQUE:
             expected.append((ray[k], t[k]))
         transmittance[ray[k]] *= math.exp(-density[k] / 32)
-    pixels = np.stack([np.array(kept.ray), np.array(kept.t)], axis=1)
+    pixels = np.stack([np.array(visible_samples.ray), np.array(visible_samples.t)], axis=1)
     np.testing.assert_array_equal(pixels, np.array(expected, np.float32))
     assert len(pixels) < 0.7 * len(ray)
     assert sum(looked_at[:-1]) < 0.75 * len(ray)  # the first ray's end is not looked at
@@ -189,9 +189,9 @@ def test_rays_gather_the_same_of_what_is_visible():
         weights, transmittance = weights_of(dense(samples.points(origin, direction)), samples)
         return np.array(sum_rays(weights * samples.t, samples)), np.array(transmittance)
 
-    kept = visible(samples, origin, direction, dense)
-    assert len(kept) < 0.9 * len(samples)
-    for pixels, expected in zip(gathered(kept), gathered(samples), strict=True):
+    visible_samples = visible(samples, origin, direction, dense)
+    assert len(visible_samples) < 0.9 * len(samples)
+    for pixels, expected in zip(gathered(visible_samples), gathered(samples), strict=True):
         np.testing.assert_allclose(pixels, expected, atol=3 * OPAQUE)
 
 

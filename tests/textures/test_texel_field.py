@@ -14,8 +14,8 @@ UNIT = (QUAD[:, :2] + 1) / 2  # uv of the quad whose map covers it once
 
 
 def field(mi, data: np.ndarray, charts: np.ndarray | None = None, **options) -> dict:
-    given = {"type": "texel_field", "data": mi.TensorXf(np.asarray(data, np.float32))} | options
-    return given if charts is None else given | {"charts": mi.TensorXf(np.asarray(charts, np.float32))}
+    plugin = {"type": "texel_field", "data": mi.TensorXf(np.asarray(data, np.float32))} | options
+    return plugin if charts is None else plugin | {"charts": mi.TensorXf(np.asarray(charts, np.float32))}
 
 
 def at(mi, uv: np.ndarray):
@@ -25,9 +25,9 @@ def at(mi, uv: np.ndarray):
     return si
 
 
-def lookups(mi, given: dict, uv: np.ndarray) -> np.ndarray:
+def lookups(mi, plugin: dict, uv: np.ndarray) -> np.ndarray:
     """(N, C) values of all channels."""
-    texture = mi.load_dict(given)
+    texture = mi.load_dict(plugin)
     return np.stack([value.numpy() for value in texture.gather(texture.locate(at(mi, uv)))], axis=1)
 
 
@@ -80,9 +80,9 @@ def charts(rng) -> np.ndarray:
 @pytest.mark.parametrize("masked", [False, True])
 def test_lookup_equals_the_slow_reference(mi, rng, uv, charts, kind: str, masked: bool):
     data = rng.uniform(-1, 2, (6, 9, 5))
-    given = field(mi, data, charts if masked else None, filter=kind, scale=2.0, offset=-0.25)
+    plugin = field(mi, data, charts if masked else None, filter=kind, scale=2.0, offset=-0.25)
     weights = slow_weights((6, 9), uv, charts if masked else None, kind == "nearest")
-    np.testing.assert_allclose(lookups(mi, given, uv), 2 * weights @ data.reshape(54, 5) - 0.25, atol=2e-5)
+    np.testing.assert_allclose(lookups(mi, plugin, uv), 2 * weights @ data.reshape(54, 5) - 0.25, atol=2e-5)
     unread = weights.sum(axis=1) == 0
     assert unread.any() == masked  # some lookups see unused texels only
 
@@ -119,9 +119,9 @@ def test_charts_do_not_bleed(mi, rng, padded: bool):
     left[:, 0] *= 4 / 9
     right[:, 0] = (5 + 4 * right[:, 0]) / 9
     left[0], right[0], right[1] = (3.999 / 9, 0.3), (5.001 / 9, 0.3), (1, 1)
-    given = field(mi, data, charts)
-    np.testing.assert_allclose(lookups(mi, given, left), np.tile(data[0, 0], (200, 1)), atol=2e-7)
-    np.testing.assert_allclose(lookups(mi, given, right), np.tile(data[0, 8], (200, 1)), atol=2e-7)
+    plugin = field(mi, data, charts)
+    np.testing.assert_allclose(lookups(mi, plugin, left), np.tile(data[0, 0], (200, 1)), atol=2e-7)
+    np.testing.assert_allclose(lookups(mi, plugin, right), np.tile(data[0, 8], (200, 1)), atol=2e-7)
     plain = lookups(mi, field(mi, data), right)
     assert np.abs(plain - data[0, 8]).max() > 0.1  # without chart numbers it bleeds
 
@@ -169,8 +169,8 @@ def test_gradient_is_the_transposed_lookup(mi, rng, uv, charts, kind: str, maske
     direction = rng.normal(size=data.shape)
 
     def total(shifted: np.ndarray) -> float:
-        given = field(mi, shifted, charts if masked else None, filter=kind, scale=3.0)
-        return float((lookups(mi, given, uv).astype(np.float64) * upstream).sum())
+        plugin = field(mi, shifted, charts if masked else None, filter=kind, scale=3.0)
+        return float((lookups(mi, plugin, uv).astype(np.float64) * upstream).sum())
 
     slope = total(data + 0.5 * direction) - total(data - 0.5 * direction)  # linear: one step is exact
     assert slope == pytest.approx(float((gradient * direction).sum()), rel=1e-4, abs=1e-3)
@@ -192,19 +192,19 @@ def test_slope_by_u_and_v(mi, rng, uv, charts, masked: bool):
         for step in ((h, 0), (-h, 0), (0, h), (0, -h)):
             same = (slow_weights((6, 9), uv + step, charts) > 0) == (slow_weights((6, 9), uv, charts) > 0)
             smooth &= same.all(axis=1)
-    chosen = uv[smooth].astype(np.float64)
-    assert len(chosen) > 100
+    places = uv[smooth].astype(np.float64)
+    assert len(places) > 100
 
     def exact(moved: np.ndarray) -> np.ndarray:
         return 2 * slow_weights((6, 9), moved, used) @ data.ravel()
 
     steps = np.array(((h, 0), (0, h)))
-    expected = [(exact(chosen + step) - exact(chosen - step)) / (2 * h) for step in steps]
-    result = np.array(texture.eval_1_grad(at(mi, chosen)))
+    expected = [(exact(places + step) - exact(places - step)) / (2 * h) for step in steps]
+    result = np.array(texture.eval_1_grad(at(mi, places)))
     np.testing.assert_allclose(result, expected, rtol=1e-3, atol=5e-3)
     assert np.abs(result).max() > 1
 
-    si = at(mi, chosen)
+    si = at(mi, places)
     dr.enable_grad(si.uv)
     dr.backward(dr.sum(texture.eval_1(si)))
     np.testing.assert_allclose(np.array(dr.grad(si.uv)), result, rtol=1e-3, atol=5e-3)
@@ -232,13 +232,13 @@ def test_reflectance_decodes_srgb(mi, points):
     np.testing.assert_allclose(radiance(mi, shape, middle, 0 * middle), encoded.clip(0, 1), atol=1e-5)
 
 
-@pytest.mark.parametrize(("channel", "shown"), [(0, (0, 1, 2)), (2, (2, 3, 4)), (3, (3, 3, 3))])
-def test_channel_selects(mi, rng, points, channel: int, shown: tuple[int, ...]):
+@pytest.mark.parametrize(("channel", "channels"), [(0, (0, 1, 2)), (2, (2, 3, 4)), (3, (3, 3, 3))])
+def test_channel_selects(mi, rng, points, channel: int, channels: tuple[int, ...]):
     values = rng.uniform(0.1, 0.9, 5)
     data = np.broadcast_to(values, (3, 4, 5))
     bsdf = {"type": "diffuse", "reflectance": field(mi, data, raw=True, channel=channel)}
     result = radiance(mi, quad(mi, bsdf, UNIT), *points)
-    np.testing.assert_allclose(result, np.broadcast_to(values[list(shown)], (50, 3)), atol=1e-6)
+    np.testing.assert_allclose(result, np.broadcast_to(values[list(channels)], (50, 3)), atol=1e-6)
 
 
 LIGHT = np.array([0.3, 0.2, -1.0]) / np.linalg.norm([0.3, 0.2, -1.0])
@@ -324,8 +324,8 @@ def test_feature_images_all_channels_with_their_adjoint(mi, rng, charts, antiali
 
 
 def test_update_through_traverse(mi, points):
-    given = field(mi, np.full((4, 4, 3), 0.2), np.zeros((4, 4)), raw=True)
-    shape = quad(mi, {"type": "diffuse", "reflectance": given}, UNIT)
+    plugin = field(mi, np.full((4, 4, 3), 0.2), np.zeros((4, 4)), raw=True)
+    shape = quad(mi, {"type": "diffuse", "reflectance": plugin}, UNIT)
     np.testing.assert_allclose(radiance(mi, shape, *points), 0.2, atol=1e-6)
     params, key = mi.traverse(shape), "bsdf.reflectance."
     params[key + "data"] = mi.TensorXf(np.full((4, 4, 3), 0.7, np.float32))
@@ -385,11 +385,11 @@ def test_to_string(mi):
     ],
 )
 def test_bad_properties_are_refused(mi, options: dict, problem: str):
-    given = field(mi, np.zeros((4, 4, 3)))
+    plugin = field(mi, np.zeros((4, 4, 3)))
     for key, value in options.items():
-        given[key] = mi.TensorXf(value.astype(np.float32)) if isinstance(value, np.ndarray) else value
+        plugin[key] = mi.TensorXf(value.astype(np.float32)) if isinstance(value, np.ndarray) else value
     with pytest.raises(RuntimeError, match=problem):
-        mi.load_dict({k: v for k, v in given.items() if v is not None})
+        mi.load_dict({k: v for k, v in plugin.items() if v is not None})
 
 
 def test_other_variants(mi, points):

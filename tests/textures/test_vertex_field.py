@@ -38,14 +38,14 @@ def test_srgb_is_decoded_for_colours_only(mi, points):
 
 
 @pytest.mark.parametrize(
-    ("channel", "shown"), [(0, (0, 1, 2)), (2, (2, 3, 4)), (3, (3, 3, 3)), (4, (4, 4, 4))]
+    ("channel", "channels"), [(0, (0, 1, 2)), (2, (2, 3, 4)), (3, (3, 3, 3)), (4, (4, 4, 4))]
 )
-def test_channel_selects(mi, rng, points, channel: int, shown: tuple[int, ...]):
+def test_channel_selects(mi, rng, points, channel: int, channels: tuple[int, ...]):
     values = rng.uniform(0.1, 0.9, 5)
     data = np.broadcast_to(values, (4, 5))
     bsdf = {"type": "diffuse", "reflectance": field(mi, data, raw=True, channel=channel)}
     result = radiance(mi, quad(mi, bsdf), *points)
-    np.testing.assert_allclose(result, np.broadcast_to(values[list(shown)], (50, 3)), atol=1e-6)
+    np.testing.assert_allclose(result, np.broadcast_to(values[list(channels)], (50, 3)), atol=1e-6)
 
 
 def test_scale_and_offset_come_before_decoding(mi, points):
@@ -197,9 +197,9 @@ def test_vector_is_one_channel(mi):
     ],
 )
 def test_bad_properties_are_refused(mi, options: dict, problem: str):
-    given = {k: v for k, v in (field(mi, np.zeros((4, 3))) | options).items() if v is not None}
+    plugin = {k: v for k, v in (field(mi, np.zeros((4, 3))) | options).items() if v is not None}
     with pytest.raises(RuntimeError, match=problem):
-        mi.load_dict(given)
+        mi.load_dict(plugin)
 
 
 def test_too_few_rows_and_other_shapes_read_nothing(mi, points):

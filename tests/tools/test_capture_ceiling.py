@@ -44,10 +44,10 @@ def capture(studio, folder: Path, colour) -> float:
 
 def test_nobody_tells_noise(tools, tmp_path):
     ceiling, studio = tools
-    drawn = np.random.default_rng(0)
-    share = capture(studio, tmp_path, lambda points: drawn.random((len(points), 3)))
-    found = ceiling.ceilings(tmp_path, np.random.default_rng(0))
-    for db, count in zip(found, (ceiling.NEAR, ceiling.ALIKE), strict=True):
+    rng = np.random.default_rng(0)
+    share = capture(studio, tmp_path, lambda points: rng.random((len(points), 3)))
+    ceilings = ceiling.ceilings(tmp_path, np.random.default_rng(0))
+    for db, count in zip(ceilings, (ceiling.NEAR, ceiling.ALIKE), strict=True):
         # A pixel's own variance, and that of the mean of `count` others.
         assert db == pytest.approx(-10 * math.log10(share * (1 + 1 / count) / 12), abs=0.15)
 

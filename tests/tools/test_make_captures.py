@@ -40,7 +40,7 @@ def capture(folder) -> Capture:
 
 
 @pytest.fixture(scope="module")
-def made(script):
+def shape(script):
     return script.KINDS[QUICK](np.random.default_rng([0, script.SEEDS[QUICK]]))
 
 
@@ -81,21 +81,21 @@ def test_cameras_stand_all_around(capture):
     assert apart.min() > 0.5 * np.sqrt(4 * np.pi / VIEWS)
 
 
-def test_true_depth_and_normal_are_those_of_the_mesh(capture, folder, made, rng):
-    mesh = made[1].mesh
+def test_true_depth_and_normal_are_those_of_the_mesh(capture, folder, shape, rng):
+    mesh = shape[1].mesh
     corners = mesh.vertices[mesh.faces].astype(np.float64)
     for view in (0, 7):
         depth, normal = truth(folder, view)
         rows, columns = rng.integers(0, SIZE, (2, 5))
         origins, rays = capture.rays(view, np.stack([columns + 0.5, rows + 0.5], axis=1))
         origins = capture.similarity.inverse(origins)
-        for origin, ray, found, towards in zip(
+        for origin, ray, distance, towards in zip(
             origins, rays.astype(float), depth[rows, columns], normal[rows, columns], strict=True
         ):
-            wanted, wanted_normal = first_hit(origin, ray, corners)
-            assert found == pytest.approx(wanted, abs=2e-4)
-            if np.isfinite(wanted):
-                assert abs(wanted_normal @ towards) > 0.99 and ray @ towards < 0
+            expected, expected_normal = first_hit(origin, ray, corners)
+            assert distance == pytest.approx(expected, abs=2e-4)
+            if np.isfinite(expected):
+                assert abs(expected_normal @ towards) > 0.99 and ray @ towards < 0
 
 
 def test_alpha_is_where_the_rays_hit(capture, folder):
@@ -113,27 +113,27 @@ def test_every_true_point_is_in_the_scene_cube(capture, folder):
         assert np.abs(points).max() <= 0.75
 
 
-def test_base_is_closed_and_below_the_texture(folder, made):
+def test_base_is_closed_and_below_the_texture(folder, shape):
     base = Mesh.load(folder / "base.obj")
     assert len(boundary_edges(base.faces, len(base.vertices))) == 0
-    assert np.allclose(base.vertices, made[0].mesh().vertices, atol=1e-5)
-    reach = np.linalg.norm(made[1].mesh.vertices, axis=1).max()
+    assert np.allclose(base.vertices, shape[0].mesh().vertices, atol=1e-5)
+    reach = np.linalg.norm(shape[1].mesh.vertices, axis=1).max()
     assert np.linalg.norm(base.vertices, axis=1).max() < reach
 
 
-def test_photos_are_made_again(script, made, folder, capture):
+def test_photos_are_made_again(script, shape, folder, capture):
     """The same seed gives the same picture."""
     studio = import_module("capture_studio")
     pose = np.array(json.loads((folder / "transforms.json").read_text())["frames"][3]["transform_matrix"])
-    again = studio.Studio(made[1], SIZE).photo(pose, 4, script.SEEDS[QUICK] + 3)
+    again = studio.Studio(shape[1], SIZE).photo(pose, 4, script.SEEDS[QUICK] + 3)
     assert np.abs(again.astype(int) - capture.images[3]).max() <= 1
 
 
 def test_unknown_names_are_refused(script, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["make_captures.py", "moss"])
-    with pytest.raises(SystemExit) as caught:
+    with pytest.raises(SystemExit) as error:
         script.main()
-    assert caught.value.code == 2 and "no such capture: moss" in capsys.readouterr().err
+    assert error.value.code == 2 and "no such capture: moss" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -90,12 +90,12 @@ def random_kills(folder: Path, kills: int = 25) -> dict:
 
 def die_at(event: int, out: Path) -> None:
     """Makes this process kill itself before its `event`th access to a file of the run or sync."""
-    seen = 0
+    count = 0
 
     def strike() -> None:
-        nonlocal seen
-        seen += 1
-        if seen == event:
+        nonlocal count
+        count += 1
+        if count == event:
             os.kill(os.getpid(), signal.SIGKILL)
 
     def hook(name: str, arguments: tuple) -> None:

@@ -36,9 +36,9 @@ PRESETS = {"patch": Config(), "paper": Config(steps=900, preset="paper", lr=0.5)
 
 
 def _error(*overrides, file=None, preset=None):
-    with pytest.raises(ConfigError) as caught:
+    with pytest.raises(ConfigError) as error:
         resolve(PRESETS, preset, file, overrides)
-    return str(caught.value)
+    return str(error.value)
 
 
 def test_the_first_preset_is_the_default():
@@ -79,9 +79,9 @@ def test_order_preset_file_override(tmp_path):
     ],
 )
 def test_settings_reach_every_type(setting, key, value):
-    found = getattr(resolve(PRESETS, overrides=[setting]), key)
-    assert found == value
-    assert type(found) is type(value)
+    result = getattr(resolve(PRESETS, overrides=[setting]), key)
+    assert result == value
+    assert type(result) is type(value)
 
 
 def test_settings_are_checked_together_and_the_last_one_counts():

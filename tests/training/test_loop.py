@@ -146,9 +146,9 @@ def test_the_learning_rate_may_change(tmp_path):
 
 
 def test_lr_may_be_a_function(tmp_path):
-    seen = []
-    _train(tmp_path, lr=lambda step: seen.append(step) or 0.0)
-    assert seen == list(range(20))
+    steps = []
+    _train(tmp_path, lr=lambda step: steps.append(step) or 0.0)
+    assert steps == list(range(20))
 
 
 def test_folders_are_not_overwritten(tmp_path):
@@ -223,9 +223,9 @@ def test_divergence_keeps_the_good_checkpoint_and_can_be_resumed(tmp_path, fault
     _train(tmp_path / "whole")
     out = tmp_path / "run"
     task = SmallTask(faults={step: fault for step in range(13, 20)})
-    with pytest.raises(TrainingDiverged) as caught:
+    with pytest.raises(TrainingDiverged) as error:
         _train(out, task)
-    message = str(caught.value)
+    message = str(error.value)
     assert f"the {kind} was not finite in 3 steps in a row, up to step 16" in message
     assert str(out / checkpoint.NAME) in message
     assert "smaller learning rate" in message
@@ -252,13 +252,13 @@ def test_an_interrupted_run_saves_and_goes_on(tmp_path, number):
     out = tmp_path / "run"
     before = signal.signal(number, signal.default_int_handler)
     try:
-        with pytest.raises(Interrupted, match="after step 8.*--resume") as caught:
+        with pytest.raises(Interrupted, match="after step 8.*--resume") as error:
             _train(out, SmallTask(faults={7: _signal(number)}))
         assert signal.getsignal(number) is signal.default_int_handler
     finally:
         signal.signal(number, before)
-    assert isinstance(caught.value, KeyboardInterrupt)
-    assert (caught.value.step, caught.value.checkpoint) == (8, out / checkpoint.NAME)
+    assert isinstance(error.value, KeyboardInterrupt)
+    assert (error.value.step, error.value.checkpoint) == (8, out / checkpoint.NAME)
     assert checkpoint.load(out).step == 8
     _train(out, resume=True)
     assert_same_run(tmp_path / "whole", out)
@@ -285,12 +285,12 @@ def test_a_second_interrupt_stops_inside_the_step(tmp_path):
 
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        with pytest.raises(KeyboardInterrupt) as caught:
+        with pytest.raises(KeyboardInterrupt) as error:
             _train(tmp_path, SmallTask(faults={7: twice}))
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     finally:
         signal.signal(signal.SIGINT, before)
-    assert not isinstance(caught.value, Interrupted)
+    assert not isinstance(error.value, Interrupted)
     assert checkpoint.load(tmp_path).step == 5
     _train(tmp_path, resume=True)
     assert len(lines(tmp_path)) == 20

@@ -44,16 +44,16 @@ def test_an_ignored_signal_stays_ignored():
 
 
 def test_other_threads_change_no_handler():
-    seen = []
+    states = []
 
     def work():
         with StopSignals() as stop:
-            seen.append((signal.getsignal(signal.SIGINT), stop.requested))
+            states.append((signal.getsignal(signal.SIGINT), stop.requested))
 
     thread = threading.Thread(target=work)
     thread.start()
     thread.join()
-    assert seen == [(signal.default_int_handler, False)]
+    assert states == [(signal.default_int_handler, False)]
 
 
 def test_the_first_signal_is_answered_unless_quiet(capfd):

@@ -135,12 +135,12 @@ def _instances(tree: dict):
     if scenes:
         roots = scenes[tree.get("scene", 0)].get("nodes", [])
     stack = [(root, np.eye(4)) for root in reversed(roots)]
-    seen = set()
+    visited = set()
     while stack:
         index, parent = stack.pop()
-        if index in seen:
+        if index in visited:
             raise ValueError(f"node {index} has two parents")
-        seen.add(index)
+        visited.add(index)
         node = nodes[index]
         matrix = parent @ _matrix(node)
         stack.extend((child, matrix) for child in reversed(node.get("children", [])))

@@ -56,46 +56,46 @@ def read_obj(name: str, data: bytes, max_vertices: int) -> Soup:
 
 
 def _scan(name: str, data: bytes) -> _Lines:
-    found = _Lines()
+    lines = _Lines()
     known: dict[bytes, tuple[int, int, int]] = {}
     for number, line in enumerate(data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines(), 1):
         try:
-            _take(found, line, known)
+            _take(lines, line, known)
         except (ValueError, IndexError) as error:
             text = line[:40].decode("ascii", "replace")
             raise MeshError(f"line {number} of {name} is not valid OBJ: '{text}'", DAMAGED) from error
-    return found
+    return lines
 
 
-def _take(found: _Lines, line: bytes, known: dict[bytes, tuple[int, int, int]]) -> None:
+def _take(lines: _Lines, line: bytes, known: dict[bytes, tuple[int, int, int]]) -> None:
     words = (line.partition(b"#")[0] if b"#" in line else line).split()
     if not words:
         return
     key = words[0]
     if key == b"v":
-        found.vertices.append((float(words[1]), float(words[2]), float(words[3])))
+        lines.vertices.append((float(words[1]), float(words[2]), float(words[3])))
     elif key == b"f":
         for word in words[1:]:
             corner = known.get(word)
             if corner is None:
-                corner = _corner(word, found)
+                corner = _corner(word, lines)
                 if b"-" not in word:
                     known[word] = corner
-            found.corners.append(corner)
-        found.sizes.append(len(words) - 1)
+            lines.corners.append(corner)
+        lines.sizes.append(len(words) - 1)
     elif key == b"vn":
-        found.normals.append((float(words[1]), float(words[2]), float(words[3])))
+        lines.normals.append((float(words[1]), float(words[2]), float(words[3])))
     elif key == b"vt":
         # One-dimensional texture coordinates are allowed.
-        found.uvs.append((float(words[1]), float(words[2]) if len(words) > 2 else 0.0))
+        lines.uvs.append((float(words[1]), float(words[2]) if len(words) > 2 else 0.0))
 
 
-def _corner(word: bytes, found: _Lines) -> tuple[int, int, int]:
+def _corner(word: bytes, lines: _Lines) -> tuple[int, int, int]:
     """`v`, `v/vt`, `v//vn` or `v/vt/vn`, 1-based, negative ones counted from the line's place backwards."""
     vertex, uv, normal = (*word.split(b"/"), b"", b"")[:3]
     if not vertex:
         raise ValueError("a corner without vertex")
-    counts = len(found.vertices), len(found.uvs), len(found.normals)
+    counts = len(lines.vertices), len(lines.uvs), len(lines.normals)
     return _index(vertex, counts[0]), _index(uv, counts[1]), _index(normal, counts[2])
 
 
@@ -112,9 +112,9 @@ def _looked_up(
     name: str, what: str, pool: list[tuple[float, ...]], index: np.ndarray, width: int
 ) -> np.ndarray | None:
     """(N, width) values of the corners, or None where some have none."""
-    given = index[index != MISSING]
-    if given.size and (given.min() < 0 or given.max() >= len(pool)):
+    present = index[index != MISSING]
+    if present.size and (present.min() < 0 or present.max() >= len(pool)):
         raise MeshError(f"{name} has a face whose {what} does not exist", DAMAGED)
-    if not len(index) or len(given) < len(index):
+    if not len(index) or len(present) < len(index):
         return None
     return np.array(pool, np.float64).reshape(-1, width)[index]

@@ -43,10 +43,10 @@ class Demo:
     def run(self) -> None:
         in_range("--seed", self.seed, *SEEDS)
         in_range("--steps", self.steps, 1)
-        begun = time.monotonic()
+        start = time.monotonic()
         for path in demo(self.out, self.seed, self.steps, lambda line: print(line, flush=True)):
             print(path)
-        print(f"done in {time.monotonic() - begun:.0f} s")
+        print(f"done in {time.monotonic() - start:.0f} s")
 
 
 def demo(out: Path, seed: int, steps: int, say: Callable[[str], None] = lambda line: None) -> list[Path]:

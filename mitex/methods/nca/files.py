@@ -82,10 +82,10 @@ def _maps(maps: list[str], model: MeshNCA, path: Path) -> list[str]:
     unknown = [name for name in maps if name not in STATE_CHANNELS]
     if unknown or not maps:
         raise CheckpointError(f"'{path}' has unknown maps {unknown}", "it was written by another version")
-    needed = 1 + max(channel for name in maps for channel in STATE_CHANNELS[name])
-    if needed > model.channels:
+    channels = 1 + max(channel for name in maps for channel in STATE_CHANNELS[name])
+    if channels > model.channels:
         raise CheckpointError(
-            f"the model in '{path}' has {model.channels} channels, its maps need {needed}", "train it again"
+            f"the model in '{path}' has {model.channels} channels, its maps need {channels}", "train it again"
         )
     return maps
 
@@ -112,11 +112,11 @@ def _model(tensors: dict[str, torch.Tensor], degree: object, path: Path) -> Mesh
     return model
 
 
-def _degree(told: object, channels: int, inputs: int) -> int | None:
+def _degree(stated: object, channels: int, inputs: int) -> int | None:
     """Of the harmonics: what the file tells, else one that leaves no condition, else the authors' 1."""
     widths = {degree: (count + 1) * channels for degree, count in HARMONICS.items()}
     exact = [degree for degree, width in widths.items() if width == inputs]
     fitting = [degree for degree, width in widths.items() if width <= inputs]
-    if told is not None:
-        return next((degree for degree in fitting if str(degree) == str(told)), None)
+    if stated is not None:
+        return next((degree for degree in fitting if str(degree) == str(stated)), None)
     return next(iter(exact or [degree for degree in (1, 0) if degree in fitting]), None)

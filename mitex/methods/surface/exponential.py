@@ -151,10 +151,10 @@ class _Planes:
         size = dr.max(dr.abs(direction))
         direction = direction / dr.select(size > 0.0, size, 1.0)  # before squares overflow
         x, y = (dr.dot(dr.gather(Array3f64, self.axes, 2 * face + k), direction) for k in range(2))
-        kept = dr.sqrt(x * x + y * y)
-        ready = kept > NORMAL
+        norm = dr.sqrt(x * x + y * y)
+        ready = norm > NORMAL
         point = Array2f64(weights.y * shape.x + weights.z * shape.y, weights.z * shape.z)
-        unit = Array2f64(x, y) / dr.select(ready, kept, 1.0)
+        unit = Array2f64(x, y) / dr.select(ready, norm, 1.0)
         return _Walk(face, shape, point, unit, length, Int32(-1), UInt32(0), ready, Bool(False))
 
     def step(self, walk: _Walk) -> tuple[_Walk]:

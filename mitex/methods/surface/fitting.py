@@ -115,12 +115,12 @@ def check_memory(mesh: Mesh, config: SurfaceConfig, maps: int = 1) -> None:
     assert mesh.uv is not None
     share = 0.5 * np.abs(twice_area(mesh.uv)).sum()
     each = BYTES_PER_TEXEL + BYTES_PER_TRIPLE * (min(config.triples, maps) - 1)
-    needed = each * share * config.resolution**2
+    memory = each * share * config.resolution**2
     free = available_memory()
-    if free is not None and needed > free:
-        fits = int(config.resolution * math.sqrt(free / needed))
+    if free is not None and memory > free:
+        fits = int(config.resolution * math.sqrt(free / memory))
         raise ConfigError(
-            f"a texture of {config.resolution}^2 needs about {needed / 1e9:.1f} GB of memory, "
+            f"a texture of {config.resolution}^2 needs about {memory / 1e9:.1f} GB of memory, "
             f"and {free / 1e9:.1f} GB are free",
             f"set --resolution {max(fits, 1)} or less",
         )

@@ -102,11 +102,11 @@ class SurfaceConv:
 
 
 class BilinearConv:
-    """The first convolution: its taps interpolate the texels (section 3.1); float32 in, `kept` out.
+    """The first convolution: its taps interpolate the texels (section 3.1); float32 in, `output_dtype` out.
 
     Args:
         weight, bias: as in `SurfaceConv`.
-        kept: dtype of the output.
+        output_dtype: dtype of the output.
         lookup: (9 n, n) CSR, the shares that each tap reads; row 9 i + k is tap k of element i.
     """
 
@@ -116,15 +116,15 @@ class BilinearConv:
         self,
         weight: torch.Tensor,
         bias: torch.Tensor,
-        kept: torch.dtype,
+        output_dtype: torch.dtype,
         lookup: scipy.sparse.csr_array,
     ) -> None:
-        self.weight, self.bias, self.kept = weight.permute(0, 2, 3, 1).flatten(1), bias, kept
+        self.weight, self.bias, self.output_dtype = weight.permute(0, 2, 3, 1).flatten(1), bias, output_dtype
         self.matrix, self.adjoint = csr_tensor(lookup), csr_tensor(lookup.T.tocsr())
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         taps = (self.matrix @ x).view(len(x), -1)
-        return F.linear(taps, self.weight, self.bias).relu_().to(self.kept)
+        return F.linear(taps, self.weight, self.bias).relu_().to(self.output_dtype)
 
     def backward(self, gradient: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
         torch.ops.aten.threshold_backward.grad_input(gradient, values, 0, grad_input=gradient)

@@ -58,18 +58,18 @@ def _planes(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
 def _glue(corners: np.ndarray) -> np.ndarray:
     """`Unfolding.glued` of welded corners (F, 3)."""
     glued = np.full((len(corners), 3), -1, np.int32)
-    kept = np.flatnonzero((corners != np.roll(corners, 1, axis=1)).all(axis=1))
-    if not len(kept):
+    faces = np.flatnonzero((corners != np.roll(corners, 1, axis=1)).all(axis=1))
+    if not len(faces):
         return glued
-    _, edges = face_edges(corners[kept], int(corners.max()) + 1)
+    _, edges = face_edges(corners[faces], int(corners.max()) + 1)
     flat = edges.ravel()
     order = np.argsort(flat, kind="stable")
     count = np.bincount(flat)
     pair = (np.cumsum(count) - count)[count == 2]
     one, other = order[pair], order[pair + 1]
-    start = corners[kept].ravel()
+    start = corners[faces].ravel()
     same = (start[one] == start[other]).astype(np.int64)
-    side = (3 * kept[:, None] + np.arange(3)).ravel()  # kept sides in the numbers of all
+    side = (3 * faces[:, None] + np.arange(3)).ravel()  # their sides in the numbers of all
     glued.reshape(-1)[side[one]] = 2 * side[other] + same
     glued.reshape(-1)[side[other]] = 2 * side[one] + same
     return glued

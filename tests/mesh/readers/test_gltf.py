@@ -52,8 +52,8 @@ def test_nodes_agree_with_trimesh(tmp_path):
         mesh = load(tmp_path, tree, blob)
     scene = trimesh.load_scene(tmp_path / "a.glb", process=False, maintain_order=True)
     reference = scene.to_mesh()
-    found = np.sort(corners(mesh).reshape(-1, 9).round(4), axis=0)
-    np.testing.assert_allclose(found, np.sort(reference.triangles.reshape(-1, 9), axis=0), atol=2e-4)
+    triangles = np.sort(corners(mesh).reshape(-1, 9).round(4), axis=0)
+    np.testing.assert_allclose(triangles, np.sort(reference.triangles.reshape(-1, 9), axis=0), atol=2e-4)
     assert len(mesh.vertices) == 4 + 6 + 6
 
 
@@ -107,9 +107,9 @@ def test_integer_uvs(kind, top, tmp_path):
 
 def test_uvs_of_some_parts_only_are_left_out(tmp_path):
     far = {"positions": FAN_POINTS + 5.0, "indices": TETRAHEDRON}
-    with pytest.warns(MeshWarning) as caught:
+    with pytest.warns(MeshWarning) as record:
         mesh = load(tmp_path, *gltf([{**PART, "uv": np.zeros((4, 2), np.float32)}, far]))
-    assert any("only some parts" in str(w.message) for w in caught)
+    assert any("only some parts" in str(w.message) for w in record)
     assert mesh.uv is None
 
 
@@ -179,9 +179,9 @@ def test_buffers_beside_the_file(tmp_path):
 def test_buffers_elsewhere_are_not_opened(uri, words, tmp_path):
     (tmp_path / "model").mkdir()
     (tmp_path / "model" / "link.bin").symlink_to(tmp_path / "secret.bin")
-    with pytest.raises(MeshError) as caught:
+    with pytest.raises(MeshError) as error:
         external(tmp_path, uri.replace("{root}", str(tmp_path)))
-    assert words in caught.value.problem
+    assert words in error.value.problem
 
 
 def edit(path: str, value):
@@ -227,9 +227,9 @@ def edit(path: str, value):
 def test_refuses_trees(change, words, tmp_path):
     tree, blob = gltf([PART])
     change(tree)
-    with pytest.raises(MeshError) as caught:
+    with pytest.raises(MeshError) as error:
         load(tmp_path, tree, blob)
-    assert words in caught.value.problem
+    assert words in error.value.problem
 
 
 def test_refuses_loops_of_nodes(tmp_path):

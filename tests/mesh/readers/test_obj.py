@@ -111,9 +111,9 @@ def test_faces_with_two_corners_are_left_out(tmp_path):
     ],
 )
 def test_refuses(lines, words, tmp_path):
-    with pytest.raises(MeshError) as caught:
+    with pytest.raises(MeshError) as error:
         load(tmp_path, SQUARE + lines)
-    assert words in caught.value.problem
+    assert words in error.value.problem
 
 
 def test_bytes_that_are_no_text_do_no_harm(tmp_path):

@@ -144,6 +144,6 @@ GOOD = ply_bytes(FAN_POINTS, TETRAHEDRON)
     ],
 )
 def test_refuses(data, words, tmp_path):
-    with pytest.raises(MeshError) as caught:
+    with pytest.raises(MeshError) as error:
         load(tmp_path, data)
-    assert words in caught.value.problem
+    assert words in error.value.problem

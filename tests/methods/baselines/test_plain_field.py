@@ -53,41 +53,41 @@ def test_the_presets_are_those_of_the_texture():
 
 
 @pytest.fixture(scope="module")
-def trained(tmp_path_factory):
+def run_folder(tmp_path_factory):
     """A run for twelve seconds, which a probe of three steps took for those that 120 steps need."""
     folder = tmp_path_factory.mktemp("plain") / "run"
-    given = []
+    calls = []
 
     def steps_within(seconds, clock):
-        given.append((seconds, len(clock)))
+        calls.append((seconds, len(clock)))
         return STEPS
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fitting, "PROBED", 3)
         patch.setattr(fitting, "steps_within", steps_within)
         fit(tiny_capture(), folder, overrides=[*SMALL, "seconds=12"], quiet=True)
-    assert given == [(12.0, 3)]
+    assert calls == [(12.0, 3)]
     return folder
 
 
-def test_a_plain_field_learns_for_the_steps_of_its_time(trained):
-    assert len((trained / run.METRICS).read_text().splitlines()) == STEPS
-    assert checkpoint.load(trained).config["lr_steps"] == STEPS
-    _, held = tiny_capture().split()
-    texture = PlainFieldTexture.load(trained)
-    view, photo = render_view(texture.field, held, 0)
+def test_a_plain_field_learns_for_the_steps_of_its_time(run_folder):
+    assert len((run_folder / run.METRICS).read_text().splitlines()) == STEPS
+    assert checkpoint.load(run_folder).config["lr_steps"] == STEPS
+    _, held_out = tiny_capture().split()
+    texture = PlainFieldTexture.load(run_folder)
+    view, photo = render_view(texture.field, held_out, 0)
     assert psnr(view, photo) > 3 + psnr(np.ones_like(photo), photo)
     assert texture.about["name"] == "tiny" and texture.about["steps"] == STEPS
 
 
-def test_a_run_that_goes_on_keeps_its_steps(trained, monkeypatch):
+def test_a_run_that_goes_on_keeps_its_steps(run_folder, monkeypatch):
     monkeypatch.setattr(fitting, "train_plain_field", None)  # which would probe again
-    texture = fit(tiny_capture(), trained, resume=True, quiet=True)
+    texture = fit(tiny_capture(), run_folder, resume=True, quiet=True)
     assert texture.about["steps"] == STEPS
 
 
-def test_a_texture_survives_saving(trained, tmp_path):
-    texture = PlainFieldTexture.load(trained)
+def test_a_texture_survives_saving(run_folder, tmp_path):
+    texture = PlainFieldTexture.load(run_folder)
     again = PlainFieldTexture.load(texture.save(tmp_path / "copy.safetensors"))
     points = np.random.default_rng(0).uniform(-0.7, 0.7, (500, 3)).astype(np.float32)
     assert np.array_equal(again.field.density_at(points), texture.field.density_at(points))
@@ -102,8 +102,8 @@ def test_a_texture_survives_saving(trained, tmp_path):
         (lambda p: {**p, "table": p["table"] * np.nan}, "not finite"),
     ],
 )
-def test_damaged_files_are_refused(trained, tmp_path, change, why):
-    texture = PlainFieldTexture.load(trained)
+def test_damaged_files_are_refused(run_folder, tmp_path, change, why):
+    texture = PlainFieldTexture.load(run_folder)
     damaged = PlainFieldTexture(change(dict(texture.parameters)), texture.occupied, texture.about)
     with pytest.raises(CheckpointError, match=why):
         PlainFieldTexture.load(damaged.save(tmp_path / "damaged.safetensors"))
@@ -154,16 +154,16 @@ def test_the_density_says_what_is_solid(ball, tmp_path):
 
 
 def test_pictures_show_the_occupied_part_of_the_world(ball, tmp_path, monkeypatch):
-    given = []
+    calls = []
 
     def still(field, similarity, outline, **options):
-        given.append((field, similarity, outline, options))
+        calls.append((field, similarity, outline, options))
         return np.full((8, 8, 3), 0.5, np.float32)
 
     monkeypatch.setattr(shell, "shell_still", still)
     applied = ball.apply(density=2.0)
     assert applied.render(tmp_path / "ball.png", resolution=64, azimuth=1.0).is_file()
-    ((field, similarity, outline, options),) = given
+    ((field, similarity, outline, options),) = calls
     assert field is applied and options == {"resolution": 64, "azimuth": 1.0}
     assert similarity.scale == 4.0 and similarity.center.tolist() == [10.0, 0.0, -3.0]
     low, high = outline.min(0), outline.max(0)

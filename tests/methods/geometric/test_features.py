@@ -51,10 +51,12 @@ def test_two_faces_by_hand():
     # Across the open side from (0, 0, 0) to (1, 0, 0): the own apex (0, 2, 0), mirrored.
     assert torch.allclose(features[0, 0], torch.tensor([-0.5, 2, 0, 1]), atol=1e-6)
     # From the upright face, whose normal is (2, 1, 0) / root up to sign, the origin lies 2 / root away.
-    seen = features[1, 0]
-    assert torch.allclose(seen[[1, 3]], torch.tensor([0.0, root]), atol=1e-6)
-    assert abs(float(seen[2])) == pytest.approx(2 / root, abs=1e-6)
-    assert float(seen[0]) == pytest.approx((points[0] - points[1:3].mean(0)) @ (points[1] - points[2]) / root)
+    upright = features[1, 0]
+    assert torch.allclose(upright[[1, 3]], torch.tensor([0.0, root]), atol=1e-6)
+    assert abs(float(upright[2])) == pytest.approx(2 / root, abs=1e-6)
+    assert float(upright[0]) == pytest.approx(
+        (points[0] - points[1:3].mean(0)) @ (points[1] - points[2]) / root
+    )
 
 
 def test_frames_are_orthonormal_and_point_outwards():
@@ -120,9 +122,9 @@ def test_displacements_turn_with_the_mesh():
 def test_faces_without_area_stay_finite(points):
     graph = FaceGraph.of(np.array([[0, 1, 2]]), 3)
     vertices = torch.tensor(points, dtype=torch.float32).requires_grad_()
-    made = face_features(displaced(vertices, graph, torch.ones(1, 3)), graph)
-    made.square().sum().backward()
-    assert made.isfinite().all() and vertices.grad is not None and vertices.grad.isfinite().all()
+    features = face_features(displaced(vertices, graph, torch.ones(1, 3)), graph)
+    features.square().sum().backward()
+    assert features.isfinite().all() and vertices.grad is not None and vertices.grad.isfinite().all()
 
 
 def test_gradients_by_finite_differences():

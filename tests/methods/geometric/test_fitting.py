@@ -67,7 +67,7 @@ def hill() -> Mesh:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs") / "bumpy"
     return folder, geometric.fit(bumpy(), folder, overrides=SMALL, quiet=True)
 
@@ -76,24 +76,24 @@ def small_task(**changes) -> GeometricTask:
     config = replace(GeometricConfig(steps=9, level_steps=3), **changes)
     ball = icosphere(1)
     hierarchy = Hierarchy.of(ball, config.levels)
-    drawn = torch.Generator().manual_seed(4)
+    generator = torch.Generator().manual_seed(4)
     meshes = [
-        torch.from_numpy(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=drawn)
+        torch.from_numpy(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=generator)
         for k, mesh in enumerate(hierarchy.meshes)
     ]
     return GeometricTask(config, hierarchy, torch.from_numpy(ball.vertices), meshes, bumpy())
 
 
-def test_the_run_folder(made):
-    folder, texture = made
+def test_the_run_folder(run):
+    folder, texture = run
     assert {p.name for p in folder.iterdir()} >= {"config.toml", "metrics.jsonl", checkpoint.NAME, NAME}
     assert method_of(folder) == method_of(folder / NAME) == METHOD
     assert texture.levels == 3 and texture.about["steps"] == 9
     assert [level["faces"] for level in texture.about["fit"]] == [20, 80, 320]
 
 
-def test_models_round_trip(made):
-    folder, texture = made
+def test_models_round_trip(run):
+    folder, texture = run
     again = GeometricTexture.load(folder)
     assert dict(again.about) == dict(texture.about)
     mesh = icosphere(4)
@@ -103,10 +103,10 @@ def test_models_round_trip(made):
 
 
 @pytest.mark.parametrize("damage", ["cut", "foreign", "nan", "noise", "missing"])
-def test_what_is_no_model_is_refused(made, tmp_path, damage):
+def test_what_is_no_model_is_refused(run, tmp_path, damage):
     from safetensors.torch import load_file, save_file
 
-    source = made[0] / NAME
+    source = run[0] / NAME
     path = tmp_path / NAME
     if damage == "cut":
         path.write_bytes(source.read_bytes()[:-100])
@@ -126,26 +126,26 @@ def test_what_is_no_model_is_refused(made, tmp_path, damage):
         GeometricTexture.load(tmp_path)
 
 
-def test_the_mesh_is_split_on_every_level_but_the_first(made):
+def test_the_mesh_is_split_on_every_level_but_the_first(run):
     mesh = torus(12, 6)
     for start, end, splits in ((0, 2, 2), (1, 2, 1), (2, 2, 0), (0, 0, 0), (None, None, 0)):
-        asset = made[1].apply(mesh, start_level=start, end_level=end)
+        asset = run[1].apply(mesh, start_level=start, end_level=end)
         assert len(asset.mesh.faces) == 4**splits * len(mesh.faces)
         assert np.array_equal(asset.mesh.faces, subdivide_midpoint(mesh, splits).faces)
 
 
-def test_results_keep_place_and_size(made):
+def test_results_keep_place_and_size(run):
     """Scaling and moving the mesh scales and moves the result; the noise decides the rest."""
     mesh = icosphere(6)
-    a = made[1].apply(mesh, seed=3).mesh.vertices
-    b = made[1].apply(mesh.with_vertices(5 * mesh.vertices + [1, 2, 3]), seed=3).mesh.vertices
+    a = run[1].apply(mesh, seed=3).mesh.vertices
+    b = run[1].apply(mesh.with_vertices(5 * mesh.vertices + [1, 2, 3]), seed=3).mesh.vertices
     assert np.allclose(5 * a + [1, 2, 3], b, atol=2e-3)
-    assert not np.allclose(a, made[1].apply(mesh, seed=4).mesh.vertices, atol=1e-4)
+    assert not np.allclose(a, run[1].apply(mesh, seed=4).mesh.vertices, atol=1e-4)
 
 
-def test_uvs_are_interpolated(made):
+def test_uvs_are_interpolated(run):
     mesh = grid(6, 6)
-    asset = made[1].apply(mesh, start_level=1)
+    asset = run[1].apply(mesh, start_level=1)
     expected = subdivide_midpoint(mesh).uv
     assert asset.mesh.uv is not None and expected is not None and np.array_equal(asset.mesh.uv, expected)
 
@@ -154,18 +154,18 @@ UNSOUND = [grid(5, 4), moebius(), fan(), turned(icosphere(3)), collapsed(icosphe
 
 
 @pytest.mark.parametrize("mesh", [torus(8, 4), *UNSOUND], ids=lambda mesh: mesh.name)
-def test_open_and_unsound_meshes_are_displaced(made, mesh):
-    moved = made[1].apply(mesh, start_level=1).mesh
+def test_open_and_unsound_meshes_are_displaced(run, mesh):
+    moved = run[1].apply(mesh, start_level=1).mesh
     assert np.isfinite(moved.vertices).all()
     far = np.linalg.norm(moved.vertices - subdivide_midpoint(mesh).vertices, axis=1)
     assert (far > 1e-3).mean() > 0.9 and far.max() < 2 * np.ptp(mesh.vertices, axis=0).max()
 
 
-def test_faces_that_name_a_vertex_twice_are_refused(made, tmp_path):
+def test_faces_that_name_a_vertex_twice_are_refused(run, tmp_path):
     ball = bumpy()
     mesh = replace(ball, faces=np.concatenate([ball.faces, [[0, 0, 1]]]))
     with pytest.raises(MeshError, match="bumpy has faces that name a vertex twice: 1"):
-        made[1].apply(mesh)
+        run[1].apply(mesh)
     with pytest.raises(MeshError, match="bumpy has faces that name a vertex twice: 1"):
         geometric.fit(mesh, tmp_path / "run", overrides=SMALL, quiet=True)
     assert not (tmp_path / "run").exists()
@@ -190,20 +190,20 @@ def test_references_that_are_learned(tmp_path, mesh, template):
     assert topology(texture.generate(seed=1)) == topology(mesh)
 
 
-def test_two_components_are_displaced_alike(made):
+def test_two_components_are_displaced_alike(run):
     """Without noise: the instance norm is taken over both."""
     two = pair(bumpy())
-    moved = replace_about(made[1], noise=0.0).apply(two, start_level=2).mesh.vertices
+    moved = replace_about(run[1], noise=0.0).apply(two, start_level=2).mesh.vertices
     count = len(two.vertices) // 2
     assert np.allclose(moved[:count] + [3.0, 0, 0], moved[count:], atol=1e-3)
     assert not np.allclose(moved, two.vertices, atol=1e-2)
 
 
-def test_edges_are_measured_again_if_wanted(made):
+def test_edges_are_measured_again_if_wanted(run):
     """On the first level that changes nothing: the mesh's mean edge is 1 there."""
-    mesh, again = bumpy(), replace_about(made[1], remeasure=True)
+    mesh, again = bumpy(), replace_about(run[1], remeasure=True)
     for start, alike in ((2, True), (1, False)):
-        a, b = (texture.apply(mesh, start_level=start).mesh.vertices for texture in (made[1], again))
+        a, b = (texture.apply(mesh, start_level=start).mesh.vertices for texture in (run[1], again))
         assert np.allclose(a, b, atol=1e-5) == alike
 
 
@@ -212,32 +212,32 @@ def replace_about(texture: GeometricTexture, **changes) -> GeometricTexture:
 
 
 @pytest.mark.parametrize(("start", "end"), [(-1, 2), (2, 1), (0, 3), (3, None)])
-def test_levels_out_of_range(made, start, end):
+def test_levels_out_of_range(run, start, end):
     with pytest.raises(ConfigError, match="this texture has the levels 0 to 2"):
-        made[1].apply(icosphere(2), start_level=start, end_level=end)
+        run[1].apply(icosphere(2), start_level=start, end_level=end)
 
 
-def test_too_many_faces(made):
+def test_too_many_faces(run):
     with pytest.raises(ConfigError, match="remesh it more coarsely"):
-        made[1].apply(icosphere(120), start_level=0)
+        run[1].apply(icosphere(120), start_level=0)
 
 
-def test_growth_starts_at_the_mesh_and_ends_at_the_result(made):
+def test_growth_starts_at_the_mesh_and_ends_at_the_result(run):
     mesh = icosphere(3)
-    shown = list(made[1].growth(mesh, frames=4, seed=2, start_level=1))
-    assert [len(m.faces) for m in shown] == [180] * 5 + [720] * 4
-    assert np.array_equal(shown[0].vertices, mesh.vertices)
-    assert np.allclose(shown[2].vertices, (shown[0].vertices + shown[4].vertices) / 2, atol=1e-6)
-    assert np.allclose(shown[-1].vertices, made[1].apply(mesh, seed=2, start_level=1).mesh.vertices)
+    meshes = list(run[1].growth(mesh, frames=4, seed=2, start_level=1))
+    assert [len(m.faces) for m in meshes] == [180] * 5 + [720] * 4
+    assert np.array_equal(meshes[0].vertices, mesh.vertices)
+    assert np.allclose(meshes[2].vertices, (meshes[0].vertices + meshes[4].vertices) / 2, atol=1e-6)
+    assert np.allclose(meshes[-1].vertices, run[1].apply(mesh, seed=2, start_level=1).mesh.vertices)
 
 
-def test_interpolation_joins_two_seeds(made):
+def test_interpolation_joins_two_seeds(run):
     mesh = icosphere(3)
-    shown = list(made[1].interpolate(mesh, (0, 1), 5))
-    ends = [made[1].apply(mesh, seed=seed).mesh.vertices for seed in (0, 1)]
-    assert np.allclose(shown[0].vertices, ends[0], atol=1e-5)
-    assert np.allclose(shown[-1].vertices, ends[1], atol=1e-5)
-    assert not np.allclose(shown[2].vertices, ends[0], atol=1e-4)
+    meshes = list(run[1].interpolate(mesh, (0, 1), 5))
+    ends = [run[1].apply(mesh, seed=seed).mesh.vertices for seed in (0, 1)]
+    assert np.allclose(meshes[0].vertices, ends[0], atol=1e-5)
+    assert np.allclose(meshes[-1].vertices, ends[1], atol=1e-5)
+    assert not np.allclose(meshes[2].vertices, ends[0], atol=1e-4)
 
 
 def test_the_great_circle_keeps_the_variance():
@@ -248,12 +248,12 @@ def test_the_great_circle_keeps_the_variance():
     assert torch.allclose(slerp(a, a, 0.4), a)
 
 
-def test_variations_of_the_reference(made):
-    first, second = (made[1].generate(seed) for seed in (0, 1))
+def test_variations_of_the_reference(run):
+    first, second = (run[1].generate(seed) for seed in (0, 1))
     assert len(first.faces) == 320 and not np.allclose(first.vertices, second.vertices, atol=1e-4)
     # From a level on that does not exist nothing is random: the reconstruction.
-    kept = [made[1].generate(seed, start_level=3).vertices for seed in (0, 1)]
-    assert np.array_equal(kept[0], kept[1])
+    reconstructions = [run[1].generate(seed, start_level=3).vertices for seed in (0, 1)]
+    assert np.array_equal(reconstructions[0], reconstructions[1])
 
 
 def test_resuming_changes_nothing(tmp_path):
@@ -274,28 +274,28 @@ def test_resuming_changes_nothing(tmp_path):
 
 def test_each_step_trains_the_generator_of_its_level():
     task = small_task()
-    drawn = torch.Generator().manual_seed(0)
+    generator = torch.Generator().manual_seed(0)
     for step, level in ((0, 0), (2, 0), (3, 1), (8, 2)):
         for parameter in task.parameters:
             parameter.grad = None
-        result = task.loss(step, drawn)
+        result = task.loss(step, generator)
         result.value.backward()
         assert result.metrics["level"] == level
-        for k, generator in enumerate(task.generators):
-            assert all((p.grad is not None) == (k == level) for p in generator.parameters)
+        for k, network in enumerate(task.generators):
+            assert all((p.grad is not None) == (k == level) for p in network.parameters)
 
 
 def test_the_loss_by_hand():
     """The critic's score of a random mesh, and the distance of the one from the fixed noise (section 3.3)."""
     task = small_task(reconstruction=7.0)
     result = task.loss(0, torch.Generator().manual_seed(1))
-    graph, drawn = task.hierarchy.graphs[0], torch.Generator().manual_seed(1)
-    made = []
-    for noise in (task.config.noise * torch.randn(task.template.shape, generator=drawn), task.fixed):
+    graph, generator = task.hierarchy.graphs[0], torch.Generator().manual_seed(1)
+    vertices = []
+    for noise in (task.config.noise * torch.randn(task.template.shape, generator=generator), task.fixed):
         offsets = task.generators[0](face_features(task.template + noise, graph), graph)
-        made.append(displaced(task.template, graph, offsets))
-    score = task.critics[0](face_features(made[0], graph), graph).mean()
-    error = ((made[1] - task.meshes[0]) ** 2).mean()
+        vertices.append(displaced(task.template, graph, offsets))
+    score = task.critics[0](face_features(vertices[0], graph), graph).mean()
+    error = ((vertices[1] - task.meshes[0]) ** 2).mean()
     assert error > 0.01 and score.abs() > 1e-3
     assert torch.allclose(result.value, 7 * error - score, rtol=1e-5)
 
@@ -306,12 +306,12 @@ def metrics_of(change: Change | None) -> Mapping[str, float]:
 
 def test_critics_take_turns():
     task = small_task(critic_steps=2, generator_steps=3)
-    drawn = torch.Generator().manual_seed(0)
-    trained = ["critic" in metrics_of(task.begin(step, drawn)) for step in range(6)]
+    generator = torch.Generator().manual_seed(0)
+    trained = ["critic" in metrics_of(task.begin(step, generator)) for step in range(6)]
     assert sum(trained) == 4 and trained[:3] == trained[3:]
     often = small_task(critic_steps=5, generator_steps=1)
     before = often.critics[0].parameters[0].clone()
-    often.begin(0, drawn)
+    often.begin(0, generator)
     assert often.optimizers[0].counts == [5] * len(often.critics[0].parameters)
     assert not torch.equal(before, often.critics[0].parameters[0])
 
@@ -333,11 +333,11 @@ def test_critics_prefer_the_training_mesh():
 
 def test_weights_are_carried_up():
     task = small_task(steps=5, level_steps=1, carried=3)
-    drawn = torch.Generator().manual_seed(0)
+    generator = torch.Generator().manual_seed(0)
     second = [p.detach().clone() for p in task.generators[2].parameters]
-    task.begin(2, drawn)
+    task.begin(2, generator)
     assert all(torch.equal(p, q) for p, q in zip(task.generators[2].parameters, second, strict=True))
-    assert "critic" not in metrics_of(task.begin(3, drawn))  # trained, it would be another one
+    assert "critic" not in metrics_of(task.begin(3, generator))  # trained, it would be another one
     for networks in (task.generators, task.critics):
         for p, q in zip(networks[3].parameters, networks[2].parameters, strict=True):
             assert torch.equal(p, q)
@@ -346,12 +346,12 @@ def test_weights_are_carried_up():
 def test_the_reconstruction_comes_near():
     """Without a critic's pull the generator learns the one mesh from the fixed noise."""
     task = small_task(steps=300, level_steps=300, reconstruction=100.0, lr=5e-3)
-    optimizer, drawn = Adam(task.parameters), torch.Generator().manual_seed(0)
+    optimizer, generator = Adam(task.parameters), torch.Generator().manual_seed(0)
     errors = []
     for step in range(120):
         optimizer.clear()
-        task.begin(step, drawn)
-        result = task.loss(step, drawn)
+        task.begin(step, generator)
+        result = task.loss(step, generator)
         result.value.backward()
         optimizer.step(5e-3)
         errors.append(result.metrics["reconstruction"])
@@ -379,9 +379,9 @@ def test_the_published_schedule(preset, quarter):
 def test_critics_learn_at_that_rate(monkeypatch):
     rates = []
     monkeypatch.setattr(Adam, "step", lambda self, rate: rates.append(rate))
-    task, drawn = small_task(steps=8, level_steps=8, critic_steps=1, generator_steps=1), torch.Generator()
+    task, generator = small_task(steps=8, level_steps=8, critic_steps=1, generator_steps=1), torch.Generator()
     for step in range(8):
-        task.begin(step, drawn)
+        task.begin(step, generator)
     assert rates == [learning_rate(task.config, step) for step in range(8)] and len(set(rates)) == 4
 
 
@@ -483,6 +483,6 @@ def test_bundled_models_are_found_by_name(name):
     assert texture.about["name"] == name and texture.levels == 5
     rebuilt = texture.generate(start_level=5)
     assert len(rebuilt.faces) == 5120
-    found = report(rebuilt, normalised(find_reference(name), texture.template)[0])
-    assert found.chamfer < 1.2 * texture.about["fit"][-1]["chamfer"]
-    assert found.normals < 1.2 * texture.about["fit"][-1]["normals"]
+    errors = report(rebuilt, normalised(find_reference(name), texture.template)[0])
+    assert errors.chamfer < 1.2 * texture.about["fit"][-1]["chamfer"]
+    assert errors.normals < 1.2 * texture.about["fit"][-1]["normals"]

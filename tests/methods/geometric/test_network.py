@@ -114,7 +114,7 @@ def test_the_gradient_penalty_by_finite_differences(graph):
     assert float(penalty.detach()) == pytest.approx(float(expected), rel=1e-9)
     # Its own derivative, with respect to a weight: through the second backward pass.
     weight = net.parameters[1]
-    (found,) = torch.autograd.grad(penalty, weight)
+    (derivative,) = torch.autograd.grad(penalty, weight)
     values = []
     for sign in (1, -1):
         with torch.no_grad():
@@ -122,7 +122,7 @@ def test_the_gradient_penalty_by_finite_differences(graph):
         values.append(float(gradient_penalty(net, features, graph).detach()))
         with torch.no_grad():
             weight[3, 5] -= sign * step
-    assert float(found[3, 5]) == pytest.approx((values[0] - values[1]) / (2 * step), rel=1e-4)
+    assert float(derivative[3, 5]) == pytest.approx((values[0] - values[1]) / (2 * step), rel=1e-4)
 
 
 def test_the_critics_loss(graph, features):

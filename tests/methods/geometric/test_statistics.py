@@ -8,14 +8,14 @@ from mitex.methods.geometric.statistics import local_statistics, statistic_dista
 
 
 def test_a_plane():
-    found = local_statistics(grid(8, 8))
-    assert np.allclose(found["dihedral"], 0, atol=1e-6)
+    statistics = local_statistics(grid(8, 8))
+    assert np.allclose(statistics["dihedral"], 0, atol=1e-6)
     points = grid(8, 8).vertices
     inner = (np.abs(points[:, :2]) < 0.99).all(1)
-    assert np.allclose(found["curvature"][inner], 0, atol=1e-9)
-    assert found["edges"].mean() == pytest.approx(1)
+    assert np.allclose(statistics["curvature"][inner], 0, atol=1e-9)
+    assert statistics["edges"].mean() == pytest.approx(1)
     mean = (144 + 64 * np.sqrt(2)) / 208  # sides and diagonals, in cells
-    assert np.ptp(found["edges"]) == pytest.approx((np.sqrt(2) - 1) / mean, rel=1e-5)
+    assert np.ptp(statistics["edges"]) == pytest.approx((np.sqrt(2) - 1) / mean, rel=1e-5)
 
 
 @pytest.mark.parametrize("radius", [0.1, 1.0, 30.0])
@@ -24,13 +24,13 @@ def test_a_sphere_has_the_curvature_of_its_radius(radius):
     mesh = ball.with_vertices(radius * ball.vertices)
     pairs = {tuple(sorted((f[k], f[k - 1]))) for f in mesh.faces.tolist() for k in range(3)}
     edge = np.mean([np.linalg.norm(mesh.vertices[a] - mesh.vertices[b]) for a, b in pairs])
-    found = local_statistics(mesh)
-    assert np.median(found["curvature"]) == pytest.approx(edge / radius, rel=0.02)
-    assert (found["dihedral"] > 0).all()
+    statistics = local_statistics(mesh)
+    assert np.median(statistics["curvature"]) == pytest.approx(edge / radius, rel=0.02)
+    assert (statistics["dihedral"] > 0).all()
     # Inside out it is concave.
     inside = local_statistics(Mesh(mesh.vertices, mesh.faces[:, ::-1]))
-    assert np.allclose(inside["dihedral"], -found["dihedral"], atol=1e-5)
-    assert np.allclose(inside["curvature"], -found["curvature"], atol=1e-5)
+    assert np.allclose(inside["dihedral"], -statistics["dihedral"], atol=1e-5)
+    assert np.allclose(inside["curvature"], -statistics["curvature"], atol=1e-5)
 
 
 def test_a_roof():

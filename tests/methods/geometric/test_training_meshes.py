@@ -76,19 +76,19 @@ def test_templates_follow_the_genus():
     for seed, ring in enumerate([REFERENCES["warts"](), *[torus(96, 48)] * 3]):
         turn, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
         turned = ring.with_vertices(ring.vertices @ (turn * np.linalg.det(turn)) + [1.0, 2.0, 3.0])
-        found = find_template(turned)
-        assert topology(found) == (1, 1, 0) and len(found.faces) < 300
+        template = find_template(turned)
+        assert topology(template) == (1, 1, 0) and len(template.faces) < 300
         # The template lies along the ring: all its vertices are near the reference. Its outside is outside.
-        nearest = [np.linalg.norm(turned.vertices - v, axis=1).min() for v in found.vertices]
+        nearest = [np.linalg.norm(turned.vertices - v, axis=1).min() for v in template.vertices]
         assert max(nearest) < 0.2
-        assert volume(found) == pytest.approx(volume(turned), rel=0.5)
+        assert volume(template) == pytest.approx(volume(turned), rel=0.5)
 
 
 def test_open_references_are_simplified():
     pytest.importorskip("pymeshlab")
     mesh = grid(20, 20)
-    found = find_template(mesh)
-    assert topology(found) == (1, 0, 1) and len(found.faces) < 100
+    template = find_template(mesh)
+    assert topology(template) == (1, 0, 1) and len(template.faces) < 100
 
 
 def test_a_template_of_another_genus_is_refused():
@@ -134,17 +134,17 @@ def test_the_distance_by_brute_force(fitting):
     """Section 3.1: the weights of both directions, and normals in both."""
     fit, mesh = fitting
     vertices = torch.from_numpy(mesh.vertices)
-    drawn = torch.Generator().manual_seed(3)
-    ours = sample_surface(vertices, fit.graph.faces, 200, drawn)
-    theirs = sample_surface(fit.target, fit.target_faces, 200, drawn)
+    generator = torch.Generator().manual_seed(3)
+    ours = sample_surface(vertices, fit.graph.faces, 200, generator)
+    theirs = sample_surface(fit.target, fit.target_faces, 200, generator)
     apart = torch.cdist(ours.points, theirs.points)
     cosines = ours.normals @ theirs.normals.T
     to = cosines.gather(1, apart.argmin(1)[:, None])
     back = cosines.gather(0, apart.argmin(0)[None])
     expected = 0.4 * apart.min(1).values.mean() + 0.6 * apart.min(0).values.mean()
     expected += 0.3 * ((1 - to).mean() + (1 - back).mean())
-    found = fit.distance(vertices, torch.Generator().manual_seed(3))
-    assert float(found) == pytest.approx(float(expected), rel=1e-5)
+    distance = fit.distance(vertices, torch.Generator().manual_seed(3))
+    assert float(distance) == pytest.approx(float(expected), rel=1e-5)
 
 
 def test_the_regularity_by_hand(fitting):
@@ -192,10 +192,10 @@ def test_training_meshes_are_kept(monkeypatch):
 def test_the_report_by_known_shapes():
     ball, larger = icosphere(16), icosphere(16)
     larger = larger.with_vertices(1.25 * larger.vertices)
-    found = report(ball, larger)
-    assert found.chamfer == pytest.approx(0.25 / 1.25, rel=0.02)
-    assert found.hausdorff == pytest.approx(0.25 / 1.25, rel=0.1)
-    assert found.normals < 4 and found.flipped == 0 and found.crossings == 0
+    errors = report(ball, larger)
+    assert errors.chamfer == pytest.approx(0.25 / 1.25, rel=0.02)
+    assert errors.hausdorff == pytest.approx(0.25 / 1.25, rel=0.1)
+    assert errors.normals < 4 and errors.flipped == 0 and errors.crossings == 0
     # A ball beside it is missing; points of a sphere are 3 + 1 / 9 away from one that is 3 away, on average.
     missing, beyond = report(ball, pair(ball)), report(pair(ball), ball)
     assert missing.chamfer == pytest.approx((3 + 1 / 9 - 1) / 2 / 2 / 2.5, rel=0.03)

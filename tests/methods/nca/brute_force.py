@@ -11,12 +11,12 @@ from mitex.mesh import Mesh, grid, icosphere
 
 def neighbours(mesh: Mesh) -> list[list[int]]:
     """Of every vertex, from the faces."""
-    found: list[set[int]] = [set() for _ in mesh.vertices]
+    rings: list[set[int]] = [set() for _ in mesh.vertices]
     for a, b, c in mesh.faces.tolist():
         for i, j in ((a, b), (b, c), (c, a)):
-            found[i].add(j)
-            found[j].add(i)
-    return [sorted(ring) for ring in found]
+            rings[i].add(j)
+            rings[j].add(i)
+    return [sorted(ring) for ring in rings]
 
 
 def harmonics(d: list[float], degree: int) -> list[float]:
@@ -38,7 +38,7 @@ def direction(mesh: Mesh, i: int, j: int, angle: float = 0.0) -> list[float]:
 
 def perceive(mesh: Mesh, state: list[list[float]], degree: int = 1, angles: list[float] | None = None):
     """Perception vectors of all vertices: one block of channels for each harmonic, then the state."""
-    seen = []
+    vectors = []
     for i, ring in enumerate(neighbours(mesh)):
         blocks = [[0.0] * len(state[i]) for _ in range((degree + 1) ** 2)]
         for j in ring:
@@ -46,8 +46,8 @@ def perceive(mesh: Mesh, state: list[list[float]], degree: int = 1, angles: list
             for block, weight in zip(blocks, harmonics(d, degree), strict=True):
                 for c in range(len(block)):
                     block[c] += weight * (state[j][c] - state[i][c])
-        seen.append([value for block in blocks for value in block] + list(state[i]))
-    return seen
+        vectors.append([value for block in blocks for value in block] + list(state[i]))
+    return vectors
 
 
 def linear(layer: torch.nn.Linear, x: list[float]) -> list[float]:

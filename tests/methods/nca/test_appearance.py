@@ -28,9 +28,9 @@ def exemplar():
 
 
 def _appearance(exemplar, network, settings, maps=None):
-    shown = Exemplar({name: exemplar.maps[name] for name in maps}) if maps else exemplar
-    pictures = channel_triples(state_layout(sorted(shown.maps)), settings.blend, 0)
-    return Appearance(settings, Targets(shown, pictures, network, settings.layers), network)
+    subset = Exemplar({name: exemplar.maps[name] for name in maps}) if maps else exemplar
+    pictures = channel_triples(state_layout(sorted(subset.maps)), settings.blend, 0)
+    return Appearance(settings, Targets(subset, pictures, network, settings.layers), network)
 
 
 def _views(count, channels, seed=0):
@@ -66,9 +66,9 @@ def test_loss_of_an_albedo(exemplar, network, preset):
     appearance = _appearance(exemplar, network, settings, ["albedo"])
     assert appearance.channels.tolist() == [0, 1, 2]
     views = _views(3, 3)
-    found = appearance(views, torch.Generator().manual_seed(0))
+    loss = appearance(views, torch.Generator().manual_seed(0))
     expected = _expected(views, appearance.targets.images.expand(3, -1, -1, -1), settings)
-    assert found.item() == pytest.approx(expected.item(), rel=1e-4)
+    assert loss.item() == pytest.approx(expected.item(), rel=1e-4)
 
 
 def test_every_view_shows_every_map_in_the_paper(exemplar, network):
@@ -80,8 +80,8 @@ def test_every_view_shows_every_map_in_the_paper(exemplar, network):
     columns = ([0, 1, 2], [3, 3, 3], [4, 5, 6], [7, 7, 7])
     images = torch.cat([views[..., c] for c in columns])
     pictures = appearance.targets.images.repeat_interleave(2, 0)
-    found = appearance(views, torch.Generator().manual_seed(0))
-    assert found.item() == pytest.approx(_expected(images, pictures, settings).item(), rel=1e-4)
+    loss = appearance(views, torch.Generator().manual_seed(0))
+    assert loss.item() == pytest.approx(_expected(images, pictures, settings).item(), rel=1e-4)
 
 
 def test_the_exemplar_itself_costs_nothing(exemplar, network):
@@ -101,8 +101,8 @@ def test_blended_views_share_the_kinds(exemplar, network):
     for _ in range(10):
         view, which = appearance._assignment(8, generator)
         assert view.tolist() == list(range(8))
-        shown = [kinds[i] for i in which.tolist()]
-        assert sorted(shown) == sorted(2 * ["albedo", "grey", "mix", "normal"])
+        view_kinds = [kinds[i] for i in which.tolist()]
+        assert sorted(view_kinds) == sorted(2 * ["albedo", "grey", "mix", "normal"])
         mixes |= {i for i in which.tolist() if kinds[i] == "mix"}
     assert len(mixes) > 6
 
@@ -112,8 +112,8 @@ def test_a_few_blended_views_take_turns(exemplar, network):
     appearance = _appearance(exemplar, network, config("blend=true"))
     generator = torch.Generator().manual_seed(0)
     kinds = [p.kind for p in appearance.targets.pictures]
-    shown = {kinds[i] for _ in range(40) for i in appearance._assignment(1, generator)[1].tolist()}
-    assert shown == {"albedo", "grey", "mix", "normal"}
+    view_kinds = {kinds[i] for _ in range(40) for i in appearance._assignment(1, generator)[1].tolist()}
+    assert view_kinds == {"albedo", "grey", "mix", "normal"}
 
 
 @pytest.mark.parametrize("blend", ["true", "false"])

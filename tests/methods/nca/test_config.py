@@ -45,8 +45,8 @@ def test_paper_preset(key):
 
 def test_layers_of_the_authors():
     """ReLUs 1, 3, 6, 8, 11, 13, 15, 22 and 29 of torchvision's list."""
-    wanted = "relu1_1 relu1_2 relu2_1 relu2_2 relu3_1 relu3_2 relu3_3 relu4_3 relu5_3"
-    assert PRESETS["paper"].layers == tuple(wanted.split())
+    layers = "relu1_1 relu1_2 relu2_1 relu2_2 relu3_1 relu3_2 relu3_3 relu4_3 relu5_3"
+    assert PRESETS["paper"].layers == tuple(layers.split())
 
 
 def test_names_and_default():

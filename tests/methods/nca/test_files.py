@@ -34,18 +34,18 @@ def _same(one, other):
     ],
 )
 def test_round_trip(tmp_path, options):
-    made = texture(("albedo", "height"), **options)
-    again = NcaTexture.load(made.save(tmp_path / "texture.safetensors"))
-    assert _same(again.model, made.model)
-    assert (again.model.degree, again.model.condition) == (made.model.degree, made.model.condition)
+    original = texture(("albedo", "height"), **options)
+    again = NcaTexture.load(original.save(tmp_path / "texture.safetensors"))
+    assert _same(again.model, original.model)
+    assert (again.model.degree, again.model.condition) == (original.model.degree, original.model.condition)
     assert again.maps == ("albedo", "height")
     assert again.about["name"] == "tiny"
 
 
 def test_what_is_known_about_a_model_is_kept(tmp_path):
-    made = texture()
+    original = texture()
     about = {"name": "ü", "steps": 12, "loss": 0.25, "parent": "waffle"}
-    files.save(tmp_path / "m.safetensors", made.model, about | {"maps": ["albedo"]})
+    files.save(tmp_path / "m.safetensors", original.model, about | {"maps": ["albedo"]})
     assert NcaTexture.load(tmp_path / "m.safetensors").about == about | {"maps": ["albedo"]}
 
 
@@ -120,9 +120,9 @@ def test_the_previous_checkpoint_will_do(tmp_path):
 
 
 def test_bundled_models_are_found_by_name():
-    found = bundled(METHOD)
-    assert found, "no model is bundled"
-    for name, path in found.items():
+    models = bundled(METHOD)
+    assert models, "no model is bundled"
+    for name, path in models.items():
         loaded = NcaTexture.load(name)
         assert loaded.about["name"] == name
         assert loaded.model.channels == 16

@@ -48,15 +48,16 @@ def test_the_run_folder_is_complete(run):
 
 
 def test_the_model_works_on_another_mesh(run):
-    out, made = run
-    assert made.maps == ("albedo",)
-    assert made.about["name"] == "lava" and made.about["steps"] == 40 and made.about["preset"] == "patch"
-    assert 0 < made.about["loss"] < 1e3 and made.about["seconds"] >= 0
+    out, result = run
+    assert result.maps == ("albedo",)
+    assert result.about["name"] == "lava" and result.about["steps"] == 40
+    assert result.about["preset"] == "patch"
+    assert 0 < result.about["loss"] < 1e3 and result.about["seconds"] >= 0
     sphere = icosphere(6)
-    grown = made.apply(sphere, steps=10, subdivide=0).vertex_maps["albedo"]
+    grown = result.apply(sphere, steps=10, subdivide=0).vertex_maps["albedo"]
     for source in (out, out / "texture.safetensors"):
         again = NcaTexture.load(source)
-        assert again.about == made.about | {"maps": ["albedo"]}
+        assert again.about == result.about | {"maps": ["albedo"]}
         assert np.array_equal(again.apply(sphere, steps=10, subdivide=0).vertex_maps["albedo"], grown)
     assert grown.std() > 0.003
 

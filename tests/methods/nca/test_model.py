@@ -50,10 +50,10 @@ def test_step_is_the_loops(mesh, generator, degree, kind):
     count = len(mesh.vertices)
     mask = {"no mask": None, "mask (V,)": (count,), "mask (B, V)": (2, count)}[kind]
     mask = None if mask is None else _mask(mask, generator)
-    found = model.step(state, mesh, mask)
+    result = model.step(state, mesh, mask)
     for k in range(2):
         own = None if mask is None else mask.expand(2, count)[k]
-        assert (found[k] - brute_force.step(model, mesh, state[k], own)).abs().max() < 1e-5
+        assert (result[k] - brute_force.step(model, mesh, state[k], own)).abs().max() < 1e-5
 
 
 @settings(max_examples=20, deadline=None)
@@ -97,18 +97,18 @@ def test_condition_is_appended_last(mesh, generator, shape):
     state = _state(mesh, generator)
     size = (len(mesh.vertices), 3) if shape == "(V, d)" else (2, len(mesh.vertices), 3)
     condition = torch.rand(size, generator=generator)
-    found = model.step(state, mesh, None, condition)
+    result = model.step(state, mesh, None, condition)
     for k in range(2):
         own = condition.expand(2, -1, -1)[k]
-        assert (found[k] - brute_force.step(model, mesh, state[k], condition=own)).abs().max() < 1e-5
+        assert (result[k] - brute_force.step(model, mesh, state[k], condition=own)).abs().max() < 1e-5
 
 
 def test_orientation_comes_with_the_perception(mesh, generator):
     model = _model()
     state = _state(mesh, generator, batch=1)
-    found = model.step(state, perception(mesh, 1, 0.8))
+    result = model.step(state, perception(mesh, 1, 0.8))
     expected = brute_force.step(model, mesh, state[0], angles=[0.8] * len(mesh.vertices))
-    assert (found[0] - expected).abs().max() < 1e-5
+    assert (result[0] - expected).abs().max() < 1e-5
 
 
 def test_update_is_the_step_without_the_state(mesh, generator):
@@ -171,9 +171,9 @@ def test_gradients_are_those_of_message_passing(mesh, generator, degree, masked)
         mask = _mask(shape, generator) if masked else None
         fast = model.step(fast, mesh, mask, condition)
         slow = naive.step(twin, slow, mask, condition64)
-    pull = torch.rand(fast.shape, generator=generator)
-    ours = torch.autograd.grad(fast, [state, condition, *model.parameters()], pull)
-    theirs = torch.autograd.grad(slow, [state64, condition64, *twin.parameters()], pull.double())
+    upstream = torch.rand(fast.shape, generator=generator)
+    ours = torch.autograd.grad(fast, [state, condition, *model.parameters()], upstream)
+    theirs = torch.autograd.grad(slow, [state64, condition64, *twin.parameters()], upstream.double())
     for one, other in zip(ours, theirs, strict=True):
         assert one.shape == other.shape
         assert (one - other).norm() < 1e-4 * other.norm()

@@ -34,10 +34,10 @@ def _state(mesh, generator, channels=3, batch=1):
 def test_patchwork_against_the_loops(generator, degree):
     mesh = patchwork()
     state = _state(mesh, generator)
-    seen = perception(mesh, degree)(state)
-    assert seen.shape == (1, len(mesh.vertices), 3 * BLOCKS[degree])
+    vectors = perception(mesh, degree)(state)
+    assert vectors.shape == (1, len(mesh.vertices), 3 * BLOCKS[degree])
     expected = torch.tensor(brute_force.perceive(mesh, state[0].tolist(), degree))
-    assert torch.allclose(seen[0], expected, atol=1e-5)
+    assert torch.allclose(vectors[0], expected, atol=1e-5)
 
 
 @settings(max_examples=25, deadline=None)
@@ -73,8 +73,8 @@ def test_components_do_not_see_each_other(generator):
 
 def test_coinciding_vertices_have_no_direction():
     mesh = Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]]))
-    seen = perception(mesh)(torch.tensor([[[0.0], [1.0], [2.0]]]))
-    assert seen[0, 0].tolist() == [3, 0, 0, 0, 0]
+    vectors = perception(mesh)(torch.tensor([[[0.0], [1.0], [2.0]]]))
+    assert vectors[0, 0].tolist() == [3, 0, 0, 0, 0]
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2])
@@ -98,8 +98,8 @@ def test_no_size_is_too_small_or_too_large(generator, radius, orientation):
 
 def test_a_constant_state_is_seen_as_no_change(generator):
     mesh = patchwork()
-    seen = perception(mesh, 2)(torch.full((1, len(mesh.vertices), 2), 0.7))
-    assert torch.allclose(seen[..., :18], torch.zeros(1), atol=1e-5)
+    vectors = perception(mesh, 2)(torch.full((1, len(mesh.vertices), 2), 0.7))
+    assert torch.allclose(vectors[..., :18], torch.zeros(1), atol=1e-5)
 
 
 def test_turning_the_mesh_turns_what_is_seen(generator):

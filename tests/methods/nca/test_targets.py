@@ -48,9 +48,9 @@ def test_targets_read_the_features_of_the_pictures(network, scales):
     maps = network.features(targets.images[[2, 0]], ["relu3_1"])["relu3_1"]
     assert targets.size("relu3_1") == 64 and targets.size("relu1_1") == targets.size("colour") == 1024
     where = torch.tensor([[0, 63, 9], [17, 17, 1]])
-    found = targets.sample("relu3_1", torch.tensor([2, 0]), where)
+    features = targets.sample("relu3_1", torch.tensor([2, 0]), where)
     for k in range(2):
-        assert torch.allclose(found[k], maps[k].flatten(0, 1)[where[k]], atol=1e-5)
+        assert torch.allclose(features[k], maps[k].flatten(0, 1)[where[k]], atol=1e-5)
     colours = targets.sample("colour", torch.tensor([1]), torch.tensor([[33]]))
     assert torch.equal(colours[0, 0], targets.images[1, 1, 1])
 

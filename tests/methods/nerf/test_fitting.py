@@ -48,11 +48,11 @@ def test_the_loss_falls_and_the_run_folder_is_whole(run):
 
 
 def test_a_held_out_view_looks_like_its_photo(texture):
-    _, held = tiny_capture().split()
-    batch, shape = Pixels(held).image(0, 48)
+    _, held_out = tiny_capture().split()
+    batch, shape = Pixels(held_out).image(0, 48)
     photo = (batch.colours * batch.alpha + 1 - batch.alpha).numpy()
-    found = render_batch(texture.shell, batch)
-    quality = psnr(found.reshape(*shape, 3), photo.reshape(*shape, 3))
+    image = render_batch(texture.shell, batch)
+    quality = psnr(image.reshape(*shape, 3), photo.reshape(*shape, 3))
     assert quality > 17
     assert quality > 3 + psnr(np.ones_like(photo).reshape(*shape, 3), photo.reshape(*shape, 3))
 
@@ -71,10 +71,10 @@ def test_the_file_goes_round(texture, tmp_path):
 
 @pytest.mark.parametrize("missing", ["frames", "weights/3", "tables/f"])
 def test_damaged_files_are_refused(texture, tmp_path, missing, monkeypatch):
-    kept = files.model_file.save
+    original = files.model_file.save
 
     def save(path, tensors, *rest, **more):
-        return kept(path, {k: v for k, v in tensors.items() if k != missing}, *rest, **more)
+        return original(path, {k: v for k, v in tensors.items() if k != missing}, *rest, **more)
 
     monkeypatch.setattr(files.model_file, "save", save)
     path = texture.save(tmp_path / "damaged.safetensors")
@@ -308,19 +308,19 @@ def test_buried_is_what_has_matter_above_and_beside_it(run, base):
 def test_wrong_cameras_find_back(run, base):
     """In a field that is right, cameras turned by half a degree turn back, or move so that it is the same."""
     capture, rng = tiny_capture(), np.random.default_rng(0)
-    learned, _ = capture.split()
-    turns = np.radians(0.5) * rng.normal(size=(len(learned), 3))
-    poses = learned.poses.copy()
+    training, _ = capture.split()
+    turns = np.radians(0.5) * rng.normal(size=(len(training), 3))
+    poses = training.poses.copy()
     poses[:, :, :3] = Rotation.from_rotvec(turns).as_matrix() @ poses[:, :, :3]
-    wrong = replace(learned, poses=poses.astype(np.float32))
+    wrong = replace(training, poses=poses.astype(np.float32))
     task = trained_task(run, base, wrong, "refine_cameras=true")
     generator, optimizer = torch.Generator().manual_seed(0), torch.optim.Adam([task.named["poses"]], lr=0.03)
     for step in range(150):
         loss = run_step(task, step, generator).value
         (task.named["poses"].grad,) = torch.autograd.grad(loss, [task.named["poses"]])
         optimizer.step()
-    found = POSE * task.named["poses"].detach().numpy()
-    centres = learned.poses[:, :, 3]
+    corrections = POSE * task.named["poses"].detach().numpy()
+    centres = training.poses[:, :, 3]
 
     def miss(turn, shift):
         """How far rays to the middle of the object are off there."""
@@ -328,4 +328,4 @@ def test_wrong_cameras_find_back(run, base):
         axis = centres / np.linalg.norm(centres, axis=1, keepdims=True)
         return np.linalg.norm(off - axis * (off * axis).sum(1, keepdims=True), axis=1).mean()
 
-    assert miss(turns + found[:, :3], found[:, 3:]) < 0.4 * miss(turns, 0)
+    assert miss(turns + corrections[:, :3], corrections[:, 3:]) < 0.4 * miss(turns, 0)

@@ -17,13 +17,13 @@ def exemplar():
 
 
 def test_the_exemplar_is_white_but_for_the_floor():
-    shown = exemplar()
-    layout = texel_layout(list(shown.maps))
-    space = ColourSpace.of(shown, layout)
-    pixels = torch.from_numpy(np.concatenate([shown.maps[name] for name in layout], 2)).view(-1, 4)
-    found = space.coordinates(pixels)
-    covariance = torch.cov(found.T)
-    assert found.mean(0).abs().max() < 1e-5
+    picture = exemplar()
+    layout = texel_layout(list(picture.maps))
+    space = ColourSpace.of(picture, layout)
+    pixels = torch.from_numpy(np.concatenate([picture.maps[name] for name in layout], 2)).view(-1, 4)
+    coordinates = space.coordinates(pixels)
+    covariance = torch.cov(coordinates.T)
+    assert coordinates.mean(0).abs().max() < 1e-5
     assert (covariance - covariance.diag().diag()).abs().max() < 1e-4
     assert covariance.diag().max() <= 1 + 1e-4 and abs(covariance[3, 3] - 1) < 1e-4
     lengths = space.basis.norm(dim=1)
@@ -31,9 +31,9 @@ def test_the_exemplar_is_white_but_for_the_floor():
 
 
 def test_round_trips():
-    shown = exemplar()
+    picture = exemplar()
     x = torch.rand(7, 4, generator=torch.Generator().manual_seed(0))
-    for space in (ColourSpace.of(shown, texel_layout(list(shown.maps))), ColourSpace.plain(4)):
+    for space in (ColourSpace.of(picture, texel_layout(list(picture.maps))), ColourSpace.plain(4)):
         assert torch.allclose(space.values(space.coordinates(x)), x, atol=1e-5)
     assert torch.equal(ColourSpace.plain(4).values(x), x)
 

@@ -28,8 +28,8 @@ def image():
 def cost(network, colours, image, layers, region):
     comparison = GramComparison(Vgg16(precision="float32", normalised=False), image[None], layers, region)
     generator = torch.Generator()
-    found = network.read(colours, comparison.taps(network, generator))
-    return comparison.cost(found, colours, 0, generator)
+    features = network.read(colours, comparison.taps(network, generator))
+    return comparison.cost(features, colours, 0, generator)
 
 
 def test_regions_are_compared_one_by_one(network, image):

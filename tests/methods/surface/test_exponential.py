@@ -139,11 +139,11 @@ def test_a_cylinder_unrolls(rng):
     stays = (end[:, 1] > unrolled[..., 1].min()) & (end[:, 1] < unrolled[..., 1].max())
     arrival = GeodesicTracer(mesh).trace(face, weights, direction, length)
     np.testing.assert_array_equal(arrival.arrived, stays)
-    found = np.einsum("mk,mkd->md", arrival.barycentric, unrolled[arrival.face]) - end
+    offset = np.einsum("mk,mkd->md", arrival.barycentric, unrolled[arrival.face]) - end
     around = unrolled[..., 0].max()
-    found[:, 0] -= np.round(found[:, 0] / around) * around
+    offset[:, 0] -= np.round(offset[:, 0] / around) * around
     assert (length[stays] > around).any()
-    np.testing.assert_allclose(found[stays], 0.0, atol=1e-11)
+    np.testing.assert_allclose(offset[stays], 0.0, atol=1e-11)
     # On the round cylinder an arc is at most 1 / sinc(pi / n) times as long as its chord.
     points = end_points(mesh, arrival)
     turn = np.arctan2(points[:, 1], points[:, 0]) - end[:, 0]
@@ -198,12 +198,12 @@ def test_a_cone_unrolls(slope, rng):
     radius, around = polar(arrival.face, arrival.barycentric)
     off = (around - expected) / total
     # Rays towards the tip within rounding of it may pass it on either side.
-    kept = arrival.arrived
-    assert kept.sum() > 400
-    np.testing.assert_allclose(radius[kept], np.linalg.norm(end, axis=1)[kept], rtol=1e-9)
-    np.testing.assert_allclose(((off - np.round(off)) * radius)[kept], 0.0, atol=1e-9)
+    arrived = arrival.arrived
+    assert arrived.sum() > 400
+    np.testing.assert_allclose(radius[arrived], np.linalg.norm(end, axis=1)[arrived], rtol=1e-9)
+    np.testing.assert_allclose(((off - np.round(off)) * radius)[arrived], 0.0, atol=1e-9)
     if slope == 8.0:
-        assert (np.abs(swept[kept]) > total).any()
+        assert (np.abs(swept[arrived]) > total).any()
     assert np.isfinite(end_points(mesh, arrival)).all()
 
 

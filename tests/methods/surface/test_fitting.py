@@ -51,7 +51,7 @@ def exemplar():
 
 
 @pytest.fixture(scope="module")
-def made(mesh, exemplar, tmp_path_factory):
+def run(mesh, exemplar, tmp_path_factory):
     folder = tmp_path_factory.mktemp("run") / "run"
     return folder, surface.fit(exemplar, mesh, folder, overrides=SMALL, quiet=True)
 
@@ -67,24 +67,24 @@ def test_the_loss_falls_and_the_colours_come_near(exemplar, tmp_path):
     texture = surface.fit(
         colours, embedded("vase"), tmp_path / "run", overrides=[*SMALL, "steps=60"], quiet=True
     )
-    found = losses(tmp_path / "run")
-    assert found[-1] < 0.15 * found[0]
-    wanted = exemplar.maps["albedo"].reshape(-1, 3)
-    assert np.abs(texture.values.mean(0) - wanted.mean(0)).max() < 0.06
-    assert np.abs(texture.values.std(0) - wanted.std(0)).max() < 0.08
+    loss = losses(tmp_path / "run")
+    assert loss[-1] < 0.15 * loss[0]
+    pixels = exemplar.maps["albedo"].reshape(-1, 3)
+    assert np.abs(texture.values.mean(0) - pixels.mean(0)).max() < 0.06
+    assert np.abs(texture.values.std(0) - pixels.std(0)).max() < 0.08
 
 
-def test_all_maps_are_synthesized(made, exemplar):
-    _, texture = made
+def test_all_maps_are_synthesized(run, exemplar):
+    _, texture = run
     asset = texture.apply()
     assert isinstance(asset, Asset) and asset.texture_maps is not None
     assert set(asset.texture_maps) == set(asset.vertex_maps) == set(exemplar.maps)
     assert asset.texture_maps["albedo"].shape == (48, 48, 3)
 
 
-def test_textures_agree_with_vertex_maps(made, mesh):
+def test_textures_agree_with_vertex_maps(run, mesh):
     """Both are read from the same texels."""
-    asset = made[1].apply(mesh)
+    asset = run[1].apply(mesh)
     assert asset.atlas is not None and asset.texture_maps is not None
     row = (1 - asset.atlas.uv[..., 1]) * 48 - 0.5
     column = asset.atlas.uv[..., 0] * 48 - 0.5
@@ -95,8 +95,8 @@ def test_textures_agree_with_vertex_maps(made, mesh):
     assert np.corrcoef(nearest.ravel(), at_corners.ravel())[0, 1] > 0.5
 
 
-def test_files_round_trip(made, mesh):
-    folder, texture = made
+def test_files_round_trip(run, mesh):
+    folder, texture = run
     again = SurfaceTexture.load(folder)
     assert method_of(folder) == method_of(folder / NAME) == METHOD
     assert np.abs(again.values - texture.values).max() < 1e-3 and again.maps == texture.maps
@@ -106,9 +106,9 @@ def test_files_round_trip(made, mesh):
 
 
 @pytest.mark.parametrize("name", ["config.toml", "nothing", "metrics.jsonl"])
-def test_what_is_no_texture_is_refused(made, name):
+def test_what_is_no_texture_is_refused(run, name):
     with pytest.raises(CheckpointError, match="surface texture|there is no model"):
-        SurfaceTexture.load(made[0] / name)
+        SurfaceTexture.load(run[0] / name)
 
 
 def test_resuming_changes_nothing(mesh, exemplar, tmp_path):
@@ -126,9 +126,9 @@ def test_resuming_changes_nothing(mesh, exemplar, tmp_path):
     assert_same_checkpoint(tmp_path / "whole", tmp_path / "part")
 
 
-def test_resuming_on_another_mesh_is_refused(made, exemplar):
+def test_resuming_on_another_mesh_is_refused(run, exemplar):
     with pytest.raises(CheckpointError):
-        surface.fit(exemplar, icosphere(7), made[0], overrides=["steps=14"], resume=True, quiet=True)
+        surface.fit(exemplar, icosphere(7), run[0], overrides=["steps=14"], resume=True, quiet=True)
 
 
 def test_optimizers_and_spaces(mesh, exemplar, tmp_path):
@@ -146,8 +146,8 @@ def test_transport_gives_the_exemplars_colours(mesh, exemplar, tmp_path):
     colours = Exemplar({"albedo": exemplar.maps["albedo"]})
     overrides = [*SMALL, "steps=60", "loss=transport", "layers=relu1_1,relu2_1,relu3_1"]
     texture = surface.fit(colours, mesh, tmp_path / "run", overrides=overrides, quiet=True)
-    found = losses(tmp_path / "run")
-    assert np.mean(found[-5:]) < 0.5 * found[0]
+    loss = losses(tmp_path / "run")
+    assert np.mean(loss[-5:]) < 0.5 * loss[0]
     assert np.abs(texture.values.mean(0) - exemplar.maps["albedo"].mean((0, 1))).max() < 0.06
 
 
@@ -197,20 +197,20 @@ class TestOrientation:
     def test_a_field_turns_the_frames_and_stays_with_the_texture(self, mesh, exemplar, tmp_path):
         down = np.tile(np.array([0.0, -1.0, 0.0], np.float32), (len(mesh.vertices), 1))
         np.save(tmp_path / "down.npy", down)
-        given = {"overrides": [*SMALL, "steps=2"], "quiet": True, "orientation": tmp_path / "down.npy"}
-        surface.fit(exemplar, mesh, tmp_path / "run", **given)
-        made = SurfaceTexture.load(tmp_path / "run")
-        tangents = made.apply().tangents
-        assert made.domain.orientation is not None and tangents is not None
-        assert np.array_equal(made.domain.orientation, down)
+        options = {"overrides": [*SMALL, "steps=2"], "quiet": True, "orientation": tmp_path / "down.npy"}
+        surface.fit(exemplar, mesh, tmp_path / "run", **options)
+        texture = SurfaceTexture.load(tmp_path / "run")
+        tangents = texture.apply().tangents
+        assert texture.domain.orientation is not None and tangents is not None
+        assert np.array_equal(texture.domain.orientation, down)
         around = np.abs(mesh.normals[:, 1]) < 0.5
         assert (tangents[around, 1] < -0.8).all()
 
     def test_resuming_with_another_field_is_refused(self, mesh, exemplar, tmp_path):
-        given = {"overrides": [*SMALL, "steps=2"], "quiet": True}
-        surface.fit(exemplar, mesh, tmp_path / "run", **given)
+        options = {"overrides": [*SMALL, "steps=2"], "quiet": True}
+        surface.fit(exemplar, mesh, tmp_path / "run", **options)
         with pytest.raises(CheckpointError, match="orientation"):
-            surface.fit(exemplar, mesh, tmp_path / "run", **given, orientation=mesh.vertices, resume=True)
+            surface.fit(exemplar, mesh, tmp_path / "run", **options, orientation=mesh.vertices, resume=True)
 
     @pytest.mark.parametrize(
         "kind", ["missing", "text", "shape", "words", "nan", "objects", "archive", "cut"]
@@ -304,12 +304,14 @@ def test_noise_start_and_range(mesh, exemplar, tmp_path):
 
 def test_diffusion_wears_down_what_is_finer_than_the_taps(mesh, exemplar, tmp_path):
     """Without a gradient noise fades and the mean stays."""
-    made = {}
+    textures = {}
     for amount in ("0", "0.1"):
         overrides = [*SMALL, "lr=0", f"diffusion={amount}"]
-        made[amount] = surface.fit(exemplar, mesh, tmp_path / amount, overrides=overrides, quiet=True).values
-    assert np.abs(made["0.1"].mean(0) - made["0"].mean(0)).max() < 0.01
-    assert (made["0.1"].std(0) < 0.6 * made["0"].std(0)).all()
+        textures[amount] = surface.fit(
+            exemplar, mesh, tmp_path / amount, overrides=overrides, quiet=True
+        ).values
+    assert np.abs(textures["0.1"].mean(0) - textures["0"].mean(0)).max() < 0.01
+    assert (textures["0.1"].std(0) < 0.6 * textures["0"].std(0)).all()
 
 
 def test_the_scale_becomes_finer():
@@ -369,18 +371,18 @@ class TestStyleTransfer:
         """The result still follows the content, in the exemplar's colours."""
         mesh = embedded("mushrooms")
         image = Exemplar({"albedo": exemplar.maps["albedo"]})
-        made = surface.fit(image, mesh, tmp_path / "run", content="ao", overrides=self.STYLE, quiet=True)
-        content = content_colours("ao", made.domain)
+        texture = surface.fit(image, mesh, tmp_path / "run", content="ao", overrides=self.STYLE, quiet=True)
+        content = content_colours("ao", texture.domain)
         assert content.std() > 0.05 and content.min() >= 0 and content.max() <= 1
-        assert np.corrcoef(content.mean(1), made.values.mean(1))[0, 1] > 0.3
-        assert np.abs(made.values - content).mean() > 0.02
+        assert np.corrcoef(content.mean(1), texture.values.mean(1))[0, 1] > 0.3
+        assert np.abs(texture.values - content).mean() > 0.02
 
     def test_without_style_nothing_changes(self, mesh, exemplar, tmp_path):
         """All weight on the content: its texture is the optimum from the start."""
         image = Exemplar({"albedo": exemplar.maps["albedo"]})
         overrides = [*self.STYLE, "content_weight=1e12", "lr=0.001", "steps=2"]
-        made = surface.fit(image, mesh, tmp_path / "run", content="ao", overrides=overrides, quiet=True)
-        assert np.abs(made.values - content_colours("ao", made.domain)).max() < 0.02
+        texture = surface.fit(image, mesh, tmp_path / "run", content="ao", overrides=overrides, quiet=True)
+        assert np.abs(texture.values - content_colours("ao", texture.domain)).max() < 0.02
 
     def test_images_are_read_on_the_meshs_own_uvs(self, tmp_path):
         """A ramp in u and v; every texel gets its own uv as colour."""
@@ -388,8 +390,8 @@ class TestStyleTransfer:
         u, v = np.meshgrid((np.arange(256) + 0.5) / 256, 1 - (np.arange(256) + 0.5) / 256)
         write_image(tmp_path / "ramp.png", np.stack([u, v, 0 * u], -1))
         domain = SurfaceDomain(square, 32)
-        found = content_colours(tmp_path / "ramp.png", domain)
-        assert np.abs(found[:, :2] - domain.texels.position[:, :2]).max() < 0.01 and not found[:, 2].any()
+        colours = content_colours(tmp_path / "ramp.png", domain)
+        assert np.abs(colours[:, :2] - domain.texels.position[:, :2]).max() < 0.01 and not colours[:, 2].any()
 
     def test_an_image_needs_uvs(self, mesh, exemplar, tmp_path):
         image = Exemplar({"albedo": exemplar.maps["albedo"]})

@@ -78,9 +78,9 @@ def test_along_the_axes_right_is_y_cross_n_or_w_cross_n(normal, right, kind):
     mesh = facing(normal)
     face, barycentric = np.arange(8), np.full((8, 3), 1 / 3)
     np.testing.assert_allclose(unit_normals(mesh.face_crosses), np.tile(normal, (8, 1)), atol=1e-12)
-    found, up = tangent_frames(mesh, face, barycentric, kind)
-    np.testing.assert_allclose(found, np.tile(right, (8, 1)), atol=1e-9)
-    check(found, up, np.tile(normal, (8, 1)))
+    actual, up = tangent_frames(mesh, face, barycentric, kind)
+    np.testing.assert_allclose(actual, np.tile(right, (8, 1)), atol=1e-9)
+    check(actual, up, np.tile(normal, (8, 1)))
 
 
 def test_up_is_up_on_walls(rng):
@@ -262,10 +262,10 @@ def test_a_field_without_a_direction_falls_back_to_fixed():
     field = np.tile(X, (len(mesh.vertices), 1))
     field[::3] = 0.0
     field[1::3] = mesh.normals[1::3]
-    found, fixed = vertex_directions(mesh, "smooth", field), vertex_directions(mesh, "fixed")
-    np.testing.assert_allclose(found[::3], fixed[::3], atol=1e-12)
-    np.testing.assert_allclose(found[1::3], fixed[1::3], atol=1e-12)
-    assert np.abs(found[2::3] - fixed[2::3]).max() > 0.5
+    directions, fixed = vertex_directions(mesh, "smooth", field), vertex_directions(mesh, "fixed")
+    np.testing.assert_allclose(directions[::3], fixed[::3], atol=1e-12)
+    np.testing.assert_allclose(directions[1::3], fixed[1::3], atol=1e-12)
+    assert np.abs(directions[2::3] - fixed[2::3]).max() > 0.5
 
 
 @pytest.mark.parametrize(

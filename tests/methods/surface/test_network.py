@@ -30,7 +30,7 @@ def levels():
 
 
 @pytest.fixture(scope="module")
-def found():
+def traced_levels():
     """The levels of a flat square of triangles whose atlas is the identity."""
     mesh = flat_square(40)
     assert mesh.uv is not None
@@ -55,7 +55,9 @@ def as_image(levels, values, layer):
     return out
 
 
-@pytest.mark.parametrize(("kind", "pool"), [("levels", "average"), ("levels", "max"), ("found", "average")])
+@pytest.mark.parametrize(
+    ("kind", "pool"), [("levels", "average"), ("levels", "max"), ("traced_levels", "average")]
+)
 def test_every_layer_equals_the_image_network_on_a_grid(request, kind, image, pool):
     levels = request.getfixturevalue(kind)
     ours = SurfaceVgg(levels, pool=pool, precision="float32")
@@ -68,7 +70,7 @@ def test_every_layer_equals_the_image_network_on_a_grid(request, kind, image, po
         assert b.numel() and (a - b).abs().max() < 1e-4 * b.abs().max(), layer
 
 
-@pytest.mark.parametrize("kind", ["levels", "found"])
+@pytest.mark.parametrize("kind", ["levels", "traced_levels"])
 def test_input_gradient_equals_the_image_networks(request, kind, image):
     """Of the centre of each layer, in float32."""
     levels = request.getfixturevalue(kind)
@@ -80,11 +82,11 @@ def test_input_gradient_equals_the_image_networks(request, kind, image):
         a = as_image(levels, ours.features(texels, [layer])[layer], layer)
         b = theirs.features(picture, [layer])[layer][0]
         centre = slice(len(b) // 2 - 1, len(b) // 2 + 1)
-        pull = torch.randn(2, 2, b.shape[2], generator=generator)
-        (got,) = torch.autograd.grad((a[centre, centre] * pull).sum(), texels)
-        (expected,) = torch.autograd.grad((b[centre, centre] * pull).sum(), picture)
+        upstream = torch.randn(2, 2, b.shape[2], generator=generator)
+        (gradient,) = torch.autograd.grad((a[centre, centre] * upstream).sum(), texels)
+        (expected,) = torch.autograd.grad((b[centre, centre] * upstream).sum(), picture)
         expected = expected.view(-1, 3)[levels.order]
-        assert (got - expected).norm() < 1e-4 * expected.norm(), layer
+        assert (gradient - expected).norm() < 1e-4 * expected.norm(), layer
 
 
 @pytest.fixture(scope="module")
@@ -112,11 +114,11 @@ def test_convolution_against_autograd(irregular, chunk, monkeypatch):
     gathered = x[torch.from_numpy(taps).long()]
     expected = torch.relu(torch.einsum("nki,oik->no", gathered, weight.flatten(2)) + bias)
     conv = SurfaceConv(weight, bias, torch.float32, Neighbourhood.of(taps))
-    got = conv.forward(x.detach())
-    assert torch.allclose(got, expected, atol=1e-4)
-    pull = torch.randn(got.shape, generator=generator)
-    (wanted,) = torch.autograd.grad(expected, x, pull)
-    assert torch.allclose(conv.backward(pull.clone(), got), wanted, atol=1e-3)
+    output = conv.forward(x.detach())
+    assert torch.allclose(output, expected, atol=1e-4)
+    upstream = torch.randn(output.shape, generator=generator)
+    (expected_gradient,) = torch.autograd.grad(expected, x, upstream)
+    assert torch.allclose(conv.backward(upstream.clone(), output), expected_gradient, atol=1e-3)
 
 
 @pytest.mark.parametrize("kind", ["average", "max"])
@@ -127,11 +129,11 @@ def test_pooling_against_loops(irregular, kind):
     parts = x.split(sizes.tolist())
     expected = torch.stack([p.mean(0) if kind == "average" else p.amax(0) for p in parts])
     pool = SurfacePool(kind, sizes)
-    got = pool.forward(x.detach())
-    assert torch.allclose(got, expected, atol=1e-6)
-    pull = torch.randn(got.shape, generator=generator)
-    (wanted,) = torch.autograd.grad(expected, x, pull)
-    assert torch.allclose(pool.backward(pull, x.detach()), wanted, atol=1e-6)
+    output = pool.forward(x.detach())
+    assert torch.allclose(output, expected, atol=1e-6)
+    upstream = torch.randn(output.shape, generator=generator)
+    (expected_gradient,) = torch.autograd.grad(expected, x, upstream)
+    assert torch.allclose(pool.backward(upstream, x.detach()), expected_gradient, atol=1e-6)
 
 
 @pytest.mark.parametrize("regions", [1, 7])
@@ -149,8 +151,8 @@ def test_gram_matrices_and_their_gradient(levels, image, regions):
         gram = torch.stack([f.T @ f / len(f) for f in groups])
         assert torch.allclose(grams[name], gram, rtol=1e-4, atol=1e-5)
         generator = torch.Generator().manual_seed(k)
-        pull = torch.randn(gram.shape, generator=generator)
-        total, expected = total + (grams[name] * pull).sum(), expected + (gram * pull).sum()
+        upstream = torch.randn(gram.shape, generator=generator)
+        total, expected = total + (grams[name] * upstream).sum(), expected + (gram * upstream).sum()
     (a,) = torch.autograd.grad(total, texels)
     (b,) = torch.autograd.grad(expected, texels)
     assert (a - b).norm() < 1e-4 * b.norm()

@@ -70,10 +70,10 @@ def bases(tmp_path_factory):
     """The textures that others are compared with, by their settings."""
     textures: dict[str, np.ndarray] = {}
 
-    def base(given: dict[str, str]) -> np.ndarray:
-        if str(given) not in textures:
-            textures[str(given)] = synthesize(tmp_path_factory.mktemp("base") / "run", given)
-        return textures[str(given)]
+    def base(settings: dict[str, str]) -> np.ndarray:
+        if str(settings) not in textures:
+            textures[str(settings)] = synthesize(tmp_path_factory.mktemp("base") / "run", settings)
+        return textures[str(settings)]
 
     return base
 
@@ -82,10 +82,10 @@ def bases(tmp_path_factory):
 def test_a_setting_changes_the_texture(bases, tmp_path, key):
     """By more than rounding; the same settings give the same texture to the last bit."""
     threads(1)
-    value, given = CASES[key]
-    base = bases(given)
-    other = synthesize(tmp_path / "other", given | {key: value})
+    value, settings = CASES[key]
+    base = bases(settings)
+    other = synthesize(tmp_path / "other", settings | {key: value})
     assert np.isfinite(other).all()
     assert base.shape != other.shape or np.abs(base - other).max() > 1e-3
     if key == "seed":
-        assert np.array_equal(base, synthesize(tmp_path / "again", given))
+        assert np.array_equal(base, synthesize(tmp_path / "again", settings))

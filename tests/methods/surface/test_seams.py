@@ -26,8 +26,8 @@ def blank():
 
 def test_a_smooth_function_of_space_has_no_seams(blank):
     waves = np.sin(9 * blank.domain.texels.position + [0, 1, 2])
-    found = seam_ratio(replace(blank, values=(0.5 + 0.5 * waves).astype(np.float32)))
-    assert found == pytest.approx(1, abs=0.1)
+    ratio = seam_ratio(replace(blank, values=(0.5 + 0.5 * waves).astype(np.float32)))
+    assert ratio == pytest.approx(1, abs=0.1)
 
 
 def test_a_colour_for_each_chart_is_all_seams(blank):
@@ -46,5 +46,5 @@ def test_a_synthesis_has_no_seams(tmp_path):
     """At most a tenth more across seams than elsewhere."""
     exemplar = Exemplar({"albedo": Exemplar.load("cobblestone").maps["albedo"]})
     settings = ["resolution=128", "exemplar_size=64", "steps=60", "milestones=40,50", "preview_every=0"]
-    made = surface.fit(exemplar, icosphere(12), tmp_path / "run", overrides=settings, quiet=True)
-    assert seam_ratio(made) < 1.1
+    texture = surface.fit(exemplar, icosphere(12), tmp_path / "run", overrides=settings, quiet=True)
+    assert seam_ratio(texture) < 1.1

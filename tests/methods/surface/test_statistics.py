@@ -18,8 +18,8 @@ def image():
 def test_features_are_those_of_a_mirrored_image(image, pool):
     """Of a picture so large that its zeros are far away."""
     network = Vgg16(pool, precision="float32", normalised=False)
-    found = exemplar_features(network, image, ("relu1_2", "pool1", "relu2_2", "pool2"))
-    assert {name: f.shape for name, f in found.items()} == {
+    features = exemplar_features(network, image, ("relu1_2", "pool1", "relu2_2", "pool2"))
+    assert {name: f.shape for name, f in features.items()} == {
         "relu1_2": (64 * 96, 64),
         "pool1": (32 * 48, 64),
         "relu2_2": (32 * 48, 128),
@@ -29,10 +29,10 @@ def test_features_are_those_of_a_mirrored_image(image, pool):
     whole = torch.cat([rows.flip(1)[:, :-1], rows, rows.flip(1)[:, 1:]], 1)[None, 63 - 32 :, 95 - 32 :]
     maps = network.features(whole, ["relu1_2", "relu2_2"])
     cut = maps["relu2_2"][0, 16 : 16 + 32, 16 : 16 + 48].flatten(0, 1)
-    assert torch.allclose(found["relu2_2"], cut, atol=1e-3 * float(cut.max()))
+    assert torch.allclose(features["relu2_2"], cut, atol=1e-3 * float(cut.max()))
     reduce = F.avg_pool2d if pool == "average" else F.max_pool2d
     pooled = reduce(maps["relu1_2"].permute(0, 3, 1, 2), 2)[0, :, 16 : 16 + 32, 16 : 16 + 48]
-    assert torch.allclose(found["pool1"], pooled.flatten(1).T, atol=1e-3 * float(pooled.max()))
+    assert torch.allclose(features["pool1"], pooled.flatten(1).T, atol=1e-3 * float(pooled.max()))
 
 
 def test_a_constant_image_has_the_same_features_everywhere():
@@ -43,5 +43,5 @@ def test_a_constant_image_has_the_same_features_everywhere():
 
 
 def test_tiny_images_have_all_layers():
-    found = exemplar_features(Vgg16(normalised=False), torch.rand(16, 16, 3), ALL_LAYERS)
-    assert found["pool5"].shape[1] == 512 and all(len(f) and f.isfinite().all() for f in found.values())
+    features = exemplar_features(Vgg16(normalised=False), torch.rand(16, 16, 3), ALL_LAYERS)
+    assert features["pool5"].shape[1] == 512 and all(len(f) and f.isfinite().all() for f in features.values())

@@ -85,8 +85,8 @@ def test_taps_read_themselves_or_neighbours(octopus):
         pairs = [label[reader] * count + label[read], label[read] * count + label[reader]]
         known = np.unique(np.concatenate(pairs))
         taps = levels.levels[n].taps
-        wanted = np.arange(count)[:, None] * count + taps
-        assert np.isin(wanted, known).all()
+        tap_pairs = np.arange(count)[:, None] * count + taps
+        assert np.isin(tap_pairs, known).all()
 
 
 def test_without_the_correction_some_taps_overshoot(octopus):
@@ -137,8 +137,8 @@ def test_bending_changes_no_feature_before_pooling():
         assert mesh.uv is not None
         around = surroundings(mesh, mesh.uv, 96)
         levels = build(around)
-        shown = colours[torch.from_numpy(around.texels.index[levels.order]).long()]
-        features = SurfaceVgg(levels, precision="float32").features(shown, ["relu1_1", "relu1_2"])
+        texels = colours[torch.from_numpy(around.texels.index[levels.order]).long()]
+        features = SurfaceVgg(levels, precision="float32").features(texels, ["relu1_1", "relu1_2"])
         back = np.argsort(levels.order)
         results.append({name: f[torch.from_numpy(back)] for name, f in features.items()})
         row, column = np.divmod(around.texels.index, 96)
@@ -168,11 +168,11 @@ def test_taps_across_a_border_are_the_opposite_ones():
 def test_representatives_are_nearest_to_the_mean():
     rng = np.random.default_rng(1)
     position, labels = rng.random((60, 3)), np.sort(rng.integers(0, 7, 60))
-    found = representatives(position, labels, 0.01)
+    members = representatives(position, labels, 0.01)
     for k in range(7):
         own = np.flatnonzero(labels == k)
         distance = np.linalg.norm(position[own] - position[own].mean(0), axis=1)
-        assert distance[own == found[k]][0] <= distance.min() + 1e-5
+        assert distance[own == members[k]][0] <= distance.min() + 1e-5
     square = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], float)
     assert representatives(square, np.zeros(4, int), 1.0).tolist() == [0]  # all alike: the first
 

@@ -69,7 +69,7 @@ def scattered() -> np.ndarray:
 
 def test_a_texel_is_used_where_clipping_leaves_something_of_a_face(scattered):
     n = 17
-    found = rasterize(scattered, n)
+    texels = rasterize(scattered, n)
     used = []
     for index in range(n * n):
         c = centre(index, n)
@@ -79,31 +79,31 @@ def test_a_texel_is_used_where_clipping_leaves_something_of_a_face(scattered):
         k = len(used)
         used.append(index)
         around = [f for f in faces if contains(scattered[f], c)]
-        assert found.inside[k] == bool(around)
+        assert texels.inside[k] == bool(around)
         if around:
-            assert found.face[k] == around[0]
+            assert texels.face[k] == around[0]
         else:
             nearest = [border_distance(scattered[f], c) for f in faces]
-            assert nearest[faces.index(found.face[k])] < min(nearest) + 1e-4 / n
-    np.testing.assert_array_equal(found.index, used)
+            assert nearest[faces.index(texels.face[k])] < min(nearest) + 1e-4 / n
+    np.testing.assert_array_equal(texels.index, used)
     assert 0.2 * n * n < len(used) < 0.8 * n * n
-    assert found.inside.any() and not found.inside.all()
+    assert texels.inside.any() and not texels.inside.all()
 
 
 def test_border_texels_show_the_nearest_point_of_their_face(scattered):
-    found = rasterize(scattered, 29)
-    assert found.barycentric.min() >= 0.0
-    np.testing.assert_allclose(found.barycentric.sum(axis=1), 1.0, rtol=0, atol=1e-14)
-    shown = np.einsum("nk,nkc->nc", found.barycentric, scattered[found.face].astype(np.float64))
-    centres = np.array([centre(i, 29) for i in found.index])
-    away = np.linalg.norm(shown - centres, axis=1)
-    assert away[found.inside].max() < 1e-9
-    border = np.flatnonzero(~found.inside)
-    expected = [border_distance(scattered[found.face[k]], centres[k]) for k in border]
+    texels = rasterize(scattered, 29)
+    assert texels.barycentric.min() >= 0.0
+    np.testing.assert_allclose(texels.barycentric.sum(axis=1), 1.0, rtol=0, atol=1e-14)
+    points = np.einsum("nk,nkc->nc", texels.barycentric, scattered[texels.face].astype(np.float64))
+    centres = np.array([centre(i, 29) for i in texels.index])
+    away = np.linalg.norm(points - centres, axis=1)
+    assert away[texels.inside].max() < 1e-9
+    border = np.flatnonzero(~texels.inside)
+    expected = [border_distance(scattered[texels.face[k]], centres[k]) for k in border]
     # Sampling overestimates, by at most h^2 / 2d for a distance d and samples h apart.
     np.testing.assert_allclose(away[border], expected, rtol=0, atol=1e-5)
     assert (away[border] <= np.array(expected) + 1e-12).all()
-    between = (found.barycentric[border] > 1e-3).sum(axis=1)
+    between = (texels.barycentric[border] > 1e-3).sum(axis=1)
     assert (between == 1).any() and (between == 2).sum() > 20  # corners and edges
 
 
@@ -112,28 +112,28 @@ def test_positions_reproduce_a_linear_function():
     low, side = 0.2925, 0.4375  # the texels along all four borders have their centres outside
     assert mesh.uv is not None
     uv = low + side * mesh.uv
-    found = Texels.rasterize(mesh, uv, 40)
-    centres = np.array([centre(i, 40) for i in found.index])
+    texels = Texels.rasterize(mesh, uv, 40)
+    centres = np.array([centre(i, 40) for i in texels.index])
     expected = 2.0 * (np.clip(centres, low, low + side) - low) / side - 1.0
-    np.testing.assert_allclose(found.position[:, :2], expected, atol=1e-6)
-    assert np.ptp(found.position[:, :2], axis=0) == pytest.approx([2.0, 2.0])
-    top = found.position[found.index < found.index[0] + 20, 1]
+    np.testing.assert_allclose(texels.position[:, :2], expected, atol=1e-6)
+    assert np.ptp(texels.position[:, :2], axis=0) == pytest.approx([2.0, 2.0])
+    top = texels.position[texels.index < texels.index[0] + 20, 1]
     assert top.min() > 0.9  # row 0 is the top
 
 
 @pytest.mark.parametrize("resolution", [1, 2, 5, 16])
 def test_a_layout_that_fills_the_map_uses_every_texel(resolution):
-    found = rasterize(SQUARE, resolution)
-    np.testing.assert_array_equal(found.index, np.arange(resolution**2))
-    assert found.inside.all()  # also the centres on the diagonal
-    assert found.face.dtype == found.index.dtype == found.chart.dtype == np.int32
+    texels = rasterize(SQUARE, resolution)
+    np.testing.assert_array_equal(texels.index, np.arange(resolution**2))
+    assert texels.inside.all()  # also the centres on the diagonal
+    assert texels.face.dtype == texels.index.dtype == texels.chart.dtype == np.int32
 
 
 def test_texels_that_are_only_touched_count():
-    found = rasterize(0.25 + 0.5 * SQUARE, 8)
-    rows, columns = np.divmod(found.index, 8)
+    texels = rasterize(0.25 + 0.5 * SQUARE, 8)
+    rows, columns = np.divmod(texels.index, 8)
     assert (rows.min(), rows.max(), columns.min(), columns.max()) == (1, 6, 1, 6)
-    assert len(found.index) == 36 and found.inside.sum() == 16
+    assert len(texels.index) == 36 and texels.inside.sum() == 16
 
 
 def test_one_texel_shows_the_centre_or_what_is_nearest_to_it():
@@ -165,8 +165,8 @@ def test_the_size_of_a_texel_is_the_median_over_the_faces(scale):
     vertices = mesh.vertices.copy()
     vertices[6:9] *= 4.0  # the third face is larger than in the layout, the fourth is a point there,
     vertices[12:] = vertices[12]  # and the fifth is one in space
-    found = Texels.rasterize(mesh.with_vertices(vertices), uv, 50)
-    assert found.size == pytest.approx(scale / 50, rel=1e-5)
+    texels = Texels.rasterize(mesh.with_vertices(vertices), uv, 50)
+    assert texels.size == pytest.approx(scale / 50, rel=1e-5)
 
 
 def test_charts_end_where_uvs_differ():
@@ -195,20 +195,20 @@ def test_charts_join_at_equal_places_and_only_along_edges():
     bow_tie = np.array([[[0, 0], [0.5, 0.5], [0, 1]], [[1, 0], [1, 1], [0.5, 0.5]]], np.float32)
     assert charts(flat(bow_tie), bow_tie).tolist() == [0, 1]
     mesh = icosphere(6)
-    found = charts(mesh, unwrap(mesh, 64, 2))
-    assert 1 < found.max() + 1 < 60
-    assert (np.diff(np.unique(found, return_index=True)[1]) > 0).all()  # numbered by first face
+    numbers = charts(mesh, unwrap(mesh, 64, 2))
+    assert 1 < numbers.max() + 1 < 60
+    assert (np.diff(np.unique(numbers, return_index=True)[1]) > 0).all()  # numbered by first face
 
 
-def slow_bilinear(found: Texels, face: int, barycentric: np.ndarray) -> dict[int, float]:
-    n = found.resolution
-    u, v = barycentric @ found.uv[face]
+def slow_bilinear(texels: Texels, face: int, barycentric: np.ndarray) -> dict[int, float]:
+    n = texels.resolution
+    u, v = barycentric @ texels.uv[face]
     x, y = u * n - 0.5, (1.0 - v) * n - 0.5
     weights = {}
-    for k, index in enumerate(found.index):
+    for k, index in enumerate(texels.index):
         row, column = divmod(int(index), n)
         weight = max(1 - abs(x - column), 0) * max(1 - abs(y - row), 0)
-        if weight > 0 and found.chart[found.face[k]] == found.chart[face]:
+        if weight > 0 and texels.chart[texels.face[k]] == texels.chart[face]:
             weights[k] = weight
     total = sum(weights.values())
     return {k: weight / total for k, weight in weights.items()}
@@ -223,28 +223,28 @@ def test_bilinear_weights_are_those_of_a_loop_over_all_texels(rng):
     left = np.array([0.37, 0.8]) * SQUARE + 0.1
     uv = np.concatenate([left, left + [0.37 + 1 / 16, 0]]).astype(np.float32)
     mesh = flat(np.concatenate([SQUARE, SQUARE + [2, 0]]).astype(np.float32))
-    found = Texels.rasterize(mesh, uv, 16)
-    assert found.chart.tolist() == [0, 0, 1, 1]
+    texels = Texels.rasterize(mesh, uv, 16)
+    assert texels.chart.tolist() == [0, 0, 1, 1]
     face = rng.integers(0, 4, 400)
     barycentric = rng.dirichlet([0.4] * 3, 400)
     barycentric[:12] = np.tile(np.eye(3), (4, 1))
-    texel, weight = found.bilinear(face, barycentric)
+    texel, weight = texels.bilinear(face, barycentric)
     assert texel.dtype == np.int32 and weight.dtype == np.float32
     for k in range(400):
         assert read(texel[k], weight[k]) == pytest.approx(
-            slow_bilinear(found, face[k], barycentric[k]), abs=1e-5
+            slow_bilinear(texels, face[k], barycentric[k]), abs=1e-5
         )
     np.testing.assert_allclose(weight.sum(axis=1), 1.0, atol=1e-6)
-    crossing = found.chart[found.face[texel]] != found.chart[face][:, None]
+    crossing = texels.chart[texels.face[texel]] != texels.chart[face][:, None]
     assert not weight[crossing].any()
     assert (weight == 0).sum() > 20
 
 
 def test_a_point_on_a_texel_centre_reads_that_texel_alone():
     mesh = icosphere(8)
-    found = Texels.rasterize(mesh, unwrap(mesh, 128, 4), 128)
-    inside = np.flatnonzero(found.inside)
-    texel, weight = found.bilinear(found.face[inside], found.barycentric[inside])
+    texels = Texels.rasterize(mesh, unwrap(mesh, 128, 4), 128)
+    inside = np.flatnonzero(texels.inside)
+    texel, weight = texels.bilinear(texels.face[inside], texels.barycentric[inside])
     assert ((weight > 0).sum(axis=1) == 1).all() and (weight.max(axis=1) == 1).all()
     np.testing.assert_array_equal(texel[np.arange(len(inside)), weight.argmax(axis=1)], inside)
 
@@ -252,11 +252,11 @@ def test_a_point_on_a_texel_centre_reads_that_texel_alone():
 def test_bilinear_reproduces_a_linear_function_away_from_the_border(rng):
     mesh = grid(2, 2)
     assert mesh.uv is not None
-    found = Texels.rasterize(mesh, 0.1 + 0.8 * mesh.uv, 32)
+    texels = Texels.rasterize(mesh, 0.1 + 0.8 * mesh.uv, 32)
     face, barycentric = rng.integers(0, 8, 200), rng.dirichlet([1.0] * 3, 200)
     points = np.einsum("mk,mkc->mc", barycentric, mesh.vertices[mesh.faces[face]])
-    texel, weight = found.bilinear(face, barycentric)
-    read = np.einsum("mk,mkc->mc", weight, found.position[texel])
+    texel, weight = texels.bilinear(face, barycentric)
+    read = np.einsum("mk,mkc->mc", weight, texels.position[texel])
     inner = np.abs(points).max(axis=1) < 0.92
     assert inner.sum() > 100
     np.testing.assert_allclose(read[inner], points[inner], atol=1e-6)
@@ -276,17 +276,17 @@ def lost_layout() -> Texels:
 
 
 def test_points_without_a_texel_of_their_chart_read_the_nearest_that_is_left():
-    found = lost_layout()
-    assert found.chart.tolist() == [0, 0, 1, 2, 3]
-    owned = [np.flatnonzero(found.chart[found.face] == c) for c in range(4)]
+    texels = lost_layout()
+    assert texels.chart.tolist() == [0, 0, 1, 2, 3]
+    owned = [np.flatnonzero(texels.chart[texels.face] == c) for c in range(4)]
     assert len(owned[0]) == 48 and not len(owned[1]) and len(owned[2]) and not len(owned[3])
     thirds, tip = np.full((1, 3), 1 / 3), np.array([[0.0, 1.0, 0.0]])
-    texel, weight = found.bilinear(np.array([2, 3, 4]), np.concatenate([thirds, tip, thirds]))
+    texel, weight = texels.bilinear(np.array([2, 3, 4]), np.concatenate([thirds, tip, thirds]))
     np.testing.assert_array_equal(weight, np.tile([1, 0, 0, 0], (3, 1)))
-    columns = found.index % 8
-    assert found.index[texel[0, 0]] == 3 * 8 + 4  # the texel that it lies in, of another chart
+    columns = texels.index % 8
+    assert texels.index[texel[0, 0]] == 3 * 8 + 4  # the texel that it lies in, of another chart
     assert texel[1, 0] in owned[2] and columns[texel[1, 0]] == columns[owned[2]].max()  # its own, far away
-    assert found.index[texel[2, 0]] == 7 * 8 + 7  # the corner
+    assert texels.index[texel[2, 0]] == 7 * 8 + 7  # the corner
 
 
 def test_a_texel_of_the_chart_nearby_stands_in():
@@ -294,23 +294,23 @@ def test_a_texel_of_the_chart_nearby_stands_in():
     big = 0.125 * np.array([[[2.2, 0], [8, 0], [8, 8]], [[2.2, 0], [8, 8], [2.2, 8]]])
     strip = 0.125 * np.array([[[1.2, 3.4], [2.9, 3.5], [1.2, 3.6]]])
     uv = np.concatenate([big, strip]).astype(np.float32)
-    found = Texels.rasterize(flat(np.concatenate([big, strip + 3]).astype(np.float32)), uv, 8)
-    own = np.flatnonzero(found.face == 2)
-    assert [divmod(int(i), 8) for i in found.index[own]] == [(4, 1)]
+    texels = Texels.rasterize(flat(np.concatenate([big, strip + 3]).astype(np.float32)), uv, 8)
+    own = np.flatnonzero(texels.face == 2)
+    assert [divmod(int(i), 8) for i in texels.index[own]] == [(4, 1)]
     barycentric = np.array([[0.0, 1.0, 0.0]])
-    texel, weight = found.bilinear(np.array([2]), barycentric)
+    texel, weight = texels.bilinear(np.array([2]), barycentric)
     assert texel[0, 0] == own[0] and weight[0].tolist() == [1, 0, 0, 0]
 
 
 def test_values_go_back_to_their_places():
-    found = rasterize(0.5 * SQUARE, 6)
-    values = np.stack([found.index, -found.index], axis=1).astype(np.float32)
-    image = found.image(values, fill=7.0)
+    texels = rasterize(0.5 * SQUARE, 6)
+    values = np.stack([texels.index, -texels.index], axis=1).astype(np.float32)
+    image = texels.image(values, fill=7.0)
     assert image.shape == (6, 6, 2) and image.dtype == np.float32
-    unused = np.setdiff1d(np.arange(36), found.index)
-    np.testing.assert_array_equal(image.reshape(36, 2)[found.index], values)
+    unused = np.setdiff1d(np.arange(36), texels.index)
+    np.testing.assert_array_equal(image.reshape(36, 2)[texels.index], values)
     assert len(unused) and (image.reshape(36, 2)[unused] == 7.0).all()
-    assert (found.image(values).reshape(36, 2)[unused] == 0.0).all()
+    assert (texels.image(values).reshape(36, 2)[unused] == 0.0).all()
 
 
 @pytest.mark.parametrize(

@@ -107,10 +107,10 @@ class Matcher:
         self.flips, self.centres = tuple(flips), np.asarray(source.centres, np.float64)
         self.apart = APART * source.length
         self.shape = _checked_shape(source)
-        names = {_source_side(name, flip) for name in sides for flip in self.flips}
+        source_sides = {_source_side(name, flip) for name in sides for flip in self.flips}
         side = self.shape[0]
         length = side // BLOCK * overlap(side) * source.matched
-        self._strips = {name: np.empty((count, length), np.float32) for name in names}
+        self._strips = {name: np.empty((count, length), np.float32) for name in source_sides}
         for index in range(count):
             square = source.patch(index)[..., : source.matched]
             for name, rows in self._strips.items():

@@ -45,13 +45,13 @@ def assert_closed_and_even(mesh: Mesh, edge: float) -> None:
 @pytest.mark.usefixtures("packages")
 def test_a_dense_ball_gives_a_ball_in_its_place():
     centre = (0.2, 0.0, -0.1)
-    made = base_shape(density(ball(centre)), edge=0.02)
-    assert_closed_and_even(made, 0.02)
-    assert quality(made).genus == 0
-    radius = np.linalg.norm(made.vertices - centre, axis=1)
+    base = base_shape(density(ball(centre)), edge=0.02)
+    assert_closed_and_even(base, 0.02)
+    assert quality(base).genus == 0
+    radius = np.linalg.norm(base.vertices - centre, axis=1)
     assert radius.mean() == pytest.approx(0.6, rel=0.01)
     np.testing.assert_allclose(radius, 0.6, rtol=0.03)
-    assert ((made.vertices - centre) * made.normals).sum(1).min() > 0
+    assert ((base.vertices - centre) * base.normals).sum(1).min() > 0
 
 
 @pytest.mark.usefixtures("packages")
@@ -59,22 +59,22 @@ def test_bumps_are_gone_and_floating_specks_too():
     bumps = 0.06 * np.prod(np.cos(16 * places()), axis=0)
     bumpy = ball() + bumps
     speck = ball((0.9, 0.9, 0.9), 0.09)
-    made = base_shape(density(np.maximum(bumpy, speck)), concavity=0.4, edge=0.025)
-    assert_closed_and_even(made, 0.025)
+    base = base_shape(density(np.maximum(bumpy, speck)), concavity=0.4, edge=0.025)
+    assert_closed_and_even(base, 0.025)
     surface = np.abs(bumpy) < 0.02
     before = np.linalg.norm(places()[:, surface], axis=0).var()
-    after = np.linalg.norm(made.vertices, axis=1).var()
+    after = np.linalg.norm(base.vertices, axis=1).var()
     assert after < before / 4
     extent = np.abs(places()[:, bumpy > 0]).max()
-    np.testing.assert_allclose(np.abs(made.vertices).max(0), extent, atol=2 / SIDE)
+    np.testing.assert_allclose(np.abs(base.vertices).max(0), extent, atol=2 / SIDE)
 
 
 @pytest.mark.usefixtures("packages")
 def test_a_ring_keeps_its_hole():
     x, y, z = places(20)
-    made = base_shape(density(0.25 - np.hypot(np.hypot(x, z) - 0.65, y)), concavity=0.3, edge=0.05)
-    assert_closed_and_even(made, 0.05)
-    assert quality(made).genus == 1
+    base = base_shape(density(0.25 - np.hypot(np.hypot(x, z) - 0.65, y)), concavity=0.3, edge=0.05)
+    assert_closed_and_even(base, 0.05)
+    assert quality(base).genus == 1
 
 
 @pytest.mark.usefixtures("packages")
@@ -102,11 +102,11 @@ def test_a_given_base_that_is_fine_enough_stays():
 def test_a_given_base_is_meshed_evenly_and_keeps_its_holes():
     coarse = icosphere(8).with_vertices(0.9 * icosphere(8).vertices)
     open_below = Mesh(coarse.vertices, coarse.faces[(coarse.vertices[coarse.faces][..., 1] > -0.5).all(1)])
-    made = given_base(open_below, 0.02)
-    report = quality(made)
+    base = given_base(open_below, 0.02)
+    report = quality(base)
     assert report.edge_variation < 0.2
     assert report.boundary_edges > 0 and report.euler == 1
-    assert report.edge_length == pytest.approx(0.02 * np.linalg.norm(np.ptp(made.vertices, axis=0)), rel=0.15)
+    assert report.edge_length == pytest.approx(0.02 * np.linalg.norm(np.ptp(base.vertices, axis=0)), rel=0.15)
 
 
 def test_a_given_base_that_looks_inwards_is_turned():
@@ -114,10 +114,10 @@ def test_a_given_base_that_looks_inwards_is_turned():
     uv = np.random.default_rng(0).random((len(mesh.faces), 3, 2))
     inwards = replace(mesh, faces=mesh.faces[:, ::-1], uv=uv[:, ::-1])
     with pytest.warns(MeshWarning, match="look inwards"):
-        made = given_base(inwards, 0.1)
-    np.testing.assert_array_equal(made.faces, mesh.faces)
-    assert made.uv is not None
-    np.testing.assert_allclose(made.uv, uv, atol=1e-6)
+        base = given_base(inwards, 0.1)
+    np.testing.assert_array_equal(base.faces, mesh.faces)
+    assert base.uv is not None
+    np.testing.assert_allclose(base.uv, uv, atol=1e-6)
 
 
 def test_a_given_base_outside_the_cube_is_refused():

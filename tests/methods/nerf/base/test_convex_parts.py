@@ -22,23 +22,23 @@ def volume(mesh: Mesh) -> float:
 def test_two_overlapping_boxes_have_the_volume_of_their_union():
     cell = 0.02
     a, b = (np.array([[0, 0, 0], [1, 0.8, 0.6]]), np.array([[0.5, 0.3, 0.2], [1.4, 1.2, 0.9]]))
-    made = union([box(*a), box(*b)], cell)
+    mesh = union([box(*a), box(*b)], cell)
     grow = np.array([[-1], [1]]) * GROWN * cell
     common = np.minimum(a[1], b[1]) - np.maximum(a[0], b[0]) + 2 * GROWN * cell
     expected = np.prod(np.ptp(a + grow, axis=0)) + np.prod(np.ptp(b + grow, axis=0)) - np.prod(common)
-    assert volume(made) == pytest.approx(expected, rel=2e-3)
-    report = quality(made)
+    assert volume(mesh) == pytest.approx(expected, rel=2e-3)
+    report = quality(mesh)
     assert (report.components, report.boundary_edges, report.non_manifold_edges) == (1, 0, 0)
     assert report.genus == 0
-    np.testing.assert_allclose(made.vertices.min(0), a[0] - GROWN * cell, atol=1e-5)
-    np.testing.assert_allclose(made.vertices.max(0), b[1] + GROWN * cell, atol=1e-5)
+    np.testing.assert_allclose(mesh.vertices.min(0), a[0] - GROWN * cell, atol=1e-5)
+    np.testing.assert_allclose(mesh.vertices.max(0), b[1] + GROWN * cell, atol=1e-5)
 
 
 def test_pieces_that_touch_become_one():
     halves = [box((0, 0, 0), (0.5, 1, 1)), box((0.5, 0, 0), (1, 1, 1))]
-    made = union(halves, 0.03)
-    assert quality(made).components == 1
-    assert volume(made) == pytest.approx((1 + 2 * GROWN * 0.03) ** 3, rel=5e-3)
+    mesh = union(halves, 0.03)
+    assert quality(mesh).components == 1
+    assert volume(mesh) == pytest.approx((1 + 2 * GROWN * 0.03) ** 3, rel=5e-3)
 
 
 def test_a_ring_keeps_its_hole_and_a_case_loses_its_hollow():
@@ -55,8 +55,8 @@ def test_a_ring_keeps_its_hole_and_a_case_loses_its_hollow():
 
 
 def test_a_ball_of_many_planes():
-    made = union([icosphere(6).vertices], 0.05)
-    np.testing.assert_allclose(np.linalg.norm(made.vertices, axis=1), 1 + GROWN * 0.05, atol=0.02)
+    mesh = union([icosphere(6).vertices], 0.05)
+    np.testing.assert_allclose(np.linalg.norm(mesh.vertices, axis=1), 1 + GROWN * 0.05, atol=0.02)
 
 
 def test_flat_pieces_are_left_out():

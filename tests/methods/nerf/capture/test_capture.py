@@ -131,10 +131,10 @@ class TestCameras:
         assert loaded.images[4].shape == (60, 80, 4) and loaded.images[5].shape == (SIZE, SIZE, 4)
 
     def test_split_holds_out_every_eighth(self, capture):
-        kept, held = capture.split()
-        assert held.names == ("images/000.png", "images/008.png") and len(kept) == 10
-        assert np.array_equal(held.poses, capture.poses[[0, 8]])
-        assert held.images[1] is capture.images[8]
+        training, held_out = capture.split()
+        assert held_out.names == ("images/000.png", "images/008.png") and len(training) == 10
+        assert np.array_equal(held_out.poses, capture.poses[[0, 8]])
+        assert held_out.images[1] is capture.images[8]
 
 
 class TestSceneCube:
@@ -391,9 +391,9 @@ def set_alpha(folder, views, alpha):
 
 
 def assert_refused(folder: Path, words: str, kind: type[Exception] = CaptureError):
-    with pytest.raises(kind, match=re.escape(words)) as caught:
+    with pytest.raises(kind, match=re.escape(words)) as error:
         load_capture(folder)
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(error.value)
 
 
 def assert_on_rays(points, origins, rays):

@@ -111,14 +111,14 @@ def test_photos_without_a_pose_are_left_out_with_a_warning(photos, monkeypatch):
 def test_a_damaged_cache_is_made_again(photos, monkeypatch):
     monkeypatch.setattr(colmap, "VERSION", "damaged")
     monkeypatch.setattr(colmap, "_reconstruct", lambda folder, names: tree(COUNT))
-    kept = colmap.cache_dir() / "captures"
-    before = set(kept.glob("*/*.json"))
+    cache = colmap.cache_dir() / "captures"
+    before = set(cache.glob("*/*.json"))
     assert len(colmap.photo_frames(photos)) == COUNT
-    (made,) = set(kept.glob("*/*.json")) - before
+    (path,) = set(cache.glob("*/*.json")) - before
     for damage in ('{"fra', "{}"):
-        made.write_text(damage)
+        path.write_text(damage)
         assert len(colmap.photo_frames(photos)) == COUNT
-        assert json.loads(made.read_text()) == tree(COUNT)
+        assert json.loads(path.read_text()) == tree(COUNT)
 
 
 class Placed:
@@ -184,6 +184,6 @@ def test_without_pycolmap(photos, monkeypatch):
 
 
 def assert_refused(folder, words):
-    with pytest.raises(CaptureError, match=re.escape(words)) as caught:
+    with pytest.raises(CaptureError, match=re.escape(words)) as error:
         load_capture(folder)
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(error.value)

@@ -22,8 +22,8 @@ def test_one_lens_for_each_point(rng):
 def test_a_lens_by_hand():
     """At (1, 2): r^2 = 5, radial 1 + 0.1 5 + 0.01 25 = 1.75; tangential by OpenCV's formula."""
     shift = [2 * 0.001 * 2 + 0.002 * (5 + 2), 0.001 * (5 + 8) + 2 * 0.002 * 2]
-    found = distort(np.array([1.0, 2.0]), np.array([0.1, 0.01, 0.001, 0.002]))
-    assert np.allclose(found, [1.75 + shift[0], 3.5 + shift[1]])
+    point = distort(np.array([1.0, 2.0]), np.array([0.1, 0.01, 0.001, 0.002]))
+    assert np.allclose(point, [1.75 + shift[0], 3.5 + shift[1]])
 
 
 def test_a_barrel_that_turns_back_folds():

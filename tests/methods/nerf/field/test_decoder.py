@@ -27,23 +27,23 @@ POINTS = 300
 
 
 def weights(preset: str, seed: int = 0) -> list[torch.Tensor]:
-    drawn = torch.Generator().manual_seed(seed)
+    generator = torch.Generator().manual_seed(seed)
     return [
-        torch.empty(s).uniform_(-weight_bound(s), weight_bound(s), generator=drawn)
+        torch.empty(s).uniform_(-weight_bound(s), weight_bound(s), generator=generator)
         for s in weight_shapes(PRESETS[preset])
     ]
 
 
 def inputs(seed: int = 0) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    drawn = torch.Generator().manual_seed(seed)
-    f, phase = torch.randn(POINTS, 16, generator=drawn), torch.randn(POINTS, 8, generator=drawn)
-    return f, phase, 0.1 * torch.randn(POINTS, generator=drawn)
+    generator = torch.Generator().manual_seed(seed)
+    f, phase = torch.randn(POINTS, 16, generator=generator), torch.randn(POINTS, 8, generator=generator)
+    return f, phase, 0.1 * torch.randn(POINTS, generator=generator)
 
 
 def decoded(f, phase, distance, *matrices, packed=False, low_precision=False):
     def run(f, phase, distance, *matrices):
-        found = Decoder(matrices, packed, low_precision)(_columns(f), _columns(phase), distance.array)
-        return tensor(mi.ArrayXf(*torch_field.outputs(found)))
+        reflection = Decoder(matrices, packed, low_precision)(_columns(f), _columns(phase), distance.array)
+        return tensor(mi.ArrayXf(*torch_field.outputs(reflection)))
 
     return call(run, f, phase, distance, *matrices)
 
@@ -53,7 +53,7 @@ def _columns(x):
     return [dr.gather(mi.Float, x.array, index + k) for k in range(x.shape[1])]
 
 
-def said(**values: Any) -> Reflection:
+def reflection_with(**values: Any) -> Reflection:
     """A reflection of which no more is known."""
     unknown: dict[str, Any] = dict.fromkeys(f.name for f in fields(Reflection))
     return Reflection(**unknown | values)
@@ -62,9 +62,9 @@ def said(**values: Any) -> Reflection:
 @pytest.mark.parametrize("preset", PRESETS)
 @pytest.mark.parametrize("packed", [False, True])
 def test_the_networks_agree_with_torch(packed, preset):
-    given = (*inputs(), *weights(preset))
+    arguments = (*inputs(), *weights(preset))
     expected = torch_field.decoded(*inputs(), weights(preset))
-    np.testing.assert_allclose(decoded(*given, packed=packed), expected, rtol=2e-4, atol=2e-5)
+    np.testing.assert_allclose(decoded(*arguments, packed=packed), expected, rtol=2e-4, atol=2e-5)
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -95,14 +95,14 @@ def gradient(x: torch.Tensor) -> torch.Tensor:
 def test_gradients_of_low_precision_are_near_and_values_the_same(chunk, monkeypatch):
     monkeypatch.setattr(mlp, "LONG", chunk)
     monkeypatch.setattr(mlp, "GRAIN", 32)
-    found = []
+    results = []
     for low_precision in (False, True):
-        given = [x.clone().requires_grad_() for x in (*inputs(), *weights("fast"))]
-        given[2].requires_grad_(False)
-        result = decoded(*given, low_precision=low_precision)
+        arguments = [x.clone().requires_grad_() for x in (*inputs(), *weights("fast"))]
+        arguments[2].requires_grad_(False)
+        result = decoded(*arguments, low_precision=low_precision)
         result.square().sum().backward()
-        found.append((result.detach().numpy(), [gradient(x) for x in given if x.requires_grad]))
-    (value, exact), (same, near) = found
+        results.append((result.detach().numpy(), [gradient(x) for x in arguments if x.requires_grad]))
+    (value, exact), (same, near) = results
     np.testing.assert_allclose(value, same, rtol=1e-5, atol=1e-6)
     for a, b in zip(exact, near, strict=True):
         assert 0 < (a - b).norm() < 0.01 * a.norm()
@@ -110,9 +110,9 @@ def test_gradients_of_low_precision_are_near_and_values_the_same(chunk, monkeypa
 
 def test_gradients_of_points_that_move_are_exact():
     def of_distance(low_precision):
-        given = [x.clone().requires_grad_() for x in (*inputs(), *weights("fast"))]
-        decoded(*given, low_precision=low_precision).square().sum().backward()
-        return gradient(given[2])
+        arguments = [x.clone().requires_grad_() for x in (*inputs(), *weights("fast"))]
+        decoded(*arguments, low_precision=low_precision).square().sum().backward()
+        return gradient(arguments[2])
 
     exact = of_distance(False)
     np.testing.assert_allclose(of_distance(True), exact, rtol=1e-4, atol=1e-5 * float(exact.abs().max()))
@@ -126,27 +126,29 @@ def test_the_embedding_is_the_distance_and_its_waves():
 
 
 def test_the_normal_of_equation_4():
-    found = said(theta=mi.Float(0.3), phi=mi.Float(1.1))
+    reflection = reflection_with(theta=mi.Float(0.3), phi=mi.Float(1.1))
     axes = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
-    normal = found.normal(*(mi.Vector3f(*row.tolist()) for row in axes))
+    normal = reflection.normal(*(mi.Vector3f(*row.tolist()) for row in axes))
     local = [np.sin(0.3) * np.cos(1.1), np.sin(0.3) * np.sin(1.1), np.cos(0.3)]
     np.testing.assert_allclose(rows(normal)[0], local @ axes, atol=1e-6)
 
 
 def test_surfaces_mirror_more_at_grazing_angles():
-    found = said(specular=mi.Float(0.04), grazing=mi.Float(0.6))
-    np.testing.assert_allclose(np.array(found.specular_at(mi.Float([1.0, 0.5, 0.0]))), [0.04, 0.0575, 0.6])
+    reflection = reflection_with(specular=mi.Float(0.04), grazing=mi.Float(0.6))
+    np.testing.assert_allclose(
+        np.array(reflection.specular_at(mi.Float([1.0, 0.5, 0.0]))), [0.04, 0.0575, 0.6]
+    )
 
 
 def test_as_published_they_mirror_as_much_from_all_sides():
     f, phase, distance = inputs()
     decoder = Decoder([mi.TensorXf(w.numpy()) for w in weights("paper")])
     f, phase = (_columns(mi.TensorXf(x.numpy())) for x in (f, phase))
-    found = decoder(f, phase, mi.Float(distance.numpy()))
+    reflection = decoder(f, phase, mi.Float(distance.numpy()))
     for cosine in (0.0, 0.3, 1.0):
-        np.testing.assert_array_equal(np.array(found.specular_at(cosine)), np.array(found.specular))
+        np.testing.assert_array_equal(np.array(reflection.specular_at(cosine)), np.array(reflection.specular))
 
 
 def test_densities_stay_finite():
-    found = said(exponent=mi.Float(1e4))
-    assert np.isfinite(np.array(found.density)).all()
+    reflection = reflection_with(exponent=mi.Float(1e4))
+    assert np.isfinite(np.array(reflection.density)).all()

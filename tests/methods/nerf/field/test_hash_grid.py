@@ -20,7 +20,7 @@ init()
 CONFIG = NerfConfig(table=10, coarsest=8, finest=16)  # the first level is dense, the others are hashed
 
 
-def drawn(*shape: int, seed: int = 0) -> torch.Tensor:
+def uniform(*shape: int, seed: int = 0) -> torch.Tensor:
     return torch.empty(shape).uniform_(-0.99, 0.99, generator=torch.Generator().manual_seed(seed))
 
 
@@ -37,10 +37,10 @@ def encoding() -> Encoding:
 @pytest.mark.parametrize("trained", [False, True])
 @pytest.mark.parametrize("which", [0, 1])
 def test_features_are_those_of_loops(encoding, which, trained):
-    points, table = drawn(200, 3), drawn(encoding.sizes[which], seed=1)
+    points, table = uniform(200, 3), uniform(encoding.sizes[which], seed=1)
     expected = torch_field.encoded(encoding, which, points, table)
-    found = features(encoding.grids[which], points, table.requires_grad_(trained))
-    np.testing.assert_allclose(found.detach().T, expected, atol=2e-4)
+    actual = features(encoding.grids[which], points, table.requires_grad_(trained))
+    np.testing.assert_allclose(actual.detach().T, expected, atol=2e-4)
 
 
 def test_some_levels_of_that_are_dense_and_some_are_hashed(encoding):
@@ -50,9 +50,9 @@ def test_some_levels_of_that_are_dense_and_some_are_hashed(encoding):
 
 @pytest.mark.parametrize("moving", [False, True])
 def test_gradients_are_those_of_loops(encoding, moving):
-    share = drawn(200, 16, seed=2)
+    share = uniform(200, 16, seed=2)
     ours, theirs = (
-        (drawn(200, 3).requires_grad_(moving), drawn(encoding.sizes[0], seed=1).requires_grad_())
+        (uniform(200, 3).requires_grad_(moving), uniform(encoding.sizes[0], seed=1).requires_grad_())
         for _ in range(2)
     )
     (features(encoding.grids[0], *ours) * share.T).sum().backward()
@@ -65,7 +65,7 @@ def test_gradients_are_those_of_loops(encoding, moving):
 
 @pytest.mark.parametrize("trained", [False, True])
 def test_points_beyond_the_cube_get_features_of_its_border(encoding, trained):
-    table = drawn(encoding.sizes[0]).requires_grad_(trained)
+    table = uniform(encoding.sizes[0]).requires_grad_(trained)
     far, near = (features(encoding.grids[0], torch.tensor([[x, 0.2, 0.3]]), table) for x in (3.0, 1.0))
     torch.testing.assert_close(far, near, rtol=0, atol=0)
 

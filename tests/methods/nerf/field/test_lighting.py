@@ -66,8 +66,8 @@ def _shade(mi, normals, light, *, view=None, kd: Any = 0.0, ks=0.0, glossiness=1
     view = -normals if view is None else view
     n, v = (mi.Vector3f(np.ascontiguousarray(x.T, np.float32)) for x in (normals, view))
     light = mi.TensorXf(np.asarray(light, np.float32))
-    found = shade(n, v, mi.Color3f(kd), mi.Float(ks), mi.Float(glossiness), light, **options)
-    return np.broadcast_to(np.array(found).T, normals.shape)
+    radiance = shade(n, v, mi.Color3f(kd), mi.Float(ks), mi.Float(glossiness), light, **options)
+    return np.broadcast_to(np.array(radiance).T, normals.shape)
 
 
 def _mirrored(view, normals):
@@ -114,8 +114,8 @@ def test_basis_is_the_reference_and_orthonormal(mi, unit):
     ],
 )
 def test_signs_are_those_of_the_docstring(mi, index, direction, value):
-    found = _shade(mi, np.array([direction], float), _alone(index), ks=1.0, glossiness=1e9)
-    assert found[0, 0] == pytest.approx(value, rel=1e-5)
+    radiance = _shade(mi, np.array([direction], float), _alone(index), ks=1.0, glossiness=1e9)
+    assert radiance[0, 0] == pytest.approx(value, rel=1e-5)
 
 
 def test_diffuse_is_the_integral_of_light_times_cosine(mi, unit, bright):
@@ -145,8 +145,8 @@ def test_specular_is_the_light_convolved_with_the_lobe(mi, unit, bright, glossin
         for n in range(40)
     )
     expected = 0.7 * (lobe * weights) @ (_harmonics(directions) @ bright)
-    found = _shade(mi, normals, bright, view=view, ks=0.7, glossiness=glossiness)
-    np.testing.assert_allclose(found, expected, rtol=1e-5)
+    radiance = _shade(mi, normals, bright, view=view, ks=0.7, glossiness=glossiness)
+    np.testing.assert_allclose(radiance, expected, rtol=1e-5)
 
 
 def test_specular_is_nearly_phongs_lobe(mi, unit, bright):
@@ -155,8 +155,8 @@ def test_specular_is_nearly_phongs_lobe(mi, unit, bright):
     directions, weights = _sphere(100)
     lobe = (_mirrored(view, normals) @ directions.T).clip(0) ** g * (g + 1) / (2 * math.pi)
     expected = (lobe * weights) @ (_harmonics(directions) @ bright)
-    found = _shade(mi, normals, bright, view=view, ks=1.0, glossiness=g)
-    np.testing.assert_allclose(found, expected, rtol=0.02)
+    radiance = _shade(mi, normals, bright, view=view, ks=1.0, glossiness=g)
+    np.testing.assert_allclose(radiance, expected, rtol=0.02)
 
 
 def test_glossiness_sharpens_up_to_a_mirror(mi, unit, bright):
@@ -164,8 +164,8 @@ def test_glossiness_sharpens_up_to_a_mirror(mi, unit, bright):
     mirror = _harmonics(_mirrored(view, normals)) @ bright
     errors = []
     for g in (1.0, 2.0, 8.0, 100.0, 1e6):
-        found = _shade(mi, normals, bright, view=view, ks=1.0, glossiness=g)
-        errors.append(np.abs(found - mirror).mean())
+        radiance = _shade(mi, normals, bright, view=view, ks=1.0, glossiness=g)
+        errors.append(np.abs(radiance - mirror).mean())
     assert all(b < 0.9 * a for a, b in zip(errors[:-1], errors[1:], strict=True)) and errors[-1] < 1e-5
 
 
@@ -174,8 +174,8 @@ def test_bands_beyond_those_asked_for_are_left_out(mi, unit, rng):
     light[0] = 4.0
     for bands in (1, 2, 3, 4):
         cut = np.where(np.arange(COEFFICIENTS) < bands * bands, light, 0.0)
-        found = _shade(mi, normals, light, ks=1.0, glossiness=1e9, bands=bands)
-        np.testing.assert_allclose(found[:, 0], _harmonics(normals) @ cut, rtol=1e-5)
+        radiance = _shade(mi, normals, light, ks=1.0, glossiness=1e9, bands=bands)
+        np.testing.assert_allclose(radiance[:, 0], _harmonics(normals) @ cut, rtol=1e-5)
     default = _shade(mi, normals, light, ks=1.0, glossiness=1e9)
     np.testing.assert_array_equal(default, _shade(mi, normals, light, ks=1.0, glossiness=1e9, bands=3))
 
@@ -190,8 +190,8 @@ def test_light_of_one_channel_is_that_of_three_equal_ones(mi, unit, bright):
 
 def test_negative_radiance_is_clamped(mi):
     normals = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
-    found = _shade(mi, normals, _alone(2), kd=1.0)
-    assert found[0, 0] > 0.3 and (found[1] == 0).all()
+    radiance = _shade(mi, normals, _alone(2), kd=1.0)
+    assert radiance[0, 0] > 0.3 and (radiance[1] == 0).all()
 
 
 def test_light_from_one_side_turns_with_the_object(mi, unit, rng):
@@ -206,13 +206,13 @@ def test_light_from_one_side_turns_with_the_object(mi, unit, rng):
         return np.array([math.sqrt(4 * math.pi), *first, *[0.0] * 12])
 
     options = {"kd": 0.6, "ks": 0.4, "glossiness": 3.0}
-    found = _shade(mi, normals, light(turned @ a), view=view, **options)[:, 0]
+    radiance = _shade(mi, normals, light(turned @ a), view=view, **options)[:, 0]
     back = _shade(mi, normals @ turned, light(a), view=view @ turned, **options)[:, 0]
-    np.testing.assert_allclose(found, back, rtol=1e-5)
+    np.testing.assert_allclose(radiance, back, rtol=1e-5)
     gloss = math.exp(-1 / 6)
     mirrored = _mirrored(view, normals) @ turned @ a
     expected = 0.6 * (1 + 2 / 3 * normals @ turned @ a) + 0.4 * (1 + gloss * mirrored)
-    np.testing.assert_allclose(found, expected, rtol=1e-5)
+    np.testing.assert_allclose(radiance, expected, rtol=1e-5)
 
 
 def test_gradients_are_finite_differences(mi, unit, rng):
@@ -255,13 +255,13 @@ def test_gradients_are_finite_differences(mi, unit, rng):
 
 def test_display_is_the_power_but_next_to_black(mi):
     values = np.concatenate([np.linspace(0, 2, 2001), np.geomspace(1e-8, TOE, 2000), [-0.5]])
-    found = np.array(to_display(mi.Float(values.astype(np.float32))))
+    display = np.array(to_display(mi.Float(values.astype(np.float32))))
     exact = values.clip(0) ** (1 / 2.4)
     away = values >= TOE
-    np.testing.assert_allclose(found[away], exact[away], rtol=1e-5)
-    assert np.abs(found - exact).max() < 1.8 / 255
+    np.testing.assert_allclose(display[away], exact[away], rtol=1e-5)
+    assert np.abs(display - exact).max() < 1.8 / 255
     order = np.argsort(values)
-    assert (np.diff(found[order]) >= 0).all() and found[-1] == 0
+    assert (np.diff(display[order]) >= 0).all() and display[-1] == 0
 
 
 def test_display_has_finite_gradients_everywhere(mi):
@@ -288,14 +288,14 @@ def _lat_long(height: int) -> np.ndarray:
 def test_projection_gives_back_the_coefficients_of_a_light(mi, rng, channels):
     light = rng.normal(size=(16, channels))
     image = (_harmonics(_lat_long(64).reshape(-1, 3)) @ light).reshape(64, 128, channels)
-    found = project_environment(image)
-    assert found.shape == (16, channels) and found.dtype == np.float32
-    np.testing.assert_allclose(found, light, atol=3e-3)
+    coefficients = project_environment(image)
+    assert coefficients.shape == (16, channels) and coefficients.dtype == np.float32
+    np.testing.assert_allclose(coefficients, light, atol=3e-3)
 
 
 def test_projection_of_a_uniform_environment_is_exact_at_any_size(mi):
-    found = project_environment(np.full((2, 5, 1), 0.5, np.float32))
-    assert found[0, 0] == pytest.approx(0.5 * math.sqrt(4 * math.pi), rel=1e-6)
+    coefficients = project_environment(np.full((2, 5, 1), 0.5, np.float32))
+    assert coefficients[0, 0] == pytest.approx(0.5 * math.sqrt(4 * math.pi), rel=1e-6)
 
 
 def test_projection_lies_as_mitsubas_environment_maps_do(mi, unit):
@@ -304,11 +304,11 @@ def test_projection_lies_as_mitsubas_environment_maps_do(mi, unit):
     image = (1 + _lat_long(64) @ colours).astype(np.float32)
     emitter = mi.load_dict({"type": "envmap", "bitmap": mi.Bitmap(image)})
     directions = unit(40)
-    seen = mi.SurfaceInteraction3f()
-    seen.wi = mi.Vector3f(np.ascontiguousarray(-directions.T, np.float32))
-    expected = np.array(emitter.eval(seen)).T
-    found = _shade(mi, directions, project_environment(image), ks=1.0, glossiness=1e9)
-    np.testing.assert_allclose(found, expected, atol=0.04)
+    interaction = mi.SurfaceInteraction3f()
+    interaction.wi = mi.Vector3f(np.ascontiguousarray(-directions.T, np.float32))
+    expected = np.array(emitter.eval(interaction)).T
+    radiance = _shade(mi, directions, project_environment(image), ks=1.0, glossiness=1e9)
+    np.testing.assert_allclose(radiance, expected, atol=0.04)
 
 
 @pytest.mark.parametrize("shape", [(4, 8), (4, 8, 4), (0, 8, 3)])

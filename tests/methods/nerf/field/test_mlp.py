@@ -16,34 +16,34 @@ WIDTHS, POINTS = (5, 8, 7, 3), 50
 
 
 @pytest.fixture
-def given() -> list[torch.Tensor]:
+def arguments() -> list[torch.Tensor]:
     """Inputs, then the matrices."""
-    drawn = torch.Generator().manual_seed(0)
+    generator = torch.Generator().manual_seed(0)
     shapes = [(WIDTHS[0], POINTS), *((o, i) for i, o in zip(WIDTHS[:-1], WIDTHS[1:], strict=True))]
-    return [torch.randn(shape, generator=drawn, requires_grad=True) for shape in shapes]
+    return [torch.randn(shape, generator=generator, requires_grad=True) for shape in shapes]
 
 
 @pytest.mark.parametrize(("chunk", "cores"), [(mlp.CHUNK, 2), (16, 1), (7, 3)])
 @pytest.mark.parametrize("learning", [True, False])
-def test_values_and_gradients_are_those_of_autograd(given, learning, chunk, cores, monkeypatch):
+def test_values_and_gradients_are_those_of_autograd(arguments, learning, chunk, cores, monkeypatch):
     monkeypatch.setattr(mlp, "CHUNK", chunk)
     threads(cores)
-    values, *weights = given
+    values, *weights = arguments
     x = values
     for weight in weights[:-1]:
         x = torch.relu(weight @ x)
     expected = weights[-1] @ x
     expected.square().sum().backward()
 
-    ours, *matrices = (mi.TensorXf(value.detach().numpy()) for value in given)
+    ours, *matrices = (mi.TensorXf(value.detach().numpy()) for value in arguments)
     dr.enable_grad(ours, *(matrices if learning else ()))
-    found = mlp.evaluate(matrices, ours)
-    dr.backward(dr.sum(found.array * found.array))
-    np.testing.assert_allclose(np.array(found), expected.detach(), rtol=1e-4, atol=1e-4)
+    outputs = mlp.evaluate(matrices, ours)
+    dr.backward(dr.sum(outputs.array * outputs.array))
+    np.testing.assert_allclose(np.array(outputs), expected.detach(), rtol=1e-4, atol=1e-4)
     _close(dr.grad(ours), values.grad)
     for matrix, weight in zip(matrices, weights, strict=True):
         _close(dr.grad(matrix), weight.grad if learning else torch.zeros_like(weight))
 
 
-def _close(found, expected):
-    np.testing.assert_allclose(np.array(found), expected, rtol=1e-4, atol=1e-4 * float(expected.abs().max()))
+def _close(actual, expected):
+    np.testing.assert_allclose(np.array(actual), expected, rtol=1e-4, atol=1e-4 * float(expected.abs().max()))

@@ -31,8 +31,8 @@ def test_lists_give_the_nearest_in_order(rng, count):
     points = rng.uniform(-1, 1, (2000, 3)).astype(np.float32) * (1.0, 0.7, 0.5)
     points = points.astype(np.float32)
     near = NearestVertices(vertices, count, 0.1)
-    chosen, index = near(points)
-    np.testing.assert_array_equal(chosen, np.arange(2000))
+    points_near, index = near(points)
+    np.testing.assert_array_equal(points_near, np.arange(2000))
     assert (near._slots(points) >= 0).mean() > 0.7
     same = (index == brute(vertices, points, count)).all(axis=1)
     assert same.mean() > 0.995
@@ -64,10 +64,10 @@ def test_points_without_a_list_are_looked_up_in_the_tree(rng, monkeypatch):
     vertices = uneven(rng)
     near = NearestVertices(vertices, 8, 0.1)
     points = rng.uniform(-2, 2, (1000, 3)).astype(np.float32)
-    chosen, index = near(points)
+    points_near, index = near(points)
     slots = near._slots(points)
     assert slots.max() == 19 and (slots == UNLISTED).mean() > 0.9
-    np.testing.assert_array_equal(chosen, np.arange(1000))
+    np.testing.assert_array_equal(points_near, np.arange(1000))
     assert (index == brute(vertices, points, 8)).all(axis=1).mean() > 0.995
 
 
@@ -75,17 +75,17 @@ def test_only_points_beyond_the_limit_are_left_out(rng):
     vertices = uneven(rng)
     points = rng.uniform(-3, 3, (5000, 3)).astype(np.float32)
     near = NearestVertices(vertices, 8, 0.1, limit=0.3)
-    chosen, index = near(points)
+    points_near, index = near(points)
     distance = np.linalg.norm(points[:, None] - vertices, axis=2).min(axis=1)
-    assert set(np.flatnonzero(distance < 0.3)) <= set(chosen)
-    assert distance[chosen].max() < 0.3 + 2 * np.sqrt(3) * 0.15
+    assert set(np.flatnonzero(distance < 0.3)) <= set(points_near)
+    assert distance[points_near].max() < 0.3 + 2 * np.sqrt(3) * 0.15
     assert (near._slots(points) == FAR).any() and (near._slots(points) == UNLISTED).any()
-    assert (index == brute(vertices, points[chosen], 8)).all(axis=1).mean() > 0.995
+    assert (index == brute(vertices, points[points_near], 8)).all(axis=1).mean() > 0.995
 
 
 def test_few_vertices_and_no_points():
     triangle = np.eye(3, dtype=np.float32)
     points = np.array([[0.9, 0.2, 0.1]], np.float32)
     np.testing.assert_array_equal(NearestVertices(triangle, 3, 1.0)(points)[1], [[0, 1, 2]])
-    chosen, index = NearestVertices(triangle, 2, 1.0)(np.zeros((0, 3), np.float32))
-    assert chosen.shape == (0,) and index.shape == (0, 2)
+    points_near, index = NearestVertices(triangle, 2, 1.0)(np.zeros((0, 3), np.float32))
+    assert points_near.shape == (0,) and index.shape == (0, 2)

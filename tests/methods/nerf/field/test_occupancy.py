@@ -28,34 +28,34 @@ def centres(side: int) -> np.ndarray:
 
 def test_cells_with_matter_are_found_and_others_are_not():
     grid = Occupancy(16)
-    drawn = torch.Generator().manual_seed(0)
+    generator = torch.Generator().manual_seed(0)
     assert grid.occupied.all() and grid.share == 1
     for _ in range(3):
-        grid.refresh(ball, drawn)
+        grid.refresh(ball, generator)
     distance = centres(16)
     assert grid.occupied[distance < 0.4].all() and not grid.occupied[distance > 0.62].any()
 
 
 def test_what_goes_away_is_forgotten_slowly_and_what_comes_is_seen():
     grid = Occupancy(8)
-    drawn = torch.Generator().manual_seed(0)
-    grid.refresh(ball, drawn)
+    generator = torch.Generator().manual_seed(0)
+    grid.refresh(ball, generator)
     before = grid.occupied.sum()
     for _ in range(WARMUP + 60):
-        grid.refresh(lambda p: np.zeros(len(p), np.float32), drawn)
+        grid.refresh(lambda p: np.zeros(len(p), np.float32), generator)
     assert grid.values.max() < 50 * 0.95 ** (WARMUP + 50) * 1.1 and before > 0
     for _ in range(40):  # of half the cells each
-        grid.refresh(ball, drawn)
+        grid.refresh(ball, generator)
     assert grid.occupied[centres(8) < 0.3].all()
 
 
 def test_impossible_cells_are_never_looked_at():
     possible = np.zeros((8, 8, 8), bool)
     possible[:4] = True
-    seen = []
+    points = []
     grid = Occupancy(8, possible)
-    grid.refresh(lambda p: seen.append(p) or ball(p), torch.Generator())
-    assert (np.concatenate(seen)[:, 0] < 0).all() and not grid.occupied[4:].any()
+    grid.refresh(lambda p: points.append(p) or ball(p), torch.Generator())
+    assert (np.concatenate(points)[:, 0] < 0).all() and not grid.occupied[4:].any()
 
 
 def test_the_state_goes_round_and_must_fit():
@@ -70,11 +70,11 @@ def test_the_state_goes_round_and_must_fit():
 def test_a_grid_is_the_density_where_cells_are_occupied():
     occupied = np.zeros((4, 4, 4), bool)
     occupied[1:3, 1:3, 2] = True
-    found = sample_grid(lambda p: p @ np.array([1, 10, 100], np.float32) + 200, occupied, 8)
+    density = sample_grid(lambda p: p @ np.array([1, 10, 100], np.float32) + 200, occupied, 8)
     axis = (np.arange(8) + 0.5) / 4 - 1
     x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
     inside = occupied.repeat(2, 0).repeat(2, 1).repeat(2, 2)
-    np.testing.assert_allclose(found, np.where(inside, x + 10 * y + 100 * z + 200, 0), rtol=1e-5)
+    np.testing.assert_allclose(density, np.where(inside, x + 10 * y + 100 * z + 200, 0), rtol=1e-5)
 
 
 def test_hull_cells_hold_the_object_and_little_else():

@@ -242,16 +242,16 @@ def equation_2(x: np.ndarray, feet: Projections) -> tuple[np.ndarray, np.ndarray
 def test_on_a_plane_the_derivative_is_exact(rng):
     x = rng.uniform(-0.7, 0.7, (300, 3)).astype(np.float32)
     projection = Projection(grid(20, 20), repulsion=None)
-    for made, expected in zip(equation_2(x, projection(x)), derivatives(projection, x, 0.01), strict=True):
-        np.testing.assert_allclose(made, expected, atol=1e-4)
+    for actual, expected in zip(equation_2(x, projection(x)), derivatives(projection, x, 0.01), strict=True):
+        np.testing.assert_allclose(actual, expected, atol=1e-4)
 
 
 def test_on_a_sphere_the_derivative_is_right_near_the_surface(ball, rng):
     x = spread(rng, 300, 0.99, 1.01)
     projection = Projection(ball)
-    made, expected = equation_2(x, projection(x)), derivatives(projection, x, 0.05)
-    np.testing.assert_allclose(made[0], expected[0], atol=0.1)
-    np.testing.assert_allclose(made[1], expected[1], atol=0.05)
+    actual, expected = equation_2(x, projection(x)), derivatives(projection, x, 0.05)
+    np.testing.assert_allclose(actual[0], expected[0], atol=0.1)
+    np.testing.assert_allclose(actual[1], expected[1], atol=0.05)
 
 
 def test_the_derivative_is_equation_2_anywhere(ball, rng):

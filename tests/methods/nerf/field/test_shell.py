@@ -55,9 +55,9 @@ def at(barycentric) -> ShellCoords:
 
 
 def shell(strength: float = 1.0, scale: float = 1.0) -> Shell:
-    drawn = np.random.default_rng(0)
+    rng = np.random.default_rng(0)
     weights = [
-        mi.TensorXf(drawn.uniform(-1, 1, s).astype(np.float32) * weight_bound(s))
+        mi.TensorXf(rng.uniform(-1, 1, s).astype(np.float32) * weight_bound(s))
         for s in weight_shapes(PRESETS["fast"])
     ]
     mesh = ball()
@@ -99,9 +99,9 @@ def test_frames_are_those_of_equation_4():
     row = np.floor((1 - place[:, 1]) * 8).astype(int)
     local = np.array([0.3, -0.5, 0.8])
     tangent, bitangent, normal = (rows(axis) for axis in latents.frame(at(place)))
-    found = local[0] * tangent + local[1] * bitangent + local[2] * normal
+    actual = local[0] * tangent + local[1] * bitangent + local[2] * normal
     expected = [axes.T @ maps.frames[maps.frame[r, c]] @ local for r, c in zip(row, column, strict=True)]
-    np.testing.assert_allclose(found, expected, atol=1e-5)
+    np.testing.assert_allclose(actual, expected, atol=1e-5)
 
 
 def test_density_is_zero_outside_and_evaluated_inside():
@@ -111,13 +111,13 @@ def test_density_is_zero_outside_and_evaluated_inside():
     density = one.density(points)
     assert (density[[0, 4, 5]] == 0).all() and (density[1:4] > 0).all()
     view = channels(mi.Vector3f, np.tile([0.0, -1.0, 0.0], (6, 1)))
-    index, found, colour = one.evaluate(channels(mi.Point3f, points), view)
+    index, inner_density, colour = one.evaluate(channels(mi.Point3f, points), view)
     np.testing.assert_array_equal(np.array(index), [1, 2, 3])
-    np.testing.assert_allclose(np.array(found), density[1:4], rtol=1e-4)
+    np.testing.assert_allclose(np.array(inner_density), density[1:4], rtol=1e-4)
     assert rows(colour).shape == (3, 3) and (rows(colour) >= 0).all()
 
 
-def seen(view, light, theta: mi.Float | float = 0.0, detach: bool = False) -> tuple[Any, Any]:
+def surface_appearance(view, light, theta: mi.Float | float = 0.0, detach: bool = False) -> tuple[Any, Any]:
     """Colour and normal of a surface of k_d = 0.2, k_s from 0.1 to 0.7 and this theta."""
 
     def surface(f, phase, distance):
@@ -133,12 +133,12 @@ def seen(view, light, theta: mi.Float | float = 0.0, detach: bool = False) -> tu
 def test_a_surface_shines_more_at_grazing_angles():
     """Seen at 60 degrees to its normal, Schlick's law says that 0.1 + 0.6 / 32 is mirrored."""
     light = [4.0, *[0.0] * 15]
-    up = rows(seen(mi.Vector3f(0, 0, -1), light)[1])[0]
+    up = rows(surface_appearance(mi.Vector3f(0, 0, -1), light)[1])[0]
     across = np.cross(up, (1.0, 0.0, 0.0))
     across /= np.linalg.norm(across)
     for angle, mirrored in ((0, 0.1), (60, 0.1 + 0.6 / 32), (90, 0.7), (120, 0.7)):
         turned = -np.cos(np.radians(angle)) * up + np.sin(np.radians(angle)) * across
-        colour = seen(mi.Vector3f(*turned.tolist()), light)[0]
+        colour = surface_appearance(mi.Vector3f(*turned.tolist()), light)[0]
         expected = to_display(mi.Float(4.0 * (0.2 + mirrored) / np.sqrt(4 * np.pi)))
         np.testing.assert_allclose(rows(colour)[0], np.array(expected)[0], rtol=1e-4)
 
@@ -148,9 +148,9 @@ def test_colours_teach_normals_unless_these_are_detached():
     view = dr.normalize(mi.Vector3f(0.5, 0.3, -0.8))
     theta = mi.Float(0.3)
     dr.enable_grad(theta)
-    assert not dr.grad_enabled(seen(view, light, theta, detach=True)[0])
-    dr.backward(dr.sum(seen(view, light, theta)[0]))
-    more, less = (rows(seen(view, light, value)[0]).sum() for value in (0.31, 0.29))
+    assert not dr.grad_enabled(surface_appearance(view, light, theta, detach=True)[0])
+    dr.backward(dr.sum(surface_appearance(view, light, theta)[0]))
+    more, less = (rows(surface_appearance(view, light, value)[0]).sum() for value in (0.31, 0.29))
     assert abs(more - less) > 5e-3
     np.testing.assert_allclose(np.array(dr.grad(theta)), (more - less) / 0.02, rtol=1e-2)
 

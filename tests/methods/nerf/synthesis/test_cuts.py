@@ -90,8 +90,8 @@ def test_corner_is_the_cheapest_of_all(rng: np.random.Generator):
 
 
 def pieces(mask: np.ndarray) -> int:
-    found: Any = label(mask, np.ones((3, 3)))
-    return found[1]
+    labels: Any = label(mask, np.ones((3, 3)))
+    return labels[1]
 
 
 def test_corner_separates_old_from_new(rng: np.random.Generator):

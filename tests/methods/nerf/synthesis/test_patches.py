@@ -125,14 +125,14 @@ def test_undersides_make_no_patch(rng: np.random.Generator):
 
 def test_steep_walls_make_no_patch(rng: np.random.Generator):
     """A roof of 30 degrees is allowed, one of 80 is not."""
-    for slope, kept in ((30.0, True), (80.0, False)):
+    for slope, allowed in ((30.0, True), (80.0, False)):
         flat = plane(np.eye(3), cells=80).vertices
         rise = np.tan(np.radians(slope)) * np.maximum(flat[:, 0] - 0.2, 0.0)
         roof = Mesh(flat + rise[:, None] * np.eye(3)[2], plane(np.eye(3), cells=80).faces)
         patches = extract_patches(roof, rng, count=300, size=16, pattern_rate=0.5, direction=np.eye(3)[0])
         x = patches.points[patches.frames[:, 2, 2] > 0.99][..., 0].reshape(-1, 256)
         crossing = (x.min(1) < 0.19) & (x.max(1) > 0.21)
-        assert crossing.any() == kept
+        assert crossing.any() == allowed
 
 
 def test_balls_bend_away_from_large_squares(rng: np.random.Generator):
@@ -174,16 +174,16 @@ def test_same_seed_same_patches():
 
 def test_features_come_when_asked(rng: np.random.Generator):
     patches = extract_patches(plane(), rng, count=10, size=8)
-    asked = []
+    counts = []
 
     def features(points: np.ndarray) -> np.ndarray:
-        asked.append(len(points))
+        counts.append(len(points))
         return points @ np.arange(12.0).reshape(3, 4)
 
     source = FeatureSource(patches, features, matched=2)
-    assert not asked
+    assert not counts
     assert np.allclose(source.patch(3), patches.points[3] @ np.arange(12.0).reshape(3, 4))
-    assert asked == [64] and source.length == patches.length
+    assert counts == [64] and source.length == patches.length
 
 
 @pytest.mark.parametrize("flip", [0, 1, 2, 3])
@@ -201,24 +201,24 @@ def test_mirrored_bumps_have_mirrored_normals(flip: int, rng: np.random.Generato
 
     heights, normals = height_and_normal(patches.points.astype(np.float64))
     source = ArraySource(heights[..., None].astype(np.float32), patches.centres, patches.length)
-    made = next(q for _ in range(99) if (q := quilt(source, (32, 32), rng, flips=True)).flip[0, 0] == flip)
+    texture = next(q for _ in range(99) if (q := quilt(source, (32, 32), rng, flips=True)).flip[0, 0] == flip)
     # What the field stores: angles in a frame of the face, here of any turn.
     tangent = np.cos(1.0) * TURN[0] + np.sin(1.0) * TURN[1]
     captured_frame = np.stack([tangent, np.cross(TURN[2], tangent), TURN[2]])
-    stored = made.look_up(normals) @ captured_frame.T
-    sampled = patches.frames[made.patch[0, :1]]
+    stored = texture.look_up(normals) @ captured_frame.T
+    sampled = patches.frames[texture.patch[0, :1]]
     target = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     target *= np.linalg.det(target)
 
     def transferred(sampling: np.ndarray) -> np.ndarray:
         return stored @ captured_frame @ sampling.T @ target
 
-    heightmap = made.features[..., 0].astype(np.float64)
+    heightmap = texture.features[..., 0].astype(np.float64)
     drop, along = (np.asarray(np.gradient(heightmap, patches.gap, axis=k)) for k in (0, 1))
     expected = target[2] - along[..., None] * target[0] + drop[..., None] * target[1]
     expected /= np.linalg.norm(expected, axis=-1, keepdims=True)
     inner = slice(1, -1), slice(1, -1)
-    frame = mirror_frames(sampled, made.flip[0, :1])[0]
+    frame = mirror_frames(sampled, texture.flip[0, :1])[0]
     assert (transferred(frame) * expected).sum(-1)[inner].min() > 1.0 - 1e-5
     if flip:
         assert (transferred(sampled[0]) * expected).sum(-1)[inner].min() < 1.0 - 1e-3

@@ -53,11 +53,11 @@ def continued(image: np.ndarray, corner: np.ndarray, size: tuple[int, int]) -> n
 def test_one_source_is_put_together_again(rng: np.random.Generator):
     """Where every crop of a periodic image is there, the best quilt is that image, without a flaw."""
     image, corners = periodic_image(), every(4)
-    made = quilt(crop_source(image, corners), (105, 90), rng, nearest=1)
-    expected = continued(image, corners[made.patch[0, 0]], (105, 90))
-    assert np.abs(made.features - expected).max() < 1e-5
-    assert (made.look_up(crops(image, corners)) == expected).all()
-    assert len(np.unique(made.patch)) > 10
+    texture = quilt(crop_source(image, corners), (105, 90), rng, nearest=1)
+    expected = continued(image, corners[texture.patch[0, 0]], (105, 90))
+    assert np.abs(texture.features - expected).max() < 1e-5
+    assert (texture.look_up(crops(image, corners)) == expected).all()
+    assert len(np.unique(texture.patch)) > 10
 
 
 def test_mirrored_patches_are_turned_back(rng: np.random.Generator):
@@ -65,16 +65,17 @@ def test_mirrored_patches_are_turned_back(rng: np.random.Generator):
     image, corners = periodic_image(), every(4)
     stored = rng.integers(0, 4, len(corners))
     values = np.stack([mirror(v, f) for v, f in zip(crops(image, corners), stored, strict=True)])
-    made = quilt(ArraySource(values, corners.astype(float), 32.0), (72, 93), rng, flips=True, nearest=1)
-    first = made.patch[0, 0]
-    total = int(stored[first] ^ made.flip[0, 0])
-    seen = mirror(image, total)  # of which the first patch is a crop at
+    texture = quilt(ArraySource(values, corners.astype(float), 32.0), (72, 93), rng, flips=True, nearest=1)
+    first = texture.patch[0, 0]
+    total = int(stored[first] ^ texture.flip[0, 0])
+    mirror_image = mirror(image, total)  # of which the first patch is a crop at
     down, right = corners[first]
     corner = np.array([32 - down if total & 2 else down, 32 - right if total & 1 else right])
-    expected = continued(seen, corner % 64, (72, 93))
-    assert np.abs(made.features - expected).max() < 1e-5
-    assert (made.look_up(values) == expected).all()
-    assert (np.unique(stored[made.patch] ^ made.flip) == total).all() and len(np.unique(made.flip)) == 4
+    expected = continued(mirror_image, corner % 64, (72, 93))
+    assert np.abs(texture.features - expected).max() < 1e-5
+    assert (texture.look_up(values) == expected).all()
+    assert (np.unique(stored[texture.patch] ^ texture.flip) == total).all()
+    assert len(np.unique(texture.flip)) == 4
 
 
 def test_stripes_go_on(rng: np.random.Generator):
@@ -84,24 +85,24 @@ def test_stripes_go_on(rng: np.random.Generator):
     waves = np.sin(2.0 * np.pi * (x + phase[:, None]))
     values = np.broadcast_to(waves[:, None, :, None], (300, SIDE, SIDE, 1)).astype(np.float32)
     source = ArraySource(values, rng.random((300, 2)) * 1000.0, float(SIDE))
-    made = quilt(source, (112, 192), rng, evenness=0.0).features[..., 0]
-    assert made.std(axis=0).max() < 0.2
-    spectrum = np.abs(np.fft.rfft(made.mean(0)[:190]))
+    image = quilt(source, (112, 192), rng, evenness=0.0).features[..., 0]
+    assert image.std(axis=0).max() < 0.2
+    spectrum = np.abs(np.fft.rfft(image.mean(0)[:190]))
     assert spectrum[1:].argmax() + 1 == 19
-    seams = np.abs(np.diff(made, axis=1)).max()
+    seams = np.abs(np.diff(image, axis=1)).max()
     assert seams < 1.3 * 2.0 * np.pi / 10.0  # no step is steeper than the waves by much
 
 
-def places(made: Quilt, tileable: bool = False) -> np.ndarray:
+def places(texture: Quilt, tileable: bool = False) -> np.ndarray:
     """(rows, columns) which patches lie there, by the middle of their cores."""
-    size = made.patch.shape
+    size = texture.patch.shape
     if tileable:
         counts = [-(-length // STRIDE) for length in size]
         corners = [np.round(np.linspace(0, n - STRIDE, k)) for n, k in zip(size, counts, strict=True)]
     else:
         corners = [np.arange(0, max(length - 12, 1), STRIDE) for length in size]
     middle = [corner.astype(int) + SIDE // 2 for corner in corners]
-    return made.patch[np.ix_(*(m[m < length] for m, length in zip(middle, size, strict=True)))]
+    return texture.patch[np.ix_(*(m[m < length] for m, length in zip(middle, size, strict=True)))]
 
 
 @pytest.mark.parametrize("tileable", [False, True])
@@ -112,8 +113,10 @@ def test_neighbours_are_from_elsewhere(tileable: bool, flips: bool, rng: np.rand
     smooth = base.values.mean((1, 2), keepdims=True) * 10.0 + 0.0 * base.values  # constant: fits itself best
     values = np.concatenate([smooth, smooth])
     centres = np.concatenate([base.centres, base.centres + 0.1 * SIDE])
-    made = quilt(ArraySource(values, centres, float(SIDE)), (192, 152), rng, flips=flips, tileable=tileable)
-    grid = centres[places(made, tileable)]
+    texture = quilt(
+        ArraySource(values, centres, float(SIDE)), (192, 152), rng, flips=flips, tileable=tileable
+    )
+    grid = centres[places(texture, tileable)]
     pairs = [grid[1:] - grid[:-1], grid[:, 1:] - grid[:, :-1]]
     if tileable:
         pairs += [grid[:1] - grid[-1:], grid[:, :1] - grid[:, -1:]]
@@ -123,8 +126,8 @@ def test_neighbours_are_from_elsewhere(tileable: bool, flips: bool, rng: np.rand
 
 def test_few_patches_repeat_as_little_as_they_can(rng: np.random.Generator):
     two = ArraySource(noise_source(2).values, np.zeros((2, 3)), 1.0)
-    found = places(quilt(two, (92, 92), rng))
-    assert (found[1:] != found[:-1]).all() and (found[:, 1:] != found[:, :-1]).all()
+    patches = places(quilt(two, (92, 92), rng))
+    assert (patches[1:] != patches[:-1]).all() and (patches[:, 1:] != patches[:, :-1]).all()
     one = ArraySource(noise_source(1).values, np.zeros((1, 3)), 1.0)
     assert (quilt(one, (70, 40), rng).patch == 0).all()
 
@@ -147,10 +150,11 @@ def summed_blocks(values: np.ndarray, axis: int) -> np.ndarray:
 def test_distances_are_those_of_the_strips(rng: np.random.Generator):
     """Against the definition, for all sides and mirror images; only the first channels count."""
     source = ArraySource(noise_source(5).values, np.zeros((5, 2)), 1.0, channels=2)
-    wanted: Any = {side: strip(rng.normal(size=(SIDE, SIDE, 2)), side) for side in SIDES}
-    assert overlap(SIDE) == 12 and wanted["left"].shape == (32, 12, 2) and wanted["top"].shape == (12, 32, 2)
+    targets: Any = {side: strip(rng.normal(size=(SIDE, SIDE, 2)), side) for side in SIDES}
+    assert overlap(SIDE) == 12
+    assert targets["left"].shape == (32, 12, 2) and targets["top"].shape == (12, 32, 2)
     for sides in (("left",), ("left", "top"), SIDES):
-        found = Matcher(source, (0, 1, 2, 3), sides).distances({side: wanted[side] for side in sides})
+        distances = Matcher(source, (0, 1, 2, 3), sides).distances({side: targets[side] for side in sides})
         for flip in range(4):
             for index in range(5):
                 square = mirror(source.values[index], flip)[..., :2]
@@ -163,17 +167,17 @@ def test_distances_are_those_of_the_strips(rng: np.random.Generator):
                         "bottom": square[20:],
                     }[side]
                     axis = 0 if side in ("left", "right") else 1
-                    total += np.square(summed_blocks(part - wanted[side], axis)).sum()
-                assert found[flip, index] == pytest.approx(np.sqrt(total), rel=1e-4)
+                    total += np.square(summed_blocks(part - targets[side], axis)).sum()
+                assert distances[flip, index] == pytest.approx(np.sqrt(total), rel=1e-4)
 
 
 def test_chances_fall_with_the_cube(rng: np.random.Generator):
     matcher = Matcher(noise_source(8), (0,), ("left",))
     costs = np.array([[4.0, 0.0, 9.0, 1.0, 2.0, 3.0, 8.0, 7.0]])
     everyone = np.ones(8, bool)
-    drawn = [matcher.choose(costs, everyone, rng, 5)[0] for _ in range(6000)]
+    choices = [matcher.choose(costs, everyone, rng, 5)[0] for _ in range(6000)]
     weights = np.array([0.0, 1.0, 0.0, 0.75**3, 0.5**3, 0.25**3, 0.0, 0.0])
-    assert np.bincount(drawn, minlength=8) / 6000 == pytest.approx(weights / weights.sum(), abs=0.02)
+    assert np.bincount(choices, minlength=8) / 6000 == pytest.approx(weights / weights.sum(), abs=0.02)
     # Four are looked at until one is allowed.
     allowed = np.zeros(8, bool)
     allowed[[7, 2]] = True
@@ -202,10 +206,10 @@ def test_tileable_has_no_border(size: tuple[int, int], rng: np.random.Generator)
     image = periodic_image(256, 1)
     corners = rng.integers(0, 256 - SIDE, (600, 2))
     source = crop_source(image, corners)
-    made = quilt(source, size, rng, tileable=True)
-    assert made.features.shape == (*size, 1) and made.texel.shape == (*size, 2)
+    texture = quilt(source, size, rng, tileable=True)
+    assert texture.features.shape == (*size, 1) and texture.texel.shape == (*size, 2)
     for axis in (0, 1):
-        across, inside = border_steps(made.features, axis)
+        across, inside = border_steps(texture.features, axis)
         assert across <= inside
     plain = quilt(source, size, rng)
     steps = [border_steps(plain.features, axis) for axis in (0, 1)]
@@ -215,10 +219,10 @@ def test_tileable_has_no_border(size: tuple[int, int], rng: np.random.Generator)
 def test_tileable_puts_a_periodic_image_together(rng: np.random.Generator):
     """Two periods by one wrap without a flaw, as every crop is there."""
     image, corners = periodic_image(), every(1)
-    made = quilt(crop_source(image, corners), (128, 64), rng, tileable=True, nearest=1)
-    corner = corners[made.patch[20, 20]] + made.texel[20, 20] - 20
+    texture = quilt(crop_source(image, corners), (128, 64), rng, tileable=True, nearest=1)
+    corner = corners[texture.patch[20, 20]] + texture.texel[20, 20] - 20
     expected = continued(image, corner % 64, (128, 64))
-    assert np.abs(made.features - expected).max() < 1e-5
+    assert np.abs(texture.features - expected).max() < 1e-5
 
 
 @pytest.mark.parametrize("axis", [0, 1])
@@ -231,8 +235,8 @@ def test_last_patches_lead_back_to_the_first(axis: int, rng: np.random.Generator
     size = (75, 32) if axis == 0 else (32, 75)
     steps = []
     for _ in range(4):
-        made = quilt(source, size, rng, tileable=True, nearest=4).features
-        steps.append(np.abs(made - np.roll(made, 1, axis)).max())
+        image = quilt(source, size, rng, tileable=True, nearest=4).features
+        steps.append(np.abs(image - np.roll(image, 1, axis)).max())
     assert np.mean(steps) < 0.08
 
 
@@ -240,8 +244,8 @@ def test_wrapped_seam_is_closed(rng: np.random.Generator):
     """Down to where a column shows the last row's patches changes by one at most, around the border too."""
     source = noise_source(60, 1)
     for _ in range(8):
-        made = quilt(source, (64, 90), rng, tileable=True)
-        first = made.texel[:12, :, 0] == np.arange(12)[:, None]  # patches of the first row begin there
+        texture = quilt(source, (64, 90), rng, tileable=True)
+        first = texture.texel[:12, :, 0] == np.arange(12)[:, None]  # patches of the first row begin there
         depth = (~first).sum(0)
         assert np.ptp(depth) > 3
         assert np.abs(depth - np.roll(depth, 1)).max() <= 1
@@ -249,25 +253,25 @@ def test_wrapped_seam_is_closed(rng: np.random.Generator):
 
 @pytest.mark.parametrize("size", [(1, 1), (12, 33), (32, 32), (33, 32), (71, 52)])
 def test_any_size(size: tuple[int, int], rng: np.random.Generator):
-    made = quilt(noise_source(), size, rng)
-    assert made.features.shape == (*size, 3) and made.features.dtype == np.float32
-    assert made.patch.shape == made.flip.shape == size
-    assert made.texel.shape == (*size, 2)
-    assert not made.flip.any()
+    texture = quilt(noise_source(), size, rng)
+    assert texture.features.shape == (*size, 3) and texture.features.dtype == np.float32
+    assert texture.patch.shape == texture.flip.shape == size
+    assert texture.texel.shape == (*size, 2)
+    assert not texture.flip.any()
 
 
 @pytest.mark.parametrize("tileable", [False, True])
 def test_one_mask_serves_all_maps(tileable: bool, rng: np.random.Generator):
     """Away from seams, features are the very texels that the maps name; at seams, a mean of two."""
     source = noise_source()
-    made = quilt(source, (112, 95), rng, flips=True, tileable=tileable)
-    named = made.look_up(source.values)
+    texture = quilt(source, (112, 95), rng, flips=True, tileable=tileable)
+    named = texture.look_up(source.values)
     mode: Any = "wrap" if tileable else "edge"
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(made.patch, 4, mode=mode), (9, 9))
-    quiet = (around == made.patch[..., None, None]).all((2, 3))
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(texture.patch, 4, mode=mode), (9, 9))
+    quiet = (around == texture.patch[..., None, None]).all((2, 3))
     assert 0.1 < quiet.mean() < 0.8
-    assert np.abs(made.features - named)[quiet].max() < 1e-5
-    assert np.abs(made.features - named)[~quiet].max() > 0.1
+    assert np.abs(texture.features - named)[quiet].max() < 1e-5
+    assert np.abs(texture.features - named)[~quiet].max() > 0.1
 
 
 def bright_source(rng: np.random.Generator) -> tuple[ArraySource, np.ndarray]:
@@ -282,8 +286,8 @@ def test_guide_decides_what_is_where(rng: np.random.Generator):
     source, colours = bright_source(rng)
     picture = np.zeros((20, 30, 3))
     picture[:, 15:] = 1.0
-    made = quilt(source, (112, 172), rng, guide=Guide(picture, colours, weight=20.0)).features[..., 1]
-    assert made[:, :70].mean() < 0.2 and made[:, 102:].mean() > 0.8
+    image = quilt(source, (112, 172), rng, guide=Guide(picture, colours, weight=20.0)).features[..., 1]
+    assert image[:, :70].mean() < 0.2 and image[:, 102:].mean() > 0.8
     ignored = quilt(source, (112, 172), rng, guide=Guide(picture, colours, weight=0.0)).features[..., 1]
     assert ignored[:, :70].mean() > 0.35
 
@@ -292,8 +296,8 @@ def test_guide_decides_what_is_where(rng: np.random.Generator):
 def test_guide_chooses_the_first_patch_too(level: float, rng: np.random.Generator):
     source, colours = bright_source(rng)
     guide = Guide(np.full((4, 4, 3), level), colours)
-    made = [quilt(source, (32, 32), rng, guide=guide).features[0, 0, 1] for _ in range(10)]
-    assert np.abs(np.array(made) - level).max() < 0.15
+    values = [quilt(source, (32, 32), rng, guide=guide).features[0, 0, 1] for _ in range(10)]
+    assert np.abs(np.array(values) - level).max() < 0.15
 
 
 def test_guide_turns_patches(rng: np.random.Generator):
@@ -302,19 +306,19 @@ def test_guide_turns_patches(rng: np.random.Generator):
     colours = np.zeros((20, 2, 2, 3))
     colours[:, 0, 1], colours[:, 1, 0], colours[:, 1, 1] = 0.3, 0.5, 0.8
     picture = mirror(colours[0], 3).repeat(16, 0).repeat(16, 1)
-    made = quilt(source, (32, 32), rng, flips=True, guide=Guide(picture, colours), nearest=1)
-    assert (made.flip == 3).all()
+    texture = quilt(source, (32, 32), rng, flips=True, guide=Guide(picture, colours), nearest=1)
+    assert (texture.flip == 3).all()
 
 
 def test_likeness_is_the_root_mean_square(rng: np.random.Generator):
     colours, picture = rng.random((3, 4, 4, 3)), rng.random((50, 50, 3))
     likeness = GuideDistance(Guide(picture, colours, 2.0), 3, (50, 50), SIDE, wrapped=True)
-    found = likeness.differences(40, 10, (0, 1, 2, 3))
+    differences = likeness.differences(40, 10, (0, 1, 2, 3))
     below = np.tile(picture, (2, 2, 1))[40:72, 10:42].reshape(4, 8, 4, 8, 3).mean((1, 3))
     for flip in range(4):
-        shown = np.stack([mirror(c, flip) for c in colours])
-        expected = 2.0 * np.sqrt(np.square(shown - below).mean((1, 2, 3)))
-        assert found[flip] == pytest.approx(expected, rel=1e-5)
+        patches = np.stack([mirror(c, flip) for c in colours])
+        expected = 2.0 * np.sqrt(np.square(patches - below).mean((1, 2, 3)))
+        assert differences[flip] == pytest.approx(expected, rel=1e-5)
 
 
 def broken(values: Iterable[tuple[Any, Any]]) -> ArraySource:

@@ -41,9 +41,9 @@ def two_kinds(rng: np.random.Generator) -> ArraySource:
     return ArraySource(values, rng.random((200, 2)) * 20.0 * SIDE, float(SIDE))
 
 
-def uses(made: Quilt) -> np.ndarray:
+def uses(texture: Quilt) -> np.ndarray:
     """(200,) how often each patch is in a quilt, by the middle of its core."""
-    return np.bincount(made.patch[SIDE // 2 :: STRIDE, SIDE // 2 :: STRIDE].ravel(), minlength=200)
+    return np.bincount(texture.patch[SIDE // 2 :: STRIDE, SIDE // 2 :: STRIDE].ravel(), minlength=200)
 
 
 def test_rare_patches_are_there_and_none_is_all_over(rng: np.random.Generator):
@@ -65,7 +65,7 @@ def test_what_a_guide_asks_for_is_not_avoided(rng: np.random.Generator):
     colours = np.broadcast_to(0.2 * bright[:, None, None, None], (200, 2, 2, 3))
     guide = Guide(np.full((4, 4, 3), 0.2), colours)
     size = 20 * STRIDE + 12, 20 * STRIDE + 12
-    given, avoided = (
+    default_uses, even_uses = (
         uses(quilt(source, size, np.random.default_rng(3), guide=guide, evenness=e)) for e in (None, 0.1)
     )
-    assert given[bright].sum() >= 390 and avoided[bright].sum() < 360
+    assert default_uses[bright].sum() >= 390 and even_uses[bright].sum() < 360

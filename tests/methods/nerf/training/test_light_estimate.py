@@ -44,26 +44,26 @@ def photographed(radiance, rng=None) -> Capture:
 def test_the_light_of_a_grey_ball_is_found(ball):
     """L(w) = 1 + a . w gives k_d (1 + 2/3 a . n) by hand."""
     a = np.array([0.5, -0.3, 0.4])
-    found = estimated_light(ball, photographed(lambda n: 0.25 * (1 + 2 / 3 * n @ a)))
+    light = estimated_light(ball, photographed(lambda n: 0.25 * (1 + 2 / 3 * n @ a)))
     first = math.sqrt(4 * math.pi / 3)
     expected = np.array([LEVEL, -first * a[1], first * a[2], -first * a[0], *[0.0] * 12])
-    assert found.shape == (16,) and found.dtype == np.float32
-    np.testing.assert_allclose(found, expected, atol=0.02 * LEVEL)
+    assert light.shape == (16,) and light.dtype == np.float32
+    np.testing.assert_allclose(light, expected, atol=0.02 * LEVEL)
 
 
 def test_colours_that_do_not_know_the_normals_average_out(ball, rng):
     a = np.array([0.0, 0.6, -0.5])
-    made = photographed(lambda n: 0.25 * (1 + 2 / 3 * n @ a), rng)
-    found = estimated_light(ball, made)
+    capture = photographed(lambda n: 0.25 * (1 + 2 / 3 * n @ a), rng)
+    light = estimated_light(ball, capture)
     even = estimated_light(ball, photographed(lambda n: 0.25 + 0 * n[:, 0]))
     expected = math.sqrt(4 * math.pi / 3) * np.array([-0.6, -0.5, 0.0])
-    np.testing.assert_allclose(found[1:4], expected, atol=0.06 * LEVEL)
+    np.testing.assert_allclose(light[1:4], expected, atol=0.06 * LEVEL)
     np.testing.assert_allclose(even, [LEVEL, *[0.0] * 15], atol=0.01 * LEVEL)
 
 
 def test_no_side_is_darker_than_a_quarter_of_the_mean(ball):
     """Light from one side alone, max(n . z, 0): what is black under it could never get a colour."""
-    found = estimated_light(ball, photographed(lambda n: np.maximum(n[:, 2], 0.0)))
+    light = estimated_light(ball, photographed(lambda n: np.maximum(n[:, 2], 0.0)))
     n = icosphere(16).vertices.astype(np.float64)
     x, y, z = n.T
     harmonics = [
@@ -75,8 +75,8 @@ def test_no_side_is_darker_than_a_quarter_of_the_mean(ball):
         math.sqrt(15 / (16 * math.pi)) * (x * x - y * y),
     ]
     cosine = np.array([1.0, *[2 / 3] * 3, *[1 / 4] * 5])
-    shades = (cosine * found[:9]) @ np.stack(harmonics)
-    assert found[2] > 0.2 * found[0]
+    shades = (cosine * light[:9]) @ np.stack(harmonics)
+    assert light[2] > 0.2 * light[0]
     assert shades.min() == pytest.approx(0.25 * shades.mean(), rel=0.02)
 
 
@@ -85,6 +85,6 @@ def test_black_photos_and_empty_ones_give_a_dim_even_light(ball, alpha):
     capture = photographed(lambda n: 0 * n[:, 0])
     for image in capture.images:
         image[..., 3] = np.minimum(image[..., 3], alpha)
-    found = estimated_light(ball, capture)
-    assert 0 < found[0] < 1
-    assert (found[1:] == 0).all()
+    light = estimated_light(ball, capture)
+    assert 0 < light[0] < 1
+    assert (light[1:] == 0).all()

@@ -48,12 +48,12 @@ def test_clustering_has_the_gradient_of_a_constant_p(kappa):
     q = q / q.sum(1, keepdim=True)
     p = q.square() / q.sum(0)
     p = p / p.sum(1, keepdim=True)
-    found = torch.autograd.grad(clustering(features, centres, kappa), (features, centres))
+    gradients = torch.autograd.grad(clustering(features, centres, kappa), (features, centres))
     for attached in (False, True):
         hard = p if attached else p.detach()
         loss = (hard * (hard / q).log()).mean()
         expected = torch.autograd.grad(loss, (features, centres), retain_graph=True)
-        same = [torch.allclose(a, b, rtol=1e-10, atol=0) for a, b in zip(found, expected, strict=True)]
+        same = [torch.allclose(a, b, rtol=1e-10, atol=0) for a, b in zip(gradients, expected, strict=True)]
         assert same == [not attached] * 2
 
 
@@ -85,10 +85,10 @@ def test_clustering_sees_features_that_have_hardly_left_their_start():
     """In float32, P and Q would be equal at the initial 1e-4, and centres would feel only rounding."""
     features = (1e-4 * _normal(500, 2)).float().requires_grad_()
     centres = (1e-4 * _normal(4, 2, seed=1)).float().requires_grad_()
-    found = torch.autograd.grad(clustering(features, centres), (features, centres))
+    gradients = torch.autograd.grad(clustering(features, centres), (features, centres))
     exact = (features.detach().double().requires_grad_(), centres.detach().double().requires_grad_())
     expected = torch.autograd.grad(clustering(*exact), exact)
-    for a, b in zip(found, expected, strict=True):
+    for a, b in zip(gradients, expected, strict=True):
         assert b.abs().max() > 0
         torch.testing.assert_close(a.double(), b, rtol=1e-5, atol=0)
 
@@ -146,10 +146,10 @@ def test_distortion_stays_precise_among_many_rays():
     weights[-5:] *= 1e-4
     many, few = weights.float().requires_grad_(), weights[-5:].float().requires_grad_()
     midpoints, widths = midpoints.float(), widths.float()
-    found = distortion(many, midpoints, widths, rays)
-    assert found.dtype == torch.float32
-    assert found.item() == pytest.approx(expected * 19_999 / 20_000, rel=1e-6)
-    found.backward()
+    loss = distortion(many, midpoints, widths, rays)
+    assert loss.dtype == torch.float32
+    assert loss.item() == pytest.approx(expected * 19_999 / 20_000, rel=1e-6)
+    loss.backward()
     distortion(few, midpoints[-5:], widths[-5:], rays[-5:]).backward()
     assert many.grad is not None and few.grad is not None
     torch.testing.assert_close(many.grad[-5:] * 20_000, few.grad, rtol=1e-5, atol=0)

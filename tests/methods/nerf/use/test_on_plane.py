@@ -23,12 +23,12 @@ def test_elevations_compare_what_photos_show(texture, monkeypatch):
     assert [row.angle for row in table][:3] == [0, 20, 40]
     count = 3 + len(FLAT)  # captured, ours, flat ones, photos
     each = np.reshape(distances, (2, len(table), count))  # by synthesis and angle
-    for row, found in zip(table, each.swapaxes(0, 1), strict=True):
-        assert np.isfinite(found).all() and found.min() > 0
+    for row, row_distances in zip(table, each.swapaxes(0, 1), strict=True):
+        assert np.isfinite(row_distances).all() and row_distances.min() > 0
         values = row.captured, row.ours, *row.flat.values(), row.photos
-        assert np.allclose(values, found.mean(0), rtol=1e-3) and list(row.flat) == list(FLAT)
-        assert (found[0, 1:-1] != found[1, 1:-1]).all()  # the second synthesis is another one
-        assert len(set(found[0])) == count  # every option shows
+        assert np.allclose(values, row_distances.mean(0), rtol=1e-3) and list(row.flat) == list(FLAT)
+        assert (row_distances[0, 1:-1] != row_distances[1, 1:-1]).all()  # the second synthesis is another one
+        assert len(set(row_distances[0])) == count  # every option shows
         assert row.captured < row.ours or row.angle > 40
         assert row.picture.shape[0] == 4 * 48 and row.picture.shape[1] % 48 == 0
     for k in range(0, len(masks), count):

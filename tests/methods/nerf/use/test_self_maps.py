@@ -23,19 +23,19 @@ from tests.methods.nerf.tiny import tiny_capture
 
 def test_on_its_own_base_shape_it_gives_the_training_views_back(texture):
     """The promise is 1 dB less than the fit."""
-    learned, _ = tiny_capture().split()
+    training, _ = tiny_capture().split()
     again = texture.on_base_shape(512)
     thickness = again.thickness * again.similarity.scale
     np.testing.assert_allclose(thickness, texture.model.base.thickness, rtol=1e-5)
     losses = []
-    for view in range(0, len(learned), 4):
-        batch, shape = Pixels(learned).image(view, 48)
+    for view in range(0, len(training), 4):
+        batch, shape = Pixels(training).image(view, 48)
         photo = (batch.colours * batch.alpha + 1 - batch.alpha).numpy()
         moved = replace(batch, origins=again.similarity.apply(batch.origins).astype(np.float32))
-        found = [render_batch(field, rays) for field, rays in ((texture.shell, batch), (again, moved))]
-        qualities = [psnr(image.reshape(*shape, 3), photo.reshape(*shape, 3)) for image in found]
+        images = [render_batch(field, rays) for field, rays in ((texture.shell, batch), (again, moved))]
+        qualities = [psnr(image.reshape(*shape, 3), photo.reshape(*shape, 3)) for image in images]
         losses.append(qualities[0] - qualities[1])
-        assert psnr(*(image.reshape(*shape, 3) for image in found)) > 24
+        assert psnr(*(image.reshape(*shape, 3) for image in images)) > 24
     assert np.mean(losses) < 1.0
 
 
@@ -130,7 +130,7 @@ def test_overlapping_uvs_are_replaced(texture, maps):
 def test_a_turned_patch_has_turned_normals(texture):
     """Equation 4: the same place, taken up with another direction as x, shows its normal in other axes."""
     base = texture.model.base
-    found = []
+    by_place = []
     for direction in ([1.0, 0.2, 0.1], [0.1, -1.0, 0.4]):
         rng, along = np.random.default_rng(0), np.array(direction)
         # Texels are so fine that those beside the middle lie on the same face, whose frame normals refer to.
@@ -138,8 +138,8 @@ def test_a_turned_patch_has_turned_normals(texture):
         patches = extract_patches(base.mesh, rng, direction=along, **options)
         normals = [_normal_in_the_middle(texture, patches, k) for k in range(len(patches))]
         places = map(tuple, patches.centres)
-        found.append(dict(zip(places, zip(patches.frames, normals, strict=True), strict=True)))
-    both = [(found[0][place], found[1][place]) for place in found[0].keys() & found[1].keys()]
+        by_place.append(dict(zip(places, zip(patches.frames, normals, strict=True), strict=True)))
+    both = [(by_place[0][place], by_place[1][place]) for place in by_place[0].keys() & by_place[1].keys()]
     assert len(both) > 10
     first, second = (np.array([pair[k][1] for pair in both]) for k in (0, 1))
     turns = np.array([pair[1][0] @ pair[0][0].T for pair in both])
