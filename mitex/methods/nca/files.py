@@ -9,22 +9,22 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import torch
 from safetensors import SafetensorError
 
-from mitex.errors import CheckpointError
+from mitex.errors import CheckpointError, ConfigError
 from mitex.methods.nca import METHOD
-from mitex.methods.nca.config import NcaConfig
+from mitex.methods.nca.config import DECODER_KEYS, NcaConfig
 from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.methods.nca.look import STATE_CHANNELS, Look
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.perception import HARMONICS
-from mitex.training import checkpoint, model_file
+from mitex.training import checkpoint, model_file, values
 from mitex.training.locate import CHECKPOINT, NAME, PREVIOUS, locate
 
 RULE = METHOD.tensors
@@ -62,17 +62,12 @@ def load(source: str | Path) -> tuple[Look, dict[str, Any]]:
     except (SafetensorError, OSError, ValueError) as e:
         raise CheckpointError(f"'{path}' is not a model ({e})", "give a model file or a run folder") from e
     about = _about(metadata, path)
-    rule = _rule(
-        {k: v for k, v in tensors.items() if not k.startswith(DECODER)}, metadata.get("degree"), path
-    )
     shape = _shape(metadata["decoder"], path) if "decoder" in metadata else None
+    parts = {k: v for k, v in tensors.items() if shape is not None and k.startswith(DECODER)}
+    rule = _rule({k: v for k, v in tensors.items() if k not in parts}, metadata.get("degree"), path)
     look = Look(rule, _maps(about["maps"], rule, shape, path), shape, metadata.get("aggregation") == "mean")
     if shape is not None:
-        _fill(
-            look.decoder,
-            {k.removeprefix(DECODER): v for k, v in tensors.items() if k.startswith(DECODER)},
-            path,
-        )
+        _fill(look.decoder, {k.removeprefix(DECODER): v for k, v in parts.items()}, path)
     return look, about
 
 
@@ -81,19 +76,31 @@ def _from_checkpoint(path: Path) -> tuple[Look, dict[str, Any]]:
     maps = state.metadata.get("maps", "albedo").split(",")
     about: dict[str, Any] = {"name": state.metadata.get("exemplar", path.parent.name), "maps": maps}
     about |= {"steps": state.step, "preset": state.config.get("preset")}
-    names = {field.name for field in fields(NcaConfig)}
-    tuples = {k: tuple(v) if isinstance(v, list) else v for k, v in state.config.items() if k in names}
-    look = Look.of(NcaConfig(**tuples), maps)
+    try:
+        look = Look.of(_config(state.config), maps)
+    except (ConfigError, LookupError, ValueError) as e:
+        raise CheckpointError(
+            f"'{path}' does not hold a MeshNCA model ({e})", "give a run of mitex fit nca"
+        ) from e
     _fill(look, {k[6:]: v for k, v in state.task.items() if k.startswith("model.")}, path)
     return look, about
 
 
 def _shape(text: str, path: Path) -> DecoderShape:
+    """The shape of a decoder, within the limits of the settings."""
     try:
-        values = {k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(text).items()}
-        return DecoderShape(**values)
-    except (ValueError, TypeError, AttributeError) as e:
+        parts = json.loads(text)
+        if parts.keys() != set(DECODER_KEYS.values()):
+            raise ValueError(f"parts {', '.join(parts)}")
+        return _config({key: parts[part] for key, part in DECODER_KEYS.items()}).decoder_shape
+    except (ConfigError, ValueError, AttributeError) as e:
         raise CheckpointError(f"the decoder in '{path}' is damaged ({e})", "save the model again") from e
+
+
+def _config(content: Mapping[str, Any]) -> NcaConfig:
+    """Settings of those keys that a file has."""
+    kinds = get_type_hints(NcaConfig)
+    return NcaConfig(**{k: values.check(v, kinds[k]) for k, v in content.items() if k in kinds})
 
 
 def _fill(module: torch.nn.Module, tensors: dict[str, torch.Tensor], path: Path) -> None:
