@@ -73,8 +73,8 @@ class NcaTexture:
             orientation: turns the texture about the normals, counter-clockwise [rad].
             scale: size of the pattern, 1 for what the density gives; others need a remeshing of the copy to
                 the fitting density (extra `remesh`).
-            resolution: of the baked textures [texels], on the mesh's own UVs if nothing in them overlaps, else
-                on new ones. None leaves the maps at the vertices.
+            resolution: of the baked textures [texels], on the mesh's own UVs if nothing in them overlaps,
+                else on new ones. None leaves the maps at the vertices.
             keep_dense: returns the finer mesh itself, rounded by Loop subdivision, instead of the given one.
 
         Returns:
