@@ -12,7 +12,7 @@ from mitex.export.exr import read_exr, write_exr, write_textures, write_views
 from mitex.export.glb import read_glb, write_glb
 from mitex.export.obj import check_side_files, read_obj, write_obj
 from mitex.export.ply import read_ply, write_ply
-from mitex.paths import prepare_output
+from mitex.paths import expanded, prepare_output
 
 __all__ = [
     "SUFFIXES",
@@ -62,7 +62,7 @@ def write_asset(asset: Asset, path: str | os.PathLike[str]) -> Path:
 
 def read_asset(path: str | os.PathLike[str]) -> Asset:
     """See `Asset.load`."""
-    source = Path(path).expanduser()
+    source = expanded(path)
     reader = _READERS.get(source.suffix.lower())
     if reader is None:
         raise MeshError(f"{path} is not an asset file", f"give one of {', '.join(_READERS)}")

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -92,7 +93,7 @@ def _material(asset: Asset, stem: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _write_mesh(file, asset: Asset, stem: str) -> None:
+def _write_mesh(file: BinaryIO, asset: Asset, stem: str) -> None:
     mesh, atlas = asset.mesh, asset.atlas
     assert atlas is not None
     pairs, uv_index = np.unique(atlas.uv.reshape(-1, 2), axis=0, return_inverse=True)
@@ -112,7 +113,7 @@ def read_obj(path: Path) -> Asset:
         MeshError: damaged, not written by Mitex, or a map is missing.
     """
     lines = path.read_text("utf-8", "replace").split("\n")
-    if lines[0] != f"# {GENERATOR}" or not lines[1].startswith("mtllib "):
+    if lines[0] != f"# {GENERATOR}" or not "".join(lines[1:2]).startswith("mtllib "):
         raise foreign(path)
     try:
         vertices = _rows(lines, "v ", 3, np.float32)

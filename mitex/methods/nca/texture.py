@@ -69,7 +69,7 @@ class NcaTexture:
             mesh: any mesh; near-uniform edges and valence 6 give the best texture (`mitex.mesh.quality`).
             seed: of the random updates.
             steps: of the automaton; 200 if None.
-            subdivide: levels of subdivision, or "auto": as many as bring the copy to 24,000 vertices.
+            subdivide: levels of subdivision, or "auto": as many as bring the copy to 8,000 vertices.
             orientation: turns the texture about the normals, counter-clockwise [rad].
             scale: size of the pattern, 1 for what the density gives; others need a remeshing of the copy to
                 the fitting density (extra `remesh`).
@@ -98,20 +98,32 @@ class NcaTexture:
 
     @torch.no_grad()
     def grow(
-        self, mesh: Mesh, *, seed: int = 0, steps: int = STEPS, orientation: float = 0.0, clamp: float = 1.0
+        self, mesh: Mesh, *, seed: int = 0, steps: int = STEPS, orientation: float = 0.0
     ) -> torch.Tensor:
-        """The state (V, C) after `steps` steps from the seed; held in [-clamp, clamp] as in the authors'
-        demo.
+        """The state of the automaton after some steps, held within the bounds of the training's.
+
+        Args:
+            mesh: any mesh.
+            seed: of the random updates.
+            steps: from the initial state, which is zero.
+            orientation: as in `apply` [rad].
+
+        Returns:
+            (V, C) float32.
+
+        Raises:
+            ConfigError: steps below 0, or the model needs a condition.
         """
         self._check_unconditioned()
         if steps < 0:
             raise ConfigError(f"{steps} steps", "give 0 or more")
         keep_freed_memory()
-        operator = perception(mesh, self.look.rule.degree, orientation, mean=self.look.mean)
+        rule = self.look.rule
+        operator = perception(mesh, rule.degree, orientation, mean=self.look.mean)
         generator = torch.Generator().manual_seed(seed)
-        state = self.look.rule.seed(operator)
+        state = rule.seed(operator)
         for _ in range(steps):
-            state = self.look.rule.evolve(state, operator, 1, generator).clamp_(-clamp, clamp)
+            state = self.look.bounded(rule.evolve(state, operator, 1, generator))
         return state[0]
 
     def _check_unconditioned(self) -> None:

@@ -11,7 +11,7 @@ from mitex import atlas
 from mitex.atlas import laid_out
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, grid, icosphere, subdivide_loop, subdivide_midpoint
-from mitex.methods.nca import cells
+from mitex.methods.nca import NcaTexture, cells
 from mitex.methods.nca.bake import tangents
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.perception import perception
@@ -38,15 +38,20 @@ def sphere():
 
 
 def test_growth_is_steps_of_the_rule_from_the_seed(texture, sphere):
-    """With states held in [-1, 1], as in the authors' demo."""
-    generator = torch.Generator().manual_seed(7)
-    rule, operator = texture.look.rule, perception(sphere, 1, mean=True)
-    state = rule.seed(sphere)
+    """With states held where the training's were, and a little beyond."""
+    look, generator = tiny.texture(ALL).look, torch.Generator().manual_seed(7)
+    look.low.copy_(torch.linspace(-0.3, -0.02, 16))
+    look.high.copy_(torch.linspace(0.01, 0.4, 16))
+    width = look.high - look.low
+    operator, state = perception(sphere, 1, mean=True), look.rule.seed(sphere)
     with torch.no_grad():
         for _ in range(5):
             mask = torch.rand(1, len(sphere.vertices), generator=generator) < 0.5
-            state = rule.step(state, operator, mask).clamp(-1, 1)
-    assert torch.equal(texture.grow(sphere, seed=7, steps=5), state[0])
+            state = look.rule.step(state, operator, mask)
+            state = state.clamp(look.low - 0.05 * width, look.high + 0.05 * width)
+    grown = NcaTexture(look).grow(sphere, seed=7, steps=5)
+    assert torch.equal(grown, state[0])
+    assert not torch.equal(grown, texture.grow(sphere, seed=7, steps=5))
 
 
 def test_maps_are_those_of_the_state(plain, sphere):
@@ -81,12 +86,25 @@ def test_no_steps_are_the_grey_seed(plain, sphere):
 
 
 def test_states_stay_bounded(sphere):
-    """A rule that explodes."""
+    """A rule that explodes; without a training the bounds are the authors', and a twentieth of their
+    distance beyond.
+    """
     wild = tiny.texture()
     with torch.no_grad():
         wild.look.rule.fc2.weight.mul_(100)
     state = wild.grow(sphere, steps=20)
-    assert state.isfinite().all() and state.abs().max() <= 1
+    assert state.isfinite().all() and 1 < state.abs().max() <= 1.1 + 1e-6
+
+
+def test_bounds_follow_the_training():
+    """A fiftieth of the way in each step, channel by channel."""
+    look = tiny.texture().look
+    state = torch.linspace(-0.5, 0.9, 7)[:, None] * torch.linspace(0.1, 1, 16)
+    for _ in range(2):
+        look.track(state)
+    share = 0.98**2
+    assert torch.allclose(look.low, -share + (1 - share) * state.amin(0), atol=1e-6)
+    assert torch.allclose(look.high, share + (1 - share) * state.amax(0), atol=1e-6)
 
 
 def test_orientation_turns_the_growth_and_the_tangents(texture):
