@@ -46,7 +46,7 @@ def linear(corners: Corners, barycentric: Sequence[mi.Float]) -> tuple[list[mi.U
 
 
 def smooth(corners: Corners, barycentric: Sequence[mi.Float]) -> tuple[list[mi.UInt32], list[mi.Float]]:
-    """Rows and weights of the smooth interpolant in the table of `with_gradients`."""
+    """Rows and weights of the smooth interpolant in the table of `mesh.gradients`."""
     value = [mi.Float(0), mi.Float(0), mi.Float(0)]
     slope = [mi.Vector3f(0), mi.Vector3f(0), mi.Vector3f(0)]
     for k, share in enumerate(_shares(barycentric)):

@@ -10,6 +10,18 @@ from mitex.features.layers import LAYERS
 from mitex.methods.nca.decoder.shape import COORDINATES, DecoderShape
 from mitex.training.settings import TrainingConfig, key
 
+# Keys that shape the decoder -> attributes of its shape.
+DECODER_KEYS = {
+    "interpolation": "interpolation",
+    "coordinates": "coordinates",
+    "waves": "waves",
+    "wave_frequencies": "frequencies",
+    "wave_amplitude": "amplitude",
+    "decoder_width": "width",
+    "decoder_depth": "depth",
+    "omega": "omega",
+}
+
 
 @dataclass(frozen=True)
 class NcaConfig(TrainingConfig):
@@ -87,20 +99,13 @@ class NcaConfig(TrainingConfig):
         unknown = [name for name in self.coordinates if name not in COORDINATES]
         if unknown:
             raise ConfigError(f"coordinates holds {unknown}", f"use some of {', '.join(COORDINATES)}")
+        if not self.wave_frequencies:
+            raise ConfigError("wave_frequencies holds nothing", "give one or more [cycles per edge]")
 
     @property
     def decoder_shape(self) -> DecoderShape:
         """What the decoder is built from."""
-        return DecoderShape(
-            self.interpolation,
-            self.coordinates,
-            self.waves,
-            self.wave_frequencies,
-            self.wave_amplitude,
-            self.decoder_width,
-            self.decoder_depth,
-            self.omega,
-        )
+        return DecoderShape(**{part: getattr(self, key) for key, part in DECODER_KEYS.items()})
 
 
 DEFAULT = NcaConfig()
