@@ -42,7 +42,9 @@ def _bent(angle: float) -> Mesh:
 
 def _uneven() -> Mesh:
     mesh = icosphere(3)
-    return mesh.with_vertices(mesh.vertices + 0.08 * np.random.default_rng(1).normal(size=mesh.vertices.shape))
+    return mesh.with_vertices(
+        mesh.vertices + 0.08 * np.random.default_rng(1).normal(size=mesh.vertices.shape)
+    )
 
 
 def _wheel(valence: int, height: float = 0.2) -> Mesh:
@@ -144,9 +146,7 @@ def test_quadratics_of_values_alone_on_an_even_mesh(rng):
     i, j = (a.ravel() for a in np.meshgrid(np.arange(7), np.arange(7), indexing="ij"))
     x, y = j + 0.5 * i, np.sqrt(0.75) * i
     own = (np.arange(6)[:, None] * 7 + np.arange(6)).ravel()
-    faces = np.concatenate(
-        [np.stack([own, own + 1, own + 7], 1), np.stack([own + 1, own + 8, own + 7], 1)]
-    )
+    faces = np.concatenate([np.stack([own, own + 1, own + 7], 1), np.stack([own + 1, own + 8, own + 7], 1)])
     mesh = Mesh(np.column_stack([x, y, 0 * x]), faces)
     table = _table(mesh, 0.1 * x * x - 0.2 * x * y, "smooth")
     face, b = _random_points(mesh, rng)
@@ -257,7 +257,10 @@ def test_any_valence_and_a_boundary_stay_bounded(valence, rng):
     mesh = _wheel(valence)
     table = _table(mesh, (rng.random((valence + 1, 30)) > 0.5).astype(float), "smooth")
     face, b = _random_points(mesh, rng)
-    outside = np.repeat(np.arange(valence), 3), np.tile(1.04 * np.eye(3) - 0.02 * (1 - np.eye(3)), (valence, 1))
+    outside = (
+        np.repeat(np.arange(valence), 3),
+        np.tile(1.04 * np.eye(3) - 0.02 * (1 - np.eye(3)), (valence, 1)),
+    )
     for where in ((face, b), outside):
         values = _read(mesh, "smooth", table, *where)
         assert np.isfinite(values).all()
@@ -277,7 +280,10 @@ def test_units_do_not_matter(kind, size, rng):
 @pytest.mark.parametrize("kind", KINDS)
 def test_faces_without_area_stay_bounded(kind, rng):
     """Lines, points, and a mesh that has nothing else."""
-    for mesh in (collapsed(icosphere(2)), Mesh(np.outer([0, 1, 3], [1, 0, 0]), np.array([[0, 1, 2], [1, 1, 1]]))):
+    for mesh in (
+        collapsed(icosphere(2)),
+        Mesh(np.outer([0, 1, 3], [1, 0, 0]), np.array([[0, 1, 2], [1, 1, 1]])),
+    ):
         table = _table(mesh, rng.random(len(mesh.vertices)), kind)
         values = _read(mesh, kind, table, *_random_points(mesh, rng))
         assert np.isfinite(values).all() and np.abs(values).max() < 3
