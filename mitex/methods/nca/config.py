@@ -10,6 +10,9 @@ from mitex.features.layers import LAYERS
 from mitex.methods.nca.decoder.shape import COORDINATES, DecoderShape
 from mitex.training.settings import TrainingConfig, key
 
+TILE_CELLS = (8, 1024)  # along a side of a tile
+TILE_SIDES = (16, 8192)  # of its maps [px]
+
 
 @dataclass(frozen=True)
 class NcaConfig(TrainingConfig):

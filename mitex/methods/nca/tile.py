@@ -5,25 +5,21 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from mitex.atlas import MAX_RESOLUTION
 from mitex.errors import ConfigError
 from mitex.exemplar import MAPS
 from mitex.geometry.normal_maps import decode, encode
 from mitex.mesh import Lattice
 from mitex.methods.nca.bake import CHUNK, Grown
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.config import TILE_CELLS, TILE_SIDES
 from mitex.methods.nca.look import Look
 
-EDGE = (
-    0.0376  # of the sphere that the default preset trains on: it mixes waves in the same shares
-)
-CELLS = (8, 1024)  # along a side
-SIDES = (16, MAX_RESOLUTION)  # of the maps [px]
+EDGE = 0.0376  # of the sphere that the default preset trains on: it mixes waves in the same shares
 
 
 def flat_cells(cells: int, resolution: int) -> Lattice:
     """The lattice of an automaton for maps of a resolution; arguments and errors as of `NcaTexture.tile`."""
-    for name, value, (low, high) in (("cells", cells, CELLS), ("pixels", resolution, SIDES)):
+    for name, value, (low, high) in (("cells", cells, TILE_CELLS), ("pixels", resolution, TILE_SIDES)):
         if not low <= value <= high:
             raise ConfigError(f"a tile of {value} {name} along a side", f"use {low} to {high}")
     return Lattice.of(cells, EDGE)

@@ -13,7 +13,7 @@ import torch
 from mitex.asset import Asset
 from mitex.atlas import laid_out
 from mitex.errors import ConfigError
-from mitex.export import SUFFIXES
+from mitex.export import Format, prepare_export
 from mitex.images import write_image
 from mitex.mesh import Mesh
 from mitex.methods.nerf.config import NerfConfig
@@ -104,13 +104,14 @@ class AppliedTexture(Shell):
         """The latent features on the mesh's UVs, (H, W, C)."""
         return {"features": self._maps.features}
 
-    def export(self, path: str | os.PathLike[str]) -> Path:
+    def export(self, path: str | os.PathLike[str], maps_format: Format = "png") -> Path:
         """Writes what is solid as a coloured mesh, as of `Asset.export`.
 
         Raises:
             OutputError: unknown suffix or unwritable place.
         """
-        return self.extract().export(prepare_output(path, SUFFIXES))
+        prepare_export(path, maps_format=maps_format)
+        return self.extract().export(path, maps_format)
 
     def render(self, path: str | os.PathLike[str], *, exposure: float = 0.0, **options: Any) -> Path:
         """Path-traces the texture in the studio: PNG or JPEG; options as of `shell_still`.
