@@ -101,9 +101,7 @@ class ApplyOptions:
     maps as layers), or a picture (.png .jpg). A folder, which exists or ends with a slash, gets each map as a
     file of its own, and mesh.obj."""
 
-    maps_format: Annotated[
-        Literal["png", "exr"] | None, arg(metavar="png|exr", help_behavior_hint="(default: png)")
-    ] = None
+    maps_format: Annotated[Literal["png", "exr"], arg(metavar="png|exr")] = "png"
     """Format of the maps in a folder."""
 
     def run(self) -> None:
@@ -118,8 +116,8 @@ class ApplyOptions:
         """--out as an absolute path, once it is sure that it can be written."""
         from mitex.export import is_folder, prepare_export
 
-        out = prepare_export(self.out, EXPORTS + PICTURES, self.inputs(), self.maps_format or "png")
-        reject_unused("--maps-format", out, self.maps_format is not None and not is_folder(self.out))
+        out = prepare_export(self.out, EXPORTS + PICTURES, self.inputs(), self.maps_format)
+        reject_unused("--maps-format", out, self.maps_format == "exr" and not is_folder(self.out))
         return out
 
     def write(self, out: Path) -> None:
@@ -128,7 +126,7 @@ class ApplyOptions:
         if out.suffix.lower() in PICTURES:
             applied.render(out, **self.picture_options())
         else:
-            applied.export(self.out, self.maps_format or "png")
+            applied.export(self.out, self.maps_format)
 
     def check(self) -> None:
         """Refuses values out of range, before anything is read."""

@@ -144,7 +144,7 @@ class Apply(OptionalMeshOptions):
         from mitex.export import check_folder
 
         place = Path(self.out).expanduser()
-        return check_folder(place, self.maps_format or "png", self.inputs(), mesh=False)
+        return check_folder(place, self.maps_format, self.inputs(), mesh=False)
 
     def check_output(self, out: Path) -> None:
         suffix = out.suffix.lower()
@@ -161,7 +161,7 @@ class Apply(OptionalMeshOptions):
         if self.tile is not None:
             texture = NcaTexture.load(self.model)
             maps = texture.tile(self.tile, cells=self.tile_cells, seed=self.seed, steps=self.steps)
-            write_maps(maps, out, self.maps_format or "png")
+            write_maps(maps, out, self.maps_format)
         elif self.variants > 1:
             from mitex.mesh import Mesh
 

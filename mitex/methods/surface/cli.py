@@ -98,7 +98,7 @@ class Fit(ExemplarOptions):
 
 @dataclass(kw_only=True)
 class Apply(OptionalMeshOptions):
-    """Write a surface texture on the mesh that it was synthesized on; if --mesh is given, it must be that one.
+    """Write a surface texture on the mesh that it was synthesized on, which --mesh may name again.
 
     examples:
       mitex apply runs/bunny --mesh bunny.obj --out bunny.glb
