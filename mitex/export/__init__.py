@@ -14,7 +14,7 @@ from mitex.export.glb import read_glb, write_glb, write_variants
 from mitex.export.obj import check_side_files, read_obj, write_obj
 from mitex.export.ply import read_ply, write_ply
 from mitex.export.together import Inputs
-from mitex.paths import prepare_output
+from mitex.paths import expanded, prepare_output
 
 __all__ = [
     "Format",
@@ -46,7 +46,7 @@ _READERS = {".glb": read_glb, ".obj": read_obj, ".ply": read_ply}
 
 def is_folder(path: str | os.PathLike[str]) -> bool:
     """Whether an asset's path stands for a folder of maps: it ends with a slash, or is there already."""
-    place = Path(path).expanduser()
+    place = expanded(path)
     return os.fspath(path).endswith(SLASHES) or (place.suffix.lower() not in SUFFIXES and place.is_dir())
 
 
@@ -63,7 +63,7 @@ def prepare_export(
     """
     inputs = list(inputs)
     if is_folder(path):
-        return check_folder(Path(path).expanduser(), maps_format, inputs)
+        return check_folder(expanded(path), maps_format, inputs)
     target = prepare_output(path, suffixes, inputs)
     if target.suffix.lower() == ".obj":
         check_side_files(target, inputs=inputs)
@@ -73,7 +73,7 @@ def prepare_export(
 def write_asset(asset: Asset, path: str | os.PathLike[str], maps_format: Format = "png") -> Path:
     """See `Asset.export`."""
     if is_folder(path):
-        return write_folder(asset, Path(path).expanduser(), maps_format)
+        return write_folder(asset, expanded(path), maps_format)
     target = prepare_output(path, SUFFIXES)
     _WRITERS[target.suffix.lower()](asset, target)
     return target
@@ -81,7 +81,7 @@ def write_asset(asset: Asset, path: str | os.PathLike[str], maps_format: Format 
 
 def read_asset(path: str | os.PathLike[str]) -> Asset:
     """See `Asset.load`."""
-    source = Path(path).expanduser()
+    source = expanded(path)
     reader = _READERS.get(source.suffix.lower())
     if reader is None:
         raise MeshError(f"{path} is not an asset file", f"give one of {', '.join(_READERS)}")

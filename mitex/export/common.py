@@ -81,7 +81,7 @@ def asset_from_textures(mesh: Mesh, uv: np.ndarray, textures: Mapping[str, np.nd
 
 
 def default_tangents(mesh: Mesh) -> np.ndarray:
-    """(V, 3) some tangents; which ones does not matter where normals are encoded anew."""
+    """(V, 3) unit tangents across the normals; any will do where normals are encoded anew."""
     return orthonormal(np.broadcast_to(np.array([1, 0, 0], np.float32), mesh.normals.shape), mesh.normals)
 
 

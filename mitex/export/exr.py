@@ -89,7 +89,11 @@ def map_channels(maps: Mapping[str, np.ndarray], prefix: str = "") -> dict[str, 
 
 
 def write_textures(asset: Asset, path: Path, half: bool = True) -> None:
-    """Writes the maps of an asset in texture space; bakes it first if it is not."""
+    """Writes the maps of an asset in texture space (`map_channels`); bakes it first if it is not.
+
+    Raises:
+        OutputError: wrong suffix or unwritable place.
+    """
     textures = (asset if asset.texture_maps else asset.baked()).texture_maps
     write_exr(path, map_channels(textures or {}), half)
 

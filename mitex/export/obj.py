@@ -109,7 +109,7 @@ def read_obj(path: Path) -> Asset:
         MeshError: damaged, not written by Mitex, or a map is missing.
     """
     lines = path.read_text("utf-8", "replace").split("\n")
-    if lines[0] != f"# {GENERATOR}" or not lines[1].startswith("mtllib "):
+    if lines[0] != f"# {GENERATOR}" or not "".join(lines[1:2]).startswith("mtllib "):
         raise foreign(path)
     try:
         vertices = _rows(lines, "v ", 3, np.float32)

@@ -5,7 +5,7 @@ from mitex.mesh.lattice import Lattice
 from mitex.mesh.mesh import Mesh, Similarity
 from mitex.mesh.quality import QualityReport, quality
 from mitex.mesh.remesh import remesh
-from mitex.mesh.shapes import grid, icosphere, torus
+from mitex.mesh.shapes import grid, icosphere, scattered_sphere, torus
 from mitex.mesh.subdivide import subdivide_loop, subdivide_midpoint
 from mitex.mesh.topology import EdgeGraph
 from mitex.mesh.validate import validate
@@ -22,6 +22,7 @@ __all__ = [
     "icosphere",
     "quality",
     "remesh",
+    "scattered_sphere",
     "subdivide_loop",
     "subdivide_midpoint",
     "torus",

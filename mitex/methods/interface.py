@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 if TYPE_CHECKING:
     import numpy as np
 
+    from mitex.mesh import Mesh
+
 
 class Applied(Protocol):
     """A texture on a mesh: an `Asset`, or a radiance field in the shell around the mesh."""
@@ -42,7 +44,7 @@ class Texture(Protocol):
 
     @property
     def about(self) -> Mapping[str, Any]:
-        """How it was made, as JSON values: name, preset, steps, seconds, loss and more."""
+        """What is known of its training, as JSON values: name, preset, steps, seconds, loss and more."""
         ...
 
     @classmethod
@@ -62,7 +64,7 @@ class Texture(Protocol):
         """
         ...
 
-    def apply(self, mesh: Any, **options: Any) -> Applied:
+    def apply(self, mesh: Mesh, **options: Any) -> Applied:
         """Puts the texture on a mesh; options are the method's own.
 
         Raises:

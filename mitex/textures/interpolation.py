@@ -6,9 +6,9 @@ that near a side only the one that starts there counts. A side's values and slop
 vertices hold alone, so that both faces agree on them: in the plane of the faces, unfolded, the interpolant is
 continuously differentiable. It reproduces quadratic polynomials.
 
-Both are linear in the values: a point reads rows of a table with weights. Linear interpolation has three rows,
-those of its corners. The smooth one has twelve: row 4 v + k of the table that `mesh.gradients` makes holds
-the values of vertex v for k = 0, and their derivatives by x, y, z for k = 1, 2, 3.
+Both are linear in the values: a point reads rows of a table with weights. Linear interpolation has three
+rows, those of its corners. The smooth one has twelve: row 4 v + k of the table that `mesh.gradients` makes
+holds the values of vertex v for k = 0, and their derivatives by x, y, z for k = 1, 2, 3.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def _add_side(
     t = dr.select(both > 0, barycentric[j] / dr.maximum(both, 1e-30), 0.5)
     # On the side: Hermite's cubic between its ends, the slope across it linear.
     (h0, d0, h1, d1), (g0, e0, g1, e1) = _hermite(t), _hermite_slopes(t)
-    radial = mi.Vector3f(apex - (p + t * edge))
+    radial = mi.Vector3f(apex - p) - t * edge
     # The way to the corner in the plane of the face, split along the side and across it.
     ahead = dr.dot(radial, edge) / length2
     height = dr.safe_sqrt(dr.squared_norm(radial) - ahead * ahead * length2)

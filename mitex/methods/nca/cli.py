@@ -142,9 +142,9 @@ class Apply(OptionalMeshOptions):
         if self.tile is None:
             return super().prepared()
         from mitex.export import check_folder
+        from mitex.paths import expanded
 
-        place = Path(self.out).expanduser()
-        return check_folder(place, self.maps_format, self.inputs(), mesh=False)
+        return check_folder(expanded(self.out), self.maps_format, self.inputs(), mesh=False)
 
     def check_output(self, out: Path) -> None:
         suffix = out.suffix.lower()

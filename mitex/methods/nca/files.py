@@ -24,11 +24,11 @@ from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.methods.nca.look import STATE_CHANNELS, Look
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.perception import HARMONICS
+from mitex.paths import expanded
 from mitex.training import checkpoint, model_file
 from mitex.training.locate import CHECKPOINT, NAME, PREVIOUS, locate
 
-RULE = METHOD.tensors
-DECODER = "decoder."
+RULE = "rule."  # before names of the rule's tensors, which files leave out
 
 
 def save(path: Path, look: Look, about: Mapping[str, Any]) -> Path:
@@ -37,10 +37,9 @@ def save(path: Path, look: Look, about: Mapping[str, Any]) -> Path:
     Raises:
         OutputError: the place is not writable.
     """
-    tensors = dict(look.rule.state_dict())
+    tensors = {name.removeprefix(RULE): value for name, value in look.state_dict().items()}
     metadata = {"degree": str(look.rule.degree), "aggregation": "mean" if look.mean else "sum"}
     if isinstance(look.decoder, Decoder):
-        tensors |= {DECODER + name: value for name, value in look.decoder.state_dict().items()}
         metadata["decoder"] = json.dumps(asdict(look.decoder.shape))
     return model_file.save(path, tensors, METHOD.name, {**about, "maps": list(look.maps)}, **metadata)
 
@@ -56,33 +55,31 @@ def load(source: str | Path) -> tuple[Look, dict[str, Any]]:
     """
     path = _newest(source)
     if path.name in (CHECKPOINT, PREVIOUS):
-        return _from_checkpoint(path)
+        # Of a run folder any readable checkpoint will do; a file is read as it was named.
+        folder = expanded(source).is_dir()
+        return _from_checkpoint(checkpoint.load(path.parent) if folder else checkpoint.read(path), path)
     try:
         tensors, metadata = model_file.read(path)
     except (SafetensorError, OSError, ValueError) as e:
         raise CheckpointError(f"'{path}' is not a model ({e})", "give a model file or a run folder") from e
     about = _about(metadata, path)
-    rule = _rule(
-        {k: v for k, v in tensors.items() if not k.startswith(DECODER)}, metadata.get("degree"), path
-    )
+    rule = _rule(tensors, metadata.get("degree"), path)
     shape = _shape(metadata["decoder"], path) if "decoder" in metadata else None
     look = Look(rule, _maps(about["maps"], rule, shape, path), shape, metadata.get("aggregation") == "mean")
-    if shape is not None:
-        _fill(
-            look.decoder,
-            {k.removeprefix(DECODER): v for k, v in tensors.items() if k.startswith(DECODER)},
-            path,
-        )
+    own = {RULE + name if name in METHOD.tensors else name: value for name, value in tensors.items()}
+    bounds = {name: getattr(look, name) for name in ("low", "high")}  # which the authors' weights lack
+    _fill(look, bounds | own, path)
     return look, about
 
 
-def _from_checkpoint(path: Path) -> tuple[Look, dict[str, Any]]:
-    state = checkpoint.load(path.parent)
+def _from_checkpoint(state: checkpoint.Checkpoint, path: Path) -> tuple[Look, dict[str, Any]]:
     maps = state.metadata.get("maps", "albedo").split(",")
     about: dict[str, Any] = {"name": state.metadata.get("exemplar", path.parent.name), "maps": maps}
     about |= {"steps": state.step, "preset": state.config.get("preset")}
     names = {field.name for field in fields(NcaConfig)}
-    tuples = {k: tuple(v) if isinstance(v, list) else v for k, v in state.config.items() if k in names}
+    tuples: dict[str, Any] = {
+        k: tuple(v) if isinstance(v, list) else v for k, v in state.config.items() if k in names
+    }
     look = Look.of(NcaConfig(**tuples), maps)
     _fill(look, {k[6:]: v for k, v in state.task.items() if k.startswith("model.")}, path)
     return look, about
@@ -90,7 +87,9 @@ def _from_checkpoint(path: Path) -> tuple[Look, dict[str, Any]]:
 
 def _shape(text: str, path: Path) -> DecoderShape:
     try:
-        values = {k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(text).items()}
+        values: dict[str, Any] = {
+            k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(text).items()
+        }
         return DecoderShape(**values)
     except (ValueError, TypeError, AttributeError) as e:
         raise CheckpointError(f"the decoder in '{path}' is damaged ({e})", "save the model again") from e
@@ -108,7 +107,7 @@ def _fill(module: torch.nn.Module, tensors: dict[str, torch.Tensor], path: Path)
 
 
 def _newest(source: str | Path) -> Path:
-    """A resumed run's checkpoint is newer than the model of its first part."""
+    """The file to read; of a resumed run the checkpoint, which is newer than the model of its first part."""
     first, *others = locate(source)
     if first.name == NAME and others and others[0].name == CHECKPOINT:
         return max(first, others[0], key=lambda file: file.stat().st_mtime_ns)
@@ -139,20 +138,18 @@ def _maps(maps: list[str], rule: MeshNCA, shape: DecoderShape | None, path: Path
 
 
 def _rule(tensors: dict[str, torch.Tensor], degree: object, path: Path) -> MeshNCA:
-    """The rule whose shape the tensors have; `degree` of the harmonics if the file tells."""
+    """A rule of the tensors' shape, without weights; `degree` of the harmonics if the file tells."""
     problem = CheckpointError(
         f"'{path}' does not hold a MeshNCA model", "give a file written by mitex fit nca"
     )
-    if set(tensors) != RULE or any(tensors[k].ndim != 2 - k.endswith("bias") for k in RULE):
+    weights = [tensors.get(name) for name in ("fc1.weight", "fc2.weight")]
+    if any(weight is None or weight.ndim != 2 for weight in weights):
         raise problem
     (channels, hidden), inputs = tensors["fc2.weight"].shape, tensors["fc1.weight"].shape[1]
-    rule_degree = _degree(degree, channels, inputs)
-    if rule_degree is None or not channels:
+    highest = _degree(degree, channels, inputs)
+    if highest is None or not channels:
         raise problem
-    condition = inputs - (HARMONICS[rule_degree] + 1) * channels
-    rule = MeshNCA(channels, hidden, condition, rule_degree)
-    _fill(rule, tensors, path)
-    return rule
+    return MeshNCA(channels, hidden, inputs - (HARMONICS[highest] + 1) * channels, highest)
 
 
 def _degree(stated: object, channels: int, inputs: int) -> int | None:

@@ -1,9 +1,9 @@
-"""Mesh perception: spherical harmonics of edge directions as one sparse product (MeshNCA, section 3.2.1).
+"""Mesh perception: spherical harmonics of edge directions as one sparse product (MeshNCA, equations 1 and 2).
 
-Vertex i perceives z_i = sum_j w(d_ij) (s_j - s_i) for each harmonic w, with d_ij = (p_j - p_i) / |p_j -
-p_i|. That is linear in the states, so all harmonics, and the state itself as a last block, are the rows of
-one sparse matrix of shape (V * blocks, V), row i * blocks + k for block k of vertex i. Its transpose is kept
-too: it is the backward pass. No tensor of the size of the edges times the channels is ever formed.
+Vertex i perceives z_i = sum_j w(d_ij) (s_j - s_i) for each harmonic w, where the sum goes over its neighbours
+j, and d_ij = (p_j - p_i) / |p_j - p_i|. That is linear in the states s: one sparse matrix of shape
+(V * blocks, V) gives all harmonics, and the state itself as a last block; row i * blocks + k is block k of
+vertex i. Its transpose is kept too: it is the backward pass. No tensor of edges times channels is formed.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Perception:
 
 
 def harmonics(directions: np.ndarray, degree: int) -> np.ndarray:
-    """Real spherical harmonics (E, count) of unit vectors (E, 3), without constants, as the authors' are.
+    """Real spherical harmonics (E, count) of unit vectors (E, 3), without constant factors, as the authors'.
 
     Order: 1; y, z, x; xy, yz, 3z^2 - 1, xz, x^2 - y^2. Up to `degree` 0, 1 or 2.
     """

@@ -17,7 +17,9 @@ from mitex.mesh import Mesh
 from mitex.methods.nca import files
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look
+from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import Perception, lattice_perception, perception
 from mitex.methods.nca.tile import flat_cells, tile_maps
 from mitex.runtime import keep_freed_memory
@@ -73,12 +75,12 @@ class NcaTexture:
             mesh: any mesh; near-uniform edges and valence 6 give the best texture (`mitex.mesh.quality`).
             seed: of the random updates.
             steps: of the automaton; 200 if None.
-            subdivide: levels of subdivision, or "auto": as many as bring the copy to 24,000 vertices.
+            subdivide: levels of subdivision, or "auto": as many as bring the copy to 8,000 vertices.
             orientation: turns the texture about the normals, counter-clockwise [rad].
             scale: size of the pattern, 1 for what the density gives; others need a remeshing of the copy to
                 the fitting density (extra `remesh`).
-            resolution: of the baked textures [texels], on the mesh's own UVs if nothing in them overlaps, else
-                on new ones. None leaves the maps at the vertices.
+            resolution: of the baked textures [texels], on the mesh's own UVs if nothing in them overlaps,
+                else on new ones. None leaves the maps at the vertices.
             keep_dense: returns the finer mesh itself, rounded by Loop subdivision, instead of the given one.
 
         Returns:
@@ -93,6 +95,11 @@ class NcaTexture:
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
         steps = STEPS if steps is None else steps
         state = self.grow(cells.mesh, seed=seed, steps=steps, orientation=orientation)
+        if "palette" in self.about:
+            generator = torch.Generator().manual_seed(seed)
+            operator = perception(cells.mesh, self.look.rule.degree, orientation, mean=self.look.mean)
+            palette = Palette.from_record(self.about["palette"])
+            state = healed(self.look, state, cells, operator, palette, generator)
         grown = Grown(self.look, state, cells, orientation)
         asset = grown.asset()
         if resolution is None:
@@ -136,28 +143,33 @@ class NcaTexture:
 
     @torch.no_grad()
     def grow(
-        self,
-        mesh: Mesh | Perception,
-        *,
-        seed: int = 0,
-        steps: int = STEPS,
-        orientation: float = 0.0,
-        clamp: float = 1.0,
+        self, mesh: Mesh | Perception, *, seed: int = 0, steps: int = STEPS, orientation: float = 0.0
     ) -> torch.Tensor:
-        """The state (V, C) after `steps` steps from the seed; held in [-clamp, clamp] as in the authors'
-        demo. A perception operator has its orientation already.
+        """The state of the automaton after some steps, held within the bounds of the training's.
+
+        Args:
+            mesh: any mesh, or its perception operator, which has an orientation of its own.
+            seed: of the random updates.
+            steps: from the initial state, which is zero.
+            orientation: as in `apply` [rad].
+
+        Returns:
+            (V, C) float32.
+
+        Raises:
+            ConfigError: steps below 0, or the model needs a condition.
         """
         self._check_unconditioned()
         if steps < 0:
             raise ConfigError(f"{steps} steps", "give 0 or more")
         keep_freed_memory()
-        operator = mesh
+        rule, operator = self.look.rule, mesh
         if isinstance(operator, Mesh):
-            operator = perception(operator, self.look.rule.degree, orientation, mean=self.look.mean)
+            operator = perception(operator, rule.degree, orientation, mean=self.look.mean)
         generator = torch.Generator().manual_seed(seed)
-        state = self.look.rule.seed(operator)
+        state = rule.seed(operator)
         for _ in range(steps):
-            state = self.look.rule.evolve(state, operator, 1, generator).clamp_(-clamp, clamp)
+            state = self.look.bounded(rule.evolve(state, operator, 1, generator))
         return state[0]
 
     def _check_unconditioned(self) -> None:

@@ -119,6 +119,14 @@ def test_the_previous_checkpoint_will_do(tmp_path):
     assert _same(NcaTexture.load(tmp_path).model, model)
 
 
+def test_a_checkpoint_that_is_named_is_the_one_that_is_read(tmp_path):
+    for step in (5, 9):
+        checkpoint.save(tmp_path, _checkpoint(MeshNCA(hidden=step), step))
+    for name, step in ((checkpoint.PREVIOUS, 5), (checkpoint.NAME, 9)):
+        loaded = NcaTexture.load(tmp_path / name)
+        assert (loaded.about["steps"], loaded.model.hidden) == (step, step)
+
+
 def test_bundled_models_are_found_by_name():
     models = bundled(METHOD)
     assert models, "no model is bundled"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.methods import nca
 from mitex.methods.nca import NcaConfig
@@ -204,8 +205,20 @@ def weights_of_parts(build):
 
 
 @pytest.mark.parametrize("key", sorted(CHECKS))
-def test_a_key_counts(build, key):
+def test_the_check_of_a_key_holds(build, key):
+    """The assertions are those of the function above that is registered for the key."""
     CHECKS[key](build)
+
+
+@pytest.mark.parametrize("key", sorted(CHECKS))
+def test_the_check_of_a_key_fails_where_it_is_ignored(build, key):
+    """As a task would behave that never reads the key: it is what it is without that setting."""
+
+    def without_key(*settings: str) -> NcaTask:
+        return build(*(setting for setting in settings if not setting.startswith(f"{key}=")))
+
+    with pytest.raises((AssertionError, ConfigError)):  # ConfigError: max_steps below the default min_steps
+        CHECKS[key](without_key)
 
 
 OF_THE_FIT = {"lr", "milestones", "decay", "normalise_gradients"}
