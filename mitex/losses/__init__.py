@@ -1,10 +1,12 @@
 """Losses on images, features and states: pure torch."""
 
+from mitex.losses.autocorrelation import autocorrelation_distance
 from mitex.losses.gram import gram_distance, gram_loss, gram_matrix
 from mitex.losses.overflow import overflow_loss
 from mitex.losses.transport import channel_transport, moment_distance, relaxed_transport
 
 __all__ = [
+    "autocorrelation_distance",
     "channel_transport",
     "gram_distance",
     "gram_loss",

@@ -4,7 +4,7 @@ from mitex.mesh.embedded import embedded, embedded_names
 from mitex.mesh.mesh import Mesh, Similarity
 from mitex.mesh.quality import QualityReport, quality
 from mitex.mesh.remesh import remesh
-from mitex.mesh.shapes import grid, icosphere, torus
+from mitex.mesh.shapes import grid, icosphere, scattered_sphere, torus
 from mitex.mesh.subdivide import subdivide_loop, subdivide_midpoint
 from mitex.mesh.topology import EdgeGraph
 from mitex.mesh.validate import validate
@@ -20,6 +20,7 @@ __all__ = [
     "icosphere",
     "quality",
     "remesh",
+    "scattered_sphere",
     "subdivide_loop",
     "subdivide_midpoint",
     "torus",

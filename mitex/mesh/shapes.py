@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from mitex.errors import MeshError
+from mitex.geometry.triangles import triangle_crosses
+from mitex.geometry.vectors import dot, scatter_add, unit
 from mitex.mesh.mesh import Mesh
+
+RELAXATIONS = 4  # of scattered vertices
 
 
 def icosphere(frequency: int) -> Mesh:
@@ -37,6 +41,37 @@ def icosphere(frequency: int) -> Mesh:
     small = _triangle_grid_faces(frequency)
     faces = ids.reshape(len(base), -1)[:, small].reshape(-1, 3)
     return Mesh(vertices, faces, name=f"icosphere{frequency}")
+
+
+def scattered_sphere(count: int, seed: int = 0) -> Mesh:
+    """The unit sphere with vertices at random places: edge lengths vary by 28 %, valences from 4 to 8.
+
+    Uniform points, moved towards their neighbours four times, and their convex hull.
+
+    Args:
+        count: number of vertices, at least 4.
+        seed: of the places.
+
+    Returns:
+        `count` vertices, 2 count - 4 faces.
+
+    Raises:
+        MeshError: there are too few vertices.
+    """
+    from scipy.spatial import ConvexHull
+
+    if count < 4:
+        raise MeshError(f"a sphere of {count} vertices is not possible", "use 4 or more")
+    points = unit(np.random.default_rng(seed).normal(size=(count, 3)))
+    for _ in range(RELAXATIONS):
+        faces = ConvexHull(points).simplices
+        around = scatter_add(faces.ravel(), points[np.roll(faces, 1, axis=1)].reshape(-1, 3), count)
+        around += scatter_add(faces.ravel(), points[np.roll(faces, -1, axis=1)].reshape(-1, 3), count)
+        points = unit(around)
+    faces = ConvexHull(points).simplices
+    inwards = dot(triangle_crosses(points[faces]), points[faces[:, 0]]) < 0
+    faces[inwards] = faces[inwards][:, ::-1]
+    return Mesh(points, faces, name=f"sphere{count}")
 
 
 def torus(rings: int = 96, sides: int = 40, radius: float = 1.0, tube: float = 0.4) -> Mesh:

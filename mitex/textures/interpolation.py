@@ -6,9 +6,9 @@ that near a side only the one that starts there counts. A side's values and slop
 vertices hold alone, so that both faces agree on them: in the plane of the faces, unfolded, the interpolant is
 continuously differentiable. It reproduces quadratic polynomials.
 
-Both are linear in the values: a point reads rows of a table with weights. Linear interpolation has three rows,
-those of its corners. The smooth one has twelve: row 4 v + k of the table that `mesh.gradients` makes holds
-the values of vertex v for k = 0, and their derivatives by x, y, z for k = 1, 2, 3.
+Both are linear in the values: a point reads rows of a table with weights. Linear interpolation has three
+rows, those of its corners. The smooth one has twelve: row 4 v + k of the table that `mesh.gradients` makes
+holds the values of vertex v for k = 0, and their derivatives by x, y, z for k = 1, 2, 3.
 """
 
 from __future__ import annotations

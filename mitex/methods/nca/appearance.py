@@ -5,16 +5,19 @@ from __future__ import annotations
 import torch
 
 from mitex.features import Vgg16, normalise_colours
-from mitex.losses import channel_transport, moment_distance, relaxed_transport
+from mitex.losses import autocorrelation_distance, channel_transport, moment_distance, relaxed_transport
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.targets import Targets
 from mitex.triples import CYCLE
+
+ORDER_LAYER = "relu3_1"  # its maps have a place for every four pixels
 
 
 class Appearance:
     """Compares views with pictures of the exemplar, at random places of each feature layer."""
 
-    def __init__(self, config: NcaConfig, targets: Targets, network: Vgg16) -> None:
+    def __init__(self, config: NcaConfig, targets: Targets, network: Vgg16, ordered: bool = False) -> None:
+        self.ordered = ordered and config.order_weight > 0
         self.config, self.targets, self.network = config, targets, network
         self._table = torch.tensor([p.channels for p in targets.pictures], device=network.device)
 
@@ -49,6 +52,8 @@ class Appearance:
         for layer in config.layers:
             h, w = self.network.extent(layer, height, width)
             n = min(h * w, self.targets.size(layer), config.samples)
+            if self.ordered and layer == ORDER_LAYER:
+                n = h * w
             ours[layer] = _places(count, h * w, n, generator).to(images.device)
             theirs[layer] = _places(count, self.targets.size(layer), n, generator).to(images.device)
         total = config.colour_weight * self._colours(images, which, generator)
@@ -57,6 +62,10 @@ class Appearance:
             b = self.targets.sample(layer, which, theirs[layer])
             total = total + relaxed_transport(a, b, low_precision=low).mean()
             total = total + config.moment_weight * moment_distance(a, b, low).mean()
+            if self.ordered and layer == ORDER_LAYER:
+                maps = a.view(count, *self.network.extent(layer, height, width), -1)
+                order = autocorrelation_distance(maps, self.targets.maps(layer, which))
+                total = total + config.order_weight * order.mean()
         return total
 
     def _colours(self, images: torch.Tensor, which: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
@@ -71,5 +80,7 @@ class Appearance:
 
 
 def _places(count: int, size: int, n: int, generator: torch.Generator) -> torch.Tensor:
-    """(count, n) indices below `size`, without repetition within a row."""
+    """(count, n) indices below `size`, without repetition within a row; all of them are in order."""
+    if n == size:
+        return torch.arange(n).expand(count, n)
     return torch.stack([torch.randperm(size, generator=generator)[:n] for _ in range(count)])

@@ -1,7 +1,7 @@
 """The mesh that an automaton runs on, beside the mesh that its texture is for.
 
-A cell sits at each vertex, and the size of a pattern follows their density. So a mesh is subdivided, or meshed
-anew, for the automaton alone; points of the given mesh are looked up on it.
+A cell sits at each vertex, and the size of a pattern follows their density. So a mesh is subdivided, or
+meshed anew, for the automaton alone; points of the given mesh are looked up on it.
 """
 
 from __future__ import annotations

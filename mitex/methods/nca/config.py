@@ -22,6 +22,9 @@ class NcaConfig(TrainingConfig):
     degree: int = key(1, "highest degree of the spherical harmonics of the perception", 0, 2)
     gain: float = key(0.1, "gain of the initial weights of the last layer (the authors: 1.2)", 0)
     frequency: int = key(32, "of the icosphere that is trained on; 10 f^2 + 2 vertices", 1, 4096)
+    sphere: Literal["both", "even", "uneven"] = key(
+        "both", "triangles of the sphere: the icosphere's, or of scattered vertices, or both in turns"
+    )
     pool: int = key(64, "states kept between steps", 1, 4096)
     aggregation: Literal["mean", "sum"] = key(
         "mean", "of what a cell perceives of its neighbours: six times the mean, or the sum (the paper)"
@@ -49,6 +52,7 @@ class NcaConfig(TrainingConfig):
     colour_weight: float = key(1.0, "of the comparison of colours, beside the layers", 0)
     colour_histogram: bool = key(True, "compare the histograms of the channels too")
     moment_weight: float = key(0.1, "of the moment terms, beside the transport terms", 0)
+    order_weight: float = key(0.0, "of the autocorrelation of the coarsest views, for regular patterns", 0)
     appearance_weight: float = key(2.0, "of the appearance loss", 0)
     overflow_weight: float = key(100.0, "of the overflow loss", 0)
     decoder: bool = key(
@@ -78,6 +82,8 @@ class NcaConfig(TrainingConfig):
         unknown = [layer for layer in self.layers if layer not in LAYERS]
         if unknown or not self.layers:
             raise ConfigError(f"layers holds {unknown or 'nothing'}", f"use some of {', '.join(LAYERS)}")
+        if self.order_weight and ("relu3_1" not in self.layers or self.views == "full"):
+            raise ConfigError("order_weight needs patches and the layer relu3_1", "set it to 0, or these")
         unknown = [name for name in self.coordinates if name not in COORDINATES]
         if unknown:
             raise ConfigError(f"coordinates holds {unknown}", f"use some of {', '.join(COORDINATES)}")
@@ -123,6 +129,7 @@ PRESETS = {
         pooling="average",
         aggregation="sum",
         overflow_weight=1e4,
+        sphere="even",
         decoder=False,
         interpolation="linear",
         blend=False,

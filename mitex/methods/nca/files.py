@@ -27,8 +27,7 @@ from mitex.methods.nca.perception import HARMONICS
 from mitex.training import checkpoint, model_file
 from mitex.training.locate import CHECKPOINT, NAME, PREVIOUS, locate
 
-RULE = METHOD.tensors
-DECODER = "decoder."
+RULE = "rule."  # before names of the rule's tensors, which files leave out
 
 
 def save(path: Path, look: Look, about: Mapping[str, Any]) -> Path:
@@ -37,10 +36,9 @@ def save(path: Path, look: Look, about: Mapping[str, Any]) -> Path:
     Raises:
         OutputError: the place is not writable.
     """
-    tensors = dict(look.rule.state_dict())
+    tensors = {name.removeprefix(RULE): value for name, value in look.state_dict().items()}
     metadata = {"degree": str(look.rule.degree), "aggregation": "mean" if look.mean else "sum"}
     if isinstance(look.decoder, Decoder):
-        tensors |= {DECODER + name: value for name, value in look.decoder.state_dict().items()}
         metadata["decoder"] = json.dumps(asdict(look.decoder.shape))
     return model_file.save(path, tensors, METHOD.name, {**about, "maps": list(look.maps)}, **metadata)
 
@@ -62,17 +60,12 @@ def load(source: str | Path) -> tuple[Look, dict[str, Any]]:
     except (SafetensorError, OSError, ValueError) as e:
         raise CheckpointError(f"'{path}' is not a model ({e})", "give a model file or a run folder") from e
     about = _about(metadata, path)
-    rule = _rule(
-        {k: v for k, v in tensors.items() if not k.startswith(DECODER)}, metadata.get("degree"), path
-    )
+    rule = _rule(tensors, metadata.get("degree"), path)
     shape = _shape(metadata["decoder"], path) if "decoder" in metadata else None
     look = Look(rule, _maps(about["maps"], rule, shape, path), shape, metadata.get("aggregation") == "mean")
-    if shape is not None:
-        _fill(
-            look.decoder,
-            {k.removeprefix(DECODER): v for k, v in tensors.items() if k.startswith(DECODER)},
-            path,
-        )
+    own = {RULE + name if name in METHOD.tensors else name: value for name, value in tensors.items()}
+    bounds = {name: getattr(look, name) for name in ("low", "high")}  # which the authors' weights lack
+    _fill(look, bounds | own, path)
     return look, about
 
 
@@ -139,20 +132,18 @@ def _maps(maps: list[str], rule: MeshNCA, shape: DecoderShape | None, path: Path
 
 
 def _rule(tensors: dict[str, torch.Tensor], degree: object, path: Path) -> MeshNCA:
-    """The rule whose shape the tensors have; `degree` of the harmonics if the file tells."""
+    """A rule of the tensors' shape, without weights; `degree` of the harmonics if the file tells."""
     problem = CheckpointError(
         f"'{path}' does not hold a MeshNCA model", "give a file written by mitex fit nca"
     )
-    if set(tensors) != RULE or any(tensors[k].ndim != 2 - k.endswith("bias") for k in RULE):
+    weights = [tensors.get(name) for name in ("fc1.weight", "fc2.weight")]
+    if any(weight is None or weight.ndim != 2 for weight in weights):
         raise problem
     (channels, hidden), inputs = tensors["fc2.weight"].shape, tensors["fc1.weight"].shape[1]
     rule_degree = _degree(degree, channels, inputs)
     if rule_degree is None or not channels:
         raise problem
-    condition = inputs - (HARMONICS[rule_degree] + 1) * channels
-    rule = MeshNCA(channels, hidden, condition, rule_degree)
-    _fill(rule, tensors, path)
-    return rule
+    return MeshNCA(channels, hidden, inputs - (HARMONICS[rule_degree] + 1) * channels, rule_degree)
 
 
 def _degree(stated: object, channels: int, inputs: int) -> int | None:

@@ -14,6 +14,9 @@ from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.targets import value_layout
 from mitex.textures.interpolation import Kind
 
+RATE = 0.02  # at which the bounds follow a step's
+MARGIN = 0.05  # of the bounds' distance, which states of other meshes may have beyond
+
 # Channels of the state that are the maps without a decoder, as in the authors' PBR checkpoints; 3 to 5 are
 # hidden.
 STATE_CHANNELS: dict[str, tuple[int, ...]] = {
@@ -35,12 +38,18 @@ class Look(nn.Module):
         mean: whether cells perceive the mean of their neighbours (see `perception`).
     """
 
+    low: torch.Tensor
+    high: torch.Tensor
+
     def __init__(
         self, rule: MeshNCA, maps: Sequence[str], shape: DecoderShape | None, mean: bool = True
     ) -> None:
         super().__init__()
         self.rule, self.maps, self.mean = rule, tuple(maps), mean
         self.layout = value_layout(maps)
+        # Between which a trained rule's states stay; the authors' demo holds them in [-1, 1].
+        self.register_buffer("low", torch.full((rule.channels,), -1.0))
+        self.register_buffer("high", torch.full((rule.channels,), 1.0))
         if shape is None:
             self.decoder: Decoder | Readout = Readout([c for name in maps for c in STATE_CHANNELS[name]])
         else:
@@ -64,3 +73,16 @@ class Look(nn.Module):
         self.rule.initialise(generator, gain)
         if isinstance(self.decoder, Decoder):
             self.decoder.network.initialise(generator)
+
+    @torch.no_grad()
+    def track(self, state: torch.Tensor) -> None:
+        """Lets the bounds follow the smallest and largest values of a state (V, C) of the training."""
+        self.low.lerp_(state.amin(0), RATE)
+        self.high.lerp_(state.amax(0), RATE)
+
+    def bounded(self, state: torch.Tensor) -> torch.Tensor:
+        """The state (..., C) held where the training's states were: on meshes unlike the sphere it may grow
+        without an end, as nothing has taught the rule to come back.
+        """
+        margin = MARGIN * (self.high - self.low)
+        return torch.minimum(torch.maximum(state, self.low - margin), self.high + margin)

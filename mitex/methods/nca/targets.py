@@ -43,7 +43,7 @@ class Targets:
         network: Vgg16,
         layers: tuple[str, ...],
     ) -> None:
-        self.pictures = pictures
+        self.pictures, self._network, self._size = pictures, network, exemplar.size
         images = torch.from_numpy(triple_images(exemplar, pictures, layout)).to(network.device)
         generator = torch.Generator().manual_seed(0)
         self._vectors = {"colour": _some(images.flatten(1, 2), generator)}
@@ -56,6 +56,10 @@ class Targets:
     def size(self, layer: str) -> int:
         """Number of feature vectors of a picture in a layer ("colour": its pixels)."""
         return self._vectors[layer].shape[1]
+
+    def maps(self, layer: str, which: torch.Tensor) -> torch.Tensor:
+        """Whole feature maps (K, h, w, C) float32 of pictures, of a layer small enough to be kept whole."""
+        return self._vectors[layer][which].float().unflatten(1, self._network.extent(layer, *self._size))
 
     def sample(self, layer: str, which: torch.Tensor, positions: torch.Tensor) -> torch.Tensor:
         """Vectors (K, n, C) float32 of pictures `which` (K,) at `positions` (K, n)."""

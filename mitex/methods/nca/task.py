@@ -11,17 +11,14 @@ import torch
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
 from mitex.losses import overflow_loss
-from mitex.mesh import icosphere
+from mitex.mesh import Mesh
 from mitex.methods.nca.appearance import Appearance
 from mitex.methods.nca.config import NcaConfig
-from mitex.methods.nca.decoder.surface import Surface
+from mitex.methods.nca.grounds import Ground, grounds
 from mitex.methods.nca.look import Look
-from mitex.methods.nca.perception import perception
 from mitex.methods.nca.targets import Targets, enlarged
-from mitex.methods.nca.views import render_views
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, orbit, patch_views, random_views
-from mitex.scenes.stage import Stage
 from mitex.training import Step
 from mitex.triples import channel_triples, triple_images
 
@@ -49,12 +46,9 @@ class NcaTask:
             self.look.initialise(torch.Generator().manual_seed(config.seed), config.gain)
         else:
             self.look.load_state_dict(init.state_dict())
-        self.mesh = icosphere(config.frequency)
-        self.perception = perception(self.mesh, config.degree, mean=config.aggregation == "mean")
-        self.surface = Surface(self.mesh, self.look.interpolation)
-        self.stage = Stage(self.mesh)
+        self.grounds = grounds(config, self.look)
         self.zooms = self._appearances()
-        self.pool = torch.zeros(config.pool, self.perception.vertices, config.channels)
+        self.pool = torch.zeros(config.pool, len(self.grounds[0].mesh.vertices), config.channels)
         self._touched = torch.zeros(config.pool, dtype=torch.bool)
 
     def _appearances(self) -> dict[int, Appearance]:
@@ -70,7 +64,7 @@ class NcaTask:
                 continue
             target = enlarged(self.exemplar.resized(size), config.target_size or size)
             targets = Targets(target, pictures, layout, network, config.layers)
-            zooms[size] = Appearance(config, targets, network)
+            zooms[size] = Appearance(config, targets, network, ordered=not zooms)
         return zooms
 
     @property
@@ -88,11 +82,11 @@ class NcaTask:
         if step % config.inject_every == 0:
             state = torch.zeros_like(state)
         steps = int(torch.randint(config.min_steps, config.max_steps + 1, (), generator=generator))
-        state = self.look.rule.evolve(state, self.perception, steps, generator)
+        ground = self.ground(index)
+        state = self.look.rule.evolve(state, ground.perception, steps, generator)
         losses = []
         for size, appearance in self.zooms.items():
-            cameras = self.cameras(size, generator)
-            views = render_views(self.look.decoder, state[0], self.surface, self.stage, cameras)
+            views = ground.views(self.look, state[0], self.cameras(ground.mesh, size, generator))
             losses.append(appearance(views, generator))
         appearance, overflow = torch.stack(losses).mean(), overflow_loss(state)
         return Step(
@@ -103,20 +97,25 @@ class NcaTask:
 
     def _put_back(self, index: int, state: torch.Tensor) -> None:
         self.pool[index], self._touched[index] = state, True
+        self.look.track(state)
 
-    def cameras(self, size: int, generator: torch.Generator) -> Cameras:
+    def ground(self, index: int) -> Ground:
+        """Where a state of the pool grows."""
+        return self.grounds[index % len(self.grounds)]
+
+    def cameras(self, mesh: Mesh, size: int, generator: torch.Generator) -> Cameras:
         """The views of one step in which the exemplar is `size` [px] wide."""
         config = self.config
         if config.views == "full":
             fov = math.radians(config.fov)
             return random_views(generator, config.view_count, config.distance, fov, config.resolution)
         half = min(0.5 * self.width * config.resolution / size, WIDEST)
-        return patch_views(generator, self.mesh, config.view_count, half, config.resolution)
+        return patch_views(generator, mesh, config.view_count, half, config.resolution)
 
     @property
     def width(self) -> float:
         """Of the exemplar on the sphere [mesh units], from the `density`."""
-        edge = math.sqrt(8 * math.pi / math.sqrt(3) / len(self.mesh.vertices))  # of equilateral faces
+        edge = math.sqrt(8 * math.pi / math.sqrt(3) / self.pool.shape[1])  # of equilateral faces
         return self.config.density * edge
 
     def state(self) -> dict[str, torch.Tensor]:
@@ -137,15 +136,13 @@ class NcaTask:
         evolved state.
         """
         generator = torch.Generator().manual_seed(step)
-        state = self.pool[int(torch.randint(self.config.pool, (), generator=generator))][None]
-        state = self.look.rule.evolve(state, self.perception, self.config.max_steps, generator)[0]
+        index = int(torch.randint(self.config.pool, (), generator=generator))
+        ground, state = self.ground(index), self.pool[index][None]
+        state = self.look.rule.evolve(state, ground.perception, self.config.max_steps, generator)[0]
         wide = min(0.5 * self.width, WIDEST)
-        cameras = [patch_views(generator, self.mesh, 1, half, PREVIEW) for half in (wide, wide / 4)]
+        cameras = [patch_views(generator, ground.mesh, 1, half, PREVIEW) for half in (wide, wide / 4)]
         cameras.append(orbit(1, distance=2.05, resolution=PREVIEW))
-        views = [
-            render_views(self.look.decoder, state, self.surface, self.stage, c, antialias=2)[0].numpy()
-            for c in cameras
-        ]
+        views = [ground.views(self.look, state, c, antialias=2)[0].numpy() for c in cameras]
         triples = channel_triples(self.look.layout, False, 0)
         images = triple_images(self.exemplar.resized(PREVIEW), triples, self.look.layout)
         rows = [

@@ -73,8 +73,8 @@ class NcaTexture:
             orientation: turns the texture about the normals, counter-clockwise [rad].
             scale: size of the pattern, 1 for what the density gives; others need a remeshing of the copy to
                 the fitting density (extra `remesh`).
-            resolution: of the baked textures [texels], on the mesh's own UVs if nothing in them overlaps, else
-                on new ones. None leaves the maps at the vertices.
+            resolution: of the baked textures [texels], on the mesh's own UVs if nothing in them overlaps,
+                else on new ones. None leaves the maps at the vertices.
             keep_dense: returns the finer mesh itself, rounded by Loop subdivision, instead of the given one.
 
         Returns:
@@ -98,20 +98,19 @@ class NcaTexture:
 
     @torch.no_grad()
     def grow(
-        self, mesh: Mesh, *, seed: int = 0, steps: int = STEPS, orientation: float = 0.0, clamp: float = 1.0
+        self, mesh: Mesh, *, seed: int = 0, steps: int = STEPS, orientation: float = 0.0
     ) -> torch.Tensor:
-        """The state (V, C) after `steps` steps from the seed; held in [-clamp, clamp] as in the authors'
-        demo.
-        """
+        """The state (V, C) after `steps` steps from the seed, held within the bounds of the training's."""
         self._check_unconditioned()
         if steps < 0:
             raise ConfigError(f"{steps} steps", "give 0 or more")
         keep_freed_memory()
-        operator = perception(mesh, self.look.rule.degree, orientation, mean=self.look.mean)
+        rule = self.look.rule
+        operator = perception(mesh, rule.degree, orientation, mean=self.look.mean)
         generator = torch.Generator().manual_seed(seed)
-        state = self.look.rule.seed(operator)
+        state = rule.seed(operator)
         for _ in range(steps):
-            state = self.look.rule.evolve(state, operator, 1, generator).clamp_(-clamp, clamp)
+            state = self.look.bounded(rule.evolve(state, operator, 1, generator))
         return state[0]
 
     def _check_unconditioned(self) -> None:
