@@ -14,14 +14,17 @@ holds the values of vertex v for k = 0, and their derivatives by x, y, z for k =
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, NamedTuple, cast
+from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 
 import numpy as np
-import torch
 
 from mitex.mesh import Mesh
 from mitex.runtime.jit import dr, mi
-from mitex.sparse import Weights
+
+if TYPE_CHECKING:
+    import torch
+
+    from mitex.sparse import Weights
 
 Kind = Literal["linear", "smooth"]
 
@@ -130,6 +133,10 @@ class SurfaceLookup:
 
     def weights(self, face: torch.Tensor, barycentric: torch.Tensor) -> Weights:
         """What the points on `face` (P,) int32 at `barycentric` (P, 3) float32 read."""
+        import torch
+
+        from mitex.sparse import Weights
+
         b = [mi.Float(barycentric[:, k].contiguous()) for k in range(3)]
         triangle = 3 * mi.UInt32(face.to(torch.int32).contiguous())
         index = [dr.gather(mi.UInt32, self._faces, triangle + k) for k in range(3)]
