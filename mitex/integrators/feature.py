@@ -18,8 +18,8 @@ class FeatureMethods:
      * - field
        - |texture|
        - The texture to image, on every shape: all channels of a `vertex_field`, `texel_field` or
-         `decoded_field`; of any other the colour that `eval` gives (3 channels in rgb variants, 1 in mono, not
-         in spectral ones).
+         `decoded_field`; of any other the colour that `eval` gives (3 channels in rgb variants, 1 in mono,
+         none in spectral ones).
        - exposed, differentiable
      * - name
        - |string|

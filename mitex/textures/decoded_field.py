@@ -186,8 +186,9 @@ class DecodedFieldMethods(FieldMethods):
         coordinates: list[mi.Float] = []
         for name in self.coordinates:
             if name == "waves":
-                edge = [dr.gather(mi.Float, self._edges, i, active) for i in index]
-                coordinates += self._waves(_mix(barycentric, position), _mix(barycentric, edge))
+                edge = _mix(barycentric, [dr.gather(mi.Float, self._edges, i, active) for i in index])
+                # No number may be infinite, even where nothing is read: its gradient would not be 0.
+                coordinates += self._waves(_mix(barycentric, position), dr.select(active, edge, 1))
             else:
                 coordinates += BARYCENTRIC[name][1](barycentric)
         return Located(tuple(rows), tuple(weights), active, tuple(coordinates))
@@ -235,7 +236,7 @@ class DecodedFieldMethods(FieldMethods):
             pairs = zip(points.barycentric, way, strict=True)
             moved = [dr.detach(b) + t * dr.detach(w) for b, w in pairs]
             located = self._at(points.index, moved, points.active)
-            dr.forward(t)
+            dr.forward(t, dr.ADFlag.ClearEdges)  # weights may be what coordinates are made of: they stay
             change = dr.grad((located.weights, located.coordinates))
         return located._replace(weights=change[0], coordinates=change[1])
 
