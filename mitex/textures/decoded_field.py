@@ -115,8 +115,10 @@ class DecodedFieldMethods(FieldMethods):
     def _read_mesh(self, props: mi.Properties) -> None:
         """What lookups need of the mesh at rest."""
         vertices, faces = (np.array(mi.TensorXf(props[name])) for name in ("vertices", "faces"))
+        with np.errstate(invalid="ignore"):
+            whole = faces.astype(np.int64)
         try:
-            mesh = Mesh(vertices, faces.astype(np.int64), name="the mesh at rest")
+            mesh = Mesh(vertices, whole if (whole == faces).all() else faces, name="the mesh at rest")
         except MeshError as e:
             raise RuntimeError(f"decoded_field: {e}") from e
         self._count = len(mesh.vertices)

@@ -206,6 +206,31 @@ def test_slopes_are_finite_differences(mi, interpolation: str, coordinates: tupl
         assert np.quantile(np.abs(slope.numpy() - expected), 0.95) < 0.02 * np.abs(expected).max()
 
 
+def test_slopes_have_gradients(mi, rng):
+    """So that relief can be learned from pictures."""
+    from mitex.runtime.jit import dr
+
+    texture = mi.load_dict(properties(random_look("smooth", ("waves",))))
+    points, shape = random_points(UNEVEN), mesh_shape(UNEVEN)
+    si = interaction(mi, shape, points.face.numpy(), points.barycentric.numpy())
+    si.dp_du, si.dp_dv = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 0.6, 0.8)
+    params = mi.traverse(texture)
+    start = np.array(params["data"])
+    direction = rng.normal(size=start.shape)
+    dr.enable_grad(params["data"])
+    params.update()
+    dr.backward(dr.sum(dr.squared_norm(texture.eval_1_grad(si))))
+    gradient = np.array(dr.grad(params["data"]))
+
+    def total(step: float) -> float:
+        params["data"] = mi.TensorXf((start + step * direction).astype(np.float32))
+        params.update()
+        return float((np.array(texture.eval_1_grad(si), np.float64) ** 2).sum())
+
+    slope = (total(1e-3) - total(-1e-3)) / 2e-3
+    assert slope == pytest.approx(float((gradient * direction).sum()), rel=2e-2)
+
+
 def test_order_of_vertices_and_faces_does_not_matter(mi, rng):
     look, points = random_look("smooth", EVERY), random_points(UNEVEN)
     face, barycentric = points.face.numpy(), points.barycentric.numpy()
@@ -395,6 +420,8 @@ def tensor(*shape: int, value: float = 0.0):
         ({"vertices": tensor(4, 2)}, "the mesh at rest"),
         ({"vertices": tensor(4, 3, value=np.nan)}, "the mesh at rest"),
         ({"faces": tensor(2, 3, value=4)}, "the mesh at rest"),
+        ({"faces": tensor(2, 3, value=0.5)}, "the mesh at rest"),
+        ({"faces": tensor(2, 3, value=np.nan)}, "the mesh at rest"),
         ({"faces": tensor(2, 4)}, "the mesh at rest"),
         ({"weight_0": None}, "pairs"),
         ({"bias_0": None}, "bias_0"),
