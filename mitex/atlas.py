@@ -8,7 +8,7 @@ import numpy as np
 import xatlas
 from scipy.ndimage import distance_transform_edt
 
-from mitex.errors import ConfigError
+from mitex.errors import ConfigError, MeshError
 from mitex.geometry.normal_maps import FLAT, encode
 from mitex.geometry.raster import covered_texels, rasterize
 from mitex.geometry.tangents import split_at_seams
@@ -18,9 +18,9 @@ from mitex.mesh import Mesh
 
 MAX_RESOLUTION = 8192
 LARGE = 40_000  # meshes of more faces are unwrapped in pieces
-SMOOTHINGS = 8
-ROUGHNESS = 0.03  # [edge lengths]
-FULL = 1.001  # area of the unit square, and rounding
+SMOOTHINGS = 8  # rounds over the neighbours before faces are sorted by the direction that they look in
+ROUGHNESS = 0.03  # by which vertices are moved before unwrapping [edge lengths], see `_rough`
+FULL = 1.001  # the area of the unit square, and some rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,6 +145,9 @@ def spread(image: np.ndarray, used: np.ndarray, padding: int) -> np.ndarray:
         image: (N, N, C).
         used: (N, N) bool.
         padding: how far [texels]; texels farther away get the mean of the used ones.
+
+    Returns:
+        (N, N, C).
     """
     nearest = np.zeros((2, *used.shape), np.int32)
     away = np.asarray(distance_transform_edt(~used, return_indices=True, indices=nearest))
@@ -194,7 +197,8 @@ def unwrap(mesh: Mesh, resolution: int, padding: int) -> np.ndarray:
 def _pieces(mesh: Mesh) -> list[np.ndarray]:
     """Indices of the faces that are flattened together: large meshes in six parts, which takes less time.
 
-    They are cut along the directions that the faces look at, after these are smoothed over the neighbours.
+    A face belongs to the part of the axis (+-x, +-y, +-z) that it looks along, after the normals have been
+    smoothed over the neighbours.
     """
     if len(mesh.faces) <= LARGE:
         return [np.arange(len(mesh.faces))]
@@ -210,8 +214,8 @@ def _pieces(mesh: Mesh) -> list[np.ndarray]:
 def _rough(mesh: Mesh) -> np.ndarray:
     """Positions (V, 3), of large meshes moved along the normals by up to 3 % of the edges around.
 
-    xatlas takes faces nearly parallel to their neighbours for flat and grows its first charts over them
-    without an end, around whole spheres if they are fine enough, and exhausts the stack.
+    xatlas takes faces that are nearly parallel to their neighbours for flat, and grows its first charts over
+    them without end: around whole spheres, if these are fine enough, until the stack is exhausted.
     """
     if len(mesh.faces) <= LARGE:
         return mesh.vertices
@@ -223,10 +227,21 @@ def _rough(mesh: Mesh) -> np.ndarray:
 
 
 def laid_out(mesh: Mesh, resolution: int, padding: int = 8) -> Mesh:
-    """The mesh with UVs for a map of `resolution` [texels]: its own if they are usable, else new ones.
+    """The mesh with UVs that can carry a map: its own if they are usable (`usable_uv`), else new ones.
 
-    Subdivision keeps UVs, and laying out the coarse mesh takes a tenth of the time.
+    A mesh that is going to be subdivided is best laid out before: subdivision keeps the UVs, and the coarse
+    mesh takes a tenth of the time.
+
+    Args:
+        mesh: any mesh.
+        resolution: side of the map [texels].
+        padding: gap between new charts [texels].
+
+    Raises:
+        MeshError: the mesh has no area.
     """
+    if not mesh.face_areas.sum() > 0.0:
+        raise MeshError(f"{mesh.name} has no area to put a texture on", "give a surface")
     if mesh.uv is not None and usable_uv(mesh, mesh.uv):
         return mesh
     return replace(mesh, uv=unwrap(mesh, resolution, padding))

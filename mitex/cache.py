@@ -17,7 +17,10 @@ Result = TypeVar("Result")
 
 
 def content_key(*parts: object) -> str:
-    """A hash of arrays (dtype, shape and content) and of anything else by its `repr`."""
+    """A hash of arrays (dtype, shape and content) and of anything else by its `repr`.
+
+    Numbers that follow each other belong into one tuple: by themselves 1, 23 has the key of 12, 3.
+    """
     digest = hashlib.sha256()
     for part in parts:
         if isinstance(part, np.ndarray):
@@ -41,10 +44,10 @@ def cached(
     Args:
         place: of this result alone.
         compute: the long computation.
-        read: gives the result from a folder; OSError, ValueError or KeyError if it is not whole.
+        read: gives the result from a folder; OSError, EOFError, ValueError or KeyError if it is not whole.
         write: fills an empty folder, which is renamed afterwards, so that all files appear together.
     """
-    with suppress(OSError, ValueError, KeyError):
+    with suppress(OSError, EOFError, ValueError, KeyError):  # EOFError: numpy's of an empty file
         return read(place)
     result = compute()
     with suppress(OSError):

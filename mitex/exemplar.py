@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import os
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +13,7 @@ import numpy as np
 from mitex.errors import ImageError
 from mitex.geometry.vectors import unit
 from mitex.images import SUFFIXES, read_image, resize
+from mitex.paths import expanded
 
 MAPS = {"albedo": 3, "ambient_occlusion": 1, "height": 1, "normal": 3, "roughness": 1}
 MIN_SIDE = 16
@@ -22,14 +22,13 @@ DATA = Path(__file__).parent / "data" / "exemplars"
 
 # File names, lower case without separators, as the usual texture sites write them.
 ALIASES = {
-    "albedo": "albedo",
+    "albedo": "albedo basecolor basecolour color colour diffuse diff col",
     "ambient_occlusion": "ambientocclusion ao occlusion occ",
     "height": "height heightmap displacement disp bump depth",
     "normal": "normal normals normalmap normalgl normalopengl norgl nor nrm",
     "normal_dx": "normaldx normaldirectx nordx",
     "roughness": "roughness rough",
 }
-ALIASES["albedo"] += " basecolor basecolour color colour diffuse diff col"
 _BY_ALIAS = {alias: name for name, aliases in ALIASES.items() for alias in aliases.split()}
 _OTHER_IMAGES = (".tif", ".tiff", ".webp", ".exr", ".tga", ".bmp", ".gif", ".psd", ".hdr")
 
@@ -83,7 +82,7 @@ class Exemplar:
         Raises:
             ImageError: nothing there, no known map, a map twice, aspect ratios that differ, unreadable image.
         """
-        source = Path(path)
+        source = expanded(path)
         if not os.path.exists(source) and str(path) in names():
             source = DATA / str(path)
         if os.path.isdir(source):
@@ -201,9 +200,8 @@ def _remedy() -> str:
     return f"name the files {', '.join(f'{name}.png' for name in MAPS)} (any subset)"
 
 
-def _suggest(name: str, candidates: Iterable[str] | None = None) -> str:
-    candidates = list(names() if candidates is None else candidates)
-    close = difflib.get_close_matches(name, candidates, 1)
+def _suggest(name: str) -> str:
+    close = difflib.get_close_matches(name, names(), 1)
     if close:
         return f"did you mean {close[0]}?"
-    return f"give an image, a folder of maps{' or one of ' + ', '.join(candidates) if candidates else ''}"
+    return f"give an image, a folder of maps or one of {', '.join(names())}"

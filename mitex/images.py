@@ -144,7 +144,8 @@ def _check_file(path: Path) -> None:
     if not path.is_file():
         raise ImageError(f"{path} is not a regular file", "give a PNG or JPEG file")
     try:
-        empty = not path.open("rb").read(1)
+        with path.open("rb") as file:
+            empty = not file.read(1)
     except OSError as error:
         raise ImageError(f"{path} cannot be read ({error.strerror})", "check its permissions") from error
     if empty:

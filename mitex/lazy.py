@@ -13,7 +13,7 @@ def attributes(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
 
     Args:
         package: Its `__name__`.
-        homes: Name -> module that has it; "" if the name is that of a sub-package.
+        homes: Name -> the module that defines it; "" if the name is that of a sub-package.
     """
 
     def resolve(name: str) -> Any:
@@ -28,6 +28,6 @@ def attributes(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
 
 
 def load(reference: str) -> Any:
-    """What "module:name" refers to."""
+    """The attribute that the reference "module:name" names; the module is imported."""
     module, _, name = reference.partition(":")
     return getattr(import_module(module), name)

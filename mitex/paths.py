@@ -129,6 +129,14 @@ def is_temporary(path: Path) -> bool:
     return _TEMPORARY.fullmatch(path.name) is not None and path.is_file()
 
 
+def expanded(path: str | os.PathLike[str]) -> Path:
+    """The path with `~` and `~NAME` replaced by that user's home; a file may also be called `~NAME`.
+
+    `Path.expanduser` raises a RuntimeError where there is no such user.
+    """
+    return Path(os.path.expanduser(path))
+
+
 def cache_dir() -> Path:
     """The user's folder for things that Mitex can make again (not created here)."""
     if sys.platform == "darwin":
@@ -141,12 +149,12 @@ def cache_dir() -> Path:
 def _absolute(path: str | os.PathLike[str]) -> Path:
     if not os.fspath(path) or "\0" in os.fspath(path):
         raise OutputError(f"{os.fspath(path)!r} is not a path", "name a file or folder")
-    return Path(os.path.abspath(Path(path).expanduser()))
+    return Path(os.path.abspath(expanded(path)))
 
 
 def _same_file(target: Path, source: str | os.PathLike[str]) -> bool:
     try:
-        source = Path(source).expanduser()
+        source = expanded(source)
         return source.is_file() and os.path.samefile(target, source)
     except (OSError, ValueError):  # one of them does not exist, or is no path
         return False

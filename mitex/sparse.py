@@ -13,9 +13,36 @@ from torch.autograd.function import once_differentiable
 
 
 def csr_tensor(matrix: Any, device: torch.device | str = "cpu") -> torch.Tensor:
-    """A scipy CSR matrix as a float32 tensor; 32-bit indices: twice as fast as torch's default of 64."""
-    indptr, indices = (torch.from_numpy(a.astype(np.int32)) for a in (matrix.indptr, matrix.indices))
-    return _csr(indptr, indices, torch.from_numpy(matrix.data.astype(np.float32)), matrix.shape).to(device)
+    """A scipy CSR array or matrix (N, M) as a sparse float32 tensor with 32-bit indices.
+
+    Torch's own conversion gives 64-bit indices, with which products take twice the time. (`Any`, because type
+    checkers take the `shape` of a scipy array for None.)
+    """
+    indptr, indices, data = (
+        torch.from_numpy(values.astype(dtype)).to(device)
+        for values, dtype in (
+            (matrix.indptr, np.int32),
+            (matrix.indices, np.int32),
+            (matrix.data, np.float32),
+        )
+    )
+    return csr(indptr, indices, data, matrix.shape)
+
+
+def csr(
+    indptr: torch.Tensor, indices: torch.Tensor, values: torch.Tensor, shape: tuple[int, int]
+) -> torch.Tensor:
+    """The sparse (N, M) tensor of CSR's three arrays, which it shares; they are not checked.
+
+    Args:
+        indptr: (N + 1,) int32, where each row starts in the other two.
+        indices: (E,) int32, the column of each entry.
+        values: (E,) float32.
+        shape: (N, M).
+    """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Sparse CSR tensor support is in beta")
+        return torch.sparse_csr_tensor(indptr, indices, values, size=shape, check_invariants=False)
 
 
 class LinearMap:
@@ -54,7 +81,7 @@ class Weights:
         """(P, columns) sparse CSR."""
         points, count = self.index.shape
         indptr = torch.arange(0, points * count + 1, count, dtype=torch.int32, device=self.index.device)
-        return _csr(indptr, self.index.reshape(-1), self.weight.reshape(-1), (points, self.columns))
+        return csr(indptr, self.index.reshape(-1), self.weight.reshape(-1), (points, self.columns))
 
     def __call__(self, table: torch.Tensor) -> torch.Tensor:
         """(columns, C) -> (P, C), differentiable in the table."""
@@ -99,11 +126,3 @@ class _Lookup(torch.autograd.Function):
     @once_differentiable
     def backward(ctx: Any, gradient: torch.Tensor) -> tuple[torch.Tensor, None]:
         return ctx.weights.transposed(gradient), None
-
-
-def _csr(
-    indptr: torch.Tensor, indices: torch.Tensor, values: torch.Tensor, size: tuple[int, int]
-) -> torch.Tensor:
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Sparse CSR tensor support is in beta")
-        return torch.sparse_csr_tensor(indptr, indices, values, size=size, check_invariants=False)

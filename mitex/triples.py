@@ -22,7 +22,12 @@ Layout = Mapping[str, tuple[int, ...]]  # name of a map -> its channels in a fie
 
 @dataclass(frozen=True)
 class ChannelTriple:
-    """Three channels taken as RGB: `channels` of the field; `kind` says why."""
+    """Three channels of a field, taken as RGB.
+
+    Attributes:
+        kind: the map that they are, or "grey" or "mix", see `channel_triples`.
+        channels: three numbers of channels; one may come twice.
+    """
 
     kind: str
     channels: tuple[int, ...]
@@ -36,13 +41,16 @@ def channel_triples(layout: Layout, blend: bool, seed: int) -> list[ChannelTripl
         blend: False gives every map by itself; True gives the coloured ones, the grey ones packed into one
             triple, and `MIXES` random mixtures of different maps' channels.
         seed: of the mixtures.
+
+    Returns:
+        Without `blend` one triple a map, in alphabetical order; else coloured maps, grey ones, mixtures.
     """
     colours = [ChannelTriple(name, layout[name]) for name in layout if MAPS[name] == 3]
     grey = [layout[name][0] for name in layout if MAPS[name] == 1]
     if not blend:
-        order = {p.kind: p for p in colours}
+        coloured = {p.kind: p for p in colours}
         single = {name: ChannelTriple(name, layout[name] * 3) for name in layout if MAPS[name] == 1}
-        return [(order | single)[name] for name in sorted(layout)]
+        return [(coloured | single)[name] for name in sorted(layout)]
     triples = colours
     if grey:
         triples = [*triples, ChannelTriple("grey", tuple((grey * 3)[:3]))]
@@ -50,7 +58,7 @@ def channel_triples(layout: Layout, blend: bool, seed: int) -> list[ChannelTripl
 
 
 def triple_images(exemplar: Exemplar, triples: list[ChannelTriple], layout: Layout) -> np.ndarray:
-    """An exemplar's maps as images (P, H, W, 3) float32, one for each triple."""
+    """An exemplar's maps as P images, one for each triple: (P, H, W, 3) float32 in [0, 1], albedo sRGB."""
     values = {}
     for name, array in exemplar.maps.items():
         values |= {channel: array[..., k] for k, channel in enumerate(layout[name])}

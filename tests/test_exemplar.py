@@ -63,6 +63,11 @@ class TestLoad:
         assert loaded.name == "moss" and list(loaded.maps) == ["albedo"] and loaded.size == (32, 32)
         np.testing.assert_allclose(loaded.maps["albedo"][3, 4], [1, 0, 0.2], atol=1e-6)
 
+    def test_a_path_below_home(self, tmp_path, monkeypatch):
+        monkeypatch.setenv("HOME", str(tmp_path))
+        save(tmp_path / "moss.png", (255, 0, 51))
+        assert Exemplar.load("~/moss.png").name == "moss"
+
     @pytest.mark.parametrize("names", [["height"], ["albedo", "roughness"], list(MAPS)])
     def test_any_subset(self, tmp_path, names):
         for name in names:
@@ -180,7 +185,7 @@ class TestEmbedded:
         assert len(exemplar.names()) >= 3
         for name in exemplar.names():
             loaded = Exemplar.load(name)
-            assert loaded.name == name and set(loaded.maps) == set(MAPS) and loaded.size == (256, 256)
+            assert loaded.name == name and set(loaded.maps) == set(MAPS) and loaded.size == (512, 512)
             for key, array in loaded.maps.items():
                 assert array.std() > 0.01, (name, key)
                 for axis in (0, 1):

@@ -8,7 +8,7 @@ import pytest
 
 from mitex import paths
 from mitex.errors import ConfigError, OutputError
-from mitex.paths import atomic_write, cache_dir, is_temporary, prepare_folder, prepare_output
+from mitex.paths import atomic_write, cache_dir, expanded, is_temporary, prepare_folder, prepare_output
 
 needs_permissions = pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 
@@ -209,3 +209,12 @@ def test_cache_dir_follows_the_users_setting(tmp_path: Path, monkeypatch: pytest
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path))
     assert cache_dir() == tmp_path / ".cache" / "mitex"
+
+
+def test_names_that_begin_with_a_tilde(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """`~` is a home; without such a user, `~NAME` is a file like any other."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    assert expanded("~/a.png") == tmp_path / "a.png"
+    assert expanded("~nobody-of-this-name.png") == Path("~nobody-of-this-name.png")
+    assert prepare_output("~nobody-of-this-name.png") == tmp_path / "~nobody-of-this-name.png"

@@ -9,8 +9,8 @@ from scipy import spatial
 
 from mitex.geometry.vectors import unit
 
-SIZE = 256
-FINE = 768
+SIZE = 512
+FINE = 1024
 
 
 @dataclass

@@ -258,7 +258,7 @@ def main() -> None:
         for key, array in result.items():
             Image.fromarray(array.squeeze()).save(options.out / name / f"{key}.png", optimize=True)
         tiles = [np.broadcast_to(a, (SIZE, SIZE, 3)) for a in result.values()]
-        columns = [np.concatenate([np.concatenate([t, t], 0) for t in tiles], 1)[:512], lit(result)]
+        columns = [np.concatenate([np.concatenate([t, t], 0) for t in tiles], 1), lit(result)]
         rows.append(np.concatenate(columns, 1))
     (options.out / "LICENSE").write_text(LICENSE)
     if options.sheet:

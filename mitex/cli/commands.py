@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from mitex.cli.usage import UsageError, refuse_unknown_options
 from mitex.lazy import load
@@ -38,7 +37,7 @@ class Call:
     """
 
     program: str
-    command: Any
+    command: type
     words: list[str]
 
 

@@ -32,9 +32,9 @@ def settings_text(words: Sequence[str]) -> str:
 
 def _preset(words: Sequence[str]) -> str | None:
     for word, value in zip(words, [*words[1:], None], strict=True):
-        name, equals, own = word.partition("=")
+        name, equals, text = word.partition("=")
         if name == "--preset":
             if not equals and value is None:
                 raise UsageError("--preset needs a name", "see `mitex fit METHOD --help`")
-            return own if equals else value
+            return text if equals else value
     return None

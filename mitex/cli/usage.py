@@ -50,11 +50,11 @@ def refuse_unknown_options(command: type, words: Sequence[str], whose: str, reme
     Args:
         command: dataclass whose fields are the options.
         words: of the command line.
-        whose: options they are, for the message.
-        remedy: if no option has a similar name.
+        whose: whom the options belong to, for the message.
+        remedy: what the message advises if no option has a similar name.
 
     Raises:
-        UsageError: one is none of the command's; the closest is named.
+        UsageError: a word names an option that the command does not have; the closest one is named.
     """
     options = ["--help", *(f"--{field.name.replace('_', '-')}" for field in fields(command))]
     for word in words:

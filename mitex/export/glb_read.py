@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import struct
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -100,7 +101,7 @@ def _unsplit(
     return Mesh(attributes["POSITION"][first], source[faces].astype(np.int64), uv, name), source, uv
 
 
-def _textures(document: dict[str, Any], view: Any) -> dict[str, np.ndarray]:
+def _textures(document: dict[str, Any], view: Callable[[int], bytes]) -> dict[str, np.ndarray]:
     def pixels(reference: dict[str, Any]) -> np.ndarray:
         entry = document["images"][document["textures"][reference["index"]]["source"]]
         with Image.open(io.BytesIO(view(entry["bufferView"])), formats=("PNG",)) as image:

@@ -68,7 +68,8 @@ def read_ply(path: Path) -> Asset:
     data = path.read_bytes()
     end = data[:4096].find(b"end_header\n")
     lines = data[: max(end, 0)].decode("ascii", "replace").split("\n")
-    if end < 0 or lines[:2] != ["ply", "format binary_little_endian 1.0"] or GENERATOR not in lines[2]:
+    own = lines[:2] == ["ply", "format binary_little_endian 1.0"] and GENERATOR in "".join(lines[2:3])
+    if end < 0 or not own:
         raise foreign(path)
     try:
         dtype = np.dtype(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import torch
 import torch.nn.functional as F
@@ -27,10 +27,12 @@ class Operation(Protocol):
 
     needs_input: bool
 
-    def forward(self, x: torch.Tensor) -> torch.Tensor: ...
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """The operation's output; the input is not changed."""
+        ...
 
     def backward(self, gradient: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
-        """The input's gradient; may overwrite `gradient`."""
+        """The gradient of the input, from that of the output, which may be overwritten."""
         ...
 
 
@@ -45,10 +47,10 @@ class FrozenConv:
     def __init__(
         self, weight: torch.Tensor, bias: torch.Tensor, dtype: torch.dtype, output_dtype: torch.dtype
     ) -> None:
-        last = torch.channels_last
-        self.weight = weight.to(dtype).contiguous(memory_format=last)
+        layout = torch.channels_last
+        self.weight = weight.to(dtype).contiguous(memory_format=layout)
         self.bias, self.output_dtype = bias.to(dtype), output_dtype
-        self.adjoint = weight.flip(2, 3).transpose(0, 1).to(output_dtype).contiguous(memory_format=last)
+        self.adjoint = weight.flip(2, 3).transpose(0, 1).to(output_dtype).contiguous(memory_format=layout)
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         return F.conv2d(x, self.weight, self.bias, padding=1).relu_().to(self.output_dtype)
@@ -145,7 +147,9 @@ class FrozenStack(torch.autograd.Function):
     """
 
     @staticmethod
-    def forward(ctx, images: torch.Tensor, operations: Sequence[Operation], taps: Sequence[Tap | GramTap]):
+    def forward(
+        ctx: Any, images: torch.Tensor, operations: Sequence[Operation], taps: Sequence[Tap | GramTap]
+    ) -> tuple[torch.Tensor, ...]:
         outputs, x = [], images
         for operation in operations:
             x = operation.forward(x)
@@ -156,7 +160,7 @@ class FrozenStack(torch.autograd.Function):
 
     @staticmethod
     @torch.autograd.function.once_differentiable
-    def backward(ctx, *gradients):
+    def backward(ctx: Any, *gradients: torch.Tensor | None) -> tuple[torch.Tensor | None, None, None]:
         outputs, flowing = ctx.outputs, None
         if outputs is None:
             raise RuntimeError("frozen features keep their maps for one backward pass only")

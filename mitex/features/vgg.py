@@ -30,7 +30,7 @@ class Vgg16:
             free (moments, Gram) weigh the layers alike. Without it the published weights' means lie between
             0.1 and 120.
         device: where the weights live.
-        weights: layer -> weight, bias; None takes the package's.
+        weights: layer -> weight, bias, which `normalised` does not change; None takes the package's.
     """
 
     def __init__(
@@ -96,7 +96,9 @@ class Vgg16:
         halvings = int(layer[4]) - 1
         return height >> halvings, width >> halvings
 
-    def _run(self, images: torch.Tensor, names: list[str], positions: Sequence[torch.Tensor | None]):
+    def _run(
+        self, images: torch.Tensor, names: list[str], positions: Sequence[torch.Tensor | None]
+    ) -> tuple[torch.Tensor, ...]:
         self._check(images, names, positions)
         taps = [Tap(self.index[name], where) for name, where in zip(names, positions, strict=True)]
         depth = max(tap.index for tap in taps) + 1

@@ -13,14 +13,18 @@ ON_EDGE = 1e-9  # [texel] a centre so close to a face is on its edge
 
 
 class _EdgeFunctions:
-    """The edge functions of triangles (F, 3, 2): three times twice a partial area, positive inside.
+    """The edge functions of triangles: twice the areas that a point spans with each edge, positive inside.
 
-    Unlike barycentrics they are not divided by the area, which keeps the test whether a triangle touches a
-    square exact where the coordinates are short binary fractions, as on layouts aligned with the texels.
+    Unlike barycentric coordinates they are not divided by the triangle's area. So the test whether a triangle
+    touches a square is exact where coordinates are short binary fractions, as on layouts aligned with
+    the texels.
+
+    Args:
+        triangles: (F, 3, 2) [texel].
 
     Attributes:
         area: (F,) twice the areas [texel^2].
-        reach: (3, F) by how much each function grows from a texel's centre to its best corner.
+        reach: (3, F) by how much each function grows from a texel's centre to the corner where it is largest.
     """
 
     def __init__(self, triangles: np.ndarray):
@@ -51,7 +55,8 @@ def cover(corners: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray]
     the whole square).
 
     Args:
-        corners: (F, 3, 2) float64 (column, row).
+        corners: (F, 3, 2) float64 (column, row) [texel].
+        resolution: R, side of the map [texels].
 
     Returns:
         (R * R,) int32 faces, -1 for none, and (R * R,) float64 distances from the centre [texel], 0 inside.

@@ -15,7 +15,7 @@ MIN_Z = 0.05  # detail normals stay this far above the surface: maps cannot show
 
 
 def decode(encoded: np.ndarray, tangent: np.ndarray, bitangent: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Unit object-space normals (..., 3) from map values in [0, 1] and the frame at each."""
+    """Unit object-space normals (..., 3) from map values (..., 3) in [0, 1] and the frame at each."""
     n = _upward(2.0 * encoded - 1.0)
     return unit(n[..., 0:1] * tangent + n[..., 1:2] * bitangent + n[..., 2:3] * normal)
 

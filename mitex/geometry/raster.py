@@ -55,7 +55,16 @@ def _counted(count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def covered_texels(uv: np.ndarray, resolution: int) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Yields (face, texel, barycentric) of the texels in each face's bounding box and a ring around it."""
+    """Yields the texels in each face's bounding box and a ring around it, several million at a time.
+
+    Args:
+        uv: (F, 3, 2), v upwards.
+        resolution: N, side of the map [texels].
+
+    Yields:
+        (M,) faces, (M,) texels as row * N + column, and (M, 3) float32 barycentric coordinates of the texels'
+        centres, negative outside the face.
+    """
     p = texel_space(uv, resolution).astype(np.float32)
     area = twice_area(p)
     low = np.clip(np.ceil(p.min(axis=1) - RING), 0, resolution - 1).astype(np.int64)
@@ -72,11 +81,19 @@ def covered_texels(uv: np.ndarray, resolution: int) -> Iterator[tuple[np.ndarray
 
 
 def rasterize(uv: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Face, barycentrics and distance [texels] of the texels in or within `RING` of a chart.
+    """Which face the texels in a chart, or within `RING` of it, show.
 
     A bilinear lookup at a chart's border also reads texels whose centres lie just outside. Those continue
     the nearest face linearly, which makes the lookup exact at the border; the continuation is limited to
     half an edge, for faces smaller than a texel.
+
+    Args:
+        uv: (F, 3, 2), v upwards.
+        resolution: N, side of the map [texels].
+
+    Returns:
+        (N, N) int32 faces, -1 for none; (N, N, 3) float32 barycentric coordinates; (N, N) float32 distances
+        from the centre to the face [texels], 0 inside and infinite where there is no face.
     """
     p = texel_space(uv, resolution).astype(np.float32)
     texels = resolution * resolution

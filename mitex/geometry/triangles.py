@@ -8,7 +8,7 @@ from mitex.geometry.vectors import cross_2d, dot
 
 
 def triangle_crosses(p: np.ndarray) -> np.ndarray:
-    """(..., 3) normals of triangles (..., 3, 3), twice as long as their areas."""
+    """(..., 3) normals of triangles (..., 3, 3); their lengths are twice the areas."""
     return np.cross(p[..., 1, :] - p[..., 0, :], p[..., 2, :] - p[..., 0, :])
 
 

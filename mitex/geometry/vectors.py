@@ -6,7 +6,7 @@ import numpy as np
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(...,) products of vectors (..., C)."""
+    """(...,) scalar products of vectors (..., C)."""
     return np.einsum("...k,...k->...", a, b)
 
 
@@ -28,12 +28,15 @@ def unit_normals(v: np.ndarray) -> np.ndarray:
 
 
 def across(v: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """What of the vectors (..., 3) lies in the plane across the unit normals."""
+    """The vectors (..., 3) projected onto the planes across the unit normals (..., 3)."""
     return v - normals * dot(normals, v)[..., None]
 
 
 def orthonormal(tangents: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Unit tangents (..., 3) across the unit normals, from any vectors; any across where those are along."""
+    """Unit vectors (..., 3) across the unit normals, nearest to the tangents (..., 3) of any length.
+
+    Where a tangent is zero or along its normal, any direction across the normal is taken, always the same.
+    """
     projected = across(tangents, normals)
     # The axis that the normal is farthest from is never parallel to it.
     axis = np.eye(3, dtype=normals.dtype)[np.abs(normals).argmin(axis=-1)]

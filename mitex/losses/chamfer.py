@@ -20,7 +20,13 @@ class Samples:
 def sample_surface(
     vertices: torch.Tensor, faces: torch.Tensor, count: int, generator: torch.Generator
 ) -> Samples:
-    """Points evenly spread by area, differentiable in the vertices (V, 3).
+    """Random points, uniform by area, differentiable in the vertices.
+
+    Args:
+        vertices: (V, 3) float32.
+        faces: (F, 3) int64.
+        count: number of points.
+        generator: source of all randomness.
 
     Raises:
         RuntimeError: no face has an area.

@@ -6,12 +6,14 @@ without gradients in one batched product; the costs of those pairs alone are the
 
 from __future__ import annotations
 
+from typing import Any
+
 import torch
 import torch.nn.functional as F
 
 # With fewer channels, rounding does not average out, and float32 costs little.
 LOW_PRECISION_CHANNELS = 32
-SQUARES = (1e-5, 1e5)  # between which a squared distance counts
+SQUARES = (1e-5, 1e5)  # bounds that a squared distance is clamped to
 
 
 def relaxed_transport(
@@ -90,7 +92,9 @@ class _PairCost(torch.autograd.Function):
     """
 
     @staticmethod
-    def forward(ctx, x: torch.Tensor, y: torch.Tensor, index: torch.Tensor, euclidean: bool) -> torch.Tensor:
+    def forward(
+        ctx: Any, x: torch.Tensor, y: torch.Tensor, index: torch.Tensor, euclidean: bool
+    ) -> torch.Tensor:
         pair = _take(y, index)
         lengths = [v.norm(dim=-1, keepdim=True).clamp_(min=1e-8) for v in (x, pair)]
         cosine = (x * pair).sum(-1, keepdim=True) / (lengths[0] * lengths[1])
@@ -104,7 +108,7 @@ class _PairCost(torch.autograd.Function):
 
     @staticmethod
     @torch.autograd.function.once_differentiable
-    def backward(ctx, gradient):
+    def backward(ctx: Any, gradient: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
         x, y, index, x_length, y_length, cosine = ctx.saved_tensors
         active = gradient.nonzero()[:, 0]
         share = (gradient[active] / x.shape[1])[:, None, None]

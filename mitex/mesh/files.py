@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import unquote
 
+from mitex.paths import expanded
+
 _LINE = rb"^[ \t]*(?:%s)[ \t]+(.+?)[ \t\r]*$"
 _URI = re.compile(rb'"uri"\s*:\s*"(?!data:)([^"]+)"')
 _REFERENCES = {
@@ -27,7 +29,7 @@ def mesh_files(path: str | os.PathLike[str]) -> list[Path]:
     For what must not be overwritten, so rather too many than too few, and damaged files are no error.
     """
     files: dict[Path, None] = {}
-    _collect(Path(path).expanduser(), files)
+    _collect(expanded(path), files)
     return list(files)
 
 

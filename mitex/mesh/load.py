@@ -14,6 +14,7 @@ from mitex.mesh.embedded import embedded, embedded_names
 from mitex.mesh.mesh import Mesh
 from mitex.mesh.readers import SUFFIXES, Soup, read
 from mitex.mesh.validate import validate
+from mitex.paths import expanded
 
 # A generous text line per vertex, normal, UV and two faces, and room for textures in a .glb.
 BYTES_PER_VERTEX = 400
@@ -39,7 +40,7 @@ def load(path: str | os.PathLike[str], max_vertices: int = 2_000_000) -> Mesh:
         MeshError: missing, unreadable, of an unknown kind, damaged, empty, over budget, or what `validate`
             refuses.
     """
-    source = Path(path)
+    source = expanded(path)
     if not os.path.exists(source) and str(path) in embedded_names():
         return embedded(str(path))
     max_bytes = BYTES_ALLOWED_ANYWAY + BYTES_PER_VERTEX * max_vertices

@@ -70,7 +70,7 @@ class Mesh:
 
     @cached_property
     def face_crosses(self) -> np.ndarray:
-        """(F, 3) float64 normals of twice the length of the face's area [mesh units^2]."""
+        """(F, 3) float64 normals whose lengths are twice the faces' areas [mesh units^2]."""
         return triangle_crosses(self.vertices[self.faces].astype(np.float64))
 
     @cached_property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,7 +100,7 @@ def _genus(mesh: Mesh, euler: int, pieces: int, non_manifold: bool) -> int | Non
     return twice // 2 if twice >= 0 and twice % 2 == 0 else None
 
 
-def _advice(report: QualityReport, target: int):
+def _advice(report: QualityReport, target: int) -> Iterator[str]:
     uneven = report.edge_variation > UNEVEN
     irregular = report.valence[1] < MIN_MEAN_VALENCE or report.odd_valence > MAX_ODD_VALENCE
     if uneven or irregular:

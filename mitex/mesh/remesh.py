@@ -13,8 +13,8 @@ from mitex.mesh.mesh import Mesh
 from mitex.mesh.subdivide import subdivide_midpoint
 from mitex.mesh.validate import validate
 
-ROUNDS = 4
-CLOSE_ENOUGH = 0.03
+ROUNDS = 4  # tries to meet the number of vertices
+CLOSE_ENOUGH = 0.03  # of it, as a logarithm
 # Equal edges that are all split or collapsed at once make the count jump; in a finer source they are not.
 FINER = 2
 # Measured: what the remesher makes of a wanted edge length is this much longer.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from mitex.errors import MeshError
@@ -10,6 +12,9 @@ from mitex.mesh.mesh import Mesh
 from mitex.mesh.topology import face_edges
 
 MAX_FACES = 32_000_000
+
+# From a mesh, its edges (E, 2) and the edges of its faces (F, 3) to the new positions (V + E, 3).
+Rule = Callable[[Mesh, np.ndarray, np.ndarray], np.ndarray]
 
 
 def subdivide_loop(mesh: Mesh, times: int = 1) -> Mesh:
@@ -59,7 +64,7 @@ def child_points(face: np.ndarray, barycentric: np.ndarray, times: int) -> tuple
     return face, barycentric
 
 
-def _repeat(mesh: Mesh, times: int, rule) -> Mesh:
+def _repeat(mesh: Mesh, times: int, rule: Rule) -> Mesh:
     if times < 0:
         raise MeshError(f"a mesh cannot be subdivided {times} times", "use 0 or more")
     if len(mesh.faces) * 4**times > MAX_FACES:

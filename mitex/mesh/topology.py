@@ -1,4 +1,4 @@
-"""Who is connected to whom: neighbourhoods, components, boundary."""
+"""What is connected with what: neighbourhoods, components, boundaries."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class EdgeGraph:
 
 
 def edge_graph(faces: np.ndarray, vertices: int) -> EdgeGraph:
-    """Neighbourhoods of the vertices of `faces` (F, 3), of which there are `vertices`."""
+    """Neighbourhoods of the vertices of faces (F, 3); `vertices` is how many there are."""
     pairs, _ = mesh_edges(faces, vertices)
     both = np.concatenate([pairs, pairs[:, ::-1]])
     keys = np.sort(both[:, 0] * vertices + both[:, 1])
@@ -41,7 +41,7 @@ def edge_graph(faces: np.ndarray, vertices: int) -> EdgeGraph:
 
 
 def mesh_edges(faces: np.ndarray, vertices: int) -> tuple[np.ndarray, np.ndarray]:
-    """Undirected edges.
+    """Undirected edges of faces (F, 3); `vertices` is the number of vertices.
 
     Returns:
         (E, 2) int64 vertex pairs, ascending in each pair and lexicographically, and (E,) the number of face

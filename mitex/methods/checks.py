@@ -1,4 +1,4 @@
-"""Checks of option values that need no library."""
+"""Checks of option values, without any library that is slow to import."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mitex.errors import ConfigError
+from mitex.training.settings import LARGEST_SEED
 
-SEEDS = (0, 2**32 - 1)
+SEEDS = (0, LARGEST_SEED)
 
 
 def in_range(option: str, value: float | None, low: float, high: float = math.inf) -> None:
-    """Refuses a value that is not finite or outside [low, high]; None passes.
+    """Refuses a value of an option that is not finite or outside [low, high]; None passes.
 
     Raises:
-        ConfigError: It is.
+        ConfigError: The value is refused.
     """
     if value is None or (math.isfinite(value) and low <= value <= high):
         return
@@ -34,13 +35,14 @@ def mutually_exclusive(first: str, second: str, condition: bool) -> None:
 
 
 def reject_unused(option: str, out: Path, condition: bool) -> None:
-    """Refuses an option that means nothing for the kind of file to be written.
+    """Refuses an option that means nothing for the kind of file, or the folder, to be written.
 
     Raises:
         ConfigError: `condition` says that it was given for such a file.
     """
     if condition:
-        raise ConfigError(f"{option} means nothing for {out.suffix} files", "leave it out or change --out")
+        kind = f"{out.suffix} files" if out.suffix else "folders"
+        raise ConfigError(f"{option} means nothing for {kind}", "leave it out or change --out")
 
 
 def merged_settings(groups: Sequence[Sequence[str]], **flags: object) -> list[str]:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 
 if TYPE_CHECKING:
     import numpy as np
+
+    from mitex.mesh import Mesh
 
 
 class Applied(Protocol):
@@ -19,8 +21,8 @@ class Applied(Protocol):
         """What the surface wears, name -> float32 values, per vertex (V, C) or as an image (H, W, C)."""
         ...
 
-    def export(self, path: str | os.PathLike[str]) -> Path:
-        """Writes it; the suffix chooses the format (.glb, .obj, .ply, .exr).
+    def export(self, path: str | os.PathLike[str], maps_format: Literal["png", "exr"] = "png") -> Path:
+        """Writes it; the suffix chooses the format (.glb, .obj, .ply, .exr), or it is a folder of maps.
 
         Raises:
             OutputError: Another suffix, or an unwritable place.
@@ -42,7 +44,7 @@ class Texture(Protocol):
 
     @property
     def about(self) -> Mapping[str, Any]:
-        """How it was made, as JSON values: name, preset, steps, seconds, loss and more."""
+        """What is known of its training, as JSON values: name, preset, steps, seconds, loss and more."""
         ...
 
     @classmethod
@@ -62,7 +64,7 @@ class Texture(Protocol):
         """
         ...
 
-    def apply(self, mesh: Any, **options: Any) -> Applied:
+    def apply(self, mesh: Mesh, **options: Any) -> Applied:
         """Puts the texture on a mesh; options are the method's own.
 
         Raises:

@@ -26,8 +26,9 @@ class Method:
         texture: reference to its `Texture`.
         animate: reference to the options of `mitex animate`, for textures that grow or change.
         demo: reference to the options of `mitex demo`, for the method that it shows.
-        tensors: names of the tensors in weights of the authors', which say nothing else of their method.
-        baseline: it is there to be compared with.
+        tensors: names of the tensors in weights that the authors published: such files tell nothing else of
+            their method.
+        baseline: whether other methods are compared with it, rather than it being one to use.
     """
 
     name: str
@@ -42,15 +43,19 @@ class Method:
     baseline: bool = False
 
     def load_presets(self) -> Mapping[str, FitConfig]:
+        """The presets, name -> config; the first one is the default."""
         return load(self.presets)
 
     def load_fit(self) -> type[FitOptions]:
+        """The dataclass of the options of `mitex fit`."""
         return load(self.fit)
 
     def load_apply(self) -> type[ApplyOptions]:
+        """The dataclass of the options of `mitex apply`."""
         return load(self.apply)
 
     def load_texture(self) -> type[Texture]:
+        """The class of its textures."""
         return load(self.texture)
 
     def recognises(self, tensors: frozenset[str], metadata: Mapping[str, str]) -> bool:

@@ -12,9 +12,7 @@ VARIABLE = "MITEX_BF16"
 def bfloat16_is_fast() -> bool:
     """Whether frozen networks, and gradients of small ones, should be multiplied in bfloat16.
 
-    That is where the CPU has AMX or AVX-512 instructions for it.
-
-    `MITEX_BF16=0` or `1` decides instead.
+    They should where the CPU has AMX or AVX-512 instructions for it. `MITEX_BF16=0` or `1` decides instead.
 
     Raises:
         ConfigError: The variable has another value.

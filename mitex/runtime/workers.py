@@ -50,10 +50,10 @@ def let_idle_threads_sleep() -> None:
 def lower_worker_priority() -> None:
     """Lets torch go before Dr.Jit's workers where both want a core (on Linux; elsewhere nothing happens).
 
-    They spin for 20 ms after each kernel, and torch's products on two cores take half as long again. At a
-    lower priority they take what is free. For work in which torch's idle threads sleep, see
-    `let_idle_threads_sleep`: beside threads that spin kernels would starve. To end workers while torch works
-    is as fast, but see `set_workers`.
+    Workers spin for 20 ms after each kernel; on two cores, torch's products then take one and a half times as
+    long. At a lower priority workers take only what is free. This is for work in which torch's idle threads
+    sleep (`let_idle_threads_sleep`): beside threads that spin, kernels would starve. Ending the workers while
+    torch works would be as fast, but see `set_workers`.
     """
     drjit = import_module("drjit")
     drjit.set_thread_count(drjit.thread_count())  # begins them if no kernel has run yet

@@ -25,7 +25,7 @@ class GeometryRenderer:
     the steps between flat faces would be edges without a derivative.
 
     Args:
-        mesh: its faces stay, its vertices are where they start from.
+        mesh: whose faces stay; `render` is given the vertices.
         cameras: K views.
         reflectance: of the mesh, linear, in [0, 1].
         samples: per pixel of the image.
@@ -74,7 +74,7 @@ class GeometryRenderer:
         return _Render.apply(vertices, self, seed)
 
     def images(self, vertices: np.ndarray, seed: int) -> np.ndarray:
-        """(K, H, W, 3) of vertices (V, 3), without derivatives."""
+        """(K, H, W, 3) float32 linear radiance of vertices (V, 3) float32, without derivatives."""
         self._move(mi.Float(vertices.ravel()))
         images = [
             mi.render(self.scene, sensor=sensor, seed=seed + k, spp=self.samples)
@@ -83,10 +83,10 @@ class GeometryRenderer:
         return np.stack([np.asarray(image) for image in images])
 
     def pull_back(self, vertices: np.ndarray, gradient: np.ndarray, seed: int) -> np.ndarray:
-        """(V, 3) gradient of the vertices, given that of the images (K, H, W, 3)."""
+        """(V, 3) float32 gradient with respect to the vertices, from that of the images (K, H, W, 3)."""
         integrator, total = self.scene.integrator(), np.zeros(vertices.size, np.float32)
         for k, sensor in enumerate(self.sensors):
-            # One leaf for each view: a backward pass clears the way from the normals to the positions.
+            # One leaf for each view: a backward pass clears the graph between positions and normals.
             positions = mi.Float(vertices.ravel())
             dr.enable_grad(positions)
             self._move(positions)

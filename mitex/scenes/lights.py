@@ -83,7 +83,7 @@ def key_and_fill(strength: float = 1.0, radius: float = 1.0) -> dict[str, dict[s
 
 def _panel(
     position: tuple[float, ...], half: float, radiance: tuple[float, ...], strength: float, radius: float
-):
+) -> dict[str, Any]:
     """A square that faces the origin and emits on that side."""
     from mitex.runtime.jit import mi
 

@@ -10,7 +10,7 @@ from mitex.runtime.jit import dr, mi
 from mitex.scenes.stage import mesh_shape
 
 RAYS = 1 << 23  # traced at once
-OFFSET = 1e-4  # of the mesh's extent: rays start so far above the surface
+OFFSET = 1e-4  # how far above the surface rays start, as a part of the mesh's extent
 
 
 def ambient_occlusion(

@@ -15,6 +15,7 @@ from mitex.mesh import Mesh
 from mitex.plugins import init
 from mitex.runtime.jit import dr, mi
 from mitex.scenes.cameras import Cameras
+from mitex.sparse import csr
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,17 +70,7 @@ class Visibility:
     @cached_property
     def matrix(self) -> torch.Tensor:
         """(K H W, V) float32 sparse CSR: multiplied with a field it gives the pixels."""
-        import warnings
-
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message="Sparse CSR tensor support is in beta")
-            return torch.sparse_csr_tensor(
-                self.indptr,
-                self.indices,
-                self.weights,
-                size=(len(self.indptr) - 1, self.vertices),
-                check_invariants=False,
-            )
+        return csr(self.indptr, self.indices, self.weights, (len(self.indptr) - 1, self.vertices))
 
     def to(self, device: torch.device | str) -> Visibility:
         """The same on another device."""

@@ -49,7 +49,7 @@ def linear(corners: Corners, barycentric: Sequence[mi.Float]) -> tuple[list[mi.U
 
 
 def smooth(corners: Corners, barycentric: Sequence[mi.Float]) -> tuple[list[mi.UInt32], list[mi.Float]]:
-    """Rows and weights of the smooth interpolant in the table of `with_gradients`."""
+    """Rows and weights of the smooth interpolant in the table of `mesh.gradients`."""
     value = [mi.Float(0), mi.Float(0), mi.Float(0)]
     slope = [mi.Vector3f(0), mi.Vector3f(0), mi.Vector3f(0)]
     for k, share in enumerate(_shares(barycentric)):
@@ -90,7 +90,7 @@ def _add_side(
     t = dr.select(both > 0, barycentric[j] / dr.maximum(both, 1e-30), 0.5)
     # On the side: Hermite's cubic between its ends, the slope across it linear.
     (h0, d0, h1, d1), (g0, e0, g1, e1) = _hermite(t), _hermite_slopes(t)
-    radial = mi.Vector3f(apex - (p + t * edge))
+    radial = mi.Vector3f(apex - p) - t * edge
     # The way to the corner in the plane of the face, split along the side and across it.
     ahead = dr.dot(radial, edge) / length2
     height = dr.safe_sqrt(dr.squared_norm(radial) - ahead * ahead * length2)
@@ -137,6 +137,10 @@ class SurfaceLookup:
 
         from mitex.sparse import Weights
 
+        columns = len(self.mesh.vertices) * (4 if self.kind == "smooth" else 1)
+        if not len(face):  # Dr.Jit has no arithmetic on empty arrays
+            width = 12 if self.kind == "smooth" else 3
+            return Weights(face.new_empty(0, width), barycentric.new_empty(0, width), columns)
         b = [mi.Float(barycentric[:, k].contiguous()) for k in range(3)]
         triangle = 3 * mi.UInt32(face.to(torch.int32).contiguous())
         index = [dr.gather(mi.UInt32, self._faces, triangle + k) for k in range(3)]
@@ -146,4 +150,4 @@ class SurfaceLookup:
         rows = [mi.Int32(row) for row in rows]
         dr.eval(rows, weights)
         stacked = [torch.stack([cast(torch.Tensor, x.torch()) for x in v], 1) for v in (rows, weights)]
-        return Weights(*stacked, columns=len(self.mesh.vertices) * (4 if self.kind == "smooth" else 1))
+        return Weights(*stacked, columns)

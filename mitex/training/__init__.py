@@ -1,10 +1,11 @@
 """Training: one loop, its config, checkpoints, metrics and progress.
 
-Names are resolved on first use: configs and errors are wanted where torch is not.
+Names are resolved on first use: configs and errors are needed where torch is not loaded.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from mitex.lazy import attributes
 
 __all__ = [
     "Change",
@@ -18,28 +19,23 @@ __all__ = [
     "train",
 ]
 
-_HOMES = {
-    "Change": "task",
-    "Interrupted": "errors",
-    "ParameterTask": "task",
-    "Step": "task",
-    "Task": "task",
-    "TrainResult": "loop",
-    "TrainingDiverged": "errors",
-    "resolve": "config",
-    "train": "loop",
-}
+__getattr__ = attributes(
+    __name__,
+    {
+        "Change": "mitex.training.task",
+        "Interrupted": "mitex.training.errors",
+        "ParameterTask": "mitex.training.task",
+        "Step": "mitex.training.task",
+        "Task": "mitex.training.task",
+        "TrainResult": "mitex.training.loop",
+        "TrainingDiverged": "mitex.training.errors",
+        "resolve": "mitex.training.config",
+        "train": "mitex.training.loop",
+    },
+)
 
 if TYPE_CHECKING:
     from mitex.training.config import resolve
     from mitex.training.errors import Interrupted, TrainingDiverged
     from mitex.training.loop import TrainResult, train
     from mitex.training.task import Change, ParameterTask, Step, Task
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'mitex.training' has no attribute {name!r}")
-    value = getattr(import_module(f"mitex.training.{_HOMES[name]}"), name)
-    globals()[name] = value
-    return value

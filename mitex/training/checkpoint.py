@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 import torch
 from safetensors import SafetensorError, safe_open
@@ -19,6 +20,8 @@ from mitex.training.locate import CHECKPOINT as NAME
 from mitex.training.locate import PREVIOUS
 
 FORMAT = "1"
+
+Value = TypeVar("Value")
 
 
 @dataclass
@@ -125,10 +128,10 @@ def read(path: Path) -> Checkpoint:
             )
         return Checkpoint(
             **json.loads(metadata["run"]),
-            task=_below("task/", tensors),
-            optimizer=_below("optimizer/", tensors),
+            task=_under("task/", tensors),
+            optimizer=_under("optimizer/", tensors),
             generator=tensors["generator"],
-            metadata=_below("task.", metadata),
+            metadata=_under("task.", metadata),
         )
     except (SafetensorError, OSError, KeyError, ValueError, TypeError) as e:
         reason = "it is missing" if isinstance(e, FileNotFoundError) else str(e)
@@ -150,5 +153,6 @@ def _refusal(error: SafetensorError) -> OSError:
     return OSError(int(number[1]), os.strerror(int(number[1]))) if number else OSError(str(error))
 
 
-def _below(prefix: str, items: Mapping[str, object]) -> dict:
+def _under(prefix: str, items: Mapping[str, Value]) -> dict[str, Value]:
+    """The items whose names begin with the prefix, named without it."""
     return {name.removeprefix(prefix): value for name, value in items.items() if name.startswith(prefix)}

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar, Unpack
 
+from mitex.paths import expanded
 from mitex.training import run
 from mitex.training.config import resolve
 from mitex.training.locate import NAME
@@ -19,9 +20,11 @@ Config = TypeVar("Config", bound=FitConfig)
 
 
 class Saved(Protocol):
-    """A texture, as far as a fit cares."""
+    """What a fit needs of a texture."""
 
-    def save(self, path: str | Path) -> Path: ...
+    def save(self, path: str | Path) -> Path:
+        """Writes the model file."""
+        ...
 
 
 Learned = TypeVar("Learned", bound=Saved)
@@ -29,7 +32,7 @@ Learned = TypeVar("Learned", bound=Saved)
 
 @dataclass(frozen=True)
 class Run(Generic[Config]):
-    """A fit that may begin.
+    """A fit whose folder and settings have been checked.
 
     Attributes:
         folder: The run folder.
@@ -52,11 +55,14 @@ class Run(Generic[Config]):
             out: Run folder: new, empty, or one with a run to `resume`.
             options: As of `RunOptions`.
 
+        Returns:
+            A fit; one that resumes has the settings of its own config.toml, if no other file is named.
+
         Raises:
             OutputError, CheckpointError: As `run.check`.
             ConfigError: As `resolve`.
         """
-        folder, resume = Path(out).expanduser(), options.get("resume", False)
+        folder, resume = expanded(out), options.get("resume", False)
         run.check(folder, resume)
         own, file = folder / run.CONFIG, options.get("config")
         if resume and file is None and own.is_file():

@@ -1,4 +1,4 @@
-"""L-BFGS: steps that know the curvature of a loss without randomness."""
+"""L-BFGS: steps that follow the curvature of a loss without randomness."""
 
 from collections.abc import Sequence
 

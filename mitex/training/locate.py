@@ -8,6 +8,7 @@ from pathlib import Path
 from safetensors import SafetensorError, safe_open
 
 from mitex.errors import CheckpointError
+from mitex.paths import expanded
 
 NAME = "texture.safetensors"  # the result of a fit, in its run folder
 CHECKPOINT = "checkpoint.safetensors"
@@ -26,7 +27,7 @@ def locate(source: str | Path) -> list[Path]:
     Raises:
         CheckpointError: there is none.
     """
-    path = Path(source).expanduser()
+    path = expanded(source)
     try:
         if path.is_dir():
             files = [path / name for name in (NAME, CHECKPOINT, PREVIOUS) if (path / name).is_file()]

@@ -75,6 +75,9 @@ def train(
             uninterrupted run. The config may differ in `mitex.training.state.FREE_KEYS` only.
         quiet: Show no progress.
 
+    Returns:
+        How the training ended.
+
     Raises:
         OutputError: The folder holds a run already (without `resume`), is in use, or cannot be written.
         CheckpointError: There is nothing to resume, or it belongs to another config or method.

@@ -12,7 +12,7 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 
-from mitex.errors import CheckpointError
+from mitex.errors import CheckpointError, MeshError
 from mitex.paths import atomic_write
 from mitex.training.locate import CHECKPOINT, PREVIOUS, locate
 
@@ -36,7 +36,8 @@ def save(
 def opened(source: str | Path, kind: str) -> Iterator[tuple[dict[str, torch.Tensor], dict[str, Any]]]:
     """Yields tensors and `about` of a model file, a finished run folder, or a bundled model by its name.
 
-    What goes wrong in the body for lack of good tensors (a missing key, a wrong shape) means a damaged file.
+    What goes wrong in the body for lack of good tensors (a missing key, a wrong shape, a mesh of bad indices)
+    means a damaged file.
 
     Raises:
         CheckpointError: there is none, or it is damaged.
@@ -51,7 +52,7 @@ def opened(source: str | Path, kind: str) -> Iterator[tuple[dict[str, torch.Tens
         if metadata.get("format") != _format(kind):
             raise ValueError("another format")
         yield tensors, json.loads(metadata["about"])
-    except (SafetensorError, OSError, ValueError, KeyError, TypeError, RuntimeError) as e:
+    except (SafetensorError, MeshError, OSError, ValueError, KeyError, TypeError, RuntimeError) as e:
         raise CheckpointError(
             f"'{path}' is not a {kind} texture ({e})", f"name the run folder of mitex fit {kind}"
         ) from e

@@ -40,8 +40,8 @@ class Adam:
         parameters: Tensors to update, in an order that stays the same between runs.
         betas: Decay of the first and the second moment.
         eps: Added to the root of the second moment.
-        shared: One second moment for a whole tensor, the mean of its elements': elements whose gradient is
-            small and mostly noise then move little, where torch's Adam moves all alike.
+        shared: Keep one second moment for a whole tensor, the mean over its elements. Elements whose gradient
+            is small and mostly noise then move little, where torch's Adam moves all alike.
     """
 
     def __init__(

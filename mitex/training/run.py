@@ -12,7 +12,7 @@ from typing import Any
 
 from mitex import __version__
 from mitex.errors import CheckpointError, OutputError
-from mitex.paths import atomic_write, is_temporary, missing_folders, prepare_folder
+from mitex.paths import atomic_write, expanded, is_temporary, missing_folders, prepare_folder
 from mitex.training import checkpoint
 from mitex.training.locate import NAME as RESULT
 from mitex.training.metrics import Metrics
@@ -34,7 +34,7 @@ def check(out: str | os.PathLike[str], resume: bool = False) -> None:
         OutputError: There is a run already, or other files.
         CheckpointError: There is nothing to resume.
     """
-    folder = Path(out).expanduser()
+    folder = expanded(out)
     try:
         begun = any((folder / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
         finished = not begun and _is_run(folder) and (folder / RESULT).exists()

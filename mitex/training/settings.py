@@ -11,11 +11,11 @@ from typing import Any, Literal, TypedDict, get_args, get_origin
 from mitex.errors import ConfigError
 from mitex.training import values
 
-MOST_SEEDS = 2**32 - 1
+LARGEST_SEED = 2**32 - 1
 
 
 class RunOptions(TypedDict, total=False):
-    """What every `fit` takes beside what it learns from.
+    """What every `fit` takes besides what it learns from.
 
     Attributes:
         preset: Name of the preset to start from; the first one if None.
@@ -55,7 +55,7 @@ class FitConfig:
     """
 
     preset: str = key("default", "the preset that the settings started from")
-    seed: int = key(0, "of all randomness", 0, MOST_SEEDS)
+    seed: int = key(0, "of all randomness", 0, LARGEST_SEED)
 
     def __post_init__(self) -> None:
         kinds = typing.get_type_hints(type(self))

@@ -5,7 +5,10 @@ Types: int, float, bool, str, None, Literal, tuples of these (any or fixed lengt
 
 import math
 import types
+from collections.abc import Callable
 from typing import Any, Literal, Union, get_args, get_origin
+
+Reader = Callable[[Any, Any], Any]  # from a value and its type to the value that it stands for
 
 TRUTH = {
     "true": True,
@@ -97,7 +100,7 @@ def _finite(number: float) -> float:
     return number
 
 
-def _each(reader: Any, items: list[Any], kind: Any) -> tuple[Any, ...]:
+def _each(reader: Reader, items: list[Any], kind: Any) -> tuple[Any, ...]:
     kinds = get_args(kind)
     if kinds[-1] is ...:
         kinds = (kinds[0],) * len(items)
@@ -106,7 +109,7 @@ def _each(reader: Any, items: list[Any], kind: Any) -> tuple[Any, ...]:
     return tuple(reader(item, item_kind) for item, item_kind in zip(items, kinds, strict=True))
 
 
-def _first(reader: Any, value: Any, kind: Any) -> Any:
+def _first(reader: Reader, value: Any, kind: Any) -> Any:
     """Reads as the first member of a union that fits; None before text, so that `none` is not a text."""
     members = get_args(kind) if get_origin(kind) in (Union, types.UnionType) else ()
     for member in sorted(members, key=lambda member: (member is not types.NoneType, member is str)):

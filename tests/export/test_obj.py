@@ -163,6 +163,12 @@ def test_indices_out_of_range_are_refused(baked, tmp_path):
             Asset.load(path)
 
 
+def test_a_file_cut_in_its_first_line(tmp_path):
+    (tmp_path / "a.obj").write_text("# Mitex")
+    with pytest.raises(MeshError, match="not written by Mitex"):
+        Asset.load(tmp_path / "a.obj")
+
+
 def test_a_missing_map_is_named(baked, tmp_path):
     path = baked.export(tmp_path / "a.obj")
     (tmp_path / "a_albedo.png").unlink()

@@ -45,6 +45,7 @@ def test_loading_gives_the_asset_back(without, tmp_path):
         pytest.param(lambda d: d + b"x", id="too long"),
         pytest.param(lambda d: b"", id="empty"),
         pytest.param(lambda d: d[:40], id="no end of the header"),
+        pytest.param(lambda d: d.replace(b"\ncomment", b"end_header\n"), id="end in the second line"),
         pytest.param(lambda d: d.replace(b"Mitex", b"Other"), id="of another program"),
         pytest.param(lambda d: d.replace(b"property float x\n", b"property banana x\n"), id="unknown type"),
         pytest.param(lambda d: d.replace(b"property float x\n", b"property float w\n"), id="no x"),

@@ -198,6 +198,13 @@ def test_refuses_places(tmp_path):
     assert_refused("/dev/null", "not a regular file")
     assert_refused("x" * 5000, "there is no mesh")
     assert_refused("a\0b.obj", "there is no mesh")
+    assert_refused("~nobody-of-this-name.obj", "there is no mesh")
+
+
+def test_a_path_below_home(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "a.obj").write_text(obj_text(octahedron()))
+    assert len(Mesh.load("~/a.obj").faces) == 8
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")

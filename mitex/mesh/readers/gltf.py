@@ -11,6 +11,7 @@ import binascii
 import json
 import math
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -45,18 +46,20 @@ def read_gltf(name: str, data: bytes, max_vertices: int, folder: Path, max_bytes
     version = str(tree.get("asset", {}).get("version", "?"))
     if not version.startswith("2"):
         raise MeshError(f"{name} is glTF version {version}", "export it as glTF 2.0")
-    used = set(tree.get("extensionsRequired", []))
-    for extension in COMPRESSIONS:
-        if extension in used:
-            raise MeshError(f"{name} is compressed with {extension}", "export it without mesh compression")
     try:
+        required = tree.get("extensionsRequired", [])
+        for extension in COMPRESSIONS:
+            if extension in required:
+                raise MeshError(
+                    f"{name} is compressed with {extension}", "export it without mesh compression"
+                )
         instances = list(_instances(tree))
         total = sum(tree["accessors"][p["attributes"]["POSITION"]]["count"] for p, _ in instances)
         check_budget(name, total, max_vertices)
         buffers = _buffers(name, tree, chunk, folder, max_bytes)
         source = _Accessors(tree, buffers, 6 * max_vertices)
         return _join(name, [(source, p, matrix) for p, matrix in instances])
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError, struct.error) as error:
+    except (LookupError, TypeError, ValueError, OverflowError, AttributeError) as error:
         detail = f"{type(error).__name__}: {error}"
         raise MeshError(f"{name} is not valid glTF ({detail})", DAMAGED) from error
 
@@ -126,7 +129,7 @@ def _fetch(name: str, uri: str, folder: Path, max_bytes: int) -> bytes:
         raise MeshError(f"{name} refers to '{excerpt}', which cannot be read", remedy) from error
 
 
-def _instances(tree: dict):
+def _instances(tree: dict[str, Any]) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
     """Yields (primitive, 4x4 matrix) of every triangle primitive in the scene."""
     nodes = tree.get("nodes", [])
     scenes = tree.get("scenes", [])

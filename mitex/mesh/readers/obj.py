@@ -19,6 +19,8 @@ MISSING = -(2**62)  # a corner without texture coordinate or normal
 
 @dataclass
 class _Lines:
+    """The numbers of all lines; `corners` holds (vertex, uv, normal), 0-based, of polygon after polygon."""
+
     vertices: list[tuple[float, ...]] = field(default_factory=list)
     uvs: list[tuple[float, ...]] = field(default_factory=list)
     normals: list[tuple[float, ...]] = field(default_factory=list)

@@ -33,6 +33,8 @@ MAX_HEADER = 1 << 16
 
 @dataclass
 class _Element:
+    """What the header says of one table."""
+
     name: str
     count: int
     # (name, type of the list's length or None for a single number, type)

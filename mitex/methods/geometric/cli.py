@@ -82,7 +82,7 @@ class GrowthOptions:
 
     def advise(self, texture: GeometricTexture, mesh: Mesh) -> None:
         """Says, on stderr, how large the texture is on a mesh, and what would change that."""
-        size, vertices = texture.relative_size(mesh, self.start_level)
+        size, vertices = texture.relative_size(mesh, self.start_level, self.end_level)
         print(
             f"features are {size:.2g} times as large as on the reference, beside the whole mesh; "
             f"--remesh {vertices} makes them as large",

@@ -7,7 +7,7 @@ import torch
 from mitex.methods.geometric.connectivity import FaceGraph
 
 CHANNELS = 4  # of each side
-LEAST = 1e-12  # squared lengths below are taken for it: directions stay finite on degenerate faces
+LEAST = 1e-12  # smaller squared lengths are raised to it, so that directions stay finite on degenerate faces
 
 
 def side_frames(vertices: torch.Tensor, graph: FaceGraph) -> tuple[torch.Tensor, torch.Tensor]:
@@ -58,7 +58,8 @@ def displaced(vertices: torch.Tensor, graph: FaceGraph, offsets: torch.Tensor) -
     Args:
         vertices: (..., V, 3) positions.
         graph: of the F faces.
-        offsets: (..., F, 3), a vector for each face; corner k reads it in the frame of the side leaving it.
+        offsets: (..., F, 3), a vector for each face; corner k takes it in the frame of the side that begins
+            there.
 
     Returns:
         (..., V, 3).

@@ -84,11 +84,11 @@ def training_meshes(
         quiet: say nothing; else a line for each level goes to stderr.
     """
     hierarchy = Hierarchy.of(template, config.levels)
-    options = [getattr(config, key) for key in vars(config) if key.startswith("fit_")]
+    options = {key: value for key, value in vars(config).items() if key.startswith("fit_")}
     arrays = (reference.vertices, reference.faces, template.vertices, template.faces)
     meshes, reports = [], []
     for level, mesh in enumerate(hierarchy.meshes):
-        place = cache_dir() / "geometric" / content_key(VERSION, *arrays, config.seed, *options, level)
+        place = cache_dir() / "geometric" / content_key(VERSION, *arrays, (config.seed, options, level))
         start = hierarchy.finer(meshes[-1], level - 1) if meshes else torch.from_numpy(template.vertices)
 
         def compute(start: torch.Tensor = start, level: int = level) -> torch.Tensor:

@@ -40,7 +40,7 @@ def critic_loss(
     mix: torch.Tensor,
     penalty: float,
 ) -> tuple[torch.Tensor, torch.Tensor]:
-    """What the critic minimises, and the estimated distance in it (real minus fake score).
+    """What the critic minimises, and the estimated distance of the two, which is a part of it.
 
     Args:
         critic: of one output; its score of a mesh is the mean over the faces.
@@ -48,6 +48,10 @@ def critic_loss(
         graph: that connectivity.
         mix: scalar in [0, 1], where between the two the penalty is taken.
         penalty: its weight.
+
+    Returns:
+        The loss, and the score of the real mesh minus that of the fake one; scalars, the second without a
+        graph.
     """
     scores = critic(torch.stack([real, fake]), graph).mean((1, 2))
     distance = scores[0] - scores[1]

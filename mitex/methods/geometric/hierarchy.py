@@ -16,7 +16,7 @@ class Hierarchy:
     """The connectivity of a mesh subdivided 0, 1, 2, ... times.
 
     Attributes:
-        meshes: the mesh on each level: only its faces and UVs matter.
+        meshes: the mesh on each level, of which only faces and UVs are used.
         graphs: of each level.
         pairs: for each level but the last, (E, 2) int64, the ends of the edges that are split next.
     """
@@ -27,7 +27,11 @@ class Hierarchy:
 
     @staticmethod
     def of(mesh: Mesh, levels: int) -> Hierarchy:
-        """The hierarchy of a mesh, `levels` >= 1 of them with its own.
+        """The hierarchy of a mesh.
+
+        Args:
+            mesh: its first level.
+            levels: how many there are in all, at least 1.
 
         Raises:
             MeshError: a face names a vertex twice.

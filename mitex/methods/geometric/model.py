@@ -10,7 +10,8 @@ from mitex.methods.geometric.gan import generate
 from mitex.methods.geometric.hierarchy import Hierarchy
 from mitex.methods.geometric.network import FaceNetwork
 
-WIDTHS = ((32, 32, 32, 32, 32), (64, 32, 32, 32, 32), (128, 64, 32, 32, 32))  # the last one further on
+# Channels of the hidden layers by level; all further levels have those of the last.
+WIDTHS = ((32, 32, 32, 32, 32), (64, 32, 32, 32, 32), (128, 64, 32, 32, 32))
 
 
 def network(level: int, outputs: int, generator: torch.Generator) -> FaceNetwork:
@@ -31,7 +32,7 @@ def grow(
         generators: one for each level of the hierarchy that is used.
         hierarchy: of the mesh; it starts with its own connectivity.
         vertices: (V, 3), in units of the mean edge length.
-        noises: for each generator.
+        noises: for each generator, (V, 3) of its level or one number.
         remeasure: as in `generate`.
     """
     for level, (generator, noise) in enumerate(zip(generators, noises, strict=True)):

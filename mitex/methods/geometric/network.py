@@ -24,8 +24,8 @@ class FaceNetwork:
 
     Args:
         widths: channels of the hidden layers.
-        outputs: channels of the last one: 3 of a generator, 1 of a discriminator.
-        generator: of the first weights, uniform in +-1 / sqrt(inputs).
+        outputs: channels of the last layer: 3 of a generator, 1 of a critic.
+        generator: source of the first weights, uniform in +-1 / sqrt(inputs).
 
     Attributes:
         parameters: [side (4, C1); across, own (C, C') for each further layer; bias (outputs,)].
@@ -51,9 +51,15 @@ class FaceNetwork:
         return x + bias
 
     def load(self, parameters: Sequence[torch.Tensor]) -> None:
-        """Takes over other values of all parameters."""
+        """Takes over other values of all parameters.
+
+        Raises:
+            ValueError: there are more or fewer, or one has another shape.
+        """
         with torch.no_grad():
             for mine, theirs in zip(self.parameters, parameters, strict=True):
+                if mine.shape != theirs.shape:  # `copy_` would broadcast
+                    raise ValueError(f"a parameter of shape {tuple(theirs.shape)}, not {tuple(mine.shape)}")
                 mine.copy_(theirs)
 
 

@@ -10,5 +10,15 @@ from mitex.render import still, tone
 
 
 def portrait(vertices: np.ndarray, faces: np.ndarray, resolution: int = 256, spp: int = 16) -> np.ndarray:
-    """A small image (H, W, 3) of a shape, sRGB in [0, 1]."""
+    """A small picture of a shape in grey.
+
+    Args:
+        vertices: (V, 3).
+        faces: (F, 3).
+        resolution: side of the picture [px].
+        spp: samples per pixel.
+
+    Returns:
+        (H, W, 3) float32, sRGB in [0, 1].
+    """
     return tone(still(clay(Mesh(vertices, faces)), resolution=resolution, spp=spp))

@@ -1,4 +1,4 @@
-"""How alike two surfaces are in small: distributions of what can be measured at edges and vertices."""
+"""How alike two surfaces are in their details: distributions of what is measured at edges and vertices."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ LEAST = 1e-12
 
 
 def local_statistics(mesh: Mesh) -> dict[str, np.ndarray]:
-    """What no rigid motion or scaling changes.
+    """Measures of a surface that no rigid motion or scaling changes.
 
     Returns:
         `dihedral`: signed angles between neighbouring faces, positive where the surface is convex [rad];

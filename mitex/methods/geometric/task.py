@@ -22,7 +22,7 @@ QUARTERS = 4  # parts of a level with a learning rate each; the paper's 2,000 st
 
 
 class GeometricTask:
-    """Generators that turn the template into the reference, or something like it, on each level.
+    """Trains the generators that turn the template into the reference, or something like it, on each level.
 
     A step updates the generator of its level. The critics have optimizers of their own and take their turns
     in `begin`. Generators of lower levels stay as they are.
@@ -152,8 +152,8 @@ class GeometricTask:
 
     def _critic_turns(self, step: int) -> int:
         """How many steps of the critic come before a step of the generator: they are spread evenly."""
-        turns, of = self.config.critic_steps, self.config.generator_steps
-        return (step + 1) * turns // of - step * turns // of
+        critic, own = self.config.critic_steps, self.config.generator_steps
+        return (step + 1) * critic // own - step * critic // own
 
     def _train_critic(self, level: int, step: int, generator: torch.Generator) -> dict[str, float]:
         """One turn; the critic stays as it is when the norm of its gradient is not finite."""
@@ -209,11 +209,11 @@ def _clones(state: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
 
 
 def betas(config: GeometricConfig) -> tuple[float, float]:
-    """Of Adam."""
+    """Adam's decays of the first and the second moment."""
     return config.beta1, config.beta2
 
 
 def learning_rate(config: GeometricConfig, step: int) -> float:
-    """Halved after each quarter of a level, so three times, and whole again on the next level."""
+    """The learning rate of a step: halved after each quarter of a level, and whole again on the next."""
     quarter = step % config.level_steps * QUARTERS // config.level_steps
     return config.lr * 0.5**quarter

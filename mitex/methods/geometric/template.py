@@ -18,7 +18,13 @@ COARSE = 80  # faces of a simplified reference
 
 
 def find_template(reference: Mesh, template: Mesh | None = None) -> Mesh:
-    """The given template, if it fits, else an icosahedron, a torus, or the reference, simplified.
+    """The user's template, or one of the reference's topology.
+
+    That is an icosahedron, a torus, or else the reference itself, simplified.
+
+    Args:
+        reference: any surface with two sides.
+        template: of the user's, or None.
 
     Raises:
         ConfigError: its topology is not the reference's, or the reference's is not that of a surface.

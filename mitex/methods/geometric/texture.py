@@ -41,6 +41,7 @@ class GeometricTexture:
 
     @property
     def levels(self) -> int:
+        """Number of generators."""
         return len(self.generators)
 
     @classmethod
@@ -67,7 +68,8 @@ class GeometricTexture:
         Args:
             mesh: any mesh; near-uniform edges give an even texture (`mitex.mesh.remesh`).
             seed: of the noise.
-            start_level: generator to begin with; 2, or the last one, if None. Low levels change the shape.
+            start_level: generator to begin with; 2, or `end_level` if that is lower, if None. Low levels
+                change the shape.
             end_level: the last generator; the last one trained if None.
 
         Returns:
@@ -107,8 +109,10 @@ class GeometricTexture:
         """A variation of the reference itself, from the template.
 
         Args:
-            seed: of the noise from `start_level` on; below it the reference's own global shape is rebuilt.
-            start_level, end_level: as in `apply`.
+            seed: of the noise.
+            start_level: the first level with random noise; below it the reference's own global shape is
+                rebuilt. Above the last level, the reference as a whole is rebuilt.
+            end_level: as in `apply`.
         """
         rollout = self.rollout(self.template, 0, end_level)
         reconstruction = [self.fixed, *[torch.zeros(())] * (len(rollout.generators) - 1)]
@@ -124,7 +128,10 @@ class GeometricTexture:
         start_level: int | None = None,
         end_level: int | None = None,
     ) -> Iterator[Mesh]:
-        """The texture growing on a mesh: `frames` meshes for each level, from undisplaced to displaced."""
+        """The texture growing on a mesh: the mesh itself, then `frames` meshes for each level.
+
+        The last of a level's meshes is displaced by the whole of it.
+        """
         rollout = self.rollout(mesh, start_level, end_level)
         before = mesh
         for level, after in enumerate(rollout.run(rollout.noise(seed))):
@@ -133,13 +140,18 @@ class GeometricTexture:
                 yield after.with_vertices(start.vertices + t * (after.vertices - start.vertices))
             before = after
 
-    def relative_size(self, mesh: Mesh, start_level: int | None = None) -> tuple[float, int]:
+    def relative_size(
+        self, mesh: Mesh, start_level: int | None = None, end_level: int | None = None
+    ) -> tuple[float, int]:
         """How large features will be beside a mesh, in relation to their size beside the reference.
+
+        Args:
+            mesh, start_level, end_level: as in `apply`.
 
         Returns:
             That ratio, and with how many vertices of the mesh, `remesh`ed, it would be about 1.
         """
-        start = min(START, self.levels - 1) if start_level is None else start_level
+        start, _ = self._range(start_level, end_level)
         faces = len(self.template.faces) * 4**start
         return (faces / len(mesh.faces)) ** 0.5, max(faces // 2, 12)
 
@@ -150,13 +162,7 @@ class GeometricTexture:
             ConfigError: levels out of range, or too many faces.
             MeshError: a face names a vertex twice.
         """
-        last = self.levels - 1
-        end = last if end_level is None else end_level
-        start = min(START, end) if start_level is None else start_level
-        if not 0 <= start <= end <= last:
-            raise ConfigError(
-                f"levels {start} to {end} are out of range", f"this texture has the levels 0 to {last}"
-            )
+        start, end = self._range(start_level, end_level)
         faces = len(mesh.faces) * 4 ** (end - start)
         if faces > MOST_FACES:
             raise ConfigError(
@@ -167,6 +173,17 @@ class GeometricTexture:
         generators = self.generators[start : end + 1]
         hierarchy = Hierarchy.of(mesh, len(generators))
         return Rollout(generators, hierarchy, float(self.about["noise"]), bool(self.about["remeasure"]))
+
+    def _range(self, start_level: int | None, end_level: int | None) -> tuple[int, int]:
+        """The first and the last level of a growth; see `apply` for what None stands for."""
+        last = self.levels - 1
+        end = last if end_level is None else end_level
+        start = min(START, end) if start_level is None else start_level
+        if not 0 <= start <= end <= last:
+            raise ConfigError(
+                f"levels {start} to {end} are out of range", f"this texture has the levels 0 to {last}"
+            )
+        return start, end
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from mitex.sparse import csr_tensor
 from mitex.training.optim import Adam
 
 TO_REFERENCE, TO_TEMPLATE = 0.4, 0.6  # weights of the two distances
-LAST = 0.1  # of the learning rate at the end of a level, on the first
+LAST = 0.1  # the learning rate at the end of a level, as a part of that at its beginning
 
 
 def fit_level(
@@ -71,7 +71,7 @@ class Fitting:
         return vertices.detach()
 
     def distance(self, vertices: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
-        """How far the two are from each other, and their normals."""
+        """Weighted sum of the distances of the two surfaces, in both directions, and of their normals."""
         ours = sample_surface(vertices, self.graph.faces, self.samples, generator)
         theirs = sample_surface(self.target, self.target_faces, self.samples, generator)
         to, back, normals_to, normals_back = chamfer(ours, theirs)
@@ -79,7 +79,7 @@ class Fitting:
         return TO_REFERENCE * to + TO_TEMPLATE * back + normals
 
     def regularity(self, vertices: torch.Tensor) -> torch.Tensor:
-        """How uneven the edges are, and how rough the surface."""
+        """Weighted sum that is small where edges are even and the surface is smooth."""
         corners = vertices[self.graph.faces]
         lengths = (corners.roll(-1, 1) - corners).norm(dim=2)
         share = (lengths / lengths.sum(1, keepdim=True)).clamp_min(1e-9)

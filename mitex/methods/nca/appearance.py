@@ -14,7 +14,16 @@ ORDER_LAYER = "relu3_1"  # its maps have a place for every four pixels
 
 
 class Appearance:
-    """Compares views with pictures of the exemplar, at random places of each feature layer."""
+    """Compares views with pictures of the exemplar, at random places of each feature layer.
+
+    A picture is a triple of the exemplar's channels as an RGB image (`mitex.triples`).
+
+    Args:
+        config: settings.
+        targets: the features of the pictures.
+        network: the frozen network that looks at the views, on whose device everything happens.
+        ordered: compare autocorrelations too, if the settings want it.
+    """
 
     def __init__(self, config: NcaConfig, targets: Targets, network: Vgg16, ordered: bool = False) -> None:
         self.ordered = ordered and config.order_weight > 0
@@ -32,7 +41,7 @@ class Appearance:
         return self.config.appearance_weight * self._compare(images, which, generator)
 
     def _assignment(self, count: int, generator: torch.Generator) -> tuple[torch.Tensor, torch.Tensor]:
-        """Pairs (view, picture) to compare."""
+        """Which views are compared with which pictures: the indices of both, (N,) each."""
         kinds = [p.kind for p in self.targets.pictures]
         if not self.config.blend:
             return torch.arange(count).repeat_interleave(len(kinds)), torch.arange(len(kinds)).repeat(count)
@@ -57,11 +66,11 @@ class Appearance:
             ours[layer] = _places(count, h * w, n, generator).to(images.device)
             theirs[layer] = _places(count, self.targets.size(layer), n, generator).to(images.device)
         total = config.colour_weight * self._colours(images, which, generator)
-        low = self.network.dtype == torch.bfloat16
+        low_precision = self.network.dtype == torch.bfloat16
         for layer, a in self.network.samples(images, ours).items():
             b = self.targets.sample(layer, which, theirs[layer])
-            total = total + relaxed_transport(a, b, low_precision=low).mean()
-            total = total + config.moment_weight * moment_distance(a, b, low).mean()
+            total = total + relaxed_transport(a, b, low_precision=low_precision).mean()
+            total = total + config.moment_weight * moment_distance(a, b, low_precision).mean()
             if self.ordered and layer == ORDER_LAYER:
                 maps = a.view(count, *self.network.extent(layer, height, width), -1)
                 order = autocorrelation_distance(maps, self.targets.maps(layer, which))
@@ -71,10 +80,10 @@ class Appearance:
     def _colours(self, images: torch.Tensor, which: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
         count, pixels = len(images), images.shape[1] * images.shape[2]
         n = min(pixels, self.targets.size("colour"), self.config.samples)
-        here = _places(count, pixels, n, generator).to(images.device)
-        there = _places(count, self.targets.size("colour"), n, generator).to(images.device)
-        a = normalise_colours(images.flatten(1, 2).gather(1, here[:, :, None].expand(-1, -1, 3)))
-        b = normalise_colours(self.targets.sample("colour", which, there))
+        ours = _places(count, pixels, n, generator).to(images.device)
+        theirs = _places(count, self.targets.size("colour"), n, generator).to(images.device)
+        a = normalise_colours(images.flatten(1, 2).gather(1, ours[:, :, None].expand(-1, -1, 3)))
+        b = normalise_colours(self.targets.sample("colour", which, theirs))
         cost = relaxed_transport(a, b, euclidean=True).mean()
         return cost + channel_transport(a, b).mean() if self.config.colour_histogram else cost
 

@@ -38,6 +38,7 @@ def fields(look: Look, state: torch.Tensor, mesh: Mesh) -> dict[str, dict[str, A
 def _mesh(mesh: Mesh) -> dict[str, Any]:
     from mitex.runtime.jit import mi
 
+    mesh = mesh.normalised()[0]  # as decoders read it, see `Surface`
     return {"vertices": mi.TensorXf(mesh.vertices), "faces": mi.TensorXf(mesh.faces)}
 
 
@@ -52,7 +53,7 @@ def _decoder(decoder: Decoder) -> dict[str, Any]:
     if "waves" in shape.coordinates:
         table = torch.cat([waves.vectors, waves.phases[:, None]], 1)
         properties |= {"waves": _tensor(table), "amplitude": waves.amplitude}
-    for k, layer in enumerate(decoder.network.layers):
+    for k, layer in enumerate(decoder.network.linear):
         properties |= {f"weight_{k}": _tensor(layer.weight), f"bias_{k}": _tensor(layer.bias)}
     return properties
 

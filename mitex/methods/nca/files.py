@@ -9,22 +9,23 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import torch
 from safetensors import SafetensorError
 
-from mitex.errors import CheckpointError
+from mitex.errors import CheckpointError, ConfigError
 from mitex.methods.nca import METHOD
-from mitex.methods.nca.config import NcaConfig
+from mitex.methods.nca.config import DECODER_KEYS, NcaConfig
 from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.methods.nca.look import STATE_CHANNELS, Look
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.perception import HARMONICS
-from mitex.training import checkpoint, model_file
+from mitex.paths import expanded
+from mitex.training import checkpoint, model_file, values
 from mitex.training.locate import CHECKPOINT, NAME, PREVIOUS, locate
 
 RULE = "rule."  # before names of the rule's tensors, which files leave out
@@ -54,7 +55,9 @@ def load(source: str | Path) -> tuple[Look, dict[str, Any]]:
     """
     path = _newest(source)
     if path.name in (CHECKPOINT, PREVIOUS):
-        return _from_checkpoint(path)
+        # Of a run folder any readable checkpoint will do; a file is read as it was named.
+        folder = expanded(source).is_dir()
+        return _from_checkpoint(checkpoint.load(path.parent) if folder else checkpoint.read(path), path)
     try:
         tensors, metadata = model_file.read(path)
     except (SafetensorError, OSError, ValueError) as e:
@@ -69,24 +72,35 @@ def load(source: str | Path) -> tuple[Look, dict[str, Any]]:
     return look, about
 
 
-def _from_checkpoint(path: Path) -> tuple[Look, dict[str, Any]]:
-    state = checkpoint.load(path.parent)
+def _from_checkpoint(state: checkpoint.Checkpoint, path: Path) -> tuple[Look, dict[str, Any]]:
     maps = state.metadata.get("maps", "albedo").split(",")
     about: dict[str, Any] = {"name": state.metadata.get("exemplar", path.parent.name), "maps": maps}
     about |= {"steps": state.step, "preset": state.config.get("preset")}
-    names = {field.name for field in fields(NcaConfig)}
-    tuples = {k: tuple(v) if isinstance(v, list) else v for k, v in state.config.items() if k in names}
-    look = Look.of(NcaConfig(**tuples), maps)
+    try:
+        look = Look.of(_config(state.config), maps)
+    except (ConfigError, LookupError, ValueError) as e:
+        raise CheckpointError(
+            f"'{path}' does not hold a MeshNCA model ({e})", "give a run of mitex fit nca"
+        ) from e
     _fill(look, {k[6:]: v for k, v in state.task.items() if k.startswith("model.")}, path)
     return look, about
 
 
 def _shape(text: str, path: Path) -> DecoderShape:
+    """The shape of a decoder, within the limits of the settings."""
     try:
-        values = {k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(text).items()}
-        return DecoderShape(**values)
-    except (ValueError, TypeError, AttributeError) as e:
+        parts = json.loads(text)
+        if parts.keys() != set(DECODER_KEYS.values()):
+            raise ValueError(f"parts {', '.join(parts)}")
+        return _config({key: parts[part] for key, part in DECODER_KEYS.items()}).decoder_shape
+    except (ConfigError, ValueError, AttributeError) as e:
         raise CheckpointError(f"the decoder in '{path}' is damaged ({e})", "save the model again") from e
+
+
+def _config(content: Mapping[str, Any]) -> NcaConfig:
+    """Settings of those keys that a file has."""
+    kinds = get_type_hints(NcaConfig)
+    return NcaConfig(**{k: values.check(v, kinds[k]) for k, v in content.items() if k in kinds})
 
 
 def _fill(module: torch.nn.Module, tensors: dict[str, torch.Tensor], path: Path) -> None:
@@ -101,7 +115,7 @@ def _fill(module: torch.nn.Module, tensors: dict[str, torch.Tensor], path: Path)
 
 
 def _newest(source: str | Path) -> Path:
-    """A resumed run's checkpoint is newer than the model of its first part."""
+    """The file to read; of a resumed run the checkpoint, which is newer than the model of its first part."""
     first, *others = locate(source)
     if first.name == NAME and others and others[0].name == CHECKPOINT:
         return max(first, others[0], key=lambda file: file.stat().st_mtime_ns)
@@ -140,10 +154,10 @@ def _rule(tensors: dict[str, torch.Tensor], degree: object, path: Path) -> MeshN
     if any(weight is None or weight.ndim != 2 for weight in weights):
         raise problem
     (channels, hidden), inputs = tensors["fc2.weight"].shape, tensors["fc1.weight"].shape[1]
-    rule_degree = _degree(degree, channels, inputs)
-    if rule_degree is None or not channels:
+    highest = _degree(degree, channels, inputs)
+    if highest is None or not channels:
         raise problem
-    return MeshNCA(channels, hidden, inputs - (HARMONICS[rule_degree] + 1) * channels, rule_degree)
+    return MeshNCA(channels, hidden, inputs - (HARMONICS[highest] + 1) * channels, highest)
 
 
 def _degree(stated: object, channels: int, inputs: int) -> int | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import torch
 import torch.nn.functional as F
 from torch import nn
@@ -134,7 +136,17 @@ class _Step(torch.autograd.Function):
     """
 
     @staticmethod
-    def forward(ctx, state, condition, w1, b1, w2, b2, operator: Perception, rows):
+    def forward(
+        ctx: Any,
+        state: torch.Tensor,
+        condition: torch.Tensor | None,
+        w1: torch.Tensor,
+        b1: torch.Tensor,
+        w2: torch.Tensor,
+        b2: torch.Tensor,
+        operator: Perception,
+        rows: torch.Tensor | None,
+    ) -> torch.Tensor:
         batch, vertices, channels = state.shape
         inputs = operator(state).view(batch * vertices, -1)
         if condition is not None:
@@ -152,31 +164,33 @@ class _Step(torch.autograd.Function):
 
     @staticmethod
     @torch.autograd.function.once_differentiable
-    def backward(ctx, gradient):
+    def backward(ctx: Any, gradient: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        """Gradients have the names of `forward`'s tensors, after `d_`."""
         inputs, hidden, w1, w2, rows = ctx.saved_tensors
         batch, vertices, channels = ctx.shape
-        change = gradient.reshape(-1, channels)
+        d_change = gradient.reshape(-1, channels)
         if rows is not None:
-            change = F.pad(change.index_select(0, rows), (0, 0, 0, len(inputs) - len(rows)))
-        behind = dense.product(change, w2.t())
-        torch.ops.aten.threshold_backward.grad_input(behind, hidden, 0, grad_input=behind)
-        states = condition = None
+            d_change = F.pad(d_change.index_select(0, rows), (0, 0, 0, len(inputs) - len(rows)))
+        d_hidden = dense.product(d_change, w2.t())
+        torch.ops.aten.threshold_backward.grad_input(d_hidden, hidden, 0, grad_input=d_hidden)
+        d_state = d_condition = None
         if any(ctx.needs_input_grad[:2]):  # not in the first step from the pool
-            into = dense.product(behind, w1.t())
+            d_inputs = dense.product(d_hidden, w1.t())
             if rows is not None:
-                whole = into.new_zeros(batch * vertices, into.shape[1])
-                into = whole.index_copy_(0, rows, into[: len(rows)])
+                whole = d_inputs.new_zeros(batch * vertices, d_inputs.shape[1])
+                d_inputs = whole.index_copy_(0, rows, d_inputs[: len(rows)])
             width = ctx.perception.blocks * channels
-            perceived = into[:, :width].contiguous().view(batch, vertices, width)
-            states = gradient + ctx.perception.transposed(perceived)
-            condition = into[:, width:].view(batch, vertices, -1) if into.shape[1] > width else None
+            d_perceived = d_inputs[:, :width].contiguous().view(batch, vertices, width)
+            d_state = gradient + ctx.perception.transposed(d_perceived)
+            if d_inputs.shape[1] > width:
+                d_condition = d_inputs[:, width:].view(batch, vertices, -1)
         return (
-            states,
-            condition,
-            dense.weight_gradient(behind, inputs),
-            behind.sum(0),
-            dense.weight_gradient(change, hidden),
-            change.sum(0),
+            d_state,
+            d_condition,
+            dense.weight_gradient(d_hidden, inputs),
+            d_hidden.sum(0),
+            dense.weight_gradient(d_change, hidden),
+            d_change.sum(0),
             None,
             None,
         )

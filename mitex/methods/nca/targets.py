@@ -25,11 +25,11 @@ def value_layout(maps: Iterable[str]) -> dict[str, tuple[int, ...]]:
 
 
 class Targets:
-    """Features of the exemplar's pictures, kept, and read at random places.
+    """The features of the exemplar's pictures, computed once and read at random places.
 
     Args:
         exemplar: maps at the size at which the features see them.
-        pictures: what the features look at.
+        pictures: the channel triples that the network looks at.
         layout: channels of the maps in the pictures.
         network: frozen features.
         layers: of the network.
@@ -47,11 +47,12 @@ class Targets:
         images = torch.from_numpy(triple_images(exemplar, pictures, layout)).to(network.device)
         generator = torch.Generator().manual_seed(0)
         self._vectors = {"colour": _some(images.flatten(1, 2), generator)}
+        parts: dict[str, list[torch.Tensor]] = {layer: [] for layer in layers}
         with torch.no_grad():
-            for one in layers:
-                vectors = [network.features(image[None], [one])[one].flatten(1, 2) for image in images]
-                kept = [_some(v.to(network.dtype), generator) for v in vectors]
-                self._vectors[one] = torch.cat(kept)
+            for image in images:
+                for layer, features in network.features(image[None], layers).items():
+                    parts[layer].append(_some(features.flatten(1, 2).to(network.dtype), generator))
+        self._vectors |= {layer: torch.cat(vectors) for layer, vectors in parts.items()}
 
     def size(self, layer: str) -> int:
         """Number of feature vectors of a picture in a layer ("colour": its pixels)."""

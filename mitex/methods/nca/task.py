@@ -28,7 +28,7 @@ WIDEST = 0.65  # half the side of a patch of the unit sphere: wider ones would l
 
 
 class NcaTask:
-    """Pool of states on an icosphere, random steps, views at several zooms, loss.
+    """Trains a look: states from a pool evolve on spheres, and their views are compared at several zooms.
 
     Args:
         config: settings.

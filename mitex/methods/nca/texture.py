@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 
 from mitex.asset import Asset
@@ -17,11 +18,16 @@ from mitex.methods.nca import files
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.field import fields
+from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look
-from mitex.methods.nca.perception import perception
+from mitex.methods.nca.palette import Palette
+from mitex.methods.nca.perception import Perception, lattice_perception, perception
+from mitex.methods.nca.tile import flat_cells, tile_maps
 from mitex.runtime import keep_freed_memory
 
 STEPS = 200  # enough for the pattern to settle at every density tried
+DENSITY = 32.0  # cells along the exemplar's width, of models that do not say it
+REPEATS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +76,7 @@ class NcaTexture:
             mesh: any mesh; near-uniform edges and valence 6 give the best texture (`mitex.mesh.quality`).
             seed: of the random updates.
             steps: of the automaton; 200 if None.
-            subdivide: levels of subdivision, or "auto": as many as bring the copy to 24,000 vertices.
+            subdivide: levels of subdivision, or "auto": as many as bring the copy to 8,000 vertices.
             orientation: turns the texture about the normals, counter-clockwise [rad].
             scale: size of the pattern, 1 for what the density gives; others need a remeshing of the copy to
                 the fitting density (extra `remesh`).
@@ -89,8 +95,7 @@ class NcaTexture:
         laid = mesh if resolution is None or (keep_dense and scale != 1.0) else laid_out(mesh, resolution)
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
         steps = STEPS if steps is None else steps
-        state = self.grow(cells.mesh, seed=seed, steps=steps, orientation=orientation)
-        grown = Grown(self.look, state, cells, orientation)
+        grown = Grown(self.look, self._healthy(cells, seed, steps, orientation), cells, orientation)
         asset = grown.asset()
         if resolution is None:
             return asset
@@ -106,24 +111,82 @@ class NcaTexture:
         A cell sits at each vertex of the mesh, and the shape in the scene must have these vertices; see
         `mitex.mesh.subdivide_midpoint`. Other arguments and errors as of `apply`.
         """
-        return fields(self.look, self.grow(mesh, seed=seed, steps=steps, orientation=orientation), mesh)
+        return fields(self.look, self._healthy(Cells(mesh, 0, mesh), seed, steps, orientation), mesh)
+
+    def variants(
+        self, mesh: Mesh, seeds: Iterable[int], *, resolution: int | None = 1024, **options: Any
+    ) -> Iterator[Asset]:
+        """One asset for each seed, all on one mesh and one UV layout, with the seed in its name; options as
+        of `apply`.
+        """
+        laid = mesh if resolution is None else laid_out(mesh, resolution)
+        for seed in seeds:
+            asset = self.apply(laid, seed=seed, resolution=resolution, **options)
+            yield replace(asset, name=f"seed {seed}")
+
+    def tile(
+        self, resolution: int = 1024, *, cells: int | None = None, seed: int = 0, steps: int | None = None
+    ) -> dict[str, np.ndarray]:
+        """Grows the texture on a flat square whose opposite sides are joined.
+
+        Args:
+            resolution: side of the maps [px], 16 to 8192.
+            cells: along a side, 8 to 1024; if None, the exemplar appears about `REPEATS` times along it.
+            seed, steps: as of `apply`.
+
+        Returns:
+            Maps (N, N, c) float32 in [0, 1], row 0 on top, the exemplar's up upwards; they go on at their
+            opposite sides.
+
+        Raises:
+            ConfigError: options out of range, or the model needs a condition.
+        """
+        cells = round(REPEATS * float(self.about.get("density", DENSITY))) if cells is None else cells
+        lattice = flat_cells(cells, resolution)
+        operator = lattice_perception(lattice, self.look.rule.degree, self.look.mean)
+        state = self.grow(operator, seed=seed, steps=STEPS if steps is None else steps)
+        return tile_maps(self.look, state, lattice, resolution)
 
     @torch.no_grad()
     def grow(
-        self, mesh: Mesh, *, seed: int = 0, steps: int = STEPS, orientation: float = 0.0
+        self, mesh: Mesh | Perception, *, seed: int = 0, steps: int = STEPS, orientation: float = 0.0
     ) -> torch.Tensor:
-        """The state (V, C) after `steps` steps from the seed, held within the bounds of the training's."""
+        """The state of the automaton after some steps, held within the bounds of the training's.
+
+        Args:
+            mesh: any mesh, or its perception operator, which has an orientation of its own.
+            seed: of the random updates.
+            steps: from the initial state, which is zero.
+            orientation: as in `apply` [rad].
+
+        Returns:
+            (V, C) float32.
+
+        Raises:
+            ConfigError: steps below 0, or the model needs a condition.
+        """
         self._check_unconditioned()
         if steps < 0:
             raise ConfigError(f"{steps} steps", "give 0 or more")
         keep_freed_memory()
-        rule = self.look.rule
-        operator = perception(mesh, rule.degree, orientation, mean=self.look.mean)
+        rule, operator = self.look.rule, mesh
+        if isinstance(operator, Mesh):
+            operator = perception(operator, rule.degree, orientation, mean=self.look.mean)
         generator = torch.Generator().manual_seed(seed)
         state = rule.seed(operator)
         for _ in range(steps):
             state = self.look.bounded(rule.evolve(state, operator, 1, generator))
         return state[0]
+
+    def _healthy(self, cells: Cells, seed: int, steps: int, orientation: float) -> torch.Tensor:
+        """What grows on the automaton's mesh, healed where it leaves the exemplar's colours."""
+        state = self.grow(cells.mesh, seed=seed, steps=steps, orientation=orientation)
+        if "palette" not in self.about:
+            return state
+        generator = torch.Generator().manual_seed(seed)
+        operator = perception(cells.mesh, self.look.rule.degree, orientation, mean=self.look.mean)
+        palette = Palette.from_record(self.about["palette"])
+        return healed(self.look, state, cells, operator, palette, generator)
 
     def _check_unconditioned(self) -> None:
         if self.look.rule.condition:

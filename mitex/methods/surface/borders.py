@@ -19,9 +19,9 @@ from mitex.mesh import Mesh
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.texels import Texels
 
-ROUNDS = 24  # in which border texels that read each other are resolved
-FAINT = 1e-3  # shares below are left out
-LEAST = 0.05  # of a border texel that must come from others; else it stays one of its own
+ROUNDS = 24  # of following border texels that read each other
+FAINT = 1e-3  # smaller shares are left out
+LEAST = 0.05  # the share that must come from texels inside; else a border texel keeps a value of its own
 FARTHEST = 2.0  # [texels] a stretched face does not carry a centre farther
 
 
@@ -30,8 +30,8 @@ class Border:
     """Which texels have values of their own, and what the others are.
 
     Attributes:
-        elements: (n,) int64 ascending texels with values of their own.
-        spread: (N, n) CSR float32, the values of all texels from those; rows sum to 1.
+        elements: (n,) int64, the texels with values of their own, ascending.
+        spread: (N, n) CSR float32, which gives the values of all N texels from these; rows sum to 1.
     """
 
     elements: np.ndarray
@@ -66,17 +66,17 @@ class Border:
         number = np.empty(count, np.int64)
         number[elements] = np.arange(len(elements))
         shares = shares.tocoo()
-        line, column = shares.coords
-        used = continued[line]
-        line, column, data = line[used], column[used], shares.data[used]
-        rows = np.concatenate([elements, outside[line]])
+        row, column = shares.coords
+        used = continued[row]
+        row, column, data = row[used], column[used], shares.data[used]
+        rows = np.concatenate([elements, outside[row]])
         columns = np.concatenate([number[elements], number[inside[column]]])
-        values = np.concatenate([np.ones(len(elements)), data / total[line]]).astype(np.float32)
+        values = np.concatenate([np.ones(len(elements)), data / total[row]]).astype(np.float32)
         return Border(elements, csr_array((values, (rows, columns)), shape=(count, len(elements))))
 
 
 def _reads(mesh: Mesh, texels: Texels, tracer: GeodesicTracer, outside: np.ndarray) -> csr_array:
-    """(G, N) bilinear weights of the texels around the points that the centres of `outside` unfold to."""
+    """(G, N) bilinear weights of the texels around the points that the G centres `outside` unfold to."""
     face, barycentric = texels.face[outside], texels.barycentric[outside]
     corners = texel_space(texels.uv[face], texels.resolution)
     row, column = np.divmod(texels.index[outside], texels.resolution)
@@ -96,7 +96,7 @@ def _reads(mesh: Mesh, texels: Texels, tracer: GeodesicTracer, outside: np.ndarr
 
 
 def _resolved(reads: csr_array, inside: np.ndarray, outside: np.ndarray) -> csr_array:
-    """(G, inside) shares, where texels outside that read others outside are traced on to those inside."""
+    """(G, I) shares of the I texels `inside` in those `outside`; readings of others outside are traced on."""
     columns = reads.tocsc()
     direct, through = columns[:, inside].tocsr(), columns[:, outside].tocsr()
     shares = direct

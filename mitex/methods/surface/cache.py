@@ -12,7 +12,7 @@ from mitex.cache import cached
 from mitex.methods.surface.levels import Level, Levels
 from mitex.paths import cache_dir
 
-VERSION = "3"  # part of the keys; to be raised when levels are found in another way
+VERSION = "3"  # part of the keys; to be raised when levels are computed in another way
 
 
 def cached_levels(key: str, find: Callable[[], Levels], folder: Path | None = None) -> Levels:

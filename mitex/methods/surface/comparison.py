@@ -19,17 +19,29 @@ MIN_VECTORS = 256  # feature vectors of a region
 class Comparison(Protocol):
     """What a loss reads of the network, and what it makes of that."""
 
-    def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Mapping[str, Tap | GramTap]: ...
+    def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Mapping[str, Tap | GramTap]:
+        """What `cost` needs of the network: layer -> tap."""
+        ...
 
     def cost(
         self, features: Mapping[str, torch.Tensor], colours: torch.Tensor, k: int, generator: torch.Generator
     ) -> torch.Tensor:
-        """Scalar distance from triple k, given what the taps read of the texels' colours (N, 3)."""
+        """How far the texels are from the exemplar, as one triple of channels shows both.
+
+        Args:
+            features: layer -> what its tap read.
+            colours: (N, 3) the texels' channels of the triple.
+            k: number of the triple.
+            generator: source of all randomness.
+
+        Returns:
+            Scalar.
+        """
         ...
 
 
 class GramComparison:
-    """Squared distance of Gram matrices, averaged over layers (equation 4) and regions of the surface.
+    """Squared distance of Gram matrices, averaged over layers (section 3.4) and regions of the surface.
 
     One matrix for the whole surface says nothing of where its features are: a texture may be strong in one
     place and faint elsewhere. Regions are compact in space (`regions.bisect`).
@@ -87,7 +99,7 @@ class TransportComparison:
         moment_weight: float,
     ) -> None:
         self.layers, self.samples, self.moment_weight = layers, samples, moment_weight
-        self.low = network.dtype == torch.bfloat16
+        self.low_precision = network.dtype == torch.bfloat16
         self.colours = [normalise_colours(image.flatten(0, 1)) for image in images]
         self.targets = [exemplar_features(network, image, layers) for image in images]
 
@@ -105,8 +117,8 @@ class TransportComparison:
         for layer, a in features.items():
             target = self.targets[k][layer]
             b = target[self._places(len(target), generator)][None]
-            total = total + relaxed_transport(a, b, low_precision=self.low).sum()
-            total = total + self.moment_weight * moment_distance(a, b, self.low).sum()
+            total = total + relaxed_transport(a, b, low_precision=self.low_precision).sum()
+            total = total + self.moment_weight * moment_distance(a, b, self.low_precision).sum()
         return total
 
     def _places(self, count: int, generator: torch.Generator) -> torch.Tensor:

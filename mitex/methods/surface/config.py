@@ -89,9 +89,11 @@ class SurfaceConfig(TrainingConfig):
     def __post_init__(self) -> None:
         super().__post_init__()
         layers = with_poolings(LAYERS_19 if self.weights == "vgg19" else LAYERS)
-        unknown = [layer for layer in (*self.layers, self.content_layer) if layer not in layers]
+        unknown = [layer for layer in self.layers if layer not in layers]
         if unknown:
             raise ConfigError(f"layers holds {', '.join(unknown)}", f"use some of {', '.join(layers)}")
+        if self.content_layer not in layers:
+            raise ConfigError(f"content_layer is {self.content_layer}", f"use one of {', '.join(layers)}")
         if self.optimizer == "lbfgs" and (self.loss != "gram" or self.scales):
             problem = "lbfgs needs a loss without randomness, the same throughout"
             raise ConfigError(problem, "set loss=gram and scales=0, or optimizer=adam")

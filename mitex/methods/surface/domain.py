@@ -29,7 +29,7 @@ class SurfaceDomain:
         resolution: side of the texture [texels].
         frames: "smooth" or "fixed", see `tangent_frames`.
         angle: turns the frames counter-clockwise, seen from outside [degrees].
-        orientation: (V, 3) float32 where the exemplar's right shall point, in place of `frames`.
+        orientation: (V, 3) where the exemplar's right shall point, in place of `frames`.
         correct, continued: how levels are computed, see `SurfaceConfig`.
         depth: number of levels.
     """

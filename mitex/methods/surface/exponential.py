@@ -204,10 +204,10 @@ def _side(shape: Array3f64, side: Int32) -> tuple[Array2f64, Array2f64]:
 
 
 def _exit(walk: _Walk) -> _Exit:
-    """The side ahead whose ends are on either side of the ray.
+    """The side ahead whose ends lie on either side of the ray.
 
-    That is the side whose line is met first. But the signs of the ends also decide on faces of no area, where
-    all lines are one, and the point stays on the side however the numbers are rounded.
+    Elsewhere that is the side whose line is met first; but this also decides on faces of no area, where all
+    three lines are one, and the exit stays on the side however the numbers are rounded.
     """
     corners = _corners(walk.shape)
     turns = [_cross(walk.direction, c - walk.point) for c in corners]  # > 0: to the left of the ray

@@ -16,8 +16,6 @@ from mitex.methods.surface.regions import bisect
 from mitex.runtime import bfloat16_is_fast
 
 POOLED = tuple(f"pool{n}" for n in range(1, 6))
-
-
 ALL_LAYERS = with_poolings(LAYERS)
 
 
@@ -29,7 +27,8 @@ class SurfaceVgg:
         pool: "average" or "max".
         precision: "bfloat16", "float32", or "auto": bfloat16 where the CPU multiplies it natively.
         bilinear: False makes the first convolution read nearest texels too (an ablation).
-        scale: the image is the texels pooled so many times; the first convolution then reads nearest ones.
+        scale: how often the texels are pooled before the network sees them. The first convolution then reads
+            nearest ones.
         weights: layer -> weight, bias, of VGG-16, VGG-19 or random ones; None takes the package's VGG-16.
 
     Attributes:

@@ -16,8 +16,8 @@ import torch.nn.functional as F
 
 from mitex.sparse import csr_tensor
 
-CHUNK = 1 << 20  # gathered values that are multiplied at a time,
-LEAST_ROWS = 512  # but so many elements at least: each product reads all weights
+CHUNK = 1 << 20  # gathered values that are multiplied at a time
+LEAST_ROWS = 512  # elements in a chunk at least: each product reads all weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +42,7 @@ class Neighbourhood:
 
     @staticmethod
     def of(taps: np.ndarray) -> Neighbourhood:
+        """The neighbourhood of taps (n, 9)."""
         slots = (taps.astype(np.int64) * 9 + np.arange(9)).ravel()
         ranked = np.argsort(slots, kind="stable")
         slots, readers = slots[ranked], (ranked // 9).astype(np.int32)

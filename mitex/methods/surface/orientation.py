@@ -8,6 +8,7 @@ import numpy as np
 
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh
+from mitex.paths import expanded
 
 
 def read_orientation(path: str | Path, mesh: Mesh) -> np.ndarray:
@@ -23,7 +24,7 @@ def read_orientation(path: str | Path, mesh: Mesh) -> np.ndarray:
     Raises:
         ConfigError: no such file, not an array of numbers, of another shape, or not finite.
     """
-    place = Path(path).expanduser()
+    place = expanded(path)
     if not place.is_file():
         raise ConfigError(f"there is no orientation field at '{place}'", "give a .npy file")
     try:

@@ -21,7 +21,7 @@ from mitex.methods.surface.levels import POOLS, Level, Levels
 from mitex.methods.surface.texels import Texels
 
 BACKWARD = 8  # samples along a geodesic that is walked back
-CENTRE = 4
+CENTRE = 4  # the tap on the element itself
 OUTER = (0, 1, 2, 3, 5, 6, 7, 8)
 
 
@@ -47,8 +47,16 @@ class Surroundings:
     def arrivals(
         self, start: np.ndarray, tap: int, length: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Exponential map of a tap from texels `start` (M,): bilinear texels and weights (M, 4) where the
-        geodesic ends, and whether it arrived (M,). `length` is that of a straight tap (equation 3).
+        """The exponential map of a tap.
+
+        Args:
+            start: (M,) texels.
+            tap: 0 to 8, row by row.
+            length: of a tap to the side or up and down [mesh units] (equation 3); diagonal ones are longer.
+
+        Returns:
+            The texels and weights of a bilinear lookup where the geodesics end, (M, 4) each, and (M,) whether
+            they arrived.
         """
         row, column = divmod(tap, 3)
         x, y = column - 1, row - 1  # y downwards, as rows of an image
@@ -62,13 +70,10 @@ class Surroundings:
 
 
 def build(around: Surroundings, count: int = POOLS) -> Levels:
-    """Finds taps and groups of `count` levels by geodesics.
-
-    Linear in texels but for sorting.
-    """
+    """Finds taps and groups of `count` levels by geodesics, in time linear in the texels but for sorting."""
     texels = around.texels
     border = around.border or Border.none(len(texels.index))
-    elements, follows = border.elements, _largest(border.spread)
+    elements, leader = border.elements, _largest(border.spread)
     index, weight = _bilinear_taps(around, elements)
     lookup: Any = _lookup(index, weight, len(texels.index)) @ border.spread
     edges = _texel_graph(lookup)
@@ -78,9 +83,9 @@ def build(around: Surroundings, count: int = POOLS) -> Levels:
     rank[order] = np.arange(len(order), dtype=np.int32)
     labels, edges = [_renumbered(label[order]) for label in labels], rank[edges]
     nearest = np.take_along_axis(index, np.argmax(weight, axis=2, keepdims=True), 2)[:, :, 0]
-    taps = [rank[follows[nearest[order]]]]
-    own, followed = elements[order].astype(np.int32), rank[follows]
-    taps += [_group_taps(around, own, followed, labels[n], edges, n) for n in range(1, count)]
+    taps = [rank[leader[nearest[order]]]]
+    own, leader = elements[order].astype(np.int32), rank[leader]
+    taps += [_group_taps(around, own, leader, labels[n], edges, n) for n in range(1, count)]
     levels = []
     for n in range(count):
         first = np.concatenate([[True], labels[n][1:] != labels[n][:-1]])
@@ -183,7 +188,7 @@ def representatives(position: np.ndarray, labels: np.ndarray, size: float) -> np
 def _group_taps(
     around: Surroundings,
     own: np.ndarray,
-    followed: np.ndarray,
+    leader: np.ndarray,
     labels: np.ndarray,
     edges: np.ndarray,
     level: int,
@@ -193,7 +198,7 @@ def _group_taps(
     Args:
         around: of the surface.
         own: (n,) texels of the elements of level 0.
-        followed: (N,) the element that each texel follows most.
+        leader: (N,) the element that has the largest share in each texel.
         labels: (n,) ascending groups of the elements.
         edges: (E, 2) neighbouring elements.
         level: n.
@@ -204,7 +209,7 @@ def _group_taps(
     taps = np.empty((len(start), 9), np.int32)
     taps[:, CENTRE] = np.arange(len(start))
     for tap in OUTER:
-        taps[:, tap] = _reached(around, start, tap, texels.size * 2**level, labels[followed], related)
+        taps[:, tap] = _reached(around, start, tap, texels.size * 2**level, labels[leader], related)
     return np.take_along_axis(taps, _replacements(taps >= 0), 1)
 
 

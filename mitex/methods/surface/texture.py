@@ -107,10 +107,11 @@ class SurfaceTexture:
             resolution, angle = int(about["resolution"]), float(about["angle"])
             orientation = arrays.get("orientation")
             domain = SurfaceDomain(mesh, resolution, str(about["frames"]), angle, orientation)
-            values = arrays["values"].astype(np.float32)
-            if len(domain.texels.index) != len(values):
-                raise ValueError("texels are missing")
-            return cls(domain, values, tuple(about["maps"]), about)
+            values, maps = arrays["values"].astype(np.float32), tuple(about["maps"])
+            channels = sum(map(len, texel_layout(list(maps)).values()))
+            if values.shape != (len(domain.texels.index), channels):
+                raise ValueError("texels or channels are missing")
+            return cls(domain, values, maps, about)
 
     def _at_vertices(self) -> np.ndarray:
         """(V, C) values at the vertices, from the first face around each; 0 without a face."""

@@ -12,8 +12,8 @@ from mitex.methods.surface.domain import SurfaceDomain
 from mitex.scenes.cameras import Cameras, orbit
 from mitex.scenes.stage import Hits, Stage
 
-SAMPLES = 2  # by as many in a pixel
-SHADE = 0.35  # how much darker than facing the camera a surface is that is seen edge-on
+SAMPLES = 2  # rows and columns of samples in a pixel
+SHADE = 0.35  # how much darker a surface is that is seen edge-on than one that faces the camera
 
 
 class Views:
@@ -42,11 +42,11 @@ class Views:
         """Hits, the texels and weights that they read, and how bright they are."""
         hits = Stage(self.mesh).hits(self.cameras, SAMPLES)
         index, weight = self.domain.texels.bilinear(hits.face.numpy(), hits.barycentric.numpy())
-        towards = np.repeat(self._eyes, SAMPLES**2, axis=0)[hits.hit.numpy()]
+        towards = np.repeat(self._directions, SAMPLES**2, axis=0)[hits.hit.numpy()]
         facing = np.abs(dot(self.mesh.face_normals[hits.face.numpy()], towards))
         return hits, index, weight, (1 - SHADE * (1 - facing)).astype(np.float32)
 
     @property
-    def _eyes(self) -> np.ndarray:
+    def _directions(self) -> np.ndarray:
         """(K H W, 3) directions of the pixels' rays."""
         return self.cameras.rays()[1].reshape(-1, 3)

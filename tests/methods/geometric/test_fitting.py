@@ -102,7 +102,7 @@ def test_models_round_trip(run):
         assert np.array_equal(a, b)
 
 
-@pytest.mark.parametrize("damage", ["cut", "foreign", "nan", "noise", "missing"])
+@pytest.mark.parametrize("damage", ["cut", "foreign", "nan", "noise", "shape", "missing"])
 def test_what_is_no_model_is_refused(run, tmp_path, damage):
     from safetensors.torch import load_file, save_file
 
@@ -121,6 +121,10 @@ def test_what_is_no_model_is_refused(run, tmp_path, damage):
     elif damage == "noise":
         texture = GeometricTexture.load(source)
         replace(texture, fixed=texture.fixed[1:]).save(path)
+    elif damage == "shape":
+        texture = GeometricTexture.load(source)
+        texture.generators[0].parameters[0] = texture.generators[0].parameters[0][:1, :1]
+        texture.save(path)
     message = "there is no model in" if damage == "missing" else "geometric texture"
     with pytest.raises(CheckpointError, match=message):
         GeometricTexture.load(tmp_path)
@@ -229,6 +233,13 @@ def test_growth_starts_at_the_mesh_and_ends_at_the_result(run):
     assert np.array_equal(meshes[0].vertices, mesh.vertices)
     assert np.allclose(meshes[2].vertices, (meshes[0].vertices + meshes[4].vertices) / 2, atol=1e-6)
     assert np.allclose(meshes[-1].vertices, run[1].apply(mesh, seed=2, start_level=1).mesh.vertices)
+
+
+def test_the_advice_is_for_the_levels_that_grow(run):
+    """A growth that ends below the usual first level starts at its end."""
+    mesh, texture = icosphere(3), run[1]
+    assert texture.relative_size(mesh, end_level=1) == texture.relative_size(mesh, start_level=1)
+    assert texture.relative_size(mesh, end_level=1) != texture.relative_size(mesh)
 
 
 def test_interpolation_joins_two_seeds(run):

@@ -209,3 +209,14 @@ def test_the_report_by_known_shapes():
     inside_out = Mesh(ball.vertices, ball.faces[:, ::-1])
     assert report(inside_out, ball).flipped == len(ball.faces)
     assert report(inside_out, ball).normals > 176
+
+
+def test_settings_that_read_alike_side_by_side_are_kept_apart():
+    """Seed 1 with 23 steps, and seed 12 with 3."""
+    reference, template = normalised(egg(), find_template(egg()))
+    config = replace(QUICK, steps=1, fit_samples=100)
+    one, other = (
+        training_meshes(reference, template, replace(config, seed=seed, fit_steps=steps))[0][0]
+        for seed, steps in ((1, 23), (12, 3))
+    )
+    assert not torch.equal(one, other)

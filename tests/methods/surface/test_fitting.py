@@ -176,6 +176,11 @@ def test_vgg19_compares_its_own_layers():
     assert resolve(PRESETS, None, None, []).compared == ALL_LAYERS
 
 
+def test_an_unknown_content_layer_is_named_as_such():
+    with pytest.raises(ConfigError, match="content_layer is relu9_1"):
+        resolve(PRESETS, None, None, ["content_layer=relu9_1"])
+
+
 def test_more_than_the_memory_is_refused_with_the_estimate(mesh, monkeypatch):
     room = import_module("mitex.methods.surface.fitting")
     config = resolve(PRESETS, None, None, ["resolution=2000"])

@@ -11,16 +11,12 @@ from typing import Any
 import numpy as np
 
 from mitex.asset import Asset
-from mitex.export import SUFFIXES
-from mitex.images import write_image
+from mitex.export import Format, prepare_export
 from mitex.mesh import Similarity
 from mitex.methods.nerf.field.tensors import channels, rows
 from mitex.methods.nerf.training.plain import PlainField
 from mitex.methods.nerf.use.extract import CHUNK, solid_surface
-from mitex.paths import prepare_output
 from mitex.runtime.jit import mi
-
-PICTURES = (".png", ".jpg", ".jpeg")
 
 
 class AppliedField:
@@ -51,27 +47,26 @@ class AppliedField:
         """Colours of the surface's vertices, as `export` writes them."""
         return self.surface.maps
 
-    def export(self, path: str | os.PathLike[str]) -> Path:
+    def export(self, path: str | os.PathLike[str], maps_format: Format = "png") -> Path:
         """Writes what is solid as a coloured mesh, as of `Asset.export`.
 
         Raises:
             OutputError: unknown suffix or unwritable place.
             MeshError: nothing is solid.
         """
-        return self.surface.export(prepare_output(path, SUFFIXES))
+        prepare_export(path, maps_format=maps_format)
+        return self.surface.export(path, maps_format)
 
     def render(self, path: str | os.PathLike[str], *, exposure: float = 0.0, **options: Any) -> Path:
         """Path-traces the object in the studio, y upwards: PNG or JPEG; options as of `shell_still`.
 
         Raises:
             OutputError: unknown suffix or unwritable place.
+            ConfigError: an option out of range.
         """
-        from mitex.render import tone
-        from mitex.render.shell import shell_still
+        from mitex.render.shell import render_shell
 
-        target = prepare_output(path, PICTURES)
-        picture = shell_still(self, self.similarity, self.outline, **options)
-        return write_image(target, tone(picture, exposure))
+        return render_shell(self, self.similarity, self.outline, path, exposure=exposure, **options)
 
     @cached_property
     def surface(self) -> Asset:
