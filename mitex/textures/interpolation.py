@@ -66,9 +66,10 @@ def _shares(barycentric: Sequence[mi.Float]) -> list[mi.Float]:
     squares = [b * b for b in barycentric]
     products = [squares[k - 2] * squares[k - 1] for k in range(3)]
     total = products[0] + products[1] + products[2]
-    # At a corner all three are the corner's value.
-    inverse = dr.select(total > 0, dr.rcp(dr.maximum(total, 1e-30)), 0)
-    return [dr.select(total > 0, product * inverse, 1 / 3) for product in products]
+    # At a corner, and nearer to it than squares of squares can tell, all three are the corner's value.
+    known = total > 1e-30
+    inverse = dr.rcp(dr.maximum(total, 1e-30))
+    return [dr.select(known, product * inverse, 1 / 3) for product in products]
 
 
 def _add_side(
