@@ -293,3 +293,15 @@ def test_no_points(rng):
     mesh = icosphere(1)
     for kind in KINDS:
         assert _weights(mesh, kind, np.zeros(0), np.zeros((0, 3))).shape[0] == 0
+
+
+@pytest.mark.parametrize("distance", [1e-20, 1e-16, 1e-12, 1e-8])
+@pytest.mark.parametrize("kind", KINDS)
+def test_next_to_a_corner_is_the_value_of_the_corner(kind, distance: float):
+    """Even where squares of barycentric coordinates have no place in float32."""
+    mesh = _uneven()
+    values = np.random.default_rng(2).normal(size=(len(mesh.vertices), 2))
+    for barycentric in ((1, distance, 0), (1, distance, distance)):
+        points = np.broadcast_to(barycentric, (len(mesh.faces), 3))
+        result = _read(mesh, kind, _table(mesh, values, kind), np.arange(len(mesh.faces)), points)
+        np.testing.assert_allclose(result, values[mesh.faces[:, 0]], atol=1e-6)

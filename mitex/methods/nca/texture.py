@@ -17,6 +17,7 @@ from mitex.mesh import Mesh
 from mitex.methods.nca import files
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.field import fields
 from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.palette import Palette
@@ -94,18 +95,23 @@ class NcaTexture:
         laid = mesh if resolution is None or (keep_dense and scale != 1.0) else laid_out(mesh, resolution)
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
         steps = STEPS if steps is None else steps
-        state = self.grow(cells.mesh, seed=seed, steps=steps, orientation=orientation)
-        if "palette" in self.about:
-            generator = torch.Generator().manual_seed(seed)
-            operator = perception(cells.mesh, self.look.rule.degree, orientation, mean=self.look.mean)
-            palette = Palette.from_record(self.about["palette"])
-            state = healed(self.look, state, cells, operator, palette, generator)
-        grown = Grown(self.look, state, cells, orientation)
+        grown = Grown(self.look, self._healthy(cells, seed, steps, orientation), cells, orientation)
         asset = grown.asset()
         if resolution is None:
             return asset
         atlas = Atlas.build(cells.given, resolution, max(min(8, resolution // 8), 1), cells.given.uv)
         return replace(asset, atlas=atlas, texture_maps=grown.textures(atlas))
+
+    def fields(
+        self, mesh: Mesh, *, seed: int = 0, steps: int = STEPS, orientation: float = 0.0
+    ) -> dict[str, dict[str, Any]]:
+        """Grows the texture on a mesh and returns it as textures of a Mitsuba scene, by map, which are
+        decoded where rays meet the surface: `{"type": "principled", "base_color": fields["albedo"], ...}`.
+
+        A cell sits at each vertex of the mesh, and the shape in the scene must have these vertices; see
+        `mitex.mesh.subdivide_midpoint`. Other arguments and errors as of `apply`.
+        """
+        return fields(self.look, self._healthy(Cells(mesh, 0, mesh), seed, steps, orientation), mesh)
 
     def variants(
         self, mesh: Mesh, seeds: Iterable[int], *, resolution: int | None = 1024, **options: Any
@@ -171,6 +177,16 @@ class NcaTexture:
         for _ in range(steps):
             state = self.look.bounded(rule.evolve(state, operator, 1, generator))
         return state[0]
+
+    def _healthy(self, cells: Cells, seed: int, steps: int, orientation: float) -> torch.Tensor:
+        """What grows on the automaton's mesh, healed where it leaves the exemplar's colours."""
+        state = self.grow(cells.mesh, seed=seed, steps=steps, orientation=orientation)
+        if "palette" not in self.about:
+            return state
+        generator = torch.Generator().manual_seed(seed)
+        operator = perception(cells.mesh, self.look.rule.degree, orientation, mean=self.look.mean)
+        palette = Palette.from_record(self.about["palette"])
+        return healed(self.look, state, cells, operator, palette, generator)
 
     def _check_unconditioned(self) -> None:
         if self.look.rule.condition:

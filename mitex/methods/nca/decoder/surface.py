@@ -42,7 +42,8 @@ class Surface:
         self.mesh = mesh
         self._lookup = SurfaceLookup(mesh, interpolation)
         self._table = LinearMap(values_and_gradients(mesh)) if interpolation == "smooth" else None
-        self._corners = torch.from_numpy(np.column_stack([mesh.vertices, _edges(mesh)]).astype(np.float32))
+        corners = np.column_stack([mesh.vertices, mesh.edge_lengths]).astype(np.float32)
+        self._corners = torch.from_numpy(corners)
         self._faces = torch.from_numpy(mesh.faces.astype(np.int64))
 
     def table(self, state: torch.Tensor) -> torch.Tensor:
@@ -58,12 +59,3 @@ class Surface:
         corners = self._corners[self._faces[points.face.long()]]
         values = (points.barycentric[:, :, None] * corners).sum(1)
         return values[:, :3], values[:, 3]
-
-
-def _edges(mesh: Mesh) -> np.ndarray:
-    """(V,) mean lengths of the edges at each vertex; of all edges where it has none."""
-    graph = mesh.edges
-    lengths = np.linalg.norm(mesh.vertices[graph.indices] - mesh.vertices[graph.rows], axis=1)
-    total = np.bincount(graph.rows, lengths, len(mesh.vertices))
-    mean = float(lengths.mean()) if len(lengths) else 1.0
-    return np.where(total > 0, total / np.maximum(np.diff(graph.indptr), 1), mean)
