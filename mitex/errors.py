@@ -56,3 +56,7 @@ class CaptureWarning(MitexWarning):
 
 class MeshWarning(MitexWarning):
     """A mesh had flaws that have been handled."""
+
+
+class TextureWarning(MitexWarning):
+    """A texture that may not look as it was learned."""

@@ -87,7 +87,7 @@ def _add_side(
     t = dr.select(both > 0, barycentric[j] / dr.maximum(both, 1e-30), 0.5)
     # On the side: Hermite's cubic between its ends, the slope across it linear.
     (h0, d0, h1, d1), (g0, e0, g1, e1) = _hermite(t), _hermite_slopes(t)
-    radial = mi.Vector3f(apex - (p + t * edge))
+    radial = mi.Vector3f(apex - p) - t * edge
     # The way to the corner in the plane of the face, split along the side and across it.
     ahead = dr.dot(radial, edge) / length2
     height = dr.safe_sqrt(dr.squared_norm(radial) - ahead * ahead * length2)

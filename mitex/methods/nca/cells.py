@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from mitex.errors import ConfigError
 from mitex.geometry.triangles import nearest_on_triangles
@@ -87,7 +87,7 @@ def _nearest(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The points of a mesh that are nearest to points (P, 3), among the faces with the nearest centres."""
     corners = mesh.vertices[mesh.faces].astype(np.float64)
     count = min(CANDIDATES, len(corners))
-    _, faces = cKDTree(corners.mean(axis=1)).query(points, k=count, workers=-1)
+    _, faces = KDTree(corners.mean(axis=1)).query(points, k=count, workers=-1)
     faces = np.asarray(faces).reshape(len(points), count)
     best, face, barycentric = np.full(len(points), np.inf), faces[:, 0].copy(), np.zeros((len(points), 3))
     for candidate in faces.T:

@@ -28,7 +28,7 @@ class NcaConfig(TrainingConfig):
     """Everything that shapes a training; every key can be set from a TOML file or with `--set`."""
 
     preset: str = "patch"
-    steps: int = key(1000, "training steps", 0)
+    steps: int = key(900, "training steps", 0)
     channels: int = key(16, "channels of a cell's state", 12, 256)
     hidden: int = key(128, "width of the hidden layer", 1, 4096)
     degree: int = key(1, "highest degree of the spherical harmonics of the perception", 0, 2)
@@ -64,7 +64,7 @@ class NcaConfig(TrainingConfig):
     colour_weight: float = key(1.0, "of the comparison of colours, beside the layers", 0)
     colour_histogram: bool = key(True, "compare the histograms of the channels too")
     moment_weight: float = key(0.1, "of the moment terms, beside the transport terms", 0)
-    order_weight: float = key(0.0, "of the autocorrelation of the coarsest views, for regular patterns", 0)
+    order_weight: float = key(10.0, "of the autocorrelation of the coarsest views, for regular patterns", 0)
     appearance_weight: float = key(2.0, "of the appearance loss", 0)
     overflow_weight: float = key(100.0, "of the overflow loss", 0)
     decoder: bool = key(
@@ -74,14 +74,14 @@ class NcaConfig(TrainingConfig):
     coordinates: tuple[str, ...] = key(
         ("waves",), "local coordinates, of waves, barycentrics, polynomials; or none"
     )
-    waves: int = key(8, "number of waves of the solid noise", 1, 256)
-    wave_frequencies: tuple[float, ...] = key((2.0, 3.0), "of the waves [cycles per edge]", 0)
+    waves: int = key(12, "number of waves of the solid noise", 1, 256)
+    wave_frequencies: tuple[float, ...] = key((1.7, 2.3, 3.1), "of the waves [cycles per edge]", 0)
     wave_amplitude: float = key(0.3, "of the waves", 0)
     decoder_width: int = key(32, "of the decoder's hidden layers", 1, 1024)
     decoder_depth: int = key(3, "number of the decoder's hidden layers", 1, 16)
     omega: float = key(10.0, "factor in the decoder's sines", 0)
     lr: float = key(1e-3, "Adam's learning rate", 0)
-    milestones: tuple[int, ...] = key((500, 800), "steps at which the learning rate falls", 0)
+    milestones: tuple[int, ...] = key((500, 750), "steps at which the learning rate falls", 0)
     decay: float = key(0.3, "factor of the learning rate at a milestone", 0)
     normalise_gradients: bool = key(True, "divide each parameter tensor's gradient by its norm")
 
@@ -135,6 +135,7 @@ PRESETS = {
         aggregation="sum",
         overflow_weight=1e4,
         sphere="even",
+        order_weight=0.0,
         decoder=False,
         interpolation="linear",
         blend=False,

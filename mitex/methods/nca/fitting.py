@@ -12,6 +12,7 @@ from mitex.methods.nca import files
 from mitex.methods.nca.config import PRESETS, NcaConfig
 from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.look import Look
+from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.task import NcaTask
 from mitex.methods.nca.texture import NcaTexture
 from mitex.training.fit import Run
@@ -44,6 +45,8 @@ def fit(
     config = run.config
     maps = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
     origin: dict[str, Any] = {"exemplar": maps.name, "density": config.density}
+    if "albedo" in maps.maps:
+        origin["palette"] = Palette.of(maps.maps["albedo"]).record()
     parent = None
     if init is not None:
         parent, about = _parent(init, config, sorted(maps.maps))

@@ -16,7 +16,9 @@ from mitex.mesh import Mesh
 from mitex.methods.nca import files
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look
+from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import perception
 from mitex.runtime import keep_freed_memory
 
@@ -89,6 +91,11 @@ class NcaTexture:
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
         steps = STEPS if steps is None else steps
         state = self.grow(cells.mesh, seed=seed, steps=steps, orientation=orientation)
+        if "palette" in self.about:
+            generator = torch.Generator().manual_seed(seed)
+            operator = perception(cells.mesh, self.look.rule.degree, orientation, mean=self.look.mean)
+            palette = Palette.from_record(self.about["palette"])
+            state = healed(self.look, state, cells, operator, palette, generator)
         grown = Grown(self.look, state, cells, orientation)
         asset = grown.asset()
         if resolution is None:

@@ -1,0 +1,60 @@
+"""What a state shows that its exemplar does not, and growing such places anew."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import torch
+
+from mitex.errors import TextureWarning
+from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.look import Look
+from mitex.methods.nca.palette import Palette
+from mitex.methods.nca.perception import Perception
+
+ROUNDS, STEPS = 3, 60  # of growing anew, and the automaton's steps in each
+RINGS = 3  # of neighbours that start anew too
+FEW = 1e-3  # share of the cells that may have any colour: a dot here and there is a pattern's own
+
+
+@torch.no_grad()
+def healed(
+    look: Look,
+    state: torch.Tensor,
+    cells: Cells,
+    operator: Perception,
+    palette: Palette,
+    generator: torch.Generator,
+) -> torch.Tensor:
+    """A state (V, C) in which places of foreign colours were set back to the seed and have grown again.
+
+    A rule that was trained to grow from the seed and to keep its pattern repairs what is taken away. Where
+    foreign colours stay after all rounds, a `TextureWarning` says how much of the mesh has them.
+    """
+    own = Cells(cells.mesh, 0, cells.mesh)
+    for _ in range(ROUNDS):
+        foreign = palette.unlike(Grown(look, state, own).at_vertices()["albedo"])
+        if foreign.mean() <= FEW:
+            return state
+        state = torch.where(torch.from_numpy(_around(cells, foreign))[:, None], 0.0, state)
+        for _ in range(STEPS):
+            state = look.bounded(look.rule.evolve(state[None], operator, 1, generator))[0]
+    foreign = palette.unlike(Grown(look, state, own).at_vertices()["albedo"])
+    if foreign.mean() > FEW:
+        warnings.warn(
+            f"{foreign.mean():.1%} of '{cells.given.name}' has colours that the exemplar does not have; "
+            "try another seed, or remesh it evenly",
+            TextureWarning,
+            stacklevel=3,
+        )
+    return state
+
+
+def _around(cells: Cells, places: np.ndarray) -> np.ndarray:
+    """The vertices and their neighbours, `RINGS` times."""
+    graph = cells.mesh.edges
+    for _ in range(RINGS):
+        places = places | (np.bincount(graph.rows, places[graph.indices], len(places)) > 0)
+    return places
