@@ -55,7 +55,7 @@ def train(name: str, exemplars: Path) -> NcaTexture:
         init=MODELS / f"{PARENT}.safetensors" if child else None,
         resume=(run / checkpoint.NAME).is_file(),
     )
-    return NcaTexture(texture.model, texture.maps, {**texture.about, "name": name})
+    return NcaTexture(texture.look, {**texture.about, "name": name})
 
 
 def thumbnail(texture: NcaTexture, path: Path) -> None:

@@ -70,7 +70,7 @@ class Apply(MeshOptions):
     """Steps of the automaton."""
 
     subdivide: Annotated[str, arg(metavar="auto|N")] = "auto"
-    """How often to subdivide the mesh, each time to four times the faces; auto: to the training's density."""
+    """How often to subdivide the automaton's copy of the mesh; auto: to the training's density."""
 
     orientation: Annotated[float, arg(metavar="DEG")] = 0.0
     """Turns the texture on the surface [degrees]."""
@@ -83,6 +83,9 @@ class Apply(MeshOptions):
 
     vertex_colors: Annotated[bool, arg(help_behavior_hint="")] = False
     """Write colours at the vertices instead of textures."""
+
+    keep_dense: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Write the subdivided, rounded mesh instead of the given one."""
 
     def check(self) -> None:
         self._levels()
@@ -113,6 +116,7 @@ class Apply(MeshOptions):
             orientation=math.radians(self.orientation),
             scale=self.scale,
             resolution=(self.resolution or RESOLUTION) if textures else None,
+            keep_dense=self.keep_dense,
         )
 
     def _levels(self) -> int | str:

@@ -177,7 +177,7 @@ def test_half_precision_weights(tmp_path):
 
 
 def _checkpoint(look, step, **changes):
-    config = NcaConfig(hidden=look.rule.hidden, decoder_width=12, decoder_depth=2)
+    config = NcaConfig(hidden=look.rule.hidden, waves=8, decoder_width=12, decoder_depth=2)
     values = {
         "step": step,
         "seconds": 1.0,
