@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -102,13 +102,15 @@ class Asset:
             textures["normal"] = atlas.normal_map(self.mesh, atlas.interpolate(self.detail_normals()[faces]))
         return replace(self, atlas=atlas, texture_maps=textures)
 
-    def export(self, path: str | os.PathLike[str]) -> Path:
+    def export(self, path: str | os.PathLike[str], maps_format: Literal["png", "exr"] = "png") -> Path:
         """Writes the asset; the suffix chooses the format.
 
         - `.glb`: glTF 2.0; with PBR textures if baked, else with vertex colours.
         - `.obj`: with `.mtl` and PNG maps beside it; bakes at the default resolution if not yet baked.
         - `.ply`: binary, vertex colours, the other maps as float properties.
         - `.exr`: the maps in texture space, named channels; bakes if not yet baked.
+        - a folder, which exists or ends with a slash: each map as a file of its own in `maps_format`, named
+          as in an exemplar's folder, and mesh.obj; bakes if not yet baked.
 
         Returns:
             The path written.
@@ -118,7 +120,7 @@ class Asset:
         """
         from mitex.export import write_asset
 
-        return write_asset(self, path)
+        return write_asset(self, path, maps_format)
 
     def render(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Path-traces a still and writes it as PNG, JPEG or EXR; options as in `mitex.render.still`.

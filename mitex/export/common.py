@@ -35,9 +35,9 @@ def plain_name(name: str) -> str:
     return re.sub(r"[^\w.-]+", "_", name).strip(".") or "asset"
 
 
-def png(image: np.ndarray) -> bytes:
-    """An (H, W, 1 or 3) image in [0, 1] as 8-bit PNG that names us as its `Software`."""
-    pixels = np.round(image * 255.0).astype(np.uint8)
+def png(image: np.ndarray, bits: int = 8) -> bytes:
+    """An (H, W, 1 or 3) image in [0, 1] as PNG that names us as its `Software`; 16 bits for one channel."""
+    pixels = np.round(image * (2.0**bits - 1)).astype(np.uint8 if bits == 8 else np.uint16)
     buffer, mark = io.BytesIO(), PngInfo()
     mark.add_text("Software", f"{GENERATOR} {__version__}")
     picture = Image.fromarray(pixels[..., 0] if pixels.shape[2] == 1 else pixels)

@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 
+from mitex import __version__
 from mitex.asset import Asset
 from mitex.colour import srgb_to_linear
 from mitex.errors import ConfigError, ImageError
 from mitex.exemplar import MAPS
+from mitex.export.common import GENERATOR
 from mitex.paths import atomic_write, prepare_output
 
 # Channel names within a layer.
@@ -41,7 +43,11 @@ def write_exr(path: str | os.PathLike[str], channels: Mapping[str, np.ndarray], 
     dtype = np.float16 if half else np.float32
     limit = np.finfo(dtype).max
     arrays = {k: np.ascontiguousarray(np.clip(v, -limit, limit), dtype) for k, v in channels.items()}
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    header = {
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        "software": f"{GENERATOR} {__version__}",
+    }
     with atomic_write(target) as temporary:
         try:
             OpenEXR.File(header, arrays).write(str(temporary))
@@ -61,6 +67,15 @@ def read_exr(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
             return {k: v.pixels for k, v in file.channels().items()}
     except Exception as e:  # RuntimeError and others, by version
         raise ImageError(f"{path} is not a readable EXR file", "check the path") from e
+
+
+def is_exr_of_ours(path: Path) -> bool:
+    """Whether a file is an EXR that `write_exr` made, and that no other program has saved since."""
+    try:
+        with OpenEXR.File(str(path), header_only=True) as file:
+            return str(file.header().get("software", "")).startswith(f"{GENERATOR} ")
+    except Exception:  # RuntimeError and others, by version
+        return False
 
 
 def map_channels(maps: Mapping[str, np.ndarray], prefix: str = "") -> dict[str, np.ndarray]:

@@ -7,7 +7,9 @@ mesh: `_VERTEX`, the vertex before splitting at UV seams, and `_HEIGHT`, for whi
 from __future__ import annotations
 
 import json
+import os
 import struct
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +17,20 @@ import numpy as np
 
 from mitex.asset import Asset
 from mitex.colour import srgb_to_linear
+from mitex.errors import ConfigError, OutputError
 from mitex.export.common import DEFAULT_ALBEDO, DEFAULT_ROUGHNESS, GENERATOR, png
 from mitex.export.glb_read import read_glb
 from mitex.geometry.tangents import split_at_seams
-from mitex.paths import atomic_write
+from mitex.paths import atomic_write, prepare_output
 
-__all__ = ["glb_bytes", "read_glb", "write_glb"]
+__all__ = ["glb_bytes", "read_glb", "write_glb", "write_variants"]
 
 _VECTORS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 _FLOAT, _UINT32 = 5126, 5125
 _VERTEX_BUFFER, _INDEX_BUFFER = 34962, 34963
 _LINEAR, _MIPMAPPED, _CLAMP = 9729, 9987, 33071
+LARGEST = 2**32 - 64  # [bytes]; lengths are 32-bit numbers
+_VARIANTS = "KHR_materials_variants"
 
 
 def write_glb(asset: Asset, path: Path) -> None:
@@ -42,27 +47,91 @@ def glb_bytes(asset: Asset) -> bytes:
     Not baked: COLOR_0 (linear), the detail normals as NORMAL, and all maps as `_NAME` attributes.
     """
     builder = _Builder()
+    primitive = _primitive(asset, builder)
+    return _container(_document(asset.name, primitive, [_material(asset, builder)], builder), builder.blob)
+
+
+def write_variants(assets: Iterable[Asset], path: str | os.PathLike[str]) -> Path:
+    """Writes several looks of one mesh as one GLB: viewers offer them by name (KHR_materials_variants), and
+    others, `Asset.load` among them, show the first one.
+
+    Args:
+        assets: baked, on the same mesh and UV layout, with names of their own; they are taken one at a time.
+        path: target, .glb.
+
+    Returns:
+        The path written.
+
+    Raises:
+        ConfigError: no asset, one without textures, on another mesh or layout, or a name twice.
+        OutputError: wrong suffix or unwritable place, or more than 4 GB.
+    """
+    target, builder = prepare_output(path, (".glb",)), _Builder()
+    materials: list[dict[str, Any]] = []
+    first, primitive = None, {}
+    for asset in assets:
+        if first is None:
+            first = asset
+            primitive = _primitive(asset, builder)
+        _check_variant(asset, first, [material["name"] for material in materials])
+        materials.append(_material(asset, builder))
+    if first is None:
+        raise ConfigError("there are no variants to write", "give at least one asset")
+    which = range(len(materials))
+    primitive["extensions"] = {_VARIANTS: {"mappings": [{"material": k, "variants": [k]} for k in which]}}
+    document = _document(first.mesh.name, primitive, materials, builder)
+    names = [{"name": material["name"]} for material in materials]
+    document |= {"extensionsUsed": [_VARIANTS], "extensions": {_VARIANTS: {"variants": names}}}
+    data = _container(document, builder.blob)
+    with atomic_write(target) as temporary:
+        temporary.write_bytes(data)
+    return target
+
+
+def _check_variant(asset: Asset, first: Asset, names: list[str]) -> None:
+    if asset.atlas is None or first.atlas is None:
+        raise ConfigError(f"variant '{asset.name}' has no textures", "bake it first")
+    if asset.name in names:
+        raise ConfigError(f"there are two variants '{asset.name}'", "give each asset a name of its own")
+    ours = asset.mesh.vertices, asset.mesh.faces, asset.atlas.uv
+    theirs = first.mesh.vertices, first.mesh.faces, first.atlas.uv
+    if not all(map(np.array_equal, ours, theirs)):
+        raise ConfigError(
+            f"variant '{asset.name}' is on another mesh or UV layout than '{first.name}'",
+            "bake all of them on one layout",
+        )
+
+
+def _primitive(asset: Asset, builder: _Builder) -> dict[str, Any]:
     attributes = _baked_attributes(asset) if asset.texture_maps else _vertex_attributes(asset)
     faces = attributes.pop("faces")
-    primitive = {
+    return {
         "attributes": {
             k: builder.accessor(v, _VERTEX_BUFFER, k == "POSITION") for k, v in attributes.items()
         },
         "indices": builder.accessor(faces.reshape(-1, 1).astype(np.uint32), _INDEX_BUFFER),
         "material": 0,
     }
-    material = _textured(asset, builder) if asset.texture_maps else _plain(asset)
-    document: dict[str, Any] = {
+
+
+def _material(asset: Asset, builder: _Builder) -> dict[str, Any]:
+    # Both sides: open meshes (a Moebius strip has no other choice).
+    look = _textured(asset, builder) if asset.texture_maps else _plain(asset)
+    return {"name": asset.name, "doubleSided": True, **look}
+
+
+def _document(
+    name: str, primitive: dict[str, Any], materials: list[dict[str, Any]], builder: _Builder
+) -> dict[str, Any]:
+    return {
         "asset": {"version": "2.0", "generator": GENERATOR},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0, "name": asset.name}],
-        "meshes": [{"primitives": [primitive], "name": asset.name}],
-        # Both sides: open meshes (a Moebius strip has no other choice).
-        "materials": [{"name": asset.name, "doubleSided": True, **material}],
+        "nodes": [{"mesh": 0, "name": name}],
+        "meshes": [{"primitives": [primitive], "name": name}],
+        "materials": materials,
         **builder.document,
     }
-    return _container(document, builder.blob)
 
 
 def _baked_attributes(asset: Asset) -> dict[str, np.ndarray]:
@@ -196,6 +265,11 @@ class _Builder:
 def _container(document: dict[str, Any], blob: bytes) -> bytes:
     text = json.dumps(document, separators=(",", ":"), ensure_ascii=False).encode()
     text += b" " * (-len(text) % 4)
+    if len(text) + len(blob) >= LARGEST:
+        raise OutputError(
+            f"a GLB of {(len(text) + len(blob)) / 1e9:.1f} GB is not possible",
+            "use fewer or smaller textures; 4 GB is the format's limit",
+        )
     chunks = (
         struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(blob), 0x004E4942) + blob
     )

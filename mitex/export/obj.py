@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
 from mitex.asset import Asset
-from mitex.errors import ImageError, MeshError, OutputError
+from mitex.errors import ImageError, MeshError
 from mitex.exemplar import MAPS
 from mitex.export.common import (
     DEFAULT_ALBEDO,
     GENERATOR,
     asset_from_textures,
     foreign,
-    is_png_of_ours,
     plain_name,
     png,
 )
+from mitex.export.together import Inputs, check_files, write_files
 from mitex.images import read_image
 from mitex.mesh import Mesh
-from mitex.paths import atomic_write, prepare_output
 
 # Material keywords, the first one is read back. `norm` and `map_Pr` are the PBR extension of the format;
 # Blender reads the normal map from `map_Bump`. Nothing standard fits occlusion: ambient colour comes closest.
@@ -37,31 +34,15 @@ _KEYWORDS = {
 }
 
 
-def check_side_files(
-    path: Path, maps: Iterable[str] = MAPS, inputs: Iterable[str | os.PathLike[str] | None] = ()
-) -> None:
+def check_side_files(path: Path, maps: Iterable[str] = MAPS, inputs: Inputs = ()) -> None:
     """Checks that the files beside the mesh `path` may be written: NAME.mtl and NAME_MAP.png for each map.
 
     Raises:
         OutputError: one of them exists and is not ours, is one of the inputs, or cannot be written.
     """
     stem = plain_name(path.stem)
-    for name in [f"{stem}.mtl", *(f"{stem}_{k}.png" for k in maps)]:
-        side = prepare_output(path.with_name(name), inputs=inputs)
-        is_ours = is_png_of_ours if side.suffix == ".png" else _is_material_of_ours
-        if os.path.lexists(side) and not is_ours(side):
-            raise OutputError(
-                f"'{path.name}' comes with '{side}', and a file of that name exists that Mitex did not write",
-                "name another --out",
-            )
-
-
-def _is_material_of_ours(path: Path) -> bool:
-    try:
-        with path.open("rb") as file:
-            return file.readline(80).strip() == f"# {GENERATOR}".encode()
-    except OSError:
-        return False
+    names = [f"{stem}.mtl", *(f"{stem}_{k}.png" for k in maps)]
+    check_files([path.with_name(name) for name in names], path.name, inputs)
 
 
 def write_obj(asset: Asset, path: Path) -> None:
@@ -73,37 +54,52 @@ def write_obj(asset: Asset, path: Path) -> None:
     check_side_files(path, asset.texture_maps or asset.vertex_maps)
     if asset.texture_maps is None:
         asset = asset.baked()
+    stem, maps = plain_name(path.stem), asset.texture_maps or {}
+    names = {name: f"{stem}_{name}.png" for name in maps}
+    files = {path.with_name(names[name]): partial(_write_png, image) for name, image in maps.items()}
+    write_files(files | mesh_files(asset, path, names))
+
+
+def mesh_files(asset: Asset, path: Path, names: Mapping[str, str]) -> dict[Path, Callable[[Path], object]]:
+    """The mesh and its material file, for `write_files`.
+
+    Args:
+        asset: baked.
+        path: of the mesh.
+        names: map -> name of its file, beside the mesh.
+    """
     stem = plain_name(path.stem)
-    files = {f"{stem}_{k}.png": png(v) for k, v in (asset.texture_maps or {}).items()}
-    files[f"{stem}.mtl"] = _material(asset, stem).encode()
-    with ExitStack() as stack:
-        # All are written before the first one gets its name; the mesh, which refers to the others, last.
-        mesh = stack.enter_context(atomic_write(path))
-        for name, data in files.items():
-            stack.enter_context(atomic_write(path.with_name(name))).write_bytes(data)
-        with mesh.open("wb") as file:
-            _write_mesh(file, asset, stem)
+    return {
+        path.with_name(f"{stem}.mtl"): lambda file: file.write_text(_material(asset, stem, names)),
+        path: lambda file: _write_mesh(file, asset, stem),
+    }
 
 
-def _material(asset: Asset, stem: str) -> str:
+def _write_png(image: np.ndarray, path: Path) -> None:
+    path.write_bytes(png(image))
+
+
+def _material(asset: Asset, stem: str, names: Mapping[str, str]) -> str:
     grey = 1.0 if "albedo" in asset.vertex_maps else DEFAULT_ALBEDO
     lines = [f"# {GENERATOR}", f"newmtl {stem}", f"Kd {grey} {grey} {grey}", "Ks 0 0 0", "Pm 0", "illum 2"]
-    for name in asset.texture_maps or {}:
-        lines += [f"{keyword} {stem}_{name}.png" for keyword in _KEYWORDS[name]]
+    for name, file in names.items():
+        lines += [f"{keyword} {file}" for keyword in _KEYWORDS[name]]
     return "\n".join(lines) + "\n"
 
 
-def _write_mesh(file: BinaryIO, asset: Asset, stem: str) -> None:
+def _write_mesh(path: Path, asset: Asset, stem: str) -> None:
     mesh, atlas = asset.mesh, asset.atlas
     assert atlas is not None
     pairs, uv_index = np.unique(atlas.uv.reshape(-1, 2), axis=0, return_inverse=True)
-    file.write(f"# {GENERATOR}\nmtllib {stem}.mtl\no {plain_name(asset.name)}\nusemtl {stem}\n".encode())
-    # Nine digits give every float32 back exactly.
-    np.savetxt(file, mesh.vertices, "v %.9g %.9g %.9g")
-    np.savetxt(file, pairs, "vt %.9g %.9g")
-    np.savetxt(file, mesh.normals, "vn %.6g %.6g %.6g")
     corners = np.stack([mesh.faces, uv_index.reshape(-1, 3), mesh.faces], axis=2) + 1
-    np.savetxt(file, corners.reshape(-1, 9), "f %d/%d/%d %d/%d/%d %d/%d/%d")
+    with path.open("wb") as file:
+        head = f"# {GENERATOR}\nmtllib {stem}.mtl\no {plain_name(asset.name)}\nusemtl {stem}\n"
+        file.write(head.encode())
+        # Nine digits give every float32 back exactly.
+        np.savetxt(file, mesh.vertices, "v %.9g %.9g %.9g")
+        np.savetxt(file, pairs, "vt %.9g %.9g")
+        np.savetxt(file, mesh.normals, "vn %.6g %.6g %.6g")
+        np.savetxt(file, corners.reshape(-1, 9), "f %d/%d/%d %d/%d/%d %d/%d/%d")
 
 
 def read_obj(path: Path) -> Asset:

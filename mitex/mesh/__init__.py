@@ -1,6 +1,7 @@
 """Meshes: loading, checking, shapes, subdivision, remeshing, quality."""
 
 from mitex.mesh.embedded import embedded, embedded_names
+from mitex.mesh.lattice import Lattice
 from mitex.mesh.mesh import Mesh, Similarity
 from mitex.mesh.quality import QualityReport, quality
 from mitex.mesh.remesh import remesh
@@ -11,6 +12,7 @@ from mitex.mesh.validate import validate
 
 __all__ = [
     "EdgeGraph",
+    "Lattice",
     "Mesh",
     "QualityReport",
     "Similarity",

@@ -35,13 +35,14 @@ def mutually_exclusive(first: str, second: str, condition: bool) -> None:
 
 
 def reject_unused(option: str, out: Path, condition: bool) -> None:
-    """Refuses an option that means nothing for the kind of file to be written.
+    """Refuses an option that means nothing for the kind of file, or the folder, to be written.
 
     Raises:
         ConfigError: `condition` says that it was given for such a file.
     """
     if condition:
-        raise ConfigError(f"{option} means nothing for {out.suffix} files", "leave it out or change --out")
+        kind = f"{out.suffix} files" if out.suffix else "folders"
+        raise ConfigError(f"{option} means nothing for {kind}", "leave it out or change --out")
 
 
 def merged_settings(groups: Sequence[Sequence[str]], **flags: object) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 
 if TYPE_CHECKING:
     import numpy as np
@@ -21,8 +21,8 @@ class Applied(Protocol):
         """What the surface wears, name -> float32 values, per vertex (V, C) or as an image (H, W, C)."""
         ...
 
-    def export(self, path: str | os.PathLike[str]) -> Path:
-        """Writes it; the suffix chooses the format (.glb, .obj, .ply, .exr).
+    def export(self, path: str | os.PathLike[str], maps_format: Literal["png", "exr"] = "png") -> Path:
+        """Writes it; the suffix chooses the format (.glb, .obj, .ply, .exr), or it is a folder of maps.
 
         Raises:
             OutputError: Another suffix, or an unwritable place.

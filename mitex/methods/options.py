@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from mitex.methods.checks import SEEDS, in_range, merged_settings
+from mitex.methods.checks import SEEDS, in_range, merged_settings, reject_unused
 from mitex.training.settings import RunOptions
 
 if TYPE_CHECKING:
@@ -96,23 +96,37 @@ class ApplyOptions:
     model: Annotated[Positional[str], arg(metavar="RUN|MODEL")]
     """Run folder, model file, or name of a bundled model (see `mitex models`)."""
 
-    out: Annotated[Path, arg(metavar="ASSET|PICTURE")]
+    out: Annotated[str, arg(metavar="ASSET|PICTURE|DIR/")]
     """File to write: .glb (PBR textures), .obj (with .mtl and PNG maps), .ply (vertex colours), .exr (the
-    maps as layers), or a picture (.png .jpg)."""
+    maps as layers), or a picture (.png .jpg). A folder, which exists or ends with a slash, gets each map as a
+    file of its own, and mesh.obj."""
+
+    maps_format: Annotated[Literal["png", "exr"], arg(metavar="png|exr")] = "png"
+    """Format of the maps in a folder."""
 
     def run(self) -> None:
         """Applies the texture, writes the file, and prints its path."""
         self.check()
-        from mitex.export import prepare_export
-
-        out = prepare_export(self.out, EXPORTS + PICTURES, self.inputs())
+        out = self.prepared()
         self.check_output(out)
+        self.write(out)
+        print(self.out)
+
+    def prepared(self) -> Path:
+        """--out as an absolute path, once it is sure that it can be written."""
+        from mitex.export import is_folder, prepare_export
+
+        out = prepare_export(self.out, EXPORTS + PICTURES, self.inputs(), self.maps_format)
+        reject_unused("--maps-format", out, self.maps_format == "exr" and not is_folder(self.out))
+        return out
+
+    def write(self, out: Path) -> None:
+        """Applies the texture and writes it to `out`, which has been checked."""
         applied = self.applied(out)
         if out.suffix.lower() in PICTURES:
             applied.render(out, **self.picture_options())
         else:
-            applied.export(out)
-        print(self.out)
+            applied.export(self.out, self.maps_format)
 
     def check(self) -> None:
         """Refuses values out of range, before anything is read."""
@@ -132,6 +146,19 @@ class ApplyOptions:
     def applied(self, out: Path) -> Applied:
         """The texture on the mesh, as `out` needs it."""
         raise NotImplementedError
+
+
+@dataclass(kw_only=True)
+class OptionalMeshOptions(ApplyOptions):
+    """Options of the methods that make maps without a mesh, too."""
+
+    mesh: Annotated[str | None, arg(metavar="MESH|NAME", help_behavior_hint="")] = None
+    """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
+
+    def inputs(self) -> list[Path | str]:
+        from mitex.mesh.files import mesh_files
+
+        return [*super().inputs(), *([] if self.mesh is None else mesh_files(self.mesh))]
 
 
 @dataclass(kw_only=True)

@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
-from mitex.methods.options import ExemplarOptions, MeshOptions
+from mitex.methods.nca.config import TILE_CELLS, TILE_SIDES
+from mitex.methods.options import EXPORTS, PICTURES, ExemplarOptions, OptionalMeshOptions
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
 
 RESOLUTION = 1024  # of baked textures [texels]
+MOST_VARIANTS = 32
 
 
 @dataclass(kw_only=True)
@@ -54,13 +56,16 @@ class Fit(ExemplarOptions):
 
 
 @dataclass(kw_only=True)
-class Apply(MeshOptions):
-    """Grow a cellular automaton's texture on a mesh.
+class Apply(OptionalMeshOptions):
+    """Grow a cellular automaton's texture on a mesh, or on a square that repeats (--tile).
 
     examples:
       mitex apply runs/pebbles --mesh bunny.obj --out bunny.glb
       mitex apply pebbles --mesh bunny.obj --out bunny.glb --subdivide 2 --resolution 2048
       mitex apply pebbles --mesh scan.ply --out scan.glb --vertex-colors --seed 7 --orientation 45
+      mitex apply pebbles --mesh bunny.obj --out bunny.glb --variants 5
+      mitex apply pebbles --mesh bunny.obj --out maps/ --maps-format exr
+      mitex apply pebbles --tile 1024 --out pebbles-tile
     """
 
     seed: Annotated[int, arg(metavar="N")] = 0
@@ -87,9 +92,22 @@ class Apply(MeshOptions):
     keep_dense: Annotated[bool, arg(help_behavior_hint="")] = False
     """Write the subdivided, rounded mesh instead of the given one."""
 
+    variants: Annotated[int, arg(metavar="N")] = 1
+    """Looks that a .glb offers on the one mesh, each with the next seed (KHR_materials_variants)."""
+
+    tile: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None
+    """In place of a mesh: write maps of N x N pixels that repeat without a seam to the folder --out."""
+
+    tile_cells: Annotated[
+        int | None, arg(metavar="N", help_behavior_hint="(default: the exemplar about twice)")
+    ] = None
+    """Cells along a side of the tile; more make the pattern finer."""
+
     def check(self) -> None:
         self._levels()
+        in_range("--variants", self.variants, 1, MOST_VARIANTS)
         in_range("--seed", self.seed, *SEEDS)
+        in_range("--seed", self.seed + self.variants - 1, *SEEDS)
         in_range("--steps", self.steps, 1, 10_000)
         in_range("--orientation", self.orientation, -360.0, 360.0)
         in_range("--scale", self.scale, 0.05, 20.0)
@@ -97,27 +115,90 @@ class Apply(MeshOptions):
         mutually_exclusive(
             "--resolution", "--vertex-colors", self.resolution is not None and self.vertex_colors
         )
+        mutually_exclusive("--variants", "--vertex-colors", self.variants > 1 and self.vertex_colors)
+        self._check_tile()
+
+    def _check_tile(self) -> None:
+        if self.tile is None:
+            if self.mesh is None:
+                raise ConfigError("--mesh is missing", "give --mesh MESH, or --tile N for maps that repeat")
+            if self.tile_cells is not None:
+                raise ConfigError("--tile-cells means nothing without --tile", "give both or neither")
+            return
+        in_range("--tile", self.tile, *TILE_SIDES)
+        in_range("--tile-cells", self.tile_cells, *TILE_CELLS)
+        others = {
+            "--mesh": self.mesh is not None,
+            "--subdivide": self.subdivide != "auto",
+            "--orientation": self.orientation != 0,
+            "--scale": self.scale != 1,
+            "--resolution": self.resolution is not None,
+            "--vertex-colors": self.vertex_colors,
+            "--keep-dense": self.keep_dense,
+            "--variants": self.variants > 1,
+        }
+        for option, used in others.items():
+            mutually_exclusive("--tile", option, used)
+        place = Path(self.out)
+        reject_unused("--tile", place, place.suffix.lower() in EXPORTS + PICTURES)
+
+    def prepared(self) -> Path:
+        if self.tile is None:
+            return super().prepared()
+        from mitex.export import check_folder
+        from mitex.paths import expanded
+
+        return check_folder(expanded(self.out), self.maps_format, self.inputs(), mesh=False)
 
     def check_output(self, out: Path) -> None:
         suffix = out.suffix.lower()
-        reject_unused("--vertex-colors", out, self.vertex_colors and suffix in (".obj", ".exr"))
-        reject_unused("--resolution", out, self.resolution is not None and suffix == ".ply")
+        if self.tile is None:
+            coloured = suffix in (".glb", ".ply", *PICTURES)
+            reject_unused("--vertex-colors", out, self.vertex_colors and not coloured)
+            reject_unused("--resolution", out, self.resolution is not None and suffix == ".ply")
+            reject_unused("--variants", out, self.variants > 1 and suffix != ".glb")
+
+    def write(self, out: Path) -> None:
+        from mitex.export import write_maps, write_variants
+        from mitex.methods.nca import NcaTexture
+
+        if self.tile is not None:
+            texture = NcaTexture.load(self.model)
+            maps = texture.tile(self.tile, cells=self.tile_cells, seed=self.seed, steps=self.steps)
+            write_maps(maps, out, self.maps_format)
+        elif self.variants > 1:
+            from mitex.mesh import Mesh
+
+            seeds = range(self.seed, self.seed + self.variants)
+            options = self._growth(out)
+            assets = NcaTexture.load(self.model).variants(Mesh.load(self._mesh), seeds, **options)
+            write_variants(assets, out)
+        else:
+            super().write(out)
 
     def applied(self, out: Path) -> Asset:
         from mitex.mesh import Mesh
         from mitex.methods.nca import NcaTexture
 
+        texture, mesh = NcaTexture.load(self.model), Mesh.load(self._mesh)
+        return texture.apply(mesh, seed=self.seed, **self._growth(out))
+
+    @property
+    def _mesh(self) -> str:
+        assert self.mesh is not None
+        return self.mesh
+
+    def _growth(self, out: Path) -> dict[str, Any]:
+        """Options of `NcaTexture.apply` but the seed."""
         textures = out.suffix.lower() != ".ply" and not self.vertex_colors
-        return NcaTexture.load(self.model).apply(
-            Mesh.load(self.mesh),
-            seed=self.seed,
-            steps=self.steps,
-            subdivide=self._levels(),
-            orientation=math.radians(self.orientation),
-            scale=self.scale,
-            resolution=(self.resolution or RESOLUTION) if textures else None,
-            keep_dense=self.keep_dense,
-        )
+        return {
+            "steps": self.steps,
+            "subdivide": self._levels(),
+            "orientation": math.radians(self.orientation),
+            "scale": self.scale,
+            "resolution": (self.resolution or RESOLUTION) if textures else None,
+            "keep_dense": self.keep_dense,
+        }
 
     def _levels(self) -> int | str:
         if self.subdivide == "auto":

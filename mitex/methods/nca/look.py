@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import deepcopy
 
 import torch
 from torch import nn
@@ -67,6 +68,13 @@ class Look(nn.Module):
     def interpolation(self) -> Kind:
         """Of the states between the vertices."""
         return self.decoder.shape.interpolation if isinstance(self.decoder, Decoder) else "linear"
+
+    def repeating(self, period: float, edge: float) -> Look:
+        """A copy whose local coordinates repeat after `period` in x and y, where edges are `edge` long."""
+        look = deepcopy(self)
+        if isinstance(look.decoder, Decoder):
+            look.decoder.waves = look.decoder.waves.repeating(period, edge)
+        return look
 
     def initialise(self, generator: torch.Generator, gain: float) -> None:
         """Draws weights: the rule's with `gain` in its last layer, then the decoder's."""

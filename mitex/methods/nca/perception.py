@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import weakref
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
 
 from mitex.errors import ConfigError
 from mitex.geometry.vectors import rotate_about, scatter_add
-from mitex.mesh import Mesh
+from mitex.mesh import Lattice, Mesh
 from mitex.sparse import csr_tensor
 
 REGULAR = 6.0  # valence of a regular mesh
@@ -98,13 +99,30 @@ def perception(
     key = (degree, np.asarray(orientation, np.float64).tobytes(), str(device), mean)
     operators = _cache.setdefault(mesh, {})
     if key not in operators:
-        operators[key] = _build(mesh, degree, orientation, device, mean)
+        matrix = _matrix(mesh, degree, orientation, mean)
+        operators[key] = _operator(matrix, len(mesh.vertices), device)
     return operators[key]
 
 
-def _build(
-    mesh: Mesh, degree: int, orientation: float | np.ndarray, device: torch.device | str, mean: bool
-) -> Perception:
+def lattice_perception(lattice: Lattice, degree: int = 1, mean: bool = False) -> Perception:
+    """The perception operator of the vertices in the square of a lattice: those at its sides have the ones at
+    the opposite sides as neighbours. Arguments as of `perception`.
+    """
+    import scipy.sparse
+
+    count, blocks = lattice.count, HARMONICS[degree] + 1
+    matrix = _matrix(lattice.mesh, degree, 0.0, mean)[: count * blocks]
+    entries = matrix.data, lattice.source[matrix.indices], matrix.indptr
+    return _operator(scipy.sparse.csr_array(entries, shape=(count * blocks, count)), count)
+
+
+def _operator(matrix: Any, vertices: int, device: torch.device | str = "cpu") -> Perception:
+    blocks = matrix.shape[0] // vertices
+    return Perception(csr_tensor(matrix, device), csr_tensor(matrix.T.tocsr(), device), vertices, blocks)
+
+
+def _matrix(mesh: Mesh, degree: int, orientation: float | np.ndarray, mean: bool) -> Any:
+    """(V * blocks, V) scipy CSR."""
     import scipy.sparse
 
     count, blocks = len(mesh.vertices), HARMONICS[degree] + 1
@@ -129,5 +147,4 @@ def _build(
     columns = np.concatenate([np.repeat(neighbours, blocks - 1), np.repeat(own, blocks)])
     own_weights = np.concatenate([-centre, np.ones((count, 1))], axis=1)
     values = np.concatenate([weights.ravel(), own_weights.ravel()]).astype(np.float32)
-    matrix = scipy.sparse.csr_array((values, (rows, columns)), shape=(count * blocks, count))
-    return Perception(csr_tensor(matrix, device), csr_tensor(matrix.T.tocsr(), device), count, blocks)
+    return scipy.sparse.csr_array((values, (rows, columns)), shape=(count * blocks, count))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 
 from mitex.asset import Asset
@@ -19,10 +20,13 @@ from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.palette import Palette
-from mitex.methods.nca.perception import perception
+from mitex.methods.nca.perception import Perception, lattice_perception, perception
+from mitex.methods.nca.tile import flat_cells, tile_maps
 from mitex.runtime import keep_freed_memory
 
 STEPS = 200  # enough for the pattern to settle at every density tried
+DENSITY = 32.0  # cells along the exemplar's width, of models that do not say it
+REPEATS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,14 +107,48 @@ class NcaTexture:
         atlas = Atlas.build(cells.given, resolution, max(min(8, resolution // 8), 1), cells.given.uv)
         return replace(asset, atlas=atlas, texture_maps=grown.textures(atlas))
 
+    def variants(
+        self, mesh: Mesh, seeds: Iterable[int], *, resolution: int | None = 1024, **options: Any
+    ) -> Iterator[Asset]:
+        """One asset for each seed, all on one mesh and one UV layout, with the seed in its name; options as
+        of `apply`.
+        """
+        laid = mesh if resolution is None else laid_out(mesh, resolution)
+        for seed in seeds:
+            asset = self.apply(laid, seed=seed, resolution=resolution, **options)
+            yield replace(asset, name=f"seed {seed}")
+
+    def tile(
+        self, resolution: int = 1024, *, cells: int | None = None, seed: int = 0, steps: int | None = None
+    ) -> dict[str, np.ndarray]:
+        """Grows the texture on a flat square whose opposite sides are joined.
+
+        Args:
+            resolution: side of the maps [px], 16 to 8192.
+            cells: along a side, 8 to 1024; if None, the exemplar appears about `REPEATS` times along it.
+            seed, steps: as of `apply`.
+
+        Returns:
+            Maps (N, N, c) float32 in [0, 1], row 0 on top, the exemplar's up upwards; they go on at their
+            opposite sides.
+
+        Raises:
+            ConfigError: options out of range, or the model needs a condition.
+        """
+        cells = round(REPEATS * float(self.about.get("density", DENSITY))) if cells is None else cells
+        lattice = flat_cells(cells, resolution)
+        operator = lattice_perception(lattice, self.look.rule.degree, self.look.mean)
+        state = self.grow(operator, seed=seed, steps=STEPS if steps is None else steps)
+        return tile_maps(self.look, state, lattice, resolution)
+
     @torch.no_grad()
     def grow(
-        self, mesh: Mesh, *, seed: int = 0, steps: int = STEPS, orientation: float = 0.0
+        self, mesh: Mesh | Perception, *, seed: int = 0, steps: int = STEPS, orientation: float = 0.0
     ) -> torch.Tensor:
         """The state of the automaton after some steps, held within the bounds of the training's.
 
         Args:
-            mesh: any mesh.
+            mesh: any mesh, or its perception operator, which has an orientation of its own.
             seed: of the random updates.
             steps: from the initial state, which is zero.
             orientation: as in `apply` [rad].
@@ -125,8 +163,9 @@ class NcaTexture:
         if steps < 0:
             raise ConfigError(f"{steps} steps", "give 0 or more")
         keep_freed_memory()
-        rule = self.look.rule
-        operator = perception(mesh, rule.degree, orientation, mean=self.look.mean)
+        rule, operator = self.look.rule, mesh
+        if isinstance(operator, Mesh):
+            operator = perception(operator, rule.degree, orientation, mean=self.look.mean)
         generator = torch.Generator().manual_seed(seed)
         state = rule.seed(operator)
         for _ in range(steps):

@@ -8,18 +8,23 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from mitex.methods.options import ExemplarOptions, MeshOptions
+from mitex.errors import ConfigError
+from mitex.methods.checks import in_range, mutually_exclusive
+from mitex.methods.options import ExemplarOptions, OptionalMeshOptions
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
 
+TILE_SIDES = (32, 4096)  # of a tile [px]
+
 
 @dataclass(kw_only=True)
 class Fit(ExemplarOptions):
-    """Synthesize a texture directly on one mesh, without views and without seams (tangent-space CNN).
+    """Synthesize a texture directly on one mesh, without views and without seams (tangent-space CNN), or on a
+    flat square that repeats (--tile).
 
     The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the texture;
-    `mitex apply RUN --mesh MESH --out ASSET` writes it. Ctrl-C saves, and --resume goes on.
+    `mitex apply RUN --out ASSET` writes it. Ctrl-C saves, and --resume goes on.
 
     examples:
       mitex fit surface --exemplar pebbles.png --mesh bunny.obj --out runs/bunny
@@ -28,10 +33,14 @@ class Fit(ExemplarOptions):
       mitex fit surface --exemplar painting.png --mesh bunny.obj --content ao --out runs/painted
       mitex fit surface --exemplar bark.png --mesh tree.obj --orientation along.npy --out runs/tree
       mitex fit surface --exemplar pebbles.png --mesh bunny.obj --out runs/bunny --resume
+      mitex fit surface --exemplar maps/ --tile 1024 --out runs/tile
     """
 
-    mesh: Annotated[str, arg(metavar="MESH|NAME")]
+    mesh: Annotated[str | None, arg(metavar="MESH|NAME", help_behavior_hint="")] = None
     """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
+
+    tile: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None
+    """In place of a mesh: a texture of N x N pixels that repeats without a seam."""
 
     preset: Annotated[str | None, arg(metavar="fast|paper|style", help_behavior_hint="(default: fast)")] = (
         None
@@ -52,12 +61,13 @@ class Fit(ExemplarOptions):
     """Use the mesh's own UVs, which must not overlap."""
 
     def run(self) -> None:
-        options = self.run_options(resolution=self.resolution)
+        self._check_tile()
+        options = self.run_options(resolution=self.tile or self.resolution)
         from mitex.exemplar import Exemplar
         from mitex.mesh import Mesh
 
-        exemplar, mesh = Exemplar.load(self.exemplar), Mesh.load(self.mesh)
-        out = self.folder(f"{exemplar.name}-{mesh.name}")
+        exemplar, mesh = Exemplar.load(self.exemplar), Mesh.load(self.mesh) if self.mesh else None
+        out = self.folder(f"{exemplar.name}-{'tile' if mesh is None else mesh.name}")
         from mitex.methods import surface
 
         surface.fit(
@@ -71,18 +81,33 @@ class Fit(ExemplarOptions):
         )
         print(out)
 
+    def _check_tile(self) -> None:
+        in_range("--tile", self.tile, *TILE_SIDES)
+        if self.mesh is None and self.tile is None:
+            raise ConfigError("--mesh is missing", "give --mesh MESH, or --tile N for a texture that repeats")
+        others = {
+            "--mesh": self.mesh is not None,
+            "--resolution": self.resolution is not None,
+            "--content": self.content is not None,
+            "--orientation": self.orientation is not None,
+            "--keep-uvs": self.keep_uvs,
+        }
+        for option, used in others.items():
+            mutually_exclusive("--tile", option, self.tile is not None and used)
+
 
 @dataclass(kw_only=True)
-class Apply(MeshOptions):
-    """Write a surface texture on the mesh that it was synthesized on.
+class Apply(OptionalMeshOptions):
+    """Write a surface texture on the mesh that it was synthesized on, which --mesh may name again.
 
     examples:
       mitex apply runs/bunny --mesh bunny.obj --out bunny.glb
+      mitex apply runs/tile --out tile/
     """
 
     def applied(self, out: Path) -> Asset:
         from mitex.mesh import Mesh
         from mitex.methods.surface import SurfaceTexture
 
-        mesh = Mesh.load(self.mesh)
+        mesh = None if self.mesh is None else Mesh.load(self.mesh)
         return SurfaceTexture.load(self.model).apply(mesh)

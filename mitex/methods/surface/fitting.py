@@ -22,6 +22,7 @@ from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.orientation import read_orientation
 from mitex.methods.surface.task import SurfaceTask
 from mitex.methods.surface.texture import SurfaceTexture
+from mitex.methods.surface.tile import TileDomain
 from mitex.runtime import available_memory
 from mitex.training.fit import Run
 from mitex.training.lbfgs import Lbfgs
@@ -35,7 +36,7 @@ PADDING = 2  # texels between charts: bilinear taps of one never see the other
 
 def fit(
     exemplar: Exemplar | str | Path,
-    mesh: Mesh | str | Path,
+    mesh: Mesh | str | Path | None,
     out: str | Path,
     *,
     keep_uvs: bool = False,
@@ -47,7 +48,7 @@ def fit(
 
     Args:
         exemplar: maps, or what `Exemplar.load` takes.
-        mesh: or what `Mesh.load` takes.
+        mesh: or what `Mesh.load` takes; None for a flat tile that repeats without a seam.
         out: run folder; must be new or empty, or hold a run to resume.
         keep_uvs: use the mesh's own UVs.
         content: style transfer: a texture on the mesh's own UVs (an image file), which are kept then, or "ao"
@@ -69,10 +70,18 @@ def fit(
     settings = run.config
     target = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
     image = content is not None and str(content) != AO
-    surface = with_layout(mesh if isinstance(mesh, Mesh) else Mesh.load(mesh), settings, keep_uvs or image)
-    field = read_orientation(orientation, surface) if isinstance(orientation, str | Path) else orientation
-    check_memory(surface, settings, len(target.maps))
-    domain = SurfaceDomain.of(surface, settings, field)
+    field = None
+    if mesh is None:
+        if keep_uvs or content is not None or orientation is not None:
+            raise ConfigError("a tile takes no UVs, content or orientation", "leave them out")
+        domain: SurfaceDomain = TileDomain.flat(settings)
+    else:
+        surface = with_layout(
+            mesh if isinstance(mesh, Mesh) else Mesh.load(mesh), settings, keep_uvs or image
+        )
+        field = read_orientation(orientation, surface) if isinstance(orientation, str | Path) else orientation
+        domain = SurfaceDomain.of(surface, settings, field)
+    check_memory(domain.mesh, settings, len(target.maps))
     start = None if content is None else content_colours(content, domain)
     inputs = {"content": content_key(start), "orientation": content_key(field)}
     task = SurfaceTask(settings, target, domain, start, inputs)

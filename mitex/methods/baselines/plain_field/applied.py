@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 
 from mitex.asset import Asset
-from mitex.export import SUFFIXES
+from mitex.export import Format, prepare_export
 from mitex.mesh import Similarity
 from mitex.methods.nerf.field.tensors import channels, rows
 from mitex.methods.nerf.training.plain import PlainField
 from mitex.methods.nerf.use.extract import CHUNK, solid_surface
-from mitex.paths import prepare_output
 from mitex.runtime.jit import mi
 
 
@@ -48,14 +47,15 @@ class AppliedField:
         """Colours of the surface's vertices, as `export` writes them."""
         return self.surface.maps
 
-    def export(self, path: str | os.PathLike[str]) -> Path:
+    def export(self, path: str | os.PathLike[str], maps_format: Format = "png") -> Path:
         """Writes what is solid as a coloured mesh, as of `Asset.export`.
 
         Raises:
             OutputError: unknown suffix or unwritable place.
             MeshError: nothing is solid.
         """
-        return self.surface.export(prepare_output(path, SUFFIXES))
+        prepare_export(path, maps_format=maps_format)
+        return self.surface.export(path, maps_format)
 
     def render(self, path: str | os.PathLike[str], *, exposure: float = 0.0, **options: Any) -> Path:
         """Path-traces the object in the studio, y upwards: PNG or JPEG; options as of `shell_still`.

@@ -10,7 +10,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -40,6 +40,12 @@ class Waves:
         vectors = lengths * unit(rng.normal(size=(count, 3)))
         phases = rng.random(count)
         return Waves(torch.from_numpy(vectors).float(), torch.from_numpy(phases).float(), amplitude)
+
+    def repeating(self, period: float, edge: float) -> Waves:
+        """The nearest waves that repeat after `period` along each axis, where edges are `edge` long."""
+        octave = math.floor(math.log2(edge)) + 1  # the coarser one of the two that are mixed
+        periods = period * 2.0**-octave
+        return replace(self, vectors=(self.vectors * periods).round() / periods)
 
     def __call__(self, position: torch.Tensor, edge: torch.Tensor) -> torch.Tensor:
         """(P, N) values at positions (P, 3) where edges are `edge` (P,) long, in the same units.

@@ -12,7 +12,7 @@ import torch
 
 from mitex.asset import Asset
 from mitex.errors import ConfigError
-from mitex.export import SUFFIXES
+from mitex.export import Format, prepare_export
 from mitex.mesh import Mesh
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field.decoder import Decoder
@@ -23,7 +23,6 @@ from mitex.methods.nerf.field.shell import Shell, shell_cells, shell_reach
 from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents, uv_frames
 from mitex.methods.nerf.use.extract import extract_mesh
 from mitex.methods.nerf.use.placement import in_scene_cube, uv_unit_length
-from mitex.paths import prepare_output
 from mitex.runtime.jit import mi
 from mitex.textures.march import DIAGONAL
 
@@ -107,13 +106,14 @@ class AppliedTexture(Shell):
         """The latent features on the mesh's UVs, (H, W, C)."""
         return {"features": self._maps.features}
 
-    def export(self, path: str | os.PathLike[str]) -> Path:
+    def export(self, path: str | os.PathLike[str], maps_format: Format = "png") -> Path:
         """Writes what is solid as a coloured mesh, as of `Asset.export`.
 
         Raises:
             OutputError: unknown suffix or unwritable place.
         """
-        return self.extract().export(prepare_output(path, SUFFIXES))
+        prepare_export(path, maps_format=maps_format)
+        return self.extract().export(path, maps_format)
 
     def render(self, path: str | os.PathLike[str], *, exposure: float = 0.0, **options: Any) -> Path:
         """Path-traces the texture in the studio: PNG or JPEG; options as of `shell_still`.

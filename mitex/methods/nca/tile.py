@@ -1,0 +1,75 @@
+"""Maps that repeat: what a look shows on a flat lattice whose opposite sides are joined."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from mitex.errors import ConfigError
+from mitex.exemplar import MAPS
+from mitex.geometry.normal_maps import decode, encode
+from mitex.mesh import Lattice
+from mitex.methods.nca.bake import CHUNK, Grown
+from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.config import TILE_CELLS, TILE_SIDES
+from mitex.methods.nca.look import Look
+
+EDGE = 0.0376  # of the sphere that the default preset trains on: it mixes waves in the same shares
+
+
+def flat_cells(cells: int, resolution: int) -> Lattice:
+    """The lattice of an automaton for maps of a resolution; arguments and errors as of `NcaTexture.tile`."""
+    for name, value, (low, high) in (("cells", cells, TILE_CELLS), ("pixels", resolution, TILE_SIDES)):
+        if not low <= value <= high:
+            raise ConfigError(f"a tile of {value} {name} along a side", f"use {low} to {high}")
+    return Lattice.of(cells, EDGE)
+
+
+def tile_maps(look: Look, state: torch.Tensor, lattice: Lattice, resolution: int) -> dict[str, np.ndarray]:
+    """Maps (N, N, c) of a state (V, C) of the cells in a lattice's square, as of `NcaTexture.tile`."""
+    sampled = Sampled(look, state, lattice)
+    maps = {name: np.empty((resolution, resolution, MAPS[name]), np.float32) for name in look.maps}
+    height = max(CHUNK // resolution, 1)
+    for top in range(0, resolution, height):
+        rows = np.arange(top, min(top + height, resolution))
+        values = sampled.values(rows, np.arange(resolution), resolution)
+        for name, columns in look.layout.items():
+            channels = values[..., list(columns)]
+            maps[name][rows] = _unit(channels) if name == "normal" else channels
+    return maps
+
+
+class Sampled:
+    """A state on a lattice, read at pixels of the plane.
+
+    Args:
+        look: the decoder and the maps.
+        state: (V, C) of the cells in the square.
+        lattice: their places.
+    """
+
+    def __init__(self, look: Look, state: torch.Tensor, lattice: Lattice) -> None:
+        self.lattice = lattice
+        cells = Cells(lattice.mesh, 0, lattice.mesh)
+        spread = state[torch.from_numpy(lattice.source)]
+        self.grown = Grown(look.repeating(lattice.period, EDGE), spread, cells)
+
+    def values(self, rows: np.ndarray, columns: np.ndarray, resolution: int) -> np.ndarray:
+        """Values (R, C, K) in [0, 1] at the centres of pixels, of which `resolution` are a period.
+
+        Args:
+            rows: (R,) integers, row 0 at the top of the square; any others are pixels beyond it.
+            columns: (C,) integers, to the right.
+            resolution: pixels in a period.
+        """
+        # Whole numbers, so that a pixel and its copies are evaluated at exactly the same place.
+        y = 1 - (rows % resolution + 0.5) / resolution
+        x = (columns % resolution + 0.5) / resolution
+        points = np.stack(np.broadcast_arrays(x, y[:, None]), axis=2).reshape(-1, 2)
+        return self.grown.values(*self.lattice.locate(points)).reshape(len(rows), len(columns), -1)
+
+
+def _unit(encoded: np.ndarray) -> np.ndarray:
+    """A normal map whose normals have length 1; its frame is that of the image."""
+    axes = np.eye(3, dtype=np.float32)
+    return encode(decode(encoded, *axes), *axes)

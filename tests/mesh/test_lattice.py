@@ -1,0 +1,57 @@
+"""The flat lattice whose opposite sides are joined."""
+
+import numpy as np
+import pytest
+
+from mitex.errors import MeshError
+from mitex.geometry.triangles import interpolate
+from mitex.mesh import Lattice
+
+
+@pytest.fixture(scope="module")
+def lattice():
+    return Lattice.of(12, edge=0.25)
+
+
+def test_the_square_is_filled_with_even_triangles(lattice):
+    mesh = lattice.mesh
+    assert (lattice.columns, lattice.rows, lattice.count, lattice.period) == (12, 14, 168, 3.0)
+    own = mesh.vertices[: lattice.count]
+    assert own.min() >= 0 and own[:, :2].max() < lattice.period and not own[:, 2].any()
+    assert (mesh.edges.valence[: lattice.count] == 6).all()
+    lengths = np.linalg.norm(mesh.vertices[mesh.edges.indices] - mesh.vertices[mesh.edges.rows], axis=1)
+    assert lengths.min() > 0.98 * 0.25 and lengths.max() < 1.02 * 0.25
+    assert np.allclose(mesh.face_normals, [0, 0, 1])
+
+
+def test_copies_are_whole_periods_away(lattice):
+    apart = (lattice.mesh.vertices - lattice.mesh.vertices[lattice.source]) / lattice.period
+    assert np.allclose(apart, np.rint(apart), atol=1e-6)
+    assert np.array_equal(lattice.source[: lattice.count], np.arange(lattice.count))
+    assert not np.rint(apart[: lattice.count]).any() and np.rint(apart[lattice.count :]).any(axis=1).all()
+
+
+def test_points_lie_where_they_are_located(lattice, rng):
+    """In the square, wherever in the plane the point is; on faces whose corners have all their neighbours."""
+    points = np.concatenate([rng.uniform(-2, 3, (2000, 2)), [[0, 0], [1, 1], [-1e-17, 0.5], [0.5, -1e-17]]])
+    face, barycentric = lattice.locate(points)
+    assert barycentric.min() > -1e-5 and np.allclose(barycentric.sum(1), 1, atol=1e-6)
+    corners = lattice.mesh.faces[face]
+    place = interpolate(barycentric, lattice.mesh.vertices[corners])[:, :2] / lattice.period
+    away = place - points
+    assert np.allclose(away, np.rint(away), atol=1e-5)
+    assert place.min() > -1e-5 and place.max() < 1 + 1e-5
+    assert (lattice.mesh.edges.valence[corners] == 6).all()
+
+
+def test_points_whole_periods_apart_are_one(lattice, rng):
+    points = rng.integers(0, 1024, (500, 2)) / 1024
+    shifted = points + rng.integers(-3, 4, (500, 2))
+    for one, other in zip(lattice.locate(points), lattice.locate(shifted), strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_too_few_columns():
+    assert Lattice.of(4).rows == 4
+    with pytest.raises(MeshError, match="3 columns"):
+        Lattice.of(3)
