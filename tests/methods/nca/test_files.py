@@ -64,6 +64,7 @@ def test_a_decoder_survives_saving(tmp_path, shape, mean):
     """Bit by bit, with everything that shapes it; so does what it shows."""
     look = Look(MeshNCA(hidden=8), ("albedo", "height"), shape, mean)
     look.initialise(torch.Generator().manual_seed(1), gain=0.5)
+    look.track(torch.rand(9, 16, generator=torch.Generator().manual_seed(2)))  # other bounds
     original = NcaTexture(look, {"name": "tiny"})
     again = NcaTexture.load(original.save(tmp_path / "m.safetensors"))
     assert _same(again.look, look) and again.look.mean == mean
@@ -297,6 +298,12 @@ def test_weights_that_are_not_finite(tmp_path, value):
         ({"maps": ["albedo", "glitter"]}, "glitter"),
         ({"maps": []}, "unknown maps"),
         ({"maps": 3}, "damaged"),
+        ({"palette": 3}, "damaged"),
+        ({"palette": {"colours": [[0, 0, 0]]}}, "damaged"),
+        ({"palette": {"colours": [[0, 0]], "radius": 1}}, "damaged"),
+        ({"palette": {"colours": [], "radius": 1}}, "damaged"),
+        ({"palette": {"colours": [[0, 0, float("nan")]], "radius": 1}}, "damaged"),
+        ({"palette": {"colours": [[0, 0, 0]], "radius": 1}, "maps": ["height"]}, "damaged"),
         ([1], "damaged"),
         ("{", "damaged"),
     ],

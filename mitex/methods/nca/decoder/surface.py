@@ -13,7 +13,7 @@ from mitex.plugins import init
 from mitex.sparse import LinearMap
 from mitex.textures.interpolation import Kind, SurfaceLookup
 
-# Mean length of the edges in decoder units: that of the sphere that the default preset trains on, so that even
+# Mean length of the edges in decoder units: that of the sphere that the default preset trains on. So even
 # meshes of any size mix waves in the shares that the training saw.
 EDGE = 0.03775
 
