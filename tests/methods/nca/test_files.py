@@ -260,6 +260,17 @@ def test_bundled_models_are_found_by_name():
         assert path.stat().st_size < 100_000
 
 
+@pytest.mark.parametrize("name", sorted(bundled(METHOD)))
+def test_bundled_models_grow(name):
+    """Those that were trained before there was a decoder, too: as their maps are channels of the state."""
+    texture = NcaTexture.load(name)
+    maps = texture.apply(icosphere(3), steps=5, subdivide=1, resolution=32).texture_maps
+    assert set(maps) == set(texture.look.maps)
+    state = texture.grow(icosphere(3), steps=30)
+    assert 0.01 < state.abs().max() < 1.2
+    assert isinstance(texture.look.decoder, Readout) != texture.look.mean
+
+
 def _tensors(**changes):
     tensors = {k: v.clone() for k, v in MeshNCA(hidden=8).state_dict().items()}
     return {k: v for k, v in (tensors | changes).items() if v is not None}
