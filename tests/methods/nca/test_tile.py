@@ -12,9 +12,10 @@ from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.coordinates import Waves
 from mitex.methods.nca.decoder.shape import DecoderShape
+from mitex.methods.nca.decoder.surface import EDGE, decoder_units
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.perception import harmonics, lattice_perception
-from mitex.methods.nca.tile import EDGE, Sampled, flat_cells, tile_maps
+from mitex.methods.nca.tile import Sampled, flat_cells, tile_maps
 
 MAPS = ("albedo", "normal")
 SIDE = 64  # of maps [px]
@@ -107,7 +108,8 @@ def test_what_is_read_goes_on_across_the_sides(lattice, state, interpolation, rn
     one, other = copies(lattice)
     assert len(one) > 4 * lattice.columns
     weights = rng.dirichlet([1, 1, 1], len(one)).astype(np.float32)
-    grown = Grown(model.repeating(lattice.period, EDGE), spread, cells)
+    period = lattice.period / decoder_units(lattice.mesh).scale
+    grown = Grown(model.repeating(period, EDGE), spread, cells)
     assert np.abs(grown.values(one, weights) - grown.values(other, weights)).max() < 2e-3
     untiled = Grown(model, spread, cells)
     assert np.abs(untiled.values(one, weights) - untiled.values(other, weights)).max() > 0.02
