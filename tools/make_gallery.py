@@ -15,47 +15,45 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from mitex import bridge
-from mitex.asset import Asset
 from mitex.exemplar import Exemplar
+from mitex.exemplar import names as exemplar_names
 from mitex.images import write_image
 from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods.nca import NcaTexture
+from mitex.methods.nca.grounds import Ground
 from mitex.render import sheet, still, tone
 from mitex.scenes.cameras import orbit
-from mitex.scenes.stage import Stage
 
 sys.path.insert(0, str(Path(__file__).parent))
-from make_models import EXEMPLARS  # noqa: E402
+from make_models import RECIPES  # noqa: E402
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 UNSEEN = ("spot", "fish", "mug")
-TEASER = {"waffle": "octopus", "honeycomb": "knot", "pebbles": "vase", "bricks": "shaderball"}
-CELL = 200
+TEASER = {"ceramic": "octopus", "honeycomb": "knot", "pebbles": "vase", "bricks": "shaderball"}
+FREQUENCY, RESOLUTION, CELL = 32, 2048, 256
 
 
-def maps_of(asset: Asset) -> list[np.ndarray]:
-    """Unlit views of every map, in the order of the exemplar's names."""
-    stage = Stage(asset.mesh)
-    visibility = stage.visibility(orbit(1, distance=2.05, resolution=CELL), antialias=2)
-    views = []
-    for values in asset.vertex_maps.values():
-        field = torch.from_numpy(np.ascontiguousarray(np.broadcast_to(values, (len(values), 3))))
-        views.append(bridge.lookup(field, visibility, background=1.0)[0].numpy())
-    return views
+def unlit(texture: NcaTexture) -> list[np.ndarray]:
+    """Views of every map on the training sphere, in the order of the exemplar's names."""
+    mesh = icosphere(FREQUENCY)
+    ground = Ground.of(mesh, texture.look)
+    with torch.no_grad():
+        cameras = orbit(1, distance=2.05, resolution=CELL)
+        view = ground.views(texture.look, texture.grow(mesh), cameras, antialias=4)[0].clamp(0, 1).numpy()
+    return [np.broadcast_to(view[..., list(c)], (CELL, CELL, 3)) for c in texture.look.layout.values()]
 
 
 def one(texture: NcaTexture, exemplar: Exemplar, meshes: Path) -> np.ndarray:
     """The sheet of a model, (H, W, 3) sRGB in [0, 1]."""
-    sphere = texture.apply(icosphere(64))
-    assets = [sphere, *(texture.apply(Mesh.load(meshes / f"{mesh}.obj")) for mesh in UNSEEN)]
+    unseen = [Mesh.load(meshes / f"{mesh}.obj") for mesh in UNSEEN]
+    assets = [texture.apply(mesh, resolution=RESOLUTION) for mesh in (icosphere(FREQUENCY), *unseen)]
     lit = [tone(still(asset, resolution=CELL, spp=96)) for asset in assets]
     square = exemplar.resized(CELL).maps
-    exemplar_maps = [np.broadcast_to(square[m], (CELL, CELL, 3)) for m in sphere.vertex_maps]
-    rows = [square["albedo"], *lit, *exemplar_maps, *maps_of(sphere)]
+    names = texture.look.maps
+    rows = [square["albedo"], *lit, *(np.broadcast_to(square[name], (CELL, CELL, 3)) for name in names)]
     labels = [f"exemplar {exemplar.name}", "sphere", *UNSEEN]
-    labels += [f"exemplar: {m}" for m in sphere.vertex_maps] + [f"grown: {m}" for m in sphere.vertex_maps]
-    return sheet(rows, columns=5, labels=labels, cell=CELL)
+    labels += [f"exemplar: {name}" for name in names] + [f"grown: {name}" for name in names]
+    return sheet([*rows, *unlit(texture)], columns=5, labels=labels, cell=CELL)
 
 
 def teaser() -> np.ndarray:
@@ -70,10 +68,10 @@ def main() -> None:
     GALLERY.mkdir(parents=True, exist_ok=True)
     if len(sys.argv) == 3:
         write_image(GALLERY / "teaser.jpg", teaser())
-    for word in sys.argv[3:] or EXEMPLARS:
-        name, folder, source = word.split("=") if "=" in word else (word, EXEMPLARS[word], word)
-        exemplar = Exemplar.load(exemplars / folder)
-        write_image(GALLERY / f"{name}.jpg", one(NcaTexture.load(source), exemplar, meshes))
+    for word in sys.argv[3:] or RECIPES:
+        name, source, model = word.split("=") if "=" in word else (word, RECIPES[word].exemplar, word)
+        exemplar = Exemplar.load(source if source in exemplar_names() else exemplars / source)
+        write_image(GALLERY / f"{name}.jpg", one(NcaTexture.load(model), exemplar, meshes))
 
 
 if __name__ == "__main__":

@@ -11,8 +11,10 @@ its run folder under runs/models/ can be resumed by calling the script again.
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
+from mitex.exemplar import names as exemplar_names
 from mitex.images import write_image
 from mitex.mesh import embedded
 from mitex.methods.nca import PRESETS, NcaTexture, fit
@@ -21,41 +23,62 @@ from mitex.training import checkpoint, resolve
 
 RUNS = Path("runs/models")
 MODELS = Path(__file__).parents[1] / "mitex" / "data" / "models"
-PARENT = "waffle"
-# The waffle's bars are coarse: fewer vertices to the exemplar leave more of them in a view.
-SETTINGS = {
-    "waffle": ("density=64", "resolution=80"),
-    "pebbles": ("steps=1450", "milestones=1200,1400"),
-    "bricks": ("steps=2050", "milestones=1800,1950"),
-    "honeycomb": ("steps=900", "milestones=500,800"),
-}
-EXEMPLARS = {
-    "waffle": "Waffle_001",
-    "pebbles": "Pebbles_025",
-    "bricks": "Bricks_Terracotta_003",
-    "honeycomb": "Honeycomb_002",
+PARENT = "ceramic"
+# The settings before there was a decoder, of the models that have not been trained anew.
+UNDECODED = (
+    *("decoder=false", "sphere=even", "aggregation=sum", "order_weight=0", "overflow_weight=1e4"),
+    *("frequency=48", "min_steps=20", "max_steps=32", "zooms=1", "view_count=8", "resolution=64"),
+    *("density=96", "exemplar_size=128", "pooling=average", "steps=1000", "milestones=750,900"),
+    "layers=relu1_1,relu1_2,relu2_1,relu2_2,relu3_1,relu3_2,relu3_3,relu4_3,relu5_3",
+)
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How a model is trained.
+
+    Attributes:
+        exemplar: name of an embedded one, or of a folder in EXEMPLARS.
+        parent: the model that it starts from.
+        settings: other than the default preset's.
+    """
+
+    exemplar: str
+    parent: str | None = PARENT
+    settings: tuple[str, ...] = ()
+
+
+RECIPES = {
+    PARENT: Recipe("scales", None),
+    # The waffle's bars are coarse: fewer vertices to the exemplar leave more of them in a view.
+    "waffle": Recipe("Waffle_001", None, (*UNDECODED, "density=64", "resolution=80")),
+    "pebbles": Recipe("Pebbles_025", "waffle", (*UNDECODED, "steps=1450", "milestones=1200,1400")),
+    "bricks": Recipe("Bricks_Terracotta_003", "waffle", (*UNDECODED, "steps=2050", "milestones=1800,1950")),
+    "honeycomb": Recipe("Honeycomb_002", "waffle", (*UNDECODED, "steps=900", "milestones=500,800")),
 }
 
 
 def record(name: str) -> dict[str, object]:
     """What the file of a model trained by this table says of its training."""
-    settings = resolve(PRESETS, overrides=SETTINGS[name])
-    about: dict[str, object] = {"name": name, "exemplar": EXEMPLARS[name], "preset": settings.preset}
+    recipe = RECIPES[name]
+    settings = resolve(PRESETS, overrides=recipe.settings)
+    about: dict[str, object] = {"name": name, "exemplar": recipe.exemplar, "preset": settings.preset}
     about |= {"steps": settings.steps, "density": settings.density}
-    return about if name == PARENT else about | {"parent": PARENT}
+    return about | ({"parent": recipe.parent} if recipe.parent else {})
 
 
 def train(name: str, exemplars: Path) -> NcaTexture:
-    """Fits one model with the default preset, from the parent unless it is the parent."""
-    run, child = RUNS / name, name != PARENT
+    """Fits one model with the default preset, from its parent if it has one."""
+    recipe, run = RECIPES[name], RUNS / name
+    embedded_one = recipe.exemplar in exemplar_names()
     texture = fit(
-        exemplars / EXEMPLARS[name],
+        recipe.exemplar if embedded_one else exemplars / recipe.exemplar,
         run,
-        overrides=SETTINGS[name],
-        init=MODELS / f"{PARENT}.safetensors" if child else None,
+        overrides=recipe.settings,
+        init=MODELS / f"{recipe.parent}.safetensors" if recipe.parent else None,
         resume=(run / checkpoint.NAME).is_file(),
     )
-    return NcaTexture(texture.model, texture.maps, {**texture.about, "name": name})
+    return NcaTexture(texture.look, {**texture.about, "name": name})
 
 
 def thumbnail(texture: NcaTexture, path: Path) -> None:
@@ -66,7 +89,7 @@ def thumbnail(texture: NcaTexture, path: Path) -> None:
 
 def main() -> None:
     exemplars = Path(sys.argv[1])
-    for name in sys.argv[2:] or EXEMPLARS:
+    for name in sys.argv[2:] or RECIPES:
         texture = train(name, exemplars)
         texture.save(MODELS / f"{name}.safetensors")
         thumbnail(texture, MODELS / f"{name}.png")

@@ -46,7 +46,7 @@ def linear(corners: Corners, barycentric: Sequence[mi.Float]) -> tuple[list[mi.U
 
 
 def smooth(corners: Corners, barycentric: Sequence[mi.Float]) -> tuple[list[mi.UInt32], list[mi.Float]]:
-    """Rows and weights of the smooth interpolant in the table of `with_gradients`."""
+    """Rows and weights of the smooth interpolant in the table of `mesh.gradients`."""
     value = [mi.Float(0), mi.Float(0), mi.Float(0)]
     slope = [mi.Vector3f(0), mi.Vector3f(0), mi.Vector3f(0)]
     for k, share in enumerate(_shares(barycentric)):
@@ -130,6 +130,10 @@ class SurfaceLookup:
 
     def weights(self, face: torch.Tensor, barycentric: torch.Tensor) -> Weights:
         """What the points on `face` (P,) int32 at `barycentric` (P, 3) float32 read."""
+        columns = len(self.mesh.vertices) * (4 if self.kind == "smooth" else 1)
+        if not len(face):  # Dr.Jit has no arithmetic on empty arrays
+            width = 12 if self.kind == "smooth" else 3
+            return Weights(face.new_empty(0, width), barycentric.new_empty(0, width), columns)
         b = [mi.Float(barycentric[:, k].contiguous()) for k in range(3)]
         triangle = 3 * mi.UInt32(face.to(torch.int32).contiguous())
         index = [dr.gather(mi.UInt32, self._faces, triangle + k) for k in range(3)]
@@ -139,4 +143,4 @@ class SurfaceLookup:
         rows = [mi.Int32(row) for row in rows]
         dr.eval(rows, weights)
         stacked = [torch.stack([cast(torch.Tensor, x.torch()) for x in v], 1) for v in (rows, weights)]
-        return Weights(*stacked, columns=len(self.mesh.vertices) * (4 if self.kind == "smooth" else 1))
+        return Weights(*stacked, columns)

@@ -6,6 +6,7 @@ from mitex.geometry.triangles import (
     barycentric_gradients,
     interpolate,
     nearest_on_border,
+    nearest_on_triangles,
     triangle_crosses,
     twice_area,
 )
@@ -49,3 +50,45 @@ def test_sides_without_length_are_points():
     triangle = np.zeros((1, 3, 2), np.float32)
     barycentric, distance = nearest_on_border(triangle, np.array([[3.0, 4.0]], np.float32))
     assert distance[0] == 5.0 and np.isfinite(barycentric).all()
+
+
+def _dense(triangle, count=60):
+    """Points all over a triangle, (N, 3), and their greatest distance from each other's neighbours."""
+    i, j = np.meshgrid(np.arange(count + 1), np.arange(count + 1), indexing="ij")
+    inside = i + j <= count
+    weights = np.stack([i, j, count - i - j], -1)[inside] / count
+    return weights @ triangle, np.linalg.norm(triangle - np.roll(triangle, 1, axis=0), axis=1).max() / count
+
+
+def test_nearest_points_of_triangles_against_dense_samples(rng):
+    """Points above, beside and below triangles in space."""
+    triangles, points = rng.normal(size=(60, 3, 3)), 1.5 * rng.normal(size=(60, 3))
+    barycentric, distance = nearest_on_triangles(triangles, points)
+    np.testing.assert_allclose(barycentric.sum(1), 1.0)
+    assert barycentric.min() >= 0.0
+    inside = (barycentric > 0).sum(1)
+    assert all((inside == count).any() for count in (1, 2, 3))  # corners, sides, and faces
+    nearest = interpolate(barycentric, triangles)
+    np.testing.assert_allclose(np.linalg.norm(nearest - points, axis=1), distance, atol=1e-12)
+    for triangle, point, value in zip(triangles, points, distance, strict=True):
+        samples, step = _dense(triangle)
+        least = np.linalg.norm(samples - point, axis=1).min()
+        assert value <= least + 1e-12 and least < value + step
+
+
+def test_the_point_of_a_triangle_nearest_to_one_of_its_own(rng):
+    triangles, weights = rng.normal(size=(40, 3, 3)), rng.dirichlet(np.ones(3), 40)
+    points = interpolate(weights, triangles)
+    barycentric, distance = nearest_on_triangles(triangles, points)
+    np.testing.assert_allclose(barycentric, weights, atol=1e-9)
+    assert distance.max() < 1e-12
+
+
+def test_triangles_without_area_are_segments_or_points():
+    line = np.array([[0.0, 0, 0], [1, 0, 0], [3, 0, 0]])
+    triangles = np.stack([line, line, np.zeros((3, 3))])
+    points = np.array([[2.0, 4, 0], [5.0, 0, 0], [0.0, 3, 4]])
+    barycentric, distance = nearest_on_triangles(triangles, points)
+    assert np.isfinite(barycentric).all()
+    np.testing.assert_allclose(distance, [4, 2, 5])
+    np.testing.assert_allclose(interpolate(barycentric, triangles), [[2, 0, 0], [3, 0, 0], [0, 0, 0]])

@@ -10,6 +10,17 @@ from mitex.features.layers import LAYERS
 from mitex.methods.nca.decoder.shape import COORDINATES, DecoderShape
 from mitex.training.settings import TrainingConfig, key
 
+# Keys that shape the decoder -> attributes of its shape.
+DECODER_KEYS = {
+    "interpolation": "interpolation",
+    "coordinates": "coordinates",
+    "waves": "waves",
+    "wave_frequencies": "frequencies",
+    "wave_amplitude": "amplitude",
+    "decoder_width": "width",
+    "decoder_depth": "depth",
+    "omega": "omega",
+}
 TILE_CELLS = (8, 1024)  # along a side of a tile
 TILE_SIDES = (16, 8192)  # of its maps [px]
 
@@ -19,7 +30,7 @@ class NcaConfig(TrainingConfig):
     """Everything that shapes a training; every key can be set from a TOML file or with `--set`."""
 
     preset: str = "patch"
-    steps: int = key(1000, "training steps", 0)
+    steps: int = key(900, "training steps", 0)
     channels: int = key(16, "channels of a cell's state", 12, 256)
     hidden: int = key(128, "width of the hidden layer", 1, 4096)
     degree: int = key(1, "highest degree of the spherical harmonics of the perception", 0, 2)
@@ -55,7 +66,7 @@ class NcaConfig(TrainingConfig):
     colour_weight: float = key(1.0, "of the comparison of colours, beside the layers", 0)
     colour_histogram: bool = key(True, "compare the histograms of the channels too")
     moment_weight: float = key(0.1, "of the moment terms, beside the transport terms", 0)
-    order_weight: float = key(0.0, "of the autocorrelation of the coarsest views, for regular patterns", 0)
+    order_weight: float = key(10.0, "of the autocorrelation of the coarsest views, for regular patterns", 0)
     appearance_weight: float = key(2.0, "of the appearance loss", 0)
     overflow_weight: float = key(100.0, "of the overflow loss", 0)
     decoder: bool = key(
@@ -65,14 +76,14 @@ class NcaConfig(TrainingConfig):
     coordinates: tuple[str, ...] = key(
         ("waves",), "local coordinates, of waves, barycentrics, polynomials; or none"
     )
-    waves: int = key(8, "number of waves of the solid noise", 1, 256)
-    wave_frequencies: tuple[float, ...] = key((2.0, 3.0), "of the waves [cycles per edge]", 0)
+    waves: int = key(12, "number of waves of the solid noise", 1, 256)
+    wave_frequencies: tuple[float, ...] = key((1.7, 2.3, 3.1), "of the waves [cycles per edge]", 0)
     wave_amplitude: float = key(0.3, "of the waves", 0)
     decoder_width: int = key(32, "of the decoder's hidden layers", 1, 1024)
     decoder_depth: int = key(3, "number of the decoder's hidden layers", 1, 16)
     omega: float = key(10.0, "factor in the decoder's sines", 0)
     lr: float = key(1e-3, "Adam's learning rate", 0)
-    milestones: tuple[int, ...] = key((500, 800), "steps at which the learning rate falls", 0)
+    milestones: tuple[int, ...] = key((500, 750), "steps at which the learning rate falls", 0)
     decay: float = key(0.3, "factor of the learning rate at a milestone", 0)
     normalise_gradients: bool = key(True, "divide each parameter tensor's gradient by its norm")
 
@@ -90,20 +101,13 @@ class NcaConfig(TrainingConfig):
         unknown = [name for name in self.coordinates if name not in COORDINATES]
         if unknown:
             raise ConfigError(f"coordinates holds {unknown}", f"use some of {', '.join(COORDINATES)}")
+        if not self.wave_frequencies:
+            raise ConfigError("wave_frequencies holds nothing", "give one or more [cycles per edge]")
 
     @property
     def decoder_shape(self) -> DecoderShape:
         """What the decoder is built from."""
-        return DecoderShape(
-            self.interpolation,
-            self.coordinates,
-            self.waves,
-            self.wave_frequencies,
-            self.wave_amplitude,
-            self.decoder_width,
-            self.decoder_depth,
-            self.omega,
-        )
+        return DecoderShape(**{part: getattr(self, key) for key, part in DECODER_KEYS.items()})
 
 
 DEFAULT = NcaConfig()
@@ -133,6 +137,7 @@ PRESETS = {
         aggregation="sum",
         overflow_weight=1e4,
         sphere="even",
+        order_weight=0.0,
         decoder=False,
         interpolation="linear",
         blend=False,

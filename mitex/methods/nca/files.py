@@ -9,23 +9,23 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import torch
 from safetensors import SafetensorError
 
-from mitex.errors import CheckpointError
+from mitex.errors import CheckpointError, ConfigError
 from mitex.methods.nca import METHOD
-from mitex.methods.nca.config import NcaConfig
+from mitex.methods.nca.config import DECODER_KEYS, NcaConfig
 from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.methods.nca.look import STATE_CHANNELS, Look
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.perception import HARMONICS
 from mitex.paths import expanded
-from mitex.training import checkpoint, model_file
+from mitex.training import checkpoint, model_file, values
 from mitex.training.locate import CHECKPOINT, NAME, PREVIOUS, locate
 
 RULE = "rule."  # before names of the rule's tensors, which files leave out
@@ -76,23 +76,31 @@ def _from_checkpoint(state: checkpoint.Checkpoint, path: Path) -> tuple[Look, di
     maps = state.metadata.get("maps", "albedo").split(",")
     about: dict[str, Any] = {"name": state.metadata.get("exemplar", path.parent.name), "maps": maps}
     about |= {"steps": state.step, "preset": state.config.get("preset")}
-    names = {field.name for field in fields(NcaConfig)}
-    tuples: dict[str, Any] = {
-        k: tuple(v) if isinstance(v, list) else v for k, v in state.config.items() if k in names
-    }
-    look = Look.of(NcaConfig(**tuples), maps)
+    try:
+        look = Look.of(_config(state.config), maps)
+    except (ConfigError, LookupError, ValueError) as e:
+        raise CheckpointError(
+            f"'{path}' does not hold a MeshNCA model ({e})", "give a run of mitex fit nca"
+        ) from e
     _fill(look, {k[6:]: v for k, v in state.task.items() if k.startswith("model.")}, path)
     return look, about
 
 
 def _shape(text: str, path: Path) -> DecoderShape:
+    """The shape of a decoder, within the limits of the settings."""
     try:
-        values: dict[str, Any] = {
-            k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(text).items()
-        }
-        return DecoderShape(**values)
-    except (ValueError, TypeError, AttributeError) as e:
+        parts = json.loads(text)
+        if parts.keys() != set(DECODER_KEYS.values()):
+            raise ValueError(f"parts {', '.join(parts)}")
+        return _config({key: parts[part] for key, part in DECODER_KEYS.items()}).decoder_shape
+    except (ConfigError, ValueError, AttributeError) as e:
         raise CheckpointError(f"the decoder in '{path}' is damaged ({e})", "save the model again") from e
+
+
+def _config(content: Mapping[str, Any]) -> NcaConfig:
+    """Settings of those keys that a file has."""
+    kinds = get_type_hints(NcaConfig)
+    return NcaConfig(**{k: values.check(v, kinds[k]) for k, v in content.items() if k in kinds})
 
 
 def _fill(module: torch.nn.Module, tensors: dict[str, torch.Tensor], path: Path) -> None:

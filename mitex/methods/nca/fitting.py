@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -9,6 +10,7 @@ from mitex.errors import CheckpointError
 from mitex.exemplar import Exemplar
 from mitex.methods.nca import files
 from mitex.methods.nca.config import PRESETS, NcaConfig
+from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.task import NcaTask
@@ -63,14 +65,18 @@ def fit(
 
 def _parent(init: str | Path, config: NcaConfig, maps: list[str]) -> tuple[Look, dict[str, Any]]:
     parent, about = files.load(init)
-    look = Look.of(config, maps)
-    shapes = [{name: tuple(t.shape) for name, t in one.state_dict().items()} for one in (parent, look)]
-    if shapes[0] != shapes[1] or parent.maps != look.maps:
-        differing = sorted(
-            name for name in shapes[0] | shapes[1] if shapes[0].get(name) != shapes[1].get(name)
-        )
+    theirs, ours = (_traits(look) for look in (parent, Look.of(config, maps)))
+    differing = sorted(name for name in theirs | ours if theirs.get(name) != ours.get(name))
+    if differing:
         raise CheckpointError(
-            f"model '{about['name']}' differs from the config in {', '.join(differing) or 'its maps'}",
-            "set channels, hidden, degree and the decoder alike, for an exemplar with the same maps",
+            f"model '{about['name']}' differs from the config in {', '.join(differing)}",
+            "set channels, hidden, degree, aggregation and the decoder alike, for an exemplar with its maps",
         )
     return parent, about
+
+
+def _traits(look: Look) -> dict[str, Any]:
+    """What two looks must have in common for the weights of one to mean the same in the other."""
+    traits: dict[str, Any] = {"maps": look.maps, "aggregation": look.mean}
+    traits |= {name: tuple(value.shape) for name, value in look.state_dict().items()}
+    return traits | (asdict(look.decoder.shape) if isinstance(look.decoder, Decoder) else {})

@@ -47,11 +47,12 @@ class Targets:
         images = torch.from_numpy(triple_images(exemplar, pictures, layout)).to(network.device)
         generator = torch.Generator().manual_seed(0)
         self._vectors = {"colour": _some(images.flatten(1, 2), generator)}
+        parts: dict[str, list[torch.Tensor]] = {layer: [] for layer in layers}
         with torch.no_grad():
-            for one in layers:
-                vectors = [network.features(image[None], [one])[one].flatten(1, 2) for image in images]
-                kept = [_some(v.to(network.dtype), generator) for v in vectors]
-                self._vectors[one] = torch.cat(kept)
+            for image in images:
+                for layer, features in network.features(image[None], layers).items():
+                    parts[layer].append(_some(features.flatten(1, 2).to(network.dtype), generator))
+        self._vectors |= {layer: torch.cat(vectors) for layer, vectors in parts.items()}
 
     def size(self, layer: str) -> int:
         """Number of feature vectors of a picture in a layer ("colour": its pixels)."""

@@ -3,13 +3,19 @@
 import json
 import os
 import struct
+from dataclasses import asdict
 
+import numpy as np
 import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
 from mitex.errors import CheckpointError, OutputError
-from mitex.methods.nca import METHOD, MeshNCA, NcaTexture, files
+from mitex.mesh import icosphere
+from mitex.methods.nca import METHOD, MeshNCA, NcaConfig, NcaTexture, files
+from mitex.methods.nca.decoder.decoder import Readout
+from mitex.methods.nca.decoder.shape import DecoderShape
+from mitex.methods.nca.look import STATE_CHANNELS, Look
 from mitex.methods.registry import bundled
 from mitex.training import checkpoint, model_file
 from mitex.training.checkpoint import Checkpoint
@@ -36,52 +42,149 @@ def _same(one, other):
 def test_round_trip(tmp_path, options):
     original = texture(("albedo", "height"), **options)
     again = NcaTexture.load(original.save(tmp_path / "texture.safetensors"))
-    assert _same(again.model, original.model)
-    assert (again.model.degree, again.model.condition) == (original.model.degree, original.model.condition)
-    assert again.maps == ("albedo", "height")
+    assert _same(again.look, original.look)
+    rules = (again.look.rule, original.look.rule)
+    assert rules[0].degree == rules[1].degree and rules[0].condition == rules[1].condition
+    assert again.look.maps == ("albedo", "height")
     assert again.about["name"] == "tiny"
+
+
+DECODERS = [
+    None,
+    DecoderShape(),
+    DecoderShape(interpolation="linear", coordinates=(), width=5, depth=1, omega=30.0),
+    DecoderShape(coordinates=("waves", "barycentrics", "polynomials"), waves=3, frequencies=(1.5,)),
+    DecoderShape(coordinates=("polynomials",), amplitude=0.7),
+]
+
+
+@pytest.mark.parametrize("shape", DECODERS)
+@pytest.mark.parametrize("mean", [True, False])
+def test_a_decoder_survives_saving(tmp_path, shape, mean):
+    """Bit by bit, with everything that shapes it; so does what it shows."""
+    look = Look(MeshNCA(hidden=8), ("albedo", "height"), shape, mean)
+    look.initialise(torch.Generator().manual_seed(1), gain=0.5)
+    original = NcaTexture(look, {"name": "tiny"})
+    again = NcaTexture.load(original.save(tmp_path / "m.safetensors"))
+    assert _same(again.look, look) and again.look.mean == mean
+    assert type(again.look.decoder) is type(look.decoder)
+    assert again.look.interpolation == look.interpolation
+    assert shape is None or again.look.decoder.shape == shape
+    shown = [t.apply(icosphere(2), steps=3, subdivide=1, resolution=32) for t in (original, again)]
+    for name in look.maps:
+        assert np.array_equal(shown[0].texture_maps[name], shown[1].texture_maps[name])
+
+
+DAMAGE = {
+    "no JSON": lambda shape: "{",
+    "no table": lambda shape: "3",
+    "an unknown part": lambda shape: json.dumps(shape | {"glitter": 1}),
+    "unknown coordinates": lambda shape: json.dumps(shape | {"coordinates": ["waves", "spirals"]}),
+    "unknown interpolation": lambda shape: json.dumps(shape | {"interpolation": "cubic"}),
+    "another width": lambda shape: json.dumps(shape | {"width": 9}),
+    "half a layer": lambda shape: json.dumps(shape | {"depth": 1.5}),
+    "a word for a width": lambda shape: json.dumps(shape | {"width": "wide"}),
+    "far too wide": lambda shape: json.dumps(shape | {"width": 10**12}),
+    "no frequencies": lambda shape: json.dumps(shape | {"frequencies": []}),
+    "a word for a frequency": lambda shape: json.dumps(shape | {"frequencies": ["high"]}),
+    "another depth": lambda shape: json.dumps(shape | {"depth": 3}),
+    "other coordinates": lambda shape: json.dumps(shape | {"coordinates": ["polynomials"]}),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_a_damaged_decoder(tmp_path, damage):
+    path = texture().save(tmp_path / "m.safetensors")
+    tensors, metadata = model_file.read(path)
+    text = DAMAGE[damage](json.loads(metadata["decoder"]))
+    save_file(tensors, path, metadata | {"decoder": text})
+    with pytest.raises(CheckpointError):
+        NcaTexture.load(path)
+
+
+@pytest.mark.parametrize("part", ["description", "tensors", "one tensor"])
+def test_a_decoder_of_which_something_is_missing(tmp_path, part):
+    path = texture().save(tmp_path / "m.safetensors")
+    tensors, metadata = model_file.read(path)
+    if part == "description":
+        del metadata["decoder"]
+    lost = {"description": (), "tensors": ("decoder.",), "one tensor": ("decoder.network.layers.0.bias",)}
+    tensors = {name: value for name, value in tensors.items() if not name.startswith(lost[part])}
+    save_file(tensors, path, metadata)
+    with pytest.raises(CheckpointError, match="does not hold a MeshNCA"):
+        NcaTexture.load(path)
+
+
+def test_a_decoder_with_weights_that_are_not_finite(tmp_path):
+    original = texture()
+    with torch.no_grad():
+        original.look.decoder.network.layers[1].weight[0, 0] = torch.nan
+    with pytest.raises(CheckpointError, match="not finite"):
+        NcaTexture.load(original.save(tmp_path / "m.safetensors"))
 
 
 def test_what_is_known_about_a_model_is_kept(tmp_path):
     original = texture()
     about = {"name": "ü", "steps": 12, "loss": 0.25, "parent": "waffle"}
-    files.save(tmp_path / "m.safetensors", original.model, about | {"maps": ["albedo"]})
+    files.save(tmp_path / "m.safetensors", original.look, about)
     assert NcaTexture.load(tmp_path / "m.safetensors").about == about | {"maps": ["albedo"]}
 
 
 def test_a_file_is_small(tmp_path):
-    assert texture().save(tmp_path / "m.safetensors").stat().st_size < 55_000
+    assert texture(shape=DecoderShape()).save(tmp_path / "m.safetensors").stat().st_size < 70_000
 
 
 @pytest.mark.parametrize("condition", [0, 3])
 def test_the_authors_weights(tmp_path, condition):
-    """Two linear layers and no description: all five maps, degree 1."""
+    """Two linear layers and no description: all five maps, degree 1, sums, and no decoder."""
     model = MeshNCA(condition=condition)
     path = tmp_path / "Wall_Shells_001.safetensors"
     save_file({k: v.contiguous() for k, v in model.state_dict().items()}, path)
     loaded = NcaTexture.load(path)
-    assert _same(loaded.model, model) and loaded.model.condition == condition
-    assert loaded.maps == ("albedo", "ambient_occlusion", "height", "normal", "roughness")
+    look = loaded.look
+    assert _same(look.rule, model) and look.rule.condition == condition
+    assert look.maps == ("albedo", "ambient_occlusion", "height", "normal", "roughness")
+    assert isinstance(look.decoder, Readout) and not look.mean and look.interpolation == "linear"
+    assert look.decoder.channels == [0, 1, 2, 11, 6, 7, 8, 9, 10]
     assert loaded.about["name"] == "Wall_Shells_001"
+
+
+def test_the_authors_weights_grow_as_theirs_do(tmp_path):
+    """Sums over the neighbours, and the maps are channels of the state."""
+    model = MeshNCA(hidden=8)
+    model.initialise(torch.Generator().manual_seed(0), gain=0.5)
+    save_file({k: v.contiguous() for k, v in model.state_dict().items()}, tmp_path / "m.safetensors")
+    sphere, generator = icosphere(3), torch.Generator().manual_seed(4)
+    state = model.seed(sphere)
+    with torch.no_grad():
+        for _ in range(4):
+            mask = torch.rand(1, len(sphere.vertices), generator=generator) < 0.5
+            state = model.step(state, sphere, mask)
+    maps = NcaTexture.load(tmp_path / "m.safetensors").apply(sphere, seed=4, steps=4, subdivide=0).vertex_maps
+    assert 0.01 < state.abs().max() < 1
+    for name, channels in STATE_CHANNELS.items():
+        expected = np.clip(state[0, :, list(channels)].numpy() + 0.5, 0, 1)
+        assert np.allclose(maps[name], expected, atol=1e-6)
 
 
 def test_half_precision_weights(tmp_path):
     model = MeshNCA(hidden=8)
     path = tmp_path / "m.safetensors"
     save_file({k: v.half() for k, v in model.state_dict().items()}, path)
-    loaded = NcaTexture.load(path).model
+    loaded = NcaTexture.load(path).look.rule
     assert loaded.fc1.weight.dtype == torch.float32
     assert torch.equal(loaded.fc1.weight, model.fc1.weight.half().float())
 
 
-def _checkpoint(model, step, **changes):
+def _checkpoint(look, step, **changes):
+    config = NcaConfig(hidden=look.rule.hidden, decoder_width=12, decoder_depth=2)
     values = {
         "step": step,
         "seconds": 1.0,
         "loss": 1.0,
         "skipped": 0,
-        "config": {"preset": "patch", "degree": model.degree},
-        "task": {f"model.{k}": v for k, v in model.state_dict().items()} | {"pool.states": torch.zeros(2)},
+        "config": asdict(config),
+        "task": {f"model.{k}": v for k, v in look.state_dict().items()} | {"pool.states": torch.zeros(2)},
         "optimizer": {},
         "generator": torch.Generator().get_state(),
         "metadata": {"method": "nca", "maps": "albedo,height", "exemplar": "lava"},
@@ -91,20 +194,38 @@ def _checkpoint(model, step, **changes):
 
 def test_a_run_folder_stands_for_its_newest_model(tmp_path):
     """A stopped run has a checkpoint only, a finished one a model, a resumed one a newer checkpoint."""
-    first, second, third = (texture(seed=seed).model for seed in range(3))
+    maps = ("albedo", "height")
+    first, second, third = (texture(maps, seed=seed).look for seed in range(3))
     checkpoint.save(tmp_path, _checkpoint(first, 5))
     loaded = NcaTexture.load(tmp_path)
-    assert _same(loaded.model, first)
-    assert loaded.maps == ("albedo", "height")
+    assert _same(loaded.look, first)
+    assert loaded.look.maps == maps
     assert loaded.about["name"] == "lava" and loaded.about["steps"] == 5 and loaded.about["preset"] == "patch"
 
-    files.save(tmp_path / files.NAME, second, {"name": "lava", "maps": ["albedo"]})
+    files.save(tmp_path / files.NAME, second, {"name": "lava"})
     _make_older(tmp_path / checkpoint.NAME)
-    assert _same(NcaTexture.load(str(tmp_path)).model, second)
+    assert _same(NcaTexture.load(str(tmp_path)).look, second)
 
     checkpoint.save(tmp_path, _checkpoint(third, 9))
     _make_older(tmp_path / files.NAME)
-    assert _same(NcaTexture.load(tmp_path).model, third)
+    assert _same(NcaTexture.load(tmp_path).look, third)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"task": {"weights": torch.zeros(3)}},
+        {"config": {"preset": "patch"}},  # another width of the decoder
+        {"config": {"resolution": 4096, "layers": ["density"]}},  # another method's
+        {"config": {"channels": "many"}},
+        {"metadata": {"maps": "albedo,glitter"}},
+        {"metadata": {"maps": ""}},
+    ],
+)
+def test_a_checkpoint_that_does_not_fit(tmp_path, changes):
+    checkpoint.save(tmp_path, _checkpoint(texture(("albedo", "height")).look, 5, **changes))
+    with pytest.raises(CheckpointError):
+        NcaTexture.load(tmp_path)
 
 
 def _make_older(path):
@@ -113,18 +234,19 @@ def _make_older(path):
 
 
 def test_the_previous_checkpoint_will_do(tmp_path):
-    model = texture().model
-    checkpoint.save(tmp_path, _checkpoint(model, 5))
+    look = texture(("albedo", "height")).look
+    checkpoint.save(tmp_path, _checkpoint(look, 5))
     (tmp_path / checkpoint.NAME).rename(tmp_path / checkpoint.PREVIOUS)
-    assert _same(NcaTexture.load(tmp_path).model, model)
+    assert _same(NcaTexture.load(tmp_path).look, look)
 
 
 def test_a_checkpoint_that_is_named_is_the_one_that_is_read(tmp_path):
     for step in (5, 9):
-        checkpoint.save(tmp_path, _checkpoint(MeshNCA(hidden=step), step))
+        look = texture(("albedo", "height"), hidden=step).look
+        checkpoint.save(tmp_path, _checkpoint(look, step))
     for name, step in ((checkpoint.PREVIOUS, 5), (checkpoint.NAME, 9)):
         loaded = NcaTexture.load(tmp_path / name)
-        assert (loaded.about["steps"], loaded.model.hidden) == (step, step)
+        assert (loaded.about["steps"], loaded.look.rule.hidden) == (step, step)
 
 
 def test_bundled_models_are_found_by_name():
@@ -133,7 +255,7 @@ def test_bundled_models_are_found_by_name():
     for name, path in models.items():
         loaded = NcaTexture.load(name)
         assert loaded.about["name"] == name
-        assert loaded.model.channels == 16
+        assert loaded.look.rule.channels == 16
         assert path.stat().st_size < 100_000
 
 
@@ -193,12 +315,14 @@ def test_a_degree_that_the_weights_are_too_small_for(tmp_path):
 
 
 def test_maps_that_the_state_has_no_room_for(tmp_path):
-    model = MeshNCA(channels=4, hidden=8)
-    files.save(tmp_path / "m.safetensors", model, {"maps": ["albedo"]})
-    assert NcaTexture.load(tmp_path / "m.safetensors").maps == ("albedo",)
-    files.save(tmp_path / "m.safetensors", model, {"maps": ["albedo", "height"]})
+    """Without a decoder; with one, four channels may be any maps."""
+    path = tmp_path / "m.safetensors"
+    assert NcaTexture.load(texture(shape=None, channels=4).save(path)).look.maps == ("albedo",)
+    decoded = texture(("albedo", "height"), channels=4)
+    assert NcaTexture.load(decoded.save(path)).look.maps == ("albedo", "height")
+    files.save(path, texture(("albedo", "height"), shape=None, channels=4).look, {"name": "small"})
     with pytest.raises(CheckpointError, match="4 channels, its maps need 7"):
-        NcaTexture.load(tmp_path / "m.safetensors")
+        NcaTexture.load(path)
 
 
 @pytest.mark.parametrize("damage", ["truncated", "garbage", "empty", "header"])
@@ -214,13 +338,6 @@ def test_damaged_files(tmp_path, damage):
     path.write_bytes(changed[damage])
     with pytest.raises(CheckpointError):
         NcaTexture.load(path)
-
-
-def test_a_checkpoint_of_another_method(tmp_path):
-    model = texture().model
-    checkpoint.save(tmp_path, _checkpoint(model, 5, task={"weights": torch.zeros(3)}))
-    with pytest.raises(CheckpointError, match="does not hold a MeshNCA"):
-        NcaTexture.load(tmp_path)
 
 
 @pytest.mark.parametrize("source", ["wafle", "no/such/file", "a\0b", "x" * 5000])

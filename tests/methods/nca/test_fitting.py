@@ -1,16 +1,20 @@
 """The whole way from an exemplar to a model file, as small as it can be."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from mitex.errors import CheckpointError, ConfigError, OutputError
+from mitex.exemplar import Exemplar
 from mitex.mesh import icosphere
 from mitex.methods import nca
 from mitex.methods.nca import NcaTexture
+from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.runtime import threads
-from tests.methods.nca.tiny import SETTINGS, texture
+from tests.methods.nca.tiny import SETTINGS, config, texture
 
 
 def _losses(folder):
@@ -18,15 +22,17 @@ def _losses(folder):
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    """A real training of 40 steps on the albedo of an embedded exemplar."""
-    from mitex.exemplar import Exemplar
+def lava():
+    return Exemplar({"albedo": Exemplar.load("lava").maps["albedo"]}, "lava")
 
-    exemplar = Exemplar({"albedo": Exemplar.load("lava").maps["albedo"]}, "lava")
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory, lava):
+    """A real training of 40 steps on the albedo of an embedded exemplar."""
     out = tmp_path_factory.mktemp("fit") / "run"
     always_from_the_seed = ["pool=1", "inject_every=1", "min_steps=8", "max_steps=8"]
     settings = [*SETTINGS, *always_from_the_seed, "steps=40", "preview_every=20", "checkpoint_every=20"]
-    return out, nca.fit(exemplar, out, overrides=settings, quiet=True)
+    return out, nca.fit(lava, out, overrides=settings, quiet=True)
 
 
 def test_it_learns(run):
@@ -49,7 +55,7 @@ def test_the_run_folder_is_complete(run):
 
 def test_the_model_works_on_another_mesh(run):
     out, result = run
-    assert result.maps == ("albedo",)
+    assert result.look.maps == ("albedo",)
     assert result.about["name"] == "lava" and result.about["steps"] == 40
     assert result.about["preset"] == "patch"
     assert 0 < result.about["loss"] < 1e3 and result.about["seconds"] >= 0
@@ -67,21 +73,40 @@ def test_a_finished_run_is_not_overwritten(run):
         nca.fit("lava", run[0], overrides=SETTINGS, quiet=True)
 
 
-def test_starting_from_a_parent(tmp_path):
-    parent = texture(seed=3, hidden=16)
+def test_starting_from_a_parent(tmp_path, lava):
+    parent = texture(seed=3, hidden=16, shape=config().decoder_shape)
     path = parent.save(tmp_path / "parent.safetensors")
-    child = nca.fit("wicker", tmp_path / "run", init=path, overrides=[*SETTINGS, "steps=0"], quiet=True)
+    child = nca.fit(lava, tmp_path / "run", init=path, overrides=[*SETTINGS, "steps=0"], quiet=True)
     assert child.about["parent"] == "tiny"
     assert "loss" not in child.about  # there was no step
-    for a, b in zip(child.model.parameters(), parent.model.parameters(), strict=True):
-        assert np.array_equal(a.detach(), b.detach())
+    own, others = (t.look.state_dict() for t in (child, parent))
+    assert own.keys() == others.keys() and all(torch.equal(own[name], others[name]) for name in own)
 
 
-def test_a_parent_of_another_shape(tmp_path):
-    path = texture(hidden=8).save(tmp_path / "parent.safetensors")
-    with pytest.raises(CheckpointError, match="hidden"):
-        nca.fit("wicker", tmp_path / "run", init=path, overrides=SETTINGS, quiet=True)
+@pytest.mark.parametrize(
+    ("parent", "problem"),
+    [
+        ({"hidden": 8}, "fc1.weight"),
+        ({"hidden": 16, "shape": None}, r"decoder\.network"),
+        ({"hidden": 16, "shape": DecoderShape(width=13)}, r"decoder\.network"),
+        ({"hidden": 16, "maps": ("albedo", "height")}, "maps"),
+        ({"hidden": 16, "maps": ("normal",)}, "maps"),
+    ],
+)
+def test_a_parent_of_another_shape(tmp_path, lava, parent, problem):
+    path = texture(**({"shape": config().decoder_shape} | parent)).save(tmp_path / "parent.safetensors")
+    with pytest.raises(CheckpointError, match=problem):
+        nca.fit(lava, tmp_path / "run", init=path, overrides=SETTINGS, quiet=True)
     assert not (tmp_path / "run").exists()
+
+
+def test_a_parent_whose_decoder_reads_something_else(tmp_path, lava):
+    """Weights of the same shapes, but other waves, or another interpolation."""
+    for changes in ({"frequencies": (1.0,)}, {"interpolation": "linear"}, {"omega": 3.0}):
+        shape = replace(config().decoder_shape, **changes)
+        path = texture(hidden=16, shape=shape).save(tmp_path / "parent.safetensors")
+        with pytest.raises(CheckpointError, match=next(iter(changes))):
+            nca.fit(lava, tmp_path / "run", init=path, overrides=SETTINGS, quiet=True)
 
 
 def test_resuming_takes_the_settings_of_the_run(tmp_path):
@@ -90,7 +115,7 @@ def test_resuming_takes_the_settings_of_the_run(tmp_path):
     first = nca.fit("wicker", out, overrides=[*SETTINGS, "steps=2"], quiet=True)
     second = nca.fit("wicker", out, overrides=["steps=3"], resume=True, quiet=True)
     assert (first.about["steps"], second.about["steps"]) == (2, 3)
-    assert second.model.hidden == 16 and len(_losses(out)) == 3
+    assert second.look.rule.hidden == 16 and len(_losses(out)) == 3
     with pytest.raises(CheckpointError, match="frequency"):
         nca.fit("wicker", out, overrides=["steps=4", "frequency=9"], resume=True, quiet=True)
 

@@ -47,8 +47,20 @@ def _appearance(task, seed=0):
     return _loss(task, seed=seed)[1]["appearance"]
 
 
-def _cameras(task):
-    return task.cameras(torch.Generator().manual_seed(0))
+def _cameras(task, size=32):
+    return task.cameras(task.grounds[0].mesh, size, torch.Generator().manual_seed(0))
+
+
+def _only(task):
+    """The comparison of a task with one zoom."""
+    (appearance,) = task.zooms.values()
+    return appearance
+
+
+def _views(task, state=None):
+    """What two patches show of a state."""
+    state = torch.zeros_like(task.pool[0]) if state is None else state
+    return task.grounds[0].views(task.look, state, _cameras(task))
 
 
 # One entry for each key that shapes the task: what tells that it counts.
@@ -65,25 +77,25 @@ def check(*keys):
 
 @check("channels", "hidden", "degree")
 def shape_of_the_model(build):
-    model = build("channels=13", "hidden=9", "degree=2").model
+    model = build("channels=13", "hidden=9", "degree=2").look.rule
     assert model.fc1.weight.shape == (9, (9 + 1) * 13) and model.fc2.weight.shape == (13, 9)
 
 
 @check("gain")
 def first_weights_are_proportional_to_the_gain(build):
-    small, large = (build(f"gain={gain}").model.fc2.weight for gain in (0.1, 0.3))
+    small, large = (build(f"gain={gain}").look.rule.fc2.weight for gain in (0.1, 0.3))
     assert torch.allclose(3 * small, large)
 
 
 @check("seed")
 def seeds_give_other_weights(build):
-    assert not torch.equal(build("seed=1").model.fc1.weight, build("seed=2").model.fc1.weight)
+    assert not torch.equal(build("seed=1").look.rule.fc1.weight, build("seed=2").look.rule.fc1.weight)
 
 
 @check("frequency", "pool")
 def pool_of_states_on_the_sphere(build):
     task = build("frequency=7", "pool=3", "density=7")
-    assert len(task.mesh.vertices) == 10 * 7**2 + 2
+    assert len(task.grounds[0].mesh.vertices) == 10 * 7**2 + 2
     assert task.pool.shape == (3, 492, 16)
 
 
@@ -98,7 +110,7 @@ def rollouts(build):
         calls.append((bool(state.any()), steps))
         return state
 
-    task.model.evolve = evolve
+    task.look.rule.evolve = evolve
     for step in range(16):
         _loss(task, step, seed=step)
     assert {steps for _, steps in calls} == {5, 6, 7}
@@ -121,29 +133,112 @@ def full_views(build):
 
 @check("density")
 def vertices_along_the_exemplar(build):
-    coarse, fine = build("density=5"), build("density=10")
-    assert fine.pixel == pytest.approx(2 * coarse.pixel)
+    coarse, fine = build("density=4"), build("density=8")
+    assert fine.width == pytest.approx(2 * coarse.width)
     assert _cameras(fine).half_width == pytest.approx(2 * _cameras(coarse).half_width)
 
 
-@check("exemplar_size")
-def pixels_of_the_exemplar(build):
-    """Fewer are wider on the sphere, and smoother when enlarged to the same size."""
-    coarse, fine = build("exemplar_size=16", "blend=false"), build("exemplar_size=32", "blend=false")
-    assert coarse.pixel == pytest.approx(2 * fine.pixel)
-    rough = [t.appearance.targets.images.diff(dim=1).square().mean() for t in (coarse, fine)]
-    assert rough[0] < 0.7 * rough[1]
+@check("exemplar_size", "zooms")
+def sizes_of_the_exemplar(build):
+    """Each zoom has twice the pixels of the one before, up to those of the exemplar."""
+    settings = ("exemplar_size=128", "target_size=0")
+    assert list(build(*settings, "zooms=2").zooms) == [64, 128]
+    assert list(build(*settings).zooms) == [128]
+    assert list(build("exemplar_size=24", "target_size=0").zooms) == [24]
+    targets = build(*settings, "zooms=2").zooms[64].targets
+    assert targets.size("colour") == 64**2
 
 
 @check("target_size")
 def size_at_which_features_see_the_exemplar(build):
-    assert build("target_size=48").appearance.targets.images.shape[1:] == (48, 48, 3)
+    assert _only(build("target_size=48")).targets.size("colour") == 48**2
 
 
 @check("blend")
 def mixed_pictures(build):
-    kinds = [{p.kind for p in build(f"blend={b}").appearance.targets.pictures} for b in ("true", "false")]
+    kinds = [{p.kind for p in _only(build(f"blend={b}")).targets.pictures} for b in ("true", "false")]
     assert "mix" in kinds[0] and "mix" not in kinds[1]
+
+
+@check("sphere")
+def spheres(build):
+    counts = {}
+    for sphere in ("even", "uneven", "both"):
+        lengths = [
+            np.linalg.norm(m.vertices[m.edges.indices] - m.vertices[m.edges.rows], axis=1)
+            for m in (ground.mesh for ground in build(f"sphere={sphere}").grounds)
+        ]
+        counts[sphere] = [bool(one.std() > 0.2 * one.mean()) for one in lengths]
+    assert counts == {"even": [False], "uneven": [True], "both": [False, True]}
+
+
+@check("aggregation")
+def aggregation(build):
+    """At the icosphere's vertices of valence 5 the mean is larger."""
+    mean, total = (build(f"aggregation={a}") for a in ("mean", "sum"))
+    assert (mean.look.mean, total.look.mean) == (True, False)
+    state = torch.rand(1, 642, 16, generator=torch.Generator().manual_seed(0))
+    ratio = (mean.grounds[0].perception(state) / total.grounds[0].perception(state))[0, :, 0]
+    valence = torch.from_numpy(np.diff(mean.grounds[0].mesh.edges.indptr))
+    assert torch.allclose(ratio, 6 / valence, rtol=1e-3)
+
+
+@check("decoder")
+def maps_without_a_decoder_are_channels(build):
+    assert [len(build(f"decoder={on}").parameters) for on in ("true", "false")] == [12, 4]
+    assert torch.equal(_views(build("decoder=false")), torch.full((4, 32, 32, 4), 0.5))
+
+
+@check("decoder_width", "decoder_depth")
+def layers_of_the_decoder(build):
+    shapes = [tuple(p.shape) for p in build("decoder_width=7", "decoder_depth=1").parameters[4:]]
+    assert shapes == [(7, 24), (7,), (4, 7), (4,)]
+
+
+@check("coordinates")
+def inputs_of_the_decoder(build):
+    for words, extra in (("", 0), ("waves", 8), ("polynomials,waves", 10), ("barycentrics,polynomials", 5)):
+        assert build(f"coordinates={words}").look.decoder.network.layers[0].in_features == 16 + extra
+
+
+@check("waves", "wave_frequencies", "wave_amplitude")
+def grain(build):
+    waves = build("waves=5", "wave_frequencies=0.5,4", "wave_amplitude=0.7").look.decoder.waves
+    lengths = waves.vectors.norm(dim=1)
+    assert lengths.tolist() == pytest.approx([0.5, 4, 0.5, 4, 0.5]) and waves.amplitude == 0.7
+
+
+@check("omega")
+def bends_of_the_decoder(build):
+    """It multiplies what enters a sine; initial weights behind the first layer are divided by it."""
+    low, high = (build(f"omega={omega}").look.decoder.network for omega in (2, 30))
+    assert torch.allclose(2 * low.layers[1].weight, 30 * high.layers[1].weight)
+    assert (low.omega, high.omega) == (2, 30)
+
+
+@check("interpolation")
+def creases_of_the_state(build):
+    """Seen close up, slopes of a linear one jump at the edges."""
+    state = torch.rand(642, 16, generator=torch.Generator().manual_seed(0)) - 0.5
+    jumps = {}
+    for kind in ("smooth", "linear"):
+        task = build(f"interpolation={kind}", "coordinates=", "resolution=64")
+        lines = task.grounds[0].views(task.look, state, _cameras(task, 512))
+        bends = lines.diff(n=2, dim=2).abs()
+        jumps[kind] = (bends.amax() / bends.mean()).item()
+    assert jumps["linear"] > 2 * jumps["smooth"]
+
+
+@check("order_weight")
+def order_counts(build):
+    """Of whole maps of relu3_1, at the coarsest zoom."""
+    settings = (*ALL_PLACES, "layers=relu1_1,relu3_1", "exemplar_size=128", "target_size=0", "zooms=2")
+    none, some = (build(*settings, f"order_weight={weight}") for weight in (0, 5))
+    assert [a.ordered for a in none.zooms.values()] == [False, False]
+    assert [a.ordered for a in some.zooms.values()] == [True, False]
+    views = torch.rand(2, 32, 32, 4, generator=torch.Generator().manual_seed(0))
+    values = [t.zooms[64](views, torch.Generator().manual_seed(0)).item() for t in (none, some)]
+    assert values[1] > values[0] + 0.1
 
 
 @check("layers")
@@ -158,8 +253,10 @@ def layers_add_up(build):
 
 @check("pooling")
 def pooling(build):
+    views = torch.rand(2, 32, 32, 4, generator=torch.Generator().manual_seed(0))
     average, largest = (
-        _appearance(build(*ALL_PLACES, f"pooling={pooling}")) for pooling in ("average", "max")
+        _only(build(*ALL_PLACES, f"pooling={pooling}"))(views, torch.Generator().manual_seed(0)).item()
+        for pooling in ("average", "max")
     )
     assert average != pytest.approx(largest, rel=1e-3)
 
@@ -169,7 +266,7 @@ def few_samples_are_random(build):
     """All places give one loss, whichever views they come from; few give another for each choice."""
     views = torch.rand(2, 32, 32, 4, generator=torch.Generator().manual_seed(0))
     for samples, same in ((4096, True), (16, False)):
-        loss = build(*ALL_PLACES, f"samples={samples}").appearance
+        loss = _only(build(*ALL_PLACES, f"samples={samples}"))
         values = [loss(views, torch.Generator().manual_seed(seed)).item() for seed in (0, 1)]
         assert (values[0] == pytest.approx(values[1], rel=1e-4)) == same
 
@@ -237,7 +334,7 @@ def fitted(tmp_path, exemplar):
     def fitted(*settings: str) -> torch.Tensor:
         out = tmp_path / "-".join(settings)
         texture = nca.fit(exemplar, out, overrides=[*SETTINGS, *settings], quiet=True)
-        return torch.cat([p.detach().flatten() for p in texture.model.parameters()])
+        return torch.cat([p.detach().flatten() for p in texture.look.parameters()])
 
     return fitted
 

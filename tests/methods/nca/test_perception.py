@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from mitex.errors import ConfigError
-from mitex.mesh import Mesh, grid, icosphere
+from mitex.mesh import Mesh, grid, icosphere, torus
 from mitex.methods.nca.perception import _cache, perception
 from tests.mesh.examples import FAN, FAN_POINTS, meshes
 from tests.methods.nca import brute_force
@@ -181,6 +181,56 @@ def test_size_grows_with_edges_not_with_channels():
     mesh = icosphere(3)
     operator = perception(mesh, 1)
     assert operator.matrix.values().numel() == 4 * len(mesh.edges.indices) + 5 * len(mesh.vertices)
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+def test_the_mean_is_the_loops_by_valence(generator, degree):
+    """Six times the sum over the number of neighbours; the state itself stays."""
+    mesh = patchwork()
+    state = _state(mesh, generator)
+    expected = torch.tensor(brute_force.perceive(mesh, state[0].tolist(), degree))
+    valence = torch.tensor([max(len(ring), 1) for ring in brute_force.neighbours(mesh)])
+    expected[:, :-3] *= 6 / valence[:, None]
+    assert torch.allclose(perception(mesh, degree, mean=True)(state)[0], expected, atol=1e-5)
+
+
+@pytest.mark.parametrize("valence", [3, 4, 5, 6, 7, 12, 30])
+def test_the_mean_is_as_large_at_any_valence(valence):
+    """A cell among equal neighbours perceives the same, whichever their number."""
+    angle = 2 * np.pi * np.arange(valence) / valence
+    ring = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    k = np.arange(valence)
+    wheel = Mesh(
+        np.concatenate([np.zeros((1, 3)), ring]), np.column_stack([0 * k, 1 + k, 1 + (k + 1) % valence])
+    )
+    state = torch.ones(1, valence + 1, 1)
+    state[0, 0] = 0
+    laplacian = perception(wheel, mean=True)(state)[0, 0, 0].item()
+    assert laplacian == pytest.approx(6, rel=1e-6)
+    assert perception(wheel)(state)[0, 0, 0].item() == pytest.approx(valence, rel=1e-6)
+
+
+def test_on_a_regular_mesh_the_mean_is_the_sum(generator):
+    """To the last bit: training on a mesh of valence 6 is the same with both."""
+    mesh = torus(12, 9)
+    assert (np.diff(mesh.edges.indptr) == 6).all()
+    state = _state(mesh, generator)
+    assert torch.equal(perception(mesh, 2, mean=True)(state), perception(mesh, 2)(state))
+
+
+@pytest.mark.parametrize("batch", [1, 3])
+def test_the_adjoint_of_the_mean_is_its_transpose(generator, batch):
+    mesh = patchwork()
+    operator = perception(mesh, 1, 0.5, mean=True)
+    x = _state(mesh, generator, batch=batch)
+    y = torch.rand(batch, len(mesh.vertices), 3 * operator.blocks, generator=generator)
+    left = (operator(x).double() * y).sum()
+    assert left.item() == pytest.approx((x.double() * operator.transposed(y)).sum().item(), rel=1e-5)
+
+
+def test_mean_and_sum_are_kept_apart():
+    mesh = patchwork()
+    assert perception(mesh, mean=True) is perception(mesh, mean=True) is not perception(mesh)
 
 
 def test_operators_are_kept_while_the_mesh_lives():

@@ -8,6 +8,8 @@ import torch
 
 from mitex.errors import CheckpointError
 from mitex.exemplar import Exemplar
+from mitex.mesh import icosphere
+from mitex.methods.nca import task as training
 from mitex.methods.nca.task import NcaTask
 from mitex.runtime import threads
 from mitex.training import train
@@ -40,7 +42,7 @@ def _fresh(task):
 
 def _grow(task, state, steps, generator):
     with torch.no_grad():
-        return task.model.evolve(state, task.perception, steps, generator)
+        return task.look.rule.evolve(state, task.grounds[0].perception, steps, generator)
 
 
 def test_a_step_evolves_a_state_of_the_pool(task):
@@ -59,6 +61,40 @@ def test_a_step_evolves_a_state_of_the_pool(task):
     assert torch.equal(task.pool[others], before[others])
 
 
+def test_states_grow_on_both_spheres_in_turns(exemplar):
+    """Even ones of the pool on the icosphere, the others on scattered vertices."""
+    task = NcaTask(config("sphere=both"), exemplar)
+    even, uneven = task.grounds
+    assert np.array_equal(even.mesh.vertices, icosphere(8).vertices)
+    assert len(uneven.mesh.vertices) == 642 and uneven.mesh.edges.indptr[-1] == even.mesh.edges.indptr[-1]
+    assert [task.ground(k) for k in range(4)] == [even, uneven, even, uneven]
+    torch.nn.init.normal_(task.pool, std=0.1, generator=torch.Generator().manual_seed(9))
+    before, grown = task.pool.clone(), set()
+    for seed in range(8):
+        task.pool.copy_(before)
+        task.loss(1, torch.Generator().manual_seed(seed)).commit()
+        generator = torch.Generator().manual_seed(seed)
+        index = int(torch.randint(4, (), generator=generator))
+        steps = int(torch.randint(2, 5, (), generator=generator))
+        with torch.no_grad():
+            operator = task.grounds[index % 2].perception
+            expected = task.look.rule.evolve(before[index][None], operator, steps, generator)[0]
+        assert torch.equal(task.pool[index], expected)
+        grown.add(index % 2)
+    assert grown == {0, 1}
+
+
+def test_a_step_moves_the_bounds(exemplar):
+    """When it is committed, towards the smallest and largest values of the state."""
+    task = NcaTask(config(), exemplar)
+    result = task.loss(1, torch.Generator().manual_seed(4))
+    assert (task.look.low == -1).all() and (task.look.high == 1).all()
+    result.commit()
+    state = task.pool[task._touched][0]
+    assert torch.allclose(task.look.low, -0.98 + 0.02 * state.amin(0), atol=1e-6)
+    assert torch.allclose(task.look.high, 0.98 + 0.02 * state.amax(0), atol=1e-6)
+
+
 def test_the_seed_is_injected(task):
     _fresh(task)
     task.pool.fill_(0.3)
@@ -75,24 +111,55 @@ def test_loss_is_appearance_and_overflow(task):
     result = task.loss(1, torch.Generator().manual_seed(0))
     parts = result.metrics
     assert parts["overflow"] > 0.5
-    assert result.value.item() == pytest.approx(parts["appearance"] + 1e4 * parts["overflow"], rel=1e-6)
+    assert result.value.item() == pytest.approx(parts["appearance"] + 100 * parts["overflow"], rel=1e-6)
     result.value.backward()
     assert all(p.grad is not None and p.grad.any() for p in task.parameters)
 
 
-def test_parameters_are_those_of_the_model(task):
-    assert [p.shape for p in task.parameters] == [(16, 80), (16,), (16, 16), (16,)]
+def test_loss_is_the_mean_over_the_zooms(exemplar):
+    """At 64, 128 and 256 pixels; each has views of its own, from the coarsest on."""
+    settings = ("exemplar_size=256", "target_size=0", "zooms=3", "resolution=16", "view_count=1")
+    task = NcaTask(config(*settings), exemplar)
+    assert list(task.zooms) == [64, 128, 256]
+    task.zooms = {size: lambda views, _, k=k: 10.0**k * views.mean() for k, size in enumerate(task.zooms)}
+    total = task.loss(1, torch.Generator().manual_seed(0)).metrics["appearance"]
+    generator = torch.Generator().manual_seed(0)
+    torch.randint(4, (), generator=generator)
+    steps = int(torch.randint(2, 5, (), generator=generator))
+    ground, state = task.grounds[0], _grow(task, torch.zeros(1, 642, 16), steps, generator)[0]
+    means = []
+    for size in (64, 128, 256):
+        cameras = task.cameras(ground.mesh, size, generator)
+        means.append(ground.views(task.look, state, cameras).mean().item())
+    assert total == pytest.approx((means[0] + 10 * means[1] + 100 * means[2]) / 3, rel=1e-4)
+
+
+def test_zooms_that_would_be_too_small_are_left_out(exemplar):
+    sizes = [
+        list(NcaTask(config(f"exemplar_size={size}", "target_size=0", "zooms=3"), exemplar).zooms)
+        for size in (32, 100, 128)
+    ]
+    assert sizes == [[32], [100], [64, 128]]
+
+
+def test_parameters_are_those_of_rule_and_decoder(task):
+    """The decoder reads 16 channels and 8 waves, and gives an albedo and a height."""
+    shapes = [tuple(p.shape) for p in task.parameters]
+    assert shapes[:4] == [(16, 80), (16,), (16, 16), (16,)]
+    assert shapes[4:] == [(12, 24), (12,), (12, 12), (12,), (12, 12), (12,), (4, 12), (4,)]
 
 
 def test_weights_follow_the_seed(exemplar):
-    one, other = (NcaTask(config(f"seed={seed}"), exemplar).model for seed in (0, 1))
-    assert not torch.equal(one.fc1.weight, other.fc1.weight)
+    one, again, other = (NcaTask(config(f"seed={seed}"), exemplar).parameters for seed in (0, 0, 1))
+    assert all(torch.equal(a, b) for a, b in zip(one, again, strict=True))
+    different = [not torch.equal(a, b) for a, b in zip(one, other, strict=True) if a.any()]
+    assert len(different) == 11 and all(different)  # all but the bias of the rule's last layer
 
 
-def test_training_can_start_from_a_model(exemplar, task):
-    started = NcaTask(config("seed=5"), exemplar, task.model)
-    assert torch.equal(started.model.fc1.weight, task.model.fc1.weight)
-    assert started.model is not task.model
+def test_training_can_start_from_a_look(exemplar, task):
+    started = NcaTask(config("seed=5"), exemplar, task.look)
+    pairs = list(zip(started.parameters, task.parameters, strict=True))
+    assert all(torch.equal(a, b) for a, b in pairs) and all(a is not b for a, b in pairs)
 
 
 def test_state_round_trip(exemplar, task):
@@ -114,40 +181,60 @@ def test_a_fresh_pool_takes_no_room(exemplar):
     assert NcaTask(config(), exemplar).state()["pool.states"].shape == (0, 642, 16)
 
 
+def _cameras(task, size=32):
+    return task.cameras(task.grounds[0].mesh, size, torch.Generator().manual_seed(0))
+
+
 def test_patches_have_the_wanted_density(task):
     """`density` vertices fit along the width of the exemplar, measured on the mesh's own edges."""
-    graph, points = task.mesh.edges, task.mesh.vertices
-    edges = np.linalg.norm(points[graph.indices] - points[graph.rows], axis=1)
-    pixels = 32  # of the exemplar
-    assert pixels * task.pixel == pytest.approx(8 * edges.mean(), rel=0.03)
-    cameras = task.cameras(torch.Generator().manual_seed(0))
+    mesh = task.grounds[0].mesh
+    edges = np.linalg.norm(mesh.vertices[mesh.edges.indices] - mesh.vertices[mesh.edges.rows], axis=1)
+    assert task.width == pytest.approx(8 * edges.mean(), rel=0.03)
+    cameras = _cameras(task)
     assert (cameras.kind, cameras.shape) == ("orthographic", (4, 32, 32))
-    assert cameras.half_width == pytest.approx(16 * task.pixel)
+    assert cameras.half_width == pytest.approx(task.width / 2)
 
 
-def test_every_pixel_of_a_patch_is_surface(task):
-    views = task.stage.visibility(task.cameras(torch.Generator().manual_seed(0)))
-    assert (views.coverage == 1).all()
+def test_a_larger_exemplar_is_seen_closer(task):
+    """A pixel of a view is always a pixel of the exemplar; no patch is wider than the sphere shows."""
+    assert _cameras(task, 64).half_width == pytest.approx(task.width / 4)
+    assert _cameras(task, 16).half_width == pytest.approx(0.65)
+
+
+@pytest.mark.parametrize("size", [8, 32, 64])
+@pytest.mark.parametrize("sphere", ["even", "uneven"])
+def test_every_pixel_of_a_patch_is_surface(exemplar, sphere, size):
+    """Also of the widest patches."""
+    (ground,) = NcaTask(config(f"sphere={sphere}"), exemplar).grounds
+    task = NcaTask(config("view_count=30"), exemplar)
+    cameras = task.cameras(ground.mesh, size, torch.Generator().manual_seed(0))
+    assert (ground.stage.visibility(cameras).coverage == 1).all()
 
 
 def test_full_views(exemplar):
     task = NcaTask(config("views=full", "distance=3", "fov=45"), exemplar)
-    cameras = task.cameras(torch.Generator().manual_seed(0))
+    cameras = _cameras(task)
     assert (cameras.kind, cameras.shape) == ("perspective", (4, 32, 32))
     assert cameras.fov == pytest.approx(np.radians(45))
     assert np.allclose(np.linalg.norm(cameras.origin, axis=1), 3, atol=1e-5)
     assert task.loss(0, torch.Generator().manual_seed(0)).value.isfinite()
 
 
-def test_preview_shows_a_row_for_each_map(task):
+def test_preview_shows_a_row_for_each_map(task, monkeypatch):
+    """The exemplar, a patch, a closer one, the sphere."""
+    monkeypatch.setattr(training, "PREVIEW", 48)
     _fresh(task)
     before = task.pool.clone()
     picture = task.preview(5)
-    assert picture.shape == (2 * 64, 32 + 32 + 64, 3)
+    assert picture.shape == (2 * 48, 4 * 48, 3)
     assert picture.min() >= 0 and picture.max() <= 1
-    albedo = task.exemplar.resized(32).maps["albedo"]
-    assert np.allclose(picture[:32, :32], albedo) and np.allclose(picture[32:64, :32], albedo)
-    assert np.ptp(picture[64:, :32], axis=2).max() == 0  # the height in grey
+    for row, name in enumerate(MAPS):
+        expected = np.clip(task.exemplar.resized(48).maps[name], 0, 1)
+        assert np.allclose(picture[48 * row : 48 * row + 48, :48], expected, atol=1e-6)
+    assert np.ptp(picture[48:], axis=2).max() == 0  # the height in grey
+    wide, close = picture[:48, 48:96], picture[:48, 96:144]
+    assert np.abs(np.diff(wide, axis=1)).mean() > 1.2 * np.abs(np.diff(close, axis=1)).mean()
+    assert not picture[:4, -48:-44].any() and picture[20:28, -28:-20].all()  # around the sphere and on it
     assert torch.equal(task.pool, before)
     assert np.array_equal(task.preview(5), picture)
 
@@ -208,7 +295,7 @@ def test_resuming_with_another_exemplar_is_refused(tmp_path, exemplar):
 
 def test_the_smallest_sizes_train(exemplar):
     """16 pixels are one place of relu5_3, where a covariance of one vector is zero."""
-    smallest = ("resolution=16", "exemplar_size=16", "target_size=16", "layers=relu1_1,relu5_3")
+    smallest = ("resolution=16", "exemplar_size=16", "target_size=16", "layers=relu1_1,relu5_3", "zooms=6")
     loss = NcaTask(config(*smallest), exemplar).loss(0, torch.Generator().manual_seed(0)).value
     loss.backward()
     assert loss.isfinite()

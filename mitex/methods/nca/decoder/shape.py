@@ -26,8 +26,8 @@ class DecoderShape:
 
     interpolation: Literal["smooth", "linear"] = "smooth"
     coordinates: tuple[str, ...] = ("waves",)
-    waves: int = 8
-    frequencies: tuple[float, ...] = (2.0, 3.0)
+    waves: int = 12
+    frequencies: tuple[float, ...] = (1.7, 2.3, 3.1)
     amplitude: float = 0.3
     width: int = 32
     depth: int = 3

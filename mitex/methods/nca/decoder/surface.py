@@ -31,13 +31,15 @@ class Surface:
     """The mesh that an automaton runs on.
 
     Args:
-        mesh: the mesh.
+        mesh: the mesh; it is normalised.
         interpolation: of the states, "smooth" or "linear".
     """
 
     def __init__(self, mesh: Mesh, interpolation: Kind = "smooth") -> None:
-        self.mesh = mesh
         init()
+        # Solid noise must depend neither on units nor on the place, and float32 needs small numbers.
+        mesh = mesh.normalised()[0]
+        self.mesh = mesh
         self._lookup = SurfaceLookup(mesh, interpolation)
         self._table = LinearMap(values_and_gradients(mesh)) if interpolation == "smooth" else None
         self._corners = torch.from_numpy(np.column_stack([mesh.vertices, _edges(mesh)]).astype(np.float32))
@@ -52,7 +54,7 @@ class Surface:
         return self._lookup.weights(points.face, points.barycentric)(table)
 
     def place(self, points: Points) -> tuple[torch.Tensor, torch.Tensor]:
-        """Positions (P, 3) and lengths of the edges around (P,) of the points [mesh units]."""
+        """Positions (P, 3) and lengths of the edges around (P,) of the points [normalised mesh units]."""
         corners = self._corners[self._faces[points.face.long()]]
         values = (points.barycentric[:, :, None] * corners).sum(1)
         return values[:, :3], values[:, 3]

@@ -1,0 +1,70 @@
+"""Bundled looks on meshes unlike the sphere of their training: no colours that the exemplar does not have."""
+
+import numpy as np
+import pytest
+import torch
+from scipy.spatial import ConvexHull
+
+from mitex.mesh import Mesh, icosphere, scattered_sphere, subdivide_midpoint, torus
+from mitex.methods.nca import METHOD, NcaTexture
+from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.palette import Palette
+from mitex.methods.registry import bundled
+
+STEPS = 100
+LOOKS = [name for name in bundled(METHOD) if "palette" in NcaTexture.load(name).about]
+
+
+def stretched(mesh: Mesh, rng: np.random.Generator) -> Mesh:
+    return mesh.with_vertices(mesh.vertices * rng.uniform(0.3, 3.0, 3))
+
+
+def jittered(mesh: Mesh, rng: np.random.Generator) -> Mesh:
+    edge = np.linalg.norm(mesh.vertices[mesh.edges.indices] - mesh.vertices[mesh.edges.rows], axis=1).mean()
+    return mesh.with_vertices(mesh.vertices + rng.normal(0, 0.2 * edge, mesh.vertices.shape))
+
+
+def coarse(rng: np.random.Generator) -> Mesh:
+    """A hull of few points, finely subdivided: large and small triangles, slivers, high valences."""
+    points = rng.normal(size=(int(rng.integers(5, 40)), 3))
+    hull = ConvexHull(points)
+    used, faces = np.unique(hull.simplices, return_inverse=True)
+    mesh = Mesh(points[used].astype(np.float32), faces.reshape(-1, 3), name="hull")
+    return subdivide_midpoint(mesh, int(np.ceil(np.log(2500 / len(used)) / np.log(4))))
+
+
+def fan(spokes: int, rng: np.random.Generator) -> Mesh:
+    """Two vertices of any valence, joined by a band of triangles."""
+    angle = np.arange(spokes) * 2 * np.pi / spokes
+    ring = np.stack([np.cos(angle), np.zeros(spokes), np.sin(angle)], 1)
+    points = np.concatenate([ring, [[0, 1, 0], [0, -1, 0]]]).astype(np.float32)
+    k = np.arange(spokes)
+    top = np.stack([k, np.full(spokes, spokes), (k + 1) % spokes], 1)
+    bottom = np.stack([(k + 1) % spokes, np.full(spokes, spokes + 1), k], 1)
+    return jittered(subdivide_midpoint(Mesh(points, np.concatenate([top, bottom])), 4), rng)
+
+
+def meshes() -> list[Mesh]:
+    rng = np.random.default_rng(0)
+    smooth = [icosphere(15), torus(48, 40), scattered_sphere(2000, 1), scattered_sphere(2000, 2)]
+    every = [stretched(mesh, rng) for mesh in smooth] + [jittered(mesh, rng) for mesh in smooth]
+    every += [jittered(stretched(mesh, rng), rng) for mesh in smooth]
+    every += [coarse(rng) for _ in range(12)]
+    return every + [fan(spokes, rng) for spokes in (3, 4, 5, 8, 15, 30)]
+
+
+@pytest.mark.parametrize("name", LOOKS)
+def test_no_region_has_foreign_colours(name):
+    texture = NcaTexture.load(name)
+    palette = Palette.from_record(texture.about["palette"])
+    for number, mesh in enumerate(meshes()):
+        state = texture.grow(mesh, steps=STEPS, seed=number)
+        with torch.no_grad():
+            colours = Grown(texture.look, state, Cells(mesh, 0, mesh)).at_vertices()["albedo"]
+        assert palette.unlike(colours).mean() <= 1e-3, f"mesh {number}, {mesh}"
+
+
+def test_there_are_thirty_meshes_of_all_valences():
+    valences = np.concatenate([np.diff(mesh.edges.indptr) for mesh in meshes()])
+    assert len(meshes()) == 30 and valences.min() == 3 and valences.max() >= 30
