@@ -17,9 +17,9 @@ LEAST = 4  # fewer columns, and a vertex would be its own neighbour's neighbour
 class Lattice:
     """Rows of nearly equilateral triangles on the square [0, columns]^2 of the plane z = 0, facing +z.
 
-    Edges along the rows have length 1, and every other row is shifted by half an edge. The mesh goes on beyond
-    the square by some rows and columns of copies, so that whatever is computed of a mesh needs to know nothing
-    of periods: values of the vertices are spread with `source`, and read at the points that `locate` finds.
+    Edges along the rows have length 1, and every other row is shifted by half an edge. The mesh goes on
+    beyond the square by some rows and columns of copies, so that whatever is computed of a mesh needs to know
+    nothing of periods: values are spread with `source`, and read at the points that `locate` finds.
 
     Attributes:
         mesh: its first `count` vertices are those of the square, the others copies of them.
