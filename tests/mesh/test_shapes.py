@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mitex.errors import MeshError
-from mitex.mesh import Mesh, grid, icosphere, quality, torus
+from mitex.mesh import Mesh, grid, icosphere, quality, scattered_sphere, torus
 
 
 def volume(mesh: Mesh) -> float:
@@ -79,3 +79,30 @@ def test_grid():
 def test_impossible_shapes(make):
     with pytest.raises(MeshError, match="not possible"):
         make()
+
+
+class TestScatteredSphere:
+    def test_it_is_a_closed_sphere_facing_outwards(self):
+        mesh = scattered_sphere(500, 3)
+        assert len(mesh.vertices) == 500 and len(mesh.faces) == 996
+        np.testing.assert_allclose(np.linalg.norm(mesh.vertices, axis=1), 1, rtol=1e-6)
+        centres = mesh.vertices[mesh.faces].mean(axis=1)
+        assert (np.einsum("fk,fk->f", mesh.face_crosses, centres) > 0).all()
+        pairs = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]))
+        assert (np.unique(pairs, axis=0, return_counts=True)[1] == 2).all()
+
+    def test_it_is_uneven(self):
+        mesh = scattered_sphere(2000)
+        graph = mesh.edges
+        lengths = np.linalg.norm(mesh.vertices[graph.indices] - mesh.vertices[graph.rows], axis=1)
+        assert lengths.std() / lengths.mean() == pytest.approx(0.28, abs=0.02)
+        valence = np.diff(graph.indptr)
+        assert valence.min() <= 4 and valence.max() >= 8
+
+    def test_places_follow_the_seed(self):
+        one, again, other = (scattered_sphere(50, seed).vertices for seed in (0, 0, 1))
+        assert np.array_equal(one, again) and not np.array_equal(one, other)
+
+    def test_too_few(self):
+        with pytest.raises(MeshError, match="3 vertices"):
+            scattered_sphere(3)

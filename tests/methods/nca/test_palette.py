@@ -1,0 +1,92 @@
+"""Colours that an exemplar has, and growing places of others anew."""
+
+import numpy as np
+import pytest
+import torch
+
+from mitex.errors import TextureWarning
+from mitex.exemplar import Exemplar
+from mitex.mesh import icosphere
+from mitex.methods.nca import healing
+from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.look import Look
+from mitex.methods.nca.model import MeshNCA
+from mitex.methods.nca.palette import Palette
+from mitex.methods.nca.perception import perception
+
+TEAL = np.array([[0.1, 0.5, 0.5]])
+
+
+@pytest.fixture(scope="module")
+def palette():
+    return Palette.of(Exemplar.load("scales").maps["albedo"])
+
+
+def test_an_exemplar_has_its_own_colours(palette):
+    pixels = Exemplar.load("scales").maps["albedo"].reshape(-1, 3)[::37]
+    assert palette.unlike(pixels).mean() < 1e-3
+
+
+def test_other_colours_are_foreign(palette):
+    foreign = np.array([[1.0, 0.0, 0.0], [0.1, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
+    assert palette.unlike(foreign).all()
+    assert not palette.unlike(TEAL).any()
+
+
+def test_one_colour_is_a_palette():
+    grey = Palette.of(np.full((16, 16, 3), 0.5, np.float32))
+    assert len(grey.colours) == 1
+    assert grey.unlike(np.array([[0.5, 0.5, 0.5], [0.9, 0.5, 0.5]])).tolist() == [False, True]
+
+
+def test_record_round_trip(palette):
+    again = Palette.from_record(palette.record())
+    np.testing.assert_allclose(again.colours, palette.colours, atol=1e-3)
+    assert again.radius == pytest.approx(palette.radius, abs=1e-4)
+
+
+class Grey(Palette):
+    """Everything near grey is known."""
+
+    def __init__(self):
+        super().__init__(np.full((1, 3), 0.5), 0.25)
+
+
+@pytest.fixture
+def ground():
+    mesh = icosphere(6)
+    look = Look(MeshNCA(), ("albedo",), None)
+    look.initialise(torch.Generator().manual_seed(3), 0.5)
+    return look, Cells(mesh, 0, mesh), perception(mesh, 1)
+
+
+def test_a_foreign_place_is_set_back_and_grows_again(ground, monkeypatch):
+    """With no steps to grow in, what was set back is the seed: the place, three rings, and nothing else."""
+    look, cells, operator = ground
+    monkeypatch.setattr(healing, "STEPS", 0)
+    state = torch.full((len(cells.mesh.vertices), 16), 0.1)
+    state[7, :3] = torch.tensor([0.5, -0.5, -0.5])
+    result = healing.healed(look, state, cells, operator, Grey(), torch.Generator().manual_seed(0))
+    place = np.zeros(len(state), bool)
+    place[7] = True
+    graph = cells.mesh.edges
+    for _ in range(healing.RINGS):
+        place |= np.bincount(graph.rows, place[graph.indices], len(place)) > 0
+    assert (result[torch.from_numpy(place)] == 0).all()
+    assert torch.equal(result[torch.from_numpy(~place)], state[torch.from_numpy(~place)])
+
+
+def test_a_good_state_stays(ground):
+    look, cells, operator = ground
+    state = torch.full((len(cells.mesh.vertices), 16), 0.1)
+    result = healing.healed(look, state, cells, operator, Grey(), torch.Generator().manual_seed(0))
+    assert torch.equal(result, state)
+
+
+def test_what_does_not_heal_is_said(ground, monkeypatch):
+    look, cells, operator = ground
+    monkeypatch.setattr(healing, "STEPS", 1)
+    nowhere = Palette(np.full((1, 3), 9.0), 0.1)
+    state = torch.zeros(len(cells.mesh.vertices), 16)
+    with pytest.warns(TextureWarning, match="100.0% of 'icosphere6' has colours that the exemplar"):
+        healing.healed(look, state, cells, operator, nowhere, torch.Generator().manual_seed(0))
