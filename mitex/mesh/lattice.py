@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -60,6 +61,14 @@ class Lattice:
     def count(self) -> int:
         """Number of vertices in the square."""
         return self.rows * self.columns
+
+    @cached_property
+    def joined(self) -> Mesh:
+        """The square alone with its sides joined, a torus; the faces across them are long."""
+        row, column = np.divmod(np.arange(self.count), self.columns)
+        first = 2 * ((row + MARGIN) * (self.columns + 2 * MARGIN - 1) + column + MARGIN)
+        faces = self.mesh.faces[np.concatenate([first, first + 1])]
+        return Mesh(self.mesh.vertices[: self.count], self.source[faces], name="tile")
 
     @property
     def edge(self) -> float:

@@ -6,6 +6,7 @@ import pytest
 from mitex.errors import MeshError
 from mitex.geometry.triangles import interpolate
 from mitex.mesh import Lattice
+from mitex.mesh.topology import boundary_edges, euler_characteristic, opposed_edges
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +52,20 @@ def test_points_whole_periods_apart_are_one(lattice, rng):
     shifted = points + rng.integers(-3, 4, (500, 2))
     for one, other in zip(lattice.locate(points), lattice.locate(shifted), strict=True):
         assert np.array_equal(one, other)
+
+
+def test_joined_sides_make_a_torus(lattice):
+    joined = lattice.joined
+    assert len(joined.vertices) == lattice.count and euler_characteristic(joined.faces, lattice.count) == 0
+    assert (joined.edges.valence == 6).all()
+    assert not len(boundary_edges(joined.faces, lattice.count))
+    assert opposed_edges(joined.faces, lattice.count) == 0
+    for vertex in (0, lattice.columns - 1, lattice.count - 1):
+        start, end = joined.edges.indptr[vertex], joined.edges.indptr[vertex + 1]
+        around = lattice.mesh.edges.indices[
+            lattice.mesh.edges.indptr[vertex] : lattice.mesh.edges.indptr[vertex + 1]
+        ]
+        assert set(joined.edges.indices[start:end]) == set(lattice.source[around])
 
 
 def test_too_few_columns():

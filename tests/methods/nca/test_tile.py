@@ -1,12 +1,14 @@
 """Maps that repeat: the rule on a flat lattice, and how it is read there."""
 
+import math
+import warnings
 from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
-from mitex.errors import ConfigError
+from mitex.errors import ConfigError, TextureWarning
 from mitex.mesh import Lattice
 from mitex.methods.nca import MeshNCA, NcaTexture
 from mitex.methods.nca import texture as room
@@ -15,6 +17,7 @@ from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.coordinates import Waves
 from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.methods.nca.look import Look
+from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import harmonics, lattice_perception
 from mitex.methods.nca.tile import Sampled, flat_cells, tile_maps
 
@@ -156,7 +159,28 @@ def test_seeds_and_steps_decide():
     assert np.abs(one - other).max() > 1e-3 and np.abs(one - more).max() > 1e-3
 
 
-@pytest.mark.parametrize(("about", "cells"), [({"density": 24.0}, 48), ({}, 64)])
+def test_foreign_colours_are_told(lattice):
+    """A look that is grey, and an exemplar that is red."""
+    red = Palette(np.array([[0.9, 0.1, 0.1]]), 0.05).record()
+    with pytest.warns(TextureWarning, match="100.0% of 'tile' has colours"):
+        NcaTexture(look(), {"palette": red}).tile(32, cells=8, steps=2)
+    grey = Palette(np.array([[0.5, 0.5, 0.5]]), 1.0).record()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        one = NcaTexture(look(), {"palette": grey}).tile(32, cells=8, steps=2)["albedo"]
+    assert np.array_equal(one, NcaTexture(look(), {}).tile(32, cells=8, steps=2)["albedo"])
+
+
+@pytest.mark.parametrize(
+    ("about", "cells"),
+    [
+        ({"density": 24.0}, 48),
+        ({}, 64),
+        ({"density": 1}, 8),
+        ({"density": "x"}, 64),
+        ({"density": math.nan}, 64),
+    ],
+)
 def test_the_exemplar_appears_twice(about, cells, monkeypatch):
     asked = []
     monkeypatch.setattr(room, "flat_cells", lambda *a: asked.append(a) or flat_cells(*a))
