@@ -11,7 +11,7 @@ from tyro.conf import arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
-from mitex.methods.nca.config import TILE_CELLS, TILE_SIDES
+from mitex.methods.nca.ranges import TILE_CELLS, TILE_SIDES
 from mitex.methods.options import EXPORTS, PICTURES, ExemplarOptions, OptionalMeshOptions
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from mitex.geometry.normal_maps import decode, encode
 from mitex.mesh import Lattice
 from mitex.methods.nca.bake import CHUNK, Grown
 from mitex.methods.nca.cells import Cells
-from mitex.methods.nca.config import TILE_CELLS, TILE_SIDES
 from mitex.methods.nca.decoder.surface import EDGE, decoder_units
 from mitex.methods.nca.look import Look
+from mitex.methods.nca.ranges import TILE_CELLS, TILE_SIDES
 
 
 def flat_cells(cells: int, resolution: int) -> Lattice:
