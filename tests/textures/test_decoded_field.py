@@ -91,7 +91,7 @@ def test_values_are_those_of_torch(mi, mesh, interpolation: Kind, coordinates: t
     np.testing.assert_allclose(
         values(mi, texture, mesh, points.face, points.barycentric), expected, atol=1e-5
     )
-    assert expected.std(0).min() > 0.01
+    assert expected.std(0).min() > 5e-3
 
 
 @pytest.mark.parametrize(("interpolation", "coordinates"), [("smooth", EVERY), ("linear", ("waves",))])
