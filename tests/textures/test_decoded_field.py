@@ -203,21 +203,22 @@ def test_smooth_slopes_do_not_jump_at_edges(mi):
 def test_slopes_are_finite_differences(mi, interpolation: Kind, coordinates: tuple[str, ...]):
     texture = mi.load_dict(properties(random_look(interpolation, coordinates), name="height"))
     face = random_points(UNEVEN).face.numpy()
-    barycentric = np.random.default_rng(3).dirichlet((9, 9, 9), len(face)).astype(np.float32)
+    barycentric = np.random.default_rng(3).dirichlet((3, 3, 3), len(face)).astype(np.float32)
     corners = UNEVEN.vertices[UNEVEN.faces[face]]
     shape = mesh_shape(UNEVEN)
     si = interaction(mi, shape, face, barycentric)
     si.dp_du = mi.Vector3f((corners[:, 1] - corners[:, 0]).T)
     si.dp_dv = mi.Vector3f((corners[:, 2] - corners[:, 1]).T)
-    step = 1 / 256
-    for slope, way in zip(texture.eval_1_grad(si), ([-1, 1, 0], [0, -1, 1]), strict=True):
+    step = 1 / 512
+    slopes = np.array(texture.eval_1_grad(si))
+    for slope, way in zip(slopes, ([-1, 1, 0], [0, -1, 1]), strict=True):
         ahead, behind = (
             values(mi, texture, UNEVEN, face, barycentric + s * np.array(way, np.float32))[:, 3]
             for s in (step, -step)
         )
         expected = (ahead - behind) / (2 * step)
         # A sorted barycentric may change its place between the two.
-        assert np.quantile(np.abs(slope.numpy() - expected), 0.95) < 0.02 * np.abs(expected).max()
+        assert np.quantile(np.abs(slope - expected), 0.9) < 0.02 * np.abs(expected).max()
 
 
 def test_slopes_have_gradients(mi, rng):
@@ -288,7 +289,7 @@ def test_reflectance_in_a_path_tracer(mi, points):
         )
     expected = srgb_to_linear(encoded[:, :3].numpy().clip(0, 1))
     np.testing.assert_allclose(radiance(mi, shape, x, y), expected, atol=1e-4)
-    assert expected.std() > 0.05
+    assert expected.std() > 0.02
 
 
 def test_constant_field_equals_a_constant(mi):
