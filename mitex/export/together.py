@@ -62,5 +62,5 @@ def write_files(files: Mapping[Path, Callable[[Path], object]]) -> None:
     """
     with ExitStack() as stack:
         # All are written before the first one gets its name; what is entered first is left last.
-        for path, write in reversed(files.items()):
+        for path, write in reversed(list(files.items())):
             write(stack.enter_context(atomic_write(path)))

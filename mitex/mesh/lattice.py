@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -15,35 +16,34 @@ LEAST = 4  # fewer columns, and a vertex would be its own neighbour's neighbour
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """Rows of nearly equilateral triangles on the square [0, period]^2 of the plane z = 0, facing +z.
+    """Rows of nearly equilateral triangles on the square [0, columns]^2 of the plane z = 0, facing +z.
 
-    Every other row is shifted by half an edge. The mesh goes on beyond the square by some rows and columns of
-    copies, so that whatever is computed of a mesh needs to know nothing of periods: values of the vertices
-    are spread with `source`, and read at the points that `locate` finds.
+    Edges along the rows have length 1, and every other row is shifted by half an edge. The mesh goes on
+    beyond the square by some rows and columns of copies, so that whatever is computed of a mesh needs to know
+    nothing of periods: values are spread with `source`, and read at the points that `locate` finds.
 
     Attributes:
         mesh: its first `count` vertices are those of the square, the others copies of them.
         source: (V,) int64, of which of the first `count` vertices each one is a copy.
-        columns, rows: of vertices in the square; `rows` is even.
-        period: side of the square [mesh units].
+        columns, rows: of vertices in the square; `rows` is even. The lattice repeats after a length of
+            `columns`, in both directions.
     """
 
     mesh: Mesh
     source: np.ndarray
     columns: int
     rows: int
-    period: float
 
     @staticmethod
-    def of(columns: int, edge: float = 1.0) -> Lattice:
-        """A lattice with `columns` vertices along a side, whose rows have edges of length `edge`.
+    def of(columns: int) -> Lattice:
+        """A lattice with `columns` vertices along a side.
 
         Raises:
             MeshError: fewer than four columns.
         """
         if columns < LEAST:
             raise MeshError(f"a lattice of {columns} columns is not possible", f"use {LEAST} or more")
-        rows, period = 2 * round(columns / np.sqrt(3.0)), columns * edge
+        rows = 2 * round(columns / np.sqrt(3.0))
         width, height = columns + 2 * MARGIN, rows + 2 * MARGIN
         i, j = np.divmod(np.arange(height * width), width)
         i, j = i - MARGIN, j - MARGIN
@@ -51,16 +51,29 @@ class Lattice:
         order = np.argsort(outside, kind="stable")
         number = np.empty_like(order)
         number[order] = np.arange(len(order))
-        x, y = (j + 0.5 * (i % 2)) * edge, i * (period / rows)
+        x, y = j + 0.5 * (i % 2), i * (columns / rows)
         points = np.stack([x, y, np.zeros_like(x)], axis=1)[order]
         source = ((i % rows) * columns + j % columns)[order]
         mesh = Mesh(points, number[_faces(height, width)], name="lattice")
-        return Lattice(mesh, source, columns, rows, period)
+        return Lattice(mesh, source, columns, rows)
 
     @property
     def count(self) -> int:
         """Number of vertices in the square."""
         return self.rows * self.columns
+
+    @cached_property
+    def joined(self) -> Mesh:
+        """The square alone with its sides joined, a torus; the faces across them are long."""
+        row, column = np.divmod(np.arange(self.count), self.columns)
+        first = 2 * ((row + MARGIN) * (self.columns + 2 * MARGIN - 1) + column + MARGIN)
+        faces = self.mesh.faces[np.concatenate([first, first + 1])]
+        return Mesh(self.mesh.vertices[: self.count], self.source[faces], name="tile")
+
+    @property
+    def edge(self) -> float:
+        """Mean length of the six edges at a vertex."""
+        return (1 + 2 * float(np.hypot(0.5, self.columns / self.rows))) / 3
 
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where points of the plane lie on the mesh; those that are whole periods apart lie at one place.

@@ -160,7 +160,8 @@ class TestUsage:
             (["fit", "nac"], "there is no command 'fit nac'; try `mitex fit nca`"),
             (["fit", "nca"], "--exemplar is missing; see `mitex fit nca --help`"),
             (["apply"], "RUN|MODEL is missing; see `mitex apply --help`"),
-            (["apply", "waffle"], "--out and --mesh are missing; see `mitex apply --help`"),
+            (["apply", "waffle"], "--out is missing; see `mitex apply --help`"),
+            (["apply", "spikes"], "--out and --mesh are missing; see `mitex apply --help`"),
             (
                 ["apply", "--seed", "3"],
                 "there is no model '3'; use a path, or one of bricks, honeycomb, "

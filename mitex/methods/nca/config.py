@@ -21,8 +21,6 @@ DECODER_KEYS = {
     "decoder_depth": "depth",
     "omega": "omega",
 }
-TILE_CELLS = (8, 1024)  # along a side of a tile
-TILE_SIDES = (16, 8192)  # of its maps [px]
 
 
 @dataclass(frozen=True)

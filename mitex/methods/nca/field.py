@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import torch
 
 from mitex.mesh import Mesh
 from mitex.methods.nca.decoder.decoder import OFFSET, Decoder
+from mitex.methods.nca.decoder.surface import decoder_units
 from mitex.methods.nca.look import Look
 from mitex.plugins import init
 
@@ -38,8 +40,8 @@ def fields(look: Look, state: torch.Tensor, mesh: Mesh) -> dict[str, dict[str, A
 def _mesh(mesh: Mesh) -> dict[str, Any]:
     from mitex.runtime.jit import mi
 
-    mesh = mesh.normalised()[0]  # as decoders read it, see `Surface`
-    return {"vertices": mi.TensorXf(mesh.vertices), "faces": mi.TensorXf(mesh.faces)}
+    vertices = decoder_units(mesh).apply(mesh.vertices).astype(np.float32)
+    return {"vertices": mi.TensorXf(vertices), "faces": mi.TensorXf(mesh.faces)}
 
 
 def _decoder(decoder: Decoder) -> dict[str, Any]:

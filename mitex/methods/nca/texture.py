@@ -22,6 +22,7 @@ from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import Perception, lattice_perception, perception
+from mitex.methods.nca.ranges import TILE_CELLS
 from mitex.methods.nca.tile import flat_cells, tile_maps
 from mitex.runtime import keep_freed_memory
 
@@ -95,7 +96,9 @@ class NcaTexture:
         laid = mesh if resolution is None or (keep_dense and scale != 1.0) else laid_out(mesh, resolution)
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
         steps = STEPS if steps is None else steps
-        grown = Grown(self.look, self._healthy(cells, seed, steps, orientation), cells, orientation)
+        operator = perception(cells.mesh, self.look.rule.degree, orientation, mean=self.look.mean)
+        state = self._healed(self.grow(operator, seed=seed, steps=steps), cells, operator, seed)
+        grown = Grown(self.look, state, cells, orientation)
         asset = grown.asset()
         if resolution is None:
             return asset
@@ -141,10 +144,10 @@ class NcaTexture:
         Raises:
             ConfigError: options out of range, or the model needs a condition.
         """
-        cells = round(REPEATS * float(self.about.get("density", DENSITY))) if cells is None else cells
-        lattice = flat_cells(cells, resolution)
+        lattice = flat_cells(self._tile_cells() if cells is None else cells, resolution)
         operator = lattice_perception(lattice, self.look.rule.degree, self.look.mean)
         state = self.grow(operator, seed=seed, steps=STEPS if steps is None else steps)
+        state = self._healed(state, Cells(lattice.joined, 0, lattice.joined), operator, seed)
         return tile_maps(self.look, state, lattice, resolution)
 
     @torch.no_grad()
@@ -178,14 +181,18 @@ class NcaTexture:
             state = self.look.bounded(rule.evolve(state, operator, 1, generator))
         return state[0]
 
-    def _healthy(self, cells: Cells, seed: int, steps: int, orientation: float) -> torch.Tensor:
-        """What grows on the automaton's mesh, healed where it leaves the exemplar's colours."""
-        state = self.grow(cells.mesh, seed=seed, steps=steps, orientation=orientation)
+    def _tile_cells(self) -> int:
+        density = self.about.get("density")
+        if not isinstance(density, int | float) or not density > 0:
+            density = DENSITY
+        low, high = TILE_CELLS
+        return round(min(max(REPEATS * density, low), high))
+
+    def _healed(self, state: torch.Tensor, cells: Cells, operator: Perception, seed: int) -> torch.Tensor:
         if "palette" not in self.about:
             return state
-        generator = torch.Generator().manual_seed(seed)
-        operator = perception(cells.mesh, self.look.rule.degree, orientation, mean=self.look.mean)
         palette = Palette.from_record(self.about["palette"])
+        generator = torch.Generator().manual_seed(seed)
         return healed(self.look, state, cells, operator, palette, generator)
 
     def _check_unconditioned(self) -> None:

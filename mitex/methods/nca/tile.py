@@ -11,10 +11,9 @@ from mitex.geometry.normal_maps import decode, encode
 from mitex.mesh import Lattice
 from mitex.methods.nca.bake import CHUNK, Grown
 from mitex.methods.nca.cells import Cells
-from mitex.methods.nca.config import TILE_CELLS, TILE_SIDES
+from mitex.methods.nca.decoder.surface import EDGE, decoder_units
 from mitex.methods.nca.look import Look
-
-EDGE = 0.0376  # of the sphere that the default preset trains on: it mixes waves in the same shares
+from mitex.methods.nca.ranges import TILE_CELLS, TILE_SIDES
 
 
 def flat_cells(cells: int, resolution: int) -> Lattice:
@@ -22,7 +21,7 @@ def flat_cells(cells: int, resolution: int) -> Lattice:
     for name, value, (low, high) in (("cells", cells, TILE_CELLS), ("pixels", resolution, TILE_SIDES)):
         if not low <= value <= high:
             raise ConfigError(f"a tile of {value} {name} along a side", f"use {low} to {high}")
-    return Lattice.of(cells, EDGE)
+    return Lattice.of(cells)
 
 
 def tile_maps(look: Look, state: torch.Tensor, lattice: Lattice, resolution: int) -> dict[str, np.ndarray]:
@@ -52,7 +51,8 @@ class Sampled:
         self.lattice = lattice
         cells = Cells(lattice.mesh, 0, lattice.mesh)
         spread = state[torch.from_numpy(lattice.source)]
-        self.grown = Grown(look.repeating(lattice.period, EDGE), spread, cells)
+        period = lattice.period / decoder_units(lattice.mesh).scale
+        self.grown = Grown(look.repeating(period, EDGE), spread, cells)
 
     def values(self, rows: np.ndarray, columns: np.ndarray, resolution: int) -> np.ndarray:
         """Values (R, C, K) in [0, 1] at the centres of pixels, of which `resolution` are a period.

@@ -1,10 +1,14 @@
 """Maps that repeat: the rule on a flat lattice, and how it is read there."""
 
+import math
+import warnings
+from typing import Any
+
 import numpy as np
 import pytest
 import torch
 
-from mitex.errors import ConfigError
+from mitex.errors import ConfigError, TextureWarning
 from mitex.mesh import Lattice
 from mitex.methods.nca import MeshNCA, NcaTexture
 from mitex.methods.nca import texture as room
@@ -13,8 +17,9 @@ from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.coordinates import Waves
 from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.methods.nca.look import Look
+from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import harmonics, lattice_perception
-from mitex.methods.nca.tile import EDGE, Sampled, flat_cells, tile_maps
+from mitex.methods.nca.tile import Sampled, flat_cells, tile_maps
 
 MAPS = ("albedo", "normal")
 SIDE = 64  # of maps [px]
@@ -28,7 +33,7 @@ def look(shape: DecoderShape | None = None, mean: bool = True, **options) -> Loo
 
 @pytest.fixture(scope="module")
 def lattice():
-    return Lattice.of(16, EDGE)
+    return Lattice.of(16)
 
 
 @pytest.fixture(scope="module")
@@ -49,9 +54,9 @@ def test_cells_perceive_across_the_sides(lattice, state, mean):
     place = lattice.mesh.vertices[: lattice.count].astype(np.float64)
     for i in (0, 5, lattice.columns - 1, lattice.columns, lattice.count - 1):
         offsets = place - place[i]
-        offsets -= lattice.period * np.rint(offsets / lattice.period)
+        offsets -= lattice.columns * np.rint(offsets / lattice.columns)
         length = np.linalg.norm(offsets, axis=1)
-        near = np.flatnonzero((length > 0) & (length < 1.3 * EDGE))
+        near = np.flatnonzero((length > 0) & (length < 1.3))
         assert len(near) == 6
         weights = harmonics(offsets[near] / length[near, None], 2)
         expected = weights.T @ (state[near] - state[i]).numpy()
@@ -107,13 +112,13 @@ def test_what_is_read_goes_on_across_the_sides(lattice, state, interpolation, rn
     one, other = copies(lattice)
     assert len(one) > 4 * lattice.columns
     weights = rng.dirichlet([1, 1, 1], len(one)).astype(np.float32)
-    grown = Grown(model.repeating(lattice.period, EDGE), spread, cells)
+    grown = Sampled(model, state, lattice).grown
     assert np.abs(grown.values(one, weights) - grown.values(other, weights)).max() < 2e-3
     untiled = Grown(model, spread, cells)
     assert np.abs(untiled.values(one, weights) - untiled.values(other, weights)).max() > 0.02
 
 
-@pytest.mark.parametrize("edge", [EDGE, 0.25, 1.0, 3.0])
+@pytest.mark.parametrize("edge", [0.0376, 0.25, 1.0, 3.0])
 def test_waves_repeat_after_the_period(edge, rng):
     waves, period = Waves.draw(16, (2.0, 3.0), 0.3), 40 * edge
     repeating = waves.repeating(period, edge)
@@ -154,7 +159,28 @@ def test_seeds_and_steps_decide():
     assert np.abs(one - other).max() > 1e-3 and np.abs(one - more).max() > 1e-3
 
 
-@pytest.mark.parametrize(("about", "cells"), [({"density": 24.0}, 48), ({}, 64)])
+def test_foreign_colours_are_told(lattice):
+    """A look that is grey, and an exemplar that is red."""
+    red = Palette(np.array([[0.9, 0.1, 0.1]]), 0.05).record()
+    with pytest.warns(TextureWarning, match="100.0% of 'tile' has colours"):
+        NcaTexture(look(), {"palette": red}).tile(32, cells=8, steps=2)
+    grey = Palette(np.array([[0.5, 0.5, 0.5]]), 1.0).record()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        one = NcaTexture(look(), {"palette": grey}).tile(32, cells=8, steps=2)["albedo"]
+    assert np.array_equal(one, NcaTexture(look(), {}).tile(32, cells=8, steps=2)["albedo"])
+
+
+@pytest.mark.parametrize(
+    ("about", "cells"),
+    [
+        ({"density": 24.0}, 48),
+        ({}, 64),
+        ({"density": 1}, 8),
+        ({"density": "x"}, 64),
+        ({"density": math.nan}, 64),
+    ],
+)
 def test_the_exemplar_appears_twice(about, cells, monkeypatch):
     asked = []
     monkeypatch.setattr(room, "flat_cells", lambda *a: asked.append(a) or flat_cells(*a))
@@ -185,7 +211,7 @@ def test_a_model_with_a_condition_is_refused():
 def test_variants_share_mesh_and_layout():
     from mitex.mesh import icosphere
 
-    options = {"subdivide": 0, "steps": 3, "resolution": 64}
+    options: Any = {"subdivide": 0, "steps": 3, "resolution": 64}
     texture, sphere = NcaTexture(look(), {}), icosphere(4)
     one, two = texture.variants(sphere, [5, 6], **options)
     assert (one.name, two.name) == ("seed 5", "seed 6") and one.mesh is two.mesh

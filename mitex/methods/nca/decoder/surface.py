@@ -7,11 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from mitex.mesh import Mesh
+from mitex.mesh import Mesh, Similarity
 from mitex.mesh.gradients import values_and_gradients
 from mitex.plugins import init
 from mitex.sparse import LinearMap
 from mitex.textures.interpolation import Kind, SurfaceLookup
+
+# Mean length of the edges in decoder units: that of the sphere that the default preset trains on. So even
+# meshes of any size mix waves in the shares that the training saw.
+EDGE = 0.03775
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,14 +35,13 @@ class Surface:
     """The mesh that an automaton runs on.
 
     Args:
-        mesh: the mesh; it is normalised.
+        mesh: the mesh; texture depends neither on its place nor on its size.
         interpolation: of the states, "smooth" or "linear".
     """
 
     def __init__(self, mesh: Mesh, interpolation: Kind = "smooth") -> None:
         init()
-        # Solid noise must depend neither on units nor on the place, and float32 needs small numbers.
-        mesh = mesh.normalised()[0]
+        mesh = mesh.with_vertices(decoder_units(mesh).apply(mesh.vertices))
         self.mesh = mesh
         self._lookup = SurfaceLookup(mesh, interpolation)
         self._table = LinearMap(values_and_gradients(mesh)) if interpolation == "smooth" else None
@@ -55,7 +58,15 @@ class Surface:
         return self._lookup.weights(points.face, points.barycentric)(table)
 
     def place(self, points: Points) -> tuple[torch.Tensor, torch.Tensor]:
-        """Positions (P, 3) and lengths of the edges around (P,) of the points [normalised mesh units]."""
+        """Positions (P, 3) and lengths of the edges around (P,) of the points [decoder units]."""
         corners = self._corners[self._faces[points.face.long()]]
         values = (points.barycentric[:, :, None] * corners).sum(1)
         return values[:, :3], values[:, 3]
+
+
+def decoder_units(mesh: Mesh) -> Similarity:
+    """From a mesh's units to decoder units: the vertices' mean is the origin, the edges' mean is `EDGE`."""
+    graph, points = mesh.edges, mesh.vertices.astype(np.float64)
+    lengths = np.linalg.norm(points[graph.indices] - points[graph.rows], axis=1)
+    mean = float(lengths.mean()) if len(lengths) else 0.0
+    return Similarity(points.mean(axis=0), mean / EDGE if mean > 0 else 1.0)
