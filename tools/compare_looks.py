@@ -1,0 +1,98 @@
+"""Measures how near textures of `nca` come to their exemplars, map by map.
+
+usage: python tools/compare_looks.py EXEMPLARS EXEMPLAR=MODEL[,MODEL ...] ...
+
+EXEMPLARS is a folder; names of embedded exemplars work too. A MODEL is a bundled one, a file or a run folder.
+Six patches of a sphere, at the exemplar's scale, are compared with the exemplar: the Frechet distances of
+VGG-16's features at relu2_2 and relu4_1, the relaxed transport over five layers, and the regularity beside
+the exemplar's. Prints a Markdown table.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from mitex.evaluation.metrics import single_image_frechet
+from mitex.evaluation.regularity import regularity
+from mitex.exemplar import Exemplar
+from mitex.exemplar import names as exemplar_names
+from mitex.features import Vgg16
+from mitex.losses import relaxed_transport
+from mitex.mesh import icosphere
+from mitex.methods.nca import NcaTexture
+from mitex.methods.nca.grounds import Ground
+from mitex.scenes.cameras import patch_views
+
+PATCHES, WIDEST, SIDE = 6, 0.65, 256
+FREQUENCIES = {True: 32, False: 48}  # of the training spheres, with a decoder and without
+FRECHET = ("relu2_2", "relu4_1")
+LAYERS = ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1")
+
+
+def main() -> None:
+    folder = Path(sys.argv[1])
+    print("| exemplar | map | model | relu2_2 | relu4_1 | transport | regularity |\n" + "| --- " * 7 + "|")
+    for word in sys.argv[2:]:
+        name, models = word.split("=")
+        source = Exemplar.load(name if name in exemplar_names() else folder / name)
+        exemplar = source.resized(min(SIDE, *source.size))
+        for model in models.split(","):
+            texture = NcaTexture.load(model)
+            for map_name, views in patches(texture, exemplar.size[0]).items():
+                target = rgb(exemplar.maps[map_name])
+                numbers = " | ".join(f"{value:.3g}" for value in distances(target, views))
+                order = f"{np.mean([regularity(view) for view in views]):.2f} of {regularity(target):.2f}"
+                print(f"| {name} | {map_name} | {model} | {numbers} | {order} |", flush=True)
+
+
+@torch.no_grad()
+def patches(texture: NcaTexture, size: int) -> dict[str, np.ndarray]:
+    """Patches (K, h, w, 3) of each map, in which the exemplar's width would be `size` [px]."""
+    mesh = icosphere(FREQUENCIES[hasattr(texture.look.decoder, "network")])
+    ground, state = Ground.of(mesh, texture.look), texture.grow(mesh)
+    edge = math.sqrt(8 * math.pi / math.sqrt(3) / len(mesh.vertices))
+    width = float(texture.about["density"]) * edge
+    half = min(0.5 * width, WIDEST)
+    pixels = round(size * 2 * half / width)
+    cameras = patch_views(torch.Generator().manual_seed(0), mesh, PATCHES, half, pixels)
+    views = ground.views(texture.look, state, cameras, antialias=2).clamp(0, 1).numpy()
+    return {name: rgb(views[..., list(columns)]) for name, columns in texture.look.layout.items()}
+
+
+def rgb(image: np.ndarray) -> np.ndarray:
+    """Three channels, of which one is repeated if there is only one."""
+    return np.ascontiguousarray(np.repeat(image, 3 // image.shape[-1], axis=-1), np.float32)
+
+
+def distances(target: np.ndarray, views: np.ndarray) -> list[float]:
+    """Means over the views: Frechet distances of `FRECHET`, then the transport."""
+    frechet = [[single_image_frechet(target, view, layer=layer) for view in views] for layer in FRECHET]
+    return [*(float(np.mean(values)) for values in frechet), transport(target, views)]
+
+
+@torch.no_grad()
+def transport(target: np.ndarray, views: np.ndarray) -> float:
+    """Relaxed transport (MeshNCA, equation 4), summed over layers, of up to 2,048 random features each."""
+    network, generator = Vgg16("max", precision="float32"), torch.Generator().manual_seed(0)
+    total = 0.0
+    for layer in LAYERS:
+        theirs = some(network.features(torch.from_numpy(target)[None], [layer])[layer], generator)
+        for view in views:
+            ours = some(network.features(torch.from_numpy(view)[None], [layer])[layer], generator)
+            total += float(relaxed_transport(ours, theirs)) / len(views)
+    return total
+
+
+def some(features: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
+    """(1, n, C) features at random places of a map (1, h, w, C)."""
+    vectors = features.flatten(1, 2)
+    return vectors[:, torch.randperm(vectors.shape[1], generator=generator)[:2048]]
+
+
+if __name__ == "__main__":
+    main()
