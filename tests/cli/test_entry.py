@@ -15,6 +15,7 @@ import pytest
 from mitex.cli import commands, main
 from mitex.errors import ConfigError, MeshWarning
 from mitex.training.errors import Interrupted
+from mitex.training.locate import bundled_files
 
 
 @pytest.fixture
@@ -164,8 +165,7 @@ class TestUsage:
             (["apply", "spikes"], "--out and --mesh are missing; see `mitex apply --help`"),
             (
                 ["apply", "--seed", "3"],
-                "there is no model '3'; use a path, or one of bricks, honeycomb, "
-                "pebbles, scales, spikes, waffle",
+                f"there is no model '3'; use a path, or one of {', '.join(bundled_files())}",
             ),
             (
                 ["apply", "--mesh", "vase", "waffle", "--orientatoin=3"],

@@ -139,17 +139,16 @@ def test_demo(folder, monkeypatch, capsys):
 
     fit, grow, bake = nca.fit, nca.NcaTexture.apply, Asset.baked
 
-    def tiny_fit(*arguments, overrides, **options):
+    def tiny_fit(*arguments, overrides, init, **options):
         return fit(*arguments, overrides=[*overrides, *TINY], **options, quiet=True)
 
     monkeypatch.setattr(nca, "fit", tiny_fit)
     monkeypatch.setattr(nca.NcaTexture, "apply", lambda *a, **o: grow(*a, **o, subdivide=1, steps=2))
     monkeypatch.setattr(Asset, "baked", lambda self, resolution, **o: bake(self, 64, **o))
-    monkeypatch.setattr(demo, "_parent", lambda: None)
     monkeypatch.setattr(demo, "MESHES", ("cube.obj",))
     monkeypatch.setattr(demo, "SIZE", 16)
     monkeypatch.setattr(demo, "SAMPLES", 1)
-    for start in ("nothing", "the run in the folder"):
+    for start in (f"model '{demo.PARENT}'", "the run in the folder"):
         assert main(["demo", "--out", "shown", "--steps", "2"]) == 0
         assert f"starting from {start}" in capsys.readouterr().out
     names = {path.name for path in (folder / "shown").iterdir()}

@@ -4,8 +4,12 @@ from pathlib import Path
 
 import pytest
 
+from mitex.exemplar import Exemplar
 from mitex.methods import nca
-from mitex.methods.nca.demo import demo
+from mitex.methods.nca import PRESETS
+from mitex.methods.nca.demo import EXEMPLAR, PARENT, SETTINGS, demo
+from mitex.methods.nca.fitting import _parent
+from mitex.training import resolve
 from mitex.training.locate import CHECKPOINT, PREVIOUS
 
 
@@ -32,3 +36,11 @@ def test_a_run_in_the_folder_is_continued(tmp_path, monkeypatch, left):
         demo(Path("~/demo"), seed=0, steps=1)
     assert options["out"] == run
     assert options["resume"] == bool(left) and (options["init"] is None) == bool(left)
+
+
+def test_its_parent_fits_its_settings():
+    """So that a training can start from the bundled model, with all maps of the exemplar."""
+    exemplar = Exemplar.load(EXEMPLAR)
+    config = resolve(PRESETS, overrides=SETTINGS)
+    look, about = _parent(PARENT, config, sorted(exemplar.maps))
+    assert about["name"] == PARENT and look.maps == tuple(sorted(exemplar.maps))
