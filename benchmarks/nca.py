@@ -21,16 +21,18 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks import naive
-from mitex import bridge
 from mitex.exemplar import Exemplar
 from mitex.features import normalise_colours
 from mitex.losses import moment_distance, overflow_loss, relaxed_transport
 from mitex.mesh import icosphere
 from mitex.methods.nca import PRESETS, NcaConfig, NcaTexture
+from mitex.methods.nca.decoder.decoder import OFFSET
+from mitex.methods.nca.decoder.surface import Points
 from mitex.methods.nca.model import FIRE_RATE
-from mitex.methods.nca.targets import OFFSET
 from mitex.methods.nca.task import NcaTask
 from mitex.runtime.precision import bfloat16_flags
+from mitex.scenes.cameras import Cameras
+from mitex.scenes.stage import Visibility
 from mitex.training.optim import Adam, gradient_norms, normalise_gradients
 
 STEPS = 20
@@ -64,24 +66,31 @@ class Bench:
         self.repetitions = repetitions
         exemplar = Exemplar({"albedo": Exemplar.load("cobblestone").maps["albedo"]})
         self.task = NcaTask(config, exemplar)
-        self.config, self.model, self.network = config, self.task.model, self.task.appearance.network
+        ((self.size, self.appearance),) = self.task.zooms.items()
+        self.config, self.rule, self.network = config, self.task.look.rule, self.appearance.network
+        self.ground = self.task.grounds[0]
         self.adam = Adam(self.task.parameters)
         generator = torch.Generator().manual_seed(0)
         self.task.pool.uniform_(-0.2, 0.2, generator=generator)  # as full of states as in a training
         self.task._touched.fill_(True)
         self.state = self.task.pool[:1].clone()
-        self.visibility = self.task.stage.visibility(self.task.cameras(generator))
-        self.field = self.state[0, :, ALBEDO].contiguous() + OFFSET
-        self.images = bridge.lookup(self.field, self.visibility).contiguous()
+        cameras = self._cameras(generator)
+        self.visibility, hits = self.ground.stage.visibility(cameras), self.ground.stage.hits(cameras)
+        self.points = Points(hits.face, hits.barycentric)
+        with torch.no_grad():
+            self.images = self.ground.views(self.task.look, self.state[0], cameras).contiguous()
         self.places, self.targets = self._targets(generator)
         with torch.no_grad():
             self.vectors = self.network.samples(self.images, self.places)
         self.upstream = {k: torch.randn(v.shape, generator=generator) for k, v in self.vectors.items()}
-        self.plain, self.passing = naive.vgg_weights(), naive.MessagePassing.of(self.task.mesh)
+        self.plain, self.passing = naive.vgg_weights(), naive.MessagePassing.of(self.ground.mesh)
+
+    def _cameras(self, generator: torch.Generator) -> Cameras:
+        return self.task.cameras(self.ground.mesh, self.size, generator)
 
     def _targets(self, generator: torch.Generator) -> tuple[dict[str, torch.Tensor], dict[str, torch.Tensor]]:
         """Places to sample in the views, and as many vectors of the exemplar."""
-        targets, count = self.task.appearance.targets, len(self.images)
+        targets, count = self.appearance.targets, len(self.images)
         which = torch.zeros(count, dtype=torch.long)
         places, vectors = {}, {}
         for layer in self.config.layers:
@@ -99,7 +108,8 @@ class Bench:
     # The parts, by Mitex.
 
     def nca(self) -> None:
-        state = self.model.evolve(self.state, self.task.perception, STEPS, torch.Generator().manual_seed(1))
+        generator = torch.Generator().manual_seed(1)
+        state = self.rule.evolve(self.state, self.ground.perception, STEPS, generator)
         torch.autograd.grad(state, self.task.parameters, torch.ones_like(state))
 
     def vgg(self) -> None:
@@ -122,11 +132,12 @@ class Bench:
         total.backward()
 
     def visible(self) -> None:
-        self.task.stage.visibility(self.task.cameras(torch.Generator().manual_seed(2)))
+        self.ground.stage.hits(self._cameras(torch.Generator().manual_seed(2)))
 
     def lookup(self) -> None:
-        field = self.field.clone().requires_grad_()
-        torch.autograd.grad(bridge.lookup(field, self.visibility), field, self.images)
+        state, surface = self.state[0].clone().requires_grad_(), self.ground.surface
+        values = self.task.look.decoder(surface, surface.table(state), self.points)
+        torch.autograd.grad(values, state, torch.ones_like(values))
 
     def step(self) -> None:
         self.adam.clear()
@@ -151,15 +162,15 @@ class Bench:
         self._naive_loss(vectors, self._colours().requires_grad_()).backward()
 
     def naive_lookup(self) -> None:
-        field = self.field.clone().requires_grad_()
-        torch.autograd.grad(naive.lookup(field, self.visibility), field, self.images)
+        state = self.state[0].clone().requires_grad_()
+        images = self._naive_lookup(state, self.visibility)
+        torch.autograd.grad(images, state, torch.ones_like(images))
 
     def naive_step(self) -> None:
         self.adam.clear()
         generator = torch.Generator().manual_seed(3)
         state = self._naive_evolve(self.task.pool[:1].clone(), generator)
-        visibility = self.task.stage.visibility(self.task.cameras(generator))
-        images = naive.lookup(state[0, :, ALBEDO] + OFFSET, visibility)
+        images = self._naive_lookup(state[0], self.ground.stage.visibility(self._cameras(generator)))
         vectors = naive.vectors(naive.vgg(images, self.plain), self.places)
         loss = self._naive_loss(vectors, images.flatten(1, 2)[:, : self.config.samples])
         (loss + self.config.overflow_weight * overflow_loss(state)).backward()
@@ -168,8 +179,12 @@ class Bench:
     def _naive_evolve(self, state: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
         for _ in range(STEPS):
             mask = torch.rand(state.shape[:2], generator=generator) < FIRE_RATE
-            state = self.passing.step(self.model, state, mask)
+            state = self.passing.step(self.rule, state, mask)
         return state
+
+    @staticmethod
+    def _naive_lookup(state: torch.Tensor, visibility: Visibility) -> torch.Tensor:
+        return naive.lookup(state[:, ALBEDO] + OFFSET, visibility)
 
     def _naive_loss(self, vectors: dict[str, torch.Tensor], colours: torch.Tensor) -> torch.Tensor:
         b = normalise_colours(self.targets["colour"])
@@ -187,18 +202,19 @@ class Bench:
         self.adam.step(1e-9)  # so small that all repetitions compute the same
 
     def check(self) -> None:
-        """Both ways compute the same: the gradients of the automaton, and those of the lookup."""
+        """Both ways compute the same: the gradients of the automaton, and the views."""
         upstream = torch.randn(self.state.shape, generator=torch.Generator().manual_seed(5))
-        ours = self.model.evolve(self.state, self.task.perception, 3, torch.Generator().manual_seed(1))
+        ours = self.rule.evolve(self.state, self.ground.perception, 3, torch.Generator().manual_seed(1))
         generator, theirs = torch.Generator().manual_seed(1), self.state
         for _ in range(3):
             mask = torch.rand(theirs.shape[:2], generator=generator) < FIRE_RATE
-            theirs = self.passing.step(self.model, theirs, mask)
+            theirs = self.passing.step(self.rule, theirs, mask)
         for a, b in zip(
             *(torch.autograd.grad(x, self.task.parameters, upstream) for x in (ours, theirs)), strict=True
         ):
             assert (a - b).norm() < 1e-3 * b.norm()
-        assert torch.allclose(self.images, naive.lookup(self.field, self.visibility), atol=1e-5)
+        with torch.no_grad():
+            assert torch.allclose(self.images, self._naive_lookup(self.state[0], self.visibility), atol=1e-5)
 
     def time(self, function: Callable[[], object]) -> float:
         return best(function, self.repetitions)
@@ -280,7 +296,7 @@ def main() -> None:
     console = Console()
     console.print(cpu())
     bench = Bench(config, options.repetitions)
-    vertices, views = len(bench.task.mesh.vertices), f"{config.view_count} views of {config.resolution}^2"
+    vertices, views = len(bench.ground.mesh.vertices), f"{config.view_count} views of {config.resolution}^2"
     console.print(f"{vertices:,} vertices, {views} pixels, VGG-16 in {bench.network.dtype}")
     show(*measure(bench, 8 if options.quick else 32), console)
 

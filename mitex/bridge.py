@@ -60,8 +60,8 @@ def render(
     Args:
         scene: an `mi.Scene`.
         values: float32 CPU tensors by parameter name as in `mi.traverse(scene)` (the integrator's own are
-            called `integrator.*` there, also when it is passed here), or one tensor if the scene has
-            exactly one `vertex_field` or `texel_field`.
+            called `integrator.*` there, also when it is passed here), or one tensor, the `data` of the field,
+            if the integrator images exactly one of Mitex.
         sensor: index of a sensor of the scene, or an `mi.Sensor`; `batch` sensors put their views side by
             side.
         integrator: a `feature` integrator, if not the scene's.

@@ -14,12 +14,12 @@ Code that needs them takes `init` from here; that of `mitex.runtime` knows no pl
 from mitex.integrators import feature, shell
 from mitex.runtime import init
 from mitex.runtime.jit import mi
-from mitex.textures import texel_field, vertex_field
+from mitex.textures import decoded_field, texel_field, vertex_field
 
 __all__ = ["PLUGINS", "init", "register"]
 
 # Each has a function register(), which builds its class for the current variant and registers it.
-PLUGINS = (vertex_field, texel_field, feature, shell)
+PLUGINS = (vertex_field, texel_field, decoded_field, feature, shell)
 
 
 def register() -> None:

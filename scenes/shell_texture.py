@@ -32,7 +32,7 @@ def main(run: str, out: str = "shell.png", size: int = 1024, resolution: int = 3
     applied = NerfTexture.load(run).apply(embedded("vase"), size=size)
     # The vase keeps its size in the scene; the field's cube goes with it.
     field = shell_field(applied, Similarity(np.array([-0.9, 0.0, 0.0]), 1.0))
-    grown = NcaTexture.load("pebbles").apply(embedded("octopus"), seed=0, resolution=512)
+    grown = NcaTexture.load("pebbles").apply(embedded("octopus"), resolution=None, keep_dense=True)
     scene = {
         "type": "scene",
         "integrator": {"type": "shell", "field": field, "max_depth": 8},

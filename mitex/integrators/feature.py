@@ -1,4 +1,4 @@
-"""`feature`: a Mitsuba integrator that images the channels of a texture, with an analytic adjoint."""
+"""`feature`: a Mitsuba integrator that images the channels of a texture, differentiably."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ class FeatureMethods:
 
      * - field
        - |texture|
-       - The texture to image, on every shape: all channels of a `vertex_field` or `texel_field`; of
-         any other the colour that `eval` gives (3 channels in rgb variants, 1 in mono, not in spectral ones).
+       - The texture to image, on every shape: all channels of a `vertex_field`, `texel_field` or
+         `decoded_field`; of any other the colour that `eval` gives (3 channels in rgb variants, 1 in mono,
+         none in spectral ones).
        - exposed, differentiable
      * - name
        - |string|
@@ -37,11 +38,12 @@ class FeatureMethods:
     The sensor's sampler and reconstruction filter are not used: the image is deterministic, the seed has no
     effect. The result is returned and not stored in the film, which has no room for C channels.
 
-    Visibility and the weights of a lookup are detached, lookups are attached: `mi.render` differentiates with
-    respect to `data`, `scale`, `offset` (or any parameter of another texture) and `background`, not to
-    geometry or cameras. The adjoint scatters the image's gradient to the vertices or texels with the weights
-    of the forward pass; no derivative passes through ray tracing or film. Calling `render` directly with
-    attached parameters returns an attached image.
+    Visibility and where a lookup reads are detached, lookups are attached: `mi.render` differentiates with
+    respect to the parameters of the texture and `background`, not to geometry or cameras. The adjoint is that
+    of the samples' values, by automatic differentiation, so values need not be linear in the data; of a
+    `vertex_field` or `texel_field` it is a scatter of the image's gradient with the weights of the forward
+    pass. No derivative passes through ray tracing or film. Calling `render` directly with attached parameters
+    returns an attached image.
     """
 
     def __init__(self, props: mi.Properties) -> None:
@@ -219,7 +221,7 @@ def _evaluate(texture: mi.Texture, si: mi.SurfaceInteraction3f, active: mi.Bool)
             located = texture.locate(si, active)
         return texture.gather(located)
     if mi.is_spectral:
-        raise RuntimeError("feature: in spectral variants only a vertex_field or texel_field can be imaged")
+        raise RuntimeError("feature: in spectral variants only the fields of Mitex can be imaged")
     return list(texture.eval(si, active))
 
 

@@ -58,6 +58,17 @@ class Mesh:
         return edge_graph(self.faces, len(self.vertices))
 
     @cached_property
+    def edge_lengths(self) -> np.ndarray:
+        """(V,) float64 mean lengths of the edges at each vertex; of all edges where they have none [mesh
+        units].
+        """
+        graph = self.edges
+        lengths = np.linalg.norm(self.vertices[graph.indices] - self.vertices[graph.rows], axis=1)
+        total = np.bincount(graph.rows, lengths, len(self.vertices))
+        mean = float(lengths.mean()) if len(lengths) else 1.0
+        return np.where(total > 0, total / np.maximum(graph.valence, 1), mean)
+
+    @cached_property
     def face_crosses(self) -> np.ndarray:
         """(F, 3) float64 normals whose lengths are twice the faces' areas [mesh units^2]."""
         return triangle_crosses(self.vertices[self.faces].astype(np.float64))

@@ -10,19 +10,28 @@ from mitex.textures.variant import init_base, option
 
 
 class Located(NamedTuple):
-    """Where lookups read: K rows of the data, their weights, and which of the lookups read any."""
+    """Where lookups read.
+
+    Attributes:
+        rows: of the data, K of them.
+        weights: of the rows.
+        active: which of the lookups read any.
+        coordinates: what else a field that decodes its data knows of the points.
+    """
 
     rows: tuple[mi.UInt32, ...]
     weights: tuple[mi.Float, ...]
     active: mi.Bool
+    coordinates: tuple[mi.Float, ...] = ()
 
 
 @runtime_checkable
 class Field(Protocol):
-    """A texture of which all channels can be read, in two steps; the first can be detached.
+    """A texture of which all channels can be read, in two steps.
 
-    `isinstance(texture, Field)` tells it from Mitsuba's own textures. A lookup is linear in the data, so its
-    adjoint is a scatter with the weights that `locate` returned.
+    `isinstance(texture, Field)` tells it from Mitsuba's own textures. `locate` may be detached: it depends on
+    the geometry alone, and `gather` carries all derivatives by the data and other parameters. Where `gather`
+    only sums rows, it is linear in the data, and its adjoint a scatter with the weights.
     """
 
     def locate(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> Located:
@@ -30,7 +39,7 @@ class Field(Protocol):
         ...
 
     def gather(self, located: Located, channels: range | None = None) -> list[mi.Float]:
-        """Interpolated `scale * data + offset` of the channels (default: all), one Float each."""
+        """Values times `scale` plus `offset` of the channels (default: all), one Float each."""
         ...
 
 
@@ -72,7 +81,7 @@ class FieldMethods:
         self._check_data()
         if not 0 <= self.channel < self.channel_count:
             raise RuntimeError(
-                f"{self.plugin}: 'channel' is {self.channel}; 'data' has 0 to {self.channel_count - 1}"
+                f"{self.plugin}: 'channel' is {self.channel}; use 0 to {self.channel_count - 1}"
             )
         # A virtual function call cannot evaluate what it captures.
         dr.eval(self.data)
@@ -90,27 +99,26 @@ class FieldMethods:
 
     def gather(self, located: Located, channels: range | None = None) -> list[mi.Float]:
         """Interpolated `scale * data + offset` of the channels (default: all), one Float each."""
-        _, weights, active = located
         values = []
         for channel in range(self.channel_count) if channels is None else channels:
             rows = self._row_values(located, channel)
-            value = sum(w * r for w, r in zip(weights, rows, strict=True))
-            values.append(dr.fma(dr.select(active, value, 0), self.scale, self.offset))
+            value = sum(w * r for w, r in zip(located.weights, rows, strict=True))
+            values.append(dr.fma(dr.select(located.active, value, 0), self.scale, self.offset))
         return values
 
     def _row_values(self, located: Located, channel: int) -> list[mi.Float]:
         """The data of one channel at the K rows of the lookups."""
-        index, _, active = located
-        return [dr.gather(mi.Float, self.data.array, self.channel_count * i + channel, active) for i in index]
+        rows = (self.channel_count * row + channel for row in located.rows)
+        return [dr.gather(mi.Float, self.data.array, row, located.active) for row in rows]
 
     def eval(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Color3f | mi.Color1f:
-        return self._color(self._three(si, active))
+        return self._color(self._three(self.locate(si, active)))
 
     def eval_1(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Float:
         return self.gather(self.locate(si, active), range(self.channel, self.channel + 1))[0]
 
     def eval_3(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Color3f:
-        return self._three(si, active)
+        return self._three(self.locate(si, active))
 
     def mean(self) -> mi.Float:
         """Mean over the data's rows of what `eval` returns."""
@@ -135,8 +143,8 @@ class FieldMethods:
         enough = self.channel + 3 <= self.channel_count
         return range(self.channel, self.channel + (3 if enough else 1))
 
-    def _three(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool) -> mi.Color3f:
-        values = self.gather(self.locate(si, active), self._selection())
+    def _three(self, located: Located) -> mi.Color3f:
+        values = self.gather(located, self._selection())
         return mi.Color3f(*values) if len(values) == 3 else mi.Color3f(values[0])
 
     def _color(self, rgb: mi.Color3f) -> mi.Color3f | mi.Color1f:
@@ -149,9 +157,8 @@ class FieldMethods:
         return mi.Color1f(mi.luminance(rgb)) if mi.is_monochromatic else rgb
 
     def _row_colors(self) -> mi.Color3f | mi.Color1f:
-        row = self._rows() * self.channel_count
-        values = [
-            dr.fma(dr.gather(mi.Float, self.data.array, row + c), self.scale, self.offset)
-            for c in self._selection()
-        ]
-        return self._color(mi.Color3f(*values) if len(values) == 3 else mi.Color3f(values[0]))
+        return self._color(self._three(self._at_rows()))
+
+    def _at_rows(self) -> Located:
+        """The lookups that read one row each."""
+        return Located((self._rows(),), (mi.Float(1),), mi.Bool(True))

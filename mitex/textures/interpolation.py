@@ -14,14 +14,17 @@ holds the values of vertex v for k = 0, and their derivatives by x, y, z for k =
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, NamedTuple, cast
+from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 
 import numpy as np
-import torch
 
 from mitex.mesh import Mesh
 from mitex.runtime.jit import dr, mi
-from mitex.sparse import Weights
+
+if TYPE_CHECKING:
+    import torch
+
+    from mitex.sparse import Weights
 
 Kind = Literal["linear", "smooth"]
 
@@ -63,9 +66,10 @@ def _shares(barycentric: Sequence[mi.Float]) -> list[mi.Float]:
     squares = [b * b for b in barycentric]
     products = [squares[k - 2] * squares[k - 1] for k in range(3)]
     total = products[0] + products[1] + products[2]
-    # At a corner all three are the corner's value.
-    inverse = dr.select(total > 0, dr.rcp(dr.maximum(total, 1e-30)), 0)
-    return [dr.select(total > 0, product * inverse, 1 / 3) for product in products]
+    # At a corner, and nearer to it than squares of squares can tell, all three are the corner's value.
+    known = total > 1e-30
+    inverse = dr.rcp(dr.maximum(total, 1e-30))
+    return [dr.select(known, product * inverse, 1 / 3) for product in products]
 
 
 def _add_side(
@@ -130,6 +134,10 @@ class SurfaceLookup:
 
     def weights(self, face: torch.Tensor, barycentric: torch.Tensor) -> Weights:
         """What the points on `face` (P,) int32 at `barycentric` (P, 3) float32 read."""
+        import torch
+
+        from mitex.sparse import Weights
+
         columns = len(self.mesh.vertices) * (4 if self.kind == "smooth" else 1)
         if not len(face):  # Dr.Jit has no arithmetic on empty arrays
             width = 12 if self.kind == "smooth" else 3

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from mitex.runtime.jit import dr, mi
 from mitex.textures.field import FieldMethods, Located
+from mitex.textures.triangle import combine, edges, triangle_points
 from mitex.textures.variant import for_variant
 
 
@@ -37,10 +36,8 @@ class VertexFieldMethods(FieldMethods):
     The texture works on triangle meshes of JIT variants, with one instance per mesh; on another shape, or
     where a triangle refers to a vertex beyond the data, it is `offset`. `eval` needs an rgb or mono variant.
 
-    Barycentric weights: a mesh without UVs gives them exactly in `si.uv`. With UVs they are solved from
-    `si.p` in the triangle, the way Mitsuba evaluates its own mesh attributes: `si.uv` cannot be inverted
-    where the UV map folds or is degenerate, and mesh attributes themselves hold only 1 or 3 channels. `si.p`
-    is in world space, so a mesh with UVs must not be placed through an `instance`.
+    Barycentric weights: a mesh without UVs gives them exactly, in `si.uv`; with UVs they are solved from
+    `si.p`, which is in world space, so such a mesh must not be placed through an `instance`.
 
     Other Mitex code reads all channels: it is a `mitex.textures.field.Field`.
     """
@@ -62,17 +59,7 @@ class VertexFieldMethods(FieldMethods):
 
     def locate(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> Located:
         """Vertices (3 indices) and barycentric weights (3) of the points `si`, and which have any."""
-        mesh = mi.MeshPtr(si.shape)
-        active = mi.Bool(active) & si.shape.is_mesh()
-        index = mesh.face_indices(si.prim_index, active)
-        active &= dr.max(index) < self.data.shape[0]
-        p0, e1, e2 = _edges(mesh, index, active)
-        offset = mi.Vector3f(si.p - p0)
-        d1, d2 = dr.dot(e1, offset), dr.dot(e2, offset)
-        u, v = _solve(e1, e2, d1, d2)
-        has_uv = mesh.has_vertex_texcoords()
-        u, v = dr.select(has_uv, u, si.uv.x), dr.select(has_uv, v, si.uv.y)
-        return Located(tuple(index), (1 - u - v, u, v), active)
+        return Located(*triangle_points(si, self.data.shape[0], active))
 
     def eval_1_grad(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Vector2f:
         """Derivatives along `si.dp_du` and `si.dp_dv`: the interpolant's surface gradient, projected on each.
@@ -81,31 +68,14 @@ class VertexFieldMethods(FieldMethods):
         of vertex values over `si.uv` would be wrong.
         """
         located = self.locate(si, active)
-        index, _, active = located
-        _, e1, e2 = _edges(mi.MeshPtr(si.shape), index, active)
+        _, e1, e2 = edges(mi.MeshPtr(si.shape), located.rows, located.active)
         corner = self._row_values(located, self.channel)
-        a, b = _solve(e1, e2, corner[1] - corner[0], corner[2] - corner[0])
-        gradient = self.scale * dr.select(active, a * e1 + b * e2, 0)
+        a, b = combine(e1, e2, corner[1] - corner[0], corner[2] - corner[0])
+        gradient = self.scale * dr.select(located.active, a * e1 + b * e2, 0)
         return mi.Vector2f(dr.dot(gradient, si.dp_du), dr.dot(gradient, si.dp_dv))
 
     def to_string(self) -> str:
         return self._description("VertexField", vertices=self.data.shape[0], channels=self.channel_count)
-
-
-def _edges(
-    mesh: mi.MeshPtr, index: Iterable[mi.UInt32], active: mi.Bool
-) -> tuple[mi.Point3f, mi.Vector3f, mi.Vector3f]:
-    """First corner of each triangle and the edges from it to the second and third."""
-    p0, p1, p2 = (mesh.vertex_position(i, active) for i in index)
-    return p0, mi.Vector3f(p1 - p0), mi.Vector3f(p2 - p0)
-
-
-def _solve(e1: mi.Vector3f, e2: mi.Vector3f, d1: mi.Float, d2: mi.Float) -> tuple[mi.Float, mi.Float]:
-    """The a, b for which the tangent vector a e1 + b e2 has the dot products d1 with e1 and d2 with e2."""
-    a11, a12, a22 = dr.dot(e1, e1), dr.dot(e1, e2), dr.dot(e2, e2)
-    determinant = dr.fma(a11, a22, -a12 * a12)
-    inverse = dr.select(determinant > 0, 1 / determinant, 0)
-    return (a22 * d1 - a12 * d2) * inverse, (a11 * d2 - a12 * d1) * inverse
 
 
 def register() -> None:

@@ -11,7 +11,8 @@ from tests.cli import bad_files as bad
 ROOT = Path(__file__).parents[2]
 QUICK = (
     "--set frequency=4 pool=1 view_count=1 resolution=32 target_size=32 exemplar_size=32 "
-    "hidden=8 min_steps=2 max_steps=2 steps=2 checkpoint_every=1 preview_every=0 layers=relu1_1"
+    "hidden=8 min_steps=2 max_steps=2 steps=2 checkpoint_every=1 preview_every=0 layers=relu1_1 "
+    "zooms=1 order_weight=0 decoder_width=8"
 )
 
 

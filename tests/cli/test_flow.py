@@ -33,6 +33,7 @@ TINY = [
         "hidden=8",
     ),
     *("min_steps=2", "max_steps=2", "checkpoint_every=1", "preview_every=0", "layers=relu1_1"),
+    *("zooms=1", "order_weight=0", "decoder_width=8"),
 ]
 
 
@@ -66,7 +67,12 @@ def test_fit_apply_render(folder, capsys):
     assert run(*apply, "--out", "new/b.glb", "--vertex-colors", "--orientation", "-90") == "new/b.glb"
     assert Asset.load("new/b.glb").atlas is None
     assert run(*apply, "--out", "c.ply") == "c.ply"
-    assert len(Asset.load("c.ply").mesh.faces) == 12 * 16
+    assert len(Asset.load("c.ply").mesh.faces) == 12
+    assert run(*apply, "--out", "d.ply", "--keep-dense") == "d.ply"
+    assert len(Asset.load("d.ply").mesh.faces) == 12 * 16
+    assert run(*apply, "--out", "d.glb", "--keep-dense", "--resolution", "64") == "d.glb"
+    dense = Asset.load("d.glb")
+    assert len(dense.mesh.faces) == 12 * 16 and dense.atlas is not None
 
     render = ["render", "a.glb", "--size", "16", "--spp", "1"]
     assert run(*render, "--out", "a.png", "--azimuth", "-30", "--elevation", "40") == "a.png"
@@ -90,7 +96,9 @@ def test_options_reach_the_library(folder, monkeypatch, capsys):
     )
     assert main(words.split()) == 0
     expected = {"seed": 5, "steps": 1, "subdivide": 0, "orientation": np.pi / 2, "scale": 1.0}
-    assert options == expected | {"resolution": None}
+    assert options == expected | {"resolution": None, "keep_dense": False}
+    assert main([*words.split(), "--keep-dense"]) == 0
+    assert options == expected | {"resolution": None, "keep_dense": True}
 
     monkeypatch.setattr(
         "mitex.render.picture.still", lambda asset, **o: options.update(o) or np.zeros((4, 4, 3))

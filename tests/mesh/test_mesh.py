@@ -67,6 +67,12 @@ def test_a_face_that_repeats_a_vertex_makes_no_edge_to_itself():
     assert graph.valence.tolist() == [1, 1, 0, 0]
 
 
+def test_edge_lengths_are_means_at_each_vertex():
+    corners = np.array([(0, 0, 0), (3, 0, 0), (0, 4, 0), (9, 9, 9)])  # the last one has no edge
+    np.testing.assert_allclose(Mesh(corners, np.array([(0, 1, 2)])).edge_lengths, (3.5, 4, 4.5, 4))
+    np.testing.assert_array_equal(Mesh(corners, np.empty((0, 3), int)).edge_lengths, np.ones(4))
+
+
 def test_no_faces_no_edges():
     mesh = Mesh(FAN_POINTS, np.empty((0, 3), int))
     assert mesh.edges.valence.tolist() == [0, 0, 0, 0]

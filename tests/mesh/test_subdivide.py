@@ -8,6 +8,7 @@ from hypothesis import given, settings
 
 from mitex.errors import MeshError
 from mitex.mesh import Mesh, grid, icosphere, quality, subdivide_loop, subdivide_midpoint, torus
+from mitex.mesh.subdivide import child_points
 from mitex.mesh.topology import mesh_edges
 from tests.mesh.examples import FAN, FAN_POINTS, meshes, octahedron
 
@@ -119,6 +120,40 @@ def test_corner_uvs_are_interpolated(subdivide):
     assert parts is not None
     assert parts[:16].max() <= 1.0
     assert parts[16:].min() >= 5.0
+
+
+@pytest.mark.parametrize("times", range(5))
+@pytest.mark.parametrize("outside", [0.0, 0.05])
+def test_points_keep_their_places_on_the_children(rng, times, outside):
+    """In space, on one of the face's own children; also points that lie a little beyond their face."""
+    mesh = icosphere(2)
+    fine = subdivide_midpoint(mesh, times)
+    face = rng.integers(len(mesh.faces), size=400)
+    weights = rng.dirichlet(np.ones(3), 400) * (1 + 3 * outside) - outside
+    child, barycentric = child_points(face, weights, times)
+    assert (child // 4**times == face).all()
+    np.testing.assert_allclose(barycentric.sum(1), 1)
+    assert barycentric.min() > -1e-9 - outside * 2**times
+    places = [
+        np.einsum("pk,pkd->pd", w, m.vertices[m.faces[f]].astype(float))
+        for m, f, w in ((mesh, face, weights), (fine, child, barycentric))
+    ]
+    np.testing.assert_allclose(*places, atol=1e-6)
+
+
+def test_points_on_sides_and_corners_of_children():
+    """Where the middle child meets the others, the place is right whichever child is taken."""
+    mesh, fine = octahedron(), subdivide_midpoint(octahedron(), 1)
+    weights = np.array([[1, 0, 0], [0, 0, 1], [0.5, 0.5, 0], [0.5, 0.25, 0.25], [0, 0.5, 0.5]], np.float32)
+    face = np.full(5, 3, np.int32)
+    child, barycentric = child_points(face, weights, 1)
+    assert child.dtype == np.int32 and barycentric.dtype == np.float32
+    assert barycentric.min() >= 0
+    np.testing.assert_allclose(
+        np.einsum("pk,pkd->pd", barycentric, fine.vertices[fine.faces[child]]),
+        np.einsum("pk,pkd->pd", weights, mesh.vertices[mesh.faces[face]]),
+        atol=1e-6,
+    )
 
 
 def test_zero_times_is_the_same_mesh():

@@ -31,7 +31,8 @@ FITS = {
     "checkerboard": TinyFit("--exemplar lava --steps 2", "--mesh cube.obj --offset 0.5"),
     "nca": TinyFit(
         "--exemplar photo.png --steps 2 --set frequency=4 pool=1 view_count=1 resolution=32 target_size=32 "
-        f"exemplar_size=32 hidden=8 min_steps=2 max_steps=2 layers=relu1_1 {SMALL_RUN}",
+        f"exemplar_size=32 hidden=8 min_steps=2 max_steps=2 layers=relu1_1 order_weight=0 "
+        f"zooms=1 decoder_width=8 {SMALL_RUN}",
         "--mesh cube.obj --subdivide 1 --steps 2 --resolution 64",
     ),
     "surface": TinyFit(

@@ -35,6 +35,18 @@ def radiance(mi, shape, x: np.ndarray, y: np.ndarray, light=(0.0, 0.0, -1.0)) ->
     return np.array(value).T
 
 
+def interaction(mi, shape, face: np.ndarray, barycentric: np.ndarray):
+    """Surface interactions at points of a mesh without UVs: faces (N,), barycentrics (N, 3). The caller keeps
+    the shape.
+    """
+    from mitex.runtime.jit import dr
+
+    si = dr.zeros(mi.SurfaceInteraction3f, len(face))
+    si.t, si.shape, si.prim_index = mi.Float(1), mi.ShapePtr(shape), mi.UInt32(face.astype(np.uint32))
+    si.uv = mi.Point2f(*np.asarray(barycentric, np.float32).T[1:])
+    return si
+
+
 def sphere_picture(mi, bsdf: dict) -> np.ndarray:
     to_world = mi.ScalarTransform4f().look_at(origin=[1, 2, 4], target=[0, 0, 0], up=[0, 1, 0])
     film = {"type": "hdrfilm", "width": 16, "height": 16}

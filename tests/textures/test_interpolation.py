@@ -41,10 +41,8 @@ def _bent(angle: float) -> Mesh:
 
 
 def _uneven() -> Mesh:
-    mesh = icosphere(3)
-    return mesh.with_vertices(
-        mesh.vertices + 0.08 * np.random.default_rng(1).normal(size=mesh.vertices.shape)
-    )
+    mesh, rng = icosphere(3), np.random.default_rng(1)
+    return mesh.with_vertices(mesh.vertices + 0.08 * rng.normal(size=mesh.vertices.shape))
 
 
 def _wheel(valence: int, height: float = 0.2) -> Mesh:
@@ -257,10 +255,8 @@ def test_any_valence_and_a_boundary_stay_bounded(valence, rng):
     mesh = _wheel(valence)
     table = _table(mesh, (rng.random((valence + 1, 30)) > 0.5).astype(float), "smooth")
     face, b = _random_points(mesh, rng)
-    outside = (
-        np.repeat(np.arange(valence), 3),
-        np.tile(1.04 * np.eye(3) - 0.02 * (1 - np.eye(3)), (valence, 1)),
-    )
+    beyond = 1.04 * np.eye(3) - 0.02 * (1 - np.eye(3))
+    outside = np.repeat(np.arange(valence), 3), np.tile(beyond, (valence, 1))
     for where in ((face, b), outside):
         values = _read(mesh, "smooth", table, *where)
         assert np.isfinite(values).all()
@@ -280,10 +276,8 @@ def test_units_do_not_matter(kind, size, rng):
 @pytest.mark.parametrize("kind", KINDS)
 def test_faces_without_area_stay_bounded(kind, rng):
     """Lines, points, and a mesh that has nothing else."""
-    for mesh in (
-        collapsed(icosphere(2)),
-        Mesh(np.outer([0, 1, 3], [1, 0, 0]), np.array([[0, 1, 2], [1, 1, 1]])),
-    ):
+    line = Mesh(np.outer([0, 1, 3], [1, 0, 0]), np.array([[0, 1, 2], [1, 1, 1]]))
+    for mesh in (collapsed(icosphere(2)), line):
         table = _table(mesh, rng.random(len(mesh.vertices)), kind)
         values = _read(mesh, kind, table, *_random_points(mesh, rng))
         assert np.isfinite(values).all() and np.abs(values).max() < 3
@@ -293,3 +287,15 @@ def test_no_points(rng):
     mesh = icosphere(1)
     for kind in KINDS:
         assert _weights(mesh, kind, np.zeros(0), np.zeros((0, 3))).shape[0] == 0
+
+
+@pytest.mark.parametrize("distance", [1e-20, 1e-16, 1e-12, 1e-8])
+@pytest.mark.parametrize("kind", KINDS)
+def test_next_to_a_corner_is_the_value_of_the_corner(kind, distance: float):
+    """Even where squares of barycentric coordinates have no place in float32."""
+    mesh = _uneven()
+    values = np.random.default_rng(2).normal(size=(len(mesh.vertices), 2))
+    for barycentric in ((1, distance, 0), (1, distance, distance)):
+        points = np.broadcast_to(barycentric, (len(mesh.faces), 3))
+        result = _read(mesh, kind, _table(mesh, values, kind), np.arange(len(mesh.faces)), points)
+        np.testing.assert_allclose(result, values[mesh.faces[:, 0]], atol=1e-6)

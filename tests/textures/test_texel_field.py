@@ -371,7 +371,7 @@ def test_to_string(mi):
     ("options", "problem"),
     [
         ({"chanel": 1}, "chanel"),
-        ({"channel": 3}, "has 0 to 2"),
+        ({"channel": 3}, "use 0 to 2"),
         ({"filter": "cubic"}, "bilinear or nearest"),
         ({"data": None}, "data"),
         ({"data": np.zeros((4, 3))}, "shape"),

@@ -191,8 +191,8 @@ def test_vector_is_one_channel(mi):
     ("options", "problem"),
     [
         ({"chanel": 1}, "chanel"),
-        ({"channel": 3}, "has 0 to 2"),
-        ({"channel": -1}, "has 0 to 2"),
+        ({"channel": 3}, "use 0 to 2"),
+        ({"channel": -1}, "use 0 to 2"),
         ({"data": None}, "data"),
     ],
 )

@@ -75,7 +75,7 @@ class Apply(OptionalMeshOptions):
     """Steps of the automaton."""
 
     subdivide: Annotated[str, arg(metavar="auto|N")] = "auto"
-    """How often to subdivide the mesh, each time to four times the faces; auto: to the training's density."""
+    """How often to subdivide the automaton's copy of the mesh; auto: to the training's density."""
 
     orientation: Annotated[float, arg(metavar="DEG")] = 0.0
     """Turns the texture on the surface [degrees]."""
@@ -88,6 +88,9 @@ class Apply(OptionalMeshOptions):
 
     vertex_colors: Annotated[bool, arg(help_behavior_hint="")] = False
     """Write colours at the vertices instead of textures."""
+
+    keep_dense: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Write the subdivided, rounded mesh instead of the given one."""
 
     variants: Annotated[int, arg(metavar="N")] = 1
     """Looks that a .glb offers on the one mesh, each with the next seed (KHR_materials_variants)."""
@@ -131,6 +134,7 @@ class Apply(OptionalMeshOptions):
             "--scale": self.scale != 1,
             "--resolution": self.resolution is not None,
             "--vertex-colors": self.vertex_colors,
+            "--keep-dense": self.keep_dense,
             "--variants": self.variants > 1,
         }
         for option, used in others.items():
@@ -193,6 +197,7 @@ class Apply(OptionalMeshOptions):
             "orientation": math.radians(self.orientation),
             "scale": self.scale,
             "resolution": (self.resolution or RESOLUTION) if textures else None,
+            "keep_dense": self.keep_dense,
         }
 
     def _levels(self) -> int | str:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mitex.exemplar import Exemplar
     from mitex.methods.nca import NcaTexture
 
-EXEMPLAR = "wicker"
+EXEMPLAR = "lava"
 PARENT = "ceramic"  # the bundled model that the training starts from
 MESHES = ("shaderball", "knot")
 RESOLUTION = 2048

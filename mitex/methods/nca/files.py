@@ -23,6 +23,7 @@ from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.methods.nca.look import STATE_CHANNELS, Look
 from mitex.methods.nca.model import MeshNCA
+from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import HARMONICS
 from mitex.paths import expanded
 from mitex.training import checkpoint, model_file, values
@@ -127,7 +128,10 @@ def _about(metadata: dict[str, str], path: Path) -> dict[str, Any]:
     try:
         about = json.loads(metadata.get("about", "{}"))
         maps = sorted(about.get("maps", STATE_CHANNELS))
-    except (ValueError, TypeError, AttributeError) as e:
+        if "palette" in about:
+            Palette.from_record(about["palette"])
+            maps.index("albedo")  # which the palette is of
+    except (LookupError, ValueError, TypeError, AttributeError) as e:
         raise CheckpointError(f"the description in '{path}' is damaged ({e})", "save the model again") from e
     return {"name": path.stem} | about | {"maps": maps}
 

@@ -47,7 +47,7 @@ def healed(
             f"{foreign.mean():.1%} of '{cells.given.name}' has colours that the exemplar does not have; "
             "try another seed, or remesh it evenly",
             TextureWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
     return state
 

@@ -44,5 +44,12 @@ class Palette:
 
     @staticmethod
     def from_record(record: dict) -> Palette:
-        """From what `record` returned."""
-        return Palette(np.asarray(record["colours"], np.float64).reshape(-1, 3), float(record["radius"]))
+        """From what `record` returned.
+
+        Raises:
+            ValueError: it is not that; a KeyError or a TypeError may come too.
+        """
+        colours, radius = np.asarray(record["colours"], np.float64).reshape(-1, 3), float(record["radius"])
+        if not len(colours) or not np.isfinite([*colours.ravel(), radius]).all():
+            raise ValueError("a palette without colours, or with some that are not finite")
+        return Palette(colours, radius)

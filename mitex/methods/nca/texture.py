@@ -17,6 +17,7 @@ from mitex.mesh import Mesh
 from mitex.methods.nca import files
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.field import fields
 from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.palette import Palette
@@ -103,6 +104,17 @@ class NcaTexture:
             return asset
         atlas = Atlas.build(cells.given, resolution, max(min(8, resolution // 8), 1), cells.given.uv)
         return replace(asset, atlas=atlas, texture_maps=grown.textures(atlas))
+
+    def fields(
+        self, mesh: Mesh, *, seed: int = 0, steps: int = STEPS, orientation: float = 0.0
+    ) -> dict[str, dict[str, Any]]:
+        """Grows the texture on a mesh and returns it as textures of a Mitsuba scene, by map, which are
+        decoded where rays meet the surface: `{"type": "principled", "base_color": fields["albedo"], ...}`.
+
+        A cell sits at each vertex of the mesh, and the shape in the scene must have these vertices; see
+        `mitex.mesh.subdivide_midpoint`. Other arguments and errors as of `apply`.
+        """
+        return fields(self.look, self._healthy(Cells(mesh, 0, mesh), seed, steps, orientation), mesh)
 
     def variants(
         self, mesh: Mesh, seeds: Iterable[int], *, resolution: int | None = 1024, **options: Any

@@ -1,9 +1,13 @@
 """Presets as published, and values that are refused."""
 
+from dataclasses import asdict, fields
+
 import pytest
 
 from mitex.errors import ConfigError
 from mitex.methods.nca import PRESETS
+from mitex.methods.nca.config import DECODER_KEYS
+from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.training import resolve
 
 PAPER = {
@@ -16,6 +20,13 @@ PAPER = {
     "inject_every": 16,
     "min_steps": 15,
     "max_steps": 24,
+    "aggregation": "sum",
+    "sphere": "even",
+    "zooms": 1,
+    "decoder": False,
+    "interpolation": "linear",
+    "order_weight": 0.0,
+    "moment_weight": 0.1,
     "views": "full",
     "view_count": 6,
     "resolution": 320,
@@ -83,6 +94,24 @@ def test_names_and_default():
         ("pooling=mean", "pooling cannot be 'mean'"),
         ("layers=relu1_1,relu6_1", "relu6_1"),
         ("layers=", "layers"),
+        ("layers=relu1_1", "order_weight needs patches and the layer relu3_1"),
+        ("views=full", "order_weight needs patches"),
+        ("order_weight=-1", "order_weight = -1"),
+        ("sphere=round", "sphere cannot be 'round'"),
+        ("aggregation=max", "aggregation cannot be 'max'"),
+        ("zooms=0", "zooms = 0"),
+        ("zooms=7", "zooms = 7"),
+        ("interpolation=cubic", "interpolation cannot be 'cubic'"),
+        ("coordinates=waves,spirals", r"coordinates holds \['spirals'\]; use some of waves, barycentrics"),
+        ("waves=0", "waves = 0"),
+        ("wave_frequencies=", "wave_frequencies holds nothing"),
+        ("wave_frequencies=2,-1", "wave_frequencies = -1"),
+        ("wave_amplitude=-0.1", "wave_amplitude = -0.1"),
+        ("decoder_width=0", "decoder_width = 0"),
+        ("decoder_width=1025", "decoder_width = 1025"),
+        ("decoder_depth=0", "decoder_depth = 0"),
+        ("omega=-1", "omega = -1"),
+        ("decoder=perhaps", "decoder"),
         ("checkpoint_every=0", "checkpoint_every = 0"),
         ("blend=perhaps", "blend"),
         ("resolutoin=64", "resolutoin"),
@@ -91,6 +120,30 @@ def test_names_and_default():
 def test_values_out_of_range(setting, problem):
     with pytest.raises(ConfigError, match=problem):
         resolve(PRESETS, overrides=[setting])
+
+
+@pytest.mark.parametrize("words", ["", "waves", "polynomials,barycentrics"])
+def test_coordinates_may_be_any_or_none(words):
+    names = tuple(name for name in words.split(",") if name)
+    shape = resolve(PRESETS, overrides=[f"coordinates={words}"]).decoder_shape
+    assert shape.coordinates == names
+
+
+def test_the_default_decoder_is_the_default_shape():
+    """Of a look that is built without settings."""
+    assert resolve(PRESETS).decoder_shape == DecoderShape()
+
+
+def test_every_key_of_the_decoder_shapes_it():
+    """And nothing else does."""
+    values = {"interpolation": "linear", "coordinates": "polynomials", "waves": 3, "wave_frequencies": 1.5}
+    values |= {"wave_amplitude": 0.1, "decoder_width": 9, "decoder_depth": 2, "omega": 4.0}
+    assert values.keys() == DECODER_KEYS.keys()
+    assert set(DECODER_KEYS.values()) == {field.name for field in fields(DecoderShape)}
+    plain = asdict(DecoderShape())
+    for key, value in values.items():
+        shape = asdict(resolve(PRESETS, overrides=[f"{key}={value}"]).decoder_shape)
+        assert [part for part in shape if shape[part] != plain[part]] == [DECODER_KEYS[key]]
 
 
 def test_equal_steps_are_a_range():

@@ -64,6 +64,7 @@ def test_a_decoder_survives_saving(tmp_path, shape, mean):
     """Bit by bit, with everything that shapes it; so does what it shows."""
     look = Look(MeshNCA(hidden=8), ("albedo", "height"), shape, mean)
     look.initialise(torch.Generator().manual_seed(1), gain=0.5)
+    look.track(torch.rand(9, 16, generator=torch.Generator().manual_seed(2)))  # other bounds
     original = NcaTexture(look, {"name": "tiny"})
     again = NcaTexture.load(original.save(tmp_path / "m.safetensors"))
     assert _same(again.look, look) and again.look.mean == mean
@@ -177,7 +178,7 @@ def test_half_precision_weights(tmp_path):
 
 
 def _checkpoint(look, step, **changes):
-    config = NcaConfig(hidden=look.rule.hidden, decoder_width=12, decoder_depth=2)
+    config = NcaConfig(hidden=look.rule.hidden, waves=8, decoder_width=12, decoder_depth=2)
     values = {
         "step": step,
         "seconds": 1.0,
@@ -259,6 +260,17 @@ def test_bundled_models_are_found_by_name():
         assert path.stat().st_size < 100_000
 
 
+@pytest.mark.parametrize("name", sorted(bundled(METHOD)))
+def test_bundled_models_grow(name):
+    """Those that were trained before there was a decoder, too: as their maps are channels of the state."""
+    texture = NcaTexture.load(name)
+    maps = texture.apply(icosphere(3), steps=5, subdivide=1, resolution=32).texture_maps
+    assert set(maps) == set(texture.look.maps)
+    state = texture.grow(icosphere(3), steps=30)
+    assert 0.01 < state.abs().max() < 1.2
+    assert isinstance(texture.look.decoder, Readout) != texture.look.mean
+
+
 def _tensors(**changes):
     tensors = {k: v.clone() for k, v in MeshNCA(hidden=8).state_dict().items()}
     return {k: v for k, v in (tensors | changes).items() if v is not None}
@@ -297,6 +309,12 @@ def test_weights_that_are_not_finite(tmp_path, value):
         ({"maps": ["albedo", "glitter"]}, "glitter"),
         ({"maps": []}, "unknown maps"),
         ({"maps": 3}, "damaged"),
+        ({"palette": 3}, "damaged"),
+        ({"palette": {"colours": [[0, 0, 0]]}}, "damaged"),
+        ({"palette": {"colours": [[0, 0]], "radius": 1}}, "damaged"),
+        ({"palette": {"colours": [], "radius": 1}}, "damaged"),
+        ({"palette": {"colours": [[0, 0, float("nan")]], "radius": 1}}, "damaged"),
+        ({"palette": {"colours": [[0, 0, 0]], "radius": 1}, "maps": ["height"]}, "damaged"),
         ([1], "damaged"),
         ("{", "damaged"),
     ],

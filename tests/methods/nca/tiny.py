@@ -10,7 +10,8 @@ from mitex.training import resolve
 SETTINGS = (
     *("frequency=8", "resolution=32", "exemplar_size=32", "target_size=32", "density=8", "view_count=4"),
     *("layers=relu1_1,relu2_1", "pool=4", "inject_every=3", "min_steps=2", "max_steps=4", "hidden=16"),
-    *("samples=256", "checkpoint_every=100", "preview_every=0", "zooms=1", "sphere=even", "decoder_width=12"),
+    *("samples=256", "checkpoint_every=100", "preview_every=0", "zooms=1", "sphere=even", "order_weight=0"),
+    *("decoder_width=12", "waves=8"),
 )
 
 
@@ -18,7 +19,7 @@ def config(*settings: str, preset: str = "patch") -> NcaConfig:
     return resolve(PRESETS, preset, None, [*SETTINGS, "steps=6", *settings])
 
 
-SHAPE = DecoderShape(width=12, depth=2)
+SHAPE = DecoderShape(waves=8, width=12, depth=2)
 
 
 def texture(

@@ -31,7 +31,7 @@ class SineNetwork(nn.Module):
 
     def initialise(self, generator: torch.Generator) -> None:
         """Uniform weights: within 1 / inputs in the first layer, sqrt(6 / inputs) / omega in the others."""
-        for k, layer in enumerate(self._linear()):
+        for k, layer in enumerate(self.linear):
             count = layer.in_features
             bound = 1 / count if k == 0 else math.sqrt(6 / count) / self.omega
             nn.init.uniform_(layer.weight, -bound, bound, generator=generator)
@@ -40,10 +40,12 @@ class SineNetwork(nn.Module):
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """(P, inputs) -> (P, outputs)."""
-        *hidden, last = self._linear()
+        *hidden, last = self.linear
         for layer in hidden:
             x = torch.sin(product(x, self.omega * layer.weight, self.omega * layer.bias))
         return product(x, last.weight, last.bias)
 
-    def _linear(self) -> list[nn.Linear]:
+    @property
+    def linear(self) -> list[nn.Linear]:
+        """The layers."""
         return [layer for layer in self.layers if isinstance(layer, nn.Linear)]

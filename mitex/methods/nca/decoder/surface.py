@@ -7,11 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from mitex.mesh import Mesh
+from mitex.mesh import Mesh, Similarity
 from mitex.mesh.gradients import values_and_gradients
 from mitex.plugins import init
 from mitex.sparse import LinearMap
 from mitex.textures.interpolation import Kind, SurfaceLookup
+
+# Mean length of the edges in decoder units: that of the sphere that the default preset trains on. So even
+# meshes of any size mix waves in the shares that the training saw.
+EDGE = 0.03775
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,18 +35,18 @@ class Surface:
     """The mesh that an automaton runs on.
 
     Args:
-        mesh: the mesh; it is normalised.
+        mesh: the mesh; texture depends neither on its place nor on its size.
         interpolation: of the states, "smooth" or "linear".
     """
 
     def __init__(self, mesh: Mesh, interpolation: Kind = "smooth") -> None:
         init()
-        # Solid noise must depend neither on units nor on the place, and float32 needs small numbers.
-        mesh = mesh.normalised()[0]
+        mesh = mesh.with_vertices(decoder_units(mesh).apply(mesh.vertices))
         self.mesh = mesh
         self._lookup = SurfaceLookup(mesh, interpolation)
         self._table = LinearMap(values_and_gradients(mesh)) if interpolation == "smooth" else None
-        self._corners = torch.from_numpy(np.column_stack([mesh.vertices, _edges(mesh)]).astype(np.float32))
+        corners = np.column_stack([mesh.vertices, mesh.edge_lengths]).astype(np.float32)
+        self._corners = torch.from_numpy(corners)
         self._faces = torch.from_numpy(mesh.faces.astype(np.int64))
 
     def table(self, state: torch.Tensor) -> torch.Tensor:
@@ -54,16 +58,15 @@ class Surface:
         return self._lookup.weights(points.face, points.barycentric)(table)
 
     def place(self, points: Points) -> tuple[torch.Tensor, torch.Tensor]:
-        """Positions (P, 3) and lengths of the edges around (P,) of the points [normalised mesh units]."""
+        """Positions (P, 3) and lengths of the edges around (P,) of the points [decoder units]."""
         corners = self._corners[self._faces[points.face.long()]]
         values = (points.barycentric[:, :, None] * corners).sum(1)
         return values[:, :3], values[:, 3]
 
 
-def _edges(mesh: Mesh) -> np.ndarray:
-    """(V,) mean lengths of the edges at each vertex; of all edges where it has none."""
-    graph = mesh.edges
-    lengths = np.linalg.norm(mesh.vertices[graph.indices] - mesh.vertices[graph.rows], axis=1)
-    total = np.bincount(graph.rows, lengths, len(mesh.vertices))
-    mean = float(lengths.mean()) if len(lengths) else 1.0
-    return np.where(total > 0, total / np.maximum(np.diff(graph.indptr), 1), mean)
+def decoder_units(mesh: Mesh) -> Similarity:
+    """From a mesh's units to decoder units: the vertices' mean is the origin, the edges' mean is `EDGE`."""
+    graph, points = mesh.edges, mesh.vertices.astype(np.float64)
+    lengths = np.linalg.norm(points[graph.indices] - points[graph.rows], axis=1)
+    mean = float(lengths.mean()) if len(lengths) else 0.0
+    return Similarity(points.mean(axis=0), mean / EDGE if mean > 0 else 1.0)

@@ -8,7 +8,7 @@ from mitex.mesh import Mesh, grid, icosphere
 from mitex.methods.nca.decoder.coordinates import sorted_barycentrics, symmetric_polynomials
 from mitex.methods.nca.decoder.decoder import Decoder, Readout
 from mitex.methods.nca.decoder.shape import COORDINATES, WIDTHS, DecoderShape
-from mitex.methods.nca.decoder.surface import Points, Surface
+from mitex.methods.nca.decoder.surface import EDGE, Points, Surface, decoder_units
 from tests.methods.nca.brute_force import patchwork
 
 
@@ -105,11 +105,14 @@ def test_decoded_values_are_continuous_across_edges():
 
 
 def test_places_and_edges_of_a_surface():
-    """In units of the normalised mesh; lengths are the means over the edges at a vertex, interpolated."""
+    """In units in which the mean edge is that of the training; lengths are the means over the edges at a
+    vertex, interpolated.
+    """
     mesh = patchwork().with_vertices(50 * patchwork().vertices + 300)
     surface, points = Surface(mesh, "linear"), _points(mesh)
-    small = mesh.normalised()[0].vertices.astype(float)
     graph, lengths = mesh.edges, np.zeros(len(mesh.vertices))
+    small = mesh.vertices.astype(float) - mesh.vertices.astype(float).mean(0)
+    small *= EDGE / np.linalg.norm(small[graph.indices] - small[graph.rows], axis=1).mean()
     for v in range(len(mesh.vertices)):
         ring = graph.indices[graph.indptr[v] : graph.indptr[v + 1]]
         lengths[v] = np.linalg.norm(small[ring] - small[v], axis=1).mean() if len(ring) else 0
@@ -117,6 +120,20 @@ def test_places_and_edges_of_a_surface():
     position, edge = surface.place(points)
     assert np.allclose(position, np.einsum("pk,pkd->pd", weights, small[corners]), atol=1e-5)
     assert np.allclose(edge, (weights * lengths[corners]).sum(1), atol=1e-5)
+
+
+def test_units_are_those_of_the_default_training():
+    """On its sphere they change next to nothing."""
+    sphere = icosphere(32)
+    assert decoder_units(sphere).scale == pytest.approx(1, abs=2e-4)
+    assert np.abs(decoder_units(sphere).center).max() < 1e-6
+
+
+def test_a_mesh_at_one_point_has_units():
+    mesh = Mesh(np.full((3, 3), 2.0), np.array([[0, 1, 2]]))
+    assert decoder_units(mesh).scale == 1
+    surface = Surface(mesh)
+    assert surface.read(surface.table(_state(mesh)), _points(mesh)).isfinite().all()
 
 
 def test_a_vertex_without_edges_has_the_mean_length():

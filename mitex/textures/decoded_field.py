@@ -1,0 +1,263 @@
+"""`decoded_field`: a Mitsuba texture that a small network decodes from states at the vertices of a mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mitex.errors import MeshError
+from mitex.mesh import Mesh
+from mitex.mesh.gradients import values_and_gradients
+from mitex.runtime.jit import dr, mi
+from mitex.textures.field import FieldMethods, Located
+from mitex.textures.interpolation import Corners, linear, smooth
+from mitex.textures.local_coordinates import BARYCENTRIC, Waves
+from mitex.textures.sine_network import SineNetwork
+from mitex.textures.triangle import TrianglePoints, edges, solve, triangle_points
+from mitex.textures.variant import for_variant, option
+
+INTERPOLATIONS = {"smooth": smooth, "linear": linear}
+
+
+class DecodedFieldMethods(FieldMethods):
+    """value(p) = g(s(p), u(p)): s is interpolated between states at the vertices of a mesh, u are local
+    coordinates, g is a sine network (Cells2Pixels, section 3.2). It has detail far below the distance of
+    vertices.
+
+    .. pluginparameters::
+
+     * - data
+       - |tensor|
+       - The states, `mi.TensorXf` of shape (V, C); row i belongs to vertex i of the mesh.
+       - exposed, differentiable
+     * - vertices, faces
+       - |tensor|
+       - The mesh at rest: positions (V, 3) and vertex indices (F, 3). Distances and directions on the
+         surface are measured on it, so the texture stays when the shape in the scene is moved, scaled or
+         bent. The shape has the same vertices in the same order; its faces may be in any order.
+     * - interpolation
+       - |string|
+       - `smooth`: continuously differentiable across edges; or `linear`. (Default: smooth)
+     * - coordinates
+       - |string|
+       - Local coordinates in the order in which the network reads them, after the state: some of `waves`,
+         `barycentrics` (sorted, 3 numbers) and `polynomials` (2), with spaces between. (Default: none)
+     * - waves
+       - |tensor|
+       - (N, 4): directions of N cosines times their frequencies [cycles per edge], and phases [cycles].
+     * - amplitude
+       - |float|
+       - Of the waves. (Default: 1)
+     * - weight_0, bias_0, weight_1, ...
+       - |tensor|
+       - Layers of the network, (outputs, inputs) and (outputs,). The last one's outputs are the channels.
+       - exposed, differentiable
+     * - omega
+       - |float|
+       - Factor in the sines of all layers but the last. (Default: 10)
+     * - channel, raw
+       - |int|, |bool|
+       - As of `vertex_field`.
+     * - scale, offset
+       - |float|
+       - Every value is `scale * decoded + offset`. (Default: 1 and 0)
+       - exposed, differentiable
+
+    The texture works on triangle meshes of LLVM variants, with one instance per mesh; on another shape, or
+    where a triangle refers to a vertex beyond the data, it is `offset`. Points of the shape are found as by
+    `vertex_field`. `mean` and `max` go over the vertices.
+
+    Values are not linear in the data, so nothing but `gather` has their derivatives: by ordinary automatic
+    differentiation to states, network, scale and offset. `eval_1_grad` differentiates exactly too, so bumps
+    have the normals of the decoded height. Other Mitex code reads all channels: it is a
+    `mitex.textures.field.Field`.
+    """
+
+    plugin = "decoded_field"
+
+    def __init__(self, props: mi.Properties) -> None:
+        self._read(props)
+        if dr.backend_v(mi.Float) != dr.JitBackend.LLVM:
+            raise RuntimeError(f"decoded_field: variant '{mi.variant()}' is not supported; use an llvm one")
+        self.interpolation = option(props, "interpolation", "smooth")
+        if self.interpolation not in INTERPOLATIONS:
+            raise RuntimeError(
+                f"decoded_field: 'interpolation' is '{self.interpolation}'; use {' or '.join(INTERPOLATIONS)}"
+            )
+        self._read_coordinates(props)
+        self._read_network(props)
+        self._read_mesh(props)
+        self._check()
+
+    def _read_coordinates(self, props: mi.Properties) -> None:
+        self.coordinates = option(props, "coordinates", "").split()
+        known = ("waves", *BARYCENTRIC)
+        if not set(self.coordinates) <= set(known):
+            names = " ".join(self.coordinates)
+            raise RuntimeError(f"decoded_field: 'coordinates' is '{names}'; use some of {', '.join(known)}")
+        table = np.array(mi.TensorXf(props["waves"])) if "waves" in self.coordinates else np.empty((0, 4))
+        if table.ndim != 2 or table.shape[1] != 4:
+            raise RuntimeError(f"decoded_field: 'waves' has shape {table.shape}; give one of shape (N, 4)")
+        amplitude: float = props.get("amplitude", 1.0)
+        self._waves = Waves(table, amplitude)
+
+    def _read_network(self, props: mi.Properties) -> None:
+        count = sum(key.startswith("weight_") for key in props.keys())  # noqa: SIM118
+        weights, biases = (
+            [mi.TensorXf(props[f"{kind}_{k}"]) for k in range(count)] for kind in ("weight", "bias")
+        )
+        try:
+            self._network = SineNetwork(weights, biases, props.get("omega", 10.0))
+        except ValueError as e:
+            raise RuntimeError(f"decoded_field: {e}") from e
+
+    def _read_mesh(self, props: mi.Properties) -> None:
+        """What lookups need of the mesh at rest."""
+        vertices, faces = (np.array(mi.TensorXf(props[name])) for name in ("vertices", "faces"))
+        with np.errstate(invalid="ignore"):
+            whole = faces.astype(np.int64)
+        try:
+            mesh = Mesh(vertices, whole if (whole == faces).all() else faces, name="the mesh at rest")
+        except MeshError as e:
+            raise RuntimeError(f"decoded_field: {e}") from e
+        self._count = len(mesh.vertices)
+        self._positions, self._normals = mi.Float(mesh.vertices.ravel()), mi.Float(mesh.normals.ravel())
+        self._edges = mi.Float(mesh.edge_lengths.astype(np.float32))
+        if self.interpolation == "smooth":
+            matrix = values_and_gradients(mesh).tocoo()
+            self._entry_row, self._entry_column = mi.UInt32(matrix.row), mi.UInt32(matrix.col)
+            self._entry = mi.Float(matrix.data)
+
+    @property
+    def channel_count(self) -> int:
+        """Number of outputs of the network."""
+        return self._network.outputs
+
+    def traverse(self, callback: mi.TraversalCallback) -> None:
+        FieldMethods.traverse(self, callback)
+        pairs = zip(self._network.weights, self._network.biases, strict=True)
+        for k, (weight, bias) in enumerate(pairs):
+            callback.put(f"weight_{k}", weight, mi.ParamFlags.Differentiable)
+            callback.put(f"bias_{k}", bias, mi.ParamFlags.Differentiable)
+
+    def _check_data(self) -> None:
+        if self.data.ndim != 2 or self.data.shape[0] != self._count or self.data.shape[1] == 0:
+            raise RuntimeError(
+                f"decoded_field: 'data' has shape {self.data.shape}; give one of shape ({self._count}, C)"
+            )
+        try:
+            self._network.check()
+        except ValueError as e:
+            raise RuntimeError(f"decoded_field: {e}") from e
+        own = {"waves": len(self._waves.table)} | {name: count for name, (count, _) in BARYCENTRIC.items()}
+        inputs = self.data.shape[1] + sum(own[name] for name in self.coordinates)
+        count = self._network.inputs
+        if count != inputs:
+            raise RuntimeError(
+                f"decoded_field: 'weight_0' has {count} inputs; state and coordinates are {inputs}"
+            )
+        self._table = self._rows_to_read()
+        dr.eval(self._table)
+
+    def _rows_to_read(self) -> mi.Float:
+        """The rows that the interpolation reads, flat: the states, or the states and their gradients."""
+        if self.interpolation == "linear":
+            return self.data.array
+        width = self.data.shape[1]
+        place = dr.arange(mi.UInt32, dr.width(self._entry) * width)
+        entry, channel = place // width, place % width
+        row, column = (dr.gather(mi.UInt32, i, entry) for i in (self._entry_row, self._entry_column))
+        value = dr.gather(mi.Float, self._entry, entry)
+        value *= dr.gather(mi.Float, self.data.array, column * width + channel)
+        table = dr.zeros(mi.Float, 4 * self.data.shape[0] * width)
+        dr.scatter_add(table, value, row * width + channel)
+        return table
+
+    def _rows(self) -> mi.UInt32:
+        return dr.arange(mi.UInt32, self._count)
+
+    def locate(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> Located:
+        """Rows, weights and local coordinates of the points `si`, and which have any."""
+        return self._at(*triangle_points(si, self._count, active))
+
+    def _at(self, index: Sequence[mi.UInt32], barycentric: Sequence[mi.Float], active: mi.Bool) -> Located:
+        position = [dr.gather(mi.Point3f, self._positions, i, active) for i in index]
+        normal = [dr.gather(mi.Normal3f, self._normals, i, active) for i in index]
+        rows, weights = INTERPOLATIONS[self.interpolation](Corners(index, position, normal), barycentric)
+        coordinates: list[mi.Float] = []
+        for name in self.coordinates:
+            if name == "waves":
+                edge = _mix(barycentric, [dr.gather(mi.Float, self._edges, i, active) for i in index])
+                # No number may be infinite, even where nothing is read: its gradient would not be 0.
+                coordinates += self._waves(_mix(barycentric, position), dr.select(active, edge, 1))
+            else:
+                coordinates += BARYCENTRIC[name][1](barycentric)
+        return Located(tuple(rows), tuple(weights), active, tuple(coordinates))
+
+    def _at_rows(self) -> Located:
+        index = self._rows()
+        return self._at((index, index, index), (mi.Float(1), mi.Float(0), mi.Float(0)), mi.Bool(True))
+
+    def gather(self, located: Located, channels: range | None = None) -> list[mi.Float]:
+        """Decoded `scale * value + offset` of the channels (default: all), one Float each."""
+        values = self._network(_inputs(located, self._states(located)))
+        return [
+            dr.fma(dr.select(located.active, values[c], 0), self.scale, self.offset)
+            for c in (range(self.channel_count) if channels is None else channels)
+        ]
+
+    def _states(self, located: Located) -> list[list[mi.Float]]:
+        """What the lookups read: for each channel of the state, K values."""
+        width = self.data.shape[1]
+        return [
+            [dr.gather(mi.Float, self._table, width * row + c, located.active) for row in located.rows]
+            for c in range(width)
+        ]
+
+    def eval_1_grad(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Vector2f:
+        """Derivatives along `si.dp_du` and `si.dp_dv`."""
+        points = triangle_points(si, self._count, active)
+        _, e1, e2 = edges(mi.MeshPtr(si.shape), points.index, points.active)
+        located = self._at(*points)
+        rows = self._states(located)
+        tangents = []
+        for way in (si.dp_du, si.dp_dv):
+            a, b = solve(e1, e2, way)
+            change = self._change(points, (-a - b, a, b))
+            tangents.append(_inputs(change, rows))
+        slopes = self._network.slopes(_inputs(located, rows), tangents)
+        along = [dr.select(points.active, slope[self.channel], 0) for slope in slopes]
+        return self.scale * mi.Vector2f(*along)
+
+    def _change(self, points: TrianglePoints, way: Sequence[mi.Float]) -> Located:
+        """The derivatives of weights and coordinates where the barycentric weights change along `way`."""
+        with dr.resume_grad():
+            t = mi.Float(0)
+            dr.enable_grad(t)
+            pairs = zip(points.barycentric, way, strict=True)
+            moved = [dr.detach(b) + t * dr.detach(w) for b, w in pairs]
+            located = self._at(points.index, moved, points.active)
+            dr.forward(t, dr.ADFlag.ClearEdges)  # weights may be what coordinates are made of: they stay
+            change = dr.grad((located.weights, located.coordinates))
+        return located._replace(weights=change[0], coordinates=change[1])
+
+    def to_string(self) -> str:
+        own = {"vertices": self._count, "states": self.data.shape[1], "channels": self.channel_count}
+        names = " ".join(self.coordinates)
+        return self._description("DecodedField", **own, interpolation=self.interpolation, coordinates=names)
+
+
+def _inputs(located: Located, rows: Sequence[Sequence[mi.Float]]) -> list[mi.Float]:
+    """What the network reads: the interpolated state, of K values for each channel, and local coordinates."""
+    return [*(_mix(located.weights, values) for values in rows), *located.coordinates]
+
+
+def _mix(weights: Sequence[mi.Float], values: Sequence[mi.Float]) -> mi.Float:
+    return sum(w * v for w, v in zip(weights, values, strict=True))
+
+
+def register() -> None:
+    """Registers the texture for the current variant."""
+    cls = for_variant("DecodedField", mi.Texture, DecodedFieldMethods)
+    mi.register_texture("decoded_field", lambda props: cls(props))
