@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -99,8 +100,7 @@ class DecodedFieldMethods(FieldMethods):
         table = np.array(mi.TensorXf(props["waves"])) if "waves" in self.coordinates else np.empty((0, 4))
         if table.ndim != 2 or table.shape[1] != 4:
             raise RuntimeError(f"decoded_field: 'waves' has shape {table.shape}; give one of shape (N, 4)")
-        amplitude: float = props.get("amplitude", 1.0)
-        self._waves = Waves(table, amplitude)
+        self._waves = Waves(table, option(props, "amplitude", 1.0))
 
     def _read_network(self, props: mi.Properties) -> None:
         count = sum(key.startswith("weight_") for key in props.keys())  # noqa: SIM118
@@ -108,7 +108,7 @@ class DecodedFieldMethods(FieldMethods):
             [mi.TensorXf(props[f"{kind}_{k}"]) for k in range(count)] for kind in ("weight", "bias")
         )
         try:
-            self._network = SineNetwork(weights, biases, props.get("omega", 10.0))
+            self._network = SineNetwork(weights, biases, option(props, "omega", 10.0))
         except ValueError as e:
             raise RuntimeError(f"decoded_field: {e}") from e
 
@@ -253,7 +253,7 @@ def _inputs(located: Located, rows: Sequence[Sequence[mi.Float]]) -> list[mi.Flo
     return [*(_mix(located.weights, values) for values in rows), *located.coordinates]
 
 
-def _mix(weights: Sequence[mi.Float], values: Sequence[mi.Float]) -> mi.Float:
+def _mix(weights: Sequence[mi.Float], values: Sequence[Any]) -> Any:
     return sum(w * v for w, v in zip(weights, values, strict=True))
 
 

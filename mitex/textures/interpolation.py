@@ -150,5 +150,5 @@ class SurfaceLookup:
         rows, weights = self._weigh(Corners(index, position, normal), b)
         rows = [mi.Int32(row) for row in rows]
         dr.eval(rows, weights)
-        stacked = [torch.stack([cast(torch.Tensor, x.torch()) for x in v], 1) for v in (rows, weights)]
-        return Weights(*stacked, columns)
+        index, weight = (torch.stack([cast(torch.Tensor, x.torch()) for x in v], 1) for v in (rows, weights))
+        return Weights(index, weight, columns)

@@ -33,7 +33,7 @@ class Waves:
         share = octave - below
         mixed = [mi.Float(0)] * len(self.table)
         for level, weight in ((below, 1 - share), (below + 1, share)):
-            place = position * dr.exp2(-level)
+            place = mi.Vector3f(position) * dr.exp2(-level)
             factor = self.amplitude * dr.safe_sqrt(weight)
             for k, (x, y, z, phase) in enumerate(self.table.tolist()):
                 cycles = dr.dot(place, mi.Vector3f(x, y, z)) + phase

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from mitex.runtime.jit import mi
 
 B = TypeVar("B")
-T = TypeVar("T", bool, int, str)
+T = TypeVar("T", bool, int, float, str)
 
 
 def for_variant(name: str, base: type[B], methods: type) -> Callable[..., B]:

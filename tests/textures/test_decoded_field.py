@@ -3,31 +3,44 @@
 import numpy as np
 import pytest
 import torch
+from torch import nn
 
 from mitex.bridge import render
 from mitex.colour import srgb_to_linear
 from mitex.mesh import Mesh, icosphere, scattered_sphere
 from mitex.methods.nca.config import NcaConfig
-from mitex.methods.nca.decoder.decoder import OFFSET
+from mitex.methods.nca.decoder.decoder import OFFSET, Decoder
 from mitex.methods.nca.decoder.surface import Points, Surface
 from mitex.methods.nca.field import fields
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.views import render_views
 from mitex.scenes import random_views
 from mitex.scenes.stage import Stage, mesh_shape
+from mitex.textures.interpolation import Kind
+from tests.scenes.helpers import gradient
 from tests.textures.helpers import FACES, QUAD, interaction, quad, radiance, sphere_picture
 
 MAPS = ("albedo", "height", "normal")  # 7 channels; height is number 3
 EVERY = ("waves", "barycentrics", "polynomials")
-CASES = [("smooth", EVERY), ("smooth", ("polynomials", "waves")), ("linear", ("waves",)), ("linear", ())]
+CASES: list[tuple[Kind, tuple[str, ...]]] = [
+    ("smooth", EVERY),
+    ("smooth", ("polynomials", "waves")),
+    ("linear", ("waves",)),
+    ("linear", ()),
+]
 UNEVEN = scattered_sphere(60)
 
 
-def random_look(interpolation: str = "smooth", coordinates: tuple[str, ...] = (), seed: int = 0) -> Look:
+def random_look(interpolation: Kind = "smooth", coordinates: tuple[str, ...] = (), seed: int = 0) -> Look:
     config = NcaConfig(interpolation=interpolation, coordinates=coordinates, decoder_width=16)
     look = Look.of(config, MAPS)
     look.initialise(torch.Generator().manual_seed(seed), 0.5)
     return look
+
+
+def layers(look: Look) -> list[nn.Linear]:
+    assert isinstance(look.decoder, Decoder)
+    return look.decoder.network.linear
 
 
 def random_state(mesh: Mesh) -> torch.Tensor:
@@ -69,7 +82,7 @@ def constant(mi, value: list[float], data: np.ndarray | None = None, **options) 
 
 @pytest.mark.parametrize(("interpolation", "coordinates"), CASES)
 @pytest.mark.parametrize("mesh", [icosphere(3), UNEVEN], ids=["even", "uneven"])
-def test_values_are_those_of_torch(mi, mesh, interpolation: str, coordinates: tuple[str, ...]):
+def test_values_are_those_of_torch(mi, mesh, interpolation: Kind, coordinates: tuple[str, ...]):
     look, state, points = random_look(interpolation, coordinates), random_state(mesh), random_points(mesh)
     surface = Surface(mesh, look.interpolation)
     with torch.no_grad():
@@ -78,11 +91,11 @@ def test_values_are_those_of_torch(mi, mesh, interpolation: str, coordinates: tu
     np.testing.assert_allclose(
         values(mi, texture, mesh, points.face, points.barycentric), expected, atol=1e-5
     )
-    assert expected.std(0).min() > 0.01
+    assert expected.std(0).min() > 5e-3
 
 
 @pytest.mark.parametrize(("interpolation", "coordinates"), [("smooth", EVERY), ("linear", ("waves",))])
-def test_gradients_are_those_of_torch(mi, rng, interpolation: str, coordinates: tuple[str, ...]):
+def test_gradients_are_those_of_torch(mi, rng, interpolation: Kind, coordinates: tuple[str, ...]):
     from mitex.runtime.jit import dr
 
     mesh, look = UNEVEN, random_look(interpolation, coordinates)
@@ -93,20 +106,19 @@ def test_gradients_are_those_of_torch(mi, rng, interpolation: str, coordinates: 
 
     texture = mi.load_dict(properties(look, mesh, state))
     params = mi.traverse(texture)
-    expected = {"data": state.grad}
-    for k, layer in enumerate(look.decoder.network.layers):
-        expected |= {f"weight_{k}": layer.weight.grad, f"bias_{k}": layer.bias.grad}
+    expected = {"data": gradient(state)}
+    for k, layer in enumerate(layers(look)):
+        expected |= {f"weight_{k}": gradient(layer.weight), f"bias_{k}": gradient(layer.bias)}
     for name in expected:
         dr.enable_grad(params[name])
     params.update()
     shape = mesh_shape(mesh)
     si = interaction(mi, shape, points.face.numpy(), points.barycentric.numpy())
     channels = texture.gather(texture.locate(si))
-    dr.backward(sum(dr.sum(v * mi.Float(u)) for v, u in zip(channels, upstream.T, strict=True)))
-    for name, gradient in expected.items():
-        np.testing.assert_allclose(
-            np.array(dr.grad(params[name])), gradient, atol=1e-4 * float(gradient.abs().max())
-        )
+    weighted = [v * mi.Float(u) for v, u in zip(channels, upstream.T, strict=True)]
+    dr.backward(dr.sum(dr.sum(mi.ArrayXf(weighted))))
+    for name, value in expected.items():
+        np.testing.assert_allclose(np.array(dr.grad(params[name])), value, atol=1e-4 * np.abs(value).max())
 
 
 @pytest.mark.parametrize("name", ["data", "weight_0", "bias_1", "weight_3"])
@@ -132,9 +144,10 @@ def test_gradients_are_finite_differences(mi, rng, name: str):
     dr.enable_grad(params[name])
     params.update()
     channels = texture.gather(texture.locate(si))
-    dr.backward(sum(dr.sum(v * mi.Float(u)) for v, u in zip(channels, upstream, strict=True)))
-    gradient = np.array(dr.grad(params[name]))
-    assert slope == pytest.approx(float((gradient * direction).sum()), rel=2e-2)
+    weighted = [v * mi.Float(u) for v, u in zip(channels, upstream, strict=True)]
+    dr.backward(dr.sum(dr.sum(mi.ArrayXf(weighted))))
+    expected = float((np.array(dr.grad(params[name])) * direction).sum())
+    assert slope == pytest.approx(expected, rel=2e-2)
 
 
 def sides(mesh: Mesh, t: float) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -154,7 +167,7 @@ def sides(mesh: Mesh, t: float) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 @pytest.mark.parametrize(("interpolation", "coordinates"), CASES)
-def test_faces_agree_on_edges_and_vertices(mi, interpolation: str, coordinates: tuple[str, ...]):
+def test_faces_agree_on_edges_and_vertices(mi, interpolation: Kind, coordinates: tuple[str, ...]):
     texture = mi.load_dict(properties(random_look(interpolation, coordinates)))
     for t in (0.0, 1e-20, 1e-6, 0.3, 0.5, 1.0):
         left, right = (values(mi, texture, UNEVEN, *side) for side in sides(UNEVEN, t))
@@ -187,23 +200,25 @@ def test_smooth_slopes_do_not_jump_at_edges(mi):
 
 
 @pytest.mark.parametrize(("interpolation", "coordinates"), CASES)
-def test_slopes_are_finite_differences(mi, interpolation: str, coordinates: tuple[str, ...]):
+def test_slopes_are_finite_differences(mi, interpolation: Kind, coordinates: tuple[str, ...]):
     texture = mi.load_dict(properties(random_look(interpolation, coordinates), name="height"))
     face = random_points(UNEVEN).face.numpy()
-    barycentric = np.random.default_rng(3).dirichlet((9, 9, 9), len(face)).astype(np.float32)
+    barycentric = np.random.default_rng(3).dirichlet((3, 3, 3), len(face)).astype(np.float32)
     corners = UNEVEN.vertices[UNEVEN.faces[face]]
     shape = mesh_shape(UNEVEN)
     si = interaction(mi, shape, face, barycentric)
     si.dp_du = mi.Vector3f((corners[:, 1] - corners[:, 0]).T)
     si.dp_dv = mi.Vector3f((corners[:, 2] - corners[:, 1]).T)
-    step = 1 / 256
-    for slope, way in zip(texture.eval_1_grad(si), ([-1, 1, 0], [0, -1, 1]), strict=True):
+    step = 1 / 512
+    slopes = np.array(texture.eval_1_grad(si))
+    for slope, way in zip(slopes, ([-1, 1, 0], [0, -1, 1]), strict=True):
         ahead, behind = (
-            values(mi, texture, UNEVEN, face, barycentric + s * np.float32(way))[:, 3] for s in (step, -step)
+            values(mi, texture, UNEVEN, face, barycentric + s * np.array(way, np.float32))[:, 3]
+            for s in (step, -step)
         )
         expected = (ahead - behind) / (2 * step)
         # A sorted barycentric may change its place between the two.
-        assert np.quantile(np.abs(slope.numpy() - expected), 0.95) < 0.02 * np.abs(expected).max()
+        assert np.quantile(np.abs(slope - expected), 0.9) < 0.02 * np.abs(expected).max()
 
 
 def test_slopes_have_gradients(mi, rng):
@@ -220,7 +235,7 @@ def test_slopes_have_gradients(mi, rng):
     dr.enable_grad(params["data"])
     params.update()
     dr.backward(dr.sum(dr.squared_norm(texture.eval_1_grad(si))))
-    gradient = np.array(dr.grad(params["data"]))
+    of_data = np.array(dr.grad(params["data"]))
 
     def total(step: float) -> float:
         params["data"] = mi.TensorXf((start + step * direction).astype(np.float32))
@@ -228,7 +243,7 @@ def test_slopes_have_gradients(mi, rng):
         return float((np.array(texture.eval_1_grad(si), np.float64) ** 2).sum())
 
     slope = (total(1e-3) - total(-1e-3)) / 2e-3
-    assert slope == pytest.approx(float((gradient * direction).sum()), rel=2e-2)
+    assert slope == pytest.approx(float((of_data * direction).sum()), rel=2e-2)
 
 
 def test_order_of_vertices_and_faces_does_not_matter(mi, rng):
@@ -260,7 +275,7 @@ def test_texture_stays_on_a_shape_that_moves(mi):
 def test_reflectance_in_a_path_tracer(mi, points):
     """Seen at points of the quad, against torch."""
     mesh, look = Mesh(QUAD, FACES), random_look("smooth", EVERY)
-    look.decoder.network.layers[-1].bias.data[:3] = 0.0
+    layers(look)[-1].bias.data[:3] = 0.0
     x, y = points
     shape = quad(mi, {"type": "diffuse", "reflectance": properties(look, mesh)})
     below = x > y  # the triangle 0, 1, 2: corners (-1, -1), (1, -1), (1, 1)
@@ -274,13 +289,13 @@ def test_reflectance_in_a_path_tracer(mi, points):
         )
     expected = srgb_to_linear(encoded[:, :3].numpy().clip(0, 1))
     np.testing.assert_allclose(radiance(mi, shape, x, y), expected, atol=1e-4)
-    assert expected.std() > 0.05
+    assert expected.std() > 0.02
 
 
 def test_constant_field_equals_a_constant(mi):
     """Albedo and roughness of a principled BSDF in a path-traced picture."""
     mesh, look = icosphere(4), random_look("smooth", EVERY)
-    last = look.decoder.network.layers[-1]
+    last = layers(look)[-1]
     last.weight.data.zero_()
     last.bias.data[:4] = torch.tensor([0.2, 0.5, 0.8, 0.3]) - OFFSET
     maps = fields(look, random_state(mesh), mesh)
@@ -331,15 +346,18 @@ def test_feature_images_all_channels_with_gradients(mi, rng):
         "sensor": views.sensors()[0],
     }
     scene = mi.load_dict(scene)
-    layer = look.decoder.network.layers[1]
+    layer = layers(look)[1]
     mine, weight = (v.detach().clone().requires_grad_() for v in (state, layer.weight))
     named = {"integrator.field.data": mine, "integrator.field.weight_1": weight}
     picture = render(scene, named)
     hit = (expected != 0).any(-1)  # the plugin's background is 0 too
     np.testing.assert_allclose(picture.detach()[hit], expected.detach()[hit], atol=2e-5)
     (picture * upstream).sum().backward()
-    for one, other in ((mine.grad, state.grad), (weight.grad, layer.weight.grad)):
-        np.testing.assert_allclose(one, other, atol=1e-3 * float(other.abs().max()))
+    for one, other in ((mine, state), (weight, layer.weight)):
+        expected_gradient = gradient(other)
+        np.testing.assert_allclose(
+            gradient(one), expected_gradient, atol=1e-3 * np.abs(expected_gradient).max()
+        )
     np.testing.assert_allclose(render(scene, state.detach()), picture.detach(), atol=1e-6)
 
 
@@ -361,7 +379,7 @@ def test_gradient_through_a_path_tracer(mi, name: str, rng):
     dr.enable_grad(params[key])
     params.update()
     dr.backward(dr.sum(mi.render(scene, params, spp=64, seed=3).array))
-    gradient = np.array(dr.grad(params[key]))
+    of_parameter = np.array(dr.grad(params[key]))
     direction = rng.normal(size=start.shape)
 
     def total(step: float) -> float:
@@ -370,7 +388,7 @@ def test_gradient_through_a_path_tracer(mi, name: str, rng):
         return float(np.array(mi.render(scene, spp=64, seed=3), np.float64).sum())
 
     slope = (total(2e-3) - total(-2e-3)) / 4e-3
-    assert slope == pytest.approx(float((gradient * direction).sum()), rel=2e-2)
+    assert slope == pytest.approx(float((of_parameter * direction).sum()), rel=2e-2)
 
 
 def test_mean_and_max_go_over_the_vertices(mi):

@@ -95,9 +95,7 @@ class NcaTexture:
         self._check_unconditioned()
         laid = mesh if resolution is None or (keep_dense and scale != 1.0) else laid_out(mesh, resolution)
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
-        steps = STEPS if steps is None else steps
-        operator = perception(cells.mesh, self.look.rule.degree, orientation, mean=self.look.mean)
-        state = self._healed(self.grow(operator, seed=seed, steps=steps), cells, operator, seed)
+        state = self._healthy(cells, seed, STEPS if steps is None else steps, orientation)
         grown = Grown(self.look, state, cells, orientation)
         asset = grown.asset()
         if resolution is None:
@@ -187,6 +185,11 @@ class NcaTexture:
             density = DENSITY
         low, high = TILE_CELLS
         return round(min(max(REPEATS * density, low), high))
+
+    def _healthy(self, cells: Cells, seed: int, steps: int, orientation: float) -> torch.Tensor:
+        """What grows on an automaton's mesh, with the exemplar's colours."""
+        operator = perception(cells.mesh, self.look.rule.degree, orientation, mean=self.look.mean)
+        return self._healed(self.grow(operator, seed=seed, steps=steps), cells, operator, seed)
 
     def _healed(self, state: torch.Tensor, cells: Cells, operator: Perception, seed: int) -> torch.Tensor:
         if "palette" not in self.about:

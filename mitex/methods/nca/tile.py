@@ -11,7 +11,7 @@ from mitex.geometry.normal_maps import decode, encode
 from mitex.mesh import Lattice
 from mitex.methods.nca.bake import CHUNK, Grown
 from mitex.methods.nca.cells import Cells
-from mitex.methods.nca.decoder.surface import EDGE, decoder_units
+from mitex.methods.nca.decoder.surface import decoder_units
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.ranges import TILE_CELLS, TILE_SIDES
 
@@ -51,8 +51,9 @@ class Sampled:
         self.lattice = lattice
         cells = Cells(lattice.mesh, 0, lattice.mesh)
         spread = state[torch.from_numpy(lattice.source)]
-        period = lattice.period / decoder_units(lattice.mesh).scale
-        self.grown = Grown(look.repeating(period, EDGE), spread, cells)
+        scale = decoder_units(lattice.mesh).scale
+        repeating = look.repeating(lattice.columns / scale, lattice.edge / scale)
+        self.grown = Grown(repeating, spread, cells)
 
     def values(self, rows: np.ndarray, columns: np.ndarray, resolution: int) -> np.ndarray:
         """Values (R, C, K) in [0, 1] at the centres of pixels, of which `resolution` are a period.
