@@ -29,7 +29,7 @@ def test_a_tile_is_an_exemplar(files, capsys):
     maps = Exemplar.load(files / "out" / "tile").maps
     assert len(maps) == 5 and maps["albedo"].shape == (32, 32, 3)
     assert names(files / "out" / "tile") == sorted(f"{name}.png" for name in maps)
-    quick = "frequency=4 pool=1 view_count=1 resolution=32 min_steps=1 max_steps=1 steps=1 preview_every=0"
+    quick = "order_weight=0 frequency=4 pool=1 view_count=1 resolution=32 min_steps=1 max_steps=1 steps=1"
     assert (
         main(f"fit nca --exemplar out/tile --out out/run --quiet --set layers=relu1_1 {quick}".split()) == 0
     )
