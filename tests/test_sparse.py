@@ -76,6 +76,7 @@ def test_the_gradient_may_be_an_expanded_tensor(generator):
     weights, dense = _weights(generator)
     table = torch.randn(11, 3, generator=generator, requires_grad=True)
     weights(table).sum().backward()
+    assert table.grad is not None
     assert torch.allclose(table.grad, dense.sum(0)[:, None].expand(11, 3), atol=1e-5)
 
 

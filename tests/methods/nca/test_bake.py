@@ -11,6 +11,7 @@ from mitex.mesh import Mesh, grid, icosphere
 from mitex.methods.nca import bake
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.decoder.surface import Points, Surface
 from mitex.methods.nca.look import Look
 from tests.methods.nca import tiny
@@ -43,9 +44,11 @@ def grown(look, sphere):
 def _constant(values) -> Look:
     """A look whose normal map is the same everywhere."""
     look = tiny.texture(("normal",)).look
+    assert isinstance(look.decoder, Decoder)
+    last = look.decoder.network.linear[-1]
     with torch.no_grad():
-        look.decoder.network.layers[-1].weight.zero_()
-        look.decoder.network.layers[-1].bias.copy_(torch.tensor(values) - 0.5)
+        last.weight.zero_()
+        last.bias.copy_(torch.tensor(values) - 0.5)
     return look
 
 
@@ -150,6 +153,7 @@ def test_orientation_turns_normals_counter_clockwise(quarter):
 def test_normals_do_not_follow_the_uvs():
     """A layout turned by a quarter changes what is stored, so that the surface looks the same."""
     detail, mesh = np.array([0.36, 0.48, 0.8]), grid(3, 3)
+    assert mesh.uv is not None
     turned = replace(mesh, uv=np.stack([1 - mesh.uv[..., 1], mesh.uv[..., 0]], -1))  # u points down
     image = _grown(_constant((detail + 1) / 2), turned).textures(Atlas.build(turned, 32, 2, turned.uv))
     x, y, z = detail

@@ -96,7 +96,11 @@ def test_nearest_points_of_a_mesh_of_few_faces(rng):
 )
 def test_automatic_levels(monkeypatch, vertices, levels):
     """As many as it takes to have 8,000, and never more than six."""
-    mesh = scattered_sphere(vertices) if vertices < 3000 else Mesh(np.zeros((vertices, 3)), [[0, 1, 2]])
+    mesh = (
+        scattered_sphere(vertices)
+        if vertices < 3000
+        else Mesh(np.zeros((vertices, 3)), np.array([[0, 1, 2]]))
+    )
     assert cells.ENOUGH_VERTICES == 8_000
     assert check(mesh, "auto", 1.0) == levels
 

@@ -13,7 +13,7 @@ from safetensors.torch import load_file, save_file
 from mitex.errors import CheckpointError, OutputError
 from mitex.mesh import icosphere
 from mitex.methods.nca import METHOD, MeshNCA, NcaConfig, NcaTexture, files
-from mitex.methods.nca.decoder.decoder import Readout
+from mitex.methods.nca.decoder.decoder import Decoder, Readout
 from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.methods.nca.look import STATE_CHANNELS, Look
 from mitex.methods.registry import bundled
@@ -73,7 +73,7 @@ def test_a_decoder_survives_saving(tmp_path, shape, mean):
     assert shape is None or again.look.decoder.shape == shape
     shown = [t.apply(icosphere(2), steps=3, subdivide=1, resolution=32) for t in (original, again)]
     for name in look.maps:
-        assert np.array_equal(shown[0].texture_maps[name], shown[1].texture_maps[name])
+        assert np.array_equal(shown[0].maps[name], shown[1].maps[name])
 
 
 DAMAGE = {
@@ -118,8 +118,9 @@ def test_a_decoder_of_which_something_is_missing(tmp_path, part):
 
 def test_a_decoder_with_weights_that_are_not_finite(tmp_path):
     original = texture()
+    assert isinstance(original.look.decoder, Decoder)
     with torch.no_grad():
-        original.look.decoder.network.layers[1].weight[0, 0] = torch.nan
+        original.look.decoder.network.linear[1].weight[0, 0] = torch.nan
     with pytest.raises(CheckpointError, match="not finite"):
         NcaTexture.load(original.save(tmp_path / "m.safetensors"))
 
@@ -264,7 +265,7 @@ def test_bundled_models_are_found_by_name():
 def test_bundled_models_grow(name):
     """Those that were trained before there was a decoder, too: as their maps are channels of the state."""
     texture = NcaTexture.load(name)
-    maps = texture.apply(icosphere(3), steps=5, subdivide=1, resolution=32).texture_maps
+    maps = texture.apply(icosphere(3), steps=5, subdivide=1, resolution=32).maps
     assert set(maps) == set(texture.look.maps)
     state = texture.grow(icosphere(3), steps=30)
     assert 0.01 < state.abs().max() < 1.2

@@ -1,6 +1,7 @@
 """The training task: pool, randomness, views, state, and bit-identical resumption."""
 
 import json
+from typing import Any
 
 import numpy as np
 import pytest
@@ -121,7 +122,8 @@ def test_loss_is_the_mean_over_the_zooms(exemplar):
     settings = ("exemplar_size=256", "target_size=0", "zooms=3", "resolution=16", "view_count=1")
     task = NcaTask(config(*settings), exemplar)
     assert list(task.zooms) == [64, 128, 256]
-    task.zooms = {size: lambda views, _, k=k: 10.0**k * views.mean() for k, size in enumerate(task.zooms)}
+    zooms: Any = {size: lambda views, _, k=k: 10.0**k * views.mean() for k, size in enumerate(task.zooms)}
+    task.zooms = zooms
     total = task.loss(1, torch.Generator().manual_seed(0)).metrics["appearance"]
     generator = torch.Generator().manual_seed(0)
     torch.randint(4, (), generator=generator)

@@ -144,6 +144,7 @@ def test_the_mesh_comes_back_as_it_was_given(texture, resolution, options):
     asset = texture.apply(mesh, steps=2, resolution=resolution, **options)
     assert np.array_equal(asset.mesh.vertices, mesh.vertices)
     assert np.array_equal(asset.mesh.faces, mesh.faces)
+    assert asset.mesh.uv is not None and mesh.uv is not None
     assert np.array_equal(asset.mesh.uv, mesh.uv)
     assert asset.mesh.name == asset.name == "ball"
     assert all(len(values) == len(mesh.vertices) for values in asset.vertex_maps.values())
@@ -199,10 +200,14 @@ def test_automatic_subdivision(texture, sphere, monkeypatch):
 
 def test_uvs_are_laid_out_before_the_subdivision(texture, sphere):
     expected = laid_out(sphere, 128)
+    assert expected.uv is not None
     asset = texture.apply(sphere, steps=1, subdivide=1, resolution=128)
+    assert asset.mesh.uv is not None
     assert np.array_equal(asset.mesh.uv, expected.uv)
     asset = texture.apply(sphere, steps=1, subdivide=1, resolution=128, keep_dense=True)
-    assert np.array_equal(asset.mesh.uv, subdivide_loop(expected, 1).uv)
+    finer = subdivide_loop(expected, 1).uv
+    assert asset.mesh.uv is not None and finer is not None
+    assert np.array_equal(asset.mesh.uv, finer)
     assert texture.apply(sphere, steps=1, subdivide=1, resolution=None).mesh.uv is None
 
 

@@ -71,6 +71,7 @@ def test_gradients_reach_state_and_weights(interpolation):
     state = _state(mesh).requires_grad_()
     decoder(surface, surface.table(state), points).square().sum().backward()
     assert all(p.grad is not None and p.grad.any() for p in decoder.parameters())
+    assert state.grad is not None
     assert (state.grad.abs().amax(1) > 0).all()
     values = []
     for change in (1e-2, -1e-2):

@@ -15,7 +15,7 @@ def _network(seed=0, **options):
 
 
 def _slow(network: SineNetwork, x: list[float], omega: float) -> list[float]:
-    *hidden, last = network.layers
+    *hidden, last = network.linear
     for layer in hidden:
         rows = zip(layer.weight.tolist(), layer.bias.tolist(), strict=True)
         x = [math.sin(omega * (sum(w * v for w, v in zip(row, x, strict=True)) + b)) for row, b in rows]
@@ -33,7 +33,7 @@ def test_against_the_loops(count, options):
 
 
 def test_shapes():
-    shapes = [tuple(layer.weight.shape) for layer in _network(width=7, depth=2).layers]
+    shapes = [tuple(layer.weight.shape) for layer in _network(width=7, depth=2).linear]
     assert shapes == [(7, 5), (7, 7), (3, 7)]
 
 
@@ -41,7 +41,7 @@ def test_gradients_against_finite_differences():
     network = _network(width=6, depth=2, omega=3.0).double()
     x = torch.rand(4, 5, dtype=torch.float64, generator=torch.Generator().manual_seed(1), requires_grad=True)
     assert torch.autograd.gradcheck(network, x)
-    first = network.layers[0].weight
+    first = network.linear[0].weight
     (gradient,) = torch.autograd.grad(network(x).sum(), first)
     with torch.no_grad():
         first[2, 3] += 1e-6
@@ -56,7 +56,7 @@ def test_initial_weights_fill_their_bounds():
     network = SineNetwork(40, 50, width=60, depth=2, omega=7.0)
     network.initialise(torch.Generator().manual_seed(0))
     bounds = [1 / 40, math.sqrt(6 / 60) / 7, math.sqrt(6 / 60) / 7]
-    for layer, bound, inputs in zip(network.layers, bounds, (40, 60, 60), strict=True):
+    for layer, bound, inputs in zip(network.linear, bounds, (40, 60, 60), strict=True):
         largest = layer.weight.abs().max().item()
         assert 0.98 * bound < largest <= bound
         assert layer.weight.std().item() == pytest.approx(bound / math.sqrt(3), rel=0.05)
