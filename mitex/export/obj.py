@@ -1,8 +1,9 @@
-"""Wavefront OBJ with a material file and PNG maps beside it."""
+"""Wavefront OBJ with a material file and PNG maps beside it: the mesh as it was read, polygons and all."""
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
@@ -22,8 +23,11 @@ from mitex.export.common import (
     plain_name,
     png,
 )
+from mitex.geometry.tangents import split_at_hard_edges
 from mitex.images import read_image
 from mitex.mesh import Mesh
+from mitex.mesh.polygons import outlines
+from mitex.mesh.readers.obj import read_obj as read_obj_soup
 from mitex.paths import atomic_write, prepare_output
 
 # Material keywords, the first one is read back. `norm` and `map_Pr` are the PBR extension of the format;
@@ -35,6 +39,8 @@ _KEYWORDS = {
     "normal": ("norm", "map_Bump"),
     "roughness": ("map_Pr",),
 }
+
+HEADER = 4096  # bytes that hold the first two lines
 
 
 def check_side_files(
@@ -101,9 +107,14 @@ def _write_mesh(file: BinaryIO, asset: Asset, stem: str) -> None:
     # Nine digits give every float32 back exactly.
     np.savetxt(file, mesh.vertices, "v %.9g %.9g %.9g")
     np.savetxt(file, pairs, "vt %.9g %.9g")
-    np.savetxt(file, mesh.normals, "vn %.6g %.6g %.6g")
-    corners = np.stack([mesh.faces, uv_index.reshape(-1, 3), mesh.faces], axis=2) + 1
-    np.savetxt(file, corners.reshape(-1, 9), "f %d/%d/%d %d/%d/%d %d/%d/%d")
+    split = split_at_hard_edges(mesh)
+    np.savetxt(file, split.normals, "vn %.9g %.9g %.9g")
+    corners = np.stack([mesh.faces, uv_index.reshape(-1, 3), split.faces], axis=2) + 1
+    sizes, (corners,) = outlines(mesh.polygons, [corners])
+    words = [f"{v}/{vt}/{vn}" for v, vt, vn in corners.tolist()]
+    ends = np.cumsum(sizes)
+    for start, end in zip((ends - sizes).tolist(), ends.tolist(), strict=True):
+        file.write(f"f {' '.join(words[start:end])}\n".encode())
 
 
 def read_obj(path: Path) -> Asset:
@@ -112,27 +123,23 @@ def read_obj(path: Path) -> Asset:
     Raises:
         MeshError: damaged, not written by Mitex, or a map is missing.
     """
-    lines = path.read_text("utf-8", "replace").split("\n")
-    if lines[0] != f"# {GENERATOR}" or not "".join(lines[1:2]).startswith("mtllib "):
+    data = path.read_bytes()
+    lines = data[:HEADER].split(b"\n")
+    if lines[0] != f"# {GENERATOR}".encode() or not re.match(rb"mtllib \S", b"".join(lines[1:2])):
         raise foreign(path)
     try:
-        vertices = _rows(lines, "v ", 3, np.float32)
-        pairs = _rows(lines, "vt ", 2, np.float32)
-        faces = _rows((line.replace("/", " ") for line in lines), "f ", 9, np.int64).reshape(-1, 3, 3) - 1
-        # A negative index would silently count from the end.
-        uv = pairs[np.where(faces[..., 1] < 0, len(pairs), faces[..., 1])]
-        mesh = Mesh(vertices, faces[..., 0], uv, path.stem)
-        textures = _textures(path, path.with_name(lines[1].split()[1]))
-    except (ValueError, IndexError) as e:
+        soup = read_obj_soup(str(path), data, len(data))
+        if soup.uv is None or soup.normals is None:
+            raise foreign(path, "is damaged")
+        mesh = Mesh(soup.vertices, soup.faces, soup.uv, path.stem, polygons=soup.polygons)
+        mesh = mesh.with_shading_normals(soup.normals)
+        material = path.with_name(lines[1].split()[1].decode("utf-8", "replace"))
+    except (MeshError, ValueError) as e:
         raise foreign(path, "is damaged") from e
+    textures = _textures(path, material)
     if len({v.shape[:2] for v in textures.values()}) != 1:
         raise foreign(path, "has no maps, or maps of different sizes")
-    return asset_from_textures(mesh, uv, textures, path.stem)
-
-
-def _rows(lines: Iterable[str], start: str, width: int, dtype: type) -> np.ndarray:
-    rows = [line[len(start) :] for line in lines if line.startswith(start)]
-    return np.array(" ".join(rows).split(), dtype).reshape(len(rows), width)
+    return asset_from_textures(mesh, soup.uv.astype(np.float32), textures, path.stem)
 
 
 def _textures(path: Path, material: Path) -> dict[str, np.ndarray]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,10 +25,10 @@ BYTES_ALLOWED_ANYWAY = 256 << 20
 def load(path: str | os.PathLike[str], max_vertices: int = 2_000_000) -> Mesh:
     """Loads a mesh.
 
-    Polygons are cut into triangles. Vertices that a format splits at seams of UVs or normals (always in STL
-    and glTF, sometimes in OBJ and PLY) are welded where their positions are bit-identical, so that the graph
-    is connected; UVs stay per face corner. Flaws are handled as `validate` says. glTF node transforms are
-    applied. Materials and images are not read.
+    Polygons are cut into triangles and remembered. Vertices that a format splits at seams of UVs or normals
+    (always in STL and glTF, sometimes in OBJ and PLY) are welded where their positions are bit-identical, so
+    that the graph is connected; UVs and normals stay per face corner, and with them seams and hard edges.
+    Flaws are handled as `validate` says. glTF node transforms are applied. Materials and images are not read.
 
     Args:
         path: .obj, .ply, .stl, .glb, .gltf or .off; or the name of a mesh that ships with Mitex.
@@ -53,8 +54,16 @@ def load(path: str | os.PathLike[str], max_vertices: int = 2_000_000) -> Mesh:
     for note in soup.notes:
         warnings.warn(f"{path}: {note}", MeshWarning, stacklevel=2)
     vertices, faces = weld(soup)
-    mesh = validate(vertices, faces, soup.uv, name=str(path), max_vertices=max_vertices)
-    return Mesh(mesh.vertices, mesh.faces, mesh.uv, source.stem)
+    mesh = validate(
+        vertices,
+        faces,
+        soup.uv,
+        name=str(path),
+        max_vertices=max_vertices,
+        corner_normals=soup.normals,
+        polygons=soup.polygons,
+    )
+    return replace(mesh, name=source.stem)
 
 
 def weld(soup: Soup) -> tuple[np.ndarray, np.ndarray]:

@@ -125,9 +125,8 @@ class SurfaceTexture:
     def _normals(self, atlas: Atlas, channels: tuple[int, ...], used: np.ndarray) -> np.ndarray:
         """The normal map, from the texels' frames into those of the atlas."""
         texels, (right, up) = self.domain.texels, self.domain.tangent_frames
-        # Bumps are added to the smooth surface that viewers shade, not to its flat faces.
-        corners = self.mesh.normals[self.mesh.faces[texels.face]]
-        smooth = interpolate(texels.barycentric, corners)
+        # Bumps are added to the surface that viewers shade, smooth but for hard edges, not to its flat faces.
+        smooth = interpolate(texels.barycentric, self.mesh.shading_normals[texels.face])
         flat = unit_normals(self.mesh.face_crosses[texels.face])
         detail = decode(self.values[:, channels], right, up, flat) - flat + smooth
         return atlas.normal_map(self.mesh, spread(texels.image(detail), used, PADDING))
