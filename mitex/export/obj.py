@@ -105,16 +105,27 @@ def _write_mesh(file: BinaryIO, asset: Asset, stem: str) -> None:
     pairs, uv_index = np.unique(atlas.uv.reshape(-1, 2), axis=0, return_inverse=True)
     file.write(f"# {GENERATOR}\nmtllib {stem}.mtl\no {plain_name(asset.name)}\nusemtl {stem}\n".encode())
     # Nine digits give every float32 back exactly.
-    np.savetxt(file, mesh.vertices, "v %.9g %.9g %.9g")
+    vertices, faces = _vertices(mesh)
+    np.savetxt(file, vertices, "v %.9g %.9g %.9g")
     np.savetxt(file, pairs, "vt %.9g %.9g")
     split = split_at_hard_edges(mesh)
     np.savetxt(file, split.normals, "vn %.9g %.9g %.9g")
-    corners = np.stack([mesh.faces, uv_index.reshape(-1, 3), split.faces], axis=2) + 1
+    corners = np.stack([faces, uv_index.reshape(-1, 3), split.faces], axis=2) + 1
     sizes, (corners,) = outlines(mesh.polygons, [corners])
     words = [f"{v}/{vt}/{vn}" for v, vt, vn in corners.tolist()]
     ends = np.cumsum(sizes)
     for start, end in zip((ends - sizes).tolist(), ends.tolist(), strict=True):
         file.write(f"f {' '.join(words[start:end])}\n".encode())
+
+
+def _vertices(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and faces with the vertices that the mesh's own file has, in its order."""
+    polygons = mesh.polygons
+    if polygons is None or polygons.vertices is None:
+        return mesh.vertices, mesh.faces
+    corners = polygons.vertices[polygons.triangles]
+    _, first, faces = np.unique(corners, return_index=True, return_inverse=True)
+    return mesh.vertices[mesh.faces.ravel()[first]], faces.reshape(-1, 3)
 
 
 def read_obj(path: Path) -> Asset:

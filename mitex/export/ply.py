@@ -25,6 +25,7 @@ _FLOATS = {
     "normal": ("normal_map_x", "normal_map_y", "normal_map_z"),
     "roughness": ("roughness",),
 }
+_POINT = ("x", "y", "z", "nx", "ny", "nz")
 _TANGENT = ("tangent_x", "tangent_y", "tangent_z")
 _COLOURS = ("red", "green", "blue")
 _NAMES = {"<f4": "float", "<u4": "uint", "<u2": "ushort", "|u1": "uchar"}
@@ -58,7 +59,7 @@ def _vertices(asset: Asset) -> np.ndarray:
     """The table of the split vertices."""
     mesh, split = asset.mesh, split_at_hard_edges(asset.mesh)
     positions = mesh.vertices[split.source]
-    columns = dict(zip(("x", "y", "z", "nx", "ny", "nz"), (*positions.T, *split.normals.T), strict=True))
+    columns: dict[str, np.ndarray] = dict(zip(_POINT, (*positions.T, *split.normals.T), strict=True))
     if asset.tangents is not None:
         columns |= dict(zip(_TANGENT, asset.tangents[split.source].T, strict=True))
     for name, properties in _FLOATS.items():

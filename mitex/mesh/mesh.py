@@ -32,7 +32,7 @@ class Mesh:
         name: for messages and file names.
         corner_normals: (F, 3, 3) float32 unit normals that the face corners are shaded with, so that hard
             edges never split vertices, or None for the smooth `normals`.
-        polygons: those that the triangles were cut from, or None where all were triangles.
+        polygons: those that the triangles were cut from, or None where all were triangles of these vertices.
 
     Raises:
         MeshError: An array has the wrong shape, an index is out of range, or a number is not finite.
@@ -195,10 +195,18 @@ def _problems(mesh: Mesh) -> Iterator[tuple[str, str]]:
     if uv is not None and not np.isfinite(uv).all():
         yield "some texture coordinates are NaN or infinite", "unwrap the mesh again or leave the uv out"
     yield from _normal_problems(faces, mesh.corner_normals)
-    if mesh.polygons is not None and (
-        mesh.polygons.triangles.shape != faces.shape or not mesh.polygons.agreeing(faces[..., None]).all()
-    ):
+    if mesh.polygons is not None and not _are_of(mesh.polygons, faces):
         yield "the polygons are not those of the faces", "leave them out where faces change"
+
+
+def _are_of(polygons: Polygons, faces: np.ndarray) -> bool:
+    if polygons.triangles.shape != faces.shape or not polygons.agreeing(faces[..., None]).all():
+        return False
+    if polygons.vertices is None:
+        return True
+    count = int(faces.max(initial=0)) + 1
+    pairs = np.unique(polygons.vertices * count + polygons.at_corners(faces))
+    return bool((np.diff(pairs // count) > 0).all())  # each vertex of the file is at one of the mesh
 
 
 def _normal_problems(faces: np.ndarray, normals: np.ndarray | None) -> Iterator[tuple[str, str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,7 +21,9 @@ class Polygons:
 
     Attributes:
         sizes: (P,) int64, their numbers of corners, 3 or more; polygon p was cut into sizes[p] - 2 triangles.
-        triangles: (F, 3) int64, which polygon corner each triangle corner is, counted through all polygons.
+        triangles: (F, 3) int64, which polygon corner each triangle corner is, counted through all N of them.
+        vertices: (N,) int64, the vertices that the polygons' corners have in the file, where it splits them
+            at seams that the mesh has joined; None where they are the mesh's.
 
     Raises:
         MeshError: the arrays do not fit each other.
@@ -29,6 +31,7 @@ class Polygons:
 
     sizes: np.ndarray
     triangles: np.ndarray
+    vertices: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         sizes, triangles = np.asarray(self.sizes, np.int64), np.asarray(self.triangles, np.int64)
@@ -47,6 +50,9 @@ class Polygons:
             )
         if len(np.unique(triangles)) != sizes.sum():
             raise MeshError("a polygon has a corner that no triangle has", "triangulate it completely")
+        if self.vertices is not None and self.vertices.shape != (sizes.sum(),):
+            problem = f"{sizes.sum()} corners of polygons have vertices of shape {self.vertices.shape}"
+            raise MeshError(problem, "give one vertex per corner")
 
     @cached_property
     def starts(self) -> np.ndarray:
@@ -83,7 +89,10 @@ class Polygons:
         sizes = np.where(whole_face, self.sizes[owners], 3)[first]
         start = (np.cumsum(sizes) - sizes)[np.cumsum(first) - 1][:, None]
         inside = self.triangles[~faces] - self.starts[owners][:, None]
-        return Polygons(sizes, start + np.where(whole_face[:, None], inside, np.arange(3)))
+        rest = Polygons(sizes, start + np.where(whole_face[:, None], inside, np.arange(3)))
+        if self.vertices is None:
+            return rest
+        return replace(rest, vertices=self.vertices[rest.at_corners(self.triangles[~faces])])
 
 
 def outlines(polygons: Polygons | None, values: Sequence[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]:
