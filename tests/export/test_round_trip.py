@@ -76,6 +76,7 @@ def test_glb_is_the_mesh_that_was_read(name, bake, tmp_path):
     np.testing.assert_array_equal(glb.attribute("POSITION")[glb.faces], mesh.vertices[mesh.faces])
     np.testing.assert_allclose(glb.attribute("NORMAL")[glb.faces], mesh.shading_normals, atol=1e-6)
     if bake:
+        assert mesh.uv is not None
         uv = glb.attribute("TEXCOORD_0")[glb.faces] * [1, -1] + [0, 1]
         np.testing.assert_allclose(uv, mesh.uv, atol=1e-6)
     else:
@@ -207,7 +208,7 @@ def test_tangents_at_hard_edges_are_those_that_others_recompute(name, tmp_path):
     glb = Glb(dressed(mesh, relief=True).baked(64).export(tmp_path / "a.glb"))
     tangents = glb.attribute("TANGENT")[glb.faces].astype(np.float64)
     corners = glb.attribute("POSITION")[glb.faces], glb.attribute("NORMAL")[glb.faces]
-    uv = glb.attribute("TEXCOORD_0")[glb.faces] * np.float32([1, -1]) + np.float32([0, 1])
+    uv = glb.attribute("TEXCOORD_0")[glb.faces] * np.array([1, -1], np.float32) + np.array([0, 1], np.float32)
     vectors, signs = mikktspace(*corners, uv, tmp_path)
     np.testing.assert_array_equal(tangents[..., 3], signs)
     np.testing.assert_allclose(tangents[..., :3], vectors, atol=1e-3)
