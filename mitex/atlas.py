@@ -8,7 +8,7 @@ import numpy as np
 import xatlas
 from scipy.ndimage import distance_transform_edt
 
-from mitex.errors import ConfigError
+from mitex.errors import ConfigError, MeshError
 from mitex.geometry.normal_maps import FLAT, encode
 from mitex.geometry.raster import covered_texels, rasterize
 from mitex.geometry.tangents import split_at_seams
@@ -236,7 +236,12 @@ def laid_out(mesh: Mesh, resolution: int, padding: int = 8) -> Mesh:
         mesh: any mesh.
         resolution: side of the map [texels].
         padding: gap between new charts [texels].
+
+    Raises:
+        MeshError: the mesh has no area.
     """
+    if not mesh.face_areas.sum() > 0.0:
+        raise MeshError(f"{mesh.name} has no area to put a texture on", "give a surface")
     if mesh.uv is not None and usable_uv(mesh, mesh.uv):
         return mesh
     return replace(mesh, uv=unwrap(mesh, resolution, padding))

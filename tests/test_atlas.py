@@ -8,7 +8,7 @@ import pytest
 from scipy.ndimage import distance_transform_edt
 
 from mitex.atlas import Atlas, laid_out, spread, unwrap, usable_uv
-from mitex.errors import ConfigError
+from mitex.errors import ConfigError, MeshError
 from mitex.mesh import Mesh, icosphere, subdivide_loop, torus
 
 
@@ -216,3 +216,16 @@ def test_spreading_continues_the_used_texels():
     assert np.array_equal(result[used], image[used])
     assert np.array_equal(result[4, 8], image[6, 8]) and np.array_equal(result[7, 2], image[7, 5])
     assert np.allclose(result[19, 19], image[used].mean(0)) and np.allclose(result[7, 1], image[used].mean(0))
+
+
+@pytest.mark.parametrize(
+    ("points", "faces"),
+    [
+        (np.eye(3), np.zeros((0, 3), np.int32)),
+        (np.zeros((3, 3)), [[0, 1, 2]]),
+        (np.outer([0, 1, 2], [1, 0, 0]), [[0, 1, 2]]),
+    ],
+)
+def test_a_mesh_without_area_is_refused(points, faces):
+    with pytest.raises(MeshError, match="flat has no area"):
+        laid_out(Mesh(points, np.array(faces), name="flat"), 64)

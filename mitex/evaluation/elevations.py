@@ -2,8 +2,8 @@
 
 The pixels of photos that see the base shape under some angle are the reference. The same camera then sees a
 plane that touches the base shape there, with a texture on it. So scale, light and perspective are those of
-the photo; only what the texture shows differs. The same pixels count in all, or windows of which few pixels
-see the angle, and their light, would weigh more on planes than in photos.
+the photo; only what the texture shows differs. The same pixels count in photos and on planes: a plane shows
+the angle in the whole window, and windows in which the photo shows it in few pixels would weigh more.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from mitex.evaluation.mip_map import MipMap
 from mitex.evaluation.windows import PLACES, WINDOW, Photos, Rendering, Surface, Window, select_windows
 
 HALF = 1.0  # half the side of the plane [scene units]
-
 
 Renderer = Callable[[Window], Rendering]  # shows a texture by the rays of a window
 
@@ -70,6 +69,7 @@ class FlatTexture:
         self._mip_map = MipMap(srgb_to_linear(image)) if filtered else None
 
     def __call__(self, window: Window) -> Rendering:
+        """The plane as the photo would see it; pixels beside the plane show the window's background."""
         _, origins, directions = window.to_plane(self.along)
         steps = -origins[:, 2:] / directions[:, 2:]
         hits = origins[:, :2] + steps * directions[:, :2]
@@ -155,12 +155,12 @@ def _compare(
 
 
 def _mean(rows: Sequence[Elevation]) -> Elevation:
-    """Of several syntheses."""
+    """One row of the table, of the same angle in several syntheses."""
     flat = {name: float(np.mean([row.flat[name] for row in rows])) for name in rows[0].flat}
     return replace(rows[0], ours=float(np.mean([row.ours for row in rows])), flat=flat)
 
 
 def _strip(views: list[Rendering]) -> Rendering:
-    """Side by side."""
+    """Images and masks of one height, side by side."""
     images, masks = zip(*views, strict=True)
     return np.concatenate(images, axis=1), np.concatenate(masks, axis=1)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cache
-from typing import Any
+from typing import cast
 
 import numpy as np
 import torch
@@ -52,7 +52,7 @@ def ssim(a: np.ndarray, b: np.ndarray, mask: np.ndarray | None = None) -> float:
         from skimage.metrics import structural_similarity
     except ImportError as e:
         raise MitexError("scikit-image is not installed", "run `pip install 'mitex[nerf]'`") from e
-    maps: Any = structural_similarity(
+    result = structural_similarity(
         a.astype(np.float64),
         b.astype(np.float64),
         data_range=1.0,
@@ -62,11 +62,12 @@ def ssim(a: np.ndarray, b: np.ndarray, mask: np.ndarray | None = None) -> float:
         use_sample_covariance=False,
         full=True,
     )
+    _, maps = cast(tuple[float, np.ndarray], result)  # as of `full`
     inner = slice(SSIM_RADIUS, -SSIM_RADIUS)
     if mask is not None:
         _check_mask(a, mask)
         mask = mask[inner, inner]
-    return float(_masked(maps[1][inner, inner], mask).mean())
+    return float(_masked(maps[inner, inner], mask).mean())
 
 
 def vgg_distance(

@@ -54,6 +54,7 @@ class MipMap:
         return total / counts.prod(1)[:, None]
 
     def _trilinear(self, places: np.ndarray, level: np.ndarray) -> np.ndarray:
+        """(N, C) values at places (N, 2), interpolated within and between the levels around `level` (N,)."""
         level = np.clip(level, 0, len(self.levels) - 1)
         lower = np.minimum(level.astype(np.int64), max(len(self.levels) - 2, 0))
         upper = np.minimum(lower + 1, len(self.levels) - 1)
@@ -65,6 +66,7 @@ class MipMap:
         return (1 - share) * values[0] + share * values[1]
 
     def _bilinear(self, places: np.ndarray, level: np.ndarray) -> np.ndarray:
+        """(N, C) values of one level (h, w, C) at places (N, 2) [texels of the image]."""
         size = np.array(level.shape[1::-1])
         position = places * (size / self.levels[0].shape[1::-1]) - 0.5
         corner = np.floor(position).astype(np.int64)

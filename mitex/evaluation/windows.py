@@ -10,11 +10,11 @@ import numpy as np
 
 from mitex.geometry.vectors import orthonormal
 
-ELEVATIONS = (0, 20, 40, 60, 80)
-TOLERANCE = 10.0  # pixels count whose angle is so near to that of the elevation [degrees]
+ELEVATIONS = (0, 20, 40, 60, 80)  # between view and normal, as in table 2 [degrees]
+TOLERANCE = 10.0  # pixels count if their angle is nearer than this to the elevation [degrees]
 WINDOW = 96  # side of a window of a photo [pixels]
 PLACES = 24  # for each angle
-LEAST = 100  # pixels that count, or a window is left out
+LEAST = 100  # windows with fewer pixels that count are left out
 SHIFT = 0.5  # of the window on the plane, at most, so that each shows another part of the texture
 SOLID = 0.5  # opacity of pixels that count
 

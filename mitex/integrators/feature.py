@@ -57,7 +57,7 @@ class FeatureMethods:
         if field is not None and not isinstance(field, mi.Texture):
             raise RuntimeError(f"feature: 'field' is a {type(field).__name__}; give a texture")
         self.field = field
-        background: Any = props.get("background", 0.0)
+        background = props.get("background", 0.0)
         self.background = mi.Float(background.array if isinstance(background, mi.TensorXf) else background)
         self.antialias = option(props, "antialias", 1)
         if self.antialias < 1:

@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -28,9 +29,14 @@ def tone(linear: np.ndarray, exposure: float = 0.0) -> np.ndarray:
     Raises:
         ConfigError: the exposure is beyond +-10 stops.
     """
+    check_exposure(exposure)
+    return linear_to_srgb(np.clip(linear * 2.0**exposure, 0.0, 1.0)).astype(np.float32)
+
+
+def check_exposure(exposure: float) -> None:
+    """Raises a ConfigError if `tone` would refuse an exposure [stops], before anything is rendered."""
     if not -10.0 <= exposure <= 10.0:
         raise ConfigError(f"exposure {exposure} is out of range", "use -10 to 10 stops")
-    return linear_to_srgb(np.clip(linear * 2.0**exposure, 0.0, 1.0)).astype(np.float32)
 
 
 def still(
@@ -65,7 +71,9 @@ def still(
     return renderer.render(azimuth, renderer.fit_view(azimuth, elevation), spp, seed)
 
 
-def render_still(asset: Asset, path: str | os.PathLike[str], *, exposure: float = 0.0, **options) -> Path:
+def render_still(
+    asset: Asset, path: str | os.PathLike[str], *, exposure: float = 0.0, **options: Any
+) -> Path:
     """Renders `still` and writes it: .png and .jpg in sRGB after `tone`, .exr linear (R, G, B, float16).
 
     Returns:
@@ -76,7 +84,7 @@ def render_still(asset: Asset, path: str | os.PathLike[str], *, exposure: float 
         ConfigError: an option out of range.
     """
     target = prepare_output(path, STILL_SUFFIXES)
-    tone(np.zeros(3), exposure)
+    check_exposure(exposure)
     linear = still(asset, **options)
     if target.suffix.lower() == ".exr":
         return write_exr(target, dict(zip("RGB", np.moveaxis(linear, 2, 0) * 2.0**exposure, strict=True)))
@@ -116,7 +124,7 @@ def turntable(
         ConfigError: an option out of range.
     """
     target = check_video(path, frames, fps, resolution)
-    tone(np.zeros(3), exposure)
+    check_exposure(exposure)
     renderer = OrbitRenderer(
         asset, resolution=resolution, displacement=displacement, ao=ao, backdrop=backdrop
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -89,12 +89,7 @@ class OrbitRenderer:
         Raises:
             ConfigError: the elevation [rad] is beyond +-85 degrees, or below the floor of the backdrop.
         """
-        lowest = 0.0 if self._on_backdrop else -math.radians(85)
-        if not lowest <= elevation <= math.radians(85):
-            raise ConfigError(
-                f"camera elevation {math.degrees(elevation):.0f} degrees is out of range",
-                f"use {math.degrees(lowest):.0f} to 85" + (", or no backdrop" if self._on_backdrop else ""),
-            )
+        check_elevation(elevation, self._on_backdrop)
         angles = np.atleast_1d(np.asarray(azimuths, np.float64))
         return fit_view(np.concatenate([self._hull @ rotation(a).T for a in angles]), elevation)
 
@@ -113,12 +108,10 @@ class OrbitRenderer:
         Raises:
             ConfigError: spp out of range.
         """
-        if not 1 <= spp <= 65536:
-            raise ConfigError(f"{spp} samples per pixel are not possible", "use 1 to 65536")
         self._turn(azimuth, view)
         return accumulated(self._scene, self.resolution, spp, seed)
 
-    def _build(self, bsdf: dict[str, Any], mesh: Mesh) -> tuple[mi.Scene, mi.SceneParameters]:
+    def _build(self, bsdf: dict[str, object], mesh: Mesh) -> tuple[mi.Scene, mi.SceneParameters]:
         from mitex.plugins import init
         from mitex.runtime.jit import mi
 
@@ -151,10 +144,26 @@ class OrbitRenderer:
         self._params.update()
 
 
+def check_elevation(elevation: float, backdrop: bool) -> None:
+    """Raises a ConfigError if a camera at this elevation [rad] would look from below the floor."""
+    lowest = 0.0 if backdrop else -math.radians(85)
+    if not lowest <= elevation <= math.radians(85):
+        raise ConfigError(
+            f"camera elevation {math.degrees(elevation):.0f} degrees is out of range",
+            f"use {math.degrees(lowest):.0f} to 85" + (", or no backdrop" if backdrop else ""),
+        )
+
+
 def accumulated(scene: mi.Scene, resolution: int, spp: int, seed: int) -> np.ndarray:
-    """(N, N, 3) linear radiance of a scene with a film of `sensor`, over white where it is transparent."""
+    """(N, N, 3) linear radiance of a scene with a film of `sensor`, over white where it is transparent.
+
+    Raises:
+        ConfigError: the samples per pixel are not 1 to 65536.
+    """
     from mitex.runtime.jit import mi
 
+    if not 1 <= spp <= 65536:
+        raise ConfigError(f"{spp} samples per pixel are not possible", "use 1 to 65536")
     level = mi.log_level()
     mi.set_log_level(mi.LogLevel.Error)  # the sampler warns each time it rounds its count up
     per_pass = max(1, min(spp, SAMPLES_PER_PASS // resolution**2))
@@ -187,7 +196,7 @@ def _surface(
     return positions.astype(np.float64), normals.astype(np.float64), detail.astype(np.float64)
 
 
-def _bsdf(asset: Asset, split: HardSplit, ao: bool) -> dict[str, Any]:
+def _bsdf(asset: Asset, split: HardSplit, ao: bool) -> dict[str, object]:
     """The material, from textures if the asset has them, else from the maps of the split vertices."""
     from mitex.plugins import init
     from mitex.runtime.jit import mi
@@ -197,7 +206,7 @@ def _bsdf(asset: Asset, split: HardSplit, ao: bool) -> dict[str, Any]:
     if asset.texture_maps is not None:
         maps, kind = asset.texture_maps, "texel_field"
 
-    def texture(values: np.ndarray) -> dict[str, Any]:
+    def texture(values: np.ndarray) -> dict[str, object]:
         return {"type": kind, "data": mi.TensorXf(np.ascontiguousarray(values, np.float32)), "raw": True}
 
     albedo, roughness = _material(maps, ao)
@@ -249,7 +258,7 @@ def paper_sweep(floor: float) -> mi.Mesh:
     return shape("backdrop", backdrop(floor), {"type": "twosided", "bsdf": paper})
 
 
-def shape(name: str, mesh: Mesh, bsdf: dict[str, Any], normals: bool = False) -> mi.Mesh:
+def shape(name: str, mesh: Mesh, bsdf: dict[str, object], normals: bool = False) -> mi.Mesh:
     """A Mitsuba mesh, with UVs if the mesh has a vertex for each."""
     from mitex.runtime.jit import mi
 
@@ -269,7 +278,7 @@ def shape(name: str, mesh: Mesh, bsdf: dict[str, Any], normals: bool = False) ->
     return shape
 
 
-def sensor(resolution: int) -> dict[str, Any]:
+def sensor(resolution: int) -> dict[str, object]:
     """A scene's entry for the camera of all pictures: square, with a portrait lens."""
     from mitex.runtime.jit import mi
 

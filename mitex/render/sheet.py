@@ -35,18 +35,24 @@ def sheet(
         (H, W, 3) float32 sRGB in [0, 1].
 
     Raises:
-        ConfigError: no images, not one label per image, more exemplars than rows, or a wrong shape.
+        ConfigError: no images, not one label per image, more exemplars than rows, a wrong shape, or a cell
+            of no pixels.
     """
     if not images or columns < 1:
         raise ConfigError("a sheet needs images and columns", "give at least one of each")
     if labels is not None and len(labels) != len(images):
         raise ConfigError(f"{len(labels)} labels for {len(images)} images", "give one per image")
+    if cell is not None and cell < 1:
+        raise ConfigError(f"cells of {cell} pixels", "use 1 or more")
     exemplars = [] if exemplar is None else [exemplar] if isinstance(exemplar, np.ndarray) else list(exemplar)
+    for image in (*images, *exemplars):
+        if np.ndim(image) != 3 or image.shape[2] != 3 or not image.size:
+            raise ConfigError(f"a picture has shape {np.shape(image)}", "give (H, W, 3)")
     columns = min(columns, len(images))
     rows = -(-len(images) // columns)
     if len(exemplars) > rows:
         raise ConfigError(f"{len(exemplars)} exemplars for {rows} rows", "give one, or one per row")
-    side = cell or max(max(np.shape(i)[:2]) for i in images)
+    side = cell or max(max(image.shape[:2]) for image in images)
     gap = max(2, round(GAP * side))
     line = round(CAPTION * side) if labels is not None else 0
     left = side + 3 * gap if exemplars else gap
@@ -67,8 +73,7 @@ def sheet(
 
 
 def _paste(canvas: Image.Image, image: np.ndarray, corner: tuple[int, int], side: int) -> None:
-    if np.ndim(image) != 3 or image.shape[2] != 3:
-        raise ConfigError(f"a picture has shape {np.shape(image)}", "give (H, W, 3)")
+    """Puts an image (H, W, 3) in the middle of the cell at a corner, scaled to fit."""
     picture = Image.fromarray(np.round(np.clip(image, 0.0, 1.0) * 255.0).astype(np.uint8))
     scale = side / max(picture.size)
     if scale != 1.0:

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 
+from mitex.errors import ConfigError
+from mitex.images import write_image
 from mitex.mesh import Similarity
+from mitex.paths import prepare_output
 from mitex.plugins import init
 from mitex.render.framing import fit_view, hull, rotation
-from mitex.render.picture import AZIMUTH, ELEVATION
-from mitex.render.renderer import MAX_DEPTH, accumulated, paper_sweep, sensor
+from mitex.render.picture import AZIMUTH, ELEVATION, check_exposure, tone
+from mitex.render.renderer import MAX_DEPTH, accumulated, check_elevation, paper_sweep, sensor
 from mitex.render.studio import lights
 from mitex.runtime.jit import mi
 from mitex.textures.march import RadianceField
+
+PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
 def shell_still(
@@ -32,10 +41,17 @@ def shell_still(
         field: in its cube.
         similarity: world -> cube.
         outline: (N, 3) points of the world that the camera is set for; the lowest is on the backdrop.
+        resolution: side of the square picture [px], 16 to 8192.
 
     Returns:
         (H, W, 3) float32 linear radiance.
+
+    Raises:
+        ConfigError: an option out of range.
     """
+    if not 16 <= resolution <= 8192:
+        raise ConfigError(f"a picture of {resolution} pixels is not possible", "use 16 to 8192")
+    check_elevation(elevation, backdrop)
     init()
     from mitex.textures.shell_field import shell_field
 
@@ -60,3 +76,26 @@ def shell_still(
     if backdrop:
         scene["backdrop"] = paper_sweep(float(points[:, 1].min()))
     return accumulated(mi.load_dict(scene), resolution, spp, seed)
+
+
+def render_shell(
+    field: RadianceField,
+    similarity: Similarity,
+    outline: np.ndarray,
+    path: str | os.PathLike[str],
+    *,
+    exposure: float = 0.0,
+    **options: Any,
+) -> Path:
+    """Renders `shell_still` with its `options` and writes it in sRGB after `tone`: .png or .jpg.
+
+    Returns:
+        The path written.
+
+    Raises:
+        OutputError: unknown suffix or unwritable place, before anything is rendered.
+        ConfigError: an option out of range.
+    """
+    target = prepare_output(path, PICTURE_SUFFIXES)
+    check_exposure(exposure)
+    return write_image(target, tone(shell_still(field, similarity, outline, **options), exposure))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ GROUND, SKY = (0.22, 0.21, 0.20), (1.05, 1.11, 1.18)  # radiance of the dome bel
 GREY = 0.72  # backdrop reflectance
 
 
-def lights() -> dict[str, Any]:
+def lights() -> dict[str, object]:
     """Scene entries for an object of radius 1 at the origin and a camera on the +z side.
 
     A soft key light from the upper left, and a dome that brightens upwards. The dome is smooth on purpose:

@@ -42,7 +42,8 @@ def write_video(
 ) -> Path:
     """Writes `frames` pictures (side, side, 3), sRGB in [0, 1], as .mp4 (H.264) or .gif, by the suffix.
 
-    They are made as they are written; `progress` is called with (frames done, frames) after each one.
+    Pictures are drawn from the iterable as they are written, so that a film need not fit into memory as .mp4.
+    `progress` is called with (frames done, frames) after each one.
 
     Raises:
         OutputError: the encoder failed, or the place is not writable; nothing is left then.
@@ -92,6 +93,7 @@ def _write_gif(path: Path, pictures: Iterator[np.ndarray], fps: int, side: int) 
 
 
 def _strip(images: Sequence[Image.Image]) -> Image.Image:
+    """Images of one size side by side."""
     strip = Image.new("RGB", (images[0].width * len(images), images[0].height))
     for k, image in enumerate(images):
         strip.paste(image, (k * image.width, 0))

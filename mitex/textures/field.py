@@ -131,7 +131,7 @@ class FieldMethods:
         return f"{name}[\n" + ",\n".join(lines) + "\n]"
 
     def _selection(self) -> range:
-        """Channels that a colour is made of."""
+        """Channels that a colour is made of: three from `channel` on, or `channel` alone."""
         enough = self.channel + 3 <= self.channel_count
         return range(self.channel, self.channel + (3 if enough else 1))
 

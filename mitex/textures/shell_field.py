@@ -48,14 +48,14 @@ class ShellFieldMethods:
         units.
 
         Args:
-            ray: `mi.Ray3f` with unit directions.
-            jitter: in [0, 1) for each.
-            active: `mi.Bool`, which rays are marched; the others pass freely.
+            ray: R rays with unit directions.
+            jitter: (R,) in [0, 1), see `march`.
+            active: which rays are marched, one value for each or for all; what is not marched passes freely.
         """
         scale = float(self.similarity.scale)
         centre = mi.Vector3f(np.asarray(self.similarity.center, np.float32).tolist())
-        rays = mi.UInt32(dr.compress(active))
         count = max(dr.width(ray.o), dr.width(active), dr.width(jitter))
+        rays = mi.UInt32(dr.compress(active & dr.full(mi.Bool, True, count)))
         total = Composite(dr.zeros(mi.Color3f, count), dr.ones(mi.Float, count), dr.zeros(mi.Float, count))
         for start in range(0, dr.width(rays), CHUNK):
             part = dr.arange(mi.UInt32, start, min(start + CHUNK, dr.width(rays)))

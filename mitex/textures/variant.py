@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 if TYPE_CHECKING:
     from mitex.runtime.jit import mi
 
+B = TypeVar("B")
 T = TypeVar("T", bool, int, str)
 
 
-def for_variant(name: str, base: Any, methods: type) -> Any:
+def for_variant(name: str, base: type[B], methods: type) -> Callable[..., B]:
     """A class called `name` with Mitsuba's `base` of the current variant and the members of `methods`.
 
     Every variant has its own base classes, and they allow neither a second base nor another metaclass, so the
     members are copied, inherited ones too. They call the base's constructor through `init_base`, not through
-    `super()`.
+    `super()`. What the class is called with are the arguments of the constructor in `methods`.
     """
     members: dict[str, Any] = {}
     for cls in reversed(methods.__mro__[:-1]):  # without `object`
         members |= {key: value for key, value in vars(cls).items() if key not in ("__dict__", "__weakref__")}
-    return type(name, (base,), members)
+    return cast(Callable[..., B], type(name, (base,), members))
 
 
 def option(props: mi.Properties, name: str, default: T) -> T:

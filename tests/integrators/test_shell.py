@@ -10,7 +10,7 @@ import pytest
 
 from mitex.colour import srgb_to_linear
 from mitex.mesh import Similarity
-from mitex.runtime import init
+from mitex.plugins import init
 from mitex.runtime.jit import dr, mi
 
 init()
@@ -203,3 +203,10 @@ def test_wrong_parameters_are_refused(wrong, message):
     integrator = {"type": "shell", "field": shell_field(Ball(), Similarity(np.zeros(3), 1.0))}
     with pytest.raises(RuntimeError, match=message):
         mi.load_dict(integrator | wrong)
+
+
+def test_one_mask_stands_for_all_rays():
+    field: Any = shell_field(Ball(), Similarity(np.zeros(3), 1.0))
+    ray = mi.Ray3f(mi.Point3f([0.0, 0.1, 0.9], 0, -2), mi.Vector3f([0.0, 0.0, 0.0], 0, 1))
+    pixels = field.march(ray, dr.full(mi.Float, 0.5, 3), mi.Bool(True))
+    np.testing.assert_allclose(np.array(pixels.transmittance), [0, 0, 1], atol=1e-3)

@@ -58,6 +58,10 @@ def test_wrong_input():
         (([picture], 1, ["a", "b"]), "2 labels for 1"),
         (([picture], 1, None, [picture, picture]), "2 exemplars for 1"),
         (([picture[..., 0]], 1), "shape"),
+        (([picture[:0]], 1), "shape"),
+        (([np.zeros(())], 1), "shape"),
+        (([picture], 1, None, None, 0), "cells of 0 pixels"),
+        (([picture], 1, None, None, -5), "cells of -5 pixels"),
     ]:
         with pytest.raises(ConfigError, match=message):
             sheet(*arguments)

@@ -20,7 +20,9 @@ class RadianceConfig(TrainingConfig):
     table: int = key(17, "binary logarithm of the entries of a level's hash table", 8, 24)
     lr: float = key(1e-2, "learning rate", 0, 1)
     lr_steps: int = key(6_000, "steps in which it falls to a tenth", 1)
-    average: float = key(0.95, "decay of the parameters' running mean per 16 steps: it is kept", 0, 0.9999)
+    average: float = key(
+        0.95, "decay, per 16 steps, of the parameters' running mean, which is what a fit returns", 0, 0.9999
+    )
     distortion: float = key(1e-2, "weight of the distortion loss", 0)
     occupancy: int = key(128, "cells of the occupancy grid along a side", 8, 512)
     checkpoint_every: int = 500
@@ -39,7 +41,9 @@ class NerfConfig(RadianceConfig):
     learn_light: bool = key(
         False, "learn the light with the field (the paper), instead of estimating it beforehand"
     )
-    fresnel: bool = key(True, "how much a surface mirrors depends on the angle; the paper: it does not")
+    fresnel: bool = key(
+        True, "surfaces mirror more or less at grazing angles; the paper: alike at all angles"
+    )
     detach_normals: bool = key(
         False, "fine normals learn from the density alone (the paper), instead of from colours too"
     )

@@ -17,10 +17,11 @@ from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field.encoding import Encoding
 from mitex.methods.nerf.field.lighting import COEFFICIENTS
 from mitex.methods.nerf.field.networks import MATRICES, weight_shapes
+from mitex.methods.nerf.field.occupancy import packed_cells, unpacked_cells
 from mitex.runtime import init
 from mitex.training import model_file
 
-SETTINGS = (
+SETTINGS = (  # that the model depends on
     "table",
     "coarsest",
     "finest",
@@ -76,7 +77,7 @@ def save(path: Path, model: Model) -> Path:
         "tables/f": model.tables[0],
         "tables/phase": model.tables[1],
         "light": model.light,
-        "occupied": torch.from_numpy(np.packbits(model.occupied)),
+        "occupied": packed_cells(model.occupied),
     }
     tensors |= {f"weights/{k}": value for k, value in enumerate(model.weights)}
     return model_file.save(path, tensors, METHOD.name, model.about | {"thickness": base.thickness})
@@ -96,8 +97,7 @@ def load(source: str | Path) -> Model:
         base = BaseShape(mesh, tensors["scan"].numpy(), float(about["thickness"]))
         weights = [tensors[f"weights/{k}"] for k in range(MATRICES)]
         tables = [tensors["tables/f"], tensors["tables/phase"]]
-        side = int(about["occupancy"])
-        occupied = np.unpackbits(tensors["occupied"].numpy(), count=side**3).reshape((side,) * 3)
+        occupied = unpacked_cells(tensors["occupied"], int(about["occupancy"]))
         model = Model(base, tensors["frames"].numpy(), tables, weights, tensors["light"], occupied, about)
         _check(model)
         return model

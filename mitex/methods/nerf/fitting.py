@@ -14,6 +14,7 @@ from mitex.methods.nerf.base.coarse import BaseShape, find_base
 from mitex.methods.nerf.capture.capture import Capture, load_capture
 from mitex.methods.nerf.config import PRESETS
 from mitex.methods.nerf.field.projection import Projection
+from mitex.methods.nerf.field.shell import shell_reach
 from mitex.methods.nerf.texture import NerfTexture
 from mitex.methods.nerf.training.radiance import schedule
 from mitex.methods.nerf.training.task import TextureTask
@@ -59,9 +60,8 @@ def fit(
     training, held_out = photos.split()
     base = find_base(training, config, base_mesh, run.quiet)
     frames = face_frames(base.mesh)
-    projection = Projection(
-        base.mesh, neighbours=config.neighbours, repulsion=config.repulsion, reach=base.thickness
-    )
+    reach = shell_reach(base.thickness, config.occupancy)
+    projection = Projection(base.mesh, neighbours=config.neighbours, repulsion=config.repulsion, reach=reach)
     task = TextureTask(config, training, (held_out, 0), projection, frames, base.thickness)
     origin: dict[str, Any] = {key: getattr(config, key) for key in files.SETTINGS}
     origin |= {"centre": photos.similarity.center.tolist(), "scale": float(photos.similarity.scale)}
@@ -74,7 +74,7 @@ def fit(
 
 
 def _model(base: BaseShape, frames: np.ndarray, task: TextureTask, about: dict[str, Any]) -> files.Model:
-    """What a training leaves: the running mean of its parameters."""
+    """The model of a training: base shape, running mean of the parameters, and occupied cells."""
     mean = task.mean
     return files.Model(
         base,

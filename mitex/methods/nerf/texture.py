@@ -15,6 +15,7 @@ from mitex.mesh import Mesh, Similarity
 from mitex.methods.nerf import files
 from mitex.methods.nerf.field.decoder import Decoder
 from mitex.methods.nerf.field.encoding import Encoding
+from mitex.methods.nerf.field.lighting import COEFFICIENTS
 from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.field.rendering import render_step
 from mitex.methods.nerf.field.shell import CapturedLatents, Shell
@@ -22,26 +23,26 @@ from mitex.methods.nerf.field.tensors import channels
 from mitex.methods.nerf.synthesis.guide import WEIGHT, Guide
 from mitex.methods.nerf.synthesis.maps import LatentMaps
 from mitex.methods.nerf.synthesis.patch_images import render_patches
-from mitex.methods.nerf.synthesis.patches import SIZE as PATCH
 from mitex.methods.nerf.synthesis.patches import (
+    PATTERN_RATE,
     FeatureSource,
     Patches,
     extract_patches,
     mirror_frames,
     texel_gap,
 )
+from mitex.methods.nerf.synthesis.patches import SIZE as PATCH
 from mitex.methods.nerf.synthesis.quilting import Quilt, quilt
-from mitex.methods.nerf.use.applied import AppliedTexture
+from mitex.methods.nerf.use.applied import AppliedTexture, check_ranges
 from mitex.methods.nerf.use.placement import EXTENT, UNWRAP_SIZE, in_scene_cube, uv_unit_length
 from mitex.methods.nerf.use.self_maps import self_maps
 from mitex.runtime import init
 from mitex.runtime.jit import mi
 
-SIZE = 2048  # texels of a synthesized texture
-LARGEST = 8192  # that is quilted for a guide [texels]
-GOOD_RATE = 1 / 8  # gap between texels, of the mean edge of the base shape
+SIZE = 2048  # side of a synthesized texture [texels]
+LARGEST = 8192  # side of a texture under a guide, at most [texels]
 BLOCK = PATCH // 16  # a guide is compared with patches in 16 x 16 blocks
-DEEPEST = 2.0  # percentile of the scan's distances
+DEEPEST = 2.0  # percentile of the scan's distances that counts as the ground
 
 
 class NerfTexture:
@@ -114,7 +115,7 @@ class NerfTexture:
 
     @property
     def light(self) -> mi.TensorXf:
-        """`mi.TensorXf` (16,), learned with the texture."""
+        """`mi.TensorXf` (16,), the light of the capture: estimated from its photos, or learned."""
         return mi.TensorXf(self.model.light.numpy())
 
     @property
@@ -129,7 +130,7 @@ class NerfTexture:
         seed: int = 0,
         *,
         patches: int = 2000,
-        pattern_rate: float = GOOD_RATE,
+        pattern_rate: float = PATTERN_RATE,
         flips: bool = False,
         tileable: bool = False,
         guide: np.ndarray | None = None,
@@ -163,7 +164,7 @@ class NerfTexture:
         layout = quilt(source, shape, rng, flips=flips, tileable=tileable, guide=target, evenness=evenness)
         return self.maps(squares, layout)
 
-    def covering(self, mesh: Mesh, scale: float = 1.0, pattern_rate: float = GOOD_RATE) -> int:
+    def covering(self, mesh: Mesh, scale: float = 1.0, pattern_rate: float = PATTERN_RATE) -> int:
         """Side of the texture that the unit square of a mesh's UVs shows once, as a guide asks for [texels].
 
         Args:
@@ -172,8 +173,9 @@ class NerfTexture:
 
         Raises:
             MeshError: the mesh has no area.
-            ConfigError: no such texture can be layout.
+            ConfigError: the scale is out of range, or the side is smaller than a patch or larger than 8192.
         """
+        check_ranges(scale, density=1.0, lift=1.0)
         gap = texel_gap(self.model.base.mesh, pattern_rate) * scale
         texels = round(uv_unit_length(in_scene_cube(laid_out(mesh, UNWRAP_SIZE))[0]) / gap)
         if not PATCH <= texels <= LARGEST:
@@ -184,7 +186,7 @@ class NerfTexture:
         return texels
 
     def patches(
-        self, rng: np.random.Generator, count: int = 2000, pattern_rate: float = GOOD_RATE
+        self, rng: np.random.Generator, count: int = 2000, pattern_rate: float = PATTERN_RATE
     ) -> Patches:
         """Squares of the base shape (section 3.2.1); arguments as of `synthesize`."""
         base = self.model.base
@@ -251,19 +253,20 @@ class NerfTexture:
             density: factor of the density.
             lift: 1 puts the mesh under the texture's ground, 0 where the base shape was, as published: there
                 the texture is carved into the mesh, and thin parts of this leave no room for its ground.
-            light: (16,) or (16, 3) spherical harmonics instead of the learned light.
+            light: (16,) or (16, 3) spherical harmonics, see `lighting`, in place of the capture's light.
             guide: without `maps`, a picture that lies once over the unit square of the mesh's UVs, as of
                 `synthesize`; `size` is then as the mesh and `scale` ask.
 
         Raises:
             MeshError: the mesh has no area.
-            ConfigError: a number is out of range.
+            ConfigError: a number is out of range, or the light has another shape or is not finite.
         """
+        check_ranges(scale, density, lift)
+        light_coefficients = self.light if light is None else _checked_light(light)
         mesh = laid_out(mesh, UNWRAP_SIZE)
         if maps is None:
             side = size if guide is None else self.covering(mesh, scale)
             maps = self.synthesize(side, seed, tileable=True, guide=guide)
-        light_coefficients = self.light if light is None else mi.TensorXf(np.asarray(light, np.float32))
         return AppliedTexture(
             mesh,
             maps,
@@ -280,3 +283,13 @@ class NerfTexture:
     def __repr__(self) -> str:
         about = self.model.about
         return f"NerfTexture({about['name']}, {about['steps']} steps)"
+
+
+def _checked_light(light: np.ndarray) -> mi.TensorXf:
+    coefficients = np.asarray(light, np.float32)
+    if coefficients.shape not in ((COEFFICIENTS,), (COEFFICIENTS, 3)) or not np.isfinite(coefficients).all():
+        raise ConfigError(
+            f"a light of shape {coefficients.shape}",
+            f"give finite spherical harmonics, ({COEFFICIENTS},) or ({COEFFICIENTS}, 3)",
+        )
+    return mi.TensorXf(coefficients)

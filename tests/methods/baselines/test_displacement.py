@@ -81,6 +81,12 @@ def test_refuses_holes():
         DisplacementMap.bake(hole)
 
 
+@pytest.mark.parametrize("options", [{"scale": 0.0}, {"scale": np.nan}, {"levels": -1}, {"levels": 7}])
+def test_refuses_numbers_out_of_range(options):
+    with pytest.raises(ConfigError, match="a relief of"):
+        DisplacementMap(np.zeros((8, 8)), 0.2).apply(icosphere(2), **options)
+
+
 def test_a_fit_is_kept_and_its_settings_count(tmp_path):
     baked = fit(waves(), tmp_path / "run", overrides=["resolution=32", "window=0.2"])
     again = DisplacementMap.load(tmp_path / "run")
@@ -91,7 +97,15 @@ def test_a_fit_is_kept_and_its_settings_count(tmp_path):
     assert np.array_equal(again.apply(ball).mesh.vertices, baked.apply(ball).mesh.vertices)
 
 
-def test_damaged_files_are_refused(tmp_path):
-    flat = DisplacementMap(np.zeros((4, 5)), 0.2, {"name": "flat"}).save(tmp_path / "flat.safetensors")
-    with pytest.raises(CheckpointError, match="heights of shape"):
-        DisplacementMap.load(flat)
+@pytest.mark.parametrize(
+    ("heights", "side", "message"),
+    [
+        (np.zeros((4, 5)), 0.2, "heights of shape"),
+        (np.full((4, 4), np.nan), 0.2, "not finite"),
+        (np.zeros((4, 4)), 0.0, "without a side"),
+    ],
+)
+def test_damaged_files_are_refused(heights, side, message, tmp_path):
+    damaged = DisplacementMap(heights, side, {"name": "flat"}).save(tmp_path / "flat.safetensors")
+    with pytest.raises(CheckpointError, match=message):
+        DisplacementMap.load(damaged)

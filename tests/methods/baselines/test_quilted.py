@@ -188,8 +188,8 @@ def test_a_mesh_without_an_area_is_refused():
     ("image", "gap", "why"),
     [
         (np.zeros((4, 5, 3), np.float32), 0.1, "an image of shape"),
-        (np.full((4, 4, 3), np.nan, np.float32), 0.1, "mean nothing"),
-        (np.zeros((4, 4, 3), np.float32), 0.0, "mean nothing"),
+        (np.full((4, 4, 3), np.nan, np.float32), 0.1, "not finite, or texels"),
+        (np.zeros((4, 4, 3), np.float32), 0.0, "not finite, or texels"),
     ],
 )
 def test_damaged_files_are_refused(tmp_path, image, gap, why):

@@ -35,8 +35,8 @@ class DisplacementMap:
     """Heights of a square piece of a surface.
 
     Attributes:
-        heights: (N, N) float64, mean 0 [parts of the root of the reference's area].
-        side: of the square [parts of the root of the reference's area].
+        heights: (N, N) float64, mean 0; rows go along v, columns along u [roots of the reference's area].
+        side: of the square [roots of the reference's area].
         about: how it was made.
     """
 
@@ -54,7 +54,7 @@ class DisplacementMap:
             window: side of the square that is taken off [of the reference's extent].
 
         Raises:
-            ConfigError: nothing of it lies in a part of the window.
+            ConfigError: the reference does not fill the window.
         """
         low, high = reference.vertices.min(0), reference.vertices.max(0)
         extent, centre = float((high - low).max()), 0.5 * (low + high)
@@ -84,6 +84,8 @@ class DisplacementMap:
             heights, side = tensors["heights"].numpy(), float(tensors["side"])
             if heights.ndim != 2 or heights.shape[0] != heights.shape[1]:
                 raise ValueError(f"heights of shape {heights.shape}")
+            if not np.isfinite(heights).all() or not 0 < side < np.inf:
+                raise ValueError("values that are not finite, or a square without a side")
             return cls(heights, side, about)
 
     def save(self, path: str | Path) -> Path:
@@ -108,7 +110,16 @@ class DisplacementMap:
 
         Returns:
             The displaced mesh in light grey; where charts meet, heights are averaged and the pattern breaks.
+
+        Raises:
+            MeshError: the mesh has no area.
+            ConfigError: a number is out of range.
         """
+        if not 0.05 <= scale <= 20 or not 0 <= levels <= 6:
+            raise ConfigError(
+                f"a relief of {scale} times the size, on faces split {levels} times",
+                "use sizes from 0.05 to 20, and 0 to 6 splits",
+            )
         fine = subdivide_midpoint(laid_out(mesh, ATLAS), levels)
         assert fine.uv is not None
         area = float(fine.face_areas.sum(dtype=np.float64))
@@ -123,7 +134,7 @@ class DisplacementMap:
 
 
 def _depth(mesh: Mesh, start: np.ndarray) -> np.ndarray:
-    """(N,) how far along -z the mesh is first met; infinite where it is not."""
+    """(N,) float64 how far along -z from points (N, 3) the mesh is first met; infinite where it is not."""
     init()
     scene = mi.load_dict({"type": "scene", "mesh": mesh_shape(mesh)})
     rays = mi.Ray3f(mi.Point3f(np.ascontiguousarray(start.T, np.float32)), mi.Vector3f(0, 0, -1))

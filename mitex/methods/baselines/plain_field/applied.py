@@ -12,15 +12,12 @@ import numpy as np
 
 from mitex.asset import Asset
 from mitex.export import SUFFIXES
-from mitex.images import write_image
 from mitex.mesh import Similarity
 from mitex.methods.nerf.field.tensors import channels, rows
 from mitex.methods.nerf.training.plain import PlainField
 from mitex.methods.nerf.use.extract import CHUNK, solid_surface
 from mitex.paths import prepare_output
 from mitex.runtime.jit import mi
-
-PICTURES = (".png", ".jpg", ".jpeg")
 
 
 class AppliedField:
@@ -65,13 +62,11 @@ class AppliedField:
 
         Raises:
             OutputError: unknown suffix or unwritable place.
+            ConfigError: an option out of range.
         """
-        from mitex.render import tone
-        from mitex.render.shell import shell_still
+        from mitex.render.shell import render_shell
 
-        target = prepare_output(path, PICTURES)
-        picture = shell_still(self, self.similarity, self.outline, **options)
-        return write_image(target, tone(picture, exposure))
+        return render_shell(self, self.similarity, self.outline, path, exposure=exposure, **options)
 
     @cached_property
     def surface(self) -> Asset:

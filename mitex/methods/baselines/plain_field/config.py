@@ -14,15 +14,15 @@ class PlainFieldConfig(nerf.RadianceConfig):
 
     seconds: float = key(
         0.0,
-        "train for so long instead of `steps`, which a short training before finds out; the learning rate "
-        "falls over all of it [s]; 0: for `steps`",
+        "training time in place of `steps`: a short training beforehand tells how many steps it is enough "
+        "for, and the learning rate falls over these [s]; 0: `steps` count",
         0,
     )
 
 
-SHARED = [one.name for one in fields(nerf.RadianceConfig)]
+SHARED = [field.name for field in fields(nerf.RadianceConfig)]
 # Those of the texture that it is compared with: alike in rays, steps along them, and size of the tables.
 PRESETS = {
-    name: PlainFieldConfig(**{shared: getattr(preset, shared) for shared in SHARED})
+    name: PlainFieldConfig(**{key: getattr(preset, key) for key in SHARED})
     for name, preset in nerf.PRESETS.items()
 }

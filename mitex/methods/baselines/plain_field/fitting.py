@@ -20,7 +20,8 @@ from mitex.training import Interrupted, run
 from mitex.training.fit import Run
 from mitex.training.settings import RunOptions
 
-PROBED, LAST = 1000, 200  # steps of the training that tells the pace, and of those the ones that tell it
+PROBED = 1000  # steps of the training that tells the pace
+LAST = 200  # of these, the last ones whose pace counts
 
 
 def fit(capture: Capture | str | Path, out: str | Path, **options: Unpack[RunOptions]) -> PlainFieldTexture:
@@ -63,9 +64,9 @@ def fit(capture: Capture | str | Path, out: str | Path, **options: Unpack[RunOpt
 
 
 def for_its_time(config: PlainFieldConfig, capture: Capture, quiet: bool) -> PlainFieldConfig:
-    """The settings with as many steps as `seconds` are enough for, by a short training before.
+    """The settings with as many steps as `seconds` are enough for, by the pace of a short training.
 
-    The first steps are slow, since nothing hides anything yet.
+    Its first steps do not count for the pace: they are slow, since nothing hides anything yet.
     """
     short = replace(config, steps=PROBED, preview_every=0, checkpoint_every=PROBED)
     with tempfile.TemporaryDirectory() as folder:
@@ -83,9 +84,9 @@ def steps_within(seconds: float, clock: Sequence[float]) -> int:
     """How many steps a time is enough for, at least one.
 
     Args:
-        seconds: that there are.
-        clock: seconds that had passed after each of the first steps, increasing; the last 200 tell the pace
-            of those that follow.
+        seconds: the time.
+        clock: seconds that had passed after each of the first steps, two or more, increasing; the last 200
+            tell the pace of those that follow.
     """
     if seconds <= clock[-1]:
         return max(1, bisect_right(clock, seconds))

@@ -16,6 +16,7 @@ from mitex.mesh import Mesh, Similarity
 from mitex.methods.baselines.plain_field import METHOD
 from mitex.methods.baselines.plain_field.applied import AppliedField
 from mitex.methods.baselines.plain_field.config import PlainFieldConfig
+from mitex.methods.nerf.field.occupancy import packed_cells, unpacked_cells
 from mitex.methods.nerf.field.rendering import render_step
 from mitex.methods.nerf.training.plain import PlainField, hash_grid, parameter_shapes
 from mitex.runtime import init
@@ -48,8 +49,7 @@ class PlainFieldTexture:
         """
         init()
         with model_file.opened(source, METHOD.name) as (tensors, about):
-            packed, side = tensors.pop("occupied").numpy(), int(about["occupancy"])
-            occupied = np.unpackbits(packed, count=side**3).reshape((side,) * 3)
+            occupied = unpacked_cells(tensors.pop("occupied"), int(about["occupancy"]))
             texture = cls(tensors, occupied, about)
             shapes = parameter_shapes(hash_grid(texture.config))
             if {name: tuple(value.shape) for name, value in tensors.items()} != shapes:
@@ -64,7 +64,7 @@ class PlainFieldTexture:
         Raises:
             OutputError: the place is not writable.
         """
-        tensors = {**self.parameters, "occupied": torch.from_numpy(np.packbits(self.occupied))}
+        tensors = {**self.parameters, "occupied": packed_cells(self.occupied)}
         return model_file.save(path, tensors, METHOD.name, self.about)
 
     @property

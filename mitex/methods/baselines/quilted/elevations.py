@@ -79,6 +79,7 @@ def compare_elevations(
     relit = in_even_light(squares, pictures, base, light)
 
     def shine(normal: np.ndarray) -> float:
+        """How bright the light makes a plane with this normal (3,)."""
         return float(brightness(light, normal[None])[0])
 
     def renderers(number: int) -> tuple[PlaneRenderer, dict[str, FlatTexture]]:

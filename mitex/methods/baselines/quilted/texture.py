@@ -50,7 +50,7 @@ class QuiltedTexture:
             if image.ndim != 3 or image.shape[0] != image.shape[1] or image.shape[2] != 3:
                 raise ValueError(f"an image of shape {image.shape}")
             if not np.isfinite(image).all() or not 0 < gap < np.inf:
-                raise ValueError("values that mean nothing")
+                raise ValueError("values that are not finite, or texels without a size")
             return cls(image, gap, about)
 
     def save(self, path: str | Path) -> Path:
@@ -93,7 +93,7 @@ class QuiltedTexture:
         return asset_from_textures(mesh, mesh.uv, {"albedo": albedo}, mesh.name)
 
     def _repeated(self, length: float, resolution: int) -> np.ndarray:
-        """(N, N, 3) sRGB, the unit square of UVs.
+        """(N, N, 3) sRGB in [0, 1]: what the unit square of the UVs shows, row 0 on top.
 
         Args:
             length: texels of the picture along its side.

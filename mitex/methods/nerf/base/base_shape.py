@@ -26,7 +26,7 @@ SMALL = 0.2  # of the largest component's faces: smaller components are dropped
 FACES = 5_000  # of the mesh that is cut into convex pieces
 CELLS = 2.0  # edges of the base shape that make a cell of the grid on which the pieces are united
 FINE = 2.0  # edges may be so many times longer than asked for, or a given base mesh is remeshed
-PERCENTILE = 70.0
+PERCENTILE = 70.0  # of the scan's distances, see `shell_thickness`
 CUBE = 1.001  # the scene cube with a little room for rounding
 
 
@@ -82,8 +82,10 @@ def given_base(mesh: Mesh, edge: float = EDGE) -> Mesh:
         edge: length of the edges [diagonals of the bounding box].
 
     Raises:
-        MeshError: it is not in the scene cube.
+        MeshError: it has no faces, or is not in the scene cube.
     """
+    if not len(mesh.faces):
+        raise MeshError(f"{mesh.name} has no faces", "give a surface as the base mesh")
     if np.abs(mesh.vertices).max(initial=0.0) > CUBE:
         problem = f"{mesh.name} reaches out of the scene cube [-1, 1]^3"
         raise MeshError(problem, "scale and move it to where the cameras see the object")
@@ -143,7 +145,7 @@ def _large_components(mesh: Mesh) -> Mesh:
 
 
 def _laplacian(mesh: Mesh, rounds: int) -> Mesh:
-    """Every vertex moves to the mean of its neighbours, some times."""
+    """Laplacian smoothing: in each of some rounds, every vertex moves to the mean of its neighbours."""
     edges = mesh.edges
     size = (len(mesh.vertices),) * 2
     matrix = csr_array((1.0 / edges.valence[edges.rows], edges.indices, edges.indptr), size)
@@ -163,7 +165,7 @@ def _into_box(mesh: Mesh, other: Mesh) -> Mesh:
 
 
 def _even(mesh: Mesh, length: float) -> Mesh:
-    """Remeshed so that edges have a length."""
+    """The mesh with equilateral faces, nearly, whose edges are about as long as `length`."""
     area = float(mesh.face_areas.sum(dtype=np.float64))
     return remesh(mesh, max(12, round(2.0 * area / (math.sqrt(3.0) * length**2))))
 

@@ -6,9 +6,8 @@ import shutil
 import sys
 import time
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from mitex.errors import CheckpointError
 from mitex.mesh import Mesh
 from mitex.methods.nerf.base.base_shape import base_shape, given_base, shell_thickness
 from mitex.methods.nerf.capture.capture import Capture
-from mitex.methods.nerf.capture.pixels import Pixels
 from mitex.methods.nerf.config import NerfConfig, RadianceConfig
 from mitex.methods.nerf.field.occupancy import sample_grid
 from mitex.methods.nerf.field.projection import Projection
@@ -28,7 +26,9 @@ from mitex.runtime.jit import dr, mi
 from mitex.textures.march import composite
 
 VERSION = 1  # of the base shapes in the cache
-COARSE: dict[str, Any] = dict(  # what the coarse field needs less of
+# Settings of the coarse field: it needs less of all this than the texture.
+COARSE = RadianceConfig(
+    preset="coarse",
     table=15,
     ray_steps=256,
     rays=1024,
@@ -62,12 +62,14 @@ class BaseShape:
 def find_base(
     capture: Capture, config: NerfConfig, base_mesh: Mesh | None = None, quiet: bool = True
 ) -> BaseShape:
-    """Trains a coarse field on a capture and takes the base shape from it; kept in the user's cache folder.
+    """Trains a coarse field on a capture, and takes base shape, scan and thickness of the shell from it.
+
+    The result is kept in the user's cache folder.
 
     Args:
         capture: the views to learn from.
         config: settings.
-        base_mesh: a base shape of the user's in the capture's world, or None.
+        base_mesh: a base shape of the user's in the scene cube; None takes it from the coarse field.
         quiet: show no progress.
 
     Raises:
@@ -83,9 +85,11 @@ def find_base(
     place = folder / content_key(VERSION, *arrays, *mesh, coarse, *settings)
 
     def compute() -> BaseShape:
+        base = None if base_mesh is None else given_base(base_mesh)  # which may be refused
         task = _trained(coarse, capture, training, quiet)
-        _say("cutting the base shape out of the coarse field, about a minute", quiet)
-        base = _shape_of(task, config) if base_mesh is None else given_base(base_mesh)
+        if base is None:
+            _say("cutting the base shape out of the coarse field, about a minute", quiet)
+            base = _shape_of(task, config)
         scan = scan_surface(task)
         projection = Projection(base, neighbours=config.neighbours, repulsion=config.repulsion)
         return BaseShape(base, scan, shell_thickness(scan, projection))
@@ -98,11 +102,10 @@ def find_base(
 
 
 def coarse_config(config: NerfConfig) -> RadianceConfig:
-    """Settings of the coarse field; of a fit's own there are only those in it that change this field."""
+    """Settings of the coarse field. Of a fit's settings they depend on seed, `lr` and `base_steps` alone, so
+    that a fit with others finds its base shape in the cache."""
     steps = config.base_steps
-    return RadianceConfig(
-        preset="coarse", seed=config.seed, lr=config.lr, steps=steps, lr_steps=steps, **COARSE
-    )
+    return replace(COARSE, seed=config.seed, lr=config.lr, steps=steps, lr_steps=steps)
 
 
 def _trained(coarse: RadianceConfig, capture: Capture, folder: Path, quiet: bool) -> PlainTask:
@@ -123,6 +126,7 @@ def _remove_abandoned(folder: Path) -> None:
 
 
 def _shape_of(task: PlainTask, config: NerfConfig) -> Mesh:
+    """The base shape of a trained coarse field."""
     occupied = task.occupancy.occupied.astype(bool)
     density = sample_grid(task.field(task.mean).density_at, occupied, GRID)
     return base_shape(density, concavity=config.concavity)
@@ -135,10 +139,10 @@ def _say(line: str, quiet: bool) -> None:
 
 def scan_surface(task: PlainTask) -> np.ndarray:
     """(M, 3) float32 points where rays of views from all around become solid."""
-    capture, field = task.pixels.capture, task.field(task.mean)
+    field = task.field(task.mean)
     points = []
-    for view in _farthest(capture.poses[:, :, 3], VIEWS):
-        batch, _ = Pixels(capture).image(int(view), SCAN_SIDE)
+    for view in _farthest(task.pixels.capture.poses[:, :, 3], VIEWS):
+        batch, _ = task.pixels.image(int(view), SCAN_SIDE)
         origin, direction = batch_rays(batch)
         pixels = composite(field, origin, direction, dr.full(mi.Float, 0.5, dr.width(origin)))
         opacity = 1 - np.array(pixels.transmittance)
@@ -151,7 +155,7 @@ def scan_surface(task: PlainTask) -> np.ndarray:
 
 
 def _farthest(points: np.ndarray, count: int) -> np.ndarray:
-    """Indices of `count` points, each as far as can be from those before it."""
+    """Indices of `count` points, the first and then always the one farthest from those before it."""
     index = [0]
     distance = np.linalg.norm(points - points[0], axis=1)
     for _ in range(min(count, len(points)) - 1):

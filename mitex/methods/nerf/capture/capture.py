@@ -22,6 +22,7 @@ from mitex.methods.nerf.capture.visual_hull import Hull, View, project, visual_h
 MIN_VIEWS = 8
 HALF_EXTENT = 0.75  # of the visual hull in the scene cube
 MAX_PIXELS = 400_000_000  # of all images: 1.6 GB
+OPAQUE = 128  # alpha of the object in a mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +126,7 @@ def assemble(frames: Sequence[Frame], name: str) -> Capture:
             f"{name} has {len(frames)} different views", f"take {MIN_VIEWS} or more, better 60 to 100"
         )
     lenses = [f.intrinsics(i.shape[1], i.shape[0]) for f, i in zip(frames, images, strict=True)]
-    views = [View(_mask(i), f.pose, *lens) for f, i, lens in zip(frames, images, lenses, strict=True)]
+    views = [View(object_mask(i), f.pose, *lens) for f, i, lens in zip(frames, images, lenses, strict=True)]
     for frame, view in zip(frames, views, strict=True):
         _check_lens(frame, view)
     _check_masks(frames, views)
@@ -183,8 +184,9 @@ def _rgba(frame: Frame) -> np.ndarray:
     return np.concatenate([image[..., :3], mask], axis=2)
 
 
-def _mask(image: np.ndarray) -> np.ndarray:
-    return image[..., 3] >= 128
+def object_mask(image: np.ndarray) -> np.ndarray:
+    """(H, W) bool, where an RGBA image (H, W, 4) uint8 shows the object."""
+    return image[..., 3] >= OPAQUE
 
 
 def _check_lens(frame: Frame, view: View) -> None:

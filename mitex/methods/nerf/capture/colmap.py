@@ -8,7 +8,8 @@ import tempfile
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from PIL import Image
@@ -18,6 +19,9 @@ from mitex.errors import CaptureError, CaptureWarning
 from mitex.images import SUFFIXES, read_bytes
 from mitex.methods.nerf.capture.transforms import ONE_FILE, Frame, find_mask, no_mask, parse_frames
 from mitex.paths import cache_dir
+
+if TYPE_CHECKING:
+    import pycolmap
 
 MIN_PHOTOS = 8
 PLACED = 0.5  # part of the photos that must get a pose
@@ -91,7 +95,7 @@ def _copy(folder: Path, name: str, target: Path) -> tuple[int, int]:
     return size
 
 
-def _largest(work: Path, one_camera: bool) -> Any:
+def _largest(work: Path, one_camera: bool) -> pycolmap.Reconstruction | None:
     """COLMAP's model with the most photos, or None; always the same for the same photos."""
     colmap = _pycolmap()
     level, colmap.logging.minloglevel = colmap.logging.minloglevel, colmap.logging.FATAL
@@ -115,9 +119,10 @@ def _largest(work: Path, one_camera: bool) -> Any:
     return max(reconstructions.values(), key=lambda model: model.num_reg_images(), default=None)
 
 
-def _frame(name: str, image: Any, size: tuple[int, int]) -> dict[str, Any]:
+def _frame(name: str, image: pycolmap.Image, size: tuple[int, int]) -> dict[str, Any]:
     """An entry of `transforms.json`; COLMAP's cameras look along +z, y down, and map world to camera."""
     camera, width, height = image.camera, *size
+    assert camera is not None  # all images of a reconstruction have one
     x, y = width / camera.width, height / camera.height
     matrix = image.cam_from_world().matrix()
     rotation = matrix[:, :3].T
@@ -146,7 +151,7 @@ def _write(place: Path, tree: Mapping[str, Any]) -> None:
     (place / ONE_FILE).write_text(json.dumps(tree, indent=1) + "\n")
 
 
-def _pycolmap() -> Any:
+def _pycolmap() -> ModuleType:
     try:
         import pycolmap
     except ImportError as error:

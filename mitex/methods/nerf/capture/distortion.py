@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-ITERATIONS = 100
-CONVERGED = 1e-10
+ITERATIONS = 100  # at most
+CONVERGED = 1e-10  # change of an iteration that is the last
 
 
 def distort(points: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
@@ -40,7 +40,7 @@ def undistort(points: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
 
 
 def folds(points: np.ndarray, coefficients: np.ndarray) -> bool:
-    """Whether some of the distorted points (..., 2) have no ideal point that is found."""
+    """Whether `undistort` fails for some of the distorted points (..., 2): the lens folds the image there."""
     with np.errstate(all="ignore"):
         again = distort(undistort(points, coefficients), coefficients)
         return not np.abs(again - points).max(initial=0.0) <= 1e-6  # NaN counts as folded

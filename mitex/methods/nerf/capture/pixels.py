@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -33,9 +34,13 @@ class Pixels:
 
     def __init__(self, capture: Capture) -> None:
         self.capture = capture
-        self._values = np.concatenate([image.reshape(-1, 4) for image in capture.images])
         self._widths = np.array([image.shape[1] for image in capture.images])
         self._ends = np.cumsum([image.shape[0] * image.shape[1] for image in capture.images])
+
+    @cached_property
+    def _values(self) -> np.ndarray:
+        """(P, 4) uint8 of all images: a copy of the whole capture, which single images do without."""
+        return np.concatenate([image.reshape(-1, 4) for image in self.capture.images])
 
     def draw(self, count: int, one_view: bool, generator: torch.Generator) -> Batch:
         """`count` pixels, of one image or of all, each as likely as the others."""

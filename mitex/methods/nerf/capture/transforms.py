@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard, TypeVar
 
 import numpy as np
 
@@ -18,6 +18,8 @@ ONE_FILE = "transforms.json"
 SPLIT_FILES = ("transforms_train.json", "transforms_val.json", "transforms_test.json")
 FOCAL = (0.02, 1e4)  # focal lengths that a lens may have [image sizes]
 FARTHEST = 1e9  # coordinate of a camera that float64 can work with
+D = TypeVar("D", float, None)
+
 ASPECT = 0.01  # singular values of a rotation may differ by this ratio
 
 
@@ -56,12 +58,17 @@ class Frame:
             raise CaptureError(f"{self.name} has no focal length", "add fl_x or camera_angle_x to its file")
         fx, fy = fx or fy, fy or fx
         centre = self._number("cx", width / 2), self._number("cy", height / 2)
-        if self.lens.get("is_fisheye") or any(self._number(k, 0.0) for k in ("k3", "k4")):
+        if self._is_fisheye or any(self._number(k, 0.0) for k in ("k3", "k4")):
             raise CaptureError(
                 f"{self.name} has a lens other than k1, k2, p1, p2", "undistort the images beforehand"
             )
         distortion = [self._number(k, 0.0) for k in ("k1", "k2", "p1", "p2")]
         return np.array([fx, fy, *centre], np.float64), np.array(distortion, np.float64)
+
+    @property
+    def _is_fisheye(self) -> bool:
+        """Whether the file says so: by the flag of instant-ngp, or the camera model of Nerfstudio."""
+        return bool(self.lens.get("is_fisheye")) or "FISHEYE" in str(self.lens.get("camera_model")).upper()
 
     def _focal(self, axis: str, size: int) -> float | None:
         if (focal := self._number(f"fl_{axis}", None)) is None:
@@ -76,9 +83,11 @@ class Frame:
             )
         return focal
 
-    def _number(self, key: str, default: Any) -> Any:
+    def _number(self, key: str, default: D) -> float | D:
         value = self.lens.get(key, default)
-        if value is not default and not _is_number(value):
+        if value is default:
+            return default
+        if not _is_number(value):
             raise CaptureError(f"{self.name} has {key} {str(value)[:40]!r}", "give a finite number")
         return value
 
@@ -189,5 +198,5 @@ def _pose(matrix: Any, name: str) -> np.ndarray:
     return np.concatenate([rotation, pose[:3, 3:]], axis=1)
 
 
-def _is_number(value: object) -> bool:
+def _is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e12

@@ -11,8 +11,8 @@ from scipy import ndimage
 
 from mitex.methods.nerf.capture.distortion import distort, undistort
 
-RESOLUTION = 64
-ROUNDS = 2
+RESOLUTION = 64  # voxels along a side
+ROUNDS = 2  # grids, each around what the one before left
 DISSENT = 0.05  # part of the views that may call a voxel background: their masks may be wrong
 COVERAGE = 0.5  # part of the views that must tell of a voxel
 MASK_SIZE = 256  # longer side of the masks that carve [pixels]
@@ -155,7 +155,15 @@ def _carve(
 def _judged(
     view: View, away: np.ndarray, block: int, points: np.ndarray, radius: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which points the view tells of, and around which of those a ball shows background only, (N,) each."""
+    """Which points the view tells of, and around which of those a ball shows background only, (N,) bool each.
+
+    Args:
+        view: the camera.
+        away: least distances of blocks of pixels from the mask [pixels].
+        block: side of a block [pixels].
+        points: (N, 3) middles of the balls.
+        radius: of the balls, in the points' units.
+    """
     height, width = view.mask.shape
     pixels, depth = project(points, view.pose, view.intrinsics, view.distortion)
     framed = (depth > 0.0) & (pixels >= 0.0).all(axis=1) & (pixels < (width, height)).all(axis=1)

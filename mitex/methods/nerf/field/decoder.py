@@ -40,6 +40,7 @@ class Reflection:
 
     @property
     def density(self) -> mi.Float:
+        """[1 / scene units], bounded."""
         return dr.exp(dr.minimum(self.exponent, HIGHEST))
 
     @property
@@ -52,7 +53,7 @@ class Reflection:
         return self.specular + (self.grazing - self.specular) * (1 - cosine) ** 5
 
     def normal(self, tangent: mi.Vector3f, bitangent: mi.Vector3f, normal: mi.Vector3f) -> mi.Vector3f:
-        """R(theta, phi) of equation 4 in a frame of `mi.Vector3f`s."""
+        """The fine normal: R(theta, phi) of equation 4 in a frame of orthonormal vectors; unit."""
         sin_theta, cos_theta = dr.sincos(self.theta)
         sin_phi, cos_phi = dr.sincos(self.phi)
         return tangent * (sin_theta * cos_phi) + bitangent * (sin_theta * sin_phi) + normal * cos_theta
@@ -64,7 +65,7 @@ class Decoder:
     Args:
         weights: matrices (out, in) as of `weight_shapes`, each a `mi.TensorXf`.
         packed: evaluate as cooperative vectors where nothing has derivatives, which is faster.
-        low_precision: gradients in bfloat16 where points stay; what is evaluated is the same.
+        low_precision: multiply gradients in bfloat16 where points do not move; outputs are the same.
     """
 
     def __init__(
@@ -87,7 +88,7 @@ class Decoder:
             self._packed = dict(zip(LAYERS, packed_networks(*self.weights.values()), strict=True))
 
     def exponent(self, f: Sequence[mi.Float], distance: mi.Float) -> mi.Float:
-        """Only the logarithm of the density."""
+        """The natural logarithm of the density [1 / scene units] alone; arguments as of a call."""
         fine = frequency_encoding(distance)
         packed = self._packed_for(f, fine)
         return network_rows((packed or self.weights)["density"], [*f, *fine])[0]
@@ -137,6 +138,7 @@ def frequency_encoding(distance: mi.Float) -> list[mi.Float]:
 
 
 def sigmoid(x: mi.Float) -> mi.Float:
+    """1 / (1 + exp(-x)), which never overflows."""
     return 0.5 * dr.tanh(0.5 * x) + 0.5
 
 

@@ -19,10 +19,10 @@ from mitex.methods.nerf.field.tensors import channels
 from mitex.runtime.jit import dr, mi
 
 A = TypeVar("A", bound=dr.ArrayBase)
-COEFFICIENTS = 16
-BANDS = 3  # of l that are rendered
-COSINE = (1.0, 2 / 3, 1 / 4, 0.0)  # of max(cos, 0) / pi, by l
-POWER = 1 / 2.4
+COEFFICIENTS = 16  # of a light: l = 0 to 3
+BANDS = 3  # values of l that are rendered: 0 to 2
+COSINE = (1.0, 2 / 3, 1 / 4, 0.0)  # coefficients of max(cos, 0) / pi, by l
+POWER = 1 / 2.4  # of the display curve
 TOE = 1e-4  # radiance below which the display curve is a line, of slope 215
 
 
@@ -78,7 +78,7 @@ def project_environment(image: np.ndarray) -> np.ndarray:
             is +y, the columns run from -z over +x, +z and -x back to -z.
 
     Returns:
-        (16, C) float32.
+        (16, C) float32 spherical harmonics, linear.
 
     Raises:
         ImageError: another shape, or values that are not finite.
@@ -88,14 +88,14 @@ def project_environment(image: np.ndarray) -> np.ndarray:
     if not np.isfinite(image).all():
         raise ImageError("the environment holds NaN or infinite values", "check the step that made it")
     height, width, channels = image.shape
-    turn = (np.arange(width) + 0.5) * (2 * math.pi / width)
+    azimuth = (np.arange(width) + 0.5) * (2 * math.pi / width)
     polar = (np.arange(height)[:, None] + 0.5) * (math.pi / height)
-    level = np.broadcast_to(np.cos(polar), (height, width))
-    towards = (np.sin(polar) * np.sin(turn), level, -np.sin(polar) * np.cos(turn))
+    up = np.broadcast_to(np.cos(polar), (height, width))
+    direction = (np.sin(polar) * np.sin(azimuth), up, -np.sin(polar) * np.cos(azimuth))
     # Exact areas of the pixels on the sphere: together 4 pi at any resolution.
     area = -np.diff(np.cos(np.arange(height + 1) * (math.pi / height))) * (2 * math.pi / width)
     weighted = image * area[:, None, None]
-    basis = dr.sh_eval(mi.Vector3f(*(_flat(axis) for axis in towards)), 3)
+    basis = dr.sh_eval(mi.Vector3f(*(_flat(axis) for axis in direction)), 3)
     light = [[dr.sum(y * _flat(weighted[..., c]))[0] for c in range(channels)] for y in basis]
     return np.array(light, np.float32)
 
@@ -110,9 +110,10 @@ def rotated(light: np.ndarray, turn: np.ndarray) -> np.ndarray:
     Returns:
         As `light`, float32: what it was in direction d, it is in direction turn d.
     """
-    ways = unit(np.random.default_rng(0).normal(size=(8 * COEFFICIENTS, 3)))
-    now, before = (_harmonics(v) for v in (ways, ways @ turn))
-    return np.linalg.lstsq(now, before @ light, rcond=None)[0].astype(np.float32)
+    directions = unit(np.random.default_rng(0).normal(size=(8 * COEFFICIENTS, 3)))
+    turned_back = directions @ turn
+    values = _harmonics(turned_back) @ light
+    return np.linalg.lstsq(_harmonics(directions), values, rcond=None)[0].astype(np.float32)
 
 
 def _harmonics(directions: np.ndarray) -> np.ndarray:
@@ -144,4 +145,5 @@ def _expand(
 
 
 def _flat(values: np.ndarray) -> mi.Float:
+    """All values in a row."""
     return mi.Float(np.ascontiguousarray(values, np.float32).ravel())

@@ -34,7 +34,12 @@ def on_threads(
 ) -> list[T]:
     """Results of `work` on each of torch's threads, which share the parts of `count` points.
 
-    Each thread could take as many of them; one that the machine holds up takes fewer.
+    A thread takes the next part when it is done with one: those that the machine holds up take fewer.
+
+    Args:
+        count: points.
+        work: goes through an iterator of parts, which it shares with the other threads.
+        kind: what is multiplied in; long parts in bfloat16, see `LONG`.
     """
     threads = torch.get_num_threads()  # torch first counts them here: in the pool it would find one
     most, grain = (CHUNK, 1) if kind == torch.float32 else (LONG, GRAIN)
@@ -47,29 +52,30 @@ def on_threads(
 
 
 def kind_of(part: slice, kind: torch.dtype) -> torch.dtype:
-    """What a part is multiplied in: `kind`, but for the rest that is no multiple of `GRAIN`."""
+    """What a part is multiplied in: `kind`, or float32 where its length is no multiple of `GRAIN`."""
     return torch.float32 if (part.stop - part.start) % GRAIN else kind
 
 
-def room(weights: Weights, count: int, kind: torch.dtype = torch.float32) -> list[torch.Tensor]:
-    """Memory for what `forwards` computes between the layers, of `count` points."""
+def empty_activations(weights: Weights, count: int, kind: torch.dtype = torch.float32) -> list[torch.Tensor]:
+    """Memory for what `forwards` computes between the layers, for `count` points: (out, count) each."""
     return [torch.empty(count, len(weight), dtype=kind).T for weight in weights[:-1]]
 
 
 def forwards(
-    weights: Weights, values: torch.Tensor, between: Weights, part: slice, out: torch.Tensor
+    weights: Weights, values: torch.Tensor, activations: Weights, part: slice, out: torch.Tensor
 ) -> None:
     """Runs a network on a part of the points.
 
     Args:
         weights: (out, in) of each layer.
         values: inputs of the part.
-        between: a `room` for all points; in bfloat16 it keeps, for gradients, what is exact here.
+        activations: of all points, see `empty_activations`; those of the part are written. Where they are
+            bfloat16, they are rounded for the gradients, and the outputs stay exact.
         part: which of them.
         out: where the outputs of the part go.
     """
-    for weight, layer_room in zip(weights[:-1], between, strict=True):
-        outputs = layer_room[:, part]
+    for weight, layer in zip(weights[:-1], activations, strict=True):
+        outputs = layer[:, part]
         if outputs.dtype == values.dtype:
             values = torch.mm(values.T, weight.T, out=outputs.T).T.relu_()
         else:
@@ -81,20 +87,20 @@ def forwards(
 def backwards(
     weights: Weights,
     values: torch.Tensor,
-    between: Weights,
+    activations: Weights,
     part: slice,
     gradient: torch.Tensor,
     sums: Weights,
 ) -> torch.Tensor:
-    """The gradient of what the first layer makes, from that of the outputs.
+    """The gradient of the first layer's outputs, before the ReLU, from that of the network's outputs.
 
     Args:
-        weights, values, between, part: as of `forwards`; the first two of the gradient's type.
+        weights, values, activations, part: as of `forwards`; the first two of the gradient's type.
         gradient: of the outputs of the part.
         sums: gradients of the weights are added to it, float32; none if empty.
     """
     for k in reversed(range(len(weights))):
-        inputs = between[k - 1][:, part].to(gradient.dtype) if k else values
+        inputs = activations[k - 1][:, part].to(gradient.dtype) if k else values
         if sums:
             sums[k].add_(gradient @ inputs.T)
         if k:
@@ -104,12 +110,12 @@ def backwards(
 
 
 def weight_bound(shape: tuple[int, int]) -> float:
-    """Of the uniform distribution that weights start from (Glorot and Bengio 2010)."""
+    """Largest initial weight of a matrix (out, in), drawn uniformly (Glorot and Bengio 2010)."""
     return math.sqrt(6 / sum(shape))
 
 
 def packed_networks(*nets: Sequence[mi.TensorXf]) -> list[dr.nn.Module]:
-    """Networks for cooperative vectors, of the matrices (out, in) of each."""
+    """Networks that are evaluated as cooperative vectors, given the matrices (out, in) of each."""
     modules = []
     for weights in nets:
         layers: list[dr.nn.Module] = []
@@ -139,16 +145,18 @@ def evaluate(weights: Sequence[mi.TensorXf], values: mi.TensorXf) -> mi.TensorXf
 
 
 class _Network(dr.CustomOp):
+    """`evaluate`, run by torch."""
+
     def eval(self, values: mi.TensorXf, weights: list[mi.TensorXf], learning: bool) -> mi.TensorXf:
         self.weights, self.learning = [as_torch(weight) for weight in weights], learning
         self.values = as_torch(values)
         count = self.values.shape[1]
-        self.between = room(self.weights, count)
+        self.activations = empty_activations(self.weights, count)
         outputs = torch.empty(len(self.weights[-1]), count)
 
         def work(parts: Iterator[slice]) -> None:
             for part in parts:
-                forwards(self.weights, self.values[:, part], self.between, part, outputs[:, part])
+                forwards(self.weights, self.values[:, part], self.activations, part, outputs[:, part])
 
         on_threads(count, work)
         return mi.TensorXf(outputs)
@@ -161,7 +169,7 @@ class _Network(dr.CustomOp):
             sums = [torch.zeros_like(weight) for weight in self.weights if self.learning]
             for part in parts:
                 values = self.values[:, part]
-                flow = backwards(self.weights, values, self.between, part, of_outputs[:, part], sums)
+                flow = backwards(self.weights, values, self.activations, part, of_outputs[:, part], sums)
                 torch.mm(self.weights[0].T, flow, out=of_values[:, part])
             return sums
 

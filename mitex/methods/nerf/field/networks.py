@@ -70,7 +70,9 @@ class Networks(dr.CustomOp):
         self.kind = torch.bfloat16 if low_precision and not moving else torch.float32
         self.nets = _join(*([as_torch(weight) for weight in net] for net in nets))
         count = self.values.shape[1]
-        self.between = {name: mlp.room(weights, count, self.kind) for name, weights in self.nets.items()}
+        self.activations = {
+            name: mlp.empty_activations(weights, count, self.kind) for name, weights in self.nets.items()
+        }
         self.code = torch.empty(CODE + 1, count)
         results = torch.empty(sum(self._sizes), count)
 
@@ -79,7 +81,7 @@ class Networks(dr.CustomOp):
                 exponent, *outputs = results[:, part].split(self._sizes)
                 for name, out in zip(self.nets, [self.code[:, part], *outputs], strict=True):
                     values = self._inputs(name, self.values[:, part], part)
-                    mlp.forwards(self.nets[name], values, self.between[name], part, out)
+                    mlp.forwards(self.nets[name], values, self.activations[name], part, out)
                 exponent.copy_(self.code[:1, part])
 
         mlp.on_threads(count, work, self.kind)
@@ -113,8 +115,8 @@ class Networks(dr.CustomOp):
         values = self.values[:, part].to(gradient.dtype)
 
         def back(name: str, gradient: torch.Tensor) -> torch.Tensor:
-            inputs, between = self._inputs(name, values, part), self.between[name]
-            return mlp.backwards(nets[name], inputs, between, part, gradient, sums[name])
+            inputs, activations = self._inputs(name, values, part), self.activations[name]
+            return mlp.backwards(nets[name], inputs, activations, part, gradient, sums[name])
 
         exponent, reflection, angles = gradient.split(self._sizes)
         of_code = nets["reflection"][0].T @ back("reflection", reflection)

@@ -8,20 +8,19 @@ import numpy as np
 import torch
 from scipy import ndimage
 
-from mitex.methods.nerf.capture.capture import Capture
+from mitex.methods.nerf.capture.capture import Capture, object_mask
 from mitex.methods.nerf.capture.visual_hull import View, visual_hull
 from mitex.runtime.jit import mi
 
-WARMUP = 16  # refreshes of all cells, before it is half of them
-DECAY = 0.95
-OPAQUE = 128  # alpha of the object in a mask
+WARMUP = 16  # refreshes of all cells; later ones are of half of them
+DECAY = 0.95  # of the running maximum, for each refresh
 CEILING = 10.0  # of the threshold [1 / scene units]
 
 
 def hull_cells(capture: Capture, side: int) -> np.ndarray:
-    """(side, side, side) bool, cells of the scene cube that the masks leave, and their neighbours."""
+    """(side, side, side) bool, cells of the scene cube that the masks leave, and two layers around them."""
     lenses = zip(capture.images, capture.poses, capture.intrinsics, capture.distortion, strict=True)
-    hull = visual_hull([View(image[..., 3] >= OPAQUE, *camera) for image, *camera in lenses])
+    hull = visual_hull([View(object_mask(image), *camera) for image, *camera in lenses])
     if hull is None:
         return np.ones((side,) * 3, bool)
     centres = (np.arange(side) + 0.5) * (2 / side) - 1
@@ -46,6 +45,18 @@ def sample_grid(density: Callable[[np.ndarray], np.ndarray], occupied: np.ndarra
             place = np.insert(index, 0, x, axis=1)
             grid[x][tuple(index.T)] = density(((place + 0.5) * (2 / side) - 1).astype(np.float32))
     return grid
+
+
+def packed_cells(occupied: np.ndarray) -> torch.Tensor:
+    """(ceil(G^3 / 8),) uint8, one bit for each of the cells (G, G, G), as model files hold them."""
+    return torch.from_numpy(np.packbits(occupied))
+
+
+def unpacked_cells(packed: torch.Tensor, side: int) -> np.ndarray:
+    """(side, side, side) uint8, the inverse of `packed_cells`; ValueError if they are of another grid."""
+    if packed.shape != (-(-(side**3) // 8),):
+        raise ValueError("occupied cells of another grid")
+    return np.unpackbits(packed.numpy(), count=side**3).reshape((side,) * 3)
 
 
 class Occupancy:
@@ -112,6 +123,7 @@ class Occupancy:
         return self.values.mean().item()
 
     def state(self) -> dict[str, torch.Tensor]:
+        """What a resumed run needs."""
         return {"occupancy": self.values, "refreshes": torch.tensor(self.refreshes)}
 
     def load_state(self, state: dict[str, torch.Tensor]) -> None:

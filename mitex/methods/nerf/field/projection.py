@@ -198,6 +198,7 @@ class _Attach(torch.autograd.Function):
 
 
 def _missed(points: np.ndarray) -> Projections:
+    """Projections of points (N, 3), none of which has a foot."""
     count = len(points)
     return Projections(
         point=points.copy(),
@@ -209,6 +210,6 @@ def _missed(points: np.ndarray) -> Projections:
 
 
 def _edge_lengths(mesh: Mesh) -> np.ndarray:
-    """(F, 3)"""
+    """(F, 3) lengths of the faces' edges."""
     corners = mesh.vertices[mesh.faces]
     return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)

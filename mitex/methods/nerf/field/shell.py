@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -168,7 +169,7 @@ class Shell:
         return {**self.latents.parameters, **weights, "light": self.light}
 
     def parameters_changed(self) -> None:
-        """Takes over new values; cells that were empty stay so.
+        """Takes over new values of the parameters; cells of the mask that were empty stay empty.
 
         Raises:
             RuntimeError: a parameter has another shape than before.
@@ -196,7 +197,7 @@ class Shell:
         return result
 
     def evaluate(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, mi.Float, mi.Color3f]:
-        """Where in the shell, which of N points are; their density and colour.
+        """Density and colour of those of N points that are in the shell.
 
         Args:
             points, view: `mi.Point3f` and the unit directions of the rays, `mi.Vector3f`.
@@ -220,19 +221,28 @@ def within(projections: Projections, thickness: float, lift: float = 0.0) -> tup
     return index, replace(subset, distance=distance[index])
 
 
+def shell_reach(thickness: float, side: int, lift: float = 0.0) -> float:
+    """How far from the mesh `shell_cells` looks for a shell's cells, `side` along the cube [scene units].
+
+    A shell thinner than a cell may lie between the cells' centres: half of their diagonal is then the reach.
+    """
+    return max(thickness, math.sqrt(3) / side) + lift
+
+
 def shell_cells(
     projection: Projection, thickness: float, possible: np.ndarray, lift: float = 0.0
 ) -> np.ndarray:
-    """Cells of the scene cube whose centres are in the shell, and their neighbours.
+    """Cells of the scene cube that the shell may touch: those with a centre within its reach, and neighbours.
 
     Args:
-        projection: onto the mesh.
+        projection: onto the mesh; with a reach of its own, that is `shell_reach` at least.
         thickness: h [scene units].
         possible: (G, G, G) bool, the cells that are looked at.
         lift: of the shell's middle above the mesh [scene units].
     """
+    reach = shell_reach(thickness, len(possible))
 
     def in_shell(points: np.ndarray) -> np.ndarray:
-        return np.abs(projection(points).distance - lift) < thickness
+        return np.abs(projection(points).distance - lift) < reach
 
     return ndimage.binary_dilation(sample_grid(in_shell, possible, len(possible)) > 0)

@@ -1,4 +1,4 @@
-"""Between arrays in memory, Dr.Jit's arrays of C channels, and its tensors."""
+"""Conversions between NumPy arrays, Dr.Jit's arrays of C channels such as `mi.Point3f`, and its tensors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ A = TypeVar("A", bound=dr.ArrayBase)
 
 
 def tensor(values: dr.ArrayBase) -> mi.TensorXf:
-    """`mi.TensorXf` (N,) of a `mi.Float`, (N, C) of an array of C of them."""
+    """A `mi.Float` as a `mi.TensorXf` (N,), an array of C of them as one (N, C)."""
     count = dr.width(values)
     if dr.depth_v(values) == 1:
         return mi.TensorXf(values, (count,))
@@ -22,7 +22,7 @@ def tensor(values: dr.ArrayBase) -> mi.TensorXf:
 
 
 def channels(kind: type[A], values: np.ndarray) -> A:
-    """A Dr.Jit array such as `mi.Point3f` of values (N, C); N is no part of the kernel."""
+    """Values (N, C) as a Dr.Jit array of a kind such as `mi.Point3f`; another N needs no other kernel."""
     return dr.unravel(kind, mi.Float(np.ascontiguousarray(values, np.float32).ravel()))
 
 
@@ -32,13 +32,13 @@ def as_torch(values: mi.TensorXf) -> torch.Tensor:
 
 
 def rows(values: dr.ArrayBase) -> np.ndarray:
-    """(N, C) float32 of an array of C channels."""
+    """An array of C channels, each (N,), in memory: (N, C) float32."""
     return np.array(dr.ravel(values)).reshape(-1, len(values))
 
 
-# Slices of tensors would have N as a literal, and so would need new kernels for each N. An opaque N does not.
+# Slicing a tensor compiles N into the kernel, so each N needs a new one. Where N is opaque, one kernel does.
 def stack_rows(values: Sequence[mi.Float]) -> mi.TensorXf:
-    """`mi.TensorXf` (C, N) of C arrays, of width N or 1."""
+    """`mi.TensorXf` (C, N) whose rows are C arrays of width N or 1; those of width 1 are repeated."""
     count = max(dr.width(value) for value in values)
     flat = dr.zeros(mi.Float, count * len(values))
     for k, value in enumerate(values):
@@ -48,9 +48,9 @@ def stack_rows(values: Sequence[mi.Float]) -> mi.TensorXf:
 
 
 def unstack_rows(tensor: mi.TensorXf) -> list[mi.Float]:
-    """The rows of a tensor (C, N)."""
-    rows, count = tensor.shape
-    places = [row_places(k, count) for k in range(rows)]
+    """The C rows, each (N,), of a tensor (C, N)."""
+    row_count, count = tensor.shape
+    places = [row_places(k, count) for k in range(row_count)]
     return [dr.gather(mi.Float, tensor.array, place, mode=dr.ReduceMode.Permute) for place in places]
 
 

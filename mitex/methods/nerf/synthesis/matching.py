@@ -1,8 +1,8 @@
 """Which patch continues a texture: candidates by their strips, and a random choice among the nearest.
 
 A square is compared by its overlap strips, in which blocks of texels along the strip are summed. That leaves
-24,576 numbers a strip of 16 channels; a search tree has no use in so many dimensions, so all distances are
-found, by one matrix product. Mirrored patches need no strips of their own: the place is mirrored instead.
+24,576 numbers for a strip of 16 channels. In so many dimensions no search tree helps, so all distances are
+computed, by one matrix product. Mirrored patches need no strips of their own: the place is mirrored instead.
 """
 
 from __future__ import annotations
@@ -107,16 +107,16 @@ class Matcher:
         self.flips, self.centres = tuple(flips), np.asarray(source.centres, np.float64)
         self.apart = APART * source.length
         self.shape = _checked_shape(source)
-        source_sides = {_source_side(side, flip) for side in sides for flip in self.flips}
+        source_sides = {_source_side(name, flip) for name in sides for flip in self.flips}
         side = self.shape[0]
         length = side // BLOCK * overlap(side) * source.matched
-        self._strips = {side: np.empty((count, length), np.float32) for side in source_sides}
+        self._strips = {name: np.empty((count, length), np.float32) for name in source_sides}
         for index in range(count):
             square = source.patch(index)[..., : source.matched]
             for name, rows in self._strips.items():
                 rows[index] = _block_sums(strip(square, name), name)
         # |a - b|^2 = |a|^2 - 2 a b + |b|^2 loses the fewest digits around the mean.
-        self._means = {side: rows.mean(0) for side, rows in self._strips.items()}
+        self._means = {name: rows.mean(0) for name, rows in self._strips.items()}
         self._squares = {name: _centre(rows, self._means[name]) for name, rows in self._strips.items()}
 
     def distances(self, strips: Mapping[str, np.ndarray]) -> np.ndarray:

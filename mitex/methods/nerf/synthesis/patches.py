@@ -25,6 +25,7 @@ from mitex.runtime.jit import dr, mi
 from mitex.scenes.stage import mesh_shape
 
 SIZE = 128  # side of a patch [texels]
+PATTERN_RATE = 1 / 8  # gap between texels [mean edges of the base shape]
 LIFT = 0.1  # of the plane that the rays start from above the tangent plane [scene units]
 MIN_FACING = 0.25  # cosine between a patch's z and the faces that it meets: they are stretched 4 times
 SPARSE = 4  # every so many texels are compared with the scan, whose points are not denser
@@ -97,7 +98,7 @@ def extract_patches(
     *,
     count: int = 2000,
     size: int = SIZE,
-    pattern_rate: float = 1.0 / 8.0,
+    pattern_rate: float = PATTERN_RATE,
     direction: np.ndarray | None = None,
     scan: np.ndarray | None = None,
     thickness: float = LIFT,

@@ -126,16 +126,16 @@ class _Canvas:
     def strips(self, row: int, column: int) -> Maps:
         """What a patch at a place has to continue: by side, the values that are compared."""
         features = self.maps["features"][..., : self.source.matched]
-        across, down = self._window(row, column)
+        rows, columns = self._window(row, column)
         strips = {}
         if column:
-            strips["left"] = strip(features[across, down], "left")
+            strips["left"] = strip(features[rows, columns], "left")
         if row:
-            strips["top"] = strip(features[across, down], "top")
+            strips["top"] = strip(features[rows, columns], "top")
         if self._wraps(column, self.columns):
-            strips["right"] = strip(features[across, : self.side], "left")
+            strips["right"] = strip(features[rows, : self.side], "left")
         if self._wraps(row, self.rows):
-            strips["bottom"] = strip(features[: self.side, down], "top")
+            strips["bottom"] = strip(features[: self.side, columns], "top")
         return strips
 
     def neighbours(self, row: int, column: int) -> list[int]:

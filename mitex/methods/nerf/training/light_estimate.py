@@ -1,9 +1,9 @@
 """The light that photos were taken in, from how the brightness of the base shape goes with its normals.
 
-A radiance field cannot tell light from colour: whatever shades it is told by k_d as well, which does not turn
-with the surface. Over the whole object, though, colours do not know where the surface faces, and what goes
-with its normals is light (inverse lighting, as Marschner and Greenberg 1997 have it, in the harmonics of
-Ramamoorthi and Hanrahan 2001).
+A radiance field cannot tell light from colour: k_d can hold the shades as well, and then they do not change
+when the texture is turned. Over the whole object, though, the colours of a texture do not depend on where the
+surface faces. What does depend on it is light (inverse lighting, as Marschner and Greenberg 1997 have it, in
+the harmonics of Ramamoorthi and Hanrahan 2001).
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from mitex.methods.nerf.field.raycast import Raycaster
 from mitex.methods.nerf.field.tensors import channels
 from mitex.runtime.jit import dr, mi
 
-STRIDE = 4  # pixels
+STRIDE = 4  # every so many pixels of a photo are looked at
 SOLID = 0.5  # alpha of pixels that count
 STEEP = 75.0  # angle to the normal of pixels that count, at most [degrees]
-ALBEDO = 0.25  # mean of k_d: what is four times as bright can still be told
-PRIOR = 1e-3  # weight of even light, beside the pixels
+ALBEDO = 0.25  # assumed mean of k_d: what is up to four times as bright keeps its k_d below 1
+PRIOR = 1e-3  # how much an even light is preferred [of the weight of all pixels]
 DARKEST = 0.01  # mean radiance of photos that a light is made for, at least
-SHADE = 0.25  # of what faces the least light, at least, beside the mean
+SHADE = 0.25  # light on the darkest side, at least [of the mean]
 DIRECTIONS = 2000  # in which the light is evaluated for that
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import torch
 import torch.nn.functional as F
@@ -78,7 +79,7 @@ class _Clustering(torch.autograd.Function):
     """
 
     @staticmethod
-    def forward(ctx, features: torch.Tensor, centres: torch.Tensor, kappa: float) -> torch.Tensor:
+    def forward(ctx: Any, features: torch.Tensor, centres: torch.Tensor, kappa: float) -> torch.Tensor:
         # Features along the last axis: sums over the few centres are slow there.
         offsets = features.double().T.contiguous()[:, None] - centres.double().T[:, :, None]  # (D, K, N)
         inverse = 1 / (1 + offsets.square().sum(0) / kappa)
@@ -92,7 +93,7 @@ class _Clustering(torch.autograd.Function):
 
     @staticmethod
     @once_differentiable
-    def backward(ctx, gradient):
+    def backward(ctx: Any, gradient: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, None]:
         offsets, force = ctx.saved_tensors
         forces = offsets * (force * (gradient.double() * ctx.scale))
         return forces.sum(1).T.to(ctx.dtypes[0]), -forces.sum(2).T.to(ctx.dtypes[1]), None

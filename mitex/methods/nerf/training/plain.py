@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -25,9 +24,9 @@ from mitex.runtime.jit import dr, mi
 from mitex.textures.march import Samples, sum_rays, weights_of
 from mitex.training import checkpoint, train
 
-LEVELS, COARSEST, FINEST = 16, 16, 2048
-CODE = 15
-DENSITY, COLOUR = (2 * LEVELS, 64, CODE + 1), (CODE + 16, 64, 64, 3)
+LEVELS, COARSEST, FINEST = 16, 16, 2048  # of the hash grid
+CODE = 15  # channels that the density network hands to that of the colour
+DENSITY, COLOUR = (2 * LEVELS, 64, CODE + 1), (CODE + 16, 64, 64, 3)  # widths of the networks' layers
 
 
 class PlainField:
@@ -36,18 +35,18 @@ class PlainField:
     Args:
         grid: of features.
         table: its values, flat.
-        weights: matrices of the networks.
+        weights: matrices (out, in) of the density network and of that of the colour.
         mask, step: as `RadianceField` has them.
-        packed: evaluate as cooperative vectors, fast forwards.
+        packed: evaluate as cooperative vectors, which is faster but has no derivatives.
     """
 
     def __init__(
         self,
         grid: HashGrid,
-        table: Any,
-        weights: Sequence[Any],
-        mask: Any = None,
-        step: float = 0.0,
+        table: mi.Float,
+        weights: Sequence[mi.TensorXf],
+        mask: mi.TensorXu8,
+        step: float,
         packed: bool = False,
     ) -> None:
         self.grid, self.table = grid, table
@@ -57,13 +56,15 @@ class PlainField:
         self.mask, self.step = mask, step
 
     @staticmethod
-    def of(parameters: Mapping[str, torch.Tensor], grid: HashGrid, mask: Any, step: float) -> PlainField:
+    def of(
+        parameters: Mapping[str, torch.Tensor], grid: HashGrid, mask: mi.TensorXu8, step: float
+    ) -> PlainField:
         """The field of a table and matrices in the order of `parameter_shapes`, packed."""
         table, *weights = (mi.TensorXf(value.detach().numpy()) for value in parameters.values())
         return PlainField(grid, table.array, weights, mask, step, packed=True)
 
-    def density(self, points: Any) -> tuple[Any, list[Any]]:
-        """Density [1 / scene units] of `mi.Point3f`, and a code for the colour."""
+    def density(self, points: mi.Point3f) -> tuple[mi.Float, list[mi.Float]]:
+        """Density [1 / scene units] of points in the scene cube, and a code for the colour (15 arrays)."""
         exponent, *code = network_rows(self._nets[0], self.grid(points, self.table))
         return dr.exp(dr.minimum(exponent, HIGHEST)), code
 
@@ -71,23 +72,24 @@ class PlainField:
         """The same of points (N, 3) in memory, (N,)."""
         return np.array(self.density(channels(mi.Point3f, points))[0])
 
-    def colour(self, code: list[Any], view: Any) -> Any:
-        """`mi.Color3f` in display values, seen in the unit directions `view`."""
+    def colour(self, code: Sequence[mi.Float], view: mi.Vector3f) -> mi.Color3f:
+        """Display values in [0, 1] for codes, seen along rays in the unit directions `view`."""
         rows = network_rows(self._nets[1], [*code, *dr.sh_eval(view, 3)])
         return mi.Color3f(*(sigmoid(row) for row in rows))
 
-    def evaluate(self, points: Any, view: Any) -> tuple[Any, Any, Any]:
+    def evaluate(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, mi.Float, mi.Color3f]:
+        """As of `RadianceField`, with all points."""
         density, code = self.density(points)
         return dr.arange(mi.UInt32, dr.width(points)), density, self.colour(code, view)
 
 
 def hash_grid(config: RadianceConfig) -> HashGrid:
-    """Of the features, as published but for the size of its tables."""
+    """The grid of the features, as published but for the size of its tables."""
     return HashGrid(LEVELS, COARSEST, FINEST, config.table)
 
 
 def parameter_shapes(grid: HashGrid) -> dict[str, tuple[int, ...]]:
-    """Of what is learned: the grid's table, and the matrices of both networks."""
+    """Shapes of what is learned, by name: the grid's table, and the matrices of both networks."""
     layers = [(o, i) for w in (DENSITY, COLOUR) for i, o in zip(w[:-1], w[1:], strict=True)]
     return {"table": (grid.size,)} | {f"weights/{k}": shape for k, shape in enumerate(layers)}
 
@@ -112,8 +114,8 @@ class PlainTask(RadianceTask[RadianceConfig]):
     def render(self, step: int, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
         origin, direction = batch_rays(batch)
 
-        def run(table: Any, *matrices: Any) -> Any:
-            field = PlainField(self.grid, table.array, matrices)
+        def run(table: mi.TensorXf, *matrices: mi.TensorXf) -> tuple[mi.TensorXf, ...]:
+            field = PlainField(self.grid, table.array, matrices, self.occupancy.mask, self.step_length)
             along = dr.gather(mi.Vector3f, direction, samples.ray)
             _, density, colour = field.evaluate(samples.points(origin, direction), along)
             weights, transmittance = weights_of(density, samples)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypedDict, TypeVar
 
 import numpy as np
 import torch
@@ -21,7 +21,7 @@ from mitex.runtime import lower_worker_priority
 from mitex.runtime.jit import dr, mi
 from mitex.textures.march import DIAGONAL, RadianceField, Samples, march, visible
 from mitex.training import Change, Step
-from mitex.training.optim import Adam
+from mitex.training.optim import Adam, Optimizer
 
 REFRESH = 16  # steps between refreshes of the occupancy, and between updates of the mean parameters
 BETAS, EPSILON = (0.9, 0.99), 1e-15  # of Adam
@@ -61,7 +61,7 @@ class RadianceTask(ABC, Generic[Config]):
 
     @abstractmethod
     def metadata(self) -> dict[str, str]:
-        """What checkpoints tell."""
+        """What a checkpoint tells of the run that it belongs to."""
 
     def with_cameras(self, batch: Batch) -> Batch:
         """The batch with rays of the refined cameras."""
@@ -77,14 +77,14 @@ class RadianceTask(ABC, Generic[Config]):
 
     @abstractmethod
     def density(self, points: np.ndarray) -> np.ndarray:
-        """Density (N,) of points (N, 3) with the parameters of now."""
+        """Density (N,) [1 / scene units] of points (N, 3) of the scene cube, with the current parameters."""
 
     @property
     def parameters(self) -> Sequence[torch.Tensor]:
         return list(self.named.values())
 
     def begin(self, step: int, generator: torch.Generator) -> Change | None:
-        """Now and then a refresh of the occupancy."""
+        """Refreshes the occupancy, every `REFRESH` steps."""
         if step % REFRESH:
             return None
         undo = partial(self.occupancy.load_state, self.occupancy.state())
@@ -118,7 +118,7 @@ class RadianceTask(ABC, Generic[Config]):
         return Step(total, metrics, self._average)
 
     def _average(self) -> None:
-        """Every `REFRESH` updates the mean parameters move towards those of now."""
+        """Every `REFRESH` updates the mean parameters move towards the current ones."""
         self._commits += 1
         if self._commits % REFRESH:
             return
@@ -144,8 +144,15 @@ class RadianceTask(ABC, Generic[Config]):
         return np.hstack(render_view(self.field(self.mean), *self.preview_view, PREVIEW)[::-1])
 
 
-def schedule(config: RadianceConfig) -> dict[str, Any]:
-    """Options of `train`: Adam with a learning rate that falls to a tenth in `lr_steps`."""
+class Schedule(TypedDict):
+    """Options of `train` that all radiance fields are trained with."""
+
+    lr: Callable[[int], float]
+    optimizer: Callable[[Sequence[torch.Tensor]], Optimizer]
+
+
+def schedule(config: RadianceConfig) -> Schedule:
+    """Adam with a learning rate that falls to a tenth in `lr_steps`."""
     return {
         "lr": lambda step: config.lr * 0.1 ** (step / config.lr_steps),
         "optimizer": partial(Adam, betas=BETAS, eps=EPSILON),
@@ -160,18 +167,17 @@ class Rendered:
         transmittance: (R,) in [0, 1].
         weights, t: (M,) compositing weight of each sample, and its distance along the ray [scene units].
         ray: (M,) int64.
-        terms: further losses, weighted.
+        terms: further losses by name, weighted; none at first.
+
+    Args:
+        colour, transmittance, weights: see above.
+        samples: the M samples.
     """
 
     def __init__(
-        self,
-        colour: torch.Tensor,
-        transmittance: torch.Tensor,
-        weights: torch.Tensor,
-        samples: Samples,
-        terms: dict[str, torch.Tensor] | None = None,
+        self, colour: torch.Tensor, transmittance: torch.Tensor, weights: torch.Tensor, samples: Samples
     ) -> None:
         self.colour, self.transmittance, self.weights = colour, transmittance, weights
         self.t = torch.from_numpy(np.array(samples.t))
         self.ray = torch.from_numpy(np.array(samples.ray).astype(np.int64))
-        self.terms = terms or {}
+        self.terms: dict[str, torch.Tensor] = {}

@@ -93,9 +93,9 @@ class TextureTask(RadianceTask[NerfConfig]):
         index, projections = within(self.projection(rows(samples.points(origin, direction))), self.thickness)
         samples = samples.subset(mi.UInt32(index.astype(np.uint32)))
         foot, distance, along = self._attached(batch, samples, projections)
-        compared = int(self.config.normal_rays * samples.rays) if self.config.normals else 0
-        interior = int(INTERIOR_RAYS * samples.rays) if self._uses_interior(step) else 0
-        depths = torch.rand(interior, generator=generator).numpy()
+        compared_rays = int(self.config.normal_rays * samples.rays) if self.config.normals else 0
+        interior_rays = int(INTERIOR_RAYS * samples.rays) if self._uses_interior(step) else 0
+        depths = torch.rand(interior_rays, generator=generator).numpy()
 
         def run(
             foot: mi.TensorXf,
@@ -112,7 +112,7 @@ class TextureTask(RadianceTask[NerfConfig]):
             density, colour, normal = appearance(latents, decoder, light, coords, view, detach)
             weights, transmittance = weights_of(density, samples)
             rgb = sum_rays(colour * weights, samples)
-            fine, target = self._normals(arrays, coords, normal, weights, samples, compared)
+            fine, target = self._normals(arrays, coords, normal, weights, samples, compared_rays)
             interior = self._interior(arrays, coords, weights, samples, mi.Float(depths))
             results = rgb, transmittance, weights, fine, target, interior
             return tuple(tensor(result) for result in results)
@@ -253,7 +253,7 @@ class TextureTask(RadianceTask[NerfConfig]):
         return dr.normalize(-slope)
 
     def _clusters(self, generator: torch.Generator) -> torch.Tensor:
-        """The clustering loss of one level of f, drawn by chance."""
+        """The clustering loss (equation 3) of one level of f, drawn at random."""
         levels = self.encoding.levels(0)
         level = int(torch.randint(len(levels), (), generator=generator))
         entries = self.named["tables/f"][levels[level]].view(-1, 2)
@@ -265,7 +265,7 @@ class TextureTask(RadianceTask[NerfConfig]):
 
 
 def _rotate(directions: torch.Tensor, turn: torch.Tensor) -> torch.Tensor:
-    """Unit vectors (N, 3), turned by small rotation vectors (N, 3) [rad]."""
+    """Unit vectors (N, 3), turned by rotation vectors (N, 3) [rad] that are small."""
     directions = directions + torch.linalg.cross(turn, directions)
     return directions / directions.norm(dim=1, keepdim=True)
 

@@ -11,39 +11,46 @@ import numpy as np
 import torch
 
 from mitex.asset import Asset
-from mitex.atlas import laid_out
 from mitex.errors import ConfigError
 from mitex.export import SUFFIXES
-from mitex.images import write_image
 from mitex.mesh import Mesh
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field.decoder import Decoder
 from mitex.methods.nerf.field.occupancy import Occupancy
 from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.field.rendering import render_step
-from mitex.methods.nerf.field.shell import Shell, shell_cells
+from mitex.methods.nerf.field.shell import Shell, shell_cells, shell_reach
 from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents, uv_frames
 from mitex.methods.nerf.use.extract import extract_mesh
-from mitex.methods.nerf.use.placement import UNWRAP_SIZE, in_scene_cube, uv_unit_length
+from mitex.methods.nerf.use.placement import in_scene_cube, uv_unit_length
 from mitex.paths import prepare_output
 from mitex.runtime.jit import mi
 from mitex.textures.march import DIAGONAL
 
-PICTURES = (".png", ".jpg", ".jpeg")
 NEIGHBOURS = 5  # vertices that make the coarse normal of a target
 OCCUPANCY_SAMPLES = 6  # of the density in each cell, to find which ones are occupied
 FINEST = 2048  # steps across the scene cube, at most
+
+
+def check_ranges(scale: float, density: float, lift: float) -> None:
+    """Raises a ConfigError if one of these numbers of `NerfTexture.apply` is out of range."""
+    if not 0.05 <= scale <= 20 or not 0 < density <= 1000 or not 0 <= lift <= 1:
+        raise ConfigError(
+            f"a texture of {scale} times the size, {density} times the density and lifted by {lift}",
+            "use sizes from 0.05 to 20, densities up to 1000 and lifts from 0 to 1",
+        )
 
 
 class AppliedTexture(Shell):
     """A texture in the shell around a mesh, in the scene cube.
 
     Attributes:
-        mesh: the target, as it was given but for its UVs.
+        mesh: the target.
         similarity: the mesh's space -> scene cube.
 
     Args:
-        mesh, maps, scale, density, lift: as of `NerfTexture.apply`.
+        mesh: the target, with UVs.
+        maps, scale, density, lift: as of `NerfTexture.apply`, in the ranges of `check_ranges`.
         decoder: the texture's networks, packed.
         light: spherical harmonics, see `lighting`.
         config: settings of the texture.
@@ -65,12 +72,7 @@ class AppliedTexture(Shell):
         density: float,
         lift: float,
     ) -> None:
-        if not 0.05 <= scale <= 20 or not 0 < density <= 1000 or not 0 <= lift <= 1:
-            raise ConfigError(
-                f"a texture of {scale} times the size, {density} times the density and lifted by {lift}",
-                "use sizes from 0.05 to 20, densities up to 1000 and lifts from 0 to 1",
-            )
-        self.mesh, self._maps = laid_out(mesh, UNWRAP_SIZE), maps
+        self.mesh, self._maps = mesh, maps
         placed, self.similarity = in_scene_cube(self.mesh)
         # One unit of the UVs shows so many textures, across and up, that elements have the requested size.
         height, width = maps.size
@@ -78,8 +80,9 @@ class AppliedTexture(Shell):
         uv = np.asarray(placed.uv) * (uv_unit_length(placed) / lengths)
         raised = lift * scale * max(-ground, 0.0)
         thickness = thickness * scale
-        projection = Projection(placed, neighbours=NEIGHBOURS, repulsion=None, reach=thickness + raised)
         cells = config.occupancy
+        reach = shell_reach(thickness, cells, raised)
+        projection = Projection(placed, neighbours=NEIGHBOURS, repulsion=None, reach=reach)
         possible = shell_cells(projection, thickness, np.ones((cells,) * 3, bool), raised)
         occupancy = Occupancy(cells, possible)
         super().__init__(
@@ -117,14 +120,11 @@ class AppliedTexture(Shell):
 
         Raises:
             OutputError: unknown suffix or unwritable place.
+            ConfigError: an option out of range.
         """
-        from mitex.render import tone
-        from mitex.render.shell import shell_still
+        from mitex.render.shell import render_shell
 
-        target = prepare_output(path, PICTURES)
-        return write_image(
-            target, tone(shell_still(self, self.similarity, self.outline, **options), exposure)
-        )
+        return render_shell(self, self.similarity, self.outline, path, exposure=exposure, **options)
 
     def extract(self, cells: int | None = None) -> Asset:
         """A coloured mesh of what is solid, in the mesh's space; see `extract_mesh`."""

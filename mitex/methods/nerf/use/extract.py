@@ -20,8 +20,8 @@ from mitex.methods.nerf.field.tensors import channels, rows
 from mitex.runtime.jit import mi
 
 CELLS = 3  # of the grid along a side of a cell of the occupancy grid
-FLOOR = -4.0  # logarithm of densities below [of the level]
-CHUNK = 1 << 17
+FLOOR = -4.0  # logarithm of a density beside the level's, at least
+CHUNK = 1 << 17  # vertices that are coloured at a time
 
 
 def extract_mesh(shell: Shell, similarity: Similarity, name: str, cells: int | None = None) -> Asset:

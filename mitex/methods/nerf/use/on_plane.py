@@ -1,4 +1,4 @@
-"""A texture by the rays of photos: on its base shape, and on planes that touch this (section 4.3)."""
+"""A texture seen along the rays of photos: on its base shape, and on planes that touch it (section 4.3)."""
 
 from __future__ import annotations
 
@@ -31,6 +31,7 @@ class CapturedRenderer:
         self.shell = shell
 
     def __call__(self, window: Window) -> Rendering:
+        """The base shape as the photo sees it."""
         colour, transmittance = render_rays(self.shell, window.origins, window.directions)
         return window.rendering(colour + transmittance[:, None] * window.background)
 
@@ -48,6 +49,7 @@ class PlaneRenderer:
         self.field, self.light, self.along = field, light, along
 
     def __call__(self, window: Window) -> Rendering:
+        """The plane as the photo would see it, in place of the base shape."""
         turn, origins, directions = window.to_plane(self.along)
         self.field.light = mi.TensorXf(rotated(self.light, turn))
         origins = self.field.similarity.apply(origins)

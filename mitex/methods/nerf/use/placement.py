@@ -7,8 +7,8 @@ import numpy as np
 from mitex.errors import MeshError
 from mitex.mesh import Mesh, Similarity
 
-EXTENT = 1 / 1.2  # of the mesh in the scene cube
-UNWRAP_SIZE = 1024  # texels that the distances of charts are made for
+EXTENT = 1 / 1.2  # largest half extent of the mesh in the scene cube
+UNWRAP_SIZE = 1024  # side of the map that charts are packed for [texels]
 
 
 def in_scene_cube(mesh: Mesh) -> tuple[Mesh, Similarity]:

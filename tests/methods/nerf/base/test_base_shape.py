@@ -125,6 +125,11 @@ def test_a_given_base_outside_the_cube_is_refused():
         given_base(torus(radius=1.0, tube=0.4))
 
 
+def test_a_given_base_without_faces_is_refused():
+    with pytest.raises(MeshError, match="has no faces"):
+        given_base(Mesh(np.zeros((3, 3)), np.zeros((0, 3), np.int32)))
+
+
 def assert_frames(mesh: Mesh, frames: np.ndarray) -> None:
     """Orthonormal, right-handed, with the face's normal."""
     assert frames.dtype == np.float32

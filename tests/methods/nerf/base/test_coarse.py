@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
+from mitex.errors import MeshError
 from mitex.mesh import Mesh, icosphere, quality
 from mitex.methods.nerf import PRESETS
 from mitex.methods.nerf.base import coarse
@@ -100,6 +101,12 @@ def test_a_setting_of_the_coarse_field_begins_another_training(capture, ball, st
     steps.clear()
     find_base(capture, replace(FEW, **change), ball)
     assert steps == list(range(STEPS))
+
+
+def test_a_base_mesh_is_refused_before_the_training(capture, ball, steps):
+    with pytest.raises(MeshError, match="scene cube"):
+        find_base(capture, FEW, ball.with_vertices(3 * ball.vertices))
+    assert not steps and not trainings()
 
 
 def test_the_same_photos_under_another_name_can_be_used(capture, ball, steps):

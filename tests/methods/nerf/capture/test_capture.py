@@ -285,6 +285,7 @@ REFUSED = {
     "huge focal length": (tree_key("fl_x", 1e8), "its fl_x 1e+08"),
     "unknown intrinsics": (without("fl_x", "fl_y"), "has no focal length"),
     "fisheye": (tree_key("is_fisheye", True), "undistort"),
+    "fisheye of Nerfstudio": (tree_key("camera_model", "OPENCV_FISHEYE"), "undistort"),
     "k3": (frame_key("k3", 0.1), "images/005.png has a lens"),
     "distortion that folds": (tree_key("k1", -3.0), "cannot be undone"),
     "distortion without bounds": (tree_key("k2", 1e11), "cannot be undone"),

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 import torch
 
-from mitex.methods.nerf.field.occupancy import WARMUP, Occupancy, hull_cells, sample_grid
+from mitex.methods.nerf.field.occupancy import (
+    WARMUP,
+    Occupancy,
+    hull_cells,
+    packed_cells,
+    sample_grid,
+    unpacked_cells,
+)
 from tests.methods.nerf.tiny import tiny_capture
 
 
@@ -74,3 +81,15 @@ def test_hull_cells_hold_the_object_and_little_else():
     cells = hull_cells(tiny_capture(), 32)
     distance = centres(32)
     assert cells[distance < 0.55].all() and not cells[distance > 0.9].any()
+
+
+@pytest.mark.parametrize("side", [1, 3, 8])
+def test_packed_cells_come_back(side):
+    occupied = np.random.default_rng(0).integers(0, 2, (side,) * 3).astype(np.uint8)
+    assert np.array_equal(unpacked_cells(packed_cells(occupied), side), occupied)
+
+
+def test_packed_cells_of_another_grid_are_refused():
+    for side in (7, 9):
+        with pytest.raises(ValueError, match="another grid"):
+            unpacked_cells(packed_cells(np.ones((8, 8, 8), np.uint8)), side)

@@ -5,15 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
-from mitex.mesh import Mesh, icosphere
+from mitex.mesh import Mesh, grid, icosphere
 from mitex.methods.nerf.config import PRESETS
 from mitex.methods.nerf.field.decoder import Decoder, Reflection
 from mitex.methods.nerf.field.lighting import to_display
 from mitex.methods.nerf.field.mlp import weight_bound
 from mitex.methods.nerf.field.networks import weight_shapes
 from mitex.methods.nerf.field.projection import Projection
-from mitex.methods.nerf.field.shell import Shell, ShellCoords, appearance, shell_cells
+from mitex.methods.nerf.field.shell import Shell, ShellCoords, appearance, shell_cells, shell_reach
 from mitex.methods.nerf.field.tensors import channels, rows
 from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents
 from mitex.runtime import init
@@ -176,3 +177,17 @@ def test_cells_of_the_shell_hold_it():
     reach = np.sqrt(3) / 32
     assert cells[np.abs(radius - 0.6) < 0.09].all()
     assert not cells[np.abs(radius - 0.6) > 0.1 + 4 * reach].any()
+
+
+@pytest.mark.parametrize("height", [0.0, 0.004, 0.0156])
+def test_a_shell_thinner_than_a_cell_is_not_lost_between_their_centres(height):
+    side, thickness = 64, 0.004
+    flat = grid(8, 8)
+    flat = flat.with_vertices(0.8 * flat.vertices + np.array([0.0, 0.0, height]))
+    projection = Projection(flat, repulsion=None, reach=shell_reach(thickness, side))
+    cells = shell_cells(projection, thickness, np.ones((side,) * 3, bool))
+    rng = np.random.default_rng(0)
+    points = np.column_stack(
+        [rng.uniform(-0.8, 0.8, (2000, 2)), height + rng.uniform(-1, 1, 2000) * thickness]
+    )
+    assert cells[tuple(np.floor((points + 1) * (side / 2)).astype(int).T)].all()

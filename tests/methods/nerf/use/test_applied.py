@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from mitex.errors import ConfigError
 from mitex.mesh import grid, icosphere
 from mitex.methods.nerf.synthesis.maps import LatentMaps
 from tests.methods.nerf.small import small_maps, small_texture
@@ -31,3 +33,27 @@ def test_textures_that_are_not_square_keep_their_proportions(mesh, rows, columns
     )
     assert (expected > 0).sum() > 100
     np.testing.assert_allclose(density, expected, rtol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"scale": 0.0}, "0.0 times the size"),
+        ({"scale": math.nan}, "nan times the size"),
+        ({"scale": 0.0, "guide": np.zeros((4, 4, 3))}, "0.0 times the size"),
+        ({"density": 0.0}, "0.0 times the density"),
+        ({"lift": 1.5}, "lifted by 1.5"),
+        ({"light": np.zeros(9)}, r"a light of shape \(9,\)"),
+        ({"light": np.full(16, np.inf)}, "a light"),
+    ],
+)
+def test_options_are_checked_before_a_texture_is_synthesized(options, message, monkeypatch):
+    texture = small_texture()
+    monkeypatch.setattr(texture, "synthesize", lambda *_, **__: pytest.fail("synthesized"))
+    with pytest.raises(ConfigError, match=message):
+        texture.apply(icosphere(2), **options)
+
+
+def test_the_side_under_a_guide_needs_a_scale():
+    with pytest.raises(ConfigError, match="0.0 times the size"):
+        small_texture().covering(icosphere(2), scale=0.0)
