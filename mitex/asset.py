@@ -14,6 +14,7 @@ from mitex.atlas import Atlas
 from mitex.errors import ConfigError
 from mitex.exemplar import MAPS
 from mitex.geometry.normal_maps import decode_at_vertices
+from mitex.geometry.tangents import HardSplit, split_at_hard_edges
 from mitex.mesh import Mesh
 
 CLAY = 0.7  # sRGB
@@ -27,7 +28,7 @@ class Asset:
         mesh: the mesh, V vertices and F faces.
         vertex_maps: name of `MAPS` -> (V, c) float32 in [0, 1]. Albedo is sRGB, the others are data;
             normals are (n + 1) / 2 in the frame (tangent, cross(normal, tangent), normal) of each vertex
-            (OpenGL convention, +y up).
+            (OpenGL convention, +y up); at hard edges the frame turns to the normal of each side.
         tangents: (V, 3) float32, unit: where the exemplar's +u (right) points on the surface. Needed with a
             normal map.
         atlas: UV layout of `texture_maps`.
@@ -71,11 +72,20 @@ class Asset:
         """The textures if baked, else the maps at the vertices."""
         return self.vertex_maps if self.texture_maps is None else self.texture_maps
 
-    def detail_normals(self) -> np.ndarray:
-        """(V, 3) float32 unit normals in object space: the mesh's own, bent by the normal map if any."""
+    def detail_normals(self, split: HardSplit | None = None) -> np.ndarray:
+        """Normals in object space: the mesh's own, bent by the normal map if any.
+
+        Args:
+            split: the mesh split at hard edges; the smooth mesh if None.
+
+        Returns:
+            (V, 3) float32, unit; (N, 3) of the split vertices.
+        """
+        source = slice(None) if split is None else split.source
+        normals = self.mesh.normals if split is None else split.normals
         if "normal" not in self.vertex_maps or self.tangents is None:
-            return self.mesh.normals
-        return decode_at_vertices(self.vertex_maps["normal"], self.tangents, self.mesh.normals)
+            return normals
+        return decode_at_vertices(self.vertex_maps["normal"][source], self.tangents[source], normals)
 
     def baked(
         self, resolution: int = 1024, padding: int | None = None, layout: np.ndarray | None = None
@@ -83,7 +93,8 @@ class Asset:
         """The same asset with textures: every texel interpolates the vertex maps.
 
         Uses the given layout, or the mesh's own UVs if nothing in them overlaps, else unwraps it. Normals are
-        interpolated in object space, where they are continuous, and written in the atlas' frame.
+        interpolated in object space, where they are continuous but for hard edges, and written in the atlas'
+        frame.
 
         Args:
             resolution: side of the textures [texels], 16 to 8192.
@@ -99,7 +110,9 @@ class Asset:
         faces = self.mesh.faces
         textures = {k: atlas.interpolate(v[faces]) for k, v in self.vertex_maps.items() if k != "normal"}
         if "normal" in self.vertex_maps:
-            textures["normal"] = atlas.normal_map(self.mesh, atlas.interpolate(self.detail_normals()[faces]))
+            split = split_at_hard_edges(self.mesh)
+            detail = atlas.interpolate(self.detail_normals(split)[split.faces])
+            textures["normal"] = atlas.normal_map(self.mesh, detail)
         return replace(self, atlas=atlas, texture_maps=textures)
 
     def export(self, path: str | os.PathLike[str], maps_format: Literal["png", "exr"] = "png") -> Path:

@@ -17,7 +17,7 @@ from mitex.atlas import Atlas
 from mitex.errors import MeshError
 from mitex.geometry.normal_maps import decode, encode
 from mitex.geometry.tangents import split_at_seams
-from mitex.geometry.vectors import orthonormal, scatter_add, unit
+from mitex.geometry.vectors import orthonormal, scatter_add
 from mitex.mesh import Mesh
 
 GENERATOR = "Mitex"
@@ -68,15 +68,15 @@ def asset_from_textures(mesh: Mesh, uv: np.ndarray, textures: Mapping[str, np.nd
     # The mean over the seam's sides; without seams each vertex has one.
     copies = np.bincount(split.source, minlength=len(mesh.vertices))
     sampled = {k: bilinear(v, split.uv) for k, v in textures.items()}
+    tangents = default_tangents(mesh)
     if "normal" in sampled:
-        sampled["normal"] = decode(sampled["normal"], split.tangents[:, :3], split.bitangents, split.normals)
+        normals = split.normals
+        detail = decode(sampled["normal"], split.tangents[:, :3], split.bitangents, normals)
+        t = orthonormal(tangents[split.source], normals)
+        sampled["normal"] = encode(detail, t, np.cross(normals, t), normals)
     maps = {}
     for key, values in sampled.items():
         maps[key] = scatter_add(split.source, values, len(copies)) / np.maximum(copies, 1)[:, None]
-    tangents = default_tangents(mesh)
-    if "normal" in maps:
-        t = tangents
-        maps["normal"] = encode(unit(maps["normal"]), t, np.cross(mesh.normals, t), mesh.normals)
     return Asset(mesh, maps, tangents, atlas, textures, name)
 
 

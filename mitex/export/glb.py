@@ -1,7 +1,8 @@
 """glTF 2.0 binary (GLB): the mesh with PBR textures, or with vertex colours where nothing is baked.
 
-Two attributes of our own (glTF reserves the leading underscore for that) make the file an exact copy of the
-mesh: `_VERTEX`, the vertex before splitting at UV seams, and `_HEIGHT`, for which glTF has no texture slot.
+Attributes of our own (glTF reserves the leading underscore for that) make the file an exact copy of the mesh,
+but for its polygons, which glTF has not: `_VERTEX`, the vertex before splitting at UV seams and hard edges,
+`_HEIGHT`, for which glTF has no texture slot, and `_SHADING_NORMAL` where NORMAL shows relief.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from mitex.colour import srgb_to_linear
 from mitex.errors import ConfigError, OutputError
 from mitex.export.common import DEFAULT_ALBEDO, DEFAULT_ROUGHNESS, GENERATOR, png
 from mitex.export.glb_read import read_glb
-from mitex.geometry.tangents import split_at_seams
+from mitex.geometry.tangents import HardSplit, split_at_hard_edges, split_at_seams
 from mitex.paths import atomic_write, prepare_output
 
 __all__ = ["glb_bytes", "read_glb", "write_glb", "write_variants"]
@@ -42,9 +43,10 @@ def write_glb(asset: Asset, path: Path) -> None:
 def glb_bytes(asset: Asset) -> bytes:
     """The asset as a GLB file.
 
-    Baked: vertices split at UV seams, NORMAL (smooth), TANGENT, TEXCOORD_0, and up to three PNG textures:
-    base colour (sRGB), occlusion (R), roughness (G) and metallic (B = 0) in one, and normal.
-    Not baked: COLOR_0 (linear), the detail normals as NORMAL, and all maps as `_NAME` attributes.
+    Baked: vertices split at UV seams and hard edges, NORMAL, TANGENT, TEXCOORD_0, and up to three PNG
+    textures: base colour (sRGB), occlusion (R), roughness (G) and metallic (B = 0) in one, and normal.
+    Not baked: vertices split at hard edges, COLOR_0 (linear), the detail normals as NORMAL, and all maps as
+    `_NAME` attributes.
     """
     builder = _Builder()
     primitive = _primitive(asset, builder)
@@ -141,7 +143,7 @@ def _baked_attributes(asset: Asset) -> dict[str, np.ndarray]:
         "POSITION": asset.mesh.vertices[split.source],
         "NORMAL": split.normals,
         "TEXCOORD_0": np.stack([split.uv[:, 0], 1.0 - split.uv[:, 1]], axis=1),  # glTF's v points down
-        "_VERTEX": split.source[:, None].astype(np.float32),
+        "_VERTEX": _indices(split),
         "faces": split.faces,
     }
     if "normal" in (asset.texture_maps or {}):
@@ -152,18 +154,26 @@ def _baked_attributes(asset: Asset) -> dict[str, np.ndarray]:
 
 
 def _vertex_attributes(asset: Asset) -> dict[str, np.ndarray]:
-    maps = asset.vertex_maps
+    split = split_at_hard_edges(asset.mesh)
+    maps = {k: v[split.source] for k, v in asset.vertex_maps.items()}
     attributes = {
-        "POSITION": asset.mesh.vertices,
-        "NORMAL": asset.detail_normals(),
-        "faces": asset.mesh.faces,
+        "POSITION": asset.mesh.vertices[split.source],
+        "NORMAL": asset.detail_normals(split),
+        "faces": split.faces,
     }
+    if asset.mesh.corner_normals is not None:
+        attributes |= {"_VERTEX": _indices(split), "_SHADING_NORMAL": split.normals}
     if "albedo" in maps:
         attributes["COLOR_0"] = srgb_to_linear(maps["albedo"])
     attributes |= {f"_{k.upper()}": v for k, v in maps.items() if k != "albedo"}
     if asset.tangents is not None:
-        attributes["_TANGENT"] = asset.tangents
+        attributes["_TANGENT"] = asset.tangents[split.source]
     return attributes
+
+
+def _indices(split: HardSplit) -> np.ndarray:
+    """(N, 1) the vertices that the split ones copy; glTF has no integers of 32 bits for attributes."""
+    return split.source[:, None].astype(np.float32)
 
 
 def _plain(asset: Asset) -> dict[str, Any]:

@@ -73,7 +73,9 @@ def _asset(document: dict[str, Any], blob: bytes, path: Path) -> Asset:
     if "TEXCOORD_0" not in attributes:
         return _from_vertices(attributes, faces, name)
     textures = _textures(document, view)
-    mesh, source, uv = _unsplit(attributes, faces, name)
+    uv = np.array([0, 1], np.float32) + attributes["TEXCOORD_0"][faces] * np.array([1, -1], np.float32)
+    mesh, source, _ = _unsplit(attributes, faces, attributes["NORMAL"], name)
+    mesh = replace(mesh, uv=uv)
     height = None
     if "_HEIGHT" in attributes:
         height = np.zeros((len(mesh.vertices), 1), np.float32)
@@ -88,17 +90,24 @@ def _from_vertices(attributes: dict[str, np.ndarray], faces: np.ndarray, name: s
     maps = {k: attributes[f"_{k.upper()}"] for k in MAPS if f"_{k.upper()}" in attributes}
     if "COLOR_0" in attributes:
         maps["albedo"] = linear_to_srgb(attributes["COLOR_0"])
-    mesh = Mesh(attributes["POSITION"], faces.astype(np.int64), name=name)
-    return Asset(mesh, maps, attributes.get("_TANGENT"), name=name)
+    tangents = attributes.get("_TANGENT")
+    if "_VERTEX" not in attributes:
+        return Asset(
+            Mesh(attributes["POSITION"], faces.astype(np.int64), name=name), maps, tangents, name=name
+        )
+    mesh, _, first = _unsplit(attributes, faces, attributes["_SHADING_NORMAL"], name)
+    maps, tangents = {k: v[first] for k, v in maps.items()}, None if tangents is None else tangents[first]
+    return Asset(mesh, maps, tangents, name=name)
 
 
 def _unsplit(
-    attributes: dict[str, np.ndarray], faces: np.ndarray, name: str
+    attributes: dict[str, np.ndarray], faces: np.ndarray, normals: np.ndarray, name: str
 ) -> tuple[Mesh, np.ndarray, np.ndarray]:
+    """The mesh before splitting, its vertices among the N split ones (N,), and one of those for each (V,)."""
     # Vertices that no face uses are not in the file: number the others without gaps.
     _, first, source = np.unique(attributes["_VERTEX"][:, 0], return_index=True, return_inverse=True)
-    uv = np.array([0, 1], np.float32) + attributes["TEXCOORD_0"][faces] * np.array([1, -1], np.float32)
-    return Mesh(attributes["POSITION"][first], source[faces].astype(np.int64), uv, name), source, uv
+    mesh = Mesh(attributes["POSITION"][first], source[faces].astype(np.int64), name=name)
+    return mesh.with_shading_normals(normals[faces]), source, first
 
 
 def _textures(document: dict[str, Any], view: Callable[[int], bytes]) -> dict[str, np.ndarray]:

@@ -1,7 +1,8 @@
-"""Wavefront OBJ with a material file and PNG maps beside it."""
+"""Wavefront OBJ with a material file and PNG maps beside it: the mesh as it was read, polygons and all."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
@@ -20,8 +21,11 @@ from mitex.export.common import (
     png,
 )
 from mitex.export.together import Inputs, check_files, write_files
+from mitex.geometry.tangents import split_at_hard_edges
 from mitex.images import read_image
 from mitex.mesh import Mesh
+from mitex.mesh.polygons import outlines
+from mitex.mesh.readers.obj import read_obj as read_obj_soup
 
 # Material keywords, the first one is read back. `norm` and `map_Pr` are the PBR extension of the format;
 # Blender reads the normal map from `map_Bump`. Nothing standard fits occlusion: ambient colour comes closest.
@@ -32,6 +36,8 @@ _KEYWORDS = {
     "normal": ("norm", "map_Bump"),
     "roughness": ("map_Pr",),
 }
+
+HEADER = 4096  # bytes that hold the first two lines
 
 
 def check_side_files(path: Path, maps: Iterable[str] = MAPS, inputs: Inputs = ()) -> None:
@@ -91,15 +97,31 @@ def _write_mesh(path: Path, asset: Asset, stem: str) -> None:
     mesh, atlas = asset.mesh, asset.atlas
     assert atlas is not None
     pairs, uv_index = np.unique(atlas.uv.reshape(-1, 2), axis=0, return_inverse=True)
-    corners = np.stack([mesh.faces, uv_index.reshape(-1, 3), mesh.faces], axis=2) + 1
+    vertices, faces = _vertices(mesh)
+    split = split_at_hard_edges(mesh)
+    corners = np.stack([faces, uv_index.reshape(-1, 3), split.faces], axis=2) + 1
+    sizes, (corners,) = outlines(mesh.polygons, [corners])
+    words = [f"{v}/{vt}/{vn}" for v, vt, vn in corners.tolist()]
+    ends = np.cumsum(sizes)
     with path.open("wb") as file:
         head = f"# {GENERATOR}\nmtllib {stem}.mtl\no {plain_name(asset.name)}\nusemtl {stem}\n"
         file.write(head.encode())
         # Nine digits give every float32 back exactly.
-        np.savetxt(file, mesh.vertices, "v %.9g %.9g %.9g")
+        np.savetxt(file, vertices, "v %.9g %.9g %.9g")
         np.savetxt(file, pairs, "vt %.9g %.9g")
-        np.savetxt(file, mesh.normals, "vn %.6g %.6g %.6g")
-        np.savetxt(file, corners.reshape(-1, 9), "f %d/%d/%d %d/%d/%d %d/%d/%d")
+        np.savetxt(file, split.normals, "vn %.9g %.9g %.9g")
+        for start, end in zip((ends - sizes).tolist(), ends.tolist(), strict=True):
+            file.write(f"f {' '.join(words[start:end])}\n".encode())
+
+
+def _vertices(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and faces with the vertices that the mesh's own file has, in its order."""
+    polygons = mesh.polygons
+    if polygons is None or polygons.vertices is None:
+        return mesh.vertices, mesh.faces
+    corners = polygons.vertices[polygons.triangles]
+    _, first, faces = np.unique(corners, return_index=True, return_inverse=True)
+    return mesh.vertices[mesh.faces.ravel()[first]], faces.reshape(-1, 3)
 
 
 def read_obj(path: Path) -> Asset:
@@ -108,27 +130,23 @@ def read_obj(path: Path) -> Asset:
     Raises:
         MeshError: damaged, not written by Mitex, or a map is missing.
     """
-    lines = path.read_text("utf-8", "replace").split("\n")
-    if lines[0] != f"# {GENERATOR}" or not "".join(lines[1:2]).startswith("mtllib "):
+    data = path.read_bytes()
+    lines = data[:HEADER].split(b"\n")
+    if lines[0] != f"# {GENERATOR}".encode() or not re.match(rb"mtllib \S", b"".join(lines[1:2])):
         raise foreign(path)
     try:
-        vertices = _rows(lines, "v ", 3, np.float32)
-        pairs = _rows(lines, "vt ", 2, np.float32)
-        faces = _rows((line.replace("/", " ") for line in lines), "f ", 9, np.int64).reshape(-1, 3, 3) - 1
-        # A negative index would silently count from the end.
-        uv = pairs[np.where(faces[..., 1] < 0, len(pairs), faces[..., 1])]
-        mesh = Mesh(vertices, faces[..., 0], uv, path.stem)
-        textures = _textures(path, path.with_name(lines[1].split()[1]))
-    except (ValueError, IndexError) as e:
+        soup = read_obj_soup(str(path), data, len(data))
+        if soup.uv is None or soup.normals is None:
+            raise foreign(path, "is damaged")
+        mesh = Mesh(soup.vertices, soup.faces, soup.uv, path.stem, polygons=soup.polygons)
+        mesh = mesh.with_shading_normals(soup.normals)
+        material = path.with_name(lines[1].split()[1].decode("utf-8", "replace"))
+    except (MeshError, ValueError) as e:
         raise foreign(path, "is damaged") from e
+    textures = _textures(path, material)
     if len({v.shape[:2] for v in textures.values()}) != 1:
         raise foreign(path, "has no maps, or maps of different sizes")
-    return asset_from_textures(mesh, uv, textures, path.stem)
-
-
-def _rows(lines: Iterable[str], start: str, width: int, dtype: type) -> np.ndarray:
-    rows = [line[len(start) :] for line in lines if line.startswith(start)]
-    return np.array(" ".join(rows).split(), dtype).reshape(len(rows), width)
+    return asset_from_textures(mesh, soup.uv.astype(np.float32), textures, path.stem)
 
 
 def _textures(path: Path, material: Path) -> dict[str, np.ndarray]:

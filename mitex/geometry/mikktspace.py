@@ -85,8 +85,8 @@ def corner_tangents(
 
 def _welded(vertices: np.ndarray, normals: np.ndarray, faces: np.ndarray, uv: np.ndarray) -> np.ndarray:
     """(F, 3) the same number for corners of equal position, normal and UV."""
-    places = _numbered(_bits(np.concatenate([vertices, normals], axis=1)))
-    return _numbered([places[faces].ravel(), *_bits(uv.reshape(-1, 2))]).reshape(-1, 3)
+    places = numbered(_bits(np.concatenate([vertices, normals], axis=1)))
+    return numbered([places[faces].ravel(), *_bits(uv.reshape(-1, 2))]).reshape(-1, 3)
 
 
 def _bits(values: np.ndarray) -> list[np.ndarray]:
@@ -95,8 +95,8 @@ def _bits(values: np.ndarray) -> list[np.ndarray]:
     return list(columns.T)
 
 
-def _numbered(columns: list[np.ndarray]) -> np.ndarray:
-    """(N,) the same number, from 0, for equal rows."""
+def numbered(columns: list[np.ndarray]) -> np.ndarray:
+    """(N,) the same number, from 0, for equal rows; they are in order of the last column first."""
     order = np.lexsort(columns)
     changes = np.zeros(len(order) - 1, bool)
     for column in columns:

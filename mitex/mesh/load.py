@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from mitex.errors import MeshError, MeshWarning
 from mitex.mesh.embedded import embedded, embedded_names
 from mitex.mesh.mesh import Mesh
+from mitex.mesh.polygons import Polygons
 from mitex.mesh.readers import SUFFIXES, Soup, read
 from mitex.mesh.validate import validate
 from mitex.paths import expanded
@@ -24,10 +26,11 @@ BYTES_ALLOWED_ANYWAY = 256 << 20
 def load(path: str | os.PathLike[str], max_vertices: int = 2_000_000) -> Mesh:
     """Loads a mesh.
 
-    Polygons are cut into triangles. Vertices that a format splits at seams of UVs or normals (always in STL
-    and glTF, sometimes in OBJ and PLY) are welded where their positions are bit-identical, so that the graph
-    is connected; UVs stay per face corner. Flaws are handled as `validate` says. glTF node transforms are
-    applied. Materials and images are not read.
+    Polygons are cut into triangles and remembered. Vertices that a format splits at seams of UVs or normals
+    (always in STL and glTF, sometimes in OBJ and PLY) are welded where their positions are bit-identical, so
+    that the graph is connected; UVs and normals stay per face corner, and with them seams and hard edges.
+    `Mesh.polygons` remembers which vertices of an OBJ or PLY were. Flaws are handled as `validate` says. glTF
+    node transforms are applied. Materials and images are not read.
 
     Args:
         path: .obj, .ply, .stl, .glb, .gltf or .off; or the name of a mesh that ships with Mitex.
@@ -53,8 +56,16 @@ def load(path: str | os.PathLike[str], max_vertices: int = 2_000_000) -> Mesh:
     for note in soup.notes:
         warnings.warn(f"{path}: {note}", MeshWarning, stacklevel=2)
     vertices, faces = weld(soup)
-    mesh = validate(vertices, faces, soup.uv, name=str(path), max_vertices=max_vertices)
-    return Mesh(mesh.vertices, mesh.faces, mesh.uv, source.stem)
+    mesh = validate(
+        vertices,
+        faces,
+        soup.uv,
+        name=str(path),
+        max_vertices=max_vertices,
+        corner_normals=soup.normals,
+        polygons=_polygons(soup, len(vertices)),
+    )
+    return replace(mesh, name=source.stem)
 
 
 def weld(soup: Soup) -> tuple[np.ndarray, np.ndarray]:
@@ -85,6 +96,15 @@ def weld(soup: Soup) -> tuple[np.ndarray, np.ndarray]:
     target = np.where(joined, first[place], np.arange(len(vertices)))
     keep = target == np.arange(len(vertices))
     return vertices[keep], (np.cumsum(keep) - 1)[target[soup.faces]]
+
+
+def _polygons(soup: Soup, count: int) -> Polygons | None:
+    """The polygons of a mesh that was welded to `count` vertices; with the file's own if they say more."""
+    if soup.split or count == len(soup.vertices):
+        return soup.polygons
+    triangles = np.arange(soup.faces.size).reshape(-1, 3)
+    polygons = soup.polygons or Polygons(np.full(len(soup.faces), 3), triangles)
+    return replace(polygons, vertices=polygons.at_corners(soup.faces))
 
 
 def _group(rows: np.ndarray) -> np.ndarray:

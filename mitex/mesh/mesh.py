@@ -1,4 +1,4 @@
-"""The mesh that everything else works on: positions, faces, corner UVs, and what follows from them."""
+"""The mesh that everything else works on: positions, faces, values at corners, and what follows from them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,12 @@ import numpy as np
 from mitex.errors import MeshError
 from mitex.geometry.triangles import triangle_crosses
 from mitex.geometry.vectors import scatter_add, unit_normals
+from mitex.mesh.polygons import Polygons
 from mitex.mesh.topology import EdgeGraph, edge_graph
+
+UNIT = 1e-3  # how far the length of a normal may be from 1
+SMOOTH = 1e-6  # normals that differ less from the smooth ones are those
+SIMILAR = 1e-5  # how far moved vertices may be from a shifted and scaled mesh [of its extent]
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +30,9 @@ class Mesh:
         uv: (F, 3, 2) float32 texture coordinates per face corner, so that UV seams never split vertices, or
             None; v points up, (0, 0) is the lower left corner of the image.
         name: for messages and file names.
+        corner_normals: (F, 3, 3) float32 unit normals that the face corners are shaded with, so that hard
+            edges never split vertices, or None for the smooth `normals`.
+        polygons: those that the triangles were cut from, or None where all were triangles of these vertices.
 
     Raises:
         MeshError: An array has the wrong shape, an index is out of range, or a number is not finite.
@@ -34,16 +42,19 @@ class Mesh:
     faces: np.ndarray
     uv: np.ndarray | None = None
     name: str = "mesh"
+    corner_normals: np.ndarray | None = None
+    polygons: Polygons | None = None
 
     def __post_init__(self) -> None:
-        with np.errstate(over="ignore", invalid="ignore"):
-            vertices = np.ascontiguousarray(self.vertices, np.float32)
-            uv = None if self.uv is None else np.ascontiguousarray(self.uv, np.float32)
-        indices = np.asarray(self.faces)
-        _check_arrays(self.name, vertices, indices, uv)
-        object.__setattr__(self, "vertices", vertices)
-        object.__setattr__(self, "faces", np.ascontiguousarray(indices, np.int32))
-        object.__setattr__(self, "uv", uv)
+        for name in ("vertices", "uv", "corner_normals"):
+            values = getattr(self, name)
+            with np.errstate(over="ignore", invalid="ignore"):
+                values = None if values is None else np.ascontiguousarray(values, np.float32)
+            object.__setattr__(self, name, values)
+        object.__setattr__(self, "faces", np.asarray(self.faces))
+        for problem, remedy in _problems(self):
+            raise MeshError(f"{self.name}: {problem}", remedy)
+        object.__setattr__(self, "faces", np.ascontiguousarray(self.faces, np.int32))
 
     @staticmethod
     def load(path: str | os.PathLike[str], max_vertices: int = 2_000_000) -> Mesh:
@@ -90,6 +101,16 @@ class Mesh:
         total = scatter_add(self.faces.ravel(), crosses, len(self.vertices))
         return unit_normals(total).astype(np.float32)
 
+    @property
+    def shading_normals(self) -> np.ndarray:
+        """(F, 3, 3) float32 unit normals that corners are shaded with: `corner_normals`, or smooth ones."""
+        return self.normals[self.faces] if self.corner_normals is None else self.corner_normals
+
+    def with_shading_normals(self, normals: np.ndarray) -> Mesh:
+        """The mesh shaded with (F, 3, 3) unit normals, which are left out if they are the smooth ones."""
+        smooth = np.abs(normals - self.normals[self.faces]).max(initial=0.0) <= SMOOTH
+        return replace(self, corner_normals=None if smooth else normals)
+
     def normalised(self) -> tuple[Mesh, Similarity]:
         """The mesh with its vertex mean at the origin and its farthest vertex at distance 1.
 
@@ -108,11 +129,17 @@ class Mesh:
         return self.with_vertices(similarity.apply(positions)), similarity
 
     def with_vertices(self, vertices: np.ndarray) -> Mesh:
-        """The same faces, UVs and edges with other positions, (V, 3)."""
+        """The same faces, UVs, polygons and edges with other positions, (V, 3).
+
+        Corner normals stay if the mesh is only moved and scaled: they belong to its shape.
+        """
         if np.shape(vertices) != self.vertices.shape:
             problem = f"{self.name} has vertices of shape {self.vertices.shape}, not {np.shape(vertices)}"
             raise MeshError(problem, "give one position per vertex")
-        mesh = replace(self, vertices=vertices)
+        normals = self.corner_normals
+        if normals is not None and not _are_similar(self.vertices, np.asarray(vertices)):
+            normals = None
+        mesh = replace(self, vertices=vertices, corner_normals=normals)
         if "edges" in self.__dict__:
             mesh.__dict__["edges"] = self.edges
         return mesh
@@ -143,14 +170,17 @@ class Similarity:
         return np.asarray(points, np.float64) * self.scale + self.center
 
 
-def _check_arrays(name: str, vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None) -> None:
-    for problem, remedy in _array_problems(vertices, faces, uv):
-        raise MeshError(f"{name}: {problem}", remedy)
+def _are_similar(before: np.ndarray, after: np.ndarray) -> bool:
+    """Whether vertices (V, 3) were shifted and scaled, and nothing else."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        a, b = (points - points.mean(axis=0, dtype=np.float64) for points in (before, after))
+        scale = np.linalg.norm(b) / max(float(np.linalg.norm(a)), 1e-300)
+        return bool(np.abs(b - scale * a).max(initial=0.0) <= SIMILAR * np.abs(b).max(initial=0.0))
 
 
-def _array_problems(
-    vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray | None
-) -> Iterator[tuple[str, str]]:
+def _problems(mesh: Mesh) -> Iterator[tuple[str, str]]:
+    """What is wrong with the arrays of a mesh, and what to do."""
+    vertices, faces, uv = mesh.vertices, mesh.faces, mesh.uv
     if vertices.ndim != 2 or vertices.shape[1] != 3:
         yield f"vertices have shape {vertices.shape}", "give (V, 3) positions"
     if faces.ndim != 2 or faces.shape[1] != 3:
@@ -175,3 +205,25 @@ def _array_problems(
         )
     if uv is not None and not np.isfinite(uv).all():
         yield "some texture coordinates are NaN or infinite", "unwrap the mesh again or leave the uv out"
+    yield from _normal_problems(faces, mesh.corner_normals)
+    if mesh.polygons is not None and not _are_of(mesh.polygons, faces):
+        yield "the polygons are not those of the faces", "leave them out where faces change"
+
+
+def _are_of(polygons: Polygons, faces: np.ndarray) -> bool:
+    if polygons.triangles.shape != faces.shape or not polygons.agreeing(faces[..., None]).all():
+        return False
+    if polygons.vertices is None:
+        return True
+    count = int(faces.max(initial=0)) + 1
+    pairs = np.unique(polygons.vertices * count + polygons.at_corners(faces))
+    return bool((np.diff(pairs // count) > 0).all())  # each vertex of the file is at one of the mesh
+
+
+def _normal_problems(faces: np.ndarray, normals: np.ndarray | None) -> Iterator[tuple[str, str]]:
+    if normals is None:
+        return
+    if normals.shape != (*faces.shape, 3):
+        yield f"corner_normals have shape {normals.shape}", f"give one per face corner, {(*faces.shape, 3)}"
+    if not (np.abs(np.linalg.norm(normals, axis=2) - 1.0) <= UNIT).all():
+        yield "some corner_normals are not of length 1", "divide them by their length, or leave them out"

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mitex.errors import MeshError
-from mitex.geometry.vectors import scatter_add
+from mitex.geometry.vectors import scatter_add, unit
 from mitex.mesh.mesh import Mesh
 from mitex.mesh.topology import face_edges
 
@@ -31,7 +31,8 @@ def subdivide_loop(mesh: Mesh, times: int = 1) -> Mesh:
 
     Returns:
         The old vertices come first, then one per edge in the order of `topology.mesh_edges`; face f becomes
-        the faces 4 f to 4 f + 3. Corner UVs are halved linearly, so that seams stay where they are.
+        the faces 4 f to 4 f + 3. Corner UVs are halved linearly, so that seams stay where they are. Polygons
+        are forgotten, corner normals too, as the surface becomes another.
 
     Raises:
         MeshError: `times` is negative, or the result would have more than 32 million faces.
@@ -40,7 +41,10 @@ def subdivide_loop(mesh: Mesh, times: int = 1) -> Mesh:
 
 
 def subdivide_midpoint(mesh: Mesh, times: int = 1) -> Mesh:
-    """Splits every edge in the middle; the shape stays as it is. Otherwise like `subdivide_loop`."""
+    """Splits every edge in the middle; the shape stays as it is, and so do hard edges.
+
+    Otherwise like `subdivide_loop`.
+    """
     return _repeat(mesh, times, _midpoints)
 
 
@@ -77,7 +81,8 @@ def _repeat(mesh: Mesh, times: int, rule: Rule) -> Mesh:
         uv = None
         if mesh.uv is not None:
             uv = _children(mesh.uv, 0.5 * (mesh.uv + np.roll(mesh.uv, -1, axis=1)))
-        mesh = Mesh(points, _children(mesh.faces, middle), uv, mesh.name)
+        normals = _halved_normals(mesh) if rule is _midpoints else None
+        mesh = Mesh(points, _children(mesh.faces, middle), uv, mesh.name, normals)
     return mesh
 
 
@@ -88,6 +93,15 @@ def _children(corner: np.ndarray, side: np.ndarray) -> np.ndarray:
     rows = [[c0, s0, s2], [s0, c1, s1], [s2, s1, c2], [s0, s1, s2]]
     children = np.stack([np.stack(row, axis=1) for row in rows], axis=1)
     return children.reshape(-1, *corner.shape[1:])
+
+
+def _halved_normals(mesh: Mesh) -> np.ndarray | None:
+    """(4 F, 3, 3) corner normals of the children: at the middle of a side the mean of its ends."""
+    if mesh.corner_normals is None:
+        return None
+    total = mesh.corner_normals + np.roll(mesh.corner_normals, -1, axis=1)
+    opposite = np.linalg.norm(total, axis=2, keepdims=True) < 1e-3
+    return _children(mesh.corner_normals, unit(np.where(opposite, mesh.face_normals[:, None], total)))
 
 
 def _midpoints(mesh: Mesh, pairs: np.ndarray, sides: np.ndarray) -> np.ndarray:

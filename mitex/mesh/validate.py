@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 
 from mitex.errors import MeshError, MeshWarning
+from mitex.geometry.vectors import dot, unit
 from mitex.mesh.mesh import Mesh
+from mitex.mesh.polygons import Polygons
 from mitex.mesh.topology import components, mesh_edges, opposed_edges
 
 # A face is degenerate if its height is below this part of its longest side.
 FLAT = 1e-10
+OPPOSITE = 0.01  # part of the area where normals may look away from the faces
 
 
 def validate(
@@ -21,12 +25,15 @@ def validate(
     *,
     name: str = "mesh",
     max_vertices: int = 2_000_000,
+    corner_normals: np.ndarray | None = None,
+    polygons: Polygons | None = None,
 ) -> Mesh:
     """Makes a mesh of arrays from outside: refuses what cannot be used, mends and reports what can.
 
     Degenerate faces (no area), repeated faces (same three vertices) and vertices without a face are dropped.
     Edges of more than two faces, neighbours of opposite winding and separate components are kept. UVs that
-    are not finite are dropped. One `MeshWarning` each.
+    are not finite are dropped, and so are corner normals if one is not finite or zero, or if they look away
+    from the faces on more than 1 % of the area. One `MeshWarning` each.
 
     Args:
         vertices: (V, 3) positions.
@@ -34,9 +41,12 @@ def validate(
         uv: (F, 3, 2) per face corner, or None.
         name: for messages.
         max_vertices: budget.
+        corner_normals: (F, 3, 3) of any length, or None.
+        polygons: those of the faces, or None.
 
     Returns:
-        The mesh; vertices and faces that stay keep their order.
+        The mesh; vertices and faces that stay keep their order. Polygons of dropped faces become triangles;
+        corner normals are None where they are the smooth ones anyway.
 
     Raises:
         MeshError: no vertices, no faces, over budget, wrong shape, an index out of range, NaN or infinite
@@ -53,9 +63,34 @@ def validate(
     if uv is not None and not np.isfinite(uv).all():
         _warn(name, "some texture coordinates are NaN or infinite, so all were left out")
         uv = None
-    mesh = _drop_unused(_drop_faces(Mesh(vertices, faces, uv, name)))
+    normals = None if corner_normals is None else _of_unit_length(name, corner_normals)
+    mesh = _drop_unused(_drop_faces(Mesh(vertices, faces, uv, name, normals, polygons)))
     _report_structure(mesh)
-    return mesh
+    return _normals_checked(mesh)
+
+
+def _of_unit_length(name: str, normals: np.ndarray) -> np.ndarray | None:
+    length = np.linalg.norm(np.asarray(normals, np.float64), axis=-1)
+    if not (np.isfinite(length) & (length > 0)).all():
+        _warn(name, "some normals are NaN, infinite or zero, so all were left out: edges are shaded smooth")
+        return None
+    return unit(np.asarray(normals, np.float64))
+
+
+def _normals_checked(mesh: Mesh) -> Mesh:
+    """The mesh without its corner normals if they look away from the faces, or are the smooth ones."""
+    if mesh.corner_normals is None:
+        return mesh
+    away = (dot(mesh.corner_normals, mesh.face_crosses[:, None]) < 0).mean(axis=1)
+    share = float((away * mesh.face_areas).sum() / mesh.face_areas.sum())
+    if share > OPPOSITE:
+        _warn(
+            mesh.name,
+            f"the normals look away from the faces on {share:.0%} of the area, so all were left out: edges "
+            "are shaded smooth; recompute them in a modeller",
+        )
+        return replace(mesh, corner_normals=None)
+    return mesh.with_shading_normals(mesh.corner_normals)
 
 
 def _drop_faces(mesh: Mesh) -> Mesh:
@@ -71,7 +106,9 @@ def _drop_faces(mesh: Mesh) -> Mesh:
     keep = ~(flat | repeated)
     if keep.all():
         return mesh
-    return Mesh(mesh.vertices, mesh.faces[keep], None if mesh.uv is None else mesh.uv[keep], mesh.name)
+    uv, normals = (None if a is None else a[keep] for a in (mesh.uv, mesh.corner_normals))
+    polygons = None if mesh.polygons is None else mesh.polygons.without(~keep)
+    return Mesh(mesh.vertices, mesh.faces[keep], uv, mesh.name, normals, polygons)
 
 
 def degenerate_faces(mesh: Mesh) -> np.ndarray:
@@ -97,7 +134,7 @@ def _drop_unused(mesh: Mesh) -> Mesh:
     if used.all():
         return mesh
     _warn(mesh.name, f"dropped vertices without a face: {(~used).sum():,}")
-    return Mesh(mesh.vertices[used], (np.cumsum(used) - 1)[mesh.faces], mesh.uv, mesh.name)
+    return replace(mesh, vertices=mesh.vertices[used], faces=(np.cumsum(used) - 1)[mesh.faces])
 
 
 def _report_structure(mesh: Mesh) -> None:

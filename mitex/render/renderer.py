@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +12,7 @@ from mitex.asset import Asset
 from mitex.colour import srgb_to_linear
 from mitex.errors import ConfigError
 from mitex.export.common import DEFAULT_ALBEDO, DEFAULT_ROUGHNESS
-from mitex.geometry.tangents import split_at_seams
+from mitex.geometry.tangents import HardSplit, split_at_hard_edges, split_at_seams
 from mitex.geometry.triangles import twice_area
 from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh
@@ -44,7 +43,7 @@ class OrbitRenderer:
         displacement: b in the offset b h^2 along the vertex normals, h the height map [object radii],
             -0.5 to 0.5. The MeshNCA demo offers -0.1 to 0.1. As there, shading normals stay those of the
             undisplaced surface, since the normal map holds the same relief already; without a normal map
-            they are taken from the displaced surface.
+            they are taken from the displaced surface, which is smooth at hard edges too.
         ao: whether ambient occlusion darkens the base colour.
         backdrop: whether the object stands on a grey sweep; without, it floats before plain white.
         like: the mesh that is normalised to radius 1, and stands on the backdrop; the asset moves with it, so
@@ -73,17 +72,16 @@ class OrbitRenderer:
         self.resolution = resolution
         self._on_backdrop = backdrop
         _, place = (like or asset.mesh).normalised()
-        self._positions, self._normals, self._detail = _surface(asset, place, displacement)
+        if asset.atlas is None:  # a vertex for each normal, and for each UV
+            split, uv = split_at_hard_edges(asset.mesh), None
+        else:
+            split = split_at_seams(asset.mesh, asset.atlas.uv)
+            uv = split.uv[split.faces]
+        self._positions, self._normals, self._detail = _surface(asset, split, place, displacement)
         framed = self._positions if like is None else place.apply(like.vertices)
         self._hull, self._floor = hull(framed), float(framed[:, 1].min())
-        mesh = replace(asset.mesh, uv=None)
-        if asset.atlas is not None:  # a vertex for each UV
-            split = split_at_seams(mesh, asset.atlas.uv)
-            self._positions, self._normals, self._detail = (
-                a[split.source] for a in (self._positions, self._normals, self._detail)
-            )
-            mesh = Mesh(mesh.vertices[split.source], split.faces, split.uv[split.faces], mesh.name)
-        self._scene, self._params = self._build(asset, mesh, ao)
+        mesh = Mesh(asset.mesh.vertices[split.source], split.faces, uv, asset.mesh.name)
+        self._scene, self._params = self._build(_bsdf(asset, split, ao), mesh)
 
     def fit_view(self, azimuths: float | Sequence[float] = 0.0, elevation: float = math.radians(18)) -> View:
         """The camera from which the object, at any of the azimuths [rad], fills the picture.
@@ -113,12 +111,11 @@ class OrbitRenderer:
         self._turn(azimuth, view)
         return accumulated(self._scene, self.resolution, spp, seed)
 
-    def _build(self, asset: Asset, mesh: Mesh, ao: bool) -> tuple[mi.Scene, mi.SceneParameters]:
+    def _build(self, bsdf: dict[str, object], mesh: Mesh) -> tuple[mi.Scene, mi.SceneParameters]:
         from mitex.plugins import init
         from mitex.runtime.jit import mi
 
         init()
-        bsdf = _bsdf(asset, ao)
         scene = {
             "type": "scene",
             "integrator": {"type": "path", "max_depth": MAX_DEPTH, "rr_depth": 99, "hide_emitters": True},
@@ -183,25 +180,29 @@ def accumulated(scene: mi.Scene, resolution: int, spp: int, seed: int) -> np.nda
 
 
 def _surface(
-    asset: Asset, place: Similarity, displacement: float
+    asset: Asset, split: HardSplit, place: Similarity, displacement: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions in the scene, vertex normals and detail normals, (V, 3) float64 each."""
-    mesh = asset.mesh.with_vertices(place.apply(asset.mesh.vertices))
+    """Positions in the scene, normals and detail normals of the split vertices, (N, 3) float64 each."""
+    mesh, normals = asset.mesh.with_vertices(place.apply(asset.mesh.vertices)), split.normals
     textured = asset.texture_maps is not None  # relief is the material's then
-    detail = asset.mesh.normals if textured else asset.detail_normals()
+    detail = normals if textured else asset.detail_normals(split)
     if displacement:
         offset = displacement * asset.vertex_maps["height"] ** 2
         mesh = mesh.with_vertices(mesh.vertices + offset * mesh.normals)
+        normals = mesh.normals[split.source]
         if textured or "normal" not in asset.vertex_maps:
-            detail = mesh.normals
-    return (mesh.vertices.astype(np.float64), mesh.normals.astype(np.float64), detail.astype(np.float64))
+            detail = normals
+    positions = mesh.vertices[split.source]
+    return positions.astype(np.float64), normals.astype(np.float64), detail.astype(np.float64)
 
 
-def _bsdf(asset: Asset, ao: bool) -> dict[str, object]:
-    """The material, from textures if the asset has them, else from vertex maps."""
+def _bsdf(asset: Asset, split: HardSplit, ao: bool) -> dict[str, object]:
+    """The material, from textures if the asset has them, else from the maps of the split vertices."""
+    from mitex.plugins import init
     from mitex.runtime.jit import mi
 
-    maps, kind = asset.vertex_maps, "vertex_field"
+    init()
+    maps, kind = {k: v[split.source] for k, v in asset.vertex_maps.items()}, "vertex_field"
     if asset.texture_maps is not None:
         maps, kind = asset.texture_maps, "texel_field"
 

@@ -136,7 +136,7 @@ def test_files_beside_it_may_be_inputs(baked, tmp_path):
     [
         ("a.obj", "# Mitex", "# Other", "not written by Mitex"),
         ("a.obj", "\nf 1/", "\nf x/", "damaged"),
-        ("a.obj", "\nf ", "\nf 1/1/1 ", "damaged"),
+        ("a.obj", "\nf ", "\nf 1/1 ", "damaged"),
         ("a.obj", "\nv ", "\nv nan ", "damaged"),
         ("a.mtl", "a_albedo.png", "../../etc/passwd", "outside"),
         ("a.mtl", "map_", "mop_", "a.obj"),
@@ -157,7 +157,7 @@ def test_damaged_files(baked, tmp_path, file, old, new, message):
 def test_indices_out_of_range_are_refused(baked, tmp_path):
     path = baked.export(tmp_path / "a.obj")
     text = path.read_text()
-    for bad in ("f 999999/1/1 1/1/1 2/2/2\n", "f 1/999999/1 1/1/1 2/2/2\n", "f -1/1/1 1/1/1 2/2/2\n"):
+    for bad in ("f 999999/1/1 1/1/1 2/2/2\n", "f 1/999999/1 1/1/1 2/2/2\n", "f -999999/1/1 1/1/1 2/2/2\n"):
         path.write_text(text + bad)
         with pytest.raises(MeshError):
             Asset.load(path)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitex.geometry.tangents import split_at_seams
+from mitex.geometry.tangents import split_at_hard_edges, split_at_seams
 from mitex.mesh import Mesh, icosphere
 
 
@@ -65,3 +65,33 @@ def test_normals_stay_smooth_across_seams():
     split = split_at_seams(mesh, uv)
     np.testing.assert_array_equal(split.normals, mesh.normals[split.source])
     np.testing.assert_allclose((split.normals * split.tangents[:, :3]).sum(axis=1), 0.0, atol=1e-5)
+
+
+def test_hard_edges_split_vertices():
+    mesh = icosphere(2)
+    assert split_at_hard_edges(mesh).faces is mesh.faces
+    flat = mesh.with_shading_normals(np.repeat(mesh.face_normals[:, None], 3, axis=1))
+    split = split_at_hard_edges(flat)
+    assert len(split.source) == 3 * len(mesh.faces) and (np.diff(split.source) >= 0).all()
+    np.testing.assert_array_equal(split.source[split.faces], mesh.faces)
+    np.testing.assert_array_equal(split.normals[split.faces], flat.corner_normals)
+    # One face with normals of its own splits its three vertices only.
+    normals = mesh.normals[mesh.faces]
+    normals[5] = mesh.face_normals[5]
+    split = split_at_hard_edges(mesh.with_shading_normals(normals))
+    assert len(split.source) == len(mesh.vertices) + 3
+    np.testing.assert_array_equal(split.normals[split.faces], normals)
+
+
+def test_seams_and_hard_edges_split_together():
+    mesh = patch()
+    assert mesh.uv is not None
+    normals = mesh.normals[mesh.faces]
+    normals[1] = [0.6, 0.0, 0.8]
+    uv = mesh.uv.copy()
+    uv[1, 0] += np.float32(0.01)
+    split = split_at_seams(mesh.with_shading_normals(normals), uv)
+    assert len(split.source) == 6
+    np.testing.assert_array_equal(split.normals[split.faces], normals)
+    np.testing.assert_array_equal(split.uv[split.faces], uv)
+    np.testing.assert_allclose((split.normals * split.tangents[:, :3]).sum(axis=1), 0.0, atol=1e-6)

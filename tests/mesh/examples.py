@@ -67,7 +67,7 @@ def gltf(parts, nodes=None, **extra):
     """A glTF tree and its buffer.
 
     Args:
-        parts: one dict per mesh: `positions`, optional `indices`, `uv`, `mode`.
+        parts: one dict per mesh: `positions`, optional `indices`, `normals`, `uv`, `mode`.
         nodes: the nodes; one per mesh, untransformed, if None.
         extra: more entries of the tree.
     """
@@ -96,6 +96,8 @@ def gltf(parts, nodes=None, **extra):
         }
         if "indices" in part:
             primitive["indices"] = add(np.asarray(part["indices"], np.uint16).ravel(), "SCALAR")
+        if "normals" in part:
+            primitive["attributes"]["NORMAL"] = add(np.asarray(part["normals"], np.float32), "VEC3")
         if "uv" in part:
             primitive["attributes"]["TEXCOORD_0"] = add(part["uv"], "VEC2")
         if "mode" in part:

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from mitex.errors import MeshError
 from mitex.mesh import Mesh, grid, icosphere
+from mitex.mesh.polygons import Polygons
 from tests.mesh.examples import FAN, FAN_POINTS, meshes, octahedron, tetrahedron
 
 
@@ -148,3 +149,60 @@ def test_with_vertices_keeps_the_rest():
         mesh.with_vertices(mesh.vertices[:2])
     with pytest.raises(MeshError, match="NaN"):
         mesh.with_vertices(mesh.vertices * np.nan)
+
+
+UP = np.tile([0.0, 0.0, 1.0], (2, 3, 1))
+QUAD = Polygons(np.array([4]), np.array([[0, 1, 2], [0, 2, 3]]))
+
+
+def square(**more) -> Mesh:
+    mesh = grid(1, 1)
+    return Mesh(mesh.vertices, mesh.faces, mesh.uv, "square", **more)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"corner_normals": UP[:1]}, "corner_normals have shape (1, 3, 3)"),
+        ({"corner_normals": UP * np.nan}, "not of length 1"),
+        ({"corner_normals": UP * 1.01}, "not of length 1"),
+        ({"corner_normals": UP * 0.0}, "not of length 1"),
+        ({"polygons": Polygons(np.array([3, 3]), np.array([[0, 1, 2], [4, 5, 3]]))}, None),
+        ({"polygons": Polygons(np.array([4]), np.array([[0, 1, 2], [0, 3, 2]]))}, "not those of the faces"),
+        ({"polygons": Polygons(np.array([5]), np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4]]))}, "not those of"),
+        (
+            {"polygons": Polygons(QUAD.sizes, QUAD.triangles, np.array([7, 1, 7, 3]))},
+            "not those of the faces",
+        ),
+        ({"polygons": Polygons(QUAD.sizes, QUAD.triangles, np.array([7, 1, 5, 3]))}, None),
+    ],
+)
+def test_refuses_normals_and_polygons_that_do_not_fit(more, words):
+    if words is None:
+        assert square(**more).polygons is more["polygons"]
+        return
+    with pytest.raises(MeshError) as error:
+        square(**more)
+    assert words in error.value.problem and error.value.problem.startswith("square: ")
+
+
+def test_shading_normals_are_the_smooth_ones_unless_others_are_given():
+    mesh = octahedron()
+    np.testing.assert_array_equal(mesh.shading_normals, mesh.normals[mesh.faces])
+    flat = np.repeat(mesh.face_normals[:, None], 3, axis=1)
+    hard = mesh.with_shading_normals(flat)
+    np.testing.assert_array_equal(hard.shading_normals, flat)
+    np.testing.assert_array_equal(hard.normals, mesh.normals)
+    assert hard.with_shading_normals(mesh.normals[mesh.faces]).corner_normals is None
+
+
+def test_corner_normals_stay_where_the_mesh_is_only_moved_and_scaled():
+    mesh = square(corner_normals=UP, polygons=QUAD)
+    moved = mesh.with_vertices(3.0 * mesh.vertices + [100.0, 2.0, -7.0])
+    np.testing.assert_array_equal(moved.corner_normals, UP)
+    assert moved.normalised()[0].corner_normals is not None and moved.polygons is QUAD
+    for shape in ([1.0, 1.0, 2.0], [1.0, 1.1, 1.0], [-1.0, 1.0, 1.0], [-1.0, -1.0, -1.0]):
+        other = mesh.with_vertices((mesh.vertices + [0.0, 0.0, 1e-3] * mesh.vertices[:, :1] ** 3) * shape)
+        assert other.corner_normals is None and other.polygons is QUAD
+    turned = mesh.with_vertices(mesh.vertices[:, [1, 2, 0]])
+    assert turned.corner_normals is None

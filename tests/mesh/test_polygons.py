@@ -1,4 +1,6 @@
-"""Polygons to triangles."""
+"""Polygons to triangles, and back."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mitex.errors import MeshError
-from mitex.mesh.polygons import triangulate
+from mitex.mesh.polygons import Polygons, outlines, triangulate
 
 
 def cut(points, sizes=None):
@@ -79,3 +81,60 @@ def test_a_polygon_that_crosses_itself_still_ends():
 def test_too_many_corners():
     with pytest.raises(MeshError, match="2001 corners"):
         triangulate(np.zeros((2001, 3)), np.arange(2001), np.array([2001]))
+
+
+MIXED = Polygons(
+    np.array([3, 4, 5]), np.array([[0, 1, 2], [3, 4, 5], [3, 5, 6], [7, 8, 9], [7, 9, 11], [9, 10, 11]])
+)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "triangles", "vertices", "words"),
+    [
+        ([4], [[0, 1, 2]], None, "do not fit"),
+        ([2, 3], [[0, 1, 2]], None, "do not fit"),
+        ([[3]], [[0, 1, 2]], None, "do not fit"),
+        ([3], [[0, 1, 2, 3]], None, "do not fit"),
+        ([3, 3], [[0, 1, 2], [2, 3, 4]], None, "corners of another polygon"),
+        ([3], [[-1, 0, 1]], None, "corners of another polygon"),
+        ([4], [[0, 1, 2], [0, 1, 2]], None, "no triangle has"),
+        ([3], [[0, 1, 2]], [0, 1], "vertices of shape (2,)"),
+    ],
+)
+def test_arrays_that_do_not_fit(sizes, triangles, vertices, words):
+    with pytest.raises(MeshError) as error:
+        Polygons(np.array(sizes), np.array(triangles), None if vertices is None else np.array(vertices))
+    assert words in error.value.problem and error.value.remedy
+
+
+def test_values_go_to_the_corners_and_back():
+    values = np.random.default_rng(0).random((12, 2))
+    corners = values[MIXED.triangles]
+    np.testing.assert_array_equal(MIXED.at_corners(corners), values)
+    assert MIXED.agreeing(corners).all()
+    corners[3, 1] += 1.0  # a corner of this triangle alone
+    assert MIXED.agreeing(corners).all()
+    corners[3, 2] += 1.0  # corner 9 is in three triangles
+    assert not MIXED.agreeing(corners)[3]
+
+
+def test_what_is_left_of_polygons():
+    drop = np.array([True, False, False, False, False, False])
+    rest = MIXED.without(drop)
+    assert rest.sizes.tolist() == [4, 5]
+    assert rest.triangles.tolist() == (MIXED.triangles[1:] - 3).tolist()
+    rest = MIXED.without(np.array([False, False, True, False, False, False]))
+    assert rest.sizes.tolist() == [3, 3, 5]
+    assert rest.triangles.tolist() == [[0, 1, 2], [3, 4, 5], *(MIXED.triangles[3:] - 1).tolist()]
+    vertices = np.arange(12) * 10
+    cut = replace(MIXED, vertices=vertices).without(np.zeros(6, bool), ~np.array([1, 1, 1, 1, 0, 1], bool))
+    assert cut.sizes.tolist() == [3, 4, 3, 3, 3]
+    assert cut.vertices is not None
+    np.testing.assert_array_equal(cut.vertices[cut.triangles], vertices[MIXED.triangles])
+
+
+def test_outlines_without_polygons_are_the_triangles():
+    values = np.arange(12).reshape(2, 3, 2)
+    sizes, (corners,) = outlines(None, [values])
+    assert sizes.tolist() == [3, 3]
+    np.testing.assert_array_equal(corners, values.reshape(6, 2))

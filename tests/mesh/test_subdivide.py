@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given, settings
 
 from mitex.errors import MeshError
+from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh, grid, icosphere, quality, subdivide_loop, subdivide_midpoint, torus
+from mitex.mesh.polygons import Polygons
 from mitex.mesh.subdivide import child_points
 from mitex.mesh.topology import mesh_edges
 from tests.mesh.examples import FAN, FAN_POINTS, meshes, octahedron
@@ -167,3 +169,29 @@ def test_impossible_numbers(subdivide):
         subdivide(octahedron(), -1)
     with pytest.raises(MeshError, match="stay below 32,000,000"):
         subdivide(octahedron(), 12)
+
+
+def test_midpoints_keep_hard_edges_and_interpolate_normals():
+    mesh = octahedron()
+    flat = Mesh(mesh.vertices, mesh.faces, None, "flat", np.repeat(mesh.face_normals[:, None], 3, axis=1))
+    fine = subdivide_midpoint(flat, 2)
+    assert fine.corner_normals is not None
+    np.testing.assert_allclose(fine.corner_normals, np.repeat(fine.face_normals[:, None], 3, 1), atol=1e-6)
+    round_one = Mesh(mesh.vertices, mesh.faces, None, "round", mesh.vertices[mesh.faces])
+    fine = subdivide_midpoint(round_one)
+    assert fine.corner_normals is not None
+    np.testing.assert_allclose(fine.corner_normals, unit(fine.vertices)[fine.faces], atol=1e-6)
+    # Where the ends of a side have opposite normals, the face's is in the middle.
+    normals = mesh.vertices[mesh.faces].copy()
+    normals[0, 1] = -normals[0, 0]
+    fine = subdivide_midpoint(Mesh(mesh.vertices, mesh.faces, None, "folded", normals))
+    assert fine.corner_normals is not None
+    np.testing.assert_allclose(fine.corner_normals[0, 1], mesh.face_normals[0], atol=1e-6)
+
+
+def test_loop_forgets_normals_and_both_forget_polygons():
+    mesh = grid(1, 1)
+    polygons = Polygons(np.array([4]), np.array([[0, 1, 2], [0, 2, 3]]))
+    quad = Mesh(mesh.vertices, mesh.faces, mesh.uv, "quad", mesh.normals[mesh.faces], polygons)
+    assert subdivide_loop(quad).corner_normals is None
+    assert subdivide_loop(quad).polygons is None and subdivide_midpoint(quad).polygons is None

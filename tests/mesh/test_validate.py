@@ -7,6 +7,7 @@ import pytest
 
 from mitex.errors import MeshError, MeshWarning
 from mitex.mesh import validate
+from mitex.mesh.polygons import Polygons
 from tests.mesh.examples import FAN, FAN_POINTS, OCTAHEDRON, OCTAHEDRON_POINTS
 
 
@@ -116,3 +117,66 @@ def test_uvs_that_are_not_finite_are_left_out():
     uv = np.zeros((3, 3, 2))
     uv[1, 2, 0] = np.nan
     assert mended(FAN_POINTS, FAN, "texture coordinates", uv).uv is None
+
+
+FLAT = np.sign(OCTAHEDRON_POINTS[OCTAHEDRON].mean(axis=1))[:, None].repeat(3, axis=1)  # not of length 1
+
+
+def test_normals_are_made_unit_and_kept():
+    mesh = quiet(OCTAHEDRON_POINTS, OCTAHEDRON, corner_normals=FLAT)
+    assert mesh.corner_normals is not None
+    np.testing.assert_allclose(mesh.corner_normals, FLAT / np.sqrt(3.0), atol=1e-6)
+
+
+def test_normals_that_are_the_smooth_ones_are_not_kept():
+    assert (
+        quiet(OCTAHEDRON_POINTS, OCTAHEDRON, corner_normals=OCTAHEDRON_POINTS[OCTAHEDRON]).corner_normals
+        is None
+    )
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 0.0])
+def test_damaged_normals_are_left_out(bad):
+    normals = FLAT.copy()
+    normals[3, 1] *= bad
+    with pytest.warns(MeshWarning, match="some normals are NaN, infinite or zero"):
+        mesh = validate(OCTAHEDRON_POINTS, OCTAHEDRON, corner_normals=normals)
+    assert mesh.corner_normals is None
+
+
+def test_normals_that_look_inwards_are_left_out():
+    with pytest.warns(MeshWarning, match="look away from the faces on 100% of the area"):
+        assert validate(OCTAHEDRON_POINTS, OCTAHEDRON, corner_normals=-FLAT).corner_normals is None
+    few = np.where(np.arange(8)[:, None, None] == 2, -FLAT, FLAT)
+    with pytest.warns(MeshWarning, match="look away from the faces on 12% of the area"):
+        assert validate(OCTAHEDRON_POINTS, OCTAHEDRON, corner_normals=few).corner_normals is None
+
+
+def test_a_sliver_may_have_normals_of_its_own():
+    points = np.concatenate([OCTAHEDRON_POINTS, [[1.0, 0.0, 1e-4]]])
+    with pytest.warns(MeshWarning, match="more than two faces"):
+        mesh = validate(
+            points,
+            np.concatenate([OCTAHEDRON, [[0, 2, 6]]]),
+            corner_normals=np.concatenate([FLAT, [[[0, 0, 1.0]] * 3]]),
+        )
+    assert mesh.corner_normals is not None
+
+
+def test_normals_of_a_wrong_shape_are_refused():
+    with pytest.raises(MeshError, match="corner_normals have shape"):
+        quiet(OCTAHEDRON_POINTS, OCTAHEDRON, corner_normals=FLAT[:, 0])
+
+
+def test_polygons_and_normals_of_dropped_faces_go():
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1]], float)
+    faces = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 3], [1, 0, 4], [0, 3, 4]])
+    polygons = Polygons(
+        np.array([4, 3, 3, 3]), np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [7, 8, 9], [10, 11, 12]])
+    )
+    normals = np.tile([0.0, 0.0, 1.0], (5, 3, 1))
+    normals[3], normals[4] = [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]
+    with pytest.warns(MeshWarning, match="degenerate faces"):
+        mesh = validate(points, faces, corner_normals=normals, polygons=polygons)
+    assert mesh.polygons is not None and mesh.polygons.sizes.tolist() == [4, 3, 3]
+    np.testing.assert_array_equal(mesh.shading_normals, normals[[0, 1, 3, 4]])

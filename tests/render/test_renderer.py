@@ -9,6 +9,7 @@ import pytest
 
 from mitex.asset import Asset
 from mitex.errors import ConfigError
+from mitex.geometry.tangents import split_at_hard_edges
 from mitex.mesh import Mesh, icosphere
 from mitex.render.renderer import OrbitRenderer, _facing, _material, _surface
 
@@ -111,9 +112,39 @@ def test_roughness_stays_off_zero():
 
 def test_displacement_moves_along_the_normals_by_the_squared_height():
     height = np.linspace(0, 1, len(SPHERE.vertices))[:, None]
-    positions, _, detail = _surface(Asset(SPHERE, {"height": height}), SPHERE.normalised()[1], 0.1)
+    asset, split = Asset(SPHERE, {"height": height}), split_at_hard_edges(SPHERE)
+    positions, _, detail = _surface(asset, split, SPHERE.normalised()[1], 0.1)
     np.testing.assert_allclose(np.linalg.norm(positions, axis=1), 1 + 0.1 * height[:, 0] ** 2, atol=1e-4)
     assert np.abs(detail - SPHERE.normals).max() > 0.01  # no normal map: relief from the surface itself
+
+
+def cube() -> Mesh:
+    """Eight vertices, and the normals of the faces."""
+    points = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+    squares = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    mesh = Mesh(points, squares[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3))
+    return replace(mesh, corner_normals=np.repeat(mesh.face_normals[:, None], 3, axis=1))
+
+
+@pytest.mark.parametrize("bake", [False, True])
+def test_hard_edges_look_as_if_the_vertices_were_split(bake):
+    hard = cube()
+    split = split_at_hard_edges(hard)
+    apart = Mesh(hard.vertices[split.source], split.faces)
+    images = []
+    for mesh, source in (
+        (hard, np.arange(8)),
+        (apart, split.source),
+        (replace(hard, corner_normals=None), None),
+    ):
+        albedo = 0.5 + 0.3 * hard.vertices[np.arange(8) if source is None else source]
+        asset = Asset(mesh, {"albedo": albedo})
+        if bake:
+            layout = np.random.default_rng(0).random((12, 3, 2)).astype(np.float32)
+            asset = asset.baked(64, layout=layout)
+        images.append(picture(asset, azimuth=0.5, elevation=0.4))
+    np.testing.assert_allclose(images[0], images[1], atol=1e-4)
+    assert np.abs(images[0] - images[2]).max() > 0.05
 
 
 def test_the_size_of_the_mesh_does_not_matter():

@@ -217,7 +217,7 @@ class _Accessors:
 
 
 def _join(name: str, parts: list[tuple[_Accessors, dict, np.ndarray]]) -> Soup:
-    vertices, faces, uvs, start = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], [], 0
+    vertices, faces, uvs, normals, start = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], [], [], 0
     for source, primitive, matrix in parts:
         local = source[primitive["attributes"]["POSITION"]].astype(np.float64)
         triangles = _triangles(source, primitive, len(local))
@@ -230,15 +230,25 @@ def _join(name: str, parts: list[tuple[_Accessors, dict, np.ndarray]]) -> Soup:
             uv = source[primitive["attributes"]["TEXCOORD_0"]][triangles].astype(np.float64)
             uv[:, :, 1] = 1.0 - uv[:, :, 1]  # glTF counts v downwards
             uvs.append(uv)
+        if "NORMAL" in primitive["attributes"]:
+            normals.append(_turned(source[primitive["attributes"]["NORMAL"]], matrix)[triangles])
         vertices.append(local @ matrix[:3, :3].T + matrix[:3, 3])
         faces.append(triangles + start)
         start += len(local)
     soup = Soup(np.concatenate(vertices), np.concatenate(faces), split=True)
-    if uvs and len(uvs) == len(parts):
-        soup.uv = np.concatenate(uvs)
-    elif uvs:
-        soup.notes.append("only some parts have texture coordinates, so they were left out")
+    soup.uv, soup.normals = (np.concatenate(a) if len(a) == len(parts) > 0 else None for a in (uvs, normals))
+    for what, values in (("texture coordinates", uvs), ("normals", normals)):
+        if 0 < len(values) < len(parts):
+            soup.notes.append(f"only some parts have {what}, so they were left out")
     return soup
+
+
+def _turned(normals: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """Normals (V, 3) under a transform, of any length: times its cofactors, which reflections turn around."""
+    rows = matrix[:3, :3]
+    with np.errstate(invalid="ignore"):
+        cofactors = np.cross(np.roll(rows, -1, axis=0), np.roll(rows, -2, axis=0))
+        return normals.astype(np.float64) @ cofactors.T * np.sign(np.linalg.det(rows))
 
 
 def _triangles(source: _Accessors, primitive: dict, count: int) -> np.ndarray:

@@ -47,9 +47,10 @@ def read_obj(name: str, data: bytes, max_vertices: int) -> Soup:
     uv = _looked_up(name, "texture coordinate", lines.uvs, corners[:, 1], 2)
     normals = _looked_up(name, "normal", lines.normals, corners[:, 2], 3)
     vertices = np.array(lines.vertices, np.float64)
-    soup = polygon_soup(name, vertices, corners[:, 0], np.array(lines.sizes, np.int64), uv)
-    if uv is None and (corners[:, 1] != MISSING).any():
-        soup.notes.append("only some faces have texture coordinates, so they were left out")
+    soup = polygon_soup(name, vertices, corners[:, 0], np.array(lines.sizes, np.int64), uv, normals)
+    for what, values, column in (("texture coordinates", uv, 1), ("normals", normals, 2)):
+        if values is None and (corners[:, column] != MISSING).any():
+            soup.notes.append(f"only some faces have {what}, so they were left out")
     values = [x for x in (uv, normals) if x is not None]
     if values:
         soup.attributes = np.zeros((len(vertices), sum(x.shape[1] for x in values)))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mitex.errors import MeshError
-from mitex.mesh.readers.soup import DAMAGED, Soup, check_budget, polygon_soup
+from mitex.mesh.readers.soup import DAMAGED, Soup, check_budget, check_indices, polygon_soup
 
 # Types by any of their names, as numpy codes without byte order.
 TYPES = {
@@ -55,6 +55,18 @@ def read_ply(name: str, data: bytes, max_vertices: int) -> Soup:
     Raises:
         MeshError: not a PLY file, a damaged header, data that end early, too many vertices.
     """
+    return soup_of_tables(name, read_tables(name, data, max_vertices)[0])
+
+
+def read_tables(name: str, data: bytes, max_vertices: int) -> tuple[dict[str, dict], int]:
+    """The elements of a PLY file up to vertices and faces, and how many bytes or numbers come after them.
+
+    Returns:
+        Element -> property -> (count,) values; lists of numbers as an object of their own.
+
+    Raises:
+        MeshError: as `read_ply`.
+    """
     order, elements, start = _header(name, data)
     for element in elements:
         if element.name == "vertex":
@@ -68,10 +80,15 @@ def read_ply(name: str, data: bytes, max_vertices: int) -> Soup:
         tables[element.name] = _read_element(body, element)
         if "vertex" in tables and "face" in tables:
             break
-    return _assemble(name, tables)
+    return tables, body.left
 
 
-def _assemble(name: str, tables: dict[str, dict]) -> Soup:
+def soup_of_tables(name: str, tables: dict[str, dict]) -> Soup:
+    """The mesh in the elements of a PLY file.
+
+    Raises:
+        MeshError: no positions, or an index that does not exist.
+    """
     points = tables.get("vertex", {})
     if not all(axis in points for axis in "xyz"):
         raise MeshError(
@@ -84,18 +101,26 @@ def _assemble(name: str, tables: dict[str, dict]) -> Soup:
         lists = _Ragged(np.empty(0, np.int64), np.empty(0, np.int64))
     with np.errstate(invalid="ignore"):
         corners = lists.values.astype(np.int64)
+    check_indices(name, corners, len(vertices))
     uv_columns = next((names for names in UV_NAMES if all(n in points for n in names)), ())
     texcoord = table.get("texcoord")
-    uv = None
+    uv = normals = None
     if isinstance(texcoord, _Ragged) and np.array_equal(texcoord.sizes, 2 * lists.sizes):
         uv = texcoord.values.astype(np.float64).reshape(-1, 2)
-    elif uv_columns and corners.size and corners.min() >= 0 and corners.max() < len(vertices):
-        uv = np.stack([points[n] for n in uv_columns], axis=1).astype(np.float64)[corners]
-    soup = polygon_soup(name, vertices, corners, lists.sizes.astype(np.int64), uv)
+    elif uv_columns:
+        uv = _gathered(points, uv_columns, corners)
+    if all(n in points for n in NORMAL_NAMES):
+        normals = _gathered(points, NORMAL_NAMES, corners)
+    soup = polygon_soup(name, vertices, corners, lists.sizes.astype(np.int64), uv, normals)
     columns = [points[n] for n in (*uv_columns, *NORMAL_NAMES) if n in points]
     if columns:
         soup.attributes = np.stack(columns, axis=1).astype(np.float64)
     return soup
+
+
+def _gathered(points: dict[str, np.ndarray], columns: tuple[str, ...], corners: np.ndarray) -> np.ndarray:
+    """(N, k) float64 values of vertex columns at corners (N,)."""
+    return np.stack([points[n] for n in columns], axis=1).astype(np.float64)[corners]
 
 
 def _header(name: str, data: bytes) -> tuple[str, list[_Element], int]:
@@ -132,6 +157,11 @@ class _Binary:
     def __init__(self, name: str, data: bytes, start: int, order: str):
         self.name, self.data, self.position, self.order = name, data, start, order
 
+    @property
+    def left(self) -> int:
+        """Bytes not yet read."""
+        return len(self.data) - self.position
+
     def table(self, columns: list[tuple[str, str, int]], count: int) -> dict[str, np.ndarray] | None:
         """`count` rows of columns (name, type, width), each (count, width); None if the data end before."""
         # Numbered fields, because the header may repeat a name.
@@ -155,6 +185,11 @@ class _Text:
             self.numbers = np.array(list(map(float, text.split())))
         except ValueError as error:
             raise MeshError(f"{name} has something between its numbers that is none", DAMAGED) from error
+
+    @property
+    def left(self) -> int:
+        """Numbers not yet read."""
+        return len(self.numbers) - self.position
 
     def table(self, columns: list[tuple[str, str, int]], count: int) -> dict[str, np.ndarray] | None:
         ends = np.cumsum([width for _, _, width in columns])

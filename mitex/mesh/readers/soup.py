@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mitex.errors import MeshError
-from mitex.mesh.polygons import triangulate
+from mitex.mesh.polygons import Polygons, triangulate
 
 DAMAGED = "the file is damaged or cut off; export or download it again"
 
@@ -20,6 +20,8 @@ class Soup:
         vertices: (V, 3) float64 positions, maybe not finite.
         faces: (F, 3) int64 indices in [0, V).
         uv: (F, 3, 2) float64 corner UVs, v up, or None.
+        normals: (F, 3, 3) float64 corner normals of any length, or None.
+        polygons: those that the triangles were cut from, or None where all were triangles.
         attributes: (V, k) float64 per-vertex UVs and normals, or None. Coincident vertices that differ in
             them were one vertex before a seam split it.
         split: the format always splits vertices at seams.
@@ -29,15 +31,22 @@ class Soup:
     vertices: np.ndarray
     faces: np.ndarray
     uv: np.ndarray | None = None
+    normals: np.ndarray | None = None
+    polygons: Polygons | None = None
     attributes: np.ndarray | None = None
     split: bool = False
     notes: list[str] = field(default_factory=list)
 
 
 def polygon_soup(
-    name: str, vertices: np.ndarray, corners: np.ndarray, sizes: np.ndarray, uv: np.ndarray | None = None
+    name: str,
+    vertices: np.ndarray,
+    corners: np.ndarray,
+    sizes: np.ndarray,
+    uv: np.ndarray | None = None,
+    normals: np.ndarray | None = None,
 ) -> Soup:
-    """Triangulates polygons.
+    """Triangulates polygons, at their positions in float32, so that those of an exported mesh are cut alike.
 
     Args:
         name: for messages.
@@ -45,16 +54,26 @@ def polygon_soup(
         corners: (N,) vertex index of every polygon corner, polygon after polygon.
         sizes: (P,) number of corners of each polygon; those with fewer than 3 are left out.
         uv: (N, 2) per corner, or None.
+        normals: (N, 3) per corner, or None.
 
     Raises:
         MeshError: a corner is not in [0, V).
     """
     check_indices(name, corners, len(vertices))
-    triangles = triangulate(vertices, corners, sizes)
-    soup = Soup(vertices, corners[triangles], None if uv is None else uv[triangles])
-    short = int((sizes < 3).sum())
-    if short:
-        soup.notes.append(f"left out faces with fewer than 3 corners: {short:,}")
+    short = sizes < 3
+    if short.any():
+        used = np.repeat(~short, sizes)
+        corners, sizes = corners[used], sizes[~short]
+        uv, normals = (None if values is None else values[used] for values in (uv, normals))
+    with np.errstate(over="ignore"):
+        points = vertices.astype(np.float32).astype(np.float64)
+    triangles = triangulate(points, corners, sizes)
+    soup = Soup(vertices, corners[triangles])
+    soup.uv, soup.normals = (None if values is None else values[triangles] for values in (uv, normals))
+    if (sizes > 3).any():
+        soup.polygons = Polygons(sizes, triangles)
+    if short.any():
+        soup.notes.append(f"left out faces with fewer than 3 corners: {short.sum():,}")
     return soup
 
 

@@ -19,6 +19,7 @@ from mitex.geometry.normal_maps import decode
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import rotate_about, unit_normals
 from mitex.mesh import Mesh
+from mitex.mesh.arrays import mesh_arrays, mesh_of_arrays
 from mitex.methods.surface import METHOD
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.training import model_file
@@ -86,7 +87,7 @@ class SurfaceTexture:
 
     def save(self, path: str | Path) -> Path:
         """Writes mesh, texels and `about` as one safetensors file."""
-        arrays = {"vertices": self.mesh.vertices, "faces": self.mesh.faces, "uv": self.domain.uv}
+        arrays = mesh_arrays(self.mesh)
         if self.domain.orientation is not None:
             arrays["orientation"] = self.domain.orientation
         tensors = {name: torch.from_numpy(np.ascontiguousarray(a)) for name, a in arrays.items()}
@@ -103,7 +104,7 @@ class SurfaceTexture:
         """
         with model_file.opened(source, METHOD.name) as (tensors, about):
             arrays = {key: tensor.numpy() for key, tensor in tensors.items()}
-            mesh = Mesh(arrays["vertices"], arrays["faces"], arrays["uv"], str(about["mesh"]))
+            mesh = mesh_of_arrays(arrays, str(about["mesh"]))
             resolution, angle = int(about["resolution"]), float(about["angle"])
             orientation = arrays.get("orientation")
             domain = SurfaceDomain(mesh, resolution, str(about["frames"]), angle, orientation)
@@ -125,9 +126,8 @@ class SurfaceTexture:
     def _normals(self, atlas: Atlas, channels: tuple[int, ...], used: np.ndarray) -> np.ndarray:
         """The normal map, from the texels' frames into those of the atlas."""
         texels, (right, up) = self.domain.texels, self.domain.tangent_frames
-        # Bumps are added to the smooth surface that viewers shade, not to its flat faces.
-        corners = self.mesh.normals[self.mesh.faces[texels.face]]
-        smooth = interpolate(texels.barycentric, corners)
+        # Bumps are added to the surface that viewers shade, smooth but for hard edges, not to its flat faces.
+        smooth = interpolate(texels.barycentric, self.mesh.shading_normals[texels.face])
         flat = unit_normals(self.mesh.face_crosses[texels.face])
         detail = decode(self.values[:, channels], right, up, flat) - flat + smooth
         return atlas.normal_map(self.mesh, spread(texels.image(detail), used, PADDING))

@@ -264,3 +264,26 @@ def test_refuses_the_old_container(tmp_path):
     path.write_bytes(struct.pack("<4sIIII", b"glTF", 1, 100, 50, 0) + b" " * 80)
     with pytest.raises(MeshError, match="version 1"):
         Mesh.load(path)
+
+
+@pytest.mark.parametrize("scale", [[1, 1, 1], [2, 1, 1], [-1, 1, 3], [-2, -1, -1]])
+def test_normals_follow_their_nodes(scale, tmp_path):
+    half = math.sqrt(0.5)
+    points, normals = (
+        OCTAHEDRON_POINTS[OCTAHEDRON].reshape(-1, 3),
+        np.sign(OCTAHEDRON_POINTS[OCTAHEDRON].sum(axis=1)),
+    )
+    normals = np.repeat(normals, 3, axis=0) / math.sqrt(3.0)
+    node = {"mesh": 0, "scale": scale, "rotation": [0, half, 0, half], "translation": [3, 4, 5]}
+    mesh = load(tmp_path, *gltf([{"positions": points, "normals": normals}], [node]))
+    assert mesh.corner_normals is not None
+    np.testing.assert_allclose(mesh.corner_normals, np.repeat(mesh.face_normals[:, None], 3, 1), atol=1e-6)
+
+
+def test_normals_of_some_parts_only_are_left_out(tmp_path):
+    far = {"positions": FAN_POINTS + 5.0, "indices": TETRAHEDRON}
+    near = {**PART, "normals": np.tile([1.0, 0.0, 0.0], (4, 1))}
+    with pytest.warns(MeshWarning) as record:
+        mesh = load(tmp_path, *gltf([near, far]))
+    assert any("only some parts have normals" in str(w.message) for w in record)
+    assert mesh.corner_normals is None

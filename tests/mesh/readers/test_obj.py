@@ -121,3 +121,20 @@ def test_bytes_that_are_no_text_do_no_harm(tmp_path):
     assert len(mesh.faces) == 2
     with pytest.raises(MeshError, match="line 2 of"):
         load(tmp_path, b"\nv 1 2 \xff\n")
+
+
+def test_normals_of_some_faces_only_are_left_out(tmp_path):
+    with pytest.warns(MeshWarning, match="only some faces have normals"):
+        mesh = load(tmp_path, f"{SQUARE}vn 0 1 1\nf 1//1 2//1 3//1\nf 1 3 4\n")
+    assert mesh.corner_normals is None
+
+
+def test_faces_of_two_corners_do_not_shift_what_follows(tmp_path):
+    values = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 1 1\nvn 0 0 1\n"
+    text = f"{SQUARE}{values}f 1/1/2 2/1/2\nf 1/1/1 2/2/1 3/3/2 4/4/2\n"
+    with pytest.warns(MeshWarning, match="fewer than 3 corners: 1"):
+        mesh = load(tmp_path, text)
+    assert mesh.polygons is not None and mesh.polygons.sizes.tolist() == [4]
+    np.testing.assert_array_equal(mesh.uv, (mesh.vertices[:, :2])[mesh.faces])
+    assert mesh.corner_normals is not None
+    np.testing.assert_allclose(mesh.corner_normals[0], [[0, 0.5**0.5, 0.5**0.5]] * 2 + [[0, 0, 1]], atol=1e-6)

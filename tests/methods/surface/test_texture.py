@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from mitex.errors import CheckpointError
-from mitex.mesh import grid
+from mitex.mesh import Mesh, grid
+from mitex.mesh.polygons import Polygons
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.texture import SurfaceTexture
 
@@ -29,3 +30,18 @@ def test_maps_and_channels_that_do_not(tmp_path, maps, channels):
     path = _saved(tmp_path / "a.safetensors", maps, channels)
     with pytest.raises(CheckpointError, match="not a surface texture"):
         SurfaceTexture.load(path)
+
+
+def test_hard_edges_and_polygons_are_kept(tmp_path):
+    flat = grid(1, 1)
+    normals = np.tile(np.array([0.6, 0.0, 0.8], np.float32), (2, 3, 1))
+    polygons = Polygons(np.array([4]), np.array([[0, 1, 2], [0, 2, 3]]), np.array([3, 1, 0, 2]))
+    mesh = Mesh(flat.vertices, flat.faces, flat.uv, "quad", normals, polygons)
+    domain = SurfaceDomain(mesh, 16, "fixed")
+    values = np.zeros((len(domain.texels.index), 3), np.float32)
+    path = SurfaceTexture(domain, values, ("albedo",), ABOUT).save(tmp_path / "a.safetensors")
+    loaded = SurfaceTexture.load(path).apply().mesh
+    np.testing.assert_array_equal(loaded.corner_normals, normals)
+    assert loaded.polygons is not None
+    for name in ("sizes", "triangles", "vertices"):
+        np.testing.assert_array_equal(getattr(loaded.polygons, name), getattr(polygons, name))

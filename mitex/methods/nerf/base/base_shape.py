@@ -92,7 +92,7 @@ def given_base(mesh: Mesh, edge: float = EDGE) -> Mesh:
     if not len(boundary_edges(mesh.faces, len(mesh.vertices))) and _volume(mesh) < 0.0:
         warnings.warn(f"{mesh.name}: faces look inwards and were turned", MeshWarning, stacklevel=2)
         uv = None if mesh.uv is None else mesh.uv[:, ::-1]
-        mesh = replace(mesh, faces=mesh.faces[:, ::-1], uv=uv)
+        mesh = Mesh(mesh.vertices, mesh.faces[:, ::-1], uv, mesh.name)
     length = edge * _diagonal(mesh)
     longest = np.linalg.norm(mesh.vertices[mesh.edges.rows] - mesh.vertices[mesh.edges.indices], axis=1).max()
     return mesh if longest <= FINE * length else _even(mesh, length)
