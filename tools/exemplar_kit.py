@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import spatial
+from scipy import ndimage, spatial
 
 from mitex.geometry.vectors import unit
 
@@ -53,6 +53,11 @@ def blur(field: np.ndarray, sigma: float) -> np.ndarray:
     f = np.fft.fftfreq(FINE, 1 / FINE)
     transfer = np.exp(-2.0 * (np.pi * sigma * f) ** 2)
     return np.fft.ifft2(np.fft.fft2(field) * transfer[None, :] * transfer[:, None]).real
+
+
+def sample(field: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """The periodic field at any positions, interpolated linearly."""
+    return ndimage.map_coordinates(field, [y * FINE - 0.5, x * FINE - 0.5], order=1, mode="grid-wrap")
 
 
 def step(low: float, high: float, x: np.ndarray) -> np.ndarray:

@@ -11,7 +11,10 @@ from PIL import Image
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize("name", ["cobblestone", "lava", "scales", "wicker"])
+@pytest.mark.parametrize(
+    "name",
+    ["bricks", "cobblestone", "hexagons", "knit", "lava", "leather", "planks", "rust", "scales", "wicker"],
+)
 def test_the_package_holds_what_the_script_makes(name, monkeypatch):
     monkeypatch.syspath_prepend(str(ROOT / "tools"))
     monkeypatch.delitem(sys.modules, "make_exemplars", raising=False)
