@@ -1,5 +1,6 @@
 """Fixtures for all tests."""
 
+import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,6 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+# As the commands do that go to and fro between torch and Dr.Jit; see `mitex.runtime.let_idle_threads_sleep`.
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 
 @pytest.fixture(autouse=True)

@@ -45,6 +45,9 @@ class Fit(ExemplarOptions):
     def run(self) -> None:
         options = self.run_options()
         mutually_exclusive("--resume", "--init", self.resume and self.init is not None)
+        from mitex.runtime import let_idle_threads_sleep
+
+        let_idle_threads_sleep()
         from mitex.exemplar import Exemplar
 
         exemplar = Exemplar.load(self.exemplar)
@@ -159,6 +162,9 @@ class Apply(OptionalMeshOptions):
             reject_unused("--variants", out, self.variants > 1 and suffix != ".glb")
 
     def write(self, out: Path) -> None:
+        from mitex.runtime import let_idle_threads_sleep
+
+        let_idle_threads_sleep()
         from mitex.export import write_maps, write_variants
         from mitex.methods.nca import NcaTexture
 

@@ -53,6 +53,9 @@ class Demo:
     def run(self) -> None:
         in_range("--seed", self.seed, *SEEDS)
         in_range("--steps", self.steps, 1)
+        from mitex.runtime import let_idle_threads_sleep
+
+        let_idle_threads_sleep()
         start = time.monotonic()
         for path in demo(self.out, self.seed, self.steps, lambda line: print(line, flush=True)):
             print(path)
