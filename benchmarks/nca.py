@@ -68,25 +68,25 @@ class Bench:
         self.task = NcaTask(config, exemplar)
         ((self.size, self.appearance),) = self.task.zooms.items()
         self.config, self.rule, self.network = config, self.task.look.rule, self.appearance.network
-        self.ground = self.task.grounds[0]
+        self.sphere = self.task.spheres[0]
         self.adam = Adam(self.task.parameters)
         generator = torch.Generator().manual_seed(0)
         self.task.pool.uniform_(-0.2, 0.2, generator=generator)  # as full of states as in a training
         self.task._touched.fill_(True)
         self.state = self.task.pool[:1].clone()
         cameras = self._cameras(generator)
-        self.visibility, hits = self.ground.stage.visibility(cameras), self.ground.stage.hits(cameras)
+        self.visibility, hits = self.sphere.stage.visibility(cameras), self.sphere.stage.hits(cameras)
         self.points = Points(hits.face, hits.barycentric)
         with torch.no_grad():
-            self.images = self.ground.views(self.task.look, self.state[0], cameras).contiguous()
+            self.images = self.sphere.views(self.task.look, self.state[0], cameras).contiguous()
         self.places, self.targets = self._targets(generator)
         with torch.no_grad():
             self.vectors = self.network.samples(self.images, self.places)
         self.upstream = {k: torch.randn(v.shape, generator=generator) for k, v in self.vectors.items()}
-        self.plain, self.passing = naive.vgg_weights(), naive.MessagePassing.of(self.ground.mesh)
+        self.plain, self.passing = naive.vgg_weights(), naive.MessagePassing.of(self.sphere.mesh)
 
     def _cameras(self, generator: torch.Generator) -> Cameras:
-        return self.task.cameras(self.ground.mesh, self.size, generator)
+        return self.task.cameras(self.sphere.mesh, self.size, generator)
 
     def _targets(self, generator: torch.Generator) -> tuple[dict[str, torch.Tensor], dict[str, torch.Tensor]]:
         """Places to sample in the views, and as many vectors of the exemplar."""
@@ -109,7 +109,7 @@ class Bench:
 
     def nca(self) -> None:
         generator = torch.Generator().manual_seed(1)
-        state = self.rule.evolve(self.state, self.ground.perception, STEPS, generator)
+        state = self.rule.evolve(self.state, self.sphere.perception, STEPS, generator)
         torch.autograd.grad(state, self.task.parameters, torch.ones_like(state))
 
     def vgg(self) -> None:
@@ -132,10 +132,10 @@ class Bench:
         total.backward()
 
     def visible(self) -> None:
-        self.ground.stage.hits(self._cameras(torch.Generator().manual_seed(2)))
+        self.sphere.stage.hits(self._cameras(torch.Generator().manual_seed(2)))
 
     def lookup(self) -> None:
-        state, surface = self.state[0].clone().requires_grad_(), self.ground.surface
+        state, surface = self.state[0].clone().requires_grad_(), self.sphere.surface
         values = self.task.look.decoder(surface, surface.table(state), self.points)
         torch.autograd.grad(values, state, torch.ones_like(values))
 
@@ -170,7 +170,7 @@ class Bench:
         self.adam.clear()
         generator = torch.Generator().manual_seed(3)
         state = self._naive_evolve(self.task.pool[:1].clone(), generator)
-        images = self._naive_lookup(state[0], self.ground.stage.visibility(self._cameras(generator)))
+        images = self._naive_lookup(state[0], self.sphere.stage.visibility(self._cameras(generator)))
         vectors = naive.vectors(naive.vgg(images, self.plain), self.places)
         loss = self._naive_loss(vectors, images.flatten(1, 2)[:, : self.config.samples])
         (loss + self.config.overflow_weight * overflow_loss(state)).backward()
@@ -204,7 +204,7 @@ class Bench:
     def check(self) -> None:
         """Both ways compute the same: the gradients of the automaton, and the views."""
         upstream = torch.randn(self.state.shape, generator=torch.Generator().manual_seed(5))
-        ours = self.rule.evolve(self.state, self.ground.perception, 3, torch.Generator().manual_seed(1))
+        ours = self.rule.evolve(self.state, self.sphere.perception, 3, torch.Generator().manual_seed(1))
         generator, theirs = torch.Generator().manual_seed(1), self.state
         for _ in range(3):
             mask = torch.rand(theirs.shape[:2], generator=generator) < FIRE_RATE
@@ -296,7 +296,7 @@ def main() -> None:
     console = Console()
     console.print(cpu())
     bench = Bench(config, options.repetitions)
-    vertices, views = len(bench.ground.mesh.vertices), f"{config.view_count} views of {config.resolution}^2"
+    vertices, views = len(bench.sphere.mesh.vertices), f"{config.view_count} views of {config.resolution}^2"
     console.print(f"{vertices:,} vertices, {views} pixels, VGG-16 in {bench.network.dtype}")
     show(*measure(bench, 8 if options.quick else 32), console)
 

@@ -26,7 +26,7 @@ from mitex.mesh import Mesh, icosphere, scattered_sphere
 from mitex.methods.nca import NcaTexture, fit
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
-from mitex.methods.nca.grounds import Ground
+from mitex.methods.nca.spheres import TrainingSphere
 from mitex.render import sheet
 from mitex.scenes.cameras import patch_views
 from mitex.training import checkpoint
@@ -61,13 +61,13 @@ def main() -> None:
 def views(texture: NcaTexture) -> tuple[np.ndarray, np.ndarray]:
     """The albedo on a sphere: as wide as the exemplar, and an eighth of that."""
     mesh = icosphere(FREQUENCY)
-    ground, state = Ground.of(mesh, texture.look), texture.grow(mesh)
+    sphere, state = TrainingSphere.of(mesh, texture.look), texture.grow(mesh)
     edge = float(np.sqrt(8 * np.pi / np.sqrt(3) / len(mesh.vertices)))
     half = 0.5 * float(texture.about["density"]) * edge
     pictures = []
     for width in (half, half / 8):
         cameras = patch_views(torch.Generator().manual_seed(0), mesh, 1, width, CELL)
-        view = ground.views(texture.look, state, cameras, antialias=3)[0]
+        view = sphere.views(texture.look, state, cameras, antialias=3)[0]
         pictures.append(view[..., list(texture.look.layout["albedo"])].clamp(0, 1).numpy())
     return pictures[0], pictures[1]
 

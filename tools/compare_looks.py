@@ -25,7 +25,7 @@ from mitex.features import Vgg16
 from mitex.losses import relaxed_transport
 from mitex.mesh import icosphere
 from mitex.methods.nca import NcaTexture
-from mitex.methods.nca.grounds import Ground
+from mitex.methods.nca.spheres import TrainingSphere
 from mitex.scenes.cameras import patch_views
 
 PATCHES, WIDEST, SIDE = 6, 0.65, 256
@@ -54,13 +54,13 @@ def main() -> None:
 def patches(texture: NcaTexture, size: int) -> dict[str, np.ndarray]:
     """Patches (K, h, w, 3) of each map, in which the exemplar's width would be `size` [px]."""
     mesh = icosphere(FREQUENCIES[hasattr(texture.look.decoder, "network")])
-    ground, state = Ground.of(mesh, texture.look), texture.grow(mesh)
+    sphere, state = TrainingSphere.of(mesh, texture.look), texture.grow(mesh)
     edge = math.sqrt(8 * math.pi / math.sqrt(3) / len(mesh.vertices))
     width = float(texture.about["density"]) * edge
     half = min(0.5 * width, WIDEST)
     pixels = round(size * 2 * half / width)
     cameras = patch_views(torch.Generator().manual_seed(0), mesh, PATCHES, half, pixels)
-    views = ground.views(texture.look, state, cameras, antialias=2).clamp(0, 1).numpy()
+    views = sphere.views(texture.look, state, cameras, antialias=2).clamp(0, 1).numpy()
     return {name: rgb(views[..., list(columns)]) for name, columns in texture.look.layout.items()}
 
 

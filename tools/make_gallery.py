@@ -20,7 +20,7 @@ from mitex.exemplar import names as exemplar_names
 from mitex.images import write_image
 from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods.nca import NcaTexture
-from mitex.methods.nca.grounds import Ground
+from mitex.methods.nca.spheres import TrainingSphere
 from mitex.render import sheet, still, tone
 from mitex.scenes.cameras import orbit
 
@@ -36,10 +36,10 @@ FREQUENCY, RESOLUTION, CELL = 32, 2048, 256
 def unlit(texture: NcaTexture) -> list[np.ndarray]:
     """Views of every map on the training sphere, in the order of the exemplar's names."""
     mesh = icosphere(FREQUENCY)
-    ground = Ground.of(mesh, texture.look)
+    sphere = TrainingSphere.of(mesh, texture.look)
     with torch.no_grad():
         cameras = orbit(1, distance=2.05, resolution=CELL)
-        view = ground.views(texture.look, texture.grow(mesh), cameras, antialias=4)[0].clamp(0, 1).numpy()
+        view = sphere.views(texture.look, texture.grow(mesh), cameras, antialias=4)[0].clamp(0, 1).numpy()
     return [np.broadcast_to(view[..., list(c)], (CELL, CELL, 3)) for c in texture.look.layout.values()]
 
 

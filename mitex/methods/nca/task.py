@@ -14,8 +14,8 @@ from mitex.losses import overflow_loss
 from mitex.mesh import Mesh
 from mitex.methods.nca.appearance import Appearance
 from mitex.methods.nca.config import NcaConfig
-from mitex.methods.nca.grounds import Ground, grounds
 from mitex.methods.nca.look import Look
+from mitex.methods.nca.spheres import TrainingSphere, training_spheres
 from mitex.methods.nca.targets import Targets, enlarged
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, orbit, patch_views, random_views
@@ -46,9 +46,9 @@ class NcaTask:
             self.look.initialise(torch.Generator().manual_seed(config.seed), config.gain)
         else:
             self.look.load_state_dict(init.state_dict())
-        self.grounds = grounds(config, self.look)
+        self.spheres = training_spheres(config, self.look)
         self.zooms = self._appearances()
-        self.pool = torch.zeros(config.pool, len(self.grounds[0].mesh.vertices), config.channels)
+        self.pool = torch.zeros(config.pool, len(self.spheres[0].mesh.vertices), config.channels)
         self._touched = torch.zeros(config.pool, dtype=torch.bool)
 
     def _appearances(self) -> dict[int, Appearance]:
@@ -82,11 +82,11 @@ class NcaTask:
         if step % config.inject_every == 0:
             state = torch.zeros_like(state)
         steps = int(torch.randint(config.min_steps, config.max_steps + 1, (), generator=generator))
-        ground = self.ground(index)
-        state = self.look.rule.evolve(state, ground.perception, steps, generator)
+        sphere = self.sphere(index)
+        state = self.look.rule.evolve(state, sphere.perception, steps, generator)
         losses = []
         for size, appearance in self.zooms.items():
-            views = ground.views(self.look, state[0], self.cameras(ground.mesh, size, generator))
+            views = sphere.views(self.look, state[0], self.cameras(sphere.mesh, size, generator))
             losses.append(appearance(views, generator))
         appearance, overflow = torch.stack(losses).mean(), overflow_loss(state)
         return Step(
@@ -99,9 +99,9 @@ class NcaTask:
         self.pool[index], self._touched[index] = state, True
         self.look.track(state)
 
-    def ground(self, index: int) -> Ground:
+    def sphere(self, index: int) -> TrainingSphere:
         """Where a state of the pool grows."""
-        return self.grounds[index % len(self.grounds)]
+        return self.spheres[index % len(self.spheres)]
 
     def cameras(self, mesh: Mesh, size: int, generator: torch.Generator) -> Cameras:
         """The views of one step in which the exemplar is `size` [px] wide."""
@@ -137,12 +137,12 @@ class NcaTask:
         """
         generator = torch.Generator().manual_seed(step)
         index = int(torch.randint(self.config.pool, (), generator=generator))
-        ground, state = self.ground(index), self.pool[index][None]
-        state = self.look.rule.evolve(state, ground.perception, self.config.max_steps, generator)[0]
+        sphere, state = self.sphere(index), self.pool[index][None]
+        state = self.look.rule.evolve(state, sphere.perception, self.config.max_steps, generator)[0]
         wide = min(0.5 * self.width, WIDEST)
-        cameras = [patch_views(generator, ground.mesh, 1, half, PREVIEW) for half in (wide, wide / 4)]
+        cameras = [patch_views(generator, sphere.mesh, 1, half, PREVIEW) for half in (wide, wide / 4)]
         cameras.append(orbit(1, distance=2.05, resolution=PREVIEW))
-        views = [ground.views(self.look, state, c, antialias=2)[0].numpy() for c in cameras]
+        views = [sphere.views(self.look, state, c, antialias=2)[0].numpy() for c in cameras]
         triples = channel_triples(self.look.layout, False, 0)
         images = triple_images(self.exemplar.resized(PREVIEW), triples, self.look.layout)
         rows = [

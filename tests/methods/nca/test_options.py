@@ -48,7 +48,7 @@ def _appearance(task, seed=0):
 
 
 def _cameras(task, size=32):
-    return task.cameras(task.grounds[0].mesh, size, torch.Generator().manual_seed(0))
+    return task.cameras(task.spheres[0].mesh, size, torch.Generator().manual_seed(0))
 
 
 def _only(task):
@@ -60,7 +60,7 @@ def _only(task):
 def _views(task, state=None):
     """What two patches show of a state."""
     state = torch.zeros_like(task.pool[0]) if state is None else state
-    return task.grounds[0].views(task.look, state, _cameras(task))
+    return task.spheres[0].views(task.look, state, _cameras(task))
 
 
 # One entry for each key that shapes the task: what tells that it counts.
@@ -95,7 +95,7 @@ def seeds_give_other_weights(build):
 @check("frequency", "pool")
 def pool_of_states_on_the_sphere(build):
     task = build("frequency=7", "pool=3", "density=7")
-    assert len(task.grounds[0].mesh.vertices) == 10 * 7**2 + 2
+    assert len(task.spheres[0].mesh.vertices) == 10 * 7**2 + 2
     assert task.pool.shape == (3, 492, 16)
 
 
@@ -166,7 +166,7 @@ def spheres(build):
     for sphere in ("even", "uneven", "both"):
         lengths = [
             np.linalg.norm(m.vertices[m.edges.indices] - m.vertices[m.edges.rows], axis=1)
-            for m in (ground.mesh for ground in build(f"sphere={sphere}").grounds)
+            for m in (sphere.mesh for sphere in build(f"sphere={sphere}").spheres)
         ]
         counts[sphere] = [bool(one.std() > 0.2 * one.mean()) for one in lengths]
     assert counts == {"even": [False], "uneven": [True], "both": [False, True]}
@@ -178,8 +178,8 @@ def aggregation(build):
     mean, total = (build(f"aggregation={a}") for a in ("mean", "sum"))
     assert (mean.look.mean, total.look.mean) == (True, False)
     state = torch.rand(1, 642, 16, generator=torch.Generator().manual_seed(0))
-    ratio = (mean.grounds[0].perception(state) / total.grounds[0].perception(state))[0, :, 0]
-    valence = torch.from_numpy(np.diff(mean.grounds[0].mesh.edges.indptr))
+    ratio = (mean.spheres[0].perception(state) / total.spheres[0].perception(state))[0, :, 0]
+    valence = torch.from_numpy(np.diff(mean.spheres[0].mesh.edges.indptr))
     assert torch.allclose(ratio, 6 / valence, rtol=1e-3)
 
 
@@ -223,7 +223,7 @@ def creases_of_the_state(build):
     jumps = {}
     for kind in ("smooth", "linear"):
         task = build(f"interpolation={kind}", "coordinates=", "resolution=64")
-        lines = task.grounds[0].views(task.look, state, _cameras(task, 512))
+        lines = task.spheres[0].views(task.look, state, _cameras(task, 512))
         bends = lines.diff(n=2, dim=2).abs()
         jumps[kind] = (bends.amax() / bends.mean()).item()
     assert jumps["linear"] > 2 * jumps["smooth"]

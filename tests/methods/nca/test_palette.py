@@ -53,16 +53,16 @@ class Grey(Palette):
 
 
 @pytest.fixture
-def ground():
+def grown():
     mesh = icosphere(6)
     look = Look(MeshNCA(), ("albedo",), None)
     look.initialise(torch.Generator().manual_seed(3), 0.5)
     return look, Cells(mesh, 0, mesh), perception(mesh, 1)
 
 
-def test_a_foreign_place_is_set_back_and_grows_again(ground, monkeypatch):
+def test_a_foreign_place_is_set_back_and_grows_again(grown, monkeypatch):
     """With no steps to grow in, what was set back is the seed: the place, three rings, and nothing else."""
-    look, cells, operator = ground
+    look, cells, operator = grown
     monkeypatch.setattr(healing, "STEPS", 0)
     state = torch.full((len(cells.mesh.vertices), 16), 0.1)
     state[7, :3] = torch.tensor([0.5, -0.5, -0.5])
@@ -76,15 +76,15 @@ def test_a_foreign_place_is_set_back_and_grows_again(ground, monkeypatch):
     assert torch.equal(result[torch.from_numpy(~place)], state[torch.from_numpy(~place)])
 
 
-def test_a_good_state_stays(ground):
-    look, cells, operator = ground
+def test_a_good_state_stays(grown):
+    look, cells, operator = grown
     state = torch.full((len(cells.mesh.vertices), 16), 0.1)
     result = healing.healed(look, state, cells, operator, Grey(), torch.Generator().manual_seed(0))
     assert torch.equal(result, state)
 
 
-def test_what_does_not_heal_is_said(ground, monkeypatch):
-    look, cells, operator = ground
+def test_what_does_not_heal_is_said(grown, monkeypatch):
+    look, cells, operator = grown
     monkeypatch.setattr(healing, "STEPS", 1)
     nowhere = Palette(np.full((1, 3), 9.0), 0.1)
     state = torch.zeros(len(cells.mesh.vertices), 16)

@@ -43,7 +43,7 @@ def _fresh(task):
 
 def _grow(task, state, steps, generator):
     with torch.no_grad():
-        return task.look.rule.evolve(state, task.grounds[0].perception, steps, generator)
+        return task.look.rule.evolve(state, task.spheres[0].perception, steps, generator)
 
 
 def test_a_step_evolves_a_state_of_the_pool(task):
@@ -65,10 +65,10 @@ def test_a_step_evolves_a_state_of_the_pool(task):
 def test_states_grow_on_both_spheres_in_turns(exemplar):
     """Even ones of the pool on the icosphere, the others on scattered vertices."""
     task = NcaTask(config("sphere=both"), exemplar)
-    even, uneven = task.grounds
+    even, uneven = task.spheres
     assert np.array_equal(even.mesh.vertices, icosphere(8).vertices)
     assert len(uneven.mesh.vertices) == 642 and uneven.mesh.edges.indptr[-1] == even.mesh.edges.indptr[-1]
-    assert [task.ground(k) for k in range(4)] == [even, uneven, even, uneven]
+    assert [task.sphere(k) for k in range(4)] == [even, uneven, even, uneven]
     torch.nn.init.normal_(task.pool, std=0.1, generator=torch.Generator().manual_seed(9))
     before, grown = task.pool.clone(), set()
     for seed in range(8):
@@ -78,7 +78,7 @@ def test_states_grow_on_both_spheres_in_turns(exemplar):
         index = int(torch.randint(4, (), generator=generator))
         steps = int(torch.randint(2, 5, (), generator=generator))
         with torch.no_grad():
-            operator = task.grounds[index % 2].perception
+            operator = task.spheres[index % 2].perception
             expected = task.look.rule.evolve(before[index][None], operator, steps, generator)[0]
         assert torch.equal(task.pool[index], expected)
         grown.add(index % 2)
@@ -128,11 +128,11 @@ def test_loss_is_the_mean_over_the_zooms(exemplar):
     generator = torch.Generator().manual_seed(0)
     torch.randint(4, (), generator=generator)
     steps = int(torch.randint(2, 5, (), generator=generator))
-    ground, state = task.grounds[0], _grow(task, torch.zeros(1, 642, 16), steps, generator)[0]
+    sphere, state = task.spheres[0], _grow(task, torch.zeros(1, 642, 16), steps, generator)[0]
     means = []
     for size in (64, 128, 256):
-        cameras = task.cameras(ground.mesh, size, generator)
-        means.append(ground.views(task.look, state, cameras).mean().item())
+        cameras = task.cameras(sphere.mesh, size, generator)
+        means.append(sphere.views(task.look, state, cameras).mean().item())
     assert total == pytest.approx((means[0] + 10 * means[1] + 100 * means[2]) / 3, rel=1e-4)
 
 
@@ -184,12 +184,12 @@ def test_a_fresh_pool_takes_no_room(exemplar):
 
 
 def _cameras(task, size=32):
-    return task.cameras(task.grounds[0].mesh, size, torch.Generator().manual_seed(0))
+    return task.cameras(task.spheres[0].mesh, size, torch.Generator().manual_seed(0))
 
 
 def test_patches_have_the_wanted_density(task):
     """`density` vertices fit along the width of the exemplar, measured on the mesh's own edges."""
-    mesh = task.grounds[0].mesh
+    mesh = task.spheres[0].mesh
     edges = np.linalg.norm(mesh.vertices[mesh.edges.indices] - mesh.vertices[mesh.edges.rows], axis=1)
     assert task.width == pytest.approx(8 * edges.mean(), rel=0.03)
     cameras = _cameras(task)
@@ -204,13 +204,13 @@ def test_a_larger_exemplar_is_seen_closer(task):
 
 
 @pytest.mark.parametrize("size", [8, 32, 64])
-@pytest.mark.parametrize("sphere", ["even", "uneven"])
-def test_every_pixel_of_a_patch_is_surface(exemplar, sphere, size):
+@pytest.mark.parametrize("kind", ["even", "uneven"])
+def test_every_pixel_of_a_patch_is_surface(exemplar, kind, size):
     """Also of the widest patches."""
-    (ground,) = NcaTask(config(f"sphere={sphere}"), exemplar).grounds
+    (sphere,) = NcaTask(config(f"sphere={kind}"), exemplar).spheres
     task = NcaTask(config("view_count=30"), exemplar)
-    cameras = task.cameras(ground.mesh, size, torch.Generator().manual_seed(0))
-    assert (ground.stage.visibility(cameras).coverage == 1).all()
+    cameras = task.cameras(sphere.mesh, size, torch.Generator().manual_seed(0))
+    assert (sphere.stage.visibility(cameras).coverage == 1).all()
 
 
 def test_full_views(exemplar):

@@ -17,7 +17,7 @@ from mitex.scenes.stage import Stage
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class TrainingSphere:
     """A mesh on which states grow and are seen.
 
     Attributes:
@@ -33,21 +33,21 @@ class Ground:
     stage: Stage
 
     @staticmethod
-    def of(mesh: Mesh, look: Look) -> Ground:
+    def of(mesh: Mesh, look: Look) -> TrainingSphere:
         """For a look's rule and decoder."""
         operator = perception(mesh, look.rule.degree, mean=look.mean)
-        return Ground(mesh, operator, Surface(mesh, look.interpolation), Stage(mesh))
+        return TrainingSphere(mesh, operator, Surface(mesh, look.interpolation), Stage(mesh))
 
     def views(self, look: Look, state: torch.Tensor, cameras: Cameras, antialias: int = 1) -> torch.Tensor:
         """Images (K, H, W, C) of a state (V, C); see `render_views`."""
         return render_views(look.decoder, state, self.surface, self.stage, cameras, antialias)
 
 
-def grounds(config: NcaConfig, look: Look) -> list[Ground]:
+def training_spheres(config: NcaConfig, look: Look) -> list[TrainingSphere]:
     """The training's spheres, all with as many vertices: states of the pool grow on them in turns."""
     meshes = []
     if config.sphere in ("even", "both"):
         meshes.append(icosphere(config.frequency))
     if config.sphere in ("uneven", "both"):
         meshes.append(scattered_sphere(10 * config.frequency**2 + 2, config.seed))
-    return [Ground.of(mesh, look) for mesh in meshes]
+    return [TrainingSphere.of(mesh, look) for mesh in meshes]
