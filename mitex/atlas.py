@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.ndimage import distance_transform_edt
 from mitex.errors import ConfigError, MeshError
 from mitex.geometry.normal_maps import FLAT, encode
 from mitex.geometry.raster import covered_texels, rasterize
-from mitex.geometry.tangents import split_at_seams
+from mitex.geometry.tangents import Split, split_at_seams
 from mitex.geometry.triangles import interpolate, twice_area
 from mitex.geometry.vectors import scatter_add, unit
 from mitex.mesh import Mesh
@@ -20,6 +21,7 @@ MAX_RESOLUTION = 8192
 LARGE = 40_000  # meshes of more faces are unwrapped in pieces
 SMOOTHINGS = 8  # rounds over the neighbours before faces are sorted by the direction that they look in
 ROUGHNESS = 0.03  # by which vertices are moved before unwrapping [edge lengths], see `_rough`
+STRIP = 1 << 18  # texels
 FULL = 1.001  # the area of the unit square, and some rounding
 
 
@@ -75,8 +77,12 @@ class Atlas:
         Returns:
             (N, N, 3) float32 in [0, 1], in the `shading_frames`.
         """
-        encoded = encode(unit(detail), *self.shading_frames(mesh))
-        encoded[self.face < 0] = FLAT
+        split = split_at_seams(mesh, self.uv)
+        encoded = np.empty(detail.shape, np.float32)
+        for rows in self.strips():
+            strip = self._strip(rows)
+            encoded[rows] = encode(unit(detail[rows]), *strip._frames(split))
+            encoded[rows][strip.face < 0] = FLAT
         return encoded
 
     def shading_frames(self, mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -85,7 +91,18 @@ class Atlas:
         Tangent and normal are interpolated and not normalised; the bitangent is sign * cross(normal, tangent)
         in each texel.
         """
-        split = split_at_seams(mesh, self.uv)
+        return self._frames(split_at_seams(mesh, self.uv))
+
+    def strips(self) -> Iterator[slice]:
+        """Rows in strips of about `STRIP` texels: what is computed of one stays in the cache."""
+        height = max(STRIP // self.resolution, 1)
+        for top in range(0, self.resolution, height):
+            yield slice(top, min(top + height, self.resolution))
+
+    def _strip(self, rows: slice) -> Atlas:
+        return Atlas(self.uv, self.face[rows], self.barycentric[rows], self.inside[rows])
+
+    def _frames(self, split: Split) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         tangent, normal = (self.interpolate(v[split.faces]) for v in (split.tangents[:, :3], split.normals))
         sign = split.tangents[split.faces[:, 0], 3][self.face][..., None]
         return tangent, sign * np.cross(normal, tangent), normal

@@ -59,16 +59,22 @@ class Grown:
 
     def textures(self, atlas: Atlas) -> dict[str, np.ndarray]:
         """Maps (N, N, c) on the texels of a layout of the given mesh; the mean where there is no chart."""
-        used = atlas.face >= 0
-        face, barycentric = atlas.face[used], atlas.barycentric[used].clip(0)
-        barycentric /= barycentric.sum(axis=1, keepdims=True)
-        maps = {}
-        for name, values in self._maps(self.values(face, barycentric)).items():
-            image = np.empty((*used.shape, values.shape[1]), np.float32)
-            image[used] = self._detail(values, face, barycentric) if name == "normal" else values
-            image[~used] = image[used].mean(axis=0) if len(values) else 0.0
-            maps[name] = atlas.normal_map(self.cells.given, image) if name == "normal" else image
-        return maps
+        side, maps = atlas.resolution, self.look.maps
+        images = {name: np.zeros((side, side, MAPS[name]), np.float32) for name in maps}
+        for rows in atlas.strips():
+            used = atlas.face[rows] >= 0
+            face, barycentric = atlas.face[rows][used], atlas.barycentric[rows][used].clip(0)
+            barycentric /= barycentric.sum(axis=1, keepdims=True)
+            for name, values in self._maps(self.values(face, barycentric)).items():
+                detail = self._detail(values, face, barycentric) if name == "normal" else values
+                images[name][rows][used] = detail
+        empty = atlas.face < 0
+        for name, image in images.items():
+            if name == "normal":
+                images[name] = atlas.normal_map(self.cells.given, image)
+            elif not empty.all():
+                image[empty] = image[~empty].mean(axis=0)
+        return images
 
     def _maps(self, values: np.ndarray) -> dict[str, np.ndarray]:
         return {name: values[:, list(columns)] for name, columns in self.look.layout.items()}
@@ -76,7 +82,7 @@ class Grown:
     def _detail(self, encoded: np.ndarray, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """Normals in object space (P, 3) of a normal map's values at points of the given mesh."""
         mesh = self.cells.given
-        normals = unit(interpolate(barycentric, mesh.normals[mesh.faces[face]]))
+        normals = unit(interpolate(barycentric, mesh.shading_normals[face]))
         right = _right(normals, self.orientation)
         x, y, z = (encoded * 2 - 1).T[..., None]
         return x * right + y * np.cross(normals, right) + z * normals

@@ -14,6 +14,7 @@ from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.decoder.surface import Points, Surface
 from mitex.methods.nca.look import Look
+from tests.mesh.solids import cube
 from tests.methods.nca import tiny
 from tests.methods.nca.brute_force import patchwork
 
@@ -171,3 +172,13 @@ def test_an_asset_has_the_mesh_its_maps_and_tangents(grown, sphere):
     asset = grown.asset()
     assert asset.mesh is sphere and tuple(asset.vertex_maps) == ALL and asset.name == sphere.name
     assert np.allclose(np.linalg.norm(asset.tangents, axis=1), 1, atol=1e-5)
+
+
+def test_hard_edges_stay_hard(tmp_path):
+    """A flat look on a cube with flat normals has a flat map: no round surface is painted over its edges."""
+    (tmp_path / "cube.obj").write_text(cube().obj())
+    mesh = laid_out(Mesh.load(tmp_path / "cube.obj"), 64, 2)
+    assert mesh.corner_normals is not None
+    atlas = Atlas.build(mesh, 64, 2, mesh.uv)
+    image = _grown(_constant(np.array([0.5, 0.5, 1.0])), mesh).textures(atlas)["normal"]
+    assert np.abs(image[atlas.inside] - np.array([0.5, 0.5, 1.0])).max() < 2e-3
