@@ -13,7 +13,7 @@ def leather(rng: np.random.Generator) -> Material:
     wy = y + 0.008 * noise(rng, 0.30, 2.0) + 0.0016 * noise(rng, 0.03, 1.2)
     pebbles = relaxed_points(rng, 1300, 1)
     pebble, border = cells(pebbles, wx, wy, 0.0011)
-    _, wrinkle = cells(relaxed_points(rng, 7000, 1), wx, wy, 0.0004)
+    _, wrinkle = cells(relaxed_points(rng, 7000, 0), wx, wy, 0.0004)
     hold = step(-1.3, 0.6, noise(rng, 0.10, 1.1))  # where the furrows are deep
     broad = np.clip(0.0042 + 0.0012 * noise(rng, 0.06, 1.0), 0.002, 0.008)
     dome = 1.0 - (1.0 - np.clip(border / broad, 0.0, 1.0)) ** 2
@@ -23,12 +23,12 @@ def leather(rng: np.random.Generator) -> Material:
     creases = _creases(rng)
     pores = step(1.9, 2.7, noise(rng, 0.008, 1.6))
     depth = 0.0016 + 0.0030 * hold
-    height = depth * dome + 0.0008 * lift * dome + 0.0007 * small * dome + 0.0002 * grain + 0.0001 * fine
+    height = depth * dome + 0.0008 * lift * dome + 0.0006 * small * dome + 0.0001 * grain
     height += 0.0012 * swell - 0.0055 * creases - 0.0016 * pores * dome
 
-    proud = dome * small * (1.0 - creases)
+    proud = dome * (0.65 + 0.35 * small) * (1.0 - creases)
     shade = 0.40 + 0.30 * (proud - 0.5) + 0.04 * tone + 0.035 * noise(rng, 0.15, 1.1)
-    shade = np.clip(shade + 0.04 * grain + 0.03 * fine, 0.0, 1.0)
+    shade = np.clip(shade + 0.03 * grain + 0.02 * fine, 0.0, 1.0)
     tan = ramp(shade, "1d0c06", "4c220e", "7e401a", "a8612c", "cf9254")
     red = ramp(shade, "1c0a07", "491a10", "76321b", "a0522f", "c98a5f")
     albedo = mix(tan, red, 0.5 * step(-1.0, 2.0, noise(rng, 0.28, 1.5)))
@@ -38,7 +38,7 @@ def leather(rng: np.random.Generator) -> Material:
     albedo = mix(albedo, colour("160905")[0], dark)
     scuffs = step(2.0, 2.9, noise(rng, 0.05, 0.7, 60.0)) * step(0.5, 1.6, noise(rng, 0.12, 1.2))
     albedo = mix(albedo, colour("d0a070")[0], 0.45 * scuffs * proud)
-    rough = 0.58 - 0.14 * proud - 0.08 * worn + 0.03 * grain + 0.10 * pores + 0.12 * scuffs
+    rough = 0.58 - 0.14 * proud - 0.08 * worn + 0.01 * grain + 0.10 * pores + 0.12 * scuffs
     return Material(height, albedo, np.clip(rough, 0.2, 1.0))
 
 

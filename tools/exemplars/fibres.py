@@ -59,26 +59,26 @@ def knit(rng: np.random.Generator) -> Material:
     bulge = np.abs(np.cos(np.pi * ply))
     # The fibres run along the plies, which climb around the yarn.
     lie = yarn.along + 0.012 * yarn.across
-    turned = yarn.across * 0.014 - 0.35 * yarn.along
+    turned = yarn.across * 0.014 - 0.10 * yarn.along
     fibres = sample(noise(rng, 0.05, 0.6, 40.0), lie, turned)
     fine = sample(noise(rng, 0.016, 0.2, 25.0), lie, turned)
     grain = noise(rng, 0.006, 0.3)
     height = np.where(cover, yarn.height, -0.030)
-    height += np.where(cover, 0.0034 * bulge + 0.0006 * fibres + 0.0005 * fine, 0.0) + 0.0002 * grain
-    fuzz, fuzz_tone = _fuzz(rng, 1000)
+    height += np.where(cover, 0.0034 * bulge + 0.0004 * fibres + 0.0002 * fine, 0.0) + 0.0001 * grain
+    fuzz, fuzz_tone = _fuzz(rng, 420)
     soft = blur(height, 0.003)
     height = height + (np.maximum(soft + 0.004, height) - height) * 0.7 * fuzz
 
-    shade = 0.46 + 0.15 * fibres + 0.12 * fine + 0.05 * noise(rng, 0.25, 1.3) + 0.16 * (bulge - 0.6)
-    shade = np.clip(shade - 0.26 * np.abs(yarn.across) ** 3, 0.0, 1.0)
+    shade = 0.50 + 0.10 * fibres + 0.06 * fine + 0.05 * noise(rng, 0.25, 1.3) + 0.16 * (bulge - 0.6)
+    shade = np.clip(shade - 0.32 * np.abs(yarn.across) ** 3, 0.0, 1.0)
     blue = ramp(shade, "0c1726", "1d3350", "345578", "587fa0", "93b2c4")
     slate = ramp(shade, "161b26", "333c50", "586378", "8a95a3", "c3c9cc")
     albedo = mix(blue, slate, step(0.2, 1.6, sample(noise(rng, 0.08, 0.9, 20.0), lie, turned)))
-    albedo = mix(albedo, colour("cfd8da")[0], 0.45 * step(1.6, 2.6, fine))
-    depth = step(-0.016, 0.021, height)
+    albedo = mix(albedo, colour("cfd8da")[0], 0.22 * step(1.6, 2.6, fine))
+    depth = step(-0.005, 0.029, height)
     albedo = albedo * (0.16 + 0.94 * depth)[..., None]
     albedo = mix(albedo, ramp(fuzz_tone, "3c5f82", "7d9fb8", "cdd9dd"), 0.45 * fuzz)
-    return Material(height, albedo, np.clip(0.86 + 0.04 * fine + 0.03 * grain, 0.5, 1.0))
+    return Material(height, albedo, np.clip(0.86 + 0.02 * fine + 0.01 * grain, 0.5, 1.0))
 
 
 @dataclass

@@ -31,9 +31,9 @@ def bricks(rng: np.random.Generator) -> Material:
     bevel = np.sqrt(1.0 - (1.0 - np.clip(edge / 0.010, 0.0, 1.0)) ** 2)
     pits = step(1.5, 2.4, noise(rng, 0.012, 1.0))
     folds = noise(rng, 0.05, 0.8, 5.0)  # the clay was dragged along its mould
-    face = 0.015 + 0.0014 * lift + 0.010 * tip * v + 0.0009 * folds + 0.0006 * lumps + 0.0003 * grain
-    face = bevel * (face - 0.0022 * pits) + 0.0002 * sand
-    joint = 0.0055 + 0.0011 * noise(rng, 0.04, 1.0) + 0.0006 * grain + 0.0004 * sand
+    face = 0.015 + 0.0014 * lift + 0.010 * tip * v + 0.0009 * folds + 0.0006 * lumps + 0.0002 * grain
+    face = bevel * (face - 0.0022 * pits) + 0.0001 * sand
+    joint = 0.0055 + 0.0011 * noise(rng, 0.04, 1.0) + 0.0005 * grain + 0.0003 * sand
     height = np.maximum(face, joint)
     is_brick = step(-0.0004, 0.0008, face - joint)
 
@@ -47,7 +47,7 @@ def bricks(rng: np.random.Generator) -> Material:
     ends = step(0.02, 0.13, np.abs(u) + 0.02 * noise(rng, 0.08, 1.1))
     kiln = step(0.62, 0.95, burnt) * (0.35 + 0.65 * ends) + 0.25 * step(0.3, 2.0, noise(rng, 0.12, 1.0))
     clay = mix(clay, ramp(np.clip(tone, 0, 1), "211816", "3d2a27", "5a403a"), np.clip(kiln, 0, 0.85))
-    clay = clay * (1.0 + 0.10 * grain + 0.09 * sand)[..., None]
+    clay = clay * (1.0 + 0.08 * grain + 0.05 * sand)[..., None]
     clay = mix(clay, colour("2a1612")[0], 0.65 * pits + 0.35 * step(1.6, 2.8, sand))
     clay = mix(clay, colour("d9a583")[0], 0.35 * step(1.7, 2.8, -sand) + 0.30 * chips * step(0.02, 0.0, edge))
     lime = step(0.5, 2.2, noise(rng, 0.16, 0.9) + 0.35 * lumps + 0.7 * step(0.016, 0.002, edge))
@@ -57,7 +57,7 @@ def bricks(rng: np.random.Generator) -> Material:
     mortar = mix(mortar, colour("3c352e")[0], 0.5 * step(1.5, 2.6, grain) + 0.4 * step(0.0035, 0.0, edge))
     soot = step(0.5, 2.4, noise(rng, 0.30, 1.0))
     albedo = mix(mortar, clay, is_brick) * (1.0 - 0.35 * soot)[..., None]
-    rough = 0.86 + 0.04 * grain - 0.12 * is_brick * step(0.4, 1.0, kiln) + 0.05 * lime
+    rough = 0.86 + 0.02 * grain - 0.12 * is_brick * step(0.4, 1.0, kiln) + 0.05 * lime
     return Material(height, albedo, np.clip(rough, 0.4, 1.0))
 
 
