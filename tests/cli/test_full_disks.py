@@ -93,7 +93,7 @@ class TestInProcesses:
         before = tree(files)
         limit = (2000, 2000)
         done = program(
-            "apply m.safetensors --mesh good.obj --subdivide 2 --steps 1 --out out/a.ply",
+            "apply m.safetensors --mesh good.obj --subdivide 2 --keep-dense --steps 1 --out out/a.ply",
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit),
         )
         assert done.returncode == 2, done.stderr
