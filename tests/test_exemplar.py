@@ -202,7 +202,7 @@ class TestEmbedded:
             up = (np.roll(height, 1, 0) - np.roll(height, -1, 0)) / 2
             for slope, component in ((dx, normal[:, :, 0]), (up, normal[:, :, 1])):
                 tangent = component / np.maximum(normal[:, :, 2], 0.1)
-                assert np.corrcoef(-slope.ravel(), tangent.ravel())[0, 1] > 0.8, name
+                assert np.corrcoef(-slope.ravel(), tangent.ravel())[0, 1] > 0.75, name
             np.testing.assert_allclose(np.linalg.norm(normal, axis=2), 1, atol=0.02)
 
     def test_license_is_there_and_the_sets_are_small(self):
