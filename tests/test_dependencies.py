@@ -47,11 +47,12 @@ def modules(requirements: Iterable[str]) -> set[str]:
 def imports(*folders: Path) -> set[str]:
     """Top-level modules imported below folders, by statement or by `import_module`, in functions too.
 
-    The standard library, Mitex and the files of the folders do not count.
+    The standard library, Mitex, and the files and packages of the folders do not count.
     """
     scripts = [file for folder in folders for file in folder.rglob("*.py")]
+    packages = {file.parent.name for file in scripts}
     names = {name.partition(".")[0] for file in scripts for name in _imported(ast.parse(file.read_text()))}
-    return names - OWN - {file.stem for file in scripts} - sys.stdlib_module_names
+    return names - OWN - packages - {file.stem for file in scripts} - sys.stdlib_module_names
 
 
 def _imported(tree: ast.AST) -> Iterable[str]:
