@@ -25,6 +25,13 @@ RUNS = Path("runs/models")
 MODELS = Path(__file__).parents[1] / "mitex" / "data" / "models"
 PARENT = "ceramic"
 SHORT = ("steps=350", "milestones=200,290")  # enough from the parent
+# The settings before there was a decoder, of the models that have not been trained anew.
+UNDECODED = (
+    *("decoder=false", "sphere=even", "aggregation=sum", "order_weight=0", "overflow_weight=1e4"),
+    *("frequency=48", "min_steps=20", "max_steps=32", "zooms=1", "view_count=8", "resolution=64"),
+    *("density=96", "exemplar_size=128", "pooling=average", "steps=1000", "milestones=750,900"),
+    "layers=relu1_1,relu1_2,relu2_1,relu2_2,relu3_1,relu3_2,relu3_3,relu4_3,relu5_3",
+)
 
 
 @dataclass(frozen=True)
@@ -44,14 +51,13 @@ class Recipe:
 
 RECIPES = {
     PARENT: Recipe("scales", None, ()),
-    "lava": Recipe("lava"),
-    "waffle": Recipe("Waffle_001"),
-    # Finer patterns need more vertices to the exemplar.
-    "honeycomb": Recipe("Honeycomb_002", settings=(*SHORT, "density=48")),
-    "bricks": Recipe("Bricks_Terracotta_003", settings=(*SHORT, "density=48")),
-    "pebbles": Recipe("Pebbles_025", settings=(*SHORT, "density=64")),
     "cobblestone": Recipe("cobblestone"),
-    "basket": Recipe("wicker", settings=("steps=600", "milestones=350,500")),
+    "lava": Recipe("lava"),
+    # The waffle's bars are coarse: fewer vertices to the exemplar leave more of them in a view.
+    "waffle": Recipe("Waffle_001", None, (*UNDECODED, "density=64", "resolution=80")),
+    "pebbles": Recipe("Pebbles_025", "waffle", (*UNDECODED, "steps=1450", "milestones=1200,1400")),
+    "bricks": Recipe("Bricks_Terracotta_003", "waffle", (*UNDECODED, "steps=2050", "milestones=1800,1950")),
+    "honeycomb": Recipe("Honeycomb_002", "waffle", (*UNDECODED, "steps=900", "milestones=500,800")),
 }
 
 

@@ -14,7 +14,7 @@ from mitex.methods.nerf.capture.pixels import Pixels
 from mitex.methods.nerf.field.rendering import render_batch, render_rays
 from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents, uv_frames
 from mitex.methods.nerf.synthesis.patch_images import render_patches
-from mitex.methods.nerf.synthesis.patches import extract_patches
+from mitex.methods.nerf.synthesis.patches import PATTERN_RATE, extract_patches
 from mitex.methods.nerf.synthesis.quilting import Quilt
 from mitex.methods.nerf.use.placement import EXTENT
 from tests.methods.nerf.field.test_shell import at, mi, rows, shell
@@ -87,10 +87,13 @@ def test_a_guide_decides_where_it_is_bright(texture):
     assert differences[0] > 0.03 and differences[1] < -0.03
 
 
-@pytest.mark.parametrize(("scale", "advice"), [(20.0, "smaller scales"), (1e-3, "larger scales")])
-def test_guides_over_too_few_or_too_many_texels(texture, scale, advice):
+@pytest.mark.parametrize(
+    ("scale", "rate", "advice"),
+    [(20.0, PATTERN_RATE, "smaller scales"), (0.05, PATTERN_RATE / 1000, "larger scales")],
+)
+def test_guides_over_too_few_or_too_many_texels(texture, scale, rate, advice):
     with pytest.raises(ConfigError, match=advice):
-        texture.covering(grid(2, 2), scale)
+        texture.covering(grid(2, 2), scale, rate)
 
 
 def test_a_lifted_shell_lies_higher():
