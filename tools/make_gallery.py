@@ -29,7 +29,7 @@ from make_models import RECIPES  # noqa: E402
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 UNSEEN = ("spot", "fish", "mug")
-TEASER = {"ceramic": "octopus", "honeycomb": "knot", "pebbles": "vase", "bricks": "shaderball"}
+TEASER = {"ceramic": "octopus", "lava": "knot", "cobblestone": "vase", "honeycomb": "shaderball"}
 FREQUENCY, RESOLUTION, CELL = 32, 2048, 256
 
 
