@@ -8,6 +8,7 @@ import numpy as np
 import torch
 
 from mitex.errors import TextureWarning
+from mitex.mesh import Mesh
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.look import Look
@@ -16,7 +17,6 @@ from mitex.methods.nca.perception import Perception
 
 ROUNDS, STEPS = 3, 60  # of growing anew, and the automaton's steps in each
 RINGS = 3  # of neighbours that start anew too
-FEW = 1e-3  # share of the cells that may have any colour: a dot here and there is a pattern's own
 
 
 @torch.no_grad()
@@ -31,25 +31,40 @@ def healed(
     """A state (V, C) in which places of foreign colours were set back to the seed and have grown again.
 
     A rule that was trained to grow from the seed and to keep its pattern repairs what is taken away. Where
-    foreign colours stay after all rounds, a `TextureWarning` says how much of the mesh has them.
+    foreign colours stay after all rounds, a `TextureWarning` says how much of the mesh has them. Only regions
+    count, see `inner`.
     """
     own = Cells(cells.mesh, 0, cells.mesh)
+
+    def foreign() -> np.ndarray:
+        return palette.unlike(Grown(look, state, own).at_vertices()["albedo"])
+
     for _ in range(ROUNDS):
-        foreign = palette.unlike(Grown(look, state, own).at_vertices()["albedo"])
-        if foreign.mean() <= FEW:
+        places = foreign()
+        if not inner(cells.mesh, places).any():
             return state
-        state = torch.where(torch.from_numpy(_around(cells, foreign))[:, None], 0.0, state)
+        state = torch.where(torch.from_numpy(_around(cells, places))[:, None], 0.0, state)
         for _ in range(STEPS):
             state = look.bounded(look.rule.evolve(state[None], operator, 1, generator))[0]
-    foreign = palette.unlike(Grown(look, state, own).at_vertices()["albedo"])
-    if foreign.mean() > FEW:
+    places = foreign()
+    if inner(cells.mesh, places).any():
         warnings.warn(
-            f"{foreign.mean():.1%} of '{cells.given.name}' has colours that the exemplar does not have; "
+            f"{places.mean():.1%} of '{cells.given.name}' has colours that the exemplar does not have; "
             "try another seed, or remesh it evenly",
             TextureWarning,
-            stacklevel=4,
+            stacklevel=5,
         )
     return state
+
+
+def inner(mesh: Mesh, places: np.ndarray) -> np.ndarray:
+    """Those of the vertices `places` (V,) bool all of whose neighbours are among them.
+
+    Dots and thin lines have none: between two colours of an exemplar there are mixtures that it need not
+    have.
+    """
+    graph = mesh.edges
+    return places & (np.bincount(graph.rows, ~places[graph.indices], len(places)) == 0)
 
 
 def _around(cells: Cells, places: np.ndarray) -> np.ndarray:

@@ -65,11 +65,11 @@ def test_a_foreign_place_is_set_back_and_grows_again(grown, monkeypatch):
     look, cells, operator = grown
     monkeypatch.setattr(healing, "STEPS", 0)
     state = torch.full((len(cells.mesh.vertices), 16), 0.1)
-    state[7, :3] = torch.tensor([0.5, -0.5, -0.5])
-    result = healing.healed(look, state, cells, operator, Grey(), torch.Generator().manual_seed(0))
-    place = np.zeros(len(state), bool)
-    place[7] = True
     graph = cells.mesh.edges
+    place = np.zeros(len(state), bool)
+    place[[7, *graph.indices[graph.indptr[7] : graph.indptr[8]]]] = True
+    state[torch.from_numpy(place), :3] = torch.tensor([0.5, -0.5, -0.5])
+    result = healing.healed(look, state, cells, operator, Grey(), torch.Generator().manual_seed(0))
     for _ in range(healing.RINGS):
         place |= np.bincount(graph.rows, place[graph.indices], len(place)) > 0
     assert (result[torch.from_numpy(place)] == 0).all()
@@ -90,3 +90,14 @@ def test_what_does_not_heal_is_said(grown, monkeypatch):
     state = torch.zeros(len(cells.mesh.vertices), 16)
     with pytest.warns(TextureWarning, match="100.0% of 'icosphere6' has colours that the exemplar"):
         healing.healed(look, state, cells, operator, nowhere, torch.Generator().manual_seed(0))
+
+
+def test_dots_and_lines_are_no_regions(grown):
+    mesh = grown[1].mesh
+    graph = mesh.edges
+    dot, whole = np.zeros((2, len(mesh.vertices)), bool)
+    dot[7] = True
+    whole[[7, *graph.indices[graph.indptr[7] : graph.indptr[8]]]] = True
+    line = np.abs(mesh.vertices[:, 1]) < 0.05
+    assert not healing.inner(mesh, dot).any() and line.any() and not healing.inner(mesh, line).any()
+    assert np.flatnonzero(healing.inner(mesh, whole)).tolist() == [7]
