@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from mitex.exemplar import Exemplar
     from mitex.methods.nca import NcaTexture
 
-EXEMPLAR = "lava"
+EXEMPLAR = "cobblestone"
 PARENT = "ceramic"  # the bundled model that the training starts from
 MESHES = ("shaderball", "knot")
 RESOLUTION = 2048
-STEPS = 80  # enough for a first look from the bundled parent
+STEPS = 110  # enough for a first look from the bundled parent
 # Half as many views as a long training has, and a higher learning rate.
 SETTINGS = ("view_count=2", "lr=0.002")
 SIZE, SAMPLES = 512, 64  # of the pictures
