@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import torch
 from torch.autograd.function import once_differentiable
 
@@ -15,6 +14,7 @@ from mitex.errors import ConfigError
 from mitex.integrators.feature import FeatureMethods
 from mitex.runtime.jit import dr, mi
 from mitex.scenes.stage import Visibility, background_values
+from mitex.sparse import transposed_product
 from mitex.textures.field import Field
 
 
@@ -198,20 +198,15 @@ class _Lookup(torch.autograd.Function):
 
 
 def _transposed_product(visibility: Visibility, grad: torch.Tensor) -> torch.Tensor:
-    """matrix.T @ grad without sorting the matrix: on a CPU scipy adds each row's entries to their columns."""
+    """matrix.T @ grad."""
     if grad.device.type != "cpu":
         rows, columns, weight = visibility.pixel, visibility.vertex_index, visibility.weight
         out = grad.new_zeros(visibility.vertices, grad.shape[1])
         for corner in range(3):
             out.index_add_(0, columns[:, corner], weight[:, corner, None] * grad[rows])
         return out
-    import scipy.sparse
-
-    matrix = scipy.sparse.csr_array(
-        (visibility.weights.numpy(), visibility.indices.numpy(), visibility.indptr.numpy()),
-        shape=(len(visibility.indptr) - 1, visibility.vertices),
-    )
-    return torch.from_numpy(np.ascontiguousarray(matrix.T @ grad.contiguous().numpy()))
+    v = visibility
+    return transposed_product(v.indptr, v.indices, v.weights, v.vertices, grad)
 
 
 def _check_field(field: torch.Tensor, visibility: Visibility) -> None:

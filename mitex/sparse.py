@@ -45,6 +45,20 @@ def csr(
         return torch.sparse_csr_tensor(indptr, indices, values, size=shape, check_invariants=False)
 
 
+def transposed_product(
+    indptr: torch.Tensor, indices: torch.Tensor, values: torch.Tensor, columns: int, rows: torch.Tensor
+) -> torch.Tensor:
+    """The transpose of a matrix (N, columns), given by CSR's three arrays, times rows (N, C), on the CPU.
+
+    scipy adds each row's entries to their columns; torch would sort the matrix first.
+    """
+    import scipy.sparse
+
+    data = (values.numpy(), indices.numpy(), indptr.numpy())
+    matrix = scipy.sparse.csr_array(data, shape=(len(indptr) - 1, columns))
+    return torch.from_numpy(np.ascontiguousarray(matrix.T @ rows.contiguous().numpy()))
+
+
 class LinearMap:
     """A constant sparse matrix, differentiable in what it is applied to.
 
@@ -94,14 +108,11 @@ class Weights:
             for k in range(self.index.shape[1]):
                 out.index_add_(0, self.index[:, k], self.weight[:, k, None] * gradient)
             return out
-        import scipy.sparse
-
-        # On a CPU scipy adds each row's entries to their columns, without sorting the matrix.
         points, count = self.index.shape
-        indptr = np.arange(0, points * count + 1, count, dtype=np.int32)
-        data = (self.weight.reshape(-1).numpy(), self.index.reshape(-1).numpy(), indptr)
-        matrix = scipy.sparse.csr_array(data, shape=(points, self.columns))
-        return torch.from_numpy(np.ascontiguousarray(matrix.T @ gradient.contiguous().numpy()))
+        indptr = torch.arange(0, points * count + 1, count, dtype=torch.int32)
+        return transposed_product(
+            indptr, self.index.reshape(-1), self.weight.reshape(-1), self.columns, gradient
+        )
 
 
 class _Product(torch.autograd.Function):

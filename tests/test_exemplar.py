@@ -196,13 +196,13 @@ class TestEmbedded:
     def test_normals_follow_from_the_height(self):
         """Direction of both slopes, OpenGL: green grows where the surface faces the top of the image."""
         for name in exemplar.names():
-            maps = Exemplar.load(name).maps
+            maps = Exemplar.load(name).resized(256).maps
             height, normal = maps["height"][:, :, 0], maps["normal"] * 2 - 1
             dx = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) / 2
             up = (np.roll(height, 1, 0) - np.roll(height, -1, 0)) / 2
             for slope, component in ((dx, normal[:, :, 0]), (up, normal[:, :, 1])):
                 tangent = component / np.maximum(normal[:, :, 2], 0.1)
-                assert np.corrcoef(-slope.ravel(), tangent.ravel())[0, 1] > 0.75, name
+                assert np.corrcoef(-slope.ravel(), tangent.ravel())[0, 1] > 0.8, name
             np.testing.assert_allclose(np.linalg.norm(normal, axis=2), 1, atol=0.02)
 
     def test_license_is_there_and_the_sets_are_small(self):
