@@ -20,7 +20,7 @@ from mitex.exemplar import names as exemplar_names
 from mitex.images import write_image
 from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods.nca import NcaTexture
-from mitex.methods.nca.spheres import TrainingSphere
+from mitex.methods.nca.surfaces import TrainingSphere
 from mitex.render import sheet, still, tone
 from mitex.scenes.cameras import orbit
 

@@ -27,7 +27,8 @@ PARENT = "ceramic"
 SHORT = ("steps=350", "milestones=200,290")  # enough from the parent
 # The settings before there was a decoder, of the models that have not been trained anew.
 UNDECODED = (
-    *("decoder=false", "sphere=even", "aggregation=sum", "order_weight=0", "overflow_weight=1e4"),
+    *("decoder=false", "surfaces=even", "relief_weight=0", "aggregation=sum", "order_weight=0"),
+    "overflow_weight=1e4",
     *("frequency=48", "min_steps=20", "max_steps=32", "zooms=1", "view_count=8", "resolution=64"),
     *("density=96", "exemplar_size=128", "pooling=average", "steps=1000", "milestones=750,900"),
     "layers=relu1_1,relu1_2,relu2_1,relu2_2,relu3_1,relu3_2,relu3_3,relu4_3,relu5_3",
