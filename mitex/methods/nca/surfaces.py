@@ -24,6 +24,7 @@ from mitex.scenes.cameras import Cameras, orbit, patch_views
 from mitex.scenes.stage import Stage
 
 WIDEST = 0.65  # half the side of a patch of the unit sphere: wider ones would look past it
+LEAST = 16  # pixels along a view
 REPEATS = 2  # of the exemplar along a flat square
 
 
@@ -73,7 +74,8 @@ class TrainingSphere:
         Args:
             look: the decoder.
             state: (V, C).
-            width: of what a close-up shows [edges].
+            width: of what a close-up shows [edges]; where the surface is too small, it shows less, in fewer
+                pixels.
             count: K.
             resolution: H and W [px].
             generator: of the places.
@@ -83,7 +85,9 @@ class TrainingSphere:
 
     def cameras(self, width: float, count: int, resolution: int, generator: torch.Generator) -> Cameras:
         """Of `patches`."""
-        return patch_views(generator, self.mesh, count, min(0.5 * width * self.edge, WIDEST), resolution)
+        half = 0.5 * width * self.edge
+        share = min(WIDEST / half, 1.0)
+        return patch_views(generator, self.mesh, count, share * half, _pixels(share, resolution))
 
     def whole(self, look: Look, state: torch.Tensor, resolution: int) -> torch.Tensor:
         """The sphere as a camera sees it, (H, W, C)."""
@@ -125,7 +129,9 @@ class TrainingPlane:
         antialias: int = 1,
     ) -> torch.Tensor:
         """As of `TrainingSphere`; within the square, as the decoder's waves do not repeat."""
-        width = min(width / self.lattice.columns, 1.0)
+        periods = width / self.lattice.columns
+        share = min(1 / periods, 1.0)
+        width, resolution = share * periods, _pixels(share, resolution)
         corners = torch.rand(count, 2, generator=generator, dtype=torch.float64).numpy() * (1 - width)
         return self._windows(look, state, corners, width, resolution, antialias)
 
@@ -152,6 +158,11 @@ class TrainingPlane:
         values = look.decoder(self.surface, table, points)
         sides = (len(corners), resolution, antialias, resolution, antialias, -1)
         return values.view(sides).mean((2, 4))
+
+
+def _pixels(share: float, resolution: int) -> int:
+    """A share of the pixels along a view, but as many as the features need."""
+    return max(round(share * resolution), min(LEAST, resolution))
 
 
 TrainingSurface = TrainingSphere | TrainingPlane

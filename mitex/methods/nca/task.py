@@ -22,7 +22,7 @@ from mitex.scenes.cameras import Cameras, random_views
 from mitex.training import Step
 from mitex.triples import channel_triples, triple_images
 
-SMALLEST = 64  # side of the exemplar at the coarsest zoom [px], at least
+SMALLEST = 128  # side of the exemplar at the coarsest zoom [px], at least: a quarter is left at relu3_1
 PREVIEW = 256  # side of a preview's pictures [px]
 
 

@@ -140,12 +140,12 @@ def vertices_along_the_exemplar(build):
 @check("exemplar_size", "zooms")
 def sizes_of_the_exemplar(build):
     """Each zoom has twice the pixels of the one before, up to those of the exemplar."""
-    settings = ("exemplar_size=128", "target_size=0")
-    assert list(build(*settings, "zooms=2").zooms) == [64, 128]
-    assert list(build(*settings).zooms) == [128]
+    settings = ("exemplar_size=256", "target_size=0")
+    assert list(build(*settings, "zooms=2").zooms) == [128, 256]
+    assert list(build(*settings).zooms) == [256]
     assert list(build("exemplar_size=24", "target_size=0").zooms) == [24]
-    targets = build(*settings, "zooms=2").zooms[64].targets
-    assert targets.size("colour") == 64**2
+    targets = build(*settings, "zooms=2").zooms[128].targets
+    assert targets.size("colour") == 128**2
 
 
 @check("target_size")
@@ -256,12 +256,12 @@ def creases_of_the_state(build):
 @check("order_weight")
 def order_counts(build):
     """Of whole maps of relu3_1, at the coarsest zoom."""
-    settings = (*ALL_PLACES, "layers=relu1_1,relu3_1", "exemplar_size=128", "target_size=0", "zooms=2")
+    settings = (*ALL_PLACES, "layers=relu1_1,relu3_1", "exemplar_size=256", "target_size=0", "zooms=2")
     none, some = (build(*settings, f"order_weight={weight}") for weight in (0, 5))
     assert [a.ordered for a in none.zooms.values()] == [False, False]
     assert [a.ordered for a in some.zooms.values()] == [True, False]
     views = torch.rand(2, 32, 32, 4, generator=torch.Generator().manual_seed(0))
-    values = [t.zooms[64](views, torch.Generator().manual_seed(0)).item() for t in (none, some)]
+    values = [t.zooms[128](views, torch.Generator().manual_seed(0)).item() for t in (none, some)]
     assert values[1] > values[0] + 0.1
 
 

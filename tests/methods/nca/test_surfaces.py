@@ -48,7 +48,8 @@ def test_patches_have_their_width_and_stay_inside():
     assert interior.sum() > 20
     assert torch.allclose(steps[interior], torch.tensor(4.0 / COLUMNS / 8), atol=1e-4)
     assert patches[..., 0].std() > 0.15  # at many places
-    assert plane.patches(look, _ramp(plane), 99.0, 1, 8, generator).shape == (1, 8, 8, 3)
+    # Twice as wide as the square: half of it, in half of the pixels.
+    assert plane.patches(look, _ramp(plane), 2.0 * COLUMNS, 1, 64, generator).shape == (1, 32, 32, 3)
 
 
 def test_the_cells_are_those_of_a_torus():

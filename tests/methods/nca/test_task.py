@@ -118,10 +118,10 @@ def test_loss_is_appearance_and_overflow(task):
 
 
 def test_loss_is_the_mean_over_the_zooms(exemplar):
-    """At 64, 128 and 256 pixels; each has views of its own, from the coarsest on."""
-    settings = ("exemplar_size=256", "target_size=0", "zooms=3", "resolution=16", "view_count=1")
+    """At 128, 256 and 512 pixels; each has views of its own, from the coarsest on."""
+    settings = ("exemplar_size=512", "target_size=0", "zooms=3", "resolution=16", "view_count=1")
     task = NcaTask(config(*settings), exemplar)
-    assert list(task.zooms) == [64, 128, 256]
+    assert list(task.zooms) == [128, 256, 512]
     zooms: Any = {size: lambda views, _, k=k: 10.0**k * views.mean() for k, size in enumerate(task.zooms)}
     task.zooms = zooms
     total = task.loss(1, torch.Generator().manual_seed(0)).metrics["appearance"]
@@ -130,7 +130,7 @@ def test_loss_is_the_mean_over_the_zooms(exemplar):
     steps = int(torch.randint(2, 5, (), generator=generator))
     sphere, state = task.surfaces[0], _grow(task, torch.zeros(1, 642, 16), steps, generator)[0]
     means = []
-    for size in (64, 128, 256):
+    for size in (128, 256, 512):
         cameras = task.cameras(sphere, size, generator)
         means.append(sphere.views(task.look, state, cameras).mean().item())
     assert total == pytest.approx((means[0] + 10 * means[1] + 100 * means[2]) / 3, rel=1e-4)
@@ -139,9 +139,9 @@ def test_loss_is_the_mean_over_the_zooms(exemplar):
 def test_zooms_that_would_be_too_small_are_left_out(exemplar):
     sizes = [
         list(NcaTask(config(f"exemplar_size={size}", "target_size=0", "zooms=3"), exemplar).zooms)
-        for size in (32, 100, 128)
+        for size in (32, 200, 256)
     ]
-    assert sizes == [[32], [100], [64, 128]]
+    assert sizes == [[32], [200], [128, 256]]
 
 
 def test_parameters_are_those_of_rule_and_decoder(task):
@@ -199,7 +199,11 @@ def test_patches_have_the_wanted_density(task):
 def test_a_larger_exemplar_is_seen_closer(task):
     """A pixel of a view is always a pixel of the exemplar; no patch is wider than the sphere shows."""
     assert _cameras(task, 64).half_width == pytest.approx(_cameras(task).half_width / 2)
-    assert _cameras(task, 16).half_width == pytest.approx(0.65)
+    widest = _cameras(task, 16)
+    assert widest.half_width == pytest.approx(0.65)
+    pixel = 2 * _cameras(task, 32).half_width / 32
+    assert 2 * widest.half_width / widest.width == pytest.approx(2 * pixel, rel=0.03)
+    assert widest.width == widest.height < 32
 
 
 @pytest.mark.parametrize("size", [8, 32, 64])
