@@ -223,7 +223,7 @@ class Bench:
 
 def apply_step(frequency: int, repetitions: int) -> float:
     """One step of the automaton without gradients [ms], averaged over fifty."""
-    mesh, texture = icosphere(frequency), NcaTexture.load("waffle")
+    mesh, texture = icosphere(frequency), NcaTexture.load("cobblestone")
     return best(lambda: texture.grow(mesh, steps=50), repetitions) / 50
 
 
