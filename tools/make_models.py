@@ -43,22 +43,22 @@ class Recipe:
 
 
 FINE = (*SHORT, "density=48")  # patterns that are small in their exemplar
+QUICK = ("steps=200", "milestones=120,170")  # without order
 SMALL = ("view_count=8",)  # exemplars of 128 pixels have one zoom, so more views of it
 RECIPES = {
     PARENT: Recipe("scales", None, ()),
-    "bark": Recipe("Bark_007", settings=(*FINE, *SMALL)),
     "bricks": Recipe("bricks"),
     "cobblestone": Recipe("cobblestone"),
-    "fur": Recipe("Stylized_Fur_001", settings=(*FINE, *SMALL)),
+    "fur": Recipe("Stylized_Fur_001", settings=(*QUICK, "density=48", *SMALL)),
     "hexagons": Recipe("hexagons"),
     "honeycomb": Recipe("Honeycomb_002", settings=(*FINE, *SMALL)),
     "knit": Recipe("knit", settings=FINE),
     "lava": Recipe("lava"),
-    "leather": Recipe("leather", settings=(*SHORT, "density=64")),
-    "mosaic": Recipe("Abstract_008", settings=(*SHORT, *SMALL)),
-    "pebbles": Recipe("Pebbles_025", settings=(*SHORT, "density=64", *SMALL)),
+    "leather": Recipe("leather", settings=(*QUICK, "density=64")),
+    "mosaic": Recipe("Abstract_008", settings=(*QUICK, *SMALL)),
+    "pebbles": Recipe("Pebbles_025", settings=(*QUICK, "density=64", *SMALL)),
     "planks": Recipe("planks"),
-    "rust": Recipe("rust"),
+    "rust": Recipe("rust", settings=QUICK),
     "shells": Recipe("Wall_Shells_001", settings=(*FINE, *SMALL)),
     "waffle": Recipe("Waffle_001", settings=(*SHORT, *SMALL)),
     "wicker": Recipe("wicker"),
