@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 import torch
@@ -166,7 +165,6 @@ def _pixels(share: float, resolution: int) -> int:
 
 
 TrainingSurface = TrainingSphere | TrainingPlane
-Kind = Literal["even", "uneven", "flat"]
 
 
 def training_surfaces(config: NcaConfig, look: Look) -> list[TrainingSurface]:
