@@ -105,9 +105,7 @@ def texture(exemplar: Exemplar, mesh: Mesh, run: Path, settings: dict[str, str])
         return surface.SurfaceTexture.load(run)
     overrides = [f"{key}={value}" for key, value in settings.items() if key != "content"]
     resume = (run / checkpoint.NAME).is_file()
-    return surface.fit(
-        exemplar, mesh, run, overrides=overrides, content=settings.get("content"), resume=resume
-    )
+    return surface.fit(exemplar, mesh, run, set=overrides, content=settings.get("content"), resume=resume)
 
 
 def pictures(result: surface.SurfaceTexture, count: int, side: int) -> list[np.ndarray]:

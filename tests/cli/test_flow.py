@@ -139,8 +139,8 @@ def test_demo(folder, monkeypatch, capsys):
 
     fit, grow, bake = nca.fit, nca.NcaTexture.apply, Asset.baked
 
-    def tiny_fit(*arguments, overrides, init, **options):
-        return fit(*arguments, overrides=[*overrides, *TINY], **options, quiet=True)
+    def tiny_fit(*arguments, set, init, **options):
+        return fit(*arguments, set=[*set, *TINY], **options)
 
     monkeypatch.setattr(nca, "fit", tiny_fit)
     monkeypatch.setattr(nca.NcaTexture, "apply", lambda *a, **o: grow(*a, **o, subdivide=1, steps=2))

@@ -39,7 +39,7 @@ def find_template(reference: Mesh, template: Mesh | None = None) -> Mesh:
         raise ConfigError(
             f"template {template.name} has {_description(actual)}, "
             f"reference {reference.name} has {_description(expected)}",
-            "give a --template of the same kind",
+            "give a `template` of the same kind",
         )
     return template
 

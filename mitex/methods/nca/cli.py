@@ -54,7 +54,8 @@ class Fit(ExemplarOptions):
         out = self.folder(exemplar.name)
         from mitex.methods import nca
 
-        nca.fit(exemplar, out, init=self.init, **options)
+        with self.progress() as on_step:
+            nca.fit(exemplar, out, init=self.init, on_step=on_step, **options)
         print(out)
 
 

@@ -98,13 +98,16 @@ def demo(out: Path, seed: int, steps: int, say: Callable[[str], None] = lambda l
 def _fit(exemplar: Exemplar, run: Path, seed: int, steps: int, say: Callable[[str], None]) -> NcaTexture:
     from mitex.methods import nca
     from mitex.training.locate import CHECKPOINT, PREVIOUS
+    from mitex.training.progress import ProgressDisplay
 
     resume = any((run / name).is_file() for name in (CHECKPOINT, PREVIOUS))
     start = "the run in the folder" if resume else f"model '{PARENT}'"
     say(f"learning '{exemplar.name}', {steps} steps, starting from {start}")
     milestones = f"{round(0.6 * steps)},{round(0.85 * steps)}"
-    overrides = [f"seed={seed}", f"steps={steps}", *SETTINGS, f"milestones={milestones}"]
-    return nca.fit(exemplar, run, overrides=overrides, resume=resume, init=None if resume else PARENT)
+    settings = [f"seed={seed}", f"steps={steps}", *SETTINGS, f"milestones={milestones}"]
+    init = None if resume else PARENT
+    with ProgressDisplay() as on_step:
+        return nca.fit(exemplar, run, set=settings, resume=resume, init=init, on_step=on_step)
 
 
 def _picture(asset: Asset) -> np.ndarray:

@@ -69,7 +69,7 @@ class SurfaceTexture:
         if mesh is not None and not same_surface(mesh, self.mesh):
             raise ConfigError(
                 f"this texture belongs to mesh '{self.mesh.name}', not to '{mesh.name}'",
-                "synthesize it there: mitex fit surface --mesh NEW --config RUN/config.toml",
+                "synthesize it there, with the config.toml of its run folder",
             )
         texels, layout = self.domain.texels, texel_layout(list(self.maps))
         atlas = Atlas.from_uv(self.domain.uv, texels.resolution, PADDING)

@@ -333,7 +333,7 @@ def fitted(tmp_path, exemplar):
 
     def fitted(*settings: str) -> torch.Tensor:
         out = tmp_path / "-".join(settings)
-        texture = nca.fit(exemplar, out, overrides=[*SETTINGS, *settings], quiet=True)
+        texture = nca.fit(exemplar, out, set=[*SETTINGS, *settings])
         return torch.cat([p.detach().flatten() for p in texture.look.parameters()])
 
     return fitted

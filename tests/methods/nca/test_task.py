@@ -255,7 +255,6 @@ def _run(exemplar, folder, steps, resume=False):
         lr=settings.lr,
         normalise_gradients=True,
         resume=resume,
-        quiet=True,
     )
     return task
 
