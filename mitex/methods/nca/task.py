@@ -107,8 +107,7 @@ class NcaTask:
         """The views of one step in which the exemplar is `size` [px] wide."""
         config = self.config
         if config.views == "full":
-            fov = math.radians(config.fov)
-            return random_views(generator, config.view_count, config.distance, fov, config.resolution)
+            return random_views(generator, config.view_count, config.distance, config.fov, config.resolution)
         half = min(0.5 * self.width * config.resolution / size, WIDEST)
         return patch_views(generator, mesh, config.view_count, half, config.resolution)
 
