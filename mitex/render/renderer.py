@@ -116,7 +116,7 @@ class OrbitRenderer:
         from mitex.plugins import init
         from mitex.runtime.jit import mi
 
-        init()
+        init(needs="ad_rgb")
         scene = {
             "type": "scene",
             "integrator": {"type": "path", "max_depth": MAX_DEPTH, "rr_depth": 99, "hide_emitters": True},
@@ -202,7 +202,7 @@ def _bsdf(asset: Asset, split: HardSplit, ao: bool) -> dict[str, object]:
     from mitex.plugins import init
     from mitex.runtime.jit import mi
 
-    init()
+    init(needs="ad_rgb")
     maps, kind = {k: v[split.source] for k, v in asset.vertex_maps.items()}, "vertex_field"
     if asset.texture_maps is not None:
         maps, kind = asset.texture_maps, "texel_field"

@@ -53,7 +53,7 @@ def shell_still(
     if not 16 <= resolution <= 8192:
         raise ConfigError(f"a picture of {resolution} pixels is not possible", "use 16 to 8192")
     check_elevation(elevation, floating)
-    init()
+    init(needs="ad_rgb")
     from mitex.textures.shell_field import shell_field
 
     centre = outline.mean(0)

@@ -112,7 +112,7 @@ class Stage:
     FIELD = "mesh.bsdf.reflectance.data"
 
     def __init__(self, mesh: Mesh, channels: int = 3, background: Sequence[float] | float = 0.0) -> None:
-        init()
+        init(needs="ad")
         if not dr.is_jit_v(mi.Float):
             raise ConfigError(f"the variant is '{mi.variant()}'", "set an llvm or cuda one, or none")
         if channels < 1:

@@ -10,6 +10,7 @@ from typing import Any, Generic, Protocol, TypeVar, Unpack
 
 from mitex.errors import ConfigError
 from mitex.paths import expanded
+from mitex.runtime.session import check_variant
 from mitex.training import run
 from mitex.training.config import by_key, resolve
 from mitex.training.control import Control
@@ -64,10 +65,11 @@ class Run(Generic[Config]):
 
         Raises:
             OutputError, CheckpointError: As `run.check`.
-            ConfigError: As `resolve`.
+            ConfigError: As `resolve`; or the program has chosen a variant of Mitsuba that fits cannot use.
         """
         folder, resume = None if out is None else expanded(out), options.get("resume", False)
         run.check(folder, resume)
+        check_variant("ad_rgb")  # of the previews, at the latest
         named = options.get("config")
         file = None if named is None else expanded(named)
         if folder is not None and resume and file is None and (folder / run.CONFIG).is_file():

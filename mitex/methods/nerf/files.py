@@ -89,7 +89,7 @@ def load(source: str | Path) -> Model:
     Raises:
         CheckpointError: there is none, or it is damaged.
     """
-    init()
+    init(needs="ad")
     with model_file.opened(source, METHOD.name) as (tensors, about):
         if not all(tensor.isfinite().all() for tensor in tensors.values()):
             raise ValueError("values that are not finite")

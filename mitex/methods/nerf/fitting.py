@@ -56,7 +56,7 @@ def fit(
         base_mesh = Mesh.load(base_mesh)
     if base_mesh is not None:
         base_mesh = base_mesh.with_vertices(photos.similarity.apply(base_mesh.vertices))
-    init()
+    init(needs="ad")
     keep_freed_memory()
     training, held_out = photos.split()
     base = find_base(training, config, base_mesh, run.control, keep=run.folder is not None)

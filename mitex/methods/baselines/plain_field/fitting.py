@@ -46,7 +46,7 @@ def fit(
     """
     training_run = Run.of(PRESETS, out, **options)
     photos = capture if isinstance(capture, Capture) else load_capture(capture)
-    init()
+    init(needs="ad")
     keep_freed_memory()
     training, held_out = photos.split()
     if training_run.config.seconds and not training_run.resume:
