@@ -11,8 +11,8 @@ import numpy as np
 import torch
 from torch.autograd.function import once_differentiable
 
-# Torch warns once a process that these tensors are new. It does so here, rather than at some call: the filters
-# of warnings are those of all threads.
+# Torch warns once a process that these tensors are new. It does so here, rather than at some call, since the
+# filters of warnings are those of all threads.
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
     torch.sparse_csr_tensor(torch.tensor([0, 0]), torch.tensor([]), torch.tensor([]), (1, 1))

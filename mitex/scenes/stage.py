@@ -132,7 +132,7 @@ class Stage:
                 "mesh": mesh_shape(mesh, mi.load_dict({"type": "diffuse", "reflectance": field})),
             }
         )
-        self._faces = torch.from_numpy(np.ascontiguousarray(mesh.faces, dtype=np.int32))
+        self._faces = torch.tensor(mesh.faces)
 
     def move(self, vertices: np.ndarray) -> None:
         """Gives the mesh other vertex positions, (V, 3), and keeps its faces.

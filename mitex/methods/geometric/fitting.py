@@ -65,7 +65,7 @@ def fit(
     keep_freed_memory()
     meshes, reports = training_meshes(shape, start, config, run.control, keep=run.folder is not None)
     hierarchy = Hierarchy.of(start, config.levels)
-    task = GeometricTask(config, hierarchy, torch.from_numpy(start.vertices), meshes, shape)
+    task = GeometricTask(config, hierarchy, torch.tensor(start.vertices), meshes, shape)
     origin = {key: getattr(config, key) for key in ("levels", "noise", "remeasure")}
     origin["fit"] = [vars(r) for r in reports]
     return run.train(
@@ -102,7 +102,7 @@ def training_meshes(
     for level, mesh in enumerate(hierarchy.meshes):
         control.check()
         place = cache_dir() / "geometric" / content_key(VERSION, *arrays, (config.seed, options, level))
-        start = hierarchy.finer(meshes[-1], level - 1) if meshes else torch.from_numpy(template.vertices)
+        start = hierarchy.finer(meshes[-1], level - 1) if meshes else torch.tensor(template.vertices)
 
         def compute(start: torch.Tensor = start, level: int = level) -> torch.Tensor:
             return fit_level(reference, start, hierarchy.graphs[level], level, config)

@@ -48,7 +48,7 @@ def normalised(reference: Mesh, template: Mesh) -> tuple[Mesh, Mesh]:
     """Both meshes centred, and scaled so that they are equally large and the template's mean edge is 1."""
     reference, template = _boxed(reference), _boxed(template)
     graph = FaceGraph.of(template.faces, len(template.vertices))
-    unit = float(mean_edge(torch.from_numpy(template.vertices), graph))
+    unit = float(mean_edge(torch.tensor(template.vertices), graph))
     return reference.with_vertices(reference.vertices / unit), template.with_vertices(
         template.vertices / unit
     )

@@ -70,8 +70,8 @@ def save(path: Path, model: Model) -> Path:
     """
     base = model.base
     tensors = {
-        "vertices": torch.from_numpy(base.mesh.vertices),
-        "faces": torch.from_numpy(base.mesh.faces),
+        "vertices": torch.tensor(base.mesh.vertices),
+        "faces": torch.tensor(base.mesh.faces),
         "scan": torch.from_numpy(base.scan),
         "frames": torch.from_numpy(model.frames),
         "tables/f": model.tables[0],

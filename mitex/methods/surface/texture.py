@@ -90,7 +90,7 @@ class SurfaceTexture:
         arrays = mesh_arrays(self.mesh)
         if self.domain.orientation is not None:
             arrays["orientation"] = self.domain.orientation
-        tensors = {name: torch.from_numpy(np.ascontiguousarray(a)) for name, a in arrays.items()}
+        tensors = {name: torch.tensor(a) for name, a in arrays.items()}
         tensors["values"] = torch.from_numpy(np.ascontiguousarray(self.values, np.float16))
         about = {**self.about, "maps": list(self.maps), "mesh": self.mesh.name}
         return model_file.save(path, tensors, METHOD.name, about)
