@@ -78,10 +78,10 @@ def small_task(**changes) -> GeometricTask:
     hierarchy = Hierarchy.of(ball, config.levels)
     generator = torch.Generator().manual_seed(4)
     meshes = [
-        torch.from_numpy(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=generator)
+        torch.tensor(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=generator)
         for k, mesh in enumerate(hierarchy.meshes)
     ]
-    return GeometricTask(config, hierarchy, torch.from_numpy(ball.vertices), meshes, bumpy())
+    return GeometricTask(config, hierarchy, torch.tensor(ball.vertices), meshes, bumpy())
 
 
 def test_the_run_folder(run):
