@@ -61,9 +61,9 @@ def runs(workplace, toy, own_cache):
         if name not in folders:
             with pytest.MonkeyPatch.context() as patch:
                 patch.chdir(workplace)
-                words = f"fit {name} --out runs/{name} --quiet {FITS[name].fit}".split()
-                before = program_state()
-                assert main(words) == 0
+                words = f"--out runs/{name} --quiet {FITS[name].fit}".split()
+                command, before = parse(methods()[name].load_fit(), words, "fit"), program_state()
+                command.run()
                 assert program_state() == before
             folders[name] = workplace / "runs" / name
         return folders[name]
