@@ -7,6 +7,8 @@ shape takes some time, so callers round row counts up to a few that come again.
 
 from __future__ import annotations
 
+from typing import cast
+
 import torch
 import torch.nn.functional as F
 from torch import nn
@@ -18,7 +20,7 @@ IMAGES = 64
 
 def layer(inputs: int, outputs: int) -> nn.Linear:
     """A linear layer of zeros: torch's own draws weights, from the generator that all of a program shares."""
-    linear = nn.utils.skip_init(nn.Linear, inputs, outputs)
+    linear = cast(nn.Linear, nn.utils.skip_init(nn.Linear, inputs, outputs))
     linear.load_state_dict({"weight": torch.zeros(outputs, inputs), "bias": torch.zeros(outputs)})
     return linear
 

@@ -1,6 +1,7 @@
 """A small real synthesis, its texture, and what is refused."""
 
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 
 import numpy as np
@@ -201,8 +202,8 @@ class TestOrientation:
     def test_a_field_turns_the_frames_and_stays_with_the_texture(self, mesh, exemplar, tmp_path):
         down = np.tile(np.array([0.0, -1.0, 0.0], np.float32), (len(mesh.vertices), 1))
         np.save(tmp_path / "down.npy", down)
-        options = {"set": [*SMALL, "steps=2"], "orientation": tmp_path / "down.npy"}
-        surface.fit(exemplar, mesh, tmp_path / "run", **options)
+        settings = [*SMALL, "steps=2"]
+        surface.fit(exemplar, mesh, tmp_path / "run", set=settings, orientation=tmp_path / "down.npy")
         texture = SurfaceTexture.load(tmp_path / "run")
         tangents = texture.apply().tangents
         assert texture.domain.orientation is not None and tangents is not None
@@ -211,10 +212,10 @@ class TestOrientation:
         assert (tangents[around, 1] < -0.8).all()
 
     def test_resuming_with_another_field_is_refused(self, mesh, exemplar, tmp_path):
-        options = {"set": [*SMALL, "steps=2"]}
-        surface.fit(exemplar, mesh, tmp_path / "run", **options)
+        fit = partial(surface.fit, exemplar, mesh, tmp_path / "run", set=[*SMALL, "steps=2"])
+        fit()
         with pytest.raises(CheckpointError, match="orientation"):
-            surface.fit(exemplar, mesh, tmp_path / "run", **options, orientation=mesh.vertices, resume=True)
+            fit(orientation=mesh.vertices, resume=True)
 
     @pytest.mark.parametrize(
         "kind", ["missing", "text", "shape", "words", "nan", "objects", "archive", "cut"]
