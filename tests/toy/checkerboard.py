@@ -71,8 +71,9 @@ class Task(ParameterTask):
         return {"method": METHOD.name, "exemplar": self.exemplar.name}
 
 
-def fit(exemplar: Exemplar, out=None, **options: Unpack[RunOptions]) -> Checkerboard:
+def fit(exemplar: Exemplar | str, out=None, **options: Unpack[RunOptions]) -> Checkerboard:
     run = Run.of(PRESETS, out, **options)
+    exemplar = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
     task, cell = Task(run.config, exemplar), run.config.cell
 
     def texture(about: dict[str, Any]) -> Checkerboard:
