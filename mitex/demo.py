@@ -107,11 +107,13 @@ def _synthesized(run: Path, seed: int) -> SurfaceTexture:
     from mitex.exemplar import Exemplar
     from mitex.methods import surface
     from mitex.training.locate import CHECKPOINT, PREVIOUS
+    from mitex.training.progress import ProgressDisplay
 
     maps = Exemplar.load(EXEMPLAR).maps
     exemplar = Exemplar({name: maps[name] for name in MAPS}, EXEMPLAR)
     resume = any((run / name).is_file() for name in (CHECKPOINT, PREVIOUS))
-    return surface.fit(exemplar, MESH, run, overrides=[f"seed={seed}", *SETTINGS], resume=resume)
+    with ProgressDisplay() as on_step:
+        return surface.fit(exemplar, MESH, run, seed=seed, set=SETTINGS, resume=resume, on_step=on_step)
 
 
 def _grown(model: str, mesh: str, seed: int) -> tuple[Asset, str]:

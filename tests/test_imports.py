@@ -40,10 +40,10 @@ ORDER = [
     "runtime",
     "sparse",
     "cache",
-    "lazy",
     "paths",
     "errors",
     "mitex",
+    "lazy",
 ]
 
 # Importing function -> module: the lazy imports without which there would be circles, see CONTRIBUTING.

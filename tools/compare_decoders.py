@@ -50,7 +50,7 @@ def main() -> None:
     for name, own in KINDS.items():
         run = runs / name.replace(", ", "-").replace(" ", "-")
         resume = (run / checkpoint.NAME).is_file()
-        texture = fit(exemplar, run, overrides=[*settings, *own], resume=resume, quiet=True)
+        texture = fit(exemplar, run, set=[*settings, *own], resume=resume)
         wide, close = views(texture)
         print(f"| {name} | " + " | ".join(row(texture, run, exemplar, wide)) + " |", flush=True)
         cells += [wide, close]

@@ -81,7 +81,7 @@ def train(name: str, exemplars: Path) -> NcaTexture:
     texture = fit(
         recipe.exemplar if embedded_one else exemplars / recipe.exemplar,
         run,
-        overrides=recipe.settings,
+        set=recipe.settings,
         init=MODELS / f"{recipe.parent}.safetensors" if recipe.parent else None,
         resume=(run / checkpoint.NAME).is_file(),
     )

@@ -71,7 +71,7 @@ def test_fit_apply_render(folder, capsys):
     dense = Asset.load("d.glb")
     assert len(dense.mesh.faces) == 12 * 16 and dense.atlas is not None
 
-    render = ["render", "a.glb", "--size", "16", "--spp", "1"]
+    render = ["render", "a.glb", "--resolution", "16", "--spp", "1"]
     assert run(*render, "--out", "a.png", "--azimuth", "-30", "--elevation", "40") == "a.png"
     assert read_image("a.png").shape == (16, 16, 3)
     assert run(*render, "--out", "a.gif", "--frames", "3", "--floating", "--elevation", "-10") == "a.gif"
@@ -92,7 +92,7 @@ def test_options_reach_the_library(folder, monkeypatch, capsys):
         "apply m.safetensors --mesh cube.obj --out a.ply --subdivide 0 --steps 1 --orientation 90 --seed 5"
     )
     assert main(words.split()) == 0
-    expected = {"seed": 5, "steps": 1, "subdivide": 0, "orientation": np.pi / 2, "scale": 1.0}
+    expected = {"seed": 5, "steps": 1, "subdivide": 0, "orientation": 90, "scale": 1.0}
     assert options == expected | {"resolution": None, "keep_dense": False}
     assert main([*words.split(), "--keep-dense"]) == 0
     assert options == expected | {"resolution": None, "keep_dense": True}
@@ -101,8 +101,13 @@ def test_options_reach_the_library(folder, monkeypatch, capsys):
         "mitex.render.picture.still", lambda asset, **o: options.update(o) or np.zeros((4, 4, 3))
     )
     options.clear()
-    assert main(["render", "a.ply", "--out", "a.png", "--azimuth", "180", "--size", "32"]) == 0
-    assert options == {"resolution": 32, "azimuth": np.pi, "displacement": 0.0, "backdrop": True}
+    assert main(["render", "a.ply", "--out", "a.png", "--azimuth", "180", "--resolution", "32"]) == 0
+    assert options == {
+        "resolution": 32,
+        "azimuth": 180,
+        "displacement": 0.0,
+        "floating": False,
+    }
 
 
 def test_models(folder, monkeypatch, capsys):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -54,7 +53,8 @@ class Fit(ExemplarOptions):
         out = self.folder(exemplar.name)
         from mitex.methods import nca
 
-        nca.fit(exemplar, out, init=self.init, **options)
+        with self.progress() as on_step:
+            nca.fit(exemplar, out, init=self.init, on_step=on_step, **options)
         print(out)
 
 
@@ -200,7 +200,7 @@ class Apply(OptionalMeshOptions):
         return {
             "steps": self.steps,
             "subdivide": self._levels(),
-            "orientation": math.radians(self.orientation),
+            "orientation": self.orientation,
             "scale": self.scale,
             "resolution": (self.resolution or RESOLUTION) if textures else None,
             "keep_dense": self.keep_dense,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 
 import numpy as np
@@ -127,8 +126,7 @@ class NcaTask:
         """The cameras of `views`."""
         config = self.config
         if config.views == "full":
-            fov = math.radians(config.fov)
-            return random_views(generator, config.view_count, config.distance, fov, config.resolution)
+            return random_views(generator, config.view_count, config.distance, config.fov, config.resolution)
         return sphere.cameras(self._width(size), config.view_count, config.resolution, generator)
 
     def _width(self, size: int) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -78,7 +79,7 @@ class NcaTexture:
             seed: of the random updates.
             steps: of the automaton; None for as many as the model's pattern needs to be in order.
             subdivide: levels of subdivision, or "auto": as many as bring the copy to 8,000 vertices.
-            orientation: turns the texture about the normals, counter-clockwise [rad].
+            orientation: turns the texture about the normals, counter-clockwise [degrees].
             scale: size of the pattern, 1 for what the density gives; others need a remeshing of the copy to
                 the fitting density (extra `remesh`).
             resolution: of the baked textures [texels], on the mesh's own UVs if nothing in them overlaps,
@@ -95,8 +96,9 @@ class NcaTexture:
         self._check_unconditioned()
         laid = mesh if resolution is None or (keep_dense and scale != 1.0) else laid_out(mesh, resolution)
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
-        state = self._healthy(cells, seed, self.steps if steps is None else steps, orientation)
-        grown = Grown(self.look, state, cells, orientation)
+        turn = math.radians(orientation)
+        state = self._healthy(cells, seed, self.steps if steps is None else steps, turn)
+        grown = Grown(self.look, state, cells, turn)
         asset = grown.asset()
         if resolution is None:
             return asset
@@ -113,7 +115,7 @@ class NcaTexture:
         `mitex.mesh.subdivide_midpoint`. Other arguments and errors as of `apply`.
         """
         cells, steps = Cells(mesh, 0, mesh), self.steps if steps is None else steps
-        return fields(self.look, self._healthy(cells, seed, steps, orientation), mesh)
+        return fields(self.look, self._healthy(cells, seed, steps, math.radians(orientation)), mesh)
 
     def variants(
         self, mesh: Mesh, seeds: Iterable[int], *, resolution: int | None = 1024, **options: Any
@@ -159,7 +161,7 @@ class NcaTexture:
             mesh: any mesh, or its perception operator, which has an orientation of its own.
             seed: of the random updates.
             steps: from the initial state, which is zero; None as of `apply`.
-            orientation: as in `apply` [rad].
+            orientation: as in `apply`.
 
         Returns:
             (V, C) float32.
@@ -174,7 +176,7 @@ class NcaTexture:
         keep_freed_memory()
         rule, operator = self.look.rule, mesh
         if isinstance(operator, Mesh):
-            operator = perception(operator, rule.degree, orientation, mean=self.look.mean)
+            operator = perception(operator, rule.degree, math.radians(orientation), mean=self.look.mean)
         generator = torch.Generator().manual_seed(seed)
         return self.look.evolve(rule.seed(operator), operator, steps, generator)[0]
 
@@ -191,9 +193,9 @@ class NcaTexture:
         low, high = TILE_CELLS
         return round(min(max(REPEATS * density, low), high))
 
-    def _healthy(self, cells: Cells, seed: int, steps: int, orientation: float) -> torch.Tensor:
-        """What grows on an automaton's mesh, with the exemplar's colours."""
-        operator = perception(cells.mesh, self.look.rule.degree, orientation, mean=self.look.mean)
+    def _healthy(self, cells: Cells, seed: int, steps: int, turn: float) -> torch.Tensor:
+        """What grows on an automaton's mesh, turned by an angle [rad], with the exemplar's colours."""
+        operator = perception(cells.mesh, self.look.rule.degree, turn, mean=self.look.mean)
         return self._healed(self.grow(operator, seed=seed, steps=steps), cells, operator, seed)
 
     def _healed(self, state: torch.Tensor, cells: Cells, operator: Perception, seed: int) -> torch.Tensor:
