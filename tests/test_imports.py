@@ -41,6 +41,7 @@ ORDER = [
     "cache",
     "lazy",
     "paths",
+    "suggestions",
     "errors",
     "mitex",
 ]

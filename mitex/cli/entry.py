@@ -51,7 +51,7 @@ def _run(words: list[str]) -> int:
     if words[0] in ("-h", "--help", "help"):
         print(overview.overview())
         return 0
-    if words[0] == "--version":
+    if words[0] in ("-V", "--version"):
         print(f"mitex {mitex.__version__}")
         return 0
     if words[1:] and set(words[1:]) <= commands.HELP:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,12 +23,12 @@ class Models:
       mitex models --json
     """
 
-    as_json: Annotated[bool, arg(name="json", help_behavior_hint="")] = field(default=False)
+    json: Annotated[bool, arg(help_behavior_hint="")] = False
     """For programs: a JSON list of objects."""
 
     def run(self) -> None:
         models = listing()
-        if self.as_json:
+        if self.json:
             print(json.dumps(models, indent=2))
             return
         for model in models:

@@ -59,13 +59,13 @@ FITS = {
     "negative seed": (None, "--seed -1", "--seed -1"),
     "huge seed": (None, "--seed 99999999999", "--seed"),
     "unknown option": (None, "--epochs 5", "--epochs"),
-    "unknown key": (None, "--set hiden=64", "'hidden'"),
+    "unknown key": (None, "--set hiden=64", "did you mean hidden?"),
     "no equals sign": (None, "--set hidden", "key=value"),
     "value of the wrong type": (None, "--set hidden=big", "hidden"),
     "value that is not finite": (None, "--set lr=nan", "lr"),
     "value out of range": (None, "--set hidden=-3", "hidden"),
     "a key twice": (None, "--steps 5 --set steps=6", "steps is set to 6 and to 5"),
-    "unknown preset": (None, "--preset papper", "'paper'"),
+    "unknown preset": (None, "--preset papper", "did you mean paper?"),
     "unknown layer": (None, "--set layers=relu9_9", "relu9_9"),
     "missing config": (None, "--config no.toml", "no.toml"),
     "config that is no TOML": (lambda d: bad.text(d / "c.toml", "steps = = 3"), "--config c.toml", "TOML"),
@@ -74,7 +74,7 @@ FITS = {
     "unknown key in the config": (
         lambda d: bad.text(d / "c.toml", "stepps = 3"),
         "--config c.toml",
-        "'steps'",
+        "did you mean steps?",
     ),
     "wrong type in the config": (lambda d: bad.text(d / "c.toml", "steps = [3]"), "--config c.toml", "steps"),
     "presets that contradict": (
@@ -82,6 +82,7 @@ FITS = {
         "--config c.toml --preset patch",
         "contradict",
     ),
+    "presets of --preset and --set": (None, "--preset patch --set preset=paper", "contradicts"),
     "resume and init": (None, "--resume --init cobblestone", "--resume and --init contradict"),
     "resume without a run": (None, "--resume", "no checkpoint"),
     "unknown init": (None, f"--init no_such_model {QUICK}", "no_such_model"),
@@ -99,7 +100,8 @@ FITS = {
 
 # Name -> (what makes the mesh, its name, words of the message)
 MESHES = {
-    "missing": (lambda d: None, "no.obj", "no.obj"),
+    "missing": (lambda d: None, "no.obj", "no.obj; give a mesh file, or one of"),
+    "misspelt name": (lambda d: None, "octopuss", "did you mean octopus?"),
     "text": (lambda d: bad.text(d / "a.obj"), "a.obj", "a.obj"),
     "empty": (lambda d: bad.text(d / "a.obj", ""), "a.obj", "a.obj"),
     "folder": (lambda d: (d / "a.obj").mkdir(), "a.obj", "a.obj"),

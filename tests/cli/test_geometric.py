@@ -219,3 +219,9 @@ def test_an_unfinished_run(files, run, capsys):
 def test_a_damaged_model(files, run, capsys):
     bad.cut(run / "texture.safetensors")
     check_refused(files, apply(), "geometric texture", capsys)
+
+
+def test_an_unknown_reference_is_answered_with_the_names(files, capsys):
+    fit = ["fit", "geometric", "--out", "out/run", "--reference"]
+    check_refused(files, [*fit, "spikse"], "there is no mesh spikse; did you mean spikes?", capsys)
+    check_refused(files, [*fit, "nothing.obj"], "one of spikes, scales, knobs, ridges", capsys)
