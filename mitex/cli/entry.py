@@ -70,15 +70,18 @@ def _run(words: list[str]) -> int:
 
 
 def _route_warnings() -> None:
-    """Mitex's warnings become lines on stderr; those of libraries are dropped (python -W shows them)."""
+    """Mitex's warnings become lines on stderr, each but once; those of libraries are dropped (python -W shows
+    them)."""
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
     warnings.simplefilter("always", MitexWarning)
-    others = warnings.showwarning
+    others, shown = warnings.showwarning, set()
 
     def show(message, category, filename, lineno, file=None, line=None):
         if issubclass(category, MitexWarning):
-            _say(f"warning: {message}")
+            if str(message) not in shown:
+                shown.add(str(message))
+                _say(f"warning: {message}")
         else:
             others(message, category, filename, lineno, file, line)
 

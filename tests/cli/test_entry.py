@@ -94,17 +94,20 @@ class TestExitCodes:
 
 
 class TestWarnings:
-    def test_ours_are_lines_and_others_unseen(self, command, capsys):
+    def test_ours_are_lines_said_once_and_others_unseen(self, command, capsys):
         def action(_):
             warnings.warn("the mesh has\na hole", MeshWarning, stacklevel=2)
             warnings.warn("the mesh has\na hole", MeshWarning, stacklevel=2)
+            warnings.warn("the mesh is flat", MeshWarning, stacklevel=2)
             warnings.warn("noise of a library", UserWarning, stacklevel=2)
 
         command.action = action
         before = warnings.showwarning
         assert main(["try"]) == 0
-        assert capsys.readouterr().err == "warning: the mesh has a hole\n" * 2
+        assert capsys.readouterr().err == "warning: the mesh has a hole\nwarning: the mesh is flat\n"
         assert warnings.showwarning is before
+        assert main(["try"]) == 0  # the next command tells anew
+        assert "hole" in capsys.readouterr().err
 
 
 class TestHelp:
