@@ -18,7 +18,7 @@ from mitex.training.metrics import Metrics, plain
 from mitex.training.progress import Progress
 from mitex.training.signals import StopSignals
 from mitex.training.state import TrainState
-from mitex.training.task import Task
+from mitex.training.task import Task, Uneven
 
 PATIENCE = 3  # non-finite steps in a row that end a run
 
@@ -96,7 +96,11 @@ def train(
         every = config.checkpoint_every, config.preview_every
         writer = _Writer(folder, state, metrics, *every, saved=state.step if resume else -1)
         title = task.metadata().get("method", "training")
-        with Progress(title, folder, state.step, config.steps, quiet) as progress, StopSignals(quiet) as stop:
+        cost = task.cost if isinstance(task, Uneven) else None
+        with (
+            Progress(title, folder, state.step, config.steps, quiet, cost=cost) as progress,
+            StopSignals(quiet) as stop,
+        ):
             while state.step < config.steps and not stop.requested:
                 record = state.advance()
                 metrics.write(record)

@@ -3,9 +3,11 @@
 import math
 import sys
 import time
-from collections import deque
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
+
+from mitex.training.pace import Pace
 
 REFRESH = 0.2  # [s]
 LINE_EVERY = 30.0  # [s]
@@ -21,16 +23,24 @@ class Progress:
         steps: Steps in all.
         quiet: Show nothing.
         stream: Where to; None is stderr.
+        cost: What a step costs beside the others, as of `Pace`.
     """
 
     def __init__(
-        self, title: str, out: Path, step: int, steps: int, quiet: bool, stream: TextIO | None = None
+        self,
+        title: str,
+        out: Path,
+        step: int,
+        steps: int,
+        quiet: bool,
+        stream: TextIO | None = None,
+        cost: Callable[[int], float] | None = None,
     ):
         self.title = title
         self.steps = steps
         self._stream = sys.stderr if stream is None else stream
         self._last_shown = time.monotonic()
-        self._times: deque[tuple[float, int]] = deque([(self._last_shown, step)], maxlen=50)
+        self._pace = Pace(step, steps, self._last_shown, cost)
         self._latest: tuple[int, float] | None = None
         self._bar: Any = None
         self._quiet = quiet
@@ -46,8 +56,8 @@ class Progress:
             return
         self._latest = (step, loss)
         now = time.monotonic()
-        if now - self._times[-1][0] >= REFRESH or step == self.steps:
-            self._times.append((now, step))
+        if now - self._pace.latest >= REFRESH or step == self.steps:
+            self._pace.mark(now, step)
         due = REFRESH if self._bar else LINE_EVERY
         if now - self._last_shown >= due or step == self.steps:
             self._last_shown = now
@@ -62,16 +72,10 @@ class Progress:
                 self._show(*self._latest)
             self._bar.stop()
 
-    @property
-    def speed(self) -> float:
-        """Steps per second, over the last 50 steps or 10 s, whichever is longer."""
-        (t0, s0), (t1, s1) = self._times[0], self._times[-1]
-        return (s1 - s0) / (t1 - t0) if t1 > t0 else 0.0
-
     def _show(self, step: int, loss: float) -> None:
-        speed = self.speed
+        speed, seconds = self._pace.speed, self._pace.left(step)
         pace = f"{speed:.2f} steps/s" if speed >= 1 or speed == 0 else f"{1 / speed:.2f} s/step"
-        left = clock((self.steps - step) / speed) if speed else "?"
+        left = "?" if seconds is None else clock(seconds)
         if self._bar:
             self._bar.update(self._row, completed=step, loss=f"{loss:.4g}", pace=pace, left=left)
             self._bar.refresh()

@@ -32,6 +32,7 @@ from mitex.triples import CYCLE, channel_triples, triple_images
 
 VIEW = 384  # side of a preview's images [px]
 CONTENT = "content"
+ALL_TEXELS = 0.1  # what a step costs beside the network on the finest scale, of the network's cost, measured
 
 
 class SurfaceTask(ParameterTask):
@@ -133,6 +134,10 @@ class SurfaceTask(ParameterTask):
         """How often the texels are pooled before they enter the network in a step."""
         coarse = round(self.config.coarse_share * self.config.steps) if self.config.scales else 0
         return 0 if step >= coarse else self.config.scales - step * self.config.scales // coarse
+
+    def cost(self, step: int) -> float:
+        """Of a step: what the network reads, a quarter for each pooling, and what is done with all texels."""
+        return 0.25 ** self.scale(step) + ALL_TEXELS
 
     def _diffuse_and_clamp(self) -> None:
         """Wears down what is finer than the taps, and brings values back to [0, 1]."""
