@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from mitex.cache import content_key
 from mitex.errors import ImageError
 from mitex.geometry.vectors import unit
 from mitex.images import SUFFIXES, read_image, resize
@@ -65,6 +67,11 @@ class Exemplar:
         """Height and width [px]."""
         height, width = next(iter(self.maps.values())).shape[:2]
         return height, width
+
+    @cached_property
+    def key(self) -> str:
+        """A hash of the maps."""
+        return content_key(*(part for name in sorted(self.maps) for part in (name, self.maps[name])))
 
     @staticmethod
     def load(path: str | os.PathLike[str]) -> Exemplar:

@@ -11,6 +11,7 @@ from typing import Any, Generic, Protocol, TypeVar, Unpack
 from mitex.paths import expanded
 from mitex.training import run
 from mitex.training.config import resolve
+from mitex.training.inputs import check_inputs
 from mitex.training.locate import NAME
 from mitex.training.loop import train
 from mitex.training.settings import FitConfig, RunOptions
@@ -69,6 +70,11 @@ class Run(Generic[Config]):
             file = own
         config = resolve(presets, options.get("preset"), file, options.get("overrides", ()))
         return Run(folder, config, resume, options.get("quiet", False))
+
+    def check_inputs(self, metadata: Mapping[str, str]) -> None:
+        """Refuses to resume with other inputs than before, as `mitex.training.inputs.check_inputs`."""
+        if self.resume:
+            check_inputs(self.folder, metadata)
 
     def train(
         self, task: Task, name: str, texture: Callable[[dict[str, Any]], Learned], **training: Any

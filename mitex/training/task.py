@@ -86,7 +86,10 @@ class Task(Protocol):
         ...
 
     def metadata(self) -> dict[str, str]:
-        """What is trained (`method`, exemplar, ...), the same throughout; a resumed run must match it."""
+        """What is trained (`method`, exemplar, ...), the same throughout; a resumed run must match it.
+
+        `NAME_key` is a hash of the content of the input `NAME`, which tells others of that name apart.
+        """
         ...
 
 

@@ -269,6 +269,9 @@ class TestArchitectures:
         assert main(fit(QUICK, files)) == 0
         capsys.readouterr()
         check_refused(files, fit("--resume --set hidden=16", files), "hidden", capsys)
+        bad.image(files / "other" / "good.png", seed=1)
+        words = fit("--resume", files, "other/good.png")
+        check_refused(files, words, "the exemplar 'good' is not the one that the run began with", capsys)
 
     def test_tensors_that_do_not_fit_together(self, files, capsys):
         bad.model(files / "odd.safetensors", hidden=16, cut=1)

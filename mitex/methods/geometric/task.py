@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 import torch
 
+from mitex.cache import content_key
 from mitex.mesh import Mesh
 from mitex.methods.geometric.config import MAX_LEVELS, GeometricConfig
 from mitex.methods.geometric.features import face_features
@@ -153,7 +154,7 @@ class GeometricTask:
         return np.hstack([portrait(self.reference.vertices, self.reference.faces), *portraits])
 
     def metadata(self) -> dict[str, str]:
-        return {"method": "geometric", "reference": self.reference.name}
+        return {"method": "geometric"} | inputs(self.reference, self.hierarchy.meshes[0])
 
     def _critic_turns(self, step: int) -> int:
         """How many steps of the critic come before a step of the generator: they are spread evenly."""
@@ -207,6 +208,15 @@ class GeometricTask:
         generators = self.generators[: level + 1]
         *_, vertices = grow(generators, self.hierarchy, self.template, noises, self.config.remeasure)
         return vertices
+
+
+def inputs(reference: Mesh, template: Mesh) -> dict[str, str]:
+    """The metadata of what a texture is learned from, both `normalised`."""
+    return {
+        "reference": reference.name,
+        "reference_key": content_key(reference.vertices, reference.faces),
+        "template_key": content_key(template.vertices, template.faces),
+    }
 
 
 def _clones(state: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:

@@ -152,4 +152,5 @@ class NcaTask:
         return np.clip(np.concatenate(rows), 0, 1)
 
     def metadata(self) -> dict[str, str]:
-        return {"method": "nca", "maps": ",".join(self.maps), "exemplar": self.exemplar.name}
+        exemplar = {"exemplar": self.exemplar.name, "exemplar_key": self.exemplar.key}
+        return {"method": "nca", "maps": ",".join(self.maps)} | exemplar

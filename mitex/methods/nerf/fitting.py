@@ -58,6 +58,7 @@ def fit(
     init()
     keep_freed_memory()
     training, held_out = photos.split()
+    run.check_inputs(training.metadata())
     base = find_base(training, config, base_mesh, run.quiet)
     frames = face_frames(base.mesh)
     reach = shell_reach(base.thickness, config.occupancy)

@@ -51,7 +51,7 @@ class SurfaceTask(ParameterTask):
         domain: the surface.
         content: (N, 3) sRGB in [0, 1] in the order of the texels, whose structure shall stay while the look
             becomes the exemplar's (style transfer). The synthesis starts from it.
-        inputs: further inputs that a resumed run must share: name -> key of the content.
+        inputs: further metadata of inputs that a resumed run must share.
 
     Raises:
         ConfigError: a content for more than the albedo, or on several scales; L-BFGS for several maps.
@@ -162,10 +162,10 @@ class SurfaceTask(ParameterTask):
         return np.concatenate([np.hstack([e, *views[..., list(p.channels)]]) for p, e in pairs])
 
     def metadata(self) -> dict[str, str]:
-        maps = ",".join(self.layout)
+        exemplar = {"exemplar": self.exemplar.name, "exemplar_key": self.exemplar.key}
         key = content_key(self.domain.mesh.vertices, self.domain.mesh.faces, self.domain.uv)
-        mesh = f"{self.domain.mesh.name} {key}"
-        return {"method": "surface", "maps": maps, "exemplar": self.exemplar.name, "mesh": mesh} | self.inputs
+        mesh = {"mesh": self.domain.mesh.name, "mesh_key": key}
+        return {"method": "surface", "maps": ",".join(self.layout)} | exemplar | mesh | self.inputs
 
     @cached_property
     def _mean_of_taps(self) -> torch.Tensor:

@@ -127,8 +127,14 @@ def test_resuming_changes_nothing(mesh, exemplar, tmp_path):
 
 
 def test_resuming_on_another_mesh_is_refused(run, exemplar):
-    with pytest.raises(CheckpointError):
+    with pytest.raises(CheckpointError, match="mesh"):
         surface.fit(exemplar, icosphere(7), run[0], overrides=["steps=14"], resume=True, quiet=True)
+
+
+def test_resuming_with_another_exemplar_of_the_same_name_is_refused(run, mesh, exemplar):
+    other = Exemplar({**exemplar.maps, "albedo": 1 - exemplar.maps["albedo"]}, exemplar.name)
+    with pytest.raises(CheckpointError, match=f"the exemplar '{exemplar.name}' is not the one"):
+        surface.fit(other, mesh, run[0], overrides=["steps=14"], resume=True, quiet=True)
 
 
 def test_optimizers_and_spaces(mesh, exemplar, tmp_path):

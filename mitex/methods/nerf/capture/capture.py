@@ -6,10 +6,12 @@ import hashlib
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from mitex.cache import content_key
 from mitex.errors import CaptureError, CaptureWarning
 from mitex.geometry.vectors import unit
 from mitex.images import read_bytes, read_image
@@ -49,6 +51,14 @@ class Capture:
 
     def __len__(self) -> int:
         return len(self.images)
+
+    def metadata(self) -> dict[str, str]:
+        """Name, and a hash of photos and cameras, for the metadata of a training."""
+        return {"capture": self.name, "capture_key": self._key}
+
+    @cached_property
+    def _key(self) -> str:
+        return content_key(*self.images, self.poses, self.intrinsics, self.distortion)
 
     def rays(self, view: int | np.ndarray, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rays through positions in an image, without the lens's distortion.
