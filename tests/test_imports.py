@@ -39,6 +39,7 @@ ORDER = [
     "runtime",
     "sparse",
     "cache",
+    "cache_entries",
     "lazy",
     "paths",
     "suggestions",

@@ -14,6 +14,7 @@ from mitex.suggestions import suggestion
 # Word -> dataclass of the command, and its line in the overview. Only the called one is imported.
 COMMANDS = {
     "doctor": ("mitex.cli.doctor:Doctor", "check that everything Mitex needs works here"),
+    "cache": ("mitex.cli.cache:Cache", "show or clear what is kept on disk to save time"),
     "models": ("mitex.cli.models:Models", "list the textures that ship with Mitex"),
     "render": ("mitex.cli.render:Render", "path-trace an asset: a still or a turntable"),
 }
