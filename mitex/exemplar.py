@@ -15,6 +15,7 @@ from mitex.errors import ImageError
 from mitex.geometry.vectors import unit
 from mitex.images import SUFFIXES, read_image, resize
 from mitex.paths import expanded
+from mitex.progress import announce
 from mitex.suggestions import suggestion
 
 MAPS = {"albedo": 3, "ambient_occlusion": 1, "height": 1, "normal": 3, "roughness": 1}
@@ -90,6 +91,7 @@ class Exemplar:
             ImageError: nothing there, no known map, a map twice, aspect ratios that differ, unreadable image.
         """
         source = expanded(path)
+        announce(f"reading exemplar {source.name}")
         if not os.path.exists(source) and str(path) in names():
             source = DATA / str(path)
         if os.path.isdir(source):

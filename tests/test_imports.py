@@ -40,6 +40,7 @@ ORDER = [
     "sparse",
     "cache",
     "cache_entries",
+    "progress",
     "lazy",
     "paths",
     "suggestions",

@@ -66,7 +66,12 @@ def _run(words: list[str]) -> int:
         return 0
     call = commands.find(words)
     command = parse(call.command, call.words, call.program)
-    return 0 if command is None else command.run() or 0
+    if command is None:
+        return 0
+    from mitex.cli.display import shown
+
+    with shown(getattr(command, "quiet", False)):
+        return command.run() or 0
 
 
 def _route_warnings() -> None:

@@ -10,7 +10,6 @@ from typing import Annotated, Any
 from tyro.conf import Positional, arg
 
 from mitex.methods.checks import in_range, reject_unused
-from mitex.render.progress import bar
 
 STILLS = (".png", ".jpg", ".jpeg", ".exr")
 MOVIES = (".mp4", ".gif")
@@ -59,6 +58,9 @@ class Render:
     fps: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 24)")] = None
     """Frames a second of a turntable."""
 
+    quiet: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Show no progress."""
+
     def run(self) -> None:
         self._check_ranges()
         from mitex.mesh.files import mesh_files
@@ -76,8 +78,7 @@ class Render:
         if moving:
             from mitex.render import turntable
 
-            with bar("turntable") as progress:
-                turntable(asset, out, **options, progress=progress)
+            turntable(asset, out, **options)
         else:
             asset.render(out, **options)
         print(self.out)

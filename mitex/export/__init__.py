@@ -15,6 +15,7 @@ from mitex.export.obj import check_side_files, read_obj, write_obj
 from mitex.export.ply import read_ply, write_ply
 from mitex.export.together import Inputs
 from mitex.paths import expanded, prepare_output
+from mitex.progress import announce
 
 __all__ = [
     "Format",
@@ -72,6 +73,7 @@ def prepare_export(
 
 def write_asset(asset: Asset, path: str | os.PathLike[str], maps_format: Format = "png") -> Path:
     """See `Asset.export`."""
+    announce(f"writing {os.path.basename(os.path.normpath(path))}")
     if is_folder(path):
         return write_folder(asset, expanded(path), maps_format)
     target = prepare_output(path, SUFFIXES)

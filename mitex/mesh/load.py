@@ -16,6 +16,7 @@ from mitex.mesh.polygons import Polygons
 from mitex.mesh.readers import SUFFIXES, Soup, read
 from mitex.mesh.validate import validate
 from mitex.paths import expanded
+from mitex.progress import announce
 from mitex.suggestions import suggestion
 
 # A generous text line per vertex, normal, UV and two faces, and room for textures in a .glb.
@@ -48,6 +49,7 @@ def load(path: str | os.PathLike[str], max_vertices: int = 2_000_000) -> Mesh:
         return embedded(str(path))
     max_bytes = BYTES_ALLOWED_ANYWAY + BYTES_PER_VERTEX * max_vertices
     _check_file(source, max_bytes)
+    announce(f"reading {source.name}")
     try:
         soup = read(source, max_vertices, max_bytes)
     except OSError as error:

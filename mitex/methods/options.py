@@ -104,6 +104,9 @@ class ApplyOptions:
     maps_format: Annotated[Literal["png", "exr"], arg(metavar="png|exr")] = "png"
     """Format of the maps in a folder."""
 
+    quiet: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Show no progress."""
+
     def run(self) -> None:
         """Applies the texture, writes the file, and prints its path."""
         self.check()

@@ -17,6 +17,7 @@ from mitex.geometry.triangles import twice_area
 from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh
 from mitex.mesh.mesh import Similarity
+from mitex.progress import announce
 from mitex.render.framing import FOV, View, fit_view, hull, rotation
 from mitex.render.studio import GREY, backdrop, lights
 
@@ -171,6 +172,7 @@ def accumulated(scene: mi.Scene, resolution: int, spp: int, seed: int) -> np.nda
     total = np.zeros((resolution, resolution, 4), np.float64)
     try:
         for k in range(passes):
+            announce("rendering", k, passes if passes > 1 else 0)
             picture = mi.render(scene, spp=math.ceil(spp / passes), seed=mi.UInt32(seed * 4096 + k))
             total += np.array(picture)
     finally:

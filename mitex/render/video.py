@@ -11,6 +11,7 @@ from PIL import Image
 
 from mitex.errors import ConfigError, OutputError
 from mitex.paths import atomic_write, prepare_output
+from mitex.progress import counted
 
 VIDEO_SUFFIXES = (".mp4", ".gif")
 
@@ -52,7 +53,7 @@ def write_video(
 
     def bytes_of() -> Iterator[np.ndarray]:
         done = 0
-        for done, picture in enumerate(pictures, 1):
+        for done, picture in enumerate(counted("rendering frames", pictures, frames), 1):
             if done > frames:
                 raise ConfigError(f"more pictures than the {frames} frames of a video", "raise frames")
             yield np.round(picture * 255.0).astype(np.uint8)

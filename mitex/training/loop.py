@@ -12,6 +12,7 @@ import torch
 from mitex.errors import ConfigError
 from mitex.images import write_image
 from mitex.paths import atomic_write
+from mitex.progress import announce
 from mitex.training import checkpoint, optim, run
 from mitex.training.errors import Interrupted, TrainingDiverged
 from mitex.training.metrics import Metrics, plain
@@ -95,6 +96,7 @@ def train(
         metrics.truncate(state.step)
         every = config.checkpoint_every, config.preview_every
         writer = _Writer(folder, state, metrics, *every, saved=state.step if resume else -1)
+        announce("")  # the training shows itself
         title = task.metadata().get("method", "training")
         cost = task.cost if isinstance(task, Uneven) else None
         with (

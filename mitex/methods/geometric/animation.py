@@ -57,6 +57,9 @@ class Animate(GrowthOptions):
     fps: Annotated[int, arg(metavar="N")] = 24
     """Frames a second."""
 
+    quiet: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Show no progress."""
+
     def run(self) -> None:
         self.check_growth()
         in_range("--seed", self.seed, *SEEDS)
@@ -73,7 +76,6 @@ class Animate(GrowthOptions):
         out = prepare_output(self.out, VIDEO_SUFFIXES, inputs)
         from mitex.asset import clay
         from mitex.methods.geometric import GeometricTexture
-        from mitex.render.progress import bar
 
         texture, start = GeometricTexture.load(self.model), self.start_level
         if self.mesh == TEMPLATE:
@@ -87,17 +89,15 @@ class Animate(GrowthOptions):
             places = [prepare_output(folder / f"{k:04}.ply", inputs=inputs) for k in range(len(meshes))]
             for place, frame in zip(places, meshes, strict=True):
                 clay(frame).export(place)
-        with bar("film") as progress:
-            film(
-                map(clay, meshes),
-                out,
-                frames=len(meshes),
-                like=meshes[-1],
-                fps=self.fps,
-                resolution=self.size,
-                spp=self.spp,
-                progress=progress,
-            )
+        film(
+            map(clay, meshes),
+            out,
+            frames=len(meshes),
+            like=meshes[-1],
+            fps=self.fps,
+            resolution=self.size,
+            spp=self.spp,
+        )
         if self.mesh != TEMPLATE:
             self.advise(texture, mesh)
         print(self.out)

@@ -50,6 +50,9 @@ class Demo:
     steps: Annotated[int, arg(metavar="N")] = STEPS
     """Training steps."""
 
+    quiet: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Show no progress."""
+
     def run(self) -> None:
         in_range("--seed", self.seed, *SEEDS)
         in_range("--steps", self.steps, 1)

@@ -17,6 +17,7 @@ from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.spheres import TrainingSphere, training_spheres
 from mitex.methods.nca.targets import Targets, enlarged
+from mitex.progress import announce
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, orbit, patch_views, random_views
 from mitex.training import Step
@@ -38,6 +39,7 @@ class NcaTask:
 
     def __init__(self, config: NcaConfig, exemplar: Exemplar, init: Look | None = None) -> None:
         keep_freed_memory()
+        announce("preparing spheres and the exemplar")
         self.config = config
         self.exemplar = exemplar.resized(min(config.exemplar_size, *exemplar.size))
         self.maps = sorted(exemplar.maps)

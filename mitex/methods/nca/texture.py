@@ -24,6 +24,7 @@ from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import Perception, lattice_perception, perception
 from mitex.methods.nca.ranges import TILE_CELLS
 from mitex.methods.nca.tile import flat_cells, tile_maps
+from mitex.progress import announce
 from mitex.runtime import keep_freed_memory
 
 STEPS = 200  # enough for the pattern to settle at every density tried
@@ -94,6 +95,7 @@ class NcaTexture:
         """
         self._check_unconditioned()
         laid = mesh if resolution is None or (keep_dense and scale != 1.0) else laid_out(mesh, resolution)
+        announce("preparing the mesh")
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
         state = self._healthy(cells, seed, STEPS if steps is None else steps, orientation)
         grown = Grown(self.look, state, cells, orientation)
@@ -175,7 +177,8 @@ class NcaTexture:
             operator = perception(operator, rule.degree, orientation, mean=self.look.mean)
         generator = torch.Generator().manual_seed(seed)
         state = rule.seed(operator)
-        for _ in range(steps):
+        for step in range(steps):
+            announce("growing the texture", step, steps)
             state = self.look.bounded(rule.evolve(state, operator, 1, generator))
         return state[0]
 

@@ -25,6 +25,7 @@ from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.texture import texel_layout
 from mitex.methods.surface.views import Views
+from mitex.progress import announce
 from mitex.runtime import keep_freed_memory
 from mitex.sparse import csr_tensor
 from mitex.training import ParameterTask, Step
@@ -83,6 +84,7 @@ class SurfaceTask(ParameterTask):
         super().__init__({"coordinates": self._start(generator)})
         self.coordinates = self.named["coordinates"]
         weights = _weights(config, generator)
+        announce("comparing the exemplar with itself on every scale")
         # The image network has the same weights: what differs is only where it looks.
         image_network = Vgg16(config.pooling, weights=weights)
         self.networks: list[SurfaceVgg] = []

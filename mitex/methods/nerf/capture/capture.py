@@ -20,6 +20,7 @@ from mitex.methods.nerf.capture.colmap import photo_frames
 from mitex.methods.nerf.capture.distortion import folds, undistort
 from mitex.methods.nerf.capture.transforms import Frame, no_mask, read_frames, transforms_files
 from mitex.methods.nerf.capture.visual_hull import Hull, View, project, visual_hull
+from mitex.progress import announce, counted
 
 MIN_VIEWS = 8
 HALF_EXTENT = 0.75  # of the visual hull in the scene cube
@@ -158,7 +159,7 @@ def _read_images(frames: Sequence[Frame]) -> tuple[list[Frame], list[np.ndarray]
     """All images as RGBA, without views that were there before."""
     unique, images, total = [], [], 0
     names_by_key: dict[bytes, str] = {}
-    for frame in frames:
+    for frame in counted("reading photos", frames, len(frames)):
         image = _rgba(frame)
         key = hashlib.sha256(frame.pose.tobytes() + image.tobytes()).digest()
         if key in names_by_key:
@@ -222,6 +223,7 @@ def _check_masks(frames: Sequence[Frame], views: Sequence[View]) -> None:
 
 def _scene_cube(frames: Sequence[Frame], views: Sequence[View]) -> Similarity:
     """The map that puts the visual hull into the scene cube."""
+    announce("carving the visual hull")
     hull = visual_hull(views)
     if hull is None:
         raise CaptureError(

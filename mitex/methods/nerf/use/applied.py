@@ -23,6 +23,7 @@ from mitex.methods.nerf.field.shell import Shell, shell_cells, shell_reach
 from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents, uv_frames
 from mitex.methods.nerf.use.extract import extract_mesh
 from mitex.methods.nerf.use.placement import in_scene_cube, uv_unit_length
+from mitex.progress import announce
 from mitex.runtime.jit import mi
 from mitex.textures.march import DIAGONAL
 
@@ -97,7 +98,8 @@ class AppliedTexture(Shell):
             lift=raised,
         )
         generator = torch.Generator().manual_seed(0)
-        for _ in range(OCCUPANCY_SAMPLES):
+        for sample in range(OCCUPANCY_SAMPLES):
+            announce("looking for what is dense", sample, OCCUPANCY_SAMPLES)
             occupancy.refresh(self.density, generator)
         self.mask = occupancy.mask
 
