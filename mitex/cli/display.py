@@ -13,7 +13,7 @@ from typing import Any, Protocol, TextIO, cast
 from mitex.progress import announce, listening
 from mitex.training.progress import clock
 
-FIRST_LINE = 1.5  # after which work gets a line [s]
+FIRST_LINE = 1.0  # after which work gets a line [s]
 LINE_EVERY = 30.0  # between two lines about the same work [s]
 LOOK_EVERY = 0.25  # how often it is seen whether a line is due [s]
 

@@ -72,6 +72,10 @@ class Render:
         reject_unused("--fps", out, not moving and self.fps is not None)
         reject_unused("--azimuth", out, moving and self.azimuth is not None)
         options = self._options()
+        if moving:
+            from mitex.render import check_video
+
+            check_video(out, self.frames or 2, self.fps or 1, self.size or 16)  # the defaults are possible
         from mitex.asset import Asset
 
         asset = Asset.load(self.asset)

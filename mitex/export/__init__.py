@@ -89,6 +89,7 @@ def read_asset(path: str | os.PathLike[str]) -> Asset:
         raise MeshError(f"{path} is not an asset file", f"give one of {', '.join(_READERS)}")
     if not os.path.isfile(source):
         raise MeshError(f"there is no asset file {path}", "check the path")
+    announce(f"reading {source.name}")
     try:
         return reader(source)
     except OSError as e:

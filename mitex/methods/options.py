@@ -52,8 +52,12 @@ class FitOptions:
         raise NotImplementedError
 
     def run_options(self, **flags: object) -> RunOptions:
-        """Checks the seed; what every `fit` takes, with further `flags` as settings."""
+        """Checks the seed and the run folder; what every `fit` takes, with further `flags` as settings."""
         in_range("--seed", self.seed, *SEEDS)
+        if self.out is not None:
+            from mitex.training import run
+
+            run.check(self.out, resume=getattr(self, "resume", False))
         return RunOptions(
             preset=self.preset,
             config=self.config,

@@ -1,5 +1,8 @@
 """The robustness table: every bad input ends with code 2 and one `error:` line, and leaves nothing behind."""
 
+import os
+from pathlib import Path
+
 import pytest
 
 from mitex.cli import main
@@ -230,6 +233,59 @@ def test_apply_options(name, more_files, capsys):
 def test_render_options(name, more_files, capsys):
     words, message = RENDERS[name]
     check_refused(more_files, ["render", *words.split()], message, capsys)
+
+
+class TestOutputsBeforeTheWork:
+    """Places that cannot be written to are refused before any input is read or prepared."""
+
+    @pytest.fixture(autouse=True)
+    def no_work(self, files, monkeypatch):
+        """Reading an input would end the test; a folder is there that cannot be written to."""
+        for name in ("mitex.exemplar.read_image", "mitex.mesh.load.read", "mitex.export.glb.read_glb"):
+            monkeypatch.setattr(name, pytest.fail)
+        (files / "locked").mkdir(mode=0o500)
+        real = os.access
+        locked = files / "locked"  # the superuser may write everywhere
+        monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != locked and real(path, mode))
+
+    @pytest.mark.parametrize(
+        ("words", "message"),
+        [
+            ("fit nca --exemplar good.png --out locked/run", "'{}/locked' is not writable"),
+            ("fit nca --exemplar good.png --out good.png/run", "is a file"),
+            ("fit surface --exemplar good.png --mesh good.obj --out locked", "'{}/locked' is not writable"),
+            ("fit surface --exemplar good.png --tile 64 --out locked/run", "is not writable"),
+            ("fit geometric --reference good.obj --out locked/run", "is not writable"),
+            ("fit displacement --reference good.obj --out locked/run", "is not writable"),
+            ("fit nerf --capture nothing --out locked/run", "is not writable"),
+            ("fit plain_field --capture nothing --out locked/run", "is not writable"),
+            ("fit quilted --texture nothing --out locked/run", "is not writable"),
+            ("fit nerf --capture nothing --set stesp=3", "did you mean steps?"),
+            ("fit plain_field --capture nothing --set stesp=3", "did you mean steps?"),
+            ("apply pebbles --mesh good.obj --out locked/a.glb", "is not writable"),
+            ("apply pebbles --mesh good.obj --out locked/maps/", "is not writable"),
+            ("apply pebbles --tile 64 --out locked/tile", "is not writable"),
+            ("apply spikes --mesh good.obj --out out/a.gltf", "use one of .glb"),
+            ("animate spikes --mesh good.obj --out locked/a.mp4", "is not writable"),
+            ("animate spikes --mesh good.obj --out out/a.png", "use one of .mp4, .gif"),
+            ("animate spikes --mesh good.obj --out out/a.mp4 --size 33", "MP4 needs an even size"),
+            ("animate spikes --mesh good.obj --out out/a.gif --meshes good.png", "is a file"),
+            ("animate spikes --mesh good.obj --out out/a.gif --meshes locked/m", "is not writable"),
+            ("render a.glb --out locked/a.png", "is not writable"),
+            ("render a.glb --out a.glb", "'a.glb'"),
+            ("render a.glb --out out/a.mp4 --size 33", "MP4 needs an even size"),
+            ("demo --out locked/demo", "is not writable"),
+            ("demo --out good.png", "is a file"),
+        ],
+    )
+    def test_it_is_refused(self, files, words, message, capsys):
+        bad.image(files / "good.png")
+        bad.text(files / "a.glb")
+        check_refused(files, words.split(), message.format(files), capsys)
+
+    def test_a_folder_in_the_way_of_the_demo(self, files, capsys):
+        (files / "out" / "knot.glb").mkdir()
+        check_refused(files, ["demo", "--out", "out"], "'out/knot.glb' is a folder", capsys)
 
 
 class TestRunFolders:

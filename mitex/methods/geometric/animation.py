@@ -69,11 +69,14 @@ class Animate(GrowthOptions):
         in_range("--spp", self.spp, 1, 65536)
         in_range("--fps", self.fps, 1, 60)
         from mitex.mesh.files import mesh_files
-        from mitex.paths import prepare_folder, prepare_output
+        from mitex.paths import check_writable, prepare_folder, prepare_output
         from mitex.render import VIDEO_SUFFIXES, check_video, film
 
         inputs = [self.model, *mesh_files(self.mesh)]
         out = prepare_output(self.out, VIDEO_SUFFIXES, inputs)
+        check_video(out, self.frames, self.fps, self.size)
+        if self.meshes is not None:
+            check_writable(self.meshes)
         from mitex.asset import clay
         from mitex.methods.geometric import GeometricTexture
 

@@ -84,6 +84,9 @@ def demo(out: Path, seed: int, steps: int, say: Callable[[str], None] = lambda l
     from mitex.mesh import Mesh
     from mitex.paths import prepare_output
 
+    for mesh in MESHES:
+        for suffix in (".glb", ".png"):
+            prepare_output(out / f"{Path(mesh).stem}{suffix}")
     out = prepare_output(out / "demo.png").parent
     exemplar = Exemplar.load(EXEMPLAR)
     texture = _fit(exemplar, out / "run", seed, steps, say)

@@ -10,6 +10,7 @@ from tyro.conf import arg
 
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
 from mitex.methods.options import PICTURES, MeshOptions, TrainingOptions
+from mitex.paths import expanded
 
 if TYPE_CHECKING:
     from mitex.methods.nerf.use.applied import AppliedTexture
@@ -47,9 +48,8 @@ class Fit(TrainingOptions):
         let_idle_threads_sleep()
         from mitex.methods import nerf
 
-        capture = nerf.load_capture(self.capture)
-        out = self.folder(capture.name)
-        nerf.fit(capture, out, base_mesh=self.base_mesh, **options)
+        out = self.folder(expanded(self.capture).resolve().name)
+        nerf.fit(self.capture, out, base_mesh=self.base_mesh, **options)
         print(out)
 
 
