@@ -32,11 +32,17 @@ class Models:
             print(json.dumps(models, indent=2))
             return
         for model in models:
-            origin = [f"{key} {model[key]}" for key in ("preset", "steps", "seconds", "loss") if key in model]
+            origin = [
+                f"{key} {_text(model[key])}" for key in ("preset", "steps", "seconds", "loss") if key in model
+            ]
             print(f"{model['name']:16}  {model['method']}: {', '.join(model.get('maps', ['relief']))}")
             print(f"{'':16}  {', '.join(origin)}")
             if model["thumbnail"]:
                 print(f"{'':16}  {model['thumbnail']}")
+
+
+def _text(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def listing() -> list[dict[str, Any]]:

@@ -67,7 +67,7 @@ class OrbitRenderer:
         if not 16 <= resolution <= 4096:
             raise ConfigError(f"a picture of {resolution} pixels is not possible", "use 16 to 4096")
         if not -0.5 <= displacement <= 0.5:
-            raise ConfigError(f"displacement {displacement} is out of range", "use -0.5 to 0.5")
+            raise ConfigError(f"displacement {displacement:g} is out of range", "use -0.5 to 0.5")
         if displacement and "height" not in asset.vertex_maps:
             raise ConfigError("displacement needs a height map", "leave it out or use a model with height")
         self.resolution = resolution

@@ -41,7 +41,7 @@ class TrainResult:
     def about(self, name: str, preset: str) -> dict[str, Any]:
         """What a model file tells of its training, as JSON values; `name` is that of what was learned."""
         about = {"name": name, "preset": preset, "steps": self.steps, "seconds": round(self.seconds, 1)}
-        return about | ({"loss": self.loss} if math.isfinite(self.loss) else {})
+        return about | ({"loss": float(f"{self.loss:.6g}")} if math.isfinite(self.loss) else {})
 
 
 def train(

@@ -90,13 +90,19 @@ def table(config: FitConfig) -> str:
     kinds = typing.get_type_hints(type(config))
     for one in fields(config):
         value = getattr(config, one.name)
-        text = ",".join(map(str, value)) if isinstance(value, tuple) else str(value).lower()
+        text = ",".join(map(_text, value)) if isinstance(value, tuple) else _text(value)
         allowed = _allowed(kinds[one.name], *bounds(type(config), one))
         rows.append((f"{one.name} = {text}", allowed, meaning(type(config), one)))
     width = min(max(len(row[0]) for row in rows), 30)
     return "\n".join(
         f"{setting:{width}}  {text}{f' ({allowed})' if allowed else ''}" for setting, allowed, text in rows
     )
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return values.number_text(value)
+    return value if isinstance(value, str) else str(value).lower()
 
 
 def _metadata(config: type, one: Field) -> Any:
@@ -118,7 +124,9 @@ def _check_range(name: str, value: Any, low: float | None, high: float | None) -
         if not isinstance(number, int | float):
             continue
         if (low is not None and number < low) or (high is not None and number > high):
-            raise ConfigError(f"{name} = {number} is out of range", f"choose {_range(low, high)}")
+            raise ConfigError(
+                f"{name} = {values.number_text(number)} is out of range", f"choose {_range(low, high)}"
+            )
 
 
 def _allowed(kind: Any, low: float | None, high: float | None) -> str:

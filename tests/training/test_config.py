@@ -124,7 +124,7 @@ def test_wrong_values_name_key_value_and_what_is_wanted(setting):
         ("=3", "'=3' is not a setting; write key=value"),
         ("preset=papr", "there is no preset 'papr'; did you mean paper?"),
         ("steps=0", "steps = 0 is out of range; choose 1 or more"),
-        ("lr=2", "lr = 2.0 is out of range; choose from 0 to 1"),
+        ("lr=2", "lr = 2 is out of range; choose from 0 to 1"),
         ("cap=11", "cap = 11 is out of range; choose 10 or less"),
         ("size=96,4", "size = 4 is out of range; choose 8 or more"),
         ("steps=60", "milestones lie beyond steps; raise steps"),
@@ -242,3 +242,10 @@ class TestKeys:
         assert rows["milestones"].split() == ["50,75", "steps"]
         assert rows["cap"].endswith("the most (10 or less)")
         assert rows["init"].startswith("none ")
+
+
+def test_numbers_are_shown_with_six_digits_at_most():
+    rows = table(replace(PRESETS["patch"], lr=0.1 + 0.2, pace=2 / 3)).splitlines()
+    settings = {row.split(" = ")[0]: row.split(" = ")[1].split()[0] for row in rows}
+    assert (settings["lr"], settings["pace"]) == ("0.3", "0.666667")
+    assert _error("lr=1.2000000000000002").startswith("lr = 1.2 is out of range")

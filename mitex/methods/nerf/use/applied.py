@@ -36,7 +36,7 @@ def check_ranges(scale: float, density: float, lift: float) -> None:
     """Raises a ConfigError if one of these numbers of `NerfTexture.apply` is out of range."""
     if not 0.05 <= scale <= 20 or not 0 < density <= 1000 or not 0 <= lift <= 1:
         raise ConfigError(
-            f"a texture of {scale} times the size, {density} times the density and lifted by {lift}",
+            f"a texture of {scale:g} times the size, {density:g} times the density and lifted by {lift:g}",
             "use sizes from 0.05 to 20, densities up to 1000 and lifts from 0 to 1",
         )
 
