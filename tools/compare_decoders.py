@@ -26,7 +26,7 @@ from mitex.mesh import Mesh, icosphere, scattered_sphere
 from mitex.methods.nca import NcaTexture, fit
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
-from mitex.methods.nca.spheres import TrainingSphere
+from mitex.methods.nca.surfaces import TrainingSphere
 from mitex.render import sheet
 from mitex.scenes.cameras import patch_views
 from mitex.training import checkpoint

@@ -1,4 +1,4 @@
-"""The commands doing their work, in small: fit, apply, render, models, demo."""
+"""The commands doing their work, in small: fit, apply, render, models."""
 
 import json
 import os
@@ -17,10 +17,7 @@ from mitex.asset import Asset
 from mitex.cli import main
 from mitex.cli.models import listing
 from mitex.exemplar import MAPS
-from mitex.exemplar import names as exemplar_names
 from mitex.images import read_image
-from mitex.mesh import embedded_names
-from mitex.methods.nca import demo
 from tests.cli import bad_files
 
 TINY = [
@@ -130,33 +127,6 @@ def test_bundled_models_are_listed_with_how_they_were_made(capsys):
     for model in listing():
         assert {"name", "method", "path", "thumbnail", "preset", "steps", "seconds", "loss"} <= set(model)
         assert model["thumbnail"] and (model["method"] == "geometric" or model["maps"])
-
-
-def test_what_the_demo_shows_is_there():
-    assert demo.EXEMPLAR in exemplar_names() and set(demo.MESHES) <= set(embedded_names())
-
-
-def test_demo(folder, monkeypatch, capsys):
-    """All of it, at toy size; the second call goes on from the first."""
-    from mitex.methods import nca
-
-    fit, grow, bake = nca.fit, nca.NcaTexture.apply, Asset.baked
-
-    def tiny_fit(*arguments, overrides, init, **options):
-        return fit(*arguments, overrides=[*overrides, *TINY], **options, quiet=True)
-
-    monkeypatch.setattr(nca, "fit", tiny_fit)
-    monkeypatch.setattr(nca.NcaTexture, "apply", lambda *a, **o: grow(*a, **o, subdivide=1, steps=2))
-    monkeypatch.setattr(Asset, "baked", lambda self, resolution, **o: bake(self, 64, **o))
-    monkeypatch.setattr(demo, "MESHES", ("cube.obj",))
-    monkeypatch.setattr(demo, "SIZE", 16)
-    monkeypatch.setattr(demo, "SAMPLES", 1)
-    for start in (f"model '{demo.PARENT}'", "the run in the folder"):
-        assert main(["demo", "--out", "shown", "--steps", "2"]) == 0
-        assert f"starting from {start}" in capsys.readouterr().out
-    names = {path.name for path in (folder / "shown").iterdir()}
-    assert names == {"run", "cube.glb", "cube.png", "demo.png"}
-    assert read_image(folder / "shown" / "demo.png").shape == (16, 32, 3)
 
 
 @pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])

@@ -100,8 +100,7 @@ class TestDescription:
         assert issubclass(method.load_fit(), FitOptions) and issubclass(method.load_apply(), ApplyOptions)
         texture = method.load_texture()
         assert all(hasattr(texture, attribute) for attribute in ("load", "save", "apply"))
-        for reference in (method.animate, method.demo):
-            assert reference is None or callable(resolve_reference(reference).run)
+        assert method.animate is None or callable(resolve_reference(method.animate).run)
 
     def test_the_default_config_is_the_first_preset_and_every_key_is_explained(self, name):
         presets = methods()[name].load_presets()

@@ -13,6 +13,7 @@ from mitex.methods.nca.config import PRESETS, NcaConfig
 from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.palette import Palette
+from mitex.methods.nca.settling import settling_steps
 from mitex.methods.nca.task import NcaTask
 from mitex.methods.nca.texture import NcaTexture
 from mitex.training.fit import Run
@@ -52,10 +53,15 @@ def fit(
         parent, about = _parent(init, config, sorted(maps.maps))
         origin["parent"] = str(about["name"])
     task = NcaTask(config, maps, parent)
+
+    def texture(about: dict[str, Any]) -> NcaTexture:
+        steps = settling_steps(task.look, task.exemplar, config.density)
+        return NcaTexture(task.look, about | origin | {"growth_steps": steps})
+
     return run.train(
         task,
         maps.name,
-        lambda about: NcaTexture(task.look, about | origin),
+        texture,
         lr=config.lr,
         milestones=config.milestones,
         decay=config.decay,

@@ -14,7 +14,6 @@ from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import Perception
-from mitex.progress import announce
 
 ROUNDS, STEPS = 3, 60  # of growing anew, and the automaton's steps in each
 RINGS = 3  # of neighbours that start anew too
@@ -45,9 +44,7 @@ def healed(
         if not inner(cells.mesh, places).any():
             return state
         state = torch.where(torch.from_numpy(_around(cells, places))[:, None], 0.0, state)
-        for step in range(STEPS):
-            announce("growing places of foreign colours again", step, STEPS)
-            state = look.bounded(look.rule.evolve(state[None], operator, 1, generator))[0]
+        state = look.evolve(state[None], operator, STEPS, generator)[0]
     places = foreign()
     if inner(cells.mesh, places).any():
         warnings.warn(

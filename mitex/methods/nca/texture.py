@@ -22,12 +22,12 @@ from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import Perception, lattice_perception, perception
-from mitex.methods.nca.ranges import TILE_CELLS
+from mitex.methods.nca.ranges import MOST_STEPS, TILE_CELLS
 from mitex.methods.nca.tile import flat_cells, tile_maps
 from mitex.progress import announce
 from mitex.runtime import keep_freed_memory
 
-STEPS = 200  # enough for the pattern to settle at every density tried
+STEPS = 200  # of models that do not say it; enough to cover a surface
 DENSITY = 32.0  # cells along the exemplar's width, of models that do not say it
 REPEATS = 2
 
@@ -77,7 +77,7 @@ class NcaTexture:
         Args:
             mesh: any mesh; near-uniform edges and valence 6 give the best texture (`mitex.mesh.quality`).
             seed: of the random updates.
-            steps: of the automaton; 200 if None.
+            steps: of the automaton; None for as many as the model's pattern needs to be in order.
             subdivide: levels of subdivision, or "auto": as many as bring the copy to 8,000 vertices.
             orientation: turns the texture about the normals, counter-clockwise [rad].
             scale: size of the pattern, 1 for what the density gives; others need a remeshing of the copy to
@@ -97,7 +97,7 @@ class NcaTexture:
         laid = mesh if resolution is None or (keep_dense and scale != 1.0) else laid_out(mesh, resolution)
         announce("preparing the mesh")
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
-        state = self._healthy(cells, seed, STEPS if steps is None else steps, orientation)
+        state = self._healthy(cells, seed, self.steps if steps is None else steps, orientation)
         grown = Grown(self.look, state, cells, orientation)
         asset = grown.asset()
         if resolution is None:
@@ -106,7 +106,7 @@ class NcaTexture:
         return replace(asset, atlas=atlas, texture_maps=grown.textures(atlas))
 
     def fields(
-        self, mesh: Mesh, *, seed: int = 0, steps: int = STEPS, orientation: float = 0.0
+        self, mesh: Mesh, *, seed: int = 0, steps: int | None = None, orientation: float = 0.0
     ) -> dict[str, dict[str, Any]]:
         """Grows the texture on a mesh and returns it as textures of a Mitsuba scene, by map, which are
         decoded where rays meet the surface: `{"type": "principled", "base_color": fields["albedo"], ...}`.
@@ -114,7 +114,8 @@ class NcaTexture:
         A cell sits at each vertex of the mesh, and the shape in the scene must have these vertices; see
         `mitex.mesh.subdivide_midpoint`. Other arguments and errors as of `apply`.
         """
-        return fields(self.look, self._healthy(Cells(mesh, 0, mesh), seed, steps, orientation), mesh)
+        cells, steps = Cells(mesh, 0, mesh), self.steps if steps is None else steps
+        return fields(self.look, self._healthy(cells, seed, steps, orientation), mesh)
 
     def variants(
         self, mesh: Mesh, seeds: Iterable[int], *, resolution: int | None = 1024, **options: Any
@@ -146,20 +147,20 @@ class NcaTexture:
         """
         lattice = flat_cells(self._tile_cells() if cells is None else cells, resolution)
         operator = lattice_perception(lattice, self.look.rule.degree, self.look.mean)
-        state = self.grow(operator, seed=seed, steps=STEPS if steps is None else steps)
+        state = self.grow(operator, seed=seed, steps=steps)
         state = self._healed(state, Cells(lattice.joined, 0, lattice.joined), operator, seed)
         return tile_maps(self.look, state, lattice, resolution)
 
     @torch.no_grad()
     def grow(
-        self, mesh: Mesh | Perception, *, seed: int = 0, steps: int = STEPS, orientation: float = 0.0
+        self, mesh: Mesh | Perception, *, seed: int = 0, steps: int | None = None, orientation: float = 0.0
     ) -> torch.Tensor:
         """The state of the automaton after some steps, held within the bounds of the training's.
 
         Args:
             mesh: any mesh, or its perception operator, which has an orientation of its own.
             seed: of the random updates.
-            steps: from the initial state, which is zero.
+            steps: from the initial state, which is zero; None as of `apply`.
             orientation: as in `apply` [rad].
 
         Returns:
@@ -169,6 +170,7 @@ class NcaTexture:
             ConfigError: steps below 0, or the model needs a condition.
         """
         self._check_unconditioned()
+        steps = self.steps if steps is None else steps
         if steps < 0:
             raise ConfigError(f"{steps} steps", "give 0 or more")
         keep_freed_memory()
@@ -176,11 +178,13 @@ class NcaTexture:
         if isinstance(operator, Mesh):
             operator = perception(operator, rule.degree, orientation, mean=self.look.mean)
         generator = torch.Generator().manual_seed(seed)
-        state = rule.seed(operator)
-        for step in range(steps):
-            announce("growing the texture", step, steps)
-            state = self.look.bounded(rule.evolve(state, operator, 1, generator))
-        return state[0]
+        return self.look.evolve(rule.seed(operator), operator, steps, generator)[0]
+
+    @property
+    def steps(self) -> int:
+        """Of the automaton, until the pattern is in order (`settling_steps`)."""
+        steps = self.about.get("growth_steps")
+        return steps if isinstance(steps, int) and 0 < steps <= MOST_STEPS else STEPS
 
     def _tile_cells(self) -> int:
         density = self.about.get("density")
