@@ -329,6 +329,8 @@ def test_the_scale_becomes_finer():
     task = object.__new__(SurfaceTask)
     task.config = resolve(PRESETS, None, None, ["steps=100", "scales=2", "coarse_share=0.4"])
     assert [task.scale(k) for k in (0, 19, 20, 39, 40, 99)] == [2, 2, 1, 1, 0, 0]
+    costs = [task.cost(k) for k in (0, 20, 40)]
+    assert costs == pytest.approx([0.1 + 1 / 16, 0.1 + 1 / 4, 1.1])
 
 
 class TestLayouts:
