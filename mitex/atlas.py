@@ -17,6 +17,7 @@ from mitex.geometry.tangents import Split, split_at_seams
 from mitex.geometry.triangles import interpolate, twice_area
 from mitex.geometry.vectors import scatter_add, unit
 from mitex.mesh import Mesh
+from mitex.progress import announce
 
 MAX_RESOLUTION = 8192
 LARGE = 40_000  # meshes of more faces are unwrapped in pieces
@@ -189,6 +190,7 @@ def unwrap(mesh: Mesh, resolution: int, padding: int) -> np.ndarray:
     Returns:
         (F, 3, 2) float32 in [0, 1], v upwards. Charts may be mirrored.
     """
+    announce("unwrapping the mesh")
     atlas = xatlas.Atlas()
     # xatlas has absolute tolerances; a power of two changes no digits.
     extent = float(np.ptp(mesh.vertices, axis=0).max())

@@ -13,6 +13,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from mitex.cache_entries import limit, touch, trim
+
 Result = TypeVar("Result")
 
 
@@ -40,7 +42,8 @@ def cached(
 ) -> Result:
     """The result kept in the folder `place`, else that of `compute`, which is kept then.
 
-    A cache that cannot be read or written is no error: the result is computed again.
+    A cache that cannot be read or written is no error: the result is computed again. After a new result the
+    cache is trimmed to its `limit`.
 
     Args:
         place: of this result alone.
@@ -48,9 +51,15 @@ def cached(
         read: gives the result from a folder; OSError, EOFError, ValueError or KeyError if it is not whole.
         write: fills an empty folder, which is renamed afterwards, so that all files appear together.
         keep: whether a computed result is kept; without, nothing is written.
+
+    Raises:
+        ConfigError: the limit that the user has set is none.
     """
+    most = limit()
     with suppress(OSError, EOFError, ValueError, KeyError):  # EOFError: numpy's of an empty file
-        return read(place)
+        result = read(place)
+        touch(place)
+        return result
     result = compute()
     if not keep:
         return result
@@ -61,6 +70,7 @@ def cached(
             write(filling, result)
             shutil.rmtree(place, ignore_errors=True)  # a damaged one
             os.rename(filling, place)
+            trim(place, most)
         finally:
             shutil.rmtree(filling, ignore_errors=True)
     return result

@@ -73,6 +73,9 @@ def demo(out: Path, seed: int, say: Callable[[str], None] = lambda line: None) -
     from mitex.paths import prepare_output
     from mitex.render import sheet
 
+    for mesh in (MESH, *MODELS.values()):
+        for suffix in (".glb", ".png"):
+            prepare_output(out / f"{mesh}{suffix}")
     out = prepare_output(out / "demo.png").parent
     say(f"synthesizing '{EXEMPLAR}' on {MESH}")
     pieces = [_put(_synthesized(out / "run", seed).apply(), EXEMPLAR, MESH, out)]

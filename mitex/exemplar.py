@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import re
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from mitex.cache import content_key
 from mitex.errors import ImageError
 from mitex.geometry.vectors import unit
 from mitex.images import SUFFIXES, read_image, resize
 from mitex.paths import expanded
+from mitex.progress import announce
+from mitex.suggestions import suggestion
 
 MAPS = {"albedo": 3, "ambient_occlusion": 1, "height": 1, "normal": 3, "roughness": 1}
 MIN_SIDE = 16
@@ -66,6 +69,11 @@ class Exemplar:
         height, width = next(iter(self.maps.values())).shape[:2]
         return height, width
 
+    @cached_property
+    def key(self) -> str:
+        """A hash of the maps."""
+        return content_key(*(part for name in sorted(self.maps) for part in (name, self.maps[name])))
+
     @staticmethod
     def load(path: str | os.PathLike[str]) -> Exemplar:
         """Load an exemplar.
@@ -83,12 +91,14 @@ class Exemplar:
             ImageError: nothing there, no known map, a map twice, aspect ratios that differ, unreadable image.
         """
         source = expanded(path)
+        announce(f"reading exemplar {source.name}")
         if not os.path.exists(source) and str(path) in names():
             source = DATA / str(path)
         if os.path.isdir(source):
             return _from_folder(source)
         if not os.path.exists(source):  # unlike Path.exists, also answers for impossible names
-            raise ImageError(f"there is no exemplar {path}", _suggest(str(path)))
+            otherwise = f"give an image, a folder of maps or one of {', '.join(names())}"
+            raise ImageError(f"there is no exemplar {path}", suggestion(str(path), names(), otherwise))
         return Exemplar({"albedo": _check_side(read_image(source), source)}, source.stem)
 
     def resized(self, size: int) -> Exemplar:
@@ -198,10 +208,3 @@ def _check_side(array: np.ndarray, path: Path) -> np.ndarray:
 
 def _remedy() -> str:
     return f"name the files {', '.join(f'{name}.png' for name in MAPS)} (any subset)"
-
-
-def _suggest(name: str) -> str:
-    close = difflib.get_close_matches(name, names(), 1)
-    if close:
-        return f"did you mean {close[0]}?"
-    return f"give an image, a folder of maps or one of {', '.join(names())}"

@@ -55,6 +55,19 @@ def prepare_output(
     return target
 
 
+def check_writable(path: str | os.PathLike[str]) -> None:
+    """Checks that the folder `path` can be made, or written to if it exists. Creates nothing.
+
+    Raises:
+        OutputError: It is a file, or cannot be made or written to.
+    """
+    target = _absolute(path)
+    try:
+        _check_folder(target)
+    except OSError as e:
+        raise _translated(e, target) from e
+
+
 def prepare_folder(path: str | os.PathLike[str]) -> Path:
     """Makes the folder `path` (and its parents) and checks that it is writable.
 
@@ -64,9 +77,9 @@ def prepare_folder(path: str | os.PathLike[str]) -> Path:
     Raises:
         OutputError: It is a file, or cannot be made or written to.
     """
+    check_writable(path)
     target = _absolute(path)
     try:
-        _check_folder(target)
         target.mkdir(parents=True, exist_ok=True)
     except OSError as e:
         raise _translated(e, target) from e

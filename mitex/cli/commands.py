@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mitex.cli.usage import UsageError, refuse_unknown_options
 from mitex.lazy import load
 from mitex.methods.registry import method_of, methods
+from mitex.suggestions import suggestion
 
 # Word -> dataclass of the command, and its line in the overview. Only the called one is imported.
 COMMANDS = {
     "doctor": ("mitex.cli.doctor:Doctor", "check that everything Mitex needs works here"),
     "demo": ("mitex.demo:Demo", "synthesize, grow, render and export textures in a few minutes"),
+    "cache": ("mitex.cli.cache:Cache", "show or clear what is kept on disk to save time"),
     "models": ("mitex.cli.models:Models", "list the textures that ship with Mitex"),
     "render": ("mitex.cli.render:Render", "path-trace an asset: a still or a turntable"),
 }
@@ -57,16 +58,17 @@ def find(words: Sequence[str]) -> Call:
         CheckpointError: the model of `apply` or `animate` does not exist.
     """
     word, rest = words[0], list(words[1:])
-    if word in COMMANDS:
-        return Call(f"mitex {word}", load(COMMANDS[word][0]), rest)
     if word in OF_MODELS:
         return _of_model(word, rest)
-    if word == "fit" and rest and rest[0] in methods():
+    if word in COMMANDS:
+        call = Call(f"mitex {word}", load(COMMANDS[word][0]), rest)
+    elif word == "fit" and rest and rest[0] in methods():
         method = methods()[rest[0]]
         call = Call(f"mitex fit {method.name}", method.load_fit(), rest[1:])
-        refuse_unknown_options(call.command, call.words, f"`{call.program}`", f"see `{call.program} --help`")
-        return call
-    raise _no_such_command(words)
+    else:
+        raise _no_such_command(words)
+    refuse_unknown_options(call.command, call.words, f"`{call.program}`", f"see `{call.program} --help`")
+    return call
 
 
 def _of_model(word: str, words: list[str]) -> Call:
@@ -98,7 +100,8 @@ def _no_such_command(words: Sequence[str]) -> UsageError:
     group = list(lines(words[0]))
     if group and not words[1:]:
         return UsageError(f"`mitex {words[0]}` needs a method", f"try `mitex {group[0]} --help`")
-    command = " ".join(words[:2]) if group else words[0]
-    close = difflib.get_close_matches(command, group or lines(), 1)
-    remedy = f"try `mitex {close[0]}`" if close else "see `mitex --help`"
-    return UsageError(f"there is no command '{command}'", remedy)
+    if group:
+        names = [name.partition(" ")[2] for name in group]
+        return UsageError(f"`mitex {words[0]}` knows no method '{words[1]}'", suggestion(words[1], names))
+    names = list(dict.fromkeys(name.partition(" ")[0] for name in lines()))
+    return UsageError(f"there is no command '{words[0]}'", suggestion(words[0], names))

@@ -57,7 +57,7 @@ def _command(words: list[str]) -> Any:
     if words[0] in ("-h", "--help", "help"):
         print(overview.overview())
         return None
-    if words[0] == "--version":
+    if words[0] in ("-V", "--version"):
         print(f"mitex {mitex.__version__}")
         return None
     if words[1:] and set(words[1:]) <= commands.HELP:
@@ -75,13 +75,16 @@ def _command(words: list[str]) -> Any:
 
 
 def _run(command: Any) -> int:
-    """Runs a command, with what Mitex logs as lines on stderr, but for --quiet."""
-    log, lines = logging.getLogger("mitex"), _Lines()
+    """Runs a command, with what it is at and what Mitex logs as lines on stderr, but for --quiet."""
+    from mitex.cli.display import shown
+
+    log, lines, quiet = logging.getLogger("mitex"), _Lines(), getattr(command, "quiet", False)
     level = log.level
     log.addHandler(lines)
-    log.setLevel(logging.WARNING if getattr(command, "quiet", False) else logging.INFO)
+    log.setLevel(logging.WARNING if quiet else logging.INFO)
     try:
-        return command.run() or 0
+        with shown(quiet):
+            return command.run() or 0
     finally:
         log.setLevel(level)
         log.removeHandler(lines)
@@ -96,15 +99,18 @@ class _Lines(logging.Handler):
 
 
 def _route_warnings() -> None:
-    """Mitex's warnings become lines on stderr; those of libraries are dropped (python -W shows them)."""
+    """Mitex's warnings become lines on stderr, each but once; those of libraries are dropped (python -W shows
+    them)."""
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
     warnings.simplefilter("always", MitexWarning)
-    others = warnings.showwarning
+    others, shown = warnings.showwarning, set()
 
     def show(message, category, filename, lineno, file=None, line=None):
         if issubclass(category, MitexWarning):
-            _say(f"warning: {message}")
+            if str(message) not in shown:
+                shown.add(str(message))
+                _say(f"warning: {message}")
         else:
             others(message, category, filename, lineno, file, line)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,20 +23,26 @@ class Models:
       mitex models --json
     """
 
-    as_json: Annotated[bool, arg(name="json", help_behavior_hint="")] = field(default=False)
+    json: Annotated[bool, arg(help_behavior_hint="")] = False
     """For programs: a JSON list of objects."""
 
     def run(self) -> None:
         models = listing()
-        if self.as_json:
+        if self.json:
             print(json.dumps(models, indent=2))
             return
         for model in models:
-            origin = [f"{key} {model[key]}" for key in ("preset", "steps", "seconds", "loss") if key in model]
+            origin = [
+                f"{key} {_text(model[key])}" for key in ("preset", "steps", "seconds", "loss") if key in model
+            ]
             print(f"{model['name']:16}  {model['method']}: {', '.join(model.get('maps', ['relief']))}")
             print(f"{'':16}  {', '.join(origin)}")
             if model["thumbnail"]:
                 print(f"{'':16}  {model['thumbnail']}")
+
+
+def _text(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def listing() -> list[dict[str, Any]]:

@@ -22,7 +22,7 @@ examples:
   mitex apply runs/pebbles --mesh bunny.obj --out bunny.glb
   mitex render bunny.glb --out bunny.png
 
-`mitex COMMAND --help` tells more."""
+`mitex COMMAND --help` tells more, and `mitex --version` which version this is."""
 
 
 def overview() -> str:

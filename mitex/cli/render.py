@@ -9,7 +9,6 @@ from typing import Annotated, Any
 from tyro.conf import Positional, arg
 
 from mitex.methods.checks import in_range, reject_unused
-from mitex.render.progress import bar
 
 STILLS = (".png", ".jpg", ".jpeg", ".exr")
 MOVIES = (".mp4", ".gif")
@@ -60,6 +59,9 @@ class Render:
     fps: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 24)")] = None
     """Frames a second of a turntable."""
 
+    quiet: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Show no progress."""
+
     def run(self) -> None:
         self._check_ranges()
         from mitex.mesh.files import mesh_files
@@ -71,14 +73,17 @@ class Render:
         reject_unused("--fps", out, not moving and self.fps is not None)
         reject_unused("--azimuth", out, moving and self.azimuth is not None)
         options = self._options()
+        if moving:
+            from mitex.render import check_video
+
+            check_video(out, self.frames or 2, self.fps or 1, self.resolution or 16)  # the defaults are possible
         from mitex.asset import Asset
 
         asset = Asset.load(self.asset)
         if moving:
             from mitex.render import turntable
 
-            with bar("turntable") as progress:
-                turntable(asset, out, **options, progress=progress)
+            turntable(asset, out, **options)
         else:
             asset.render(out, **options)
         print(self.out)

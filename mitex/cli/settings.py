@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from mitex.cli.usage import UsageError
 from mitex.methods.registry import methods
+from mitex.suggestions import suggestion
 
 
 def settings_text(words: Sequence[str]) -> str:
@@ -22,7 +23,7 @@ def settings_text(words: Sequence[str]) -> str:
     from mitex.training.settings import table
 
     if words[0] not in methods():
-        raise UsageError(f"there is no method '{words[0]}'", f"use one of {', '.join(methods())}")
+        raise UsageError(f"there is no method '{words[0]}'", suggestion(words[0], methods()))
     presets = methods()[words[0]].load_presets()
     config = resolve(presets, _preset(words))
     others = [name for name in presets if name != config.preset]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import io
 import re
@@ -12,6 +11,7 @@ from dataclasses import fields
 from typing import Any
 
 from mitex.errors import MitexError
+from mitex.suggestions import suggestion
 
 
 class UsageError(MitexError):
@@ -60,10 +60,7 @@ def refuse_unknown_options(command: type, words: Sequence[str], whose: str, reme
     for word in words:
         name = word.partition("=")[0].replace("_", "-")
         if name.startswith("--") and name not in options:
-            close = difflib.get_close_matches(name, options, 1)
-            raise UsageError(
-                f"{name} is no option of {whose}", f"did you mean {close[0]}?" if close else remedy
-            )
+            raise UsageError(f"{name} is no option of {whose}", suggestion(name, options, remedy))
 
 
 def as_options(message: str, command: Any) -> str:

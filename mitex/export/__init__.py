@@ -15,6 +15,7 @@ from mitex.export.obj import check_side_files, read_obj, write_obj
 from mitex.export.ply import read_ply, write_ply
 from mitex.export.together import Inputs
 from mitex.paths import expanded, prepare_output
+from mitex.progress import announce
 
 __all__ = [
     "Format",
@@ -72,6 +73,7 @@ def prepare_export(
 
 def write_asset(asset: Asset, path: str | os.PathLike[str], maps_format: Format = "png") -> Path:
     """See `Asset.export`."""
+    announce(f"writing {os.path.basename(os.path.normpath(path))}")
     if is_folder(path):
         return write_folder(asset, expanded(path), maps_format)
     target = prepare_output(path, SUFFIXES)
@@ -87,6 +89,7 @@ def read_asset(path: str | os.PathLike[str]) -> Asset:
         raise MeshError(f"{path} is not an asset file", f"give one of {', '.join(_READERS)}")
     if not os.path.isfile(source):
         raise MeshError(f"there is no asset file {path}", "check the path")
+    announce(f"reading {source.name}")
     try:
         return reader(source)
     except OSError as e:

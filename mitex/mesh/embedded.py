@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 
 from mitex.errors import MeshError
 from mitex.mesh.mesh import Mesh
+from mitex.suggestions import suggestion
 
 DATA = Path(__file__).parents[1] / "data" / "meshes"
 
@@ -24,7 +24,5 @@ def embedded(name: str) -> Mesh:
     """
     names = embedded_names()
     if name not in names:
-        close = difflib.get_close_matches(name, names, 1)
-        remedy = f"did you mean {close[0]}?" if close else f"use one of {', '.join(names)}"
-        raise MeshError(f"there is no embedded mesh {name}", remedy)
+        raise MeshError(f"there is no embedded mesh {name}", suggestion(name, names))
     return Mesh.load(DATA / f"{name}.ply")

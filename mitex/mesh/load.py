@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import warnings
 from dataclasses import replace
@@ -17,6 +16,8 @@ from mitex.mesh.polygons import Polygons
 from mitex.mesh.readers import SUFFIXES, Soup, read
 from mitex.mesh.validate import validate
 from mitex.paths import expanded
+from mitex.progress import announce
+from mitex.suggestions import suggestion
 
 # A generous text line per vertex, normal, UV and two faces, and room for textures in a .glb.
 BYTES_PER_VERTEX = 400
@@ -48,6 +49,7 @@ def load(path: str | os.PathLike[str], max_vertices: int = 2_000_000) -> Mesh:
         return embedded(str(path))
     max_bytes = BYTES_ALLOWED_ANYWAY + BYTES_PER_VERTEX * max_vertices
     _check_file(source, max_bytes)
+    announce(f"reading {source.name}")
     try:
         soup = read(source, max_vertices, max_bytes)
     except OSError as error:
@@ -119,9 +121,9 @@ def _group(rows: np.ndarray) -> np.ndarray:
 def _check_file(source: Path, max_bytes: int) -> None:
     formats = ", ".join(SUFFIXES)
     if not os.path.exists(source):  # unlike Path.exists, also answers for impossible names
-        close = difflib.get_close_matches(str(source), embedded_names(), 1)
-        remedy = f"did you mean {close[0]}?" if close else "check the path"
-        raise MeshError(f"there is no mesh {source}", remedy)
+        names = embedded_names()
+        otherwise = f"give a mesh file, or one of {', '.join(names)}"
+        raise MeshError(f"there is no mesh {source}", suggestion(str(source), names, otherwise))
     if os.path.isdir(source):
         raise MeshError(f"{source} is a folder", f"name a mesh file ({formats})")
     if not os.path.isfile(source):

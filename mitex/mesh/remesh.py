@@ -12,6 +12,7 @@ from mitex.errors import MeshError
 from mitex.mesh.mesh import Mesh
 from mitex.mesh.subdivide import subdivide_midpoint
 from mitex.mesh.validate import validate
+from mitex.progress import announce
 
 ROUNDS = 4  # tries to meet the number of vertices
 CLOSE_ENOUGH = 0.03  # of it, as a logarithm
@@ -90,6 +91,7 @@ def _isotropic(mesh: Mesh, length: float, feature_angle: float) -> Mesh:
 def _filtered(mesh: Mesh, change: Callable[[Any], None]) -> Mesh:
     """The mesh after a filter of PyMeshLab."""
     pymeshlab = _pymeshlab()
+    announce(f"remeshing {mesh.name}")
     meshes = pymeshlab.MeshSet(verbose=False)
     try:
         meshes.add_mesh(pymeshlab.Mesh(mesh.vertices.astype(np.float64), mesh.faces))

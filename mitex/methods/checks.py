@@ -8,6 +8,7 @@ from pathlib import Path
 
 from mitex.errors import ConfigError
 from mitex.training.settings import LARGEST_SEED
+from mitex.training.values import number_text
 
 SEEDS = (0, LARGEST_SEED)
 
@@ -20,8 +21,9 @@ def in_range(option: str, value: float | None, low: float, high: float = math.in
     """
     if value is None or (math.isfinite(value) and low <= value <= high):
         return
-    bounds = f"of at least {low:g}" if high == math.inf else f"from {low:g} to {high:g}"
-    raise ConfigError(f"{option} {value} is out of range", f"choose a value {bounds}")
+    least, most = number_text(low), number_text(high)
+    bounds = f"of at least {least}" if high == math.inf else f"from {least} to {most}"
+    raise ConfigError(f"{option} {number_text(value)} is out of range", f"choose a value {bounds}")
 
 
 def mutually_exclusive(first: str, second: str, condition: bool) -> None:

@@ -54,8 +54,12 @@ class FitOptions:
         raise NotImplementedError
 
     def run_options(self, **flags: object) -> RunSettings:
-        """Checks the seed; what every `fit` takes, with further `flags` as settings."""
+        """Checks the seed and the run folder; what every `fit` takes, with further `flags` as settings."""
         in_range("--seed", self.seed, *SEEDS)
+        if self.out is not None:
+            from mitex.training import run
+
+            run.check(self.out, resume=getattr(self, "resume", False))
         return RunSettings(
             preset=self.preset,
             config=self.config,
@@ -110,6 +114,9 @@ class ApplyOptions:
 
     maps_format: Annotated[Literal["png", "exr"], arg(metavar="png|exr")] = "png"
     """Format of the maps in a folder."""
+
+    quiet: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Show no progress."""
 
     def run(self) -> None:
         """Applies the texture, writes the file, and prints its path."""

@@ -35,7 +35,7 @@ def tone(linear: np.ndarray, exposure: float = 0.0) -> np.ndarray:
 def check_exposure(exposure: float) -> None:
     """Raises a ConfigError if `tone` would refuse an exposure [stops], before anything is rendered."""
     if not -10.0 <= exposure <= 10.0:
-        raise ConfigError(f"exposure {exposure} is out of range", "use -10 to 10 stops")
+        raise ConfigError(f"exposure {exposure:g} is out of range", "use -10 to 10 stops")
 
 
 def still(

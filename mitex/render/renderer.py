@@ -17,6 +17,7 @@ from mitex.geometry.triangles import twice_area
 from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh
 from mitex.mesh.mesh import Similarity
+from mitex.progress import announce
 from mitex.render.framing import FOV, View, fit_view, hull, rotation
 from mitex.render.studio import GREY, backdrop, lights
 
@@ -66,7 +67,7 @@ class OrbitRenderer:
         if not 16 <= resolution <= 4096:
             raise ConfigError(f"a picture of {resolution} pixels is not possible", "use 16 to 4096")
         if not -0.5 <= displacement <= 0.5:
-            raise ConfigError(f"displacement {displacement} is out of range", "use -0.5 to 0.5")
+            raise ConfigError(f"displacement {displacement:g} is out of range", "use -0.5 to 0.5")
         if displacement and "height" not in asset.vertex_maps:
             raise ConfigError("displacement needs a height map", "leave it out or use a model with height")
         self.resolution = resolution
@@ -172,6 +173,7 @@ def accumulated(scene: mi.Scene, resolution: int, spp: int, seed: int) -> np.nda
     total = np.zeros((resolution, resolution, 4), np.float64)
     try:
         for k in range(passes):
+            announce("rendering", k, passes if passes > 1 else 0)
             picture = mi.render(scene, spp=math.ceil(spp / passes), seed=mi.UInt32(seed * 4096 + k))
             total += np.array(picture)
     finally:

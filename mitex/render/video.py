@@ -11,6 +11,7 @@ from PIL import Image
 
 from mitex.errors import ConfigError, OutputError
 from mitex.paths import atomic_write, prepare_output
+from mitex.progress import counted
 
 VIDEO_SUFFIXES = (".mp4", ".gif")
 
@@ -46,14 +47,20 @@ def write_video(
     `progress` is called with (frames done, frames) after each one.
 
     Raises:
+        ConfigError: there are fewer or more pictures than `frames`; nothing is left then.
         OutputError: the encoder failed, or the place is not writable; nothing is left then.
     """
 
     def bytes_of() -> Iterator[np.ndarray]:
-        for done, picture in enumerate(pictures, 1):
+        done = 0
+        for done, picture in enumerate(counted("rendering frames", pictures, frames), 1):
+            if done > frames:
+                raise ConfigError(f"more pictures than the {frames} frames of a video", "raise frames")
             yield np.round(picture * 255.0).astype(np.uint8)
             if progress:
                 progress(done, frames)
+        if done < frames:
+            raise ConfigError(f"{done} pictures for a video of {frames} frames", "give one for each frame")
 
     with atomic_write(target) as temporary:
         (_write_gif if target.suffix.lower() == ".gif" else _write_mp4)(temporary, bytes_of(), fps, side)

@@ -297,7 +297,7 @@ def _check(cameras: Cameras) -> None:
             f"image size {cameras.width} x {cameras.height}", "both sides must be at least 1 pixel"
         )
     if cameras.kind == "perspective" and not 0 < cameras.fov < 180:
-        raise ConfigError(f"field of view {cameras.fov} degrees", "choose one between 0 and 180")
+        raise ConfigError(f"field of view {cameras.fov:g} degrees", "choose one between 0 and 180")
     if cameras.kind == "orthographic" and not 0 < cameras.half_width < math.inf:
         raise ConfigError(f"half_width {cameras.half_width}", "choose a positive number of mesh units")
     forward = cameras.target.astype(np.float64) - cameras.origin

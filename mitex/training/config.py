@@ -1,14 +1,14 @@
 """Resolving a config from a preset, a TOML file and `key=value` settings."""
 
-import difflib
 import tomllib
 import typing
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 from mitex.errors import ConfigError
+from mitex.suggestions import suggestion
 from mitex.training import values
 
 Config = TypeVar("Config")
@@ -36,20 +36,28 @@ def resolve(
 
     Raises:
         ConfigError: An unknown key or preset (the closest match is named), a value of the wrong type, not
-            finite or out of range, an unreadable file, or a preset that contradicts the file's.
+            finite or out of range, an unreadable file, or two presets that contradict each other.
     """
     kinds = _kinds(next(iter(presets.values())))
-    changes = {} if file is None else _from_file(Path(file), kinds)
-    if preset is not None and changes.get("preset", preset) != preset:
-        raise ConfigError(
-            f"preset '{preset}' contradicts preset '{changes['preset']}' in '{file}'",
-            "leave out one of the two",
-        )
-    changes |= {key: _read(key, value, kinds, _value) for key, value in by_key(overrides).items()}
-    name = changes.get("preset", preset) or next(iter(presets))
+    from_file = {} if file is None else _from_file(Path(file), kinds)
+    from_overrides = {key: _read(key, value, kinds, _value) for key, value in by_key(overrides).items()}
+    places = {"": preset, " in the settings": from_overrides.get("preset")}
+    name = _agreed(places | {f" in '{file}'": from_file.get("preset")}) or next(iter(presets))
     if name not in presets:
-        raise ConfigError(f"there is no preset '{name}'", f"use {_choices(name, presets)}")
-    return replace(presets[name], **(changes | {"preset": name}))  # type: ignore[type-var]
+        raise ConfigError(f"there is no preset '{name}'", suggestion(name, presets))
+    return replace(presets[name], **(from_file | from_overrides | {"preset": name}))  # type: ignore[type-var]
+
+
+def _agreed(places: Mapping[str, str | None]) -> str | None:
+    """The one preset that all places name, if any."""
+    names = {place: name for place, name in places.items() if name is not None}
+    first = next(iter(names.values()), None)
+    for place, name in names.items():
+        if name != first:
+            raise ConfigError(
+                f"preset '{first}' contradicts preset '{name}'{place}", "leave out one of the two"
+            )
+    return first
 
 
 def by_key(overrides: Mapping[str, Any] | Sequence[str]) -> dict[str, Any]:
@@ -94,15 +102,8 @@ def _from_file(file: Path, kinds: Mapping[str, Any]) -> dict[str, Any]:
 
 def _read(key: str, value: Any, kinds: Mapping[str, Any], reader: Callable[[Any, Any], Any]) -> Any:
     if key not in kinds:
-        raise ConfigError(f"there is no key '{key}'", f"use {_choices(key, kinds)}")
+        raise ConfigError(f"there is no key '{key}'", suggestion(key, kinds))
     try:
         return reader(value, kinds[key])
     except ValueError as e:
         raise ConfigError(f"{key} cannot be {value!r}", f"give {values.describe(kinds[key])}") from e
-
-
-def _choices(wrong: str, names: Iterable[str]) -> str:
-    """The closest name, or all of them when none is close."""
-    names = list(names)
-    close = difflib.get_close_matches(wrong, names, n=1, cutoff=0.6)
-    return f"'{close[0]}'" if close else "one of " + ", ".join(names)

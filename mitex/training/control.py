@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import time
-from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from mitex.training.errors import Cancelled
-
-REFRESH = 0.2  # least time between two measurements of the pace [s]
 
 
 @dataclass(frozen=True)
@@ -74,27 +70,3 @@ class Control:
 
 
 ALONE = Control()  # of a fit that nobody watches
-
-
-class Pace:
-    """Measures how fast steps follow each other.
-
-    Args:
-        step: Steps done before.
-        steps: Steps in all.
-    """
-
-    def __init__(self, step: int, steps: int) -> None:
-        self._steps = steps
-        self._times: deque[tuple[float, int]] = deque([(time.monotonic(), step)], maxlen=50)
-
-    def measure(self, step: int) -> dict[str, float]:
-        """`speed` and `seconds_left` of a `Progress` with so many steps done; empty if no time has passed."""
-        now = time.monotonic()
-        if now - self._times[-1][0] >= REFRESH or step == self._steps or len(self._times) == 1:
-            self._times.append((now, step))
-        (t0, s0), (t1, s1) = self._times[0], self._times[-1]
-        if t1 <= t0:
-            return {}
-        speed = (s1 - s0) / (t1 - t0)
-        return {"speed": speed, "seconds_left": (self._steps - step) / speed}

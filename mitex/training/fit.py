@@ -14,6 +14,7 @@ from mitex.runtime.session import check_variant
 from mitex.training import run
 from mitex.training.config import by_key, resolve
 from mitex.training.control import Control
+from mitex.training.inputs import check_inputs
 from mitex.training.locate import NAME
 from mitex.training.loop import train
 from mitex.training.settings import FitConfig, RunOptions
@@ -76,6 +77,11 @@ class Run(Generic[Config]):
             file = folder / run.CONFIG
         config = resolve(presets, options.get("preset"), file, _settings(options))
         return Run(folder, config, resume, Control(options.get("on_step"), options.get("cancel")))
+
+    def check_inputs(self, metadata: Mapping[str, str]) -> None:
+        """Refuses to resume with other inputs than before, as `mitex.training.inputs.check_inputs`."""
+        if self.resume and self.folder is not None:
+            check_inputs(self.folder, metadata)
 
     def train(
         self, task: Task, name: str, texture: Callable[[dict[str, Any]], Learned], **training: Any

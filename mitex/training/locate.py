@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 
 from safetensors import SafetensorError, safe_open
 
 from mitex.errors import CheckpointError
 from mitex.paths import expanded
+from mitex.suggestions import suggestion
 
 NAME = "texture.safetensors"  # the result of a fit, in its run folder
 CHECKPOINT = "checkpoint.safetensors"
@@ -43,8 +43,7 @@ def locate(source: str | Path) -> list[Path]:
     bundled = bundled_files()
     if str(source) in bundled:
         return [bundled[str(source)]]
-    close = difflib.get_close_matches(str(source), bundled, 1)
-    remedy = f"did you mean {close[0]}?" if close else f"use a path, or one of {', '.join(bundled) or 'none'}"
+    remedy = suggestion(str(source), bundled, f"use a path, or one of {', '.join(bundled) or 'none'}")
     raise CheckpointError(f"there is no model '{source}'", remedy)
 
 

@@ -2,6 +2,7 @@
 
 import logging
 import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,12 +11,14 @@ from typing import Any
 import torch
 
 from mitex.errors import ConfigError
+from mitex.progress import announce
 from mitex.training import keeping, optim
-from mitex.training.control import ALONE, Control, Pace, Progress
+from mitex.training.control import ALONE, Control, Progress
 from mitex.training.errors import Cancelled, Interrupted, TrainingDiverged
+from mitex.training.pace import Pace
 from mitex.training.signals import StopSignals
 from mitex.training.state import TrainState
-from mitex.training.task import Task
+from mitex.training.task import Task, Uneven
 
 PATIENCE = 3  # non-finite steps in a row that end a run
 log = logging.getLogger(__name__)
@@ -38,7 +41,7 @@ class TrainResult:
     def about(self, name: str, preset: str) -> dict[str, Any]:
         """What a model file tells of its training, as JSON values; `name` is that of what was learned."""
         about = {"name": name, "preset": preset, "steps": self.steps, "seconds": round(self.seconds, 1)}
-        return about | ({"loss": self.loss} if math.isfinite(self.loss) else {})
+        return about | ({"loss": float(f"{self.loss:.6g}")} if math.isfinite(self.loss) else {})
 
 
 def train(
@@ -89,6 +92,7 @@ def train(
     with keeping.opened(out, resume, config.checkpoint_every, config.preview_every) as kept:
         state = TrainState(task, config, schedule, normalise_gradients, optimizer)
         kept.begin(state)
+        announce("")  # the training shows itself
         tell = _teller(state, kept.place, control)
         with StopSignals() as stop:
             while state.step < config.steps and not (stop.requested or control.cancelled):
@@ -111,11 +115,12 @@ def _teller(state: TrainState, place: str, control: Control) -> Callable[[dict[s
     stage, steps = state.task.metadata().get("method", "training"), state.config.steps
     verb = f"continues at step {state.step} of {steps}" if state.step else f"starts, {steps} steps"
     log.info("%s %s; output in %s", stage, verb, place)
-    pace = Pace(state.step, steps)
+    cost = state.task.cost if isinstance(state.task, Uneven) else None
+    pace = Pace(state.step, steps, time.monotonic(), cost)
 
     def tell(record: dict[str, Any]) -> None:
         if control.on_step is not None:
-            measured = pace.measure(state.step) if record else {}
+            measured = pace.measure(time.monotonic(), state.step) if record else {}
             progress = Progress(stage, state.step, steps, state.loss, record, state.seconds, **measured)
             control.on_step(progress)
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from mitex import __version__
 from mitex.errors import CheckpointError, OutputError
-from mitex.paths import atomic_write, expanded, is_temporary, missing_folders, prepare_folder
+from mitex.paths import atomic_write, check_writable, expanded, is_temporary, missing_folders, prepare_folder
 from mitex.training import checkpoint
 from mitex.training.locate import NAME as RESULT
 from mitex.training.metrics import Metrics
@@ -33,7 +33,7 @@ def check(out: str | os.PathLike[str] | None, resume: bool = False) -> None:
     config.toml tells, since other programs write files of the same names.
 
     Raises:
-        OutputError: There is a run already, or other files.
+        OutputError: There is a run already, or other files, or the folder cannot be written to.
         CheckpointError: There is nothing to resume.
     """
     if out is None:
@@ -59,6 +59,7 @@ def check(out: str | os.PathLike[str] | None, resume: bool = False) -> None:
         raise OutputError(f"'{out}' holds a finished run", "name another `out`")
     if foreign:
         raise OutputError(f"'{out}' holds other files", "name a new or empty folder with `out`")
+    check_writable(out)
 
 
 @contextmanager

@@ -133,8 +133,12 @@ def table(config: FitConfig) -> str:
 
 
 def _written(value: Any) -> str:
-    """A value as `--set` takes it."""
-    return ",".join(map(str, value)) if isinstance(value, tuple) else str(value).lower()
+    """A value as `--set` takes it, numbers with six digits at most."""
+    if isinstance(value, tuple):
+        return ",".join(map(_written, value))
+    if isinstance(value, float):
+        return str(float(f"{value:.6g}"))
+    return value if isinstance(value, str) else str(value).lower()
 
 
 def _metadata(config: type, one: Field) -> Any:
@@ -156,7 +160,9 @@ def _check_range(name: str, value: Any, low: float | None, high: float | None) -
         if not isinstance(number, int | float):
             continue
         if (low is not None and number < low) or (high is not None and number > high):
-            raise ConfigError(f"{name} = {number} is out of range", f"choose {_range(low, high)}")
+            raise ConfigError(
+                f"{name} = {values.number_text(number)} is out of range", f"choose {_range(low, high)}"
+            )
 
 
 def _allowed(kind: Any, low: float | None, high: float | None) -> str:

@@ -10,6 +10,7 @@ import torch
 from mitex.errors import CheckpointError
 from mitex.training import optim
 from mitex.training.checkpoint import Checkpoint
+from mitex.training.inputs import KEY, refuse_other_inputs
 from mitex.training.run import as_json
 from mitex.training.task import Step, Task
 
@@ -121,11 +122,13 @@ class TrainState:
             CheckpointError: It is of another method, exemplar, config or shape.
         """
         remedy = "resume with the settings it was made with, or name another `out`"
-        for old, new in ((saved.metadata, self.task.metadata()), (saved.config, as_json(self.config))):
+        metadata = self.task.metadata()
+        for old, new in ((saved.metadata, metadata), (saved.config, as_json(self.config))):
             for key in sorted(old.keys() | new.keys()):
-                if key not in FREE_KEYS and old.get(key) != new.get(key):
+                if key not in FREE_KEYS and not key.endswith(KEY) and old.get(key) != new.get(key):
                     was, now = old.get(key, "nothing"), new.get(key, "nothing")
                     raise CheckpointError(f"the checkpoint was made with {key} {was!r}, not {now!r}", remedy)
+        refuse_other_inputs(saved.metadata, metadata)
         try:
             self.optimizer.load_state(saved.optimizer)
             self.generator.set_state(saved.generator)

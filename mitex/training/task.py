@@ -6,7 +6,7 @@ says how to undo it, `Task.loss` changes nothing, and `Step.commit` changes what
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import torch
@@ -86,7 +86,19 @@ class Task(Protocol):
         ...
 
     def metadata(self) -> dict[str, str]:
-        """What is trained (`method`, exemplar, ...), the same throughout; a resumed run must match it."""
+        """What is trained (`method`, exemplar, ...), the same throughout; a resumed run must match it.
+
+        `NAME_key` is a hash of the content of the input `NAME`, which tells others of that name apart.
+        """
+        ...
+
+
+@runtime_checkable
+class Uneven(Protocol):
+    """A task whose steps take more or less time by what they work on, which the time left accounts for."""
+
+    def cost(self, step: int) -> float:
+        """What a step costs beside the others, in any unit, above 0."""
         ...
 
 

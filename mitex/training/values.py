@@ -90,6 +90,11 @@ def describe(kind: Any) -> str:
     return " or ".join(describe(member) for member in arguments)
 
 
+def number_text(number: float) -> str:
+    """A number to be read: whole ones as they are, others with six digits at most."""
+    return str(number) if isinstance(number, int) else f"{number:.6g}"
+
+
 def _one_of(choices: dict[str, Any], text: Any) -> Any:
     if not isinstance(text, str) or text not in choices:
         raise ValueError(text)

@@ -1,5 +1,8 @@
 """The robustness table: every bad input ends with code 2 and one `error:` line, and leaves nothing behind."""
 
+import os
+from pathlib import Path
+
 import pytest
 
 from mitex.cli import main
@@ -59,13 +62,13 @@ FITS = {
     "negative seed": (None, "--seed -1", "--seed -1"),
     "huge seed": (None, "--seed 99999999999", "--seed"),
     "unknown option": (None, "--epochs 5", "--epochs"),
-    "unknown key": (None, "--set hiden=64", "'hidden'"),
+    "unknown key": (None, "--set hiden=64", "did you mean hidden?"),
     "no equals sign": (None, "--set hidden", "key=value"),
     "value of the wrong type": (None, "--set hidden=big", "hidden"),
     "value that is not finite": (None, "--set lr=nan", "lr"),
     "value out of range": (None, "--set hidden=-3", "hidden"),
     "a key twice": (None, "--steps 5 --set steps=6", "steps is set to 6 and to 5"),
-    "unknown preset": (None, "--preset papper", "'paper'"),
+    "unknown preset": (None, "--preset papper", "did you mean paper?"),
     "unknown layer": (None, "--set layers=relu9_9", "relu9_9"),
     "missing config": (None, "--config no.toml", "no.toml"),
     "config that is no TOML": (lambda d: bad.text(d / "c.toml", "steps = = 3"), "--config c.toml", "TOML"),
@@ -74,7 +77,7 @@ FITS = {
     "unknown key in the config": (
         lambda d: bad.text(d / "c.toml", "stepps = 3"),
         "--config c.toml",
-        "'steps'",
+        "did you mean steps?",
     ),
     "wrong type in the config": (lambda d: bad.text(d / "c.toml", "steps = [3]"), "--config c.toml", "steps"),
     "presets that contradict": (
@@ -82,6 +85,7 @@ FITS = {
         "--config c.toml --preset patch",
         "contradict",
     ),
+    "presets of --preset and --set": (None, "--preset patch --set preset=paper", "contradicts"),
     "resume and init": (None, "--resume --init cobblestone", "--resume and --init contradict"),
     "resume without a run": (None, "--resume", "no checkpoint"),
     "unknown init": (None, f"--init no_such_model {QUICK}", "no_such_model"),
@@ -99,7 +103,8 @@ FITS = {
 
 # Name -> (what makes the mesh, its name, words of the message)
 MESHES = {
-    "missing": (lambda d: None, "no.obj", "no.obj"),
+    "missing": (lambda d: None, "no.obj", "no.obj; give a mesh file, or one of"),
+    "misspelt name": (lambda d: None, "octopuss", "did you mean octopus?"),
     "text": (lambda d: bad.text(d / "a.obj"), "a.obj", "a.obj"),
     "empty": (lambda d: bad.text(d / "a.obj", ""), "a.obj", "a.obj"),
     "folder": (lambda d: (d / "a.obj").mkdir(), "a.obj", "a.obj"),
@@ -230,6 +235,59 @@ def test_render_options(name, more_files, capsys):
     check_refused(more_files, ["render", *words.split()], message, capsys)
 
 
+class TestOutputsBeforeTheWork:
+    """Places that cannot be written to are refused before any input is read or prepared."""
+
+    @pytest.fixture(autouse=True)
+    def no_work(self, files, monkeypatch):
+        """Reading an input would end the test; a folder is there that cannot be written to."""
+        for name in ("mitex.exemplar.read_image", "mitex.mesh.load.read", "mitex.export.glb.read_glb"):
+            monkeypatch.setattr(name, pytest.fail)
+        (files / "locked").mkdir(mode=0o500)
+        real = os.access
+        locked = files / "locked"  # the superuser may write everywhere
+        monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != locked and real(path, mode))
+
+    @pytest.mark.parametrize(
+        ("words", "message"),
+        [
+            ("fit nca --exemplar good.png --out locked/run", "'{}/locked' is not writable"),
+            ("fit nca --exemplar good.png --out good.png/run", "is a file"),
+            ("fit surface --exemplar good.png --mesh good.obj --out locked", "'{}/locked' is not writable"),
+            ("fit surface --exemplar good.png --tile 64 --out locked/run", "is not writable"),
+            ("fit geometric --reference good.obj --out locked/run", "is not writable"),
+            ("fit displacement --reference good.obj --out locked/run", "is not writable"),
+            ("fit nerf --capture nothing --out locked/run", "is not writable"),
+            ("fit plain_field --capture nothing --out locked/run", "is not writable"),
+            ("fit quilted --texture nothing --out locked/run", "is not writable"),
+            ("fit nerf --capture nothing --set stesp=3", "did you mean steps?"),
+            ("fit plain_field --capture nothing --set stesp=3", "did you mean steps?"),
+            ("apply pebbles --mesh good.obj --out locked/a.glb", "is not writable"),
+            ("apply pebbles --mesh good.obj --out locked/maps/", "is not writable"),
+            ("apply pebbles --tile 64 --out locked/tile", "is not writable"),
+            ("apply spikes --mesh good.obj --out out/a.gltf", "use one of .glb"),
+            ("animate spikes --mesh good.obj --out locked/a.mp4", "is not writable"),
+            ("animate spikes --mesh good.obj --out out/a.png", "use one of .mp4, .gif"),
+            ("animate spikes --mesh good.obj --out out/a.mp4 --resolution 33", "MP4 needs an even size"),
+            ("animate spikes --mesh good.obj --out out/a.gif --meshes good.png", "is a file"),
+            ("animate spikes --mesh good.obj --out out/a.gif --meshes locked/m", "is not writable"),
+            ("render a.glb --out locked/a.png", "is not writable"),
+            ("render a.glb --out a.glb", "'a.glb'"),
+            ("render a.glb --out out/a.mp4 --resolution 33", "MP4 needs an even size"),
+            ("demo --out locked/demo", "is not writable"),
+            ("demo --out good.png", "is a file"),
+        ],
+    )
+    def test_it_is_refused(self, files, words, message, capsys):
+        bad.image(files / "good.png")
+        bad.text(files / "a.glb")
+        check_refused(files, words.split(), message.format(files), capsys)
+
+    def test_a_folder_in_the_way_of_the_demo(self, files, capsys):
+        (files / "out" / "knot.glb").mkdir()
+        check_refused(files, ["demo", "--out", "out"], "'out/knot.glb' is a folder", capsys)
+
+
 class TestRunFolders:
     def test_other_files(self, files, capsys):
         bad.text(files / "out" / "run" / "thesis.txt")
@@ -267,6 +325,9 @@ class TestArchitectures:
         assert main(fit(QUICK, files)) == 0
         capsys.readouterr()
         check_refused(files, fit("--resume --set hidden=16", files), "hidden", capsys)
+        bad.image(files / "other" / "good.png", seed=1)
+        words = fit("--resume", files, "other/good.png")
+        check_refused(files, words, "the exemplar 'good' is not the one that the run began with", capsys)
 
     def test_tensors_that_do_not_fit_together(self, files, capsys):
         bad.model(files / "odd.safetensors", hidden=16, cut=1)

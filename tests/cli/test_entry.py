@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 import pytest
 
+import mitex
 from mitex.cli import commands, main
 from mitex.errors import ConfigError, MeshWarning
 from mitex.training.errors import Interrupted
@@ -89,10 +90,11 @@ class TestExitCodes:
             main(["try"])
 
     def test_in_a_process(self):
-        for words, code in ((["--version"], 0), (["bogus"], 2)):
+        for words, code in ((["--version"], 0), (["-V"], 0), (["bogus"], 2)):
             done = subprocess.run([sys.executable, "-m", "mitex", *words], capture_output=True, text=True)
             assert done.returncode == code
             assert ("error: " in done.stderr) == (code == 2)
+            assert done.stdout == ("" if code else f"mitex {mitex.__version__}\n")
 
     def test_a_closed_pipe_is_no_error(self):
         line = f"{sys.executable} -m mitex --help | true; exit ${{PIPESTATUS[0]}}"
@@ -101,17 +103,20 @@ class TestExitCodes:
 
 
 class TestWarnings:
-    def test_ours_are_lines_and_others_unseen(self, command, capsys):
+    def test_ours_are_lines_said_once_and_others_unseen(self, command, capsys):
         def action(_):
             warnings.warn("the mesh has\na hole", MeshWarning, stacklevel=2)
             warnings.warn("the mesh has\na hole", MeshWarning, stacklevel=2)
+            warnings.warn("the mesh is flat", MeshWarning, stacklevel=2)
             warnings.warn("noise of a library", UserWarning, stacklevel=2)
 
         command.action = action
         before = warnings.showwarning
         assert main(["try"]) == 0
-        assert capsys.readouterr().err == "warning: the mesh has a hole\n" * 2
+        assert capsys.readouterr().err == "warning: the mesh has a hole\nwarning: the mesh is flat\n"
         assert warnings.showwarning is before
+        assert main(["try"]) == 0  # the next command tells anew
+        assert "hole" in capsys.readouterr().err
 
 
 class TestHelp:
@@ -164,10 +169,19 @@ class TestUsage:
         ("words", "message"),
         [
             ([], "no command given; see `mitex --help`"),
-            (["modles"], "there is no command 'modles'; try `mitex models`"),
-            (["xyzzy"], "there is no command 'xyzzy'; see `mitex --help`"),
+            (["modles"], "there is no command 'modles'; did you mean models?"),
+            (
+                ["xyzzy"],
+                "there is no command 'xyzzy'; use one of doctor, demo, fit, apply, animate, cache, models, "
+                "render, try",
+            ),
             (["fit"], "`mitex fit` needs a method; try `mitex fit geometric --help`"),
-            (["fit", "nac"], "there is no command 'fit nac'; try `mitex fit nca`"),
+            (["fit", "nac"], "`mitex fit` knows no method 'nac'; did you mean nca?"),
+            (
+                ["fit", "--exemplar", "a.png"],
+                "`mitex fit` knows no method '--exemplar'; use one of geometric, nca, nerf, surface, "
+                "displacement, plain_field, quilted",
+            ),
             (["fit", "nca"], "--exemplar is missing; see `mitex fit nca --help`"),
             (["apply"], "RUN|MODEL is missing; see `mitex apply --help`"),
             (["apply", "waffle"], "--out is missing; see `mitex apply --help`"),
@@ -192,10 +206,12 @@ class TestUsage:
             ),
             (
                 ["fit", "nac", "--settings"],
-                "there is no method 'nac'; use one of geometric, nca, nerf, surface, displacement, "
-                "plain_field, quilted",
+                "there is no method 'nac'; did you mean nca?",
             ),
-            (["fit", "nca", "--settings", "--preset", "papr"], "there is no preset 'papr'; use 'paper'"),
+            (
+                ["fit", "nca", "--settings", "--preset", "papr"],
+                "there is no preset 'papr'; did you mean paper?",
+            ),
             (
                 ["fit", "nca", "--settings", "--preset"],
                 "--preset needs a name; see `mitex fit METHOD --help`",
@@ -205,7 +221,10 @@ class TestUsage:
                 ["try", "--count"],
                 "missing value for argument '--count'. Expected 1 values; see `mitex try --help`",
             ),
-            (["try", "--bogus"], "unrecognized options: --bogus; see `mitex try --help`"),
+            (["try", "--bogus"], "--bogus is no option of `mitex try`; see `mitex try --help`"),
+            (["try", "--cuont", "2"], "--cuont is no option of `mitex try`; did you mean --count?"),
+            (["models", "--jsn"], "--jsn is no option of `mitex models`; did you mean --json?"),
+            (["render", "a.glb", "--szie=9"], "--szie is no option of `mitex render`; did you mean --resolution?"),
             (["try", "more"], "unrecognized options: more; see `mitex try --help`"),
         ],
     )

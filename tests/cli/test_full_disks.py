@@ -82,7 +82,7 @@ class TestInProcesses:
         bad.huge_png(files / "huge.png")
         bad.text(files / "text.glb")
         before = tree(files)
-        done = program(words)
+        done = program(f"{words} --quiet")
         assert done.returncode == 2, done.stderr
         assert done.stderr.count("\n") == 1 and done.stderr.startswith("error: ") and message in done.stderr
         assert not done.stdout and tree(files) == before
@@ -93,7 +93,8 @@ class TestInProcesses:
         before = tree(files)
         limit = (2000, 2000)
         done = program(
-            "apply m.safetensors --mesh good.obj --subdivide 2 --keep-dense --steps 1 --out out/a.ply",
+            "apply m.safetensors --mesh good.obj --subdivide 2 --keep-dense --steps 1 --out out/a.ply "
+            "--quiet",
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit),
         )
         assert done.returncode == 2, done.stderr

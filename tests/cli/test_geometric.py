@@ -53,6 +53,14 @@ def test_further_levels_by_resuming(files, run):
     assert len(Mesh.load(files / "out" / "a.ply").faces) == 16 * 12
 
 
+def test_resuming_with_another_reference_of_the_same_name(files, run, capsys, monkeypatch):
+    """It is noticed before the training meshes are computed, which takes minutes."""
+    monkeypatch.setattr("mitex.methods.geometric.fitting.training_meshes", None)
+    bad.text(files / "good.obj", bad.CUBE.replace("v 1 1 1", "v 1.5 1 1"))
+    message = "the reference 'good' is not the one that the run began with"
+    check_refused(files, fit("--resume --quiet"), message, capsys)
+
+
 def test_remeshing_first(files, run):
     pytest.importorskip("pymeshlab")
     assert main(apply("--remesh 200 --start-level 1")) == 0
@@ -219,3 +227,9 @@ def test_an_unfinished_run(files, run, capsys):
 def test_a_damaged_model(files, run, capsys):
     bad.cut(run / "texture.safetensors")
     check_refused(files, apply(), "geometric texture", capsys)
+
+
+def test_an_unknown_reference_is_answered_with_the_names(files, capsys):
+    fit = ["fit", "geometric", "--out", "out/run", "--reference"]
+    check_refused(files, [*fit, "spikse"], "there is no mesh spikse; did you mean spikes?", capsys)
+    check_refused(files, [*fit, "nothing.obj"], "one of spikes, scales, knobs, ridges", capsys)

@@ -46,8 +46,10 @@ def test_fit_apply_render(files, run, capsys):
     cube = Mesh.load(files / "good.obj").vertices
     assert np.allclose(geometry.bounds, [cube.min(0), cube.max(0)], atol=1e-6)
     assert main(["render", "out/a.glb", "--out", "out/a.png", "--resolution", "32", "--spp", "1"]) == 0
-    assert main(["apply", "out/run", "--mesh", "good.obj", "--out", "out/a.ply"]) == 0
+    (files / "good.obj").unlink()  # the run has the mesh
+    assert main(["apply", "out/run", "--out", "out/a.ply"]) == 0
     assert "out/a.ply" in capsys.readouterr().out
+    assert np.allclose(Mesh.load(files / "out" / "a.ply").vertices, cube, atol=1e-6)
 
 
 def test_resume(files, run):

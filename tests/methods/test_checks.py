@@ -50,3 +50,17 @@ def test_settings_come_together():
 def test_settings_refuse_two_values(words):
     with pytest.raises(ConfigError, match="give it once"):
         merged_settings([words], seed=4)
+
+
+@pytest.mark.parametrize(
+    ("value", "high", "message"),
+    [
+        (0.1 + 0.2, 0.25, "--x 0.3 is out of range; choose a value from 0 to 0.25"),
+        (5_000_000_000, 2**32 - 1, "--x 5000000000 is out of range; choose a value from 0 to 4294967295"),
+        (-1, math.inf, "--x -1 is out of range; choose a value of at least 0"),
+    ],
+)
+def test_numbers_are_shown_as_people_write_them(value, high, message):
+    with pytest.raises(ConfigError) as error:
+        in_range("--x", value, 0, high)
+    assert str(error.value) == message

@@ -118,18 +118,18 @@ def test_wrong_values_name_key_value_and_what_is_wanted(setting):
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("stepps=3", "there is no key 'stepps'; use 'steps'"),
+        ("stepps=3", "there is no key 'stepps'; did you mean steps?"),
         ("zzz=3", "there is no key 'zzz'; use one of preset, seed, steps, checkpoint_every"),
         ("steps", "'steps' is not a setting; write key=value"),
         ("=3", "'=3' is not a setting; write key=value"),
-        ("preset=papr", "there is no preset 'papr'; use 'paper'"),
+        ("preset=papr", "there is no preset 'papr'; did you mean paper?"),
         ("steps=0", "steps = 0 is out of range; choose 1 or more"),
-        ("lr=2", "lr = 2.0 is out of range; choose from 0 to 1"),
+        ("lr=2", "lr = 2 is out of range; choose from 0 to 1"),
         ("cap=11", "cap = 11 is out of range; choose 10 or less"),
         ("size=96,4", "size = 4 is out of range; choose 8 or more"),
         ("steps=60", "milestones lie beyond steps; raise steps"),
         ("size=a", "size cannot be 'a'; give a list of 2: a whole number, a whole number"),
-        ("layers2=a", "there is no key 'layers2'; use 'layers'"),
+        ("layers2=a", "there is no key 'layers2'; did you mean layers?"),
         ("pace=x", "pace cannot be 'x'; give a finite number or one of 'auto'"),
     ],
 )
@@ -196,9 +196,12 @@ def test_where_the_preset_comes_from(tmp_path):
     file.write_text('preset = "paper"\n')
     assert resolve(PRESETS, file=file).lr == 0.5
     assert resolve(PRESETS, "paper", file).lr == 0.5
-    assert resolve(PRESETS, "patch", overrides=["preset=paper"]).lr == 0.5
-    assert resolve(PRESETS, None, file, ["preset=patch"]).lr == 1e-3
-    assert "contradicts preset 'paper'" in _error(file=file, preset="patch")
+    assert resolve(PRESETS, overrides=["preset=paper"]).lr == 0.5
+    assert resolve(PRESETS, "paper", file, ["preset=paper"]).lr == 0.5
+    for preset, override in (("patch", []), (None, ["preset=patch"]), ("patch", ["preset=paper"])):
+        error = _error(*override, file=file, preset=preset)
+        assert "preset 'patch'" in error and "preset 'paper'" in error and "contradicts" in error
+    assert _error("preset=paper", preset="patch").startswith("preset 'patch' contradicts preset 'paper' in ")
     assert "there is no preset 'x'" in _error(preset="x")
 
 
@@ -239,3 +242,10 @@ class TestKeys:
         assert rows["milestones"].split() == ["50,75", "steps"]
         assert rows["cap"].endswith("the most (10 or less)")
         assert rows["init"].startswith("none ")
+
+
+def test_numbers_are_shown_with_six_digits_at_most():
+    rows = table(replace(PRESETS["patch"], lr=0.1 + 0.2, pace=2 / 3)).splitlines()
+    settings = {row.split(" = ")[0]: row.split(" = ")[1].split()[0] for row in rows}
+    assert (settings["lr"], settings["pace"]) == ("0.3", "0.666667")
+    assert _error("lr=1.2000000000000002").startswith("lr = 1.2 is out of range")

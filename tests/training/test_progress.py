@@ -6,8 +6,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from mitex.training import control, progress
-from mitex.training.control import Pace, Progress
+from mitex.training import progress
+from mitex.training.control import Progress
+from mitex.training.pace import Pace
 from mitex.training.progress import ProgressDisplay, clock
 
 
@@ -31,9 +32,8 @@ def show(stream, reports, first=0):
 @pytest.fixture
 def ticking(monkeypatch):
     """A clock that each look moves on by one second."""
-    for module in (progress, control):
-        now = iter(range(10**6))
-        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda now=now: float(next(now))))
+    now = iter(range(10**6))
+    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: float(next(now))))
 
 
 @pytest.mark.parametrize(
@@ -44,24 +44,21 @@ def test_clock(seconds, text):
     assert clock(seconds) == text
 
 
-def test_the_pace_is_that_of_the_last_steps(monkeypatch):
-    times = iter([0.0, 10.0, *(10.0 + 0.5 * k for k in range(1, 101))])
-    monkeypatch.setattr(control, "time", SimpleNamespace(monotonic=lambda: next(times)))
-    pace = Pace(20, 200)
-    assert pace.measure(21) == {"speed": 0.1, "seconds_left": 1790}  # a slow first step
-    measured = [pace.measure(step) for step in range(22, 122)]
+def test_the_pace_is_that_of_the_last_steps():
+    pace = Pace(20, 200, 0.0)
+    assert pace.measure(10.0, 21) == {"speed": 0.1, "seconds_left": 1790}  # a slow first step
+    measured = [pace.measure(10.0 + 0.5 * k, 21 + k) for k in range(1, 101)]
     assert measured[-1] == {"speed": 2, "seconds_left": 39.5}
 
 
-def test_no_pace_before_time_has_passed(monkeypatch):
-    monkeypatch.setattr(control, "time", SimpleNamespace(monotonic=lambda: 3.0))
-    assert Pace(0, 5).measure(1) == {}
+def test_no_pace_before_time_has_passed():
+    assert Pace(0, 5, 3.0).measure(3.0, 1) == {}
 
 
 def test_plain_lines_now_and_then_and_at_the_end(ticking):
-    pace = Pace(10, 110)
-    text = show(io.StringIO(), [at(step, 110, **pace.measure(step)) for step in range(11, 111)], 10)
-    assert text.splitlines() == [
+    pace = Pace(10, 110, 0.0)
+    reports = [at(step, 110, **pace.measure(step - 10.0, step)) for step in range(11, 111)]
+    assert show(io.StringIO(), reports, 10).splitlines() == [
         "nca step 40/110, loss 0.5, 1.00 steps/s, 1:10 left",
         "nca step 70/110, loss 0.5, 1.00 steps/s, 0:40 left",
         "nca step 100/110, loss 0.5, 1.00 steps/s, 0:10 left",
@@ -77,8 +74,9 @@ def test_slow_steps_are_given_in_seconds():
 def test_a_terminal_gets_a_bar(ticking, monkeypatch):
     monkeypatch.setenv("COLUMNS", "120")
     monkeypatch.setenv("TERM", "xterm")
-    pace = Pace(0, 4)
-    text = show(Terminal(), [at(step, 4, 0.25, **pace.measure(step)) for step in range(1, 5)])
+    pace = Pace(0, 4, 0.0)
+    reports = [at(step, 4, 0.25, **pace.measure(float(step), step)) for step in range(1, 5)]
+    text = show(Terminal(), reports)
     text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", text)
     assert "2/4 loss 0.25 1.00 steps/s 0:02 left" in text
     assert "4/4 loss 0.25 1.00 steps/s 0:00 left" in text

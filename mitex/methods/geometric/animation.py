@@ -57,6 +57,9 @@ class Animate(GrowthOptions):
     fps: Annotated[int, arg(metavar="N")] = 24
     """Frames a second."""
 
+    quiet: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Show no progress."""
+
     def run(self) -> None:
         self.check_growth()
         in_range("--seed", self.seed, *SEEDS)
@@ -66,14 +69,16 @@ class Animate(GrowthOptions):
         in_range("--spp", self.spp, 1, 65536)
         in_range("--fps", self.fps, 1, 60)
         from mitex.mesh.files import mesh_files
-        from mitex.paths import prepare_folder, prepare_output
+        from mitex.paths import check_writable, prepare_folder, prepare_output
         from mitex.render import VIDEO_SUFFIXES, check_video, film
 
         inputs = [self.model, *mesh_files(self.mesh)]
         out = prepare_output(self.out, VIDEO_SUFFIXES, inputs)
+        check_video(out, self.frames, self.fps, self.resolution)
+        if self.meshes is not None:
+            check_writable(self.meshes)
         from mitex.asset import clay
         from mitex.methods.geometric import GeometricTexture
-        from mitex.render.progress import bar
 
         texture, start = GeometricTexture.load(self.model), self.start_level
         if self.mesh == TEMPLATE:
@@ -87,17 +92,15 @@ class Animate(GrowthOptions):
             places = [prepare_output(folder / f"{k:04}.ply", inputs=inputs) for k in range(len(meshes))]
             for place, frame in zip(places, meshes, strict=True):
                 clay(frame).export(place)
-        with bar("film") as progress:
-            film(
-                map(clay, meshes),
-                out,
-                frames=len(meshes),
-                like=meshes[-1],
-                fps=self.fps,
-                resolution=self.resolution,
-                spp=self.spp,
-                progress=progress,
-            )
+        film(
+            map(clay, meshes),
+            out,
+            frames=len(meshes),
+            like=meshes[-1],
+            fps=self.fps,
+            resolution=self.resolution,
+            spp=self.spp,
+        )
         if self.mesh != TEMPLATE:
             self.advise(texture, mesh)
         print(self.out)

@@ -16,7 +16,7 @@ from mitex.methods.geometric.config import PRESETS, GeometricConfig
 from mitex.methods.geometric.hierarchy import Hierarchy
 from mitex.methods.geometric.references import find_reference
 from mitex.methods.geometric.report import FitReport, report
-from mitex.methods.geometric.task import GeometricTask, betas, learning_rate
+from mitex.methods.geometric.task import GeometricTask, betas, inputs, learning_rate
 from mitex.methods.geometric.template import find_template, normalised
 from mitex.methods.geometric.texture import GeometricTexture
 from mitex.methods.geometric.training_meshes import fit_level
@@ -62,6 +62,7 @@ def fit(
     shape = reference if isinstance(reference, Mesh) else find_reference(reference)
     template = Mesh.load(template) if isinstance(template, str | Path) else template
     shape, start = normalised(shape, find_template(shape, template))
+    run.check_inputs(inputs(shape, start))
     keep_freed_memory()
     meshes, reports = training_meshes(shape, start, config, run.control, keep=run.folder is not None)
     hierarchy = Hierarchy.of(start, config.levels)

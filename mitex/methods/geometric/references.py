@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from mitex.errors import MeshError
 from mitex.geometry.vectors import across, unit
-from mitex.mesh import Mesh, icosphere, torus
+from mitex.mesh import Mesh, embedded_names, icosphere, torus
+from mitex.paths import expanded
+from mitex.suggestions import suggestion
 
 FREQUENCY = 56  # of the spheres: 62,720 faces
 GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
@@ -86,8 +90,18 @@ REFERENCES: dict[str, Callable[[], Mesh]] = {
 
 
 def find_reference(source: str | Path) -> Mesh:
-    """A reference by name, or from a file or embedded mesh as `Mesh.load` finds it."""
-    return REFERENCES[str(source)]() if str(source) in REFERENCES else Mesh.load(source)
+    """A reference by name, or from a file or embedded mesh as `Mesh.load` finds it.
+
+    Raises:
+        MeshError: as `Mesh.load`; for a name that is neither, with the names that there are.
+    """
+    name, names = str(source), [*REFERENCES, *embedded_names()]
+    if name in REFERENCES:
+        return REFERENCES[name]()
+    if name not in names and not os.path.exists(expanded(source)):
+        otherwise = f"give a mesh file, or one of {', '.join(names)}"
+        raise MeshError(f"there is no mesh {name}", suggestion(name, names, otherwise))
+    return Mesh.load(source)
 
 
 def _spiral(count: int) -> np.ndarray:

@@ -17,6 +17,7 @@ from mitex.methods.geometric import files
 from mitex.methods.geometric.hierarchy import Hierarchy, mean_edge
 from mitex.methods.geometric.model import grow
 from mitex.methods.geometric.network import FaceNetwork
+from mitex.progress import counted
 from mitex.runtime import keep_freed_memory
 
 START = 2  # the paper starts at level 2 or 3
@@ -216,7 +217,7 @@ class Rollout:
         centred = torch.from_numpy((mesh.vertices - centre).astype(np.float32))
         unit = float(mean_edge(centred, graph))
         steps = grow(self.generators, self.hierarchy, centred / unit, noises, self.remeasure)
-        for level, vertices in enumerate(steps):
+        for level, vertices in enumerate(counted("growing levels", steps, len(self.generators))):
             positions = vertices.numpy().astype(np.float64) * (unit / 2**level) + centre
             yield self.hierarchy.meshes[level].with_vertices(positions)
 

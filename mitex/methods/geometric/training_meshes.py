@@ -12,6 +12,7 @@ from mitex.mesh.topology import edge_graph
 from mitex.methods.geometric.config import GeometricConfig
 from mitex.methods.geometric.connectivity import FaceGraph
 from mitex.methods.geometric.hierarchy import mean_edge
+from mitex.progress import announce
 from mitex.sparse import csr_tensor
 from mitex.training.optim import Adam
 
@@ -34,7 +35,8 @@ def fit_level(
     generator = torch.Generator().manual_seed(config.seed + level)
     target = torch.tensor(reference.vertices) * 2**level
     faces = torch.tensor(reference.faces).long()
-    return Fitting(graph, target, faces, config, config.fit_samples * (level + 1)).run(vertices, generator)
+    fitting = Fitting(graph, target, faces, config, config.fit_samples * (level + 1))
+    return fitting.run(vertices, generator, f"fitting training mesh {level}")
 
 
 class Fitting:
@@ -59,12 +61,15 @@ class Fitting:
         self.config, self.samples = config, samples
         self.ring = _ring(graph)
 
-    def run(self, vertices: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
-        """The vertices (V, 3), fitted."""
+    def run(
+        self, vertices: torch.Tensor, generator: torch.Generator, work: str = "fitting a mesh"
+    ) -> torch.Tensor:
+        """The vertices (V, 3), fitted; `work` is announced."""
         vertices = vertices.clone().requires_grad_()
         optimizer, config = Adam([vertices]), self.config
         unit = float(mean_edge(vertices.detach(), self.graph))
         for step in range(config.fit_steps):
+            announce(work, step, config.fit_steps)
             optimizer.clear()
             (self.distance(vertices, generator) + self.regularity(vertices)).backward()
             optimizer.step(config.fit_lr * unit * LAST ** (step / config.fit_steps))

@@ -14,6 +14,7 @@ from mitex.mesh import Mesh
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.surface import Points, Surface
 from mitex.methods.nca.look import Look
+from mitex.progress import announce
 
 CHUNK = 1 << 18  # points that are decoded at a time
 
@@ -62,6 +63,7 @@ class Grown:
         side, maps = atlas.resolution, self.look.maps
         images = {name: np.zeros((side, side, MAPS[name]), np.float32) for name in maps}
         for rows in atlas.strips():
+            announce("baking the maps", rows.start, side)
             used = atlas.face[rows] >= 0
             face, barycentric = atlas.face[rows][used], atlas.barycentric[rows][used].clip(0)
             barycentric /= barycentric.sum(axis=1, keepdims=True)

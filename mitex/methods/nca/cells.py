@@ -77,7 +77,7 @@ def check(mesh: Mesh, subdivide: int | str, scale: float) -> int:
     if not 0 <= levels <= MOST_LEVELS:
         raise ConfigError(f"subdivide = {subdivide}", f"use 'auto' or 0 to {MOST_LEVELS}")
     if not 0.05 <= scale <= 20:
-        raise ConfigError(f"scale = {scale}", "use 0.05 to 20")
+        raise ConfigError(f"scale = {scale:g}", "use 0.05 to 20")
     if len(mesh.vertices) * 4**levels * max(1 / scale**2, 1) > MOST_VERTICES:
         raise ConfigError(f"a mesh of more than {MOST_VERTICES:,} vertices", "subdivide less")
     return levels

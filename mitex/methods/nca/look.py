@@ -14,6 +14,7 @@ from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.perception import Perception
 from mitex.methods.nca.targets import value_layout
+from mitex.progress import announce
 from mitex.textures.interpolation import Kind
 
 RATE = 0.02  # at which the bounds follow a step's
@@ -93,7 +94,8 @@ class Look(nn.Module):
         self, state: torch.Tensor, operator: Perception, steps: int, generator: torch.Generator
     ) -> torch.Tensor:
         """`steps` steps of the rule from a state (B, V, C), held within the bounds after each."""
-        for _ in range(steps):
+        for step in range(steps):
+            announce("growing the texture", step, steps)
             state = self.bounded(self.rule.evolve(state, operator, 1, generator))
         return state
 

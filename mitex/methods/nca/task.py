@@ -16,6 +16,7 @@ from mitex.methods.nca.look import Look
 from mitex.methods.nca.relief import Relief
 from mitex.methods.nca.surfaces import TrainingPlane, TrainingSphere, TrainingSurface, training_surfaces
 from mitex.methods.nca.targets import Targets, enlarged
+from mitex.progress import announce
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, random_views
 from mitex.training import Step
@@ -36,6 +37,7 @@ class NcaTask:
 
     def __init__(self, config: NcaConfig, exemplar: Exemplar, init: Look | None = None) -> None:
         keep_freed_memory()
+        announce("preparing spheres and the exemplar")
         self.config = config
         self.exemplar = exemplar.resized(min(config.exemplar_size, *exemplar.size))
         self.maps = sorted(exemplar.maps)
@@ -168,4 +170,5 @@ class NcaTask:
         return np.clip(np.concatenate(rows), 0, 1)
 
     def metadata(self) -> dict[str, str]:
-        return {"method": "nca", "maps": ",".join(self.maps), "exemplar": self.exemplar.name}
+        exemplar = {"exemplar": self.exemplar.name, "exemplar_key": self.exemplar.key}
+        return {"method": "nca", "maps": ",".join(self.maps)} | exemplar

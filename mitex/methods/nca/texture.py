@@ -25,6 +25,7 @@ from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import Perception, lattice_perception, perception
 from mitex.methods.nca.ranges import MOST_STEPS, TILE_CELLS
 from mitex.methods.nca.tile import flat_cells, tile_maps
+from mitex.progress import announce
 from mitex.runtime import keep_freed_memory
 
 STEPS = 200  # of models that do not say it; enough to cover a surface
@@ -95,6 +96,7 @@ class NcaTexture:
         """
         self._check_unconditioned()
         laid = mesh if resolution is None or (keep_dense and scale != 1.0) else laid_out(mesh, resolution)
+        announce("preparing the mesh")
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
         turn = math.radians(orientation)
         state = self._healthy(cells, seed, self.steps if steps is None else steps, turn)

@@ -10,6 +10,7 @@ from tyro.conf import arg
 
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
 from mitex.methods.options import PICTURES, MeshOptions, TrainingOptions
+from mitex.paths import expanded
 
 if TYPE_CHECKING:
     from mitex.methods.nerf.use.applied import AppliedTexture
@@ -47,10 +48,9 @@ class Fit(TrainingOptions):
         let_idle_threads_sleep()
         from mitex.methods import nerf
 
-        capture = nerf.load_capture(self.capture)
-        out = self.folder(capture.name)
+        out = self.folder(expanded(self.capture).resolve().name)
         with self.progress() as on_step:
-            nerf.fit(capture, out, base_mesh=self.base_mesh, on_step=on_step, **options)
+            nerf.fit(self.capture, out, base_mesh=self.base_mesh, on_step=on_step, **options)
         print(out)
 
 

@@ -18,6 +18,7 @@ from mitex.methods.nerf.field.shell import shell_reach
 from mitex.methods.nerf.texture import NerfTexture
 from mitex.methods.nerf.training.radiance import schedule
 from mitex.methods.nerf.training.task import TextureTask
+from mitex.progress import announce
 from mitex.runtime import init, keep_freed_memory
 from mitex.training.fit import Run
 from mitex.training.settings import RunOptions
@@ -59,7 +60,9 @@ def fit(
     init(needs="ad")
     keep_freed_memory()
     training, held_out = photos.split()
+    run.check_inputs(training.metadata())
     base = find_base(training, config, base_mesh, run.control, keep=run.folder is not None)
+    announce("preparing the field")
     frames = face_frames(base.mesh)
     reach = shell_reach(base.thickness, config.occupancy)
     projection = Projection(base.mesh, neighbours=config.neighbours, repulsion=config.repulsion, reach=reach)

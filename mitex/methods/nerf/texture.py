@@ -36,6 +36,7 @@ from mitex.methods.nerf.synthesis.quilting import Quilt, quilt
 from mitex.methods.nerf.use.applied import AppliedTexture, check_ranges
 from mitex.methods.nerf.use.placement import EXTENT, UNWRAP_SIZE, in_scene_cube, uv_unit_length
 from mitex.methods.nerf.use.self_maps import self_maps
+from mitex.progress import announce
 from mitex.runtime import init
 from mitex.runtime.jit import mi
 
@@ -153,6 +154,7 @@ class NerfTexture:
         Raises:
             ConfigError: a number is out of range, the guide is no picture, or no patch fits.
         """
+        announce("taking patches of the texture")
         rng = np.random.default_rng(seed)
         squares = self.patches(rng, patches, pattern_rate)
         source = FeatureSource(squares, self.features, len(self.latents.encoding.levels(0)) * 2)

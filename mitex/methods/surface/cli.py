@@ -100,10 +100,12 @@ class Fit(ExemplarOptions):
 
 @dataclass(kw_only=True)
 class Apply(OptionalMeshOptions):
-    """Write a surface texture on the mesh that it was synthesized on, which --mesh may name again.
+    """Write a surface texture on the mesh that it was synthesized on, which is kept with it.
+
+    --mesh only checks that a mesh is that one.
 
     examples:
-      mitex apply runs/bunny --mesh bunny.obj --out bunny.glb
+      mitex apply runs/bunny --out bunny.glb
       mitex apply runs/tile --out tile/
     """
 

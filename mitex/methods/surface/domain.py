@@ -18,6 +18,7 @@ from mitex.methods.surface.frames import interpolate_frames, vertex_directions
 from mitex.methods.surface.levels import POOLS, Levels
 from mitex.methods.surface.taps import Surroundings, build
 from mitex.methods.surface.texels import Texels
+from mitex.progress import announce
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +102,7 @@ class SurfaceDomain:
 
     def compute_levels(self) -> Levels:
         """The levels, computed anew."""
+        announce("following geodesics from every texel")
         border = Border.continued(self.mesh, self.texels, self.tracer) if self.continued else None
         around = Surroundings(self.texels, self.tracer, *self.tangent_frames, self.correct, border)
         return build(around, self.depth)

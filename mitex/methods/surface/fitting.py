@@ -84,7 +84,7 @@ def fit(
     run.control.check()
     check_memory(domain.mesh, settings, len(target.maps))
     start = None if content is None else content_colours(content, domain)
-    inputs = {"content": content_key(start), "orientation": content_key(field)}
+    inputs = {"content_key": content_key(start), "orientation_key": content_key(field)}
     task = SurfaceTask(settings, target, domain, start, inputs)
     origin: dict[str, Any] = {key: getattr(settings, key) for key in ("resolution", "frames", "angle")}
     return run.train(

@@ -19,6 +19,7 @@ from mitex.methods.surface.borders import Border
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.levels import POOLS, Level, Levels
 from mitex.methods.surface.texels import Texels
+from mitex.progress import announce
 
 BACKWARD = 8  # samples along a geodesic that is walked back
 CENTRE = 4  # the tap on the element itself
@@ -85,7 +86,9 @@ def build(around: Surroundings, count: int = POOLS) -> Levels:
     nearest = np.take_along_axis(index, np.argmax(weight, axis=2, keepdims=True), 2)[:, :, 0]
     taps = [rank[leader[nearest[order]]]]
     own, leader = elements[order].astype(np.int32), rank[leader]
-    taps += [_group_taps(around, own, leader, labels[n], edges, n) for n in range(1, count)]
+    for n in range(1, count):
+        announce("following geodesics from groups of texels", n - 1, count - 1)
+        taps.append(_group_taps(around, own, leader, labels[n], edges, n))
     levels = []
     for n in range(count):
         first = np.concatenate([[True], labels[n][1:] != labels[n][:-1]])

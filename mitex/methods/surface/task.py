@@ -25,6 +25,7 @@ from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.texture import texel_layout
 from mitex.methods.surface.views import Views
+from mitex.progress import announce
 from mitex.runtime import keep_freed_memory
 from mitex.sparse import csr_tensor
 from mitex.training import ParameterTask, Step
@@ -32,6 +33,7 @@ from mitex.triples import CYCLE, channel_triples, triple_images
 
 VIEW = 384  # side of a preview's images [px]
 CONTENT = "content"
+ALL_TEXELS = 0.1  # what a step costs beside the network on the finest scale, of the network's cost, measured
 
 
 class SurfaceTask(ParameterTask):
@@ -50,7 +52,7 @@ class SurfaceTask(ParameterTask):
         domain: the surface.
         content: (N, 3) sRGB in [0, 1] in the order of the texels, whose structure shall stay while the look
             becomes the exemplar's (style transfer). The synthesis starts from it.
-        inputs: further inputs that a resumed run must share: name -> key of the content.
+        inputs: further metadata of inputs that a resumed run must share.
 
     Raises:
         ConfigError: a content for more than the albedo, or on several scales; L-BFGS for several maps.
@@ -83,6 +85,7 @@ class SurfaceTask(ParameterTask):
         super().__init__({"coordinates": self._start(generator)})
         self.coordinates = self.named["coordinates"]
         weights = _weights(config, generator)
+        announce("comparing the exemplar with itself on every scale")
         # The image network has the same weights: what differs is only where it looks.
         image_network = Vgg16(config.pooling, weights=weights)
         self.networks: list[SurfaceVgg] = []
@@ -135,6 +138,10 @@ class SurfaceTask(ParameterTask):
         coarse = round(self.config.coarse_share * self.config.steps) if self.config.scales else 0
         return 0 if step >= coarse else self.config.scales - step * self.config.scales // coarse
 
+    def cost(self, step: int) -> float:
+        """Of a step: what the network reads, a quarter for each pooling, and what is done with all texels."""
+        return 0.25 ** self.scale(step) + ALL_TEXELS
+
     def _diffuse_and_clamp(self) -> None:
         """Wears down what is finer than the taps, and brings values back to [0, 1]."""
         with torch.no_grad():
@@ -158,10 +165,10 @@ class SurfaceTask(ParameterTask):
         return np.concatenate([np.hstack([e, *views[..., list(p.channels)]]) for p, e in pairs])
 
     def metadata(self) -> dict[str, str]:
-        maps = ",".join(self.layout)
+        exemplar = {"exemplar": self.exemplar.name, "exemplar_key": self.exemplar.key}
         key = content_key(self.domain.mesh.vertices, self.domain.mesh.faces, self.domain.uv)
-        mesh = f"{self.domain.mesh.name} {key}"
-        return {"method": "surface", "maps": maps, "exemplar": self.exemplar.name, "mesh": mesh} | self.inputs
+        mesh = {"mesh": self.domain.mesh.name, "mesh_key": key}
+        return {"method": "surface", "maps": ",".join(self.layout)} | exemplar | mesh | self.inputs
 
     @cached_property
     def _mean_of_taps(self) -> torch.Tensor:

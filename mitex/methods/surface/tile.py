@@ -37,7 +37,7 @@ class TileDomain(SurfaceDomain):
                 f"use a multiple of {2**depth}, or fewer scales",
             )
         if config.angle:
-            raise ConfigError(f"angle = {config.angle} of a tile", "leave it at 0")
+            raise ConfigError(f"angle = {config.angle:g} of a tile", "leave it at 0")
         mesh = replace(grid(1, 1), name="tile")
         return TileDomain(mesh, config.resolution, config.frames, depth=depth)
 

@@ -286,7 +286,9 @@ def test_resuming_changes_nothing(tmp_path):
 def test_each_step_trains_the_generator_of_its_level():
     task = small_task()
     generator = torch.Generator().manual_seed(0)
+    faces = [len(graph.faces) for graph in task.hierarchy.graphs]
     for step, level in ((0, 0), (2, 0), (3, 1), (8, 2)):
+        assert task.cost(step) == 260 + faces[level]
         for parameter in task.parameters:
             parameter.grad = None
         result = task.loss(step, generator)

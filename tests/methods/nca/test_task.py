@@ -245,7 +245,13 @@ def test_preview_shows_a_row_for_each_map(task, monkeypatch):
 
 
 def test_metadata(task):
-    assert task.metadata() == {"method": "nca", "maps": "albedo,height", "exemplar": "scales"}
+    key = task.exemplar.key
+    exemplar = {"exemplar": "scales", "exemplar_key": key}
+    assert task.metadata() == {"method": "nca", "maps": "albedo,height"} | exemplar
+    maps = {name: values.copy() for name, values in task.exemplar.maps.items()}
+    assert Exemplar(maps, "of another name").key == key
+    maps["height"][0, 0] = 1 - maps["height"][0, 0]
+    assert Exemplar(maps, "scales").key != key
 
 
 def _run(exemplar, folder, steps, resume=False):

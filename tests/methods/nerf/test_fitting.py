@@ -199,7 +199,7 @@ def test_a_run_does_not_go_on_on_another_base_shape(base):
     """Checkpoints tell it, so that the loop refuses them."""
     moved = base.with_vertices(1.001 * base.vertices)
     tasks = [small_task(mesh) for mesh in (base, base.with_vertices(base.vertices), moved)]
-    first, same, other = [task.metadata()["base"] for task in tasks]
+    first, same, other = [task.metadata()["base_key"] for task in tasks]
     assert first == same != other
 
 

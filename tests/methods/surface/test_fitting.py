@@ -126,8 +126,14 @@ def test_resuming_changes_nothing(mesh, exemplar, tmp_path):
 
 
 def test_resuming_on_another_mesh_is_refused(run, exemplar):
-    with pytest.raises(CheckpointError):
+    with pytest.raises(CheckpointError, match="mesh"):
         surface.fit(exemplar, icosphere(7), run[0], set=["steps=14"], resume=True)
+
+
+def test_resuming_with_another_exemplar_of_the_same_name_is_refused(run, mesh, exemplar):
+    other = Exemplar({**exemplar.maps, "albedo": 1 - exemplar.maps["albedo"]}, exemplar.name)
+    with pytest.raises(CheckpointError, match=f"the exemplar '{exemplar.name}' is not the one"):
+        surface.fit(other, mesh, run[0], set=["steps=14"], resume=True)
 
 
 def test_optimizers_and_spaces(mesh, exemplar, tmp_path):
@@ -321,6 +327,8 @@ def test_the_scale_becomes_finer():
     task = object.__new__(SurfaceTask)
     task.config = resolve(PRESETS, None, None, ["steps=100", "scales=2", "coarse_share=0.4"])
     assert [task.scale(k) for k in (0, 19, 20, 39, 40, 99)] == [2, 2, 1, 1, 0, 0]
+    costs = [task.cost(k) for k in (0, 20, 40)]
+    assert costs == pytest.approx([0.1 + 1 / 16, 0.1 + 1 / 4, 1.1])
 
 
 class TestLayouts:

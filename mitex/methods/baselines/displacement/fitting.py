@@ -11,6 +11,7 @@ from mitex.methods.baselines.displacement import METHOD
 from mitex.methods.baselines.displacement.config import PRESETS
 from mitex.methods.baselines.displacement.texture import DisplacementMap
 from mitex.methods.geometric.references import find_reference
+from mitex.progress import announce
 from mitex.training.fit import Run
 from mitex.training.settings import RunOptions
 
@@ -34,5 +35,6 @@ def fit(
     """
     run = Run.of(PRESETS, out, **options)
     mesh = reference if isinstance(reference, Mesh) else find_reference(reference)
+    announce("baking the height map")
     baked = DisplacementMap.bake(mesh, run.config.resolution, run.config.window)
     return run.compute(METHOD.name, mesh.name, lambda about: replace(baked, about=about), reference=mesh.name)

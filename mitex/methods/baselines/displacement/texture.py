@@ -117,7 +117,7 @@ class DisplacementMap:
         """
         if not 0.05 <= scale <= 20 or not 0 <= levels <= 6:
             raise ConfigError(
-                f"a relief of {scale} times the size, on faces split {levels} times",
+                f"a relief of {scale:g} times the size, on faces split {levels} times",
                 "use sizes from 0.05 to 20, and 0 to 6 splits",
             )
         fine = subdivide_midpoint(laid_out(mesh, ATLAS), levels)

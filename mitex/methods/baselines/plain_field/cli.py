@@ -10,6 +10,7 @@ from tyro.conf import arg
 
 from mitex.methods.checks import in_range, reject_unused
 from mitex.methods.options import PICTURES, ApplyOptions, TrainingOptions
+from mitex.paths import expanded
 
 if TYPE_CHECKING:
     from mitex.methods.baselines.plain_field.applied import AppliedField
@@ -42,12 +43,10 @@ class Fit(TrainingOptions):
 
         let_idle_threads_sleep()
         from mitex.methods.baselines import plain_field
-        from mitex.methods.nerf import load_capture
 
-        capture = load_capture(self.capture)
-        out = self.folder(f"{capture.name}-plain_field")
+        out = self.folder(f"{expanded(self.capture).resolve().name}-plain_field")
         with self.progress() as on_step:
-            plain_field.fit(capture, out, on_step=on_step, **options)
+            plain_field.fit(self.capture, out, on_step=on_step, **options)
         print(out)
 
 

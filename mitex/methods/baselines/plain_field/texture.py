@@ -100,5 +100,5 @@ class PlainFieldTexture:
                 "leave out the mesh, or learn a texture with mitex fit nerf",
             )
         if not 0 < density <= 1000:
-            raise ConfigError(f"{density} times the density", "use densities up to 1000")
+            raise ConfigError(f"{density:g} times the density", "use densities up to 1000")
         return AppliedField(self.field, self.similarity, str(self.about["name"]), density)

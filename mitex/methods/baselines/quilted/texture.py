@@ -83,7 +83,7 @@ class QuiltedTexture:
         """
         if not 0.05 <= scale <= 20 or not 16 <= resolution <= MAX_RESOLUTION:
             raise ConfigError(
-                f"a texture of {scale} times the size and {resolution} texels",
+                f"a texture of {scale:g} times the size and {resolution} texels",
                 f"use sizes from 0.05 to 20, and 16 to {MAX_RESOLUTION} texels",
             )
         mesh = laid_out(mesh, UNWRAP_SIZE)

@@ -22,6 +22,7 @@ from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.field.rendering import batch_rays
 from mitex.methods.nerf.training.plain import PlainTask, train_plain_field
 from mitex.paths import cache_dir
+from mitex.progress import announce
 from mitex.runtime.jit import dr, mi
 from mitex.textures.march import composite
 from mitex.training.control import ALONE, Control
@@ -95,6 +96,7 @@ def find_base(
         task = _trained(coarse, capture, training if keep else None, control)
         if base is None:
             log.info("cutting the base shape out of the coarse field, about a minute")
+            announce("cutting the base shape out of the coarse field")
             base = _shape_of(task, config)
         scan = scan_surface(task)
         projection = Projection(base, neighbours=config.neighbours, repulsion=config.repulsion)

@@ -6,10 +6,12 @@ import hashlib
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from mitex.cache import content_key
 from mitex.errors import CaptureError, CaptureWarning
 from mitex.geometry.vectors import unit
 from mitex.images import read_bytes, read_image
@@ -18,6 +20,7 @@ from mitex.methods.nerf.capture.colmap import photo_frames
 from mitex.methods.nerf.capture.distortion import folds, undistort
 from mitex.methods.nerf.capture.transforms import Frame, no_mask, read_frames, transforms_files
 from mitex.methods.nerf.capture.visual_hull import Hull, View, project, visual_hull
+from mitex.progress import announce, counted
 
 MIN_VIEWS = 8
 HALF_EXTENT = 0.75  # of the visual hull in the scene cube
@@ -49,6 +52,14 @@ class Capture:
 
     def __len__(self) -> int:
         return len(self.images)
+
+    def metadata(self) -> dict[str, str]:
+        """Name, and a hash of photos and cameras, for the metadata of a training."""
+        return {"capture": self.name, "capture_key": self._key}
+
+    @cached_property
+    def _key(self) -> str:
+        return content_key(*self.images, self.poses, self.intrinsics, self.distortion)
 
     def rays(self, view: int | np.ndarray, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rays through positions in an image, without the lens's distortion.
@@ -148,7 +159,7 @@ def _read_images(frames: Sequence[Frame]) -> tuple[list[Frame], list[np.ndarray]
     """All images as RGBA, without views that were there before."""
     unique, images, total = [], [], 0
     names_by_key: dict[bytes, str] = {}
-    for frame in frames:
+    for frame in counted("reading photos", frames, len(frames)):
         image = _rgba(frame)
         key = hashlib.sha256(frame.pose.tobytes() + image.tobytes()).digest()
         if key in names_by_key:
@@ -212,6 +223,7 @@ def _check_masks(frames: Sequence[Frame], views: Sequence[View]) -> None:
 
 def _scene_cube(frames: Sequence[Frame], views: Sequence[View]) -> Similarity:
     """The map that puts the visual hull into the scene cube."""
+    announce("carving the visual hull")
     hull = visual_hull(views)
     if hull is None:
         raise CaptureError(

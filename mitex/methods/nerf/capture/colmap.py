@@ -19,6 +19,7 @@ from mitex.errors import CaptureError, CaptureWarning
 from mitex.images import SUFFIXES, read_bytes
 from mitex.methods.nerf.capture.transforms import ONE_FILE, Frame, find_mask, no_mask, parse_frames
 from mitex.paths import cache_dir
+from mitex.progress import announce
 
 if TYPE_CHECKING:
     import pycolmap
@@ -66,6 +67,7 @@ def _photos(folder: Path) -> list[Path]:
 
 def _reconstruct(folder: Path, names: Sequence[str]) -> dict[str, Any]:
     """The content of a `transforms.json` for those photos that COLMAP places in one world."""
+    announce("finding the cameras, some minutes")
     with tempfile.TemporaryDirectory(prefix="mitex-") as temporary:
         work = Path(temporary)
         (work / "images").mkdir()

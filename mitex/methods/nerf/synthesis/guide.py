@@ -39,7 +39,7 @@ class Guide:
         if not square or not colours.size or not np.isfinite(colours).all():
             raise ConfigError(f"patch colours of shape {colours.shape}", "give finite (P, G, G, 3) ones")
         if not self.weight >= 0.0:
-            raise ConfigError(f"a guide of weight {self.weight}", "use 0 or more")
+            raise ConfigError(f"a guide of weight {self.weight:g}", "use 0 or more")
         object.__setattr__(self, "image", image)
         object.__setattr__(self, "colours", colours)
 

@@ -16,6 +16,7 @@ from mitex.methods.nerf.synthesis.cuts import cheapest_path, feather, new_part, 
 from mitex.methods.nerf.synthesis.guide import Guide, GuideDistance
 from mitex.methods.nerf.synthesis.matching import FLIPS, SIDES, Matcher, Source, mirror, overlap, strip
 from mitex.methods.nerf.synthesis.repetition import EVENNESS, Repetition
+from mitex.progress import announce
 
 NEAREST = 16  # candidates for a place
 Maps = dict[str, np.ndarray]  # the fields of `Quilt`
@@ -80,6 +81,7 @@ def quilt(
     if guide is not None:
         guide_distance = GuideDistance(guide, len(matcher.centres), size, canvas.side, tileable)
     for row, top in enumerate(canvas.rows):
+        announce("quilting the texture", row, len(canvas.rows))
         for column, left in enumerate(canvas.columns):
             strips = canvas.strips(row, column)
             costs = matcher.distances(strips)

@@ -110,7 +110,7 @@ class PlainTask(RadianceTask[RadianceConfig]):
         super().__init__(config, capture, preview_view, occupancy, parameters)
 
     def metadata(self) -> dict[str, str]:
-        return {"method": "plain_field", "capture": self.pixels.capture.name}
+        return {"method": "plain_field"} | self.pixels.capture.metadata()
 
     def render(self, step: int, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
         origin, direction = batch_rays(batch)

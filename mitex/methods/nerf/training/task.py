@@ -79,7 +79,7 @@ class TextureTask(RadianceTask[NerfConfig]):
     def metadata(self) -> dict[str, str]:
         mesh = self.projection.mesh
         base = content_key(mesh.vertices, mesh.faces, self.thickness)
-        return {"method": "nerf", "capture": self.pixels.capture.name, "base": base}
+        return {"method": "nerf", "base_key": base} | self.pixels.capture.metadata()
 
     def with_cameras(self, batch: Batch) -> Batch:
         if not self.config.refine_cameras:

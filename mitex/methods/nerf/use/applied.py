@@ -23,6 +23,7 @@ from mitex.methods.nerf.field.shell import Shell, shell_cells, shell_reach
 from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents, uv_frames
 from mitex.methods.nerf.use.extract import extract_mesh
 from mitex.methods.nerf.use.placement import in_scene_cube, uv_unit_length
+from mitex.progress import announce
 from mitex.runtime.jit import mi
 from mitex.textures.march import DIAGONAL
 
@@ -35,7 +36,7 @@ def check_ranges(scale: float, density: float, lift: float) -> None:
     """Raises a ConfigError if one of these numbers of `NerfTexture.apply` is out of range."""
     if not 0.05 <= scale <= 20 or not 0 < density <= 1000 or not 0 <= lift <= 1:
         raise ConfigError(
-            f"a texture of {scale} times the size, {density} times the density and lifted by {lift}",
+            f"a texture of {scale:g} times the size, {density:g} times the density and lifted by {lift:g}",
             "use sizes from 0.05 to 20, densities up to 1000 and lifts from 0 to 1",
         )
 
@@ -97,7 +98,8 @@ class AppliedTexture(Shell):
             lift=raised,
         )
         generator = torch.Generator().manual_seed(0)
-        for _ in range(OCCUPANCY_SAMPLES):
+        for sample in range(OCCUPANCY_SAMPLES):
+            announce("looking for what is dense", sample, OCCUPANCY_SAMPLES)
             occupancy.refresh(self.density, generator)
         self.mask = occupancy.mask
 

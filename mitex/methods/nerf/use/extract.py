@@ -17,6 +17,7 @@ from mitex.methods.nerf.field.lighting import COEFFICIENTS
 from mitex.methods.nerf.field.occupancy import sample_grid
 from mitex.methods.nerf.field.shell import Shell, appearance
 from mitex.methods.nerf.field.tensors import channels, rows
+from mitex.progress import announce
 from mitex.runtime.jit import mi
 
 CELLS = 3  # of the grid along a side of a cell of the occupancy grid
@@ -41,6 +42,7 @@ def extract_mesh(shell: Shell, similarity: Similarity, name: str, cells: int | N
         ConfigError: `cells` is out of range.
         MeshError: nothing is so dense.
     """
+    announce("cutting out what is solid")
     mesh = solid_surface(shell.density, np.array(shell.mask).astype(bool), name, cells)
     albedo, normals = _albedo_and_normals(shell, mesh)
     placed = mesh.with_vertices(similarity.inverse(mesh.vertices))

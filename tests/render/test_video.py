@@ -1,0 +1,29 @@
+"""Pictures become a video, or nothing at all."""
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+
+from mitex.errors import ConfigError
+from mitex.render.video import write_video
+
+
+def pictures(count):
+    return (np.full((16, 16, 3), k / max(count, 1), np.float32) for k in range(count))
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".mp4"])
+def test_a_picture_for_each_frame(tmp_path, suffix):
+    calls = []
+    path = write_video(
+        tmp_path / f"a{suffix}", pictures(3), 3, 24, 16, lambda done, total: calls.append((done, total))
+    )
+    assert len(iio.imread(path)) == 3 and calls == [(1, 3), (2, 3), (3, 3)]
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".mp4"])
+@pytest.mark.parametrize("count", [0, 1, 4])
+def test_another_number_of_pictures_leaves_nothing(tmp_path, suffix, count):
+    with pytest.raises(ConfigError, match="pictures"):
+        write_video(tmp_path / f"a{suffix}", pictures(count), 3, 24, 16)
+    assert list(tmp_path.iterdir()) == []
