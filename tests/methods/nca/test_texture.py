@@ -283,7 +283,7 @@ def test_the_operator_of_a_mesh_is_built_once(texture, sphere):
         ({"subdivide": 7}, "subdivide = 7"),
         ({"subdivide": "much"}, "subdivide = much"),
         ({"subdivide": 1.5}, "subdivide = 1.5"),
-        ({"scale": 0.0, "subdivide": 0}, "scale = 0.0"),
+        ({"scale": 0.0, "subdivide": 0}, "scale = 0"),
         ({"scale": math.nan, "subdivide": 0}, "scale = nan"),
         ({"scale": 21, "subdivide": 0}, "scale = 21"),
         ({"orientation": math.nan, "subdivide": 0}, "not finite"),
