@@ -76,7 +76,8 @@ class Render:
         if moving:
             from mitex.render import check_video
 
-            check_video(out, self.frames or 2, self.fps or 1, self.resolution or 16)  # the defaults are possible
+            # The defaults are possible.
+            check_video(out, self.frames or 2, self.fps or 1, self.resolution or 16)
         from mitex.asset import Asset
 
         asset = Asset.load(self.asset)

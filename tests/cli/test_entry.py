@@ -224,7 +224,7 @@ class TestUsage:
             (["try", "--bogus"], "--bogus is no option of `mitex try`; see `mitex try --help`"),
             (["try", "--cuont", "2"], "--cuont is no option of `mitex try`; did you mean --count?"),
             (["models", "--jsn"], "--jsn is no option of `mitex models`; did you mean --json?"),
-            (["render", "a.glb", "--szie=9"], "--szie is no option of `mitex render`; did you mean --resolution?"),
+            (["render", "a.glb", "--spq=9"], "--spq is no option of `mitex render`; did you mean --spp?"),
             (["try", "more"], "unrecognized options: more; see `mitex try --help`"),
         ],
     )

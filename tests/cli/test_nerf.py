@@ -26,7 +26,7 @@ def fit(words=QUICK, base="base.obj", out="out/run"):
     return f"fit nerf --capture photos --base-mesh {base} --out {out} {words}".split()
 
 
-def apply(words="--resolution 128", mesh="ball.obj", out="out/a.ply"):
+def apply(words="--size 128", mesh="ball.obj", out="out/a.ply"):
     return f"apply out/run --mesh {mesh} --out {out} {words}".split()
 
 
@@ -168,8 +168,8 @@ def few(extract, mesh, rng, *, count, **options):
 
 APPLIED = {
     "lift": ("--lift 2", "--lift"),
-    "size": ("--resolution 10", "--resolution"),
-    "size and guide": ("--resolution 128 --guide no.png", "--resolution and --guide"),
+    "size": ("--size 10", "--size"),
+    "size and guide": ("--size 128 --guide no.png", "--size and --guide"),
     "scale and guide": ("--scale 0.05 --guide guide.png", "use larger scales"),
     "density": ("--density 0", "--density"),
     "guide": ("--guide no.png", "no.png"),

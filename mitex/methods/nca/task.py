@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 import torch
+import torch.nn.functional as F
 
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
@@ -160,7 +161,7 @@ class NcaTask:
             surface.patches(look, state, width, 1, PREVIEW, generator, antialias=2)[0]
             for width in (self.config.density, self.config.density / 4)
         ]
-        views = [view.numpy() for view in (*views, surface.whole(look, state, PREVIEW))]
+        views = [_padded(view, PREVIEW) for view in (*views, surface.whole(look, state, PREVIEW))]
         triples = channel_triples(self.look.layout, False, 0)
         images = triple_images(self.exemplar.resized(PREVIEW), triples, self.look.layout)
         rows = [
@@ -172,3 +173,10 @@ class NcaTask:
     def metadata(self) -> dict[str, str]:
         exemplar = {"exemplar": self.exemplar.name, "exemplar_key": self.exemplar.key}
         return {"method": "nca", "maps": ",".join(self.maps)} | exemplar
+
+
+def _padded(view: torch.Tensor, side: int) -> np.ndarray:
+    """A square view (h, h, C) in the middle of (side, side, C) zeros."""
+    before = (side - len(view)) // 2
+    after = side - len(view) - before
+    return F.pad(view, (0, 0, before, after, before, after)).numpy()

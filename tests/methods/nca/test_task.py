@@ -244,6 +244,15 @@ def test_preview_shows_a_row_for_each_map(task, monkeypatch):
     assert np.array_equal(task.preview(5), picture)
 
 
+def test_preview_of_an_exemplar_that_the_sphere_is_too_small_for(exemplar, monkeypatch):
+    """Its patch shows less, at its scale, with a margin."""
+    monkeypatch.setattr(training, "PREVIEW", 48)
+    task = NcaTask(config("density=24"), exemplar)
+    picture = task.preview(5)
+    assert picture.shape == (2 * 48, 4 * 48, 3)
+    assert not picture[:4, 48:96].any() and picture[20:28, 68:76].any()
+
+
 def test_metadata(task):
     key = task.exemplar.key
     exemplar = {"exemplar": "scales", "exemplar_key": key}
