@@ -6,6 +6,7 @@ import sys
 import threading
 import tomllib
 from dataclasses import fields
+from functools import partial
 from importlib import import_module
 from inspect import signature
 from pathlib import Path
@@ -103,12 +104,12 @@ def test_an_installed_method_cannot_take_a_built_in_one_s_name(monkeypatch, toy)
 
 
 def python_fit(name, **options):
-    """The fit of the words in Python: the names are the same."""
+    """The fit of the words in Python, where the names are the same; not yet called."""
     method = methods()[name]
     command = parse(method.load_fit(), FITS[name].fit.split(), "fit")
     fit = import_module(method.texture.partition(":")[0].rpartition(".")[0] or "checkerboard").fit
     inputs = {key: getattr(command, key) for key in signature(fit).parameters if hasattr(command, key)}
-    return fit(**(inputs | {"out": None}), **command.run_options(), **options)
+    return partial(fit, **(inputs | {"out": None}), **command.run_options(), **options)
 
 
 @pytest.mark.parametrize("name", ["checkerboard", "displacement"])
@@ -116,7 +117,7 @@ def test_a_fit_in_memory_gives_the_texture_of_the_run_folder(name, runs, workpla
     run = runs(name)
     monkeypatch.chdir(workplace)
     files = set(workplace.rglob("*"))
-    texture = python_fit(name)
+    texture = python_fit(name)()
     assert set(workplace.rglob("*")) == files and type(texture) is methods()[name].load_texture()
     (expected, _), (actual, _) = map(model_file.read, (run / NAME, texture.save(tmp_path / NAME)))
     assert expected.keys() == actual.keys()
@@ -128,7 +129,7 @@ def test_a_fit_that_computes_in_one_go_is_cancelled_before(runs, workplace, monk
     stop = threading.Event()
     stop.set()
     with pytest.raises(mitex.Cancelled):
-        python_fit("displacement", cancel=stop)
+        python_fit("displacement", cancel=stop)()
 
 
 def test_settings_by_name(workplace, monkeypatch, toy):
@@ -155,7 +156,7 @@ def test_another_variant_gets_what_works_or_an_error(mi, workplace, monkeypatch,
     for call in (
         lambda: texture.apply(mesh, steps=1, subdivide=1),
         lambda: asset.render("a.png", resolution=16, spp=1),
-        lambda: python_fit("checkerboard"),
+        python_fit("checkerboard"),
     ):
         with pytest.raises(
             mitex.ConfigError, match="'scalar_rgb', which is in use; call mitsuba.set_variant"
@@ -241,7 +242,6 @@ class TestRun:
             pytest.skip("a method that does not train")
         monkeypatch.chdir(workplace)
         monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-        files, before = set(workplace.rglob("*")), program_state()
         reports, stop = [], threading.Event()
 
         def on_step(progress):
@@ -249,8 +249,10 @@ class TestRun:
             if progress.step:
                 stop.set()
 
+        fit = python_fit(name, on_step=on_step, cancel=stop)
+        files, before = set(workplace.rglob("*")), program_state()
         with pytest.raises(mitex.Cancelled, match="after step 1; nothing has been kept"):
-            in_thread(lambda: python_fit(name, on_step=on_step, cancel=stop))
+            in_thread(fit)
         assert [report.step for report in reports] == [0, 1] and reports[0].steps >= 2
         assert set(workplace.rglob("*")) == files and not list(tmp_path.iterdir())
         assert program_state() == before

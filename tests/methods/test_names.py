@@ -45,5 +45,5 @@ class TestMethod:
 
 
 def test_pictures_and_films():
-    assert names(Render) - parameters(still, turntable, render_still) == {"asset", "out"}
+    assert names(Render) - parameters(still, turntable, render_still) == {"out"}
     assert names(Animate) - parameters(film) <= FILM_ONLY

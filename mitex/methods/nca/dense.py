@@ -7,8 +7,6 @@ shape takes some time, so callers round row counts up to a few that come again.
 
 from __future__ import annotations
 
-from typing import cast
-
 import torch
 import torch.nn.functional as F
 from torch import nn
@@ -18,11 +16,12 @@ from torch.nn.grad import conv2d_weight
 IMAGES = 64
 
 
-def layer(inputs: int, outputs: int) -> nn.Linear:
+class ZeroLinear(nn.Linear):
     """A linear layer of zeros: torch's own draws weights, from the generator that all of a program shares."""
-    linear = cast(nn.Linear, nn.utils.skip_init(nn.Linear, inputs, outputs))
-    linear.load_state_dict({"weight": torch.zeros(outputs, inputs), "bias": torch.zeros(outputs)})
-    return linear
+
+    def reset_parameters(self) -> None:
+        nn.init.zeros_(self.weight)
+        nn.init.zeros_(self.bias)
 
 
 def product(x: torch.Tensor, weight: torch.Tensor, bias: torch.Tensor | None = None) -> torch.Tensor:

@@ -27,7 +27,7 @@ class SineNetwork(nn.Module):
         super().__init__()
         self.omega = omega
         widths = [inputs, *[width] * depth, outputs]
-        self.layers = nn.ModuleList(dense.layer(a, b) for a, b in zip(widths, widths[1:], strict=False))
+        self.layers = nn.ModuleList(dense.ZeroLinear(a, b) for a, b in zip(widths, widths[1:], strict=False))
 
     def initialise(self, generator: torch.Generator) -> None:
         """Uniform weights: within 1 / inputs in the first layer, sqrt(6 / inputs) / omega in the others."""
