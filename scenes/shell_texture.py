@@ -18,11 +18,11 @@ from mitex.images import write_image
 from mitex.mesh import Similarity, embedded
 from mitex.methods.nca import NcaTexture
 from mitex.render import tone
-from mitex.runtime.jit import dr
+from mitex.runtime.jit import dr, mi
 from mitex.scenes import mesh_shape
 from mitex.textures.shell_field import shell_field
 
-mi = mitex.init()
+mitex.init()
 
 FLOOR = -1.0  # its height
 
@@ -103,4 +103,4 @@ def textured(asset, place):
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:3])
+    main(sys.argv[1] if len(sys.argv) > 1 else "shell.png", sys.argv[2] if len(sys.argv) > 2 else None)

@@ -103,4 +103,4 @@ def main(path: str = "ring.png", spp: int = 128) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:2])
+    main(sys.argv[1] if len(sys.argv) > 1 else "ring.png")

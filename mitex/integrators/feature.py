@@ -38,6 +38,8 @@ class FeatureIntegrator:
          sample at the pixel's centre. An `spp` given to `mi.render` replaces it and must be a square number.
          (Default: 1)
 
+    Variants: llvm and cuda ones; in spectral ones only the fields of Mitex.
+
     The sensor's sampler and reconstruction filter are not used: the image is deterministic, the seed has no
     effect. The result is returned and not stored in the film, which has no room for C channels.
 

@@ -31,6 +31,8 @@ class ShellIntegrator:
        - |bool|
        - Show nothing where the camera sees light sources directly. (Default: no)
 
+    Variants: llvm_ad_rgb and cuda_ad_rgb.
+
     Images are differentiable in the field's parameters.
     """
 

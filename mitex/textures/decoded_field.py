@@ -66,9 +66,9 @@ class DecodedField(VertexRows):
        - Every value is `scale * decoded + offset`. (Default: 1 and 0)
        - exposed, differentiable
 
-    The texture works on triangle meshes of LLVM variants, with one instance per mesh; on another shape, or
-    where a triangle refers to a vertex beyond the data, it is `offset`. Points of the shape are found as by
-    `vertex_field`. `mean` and `max` go over the vertices.
+    Variants: llvm ones; colours (`eval`) in rgb and mono, the rest in spectral ones, too. Others are a
+    ConfigError, and so is rendering a mesh with another number of vertices than `data` has rows. Other shapes
+    show `offset`. Points of the shape are found as by `vertex_field`. `mean` and `max` go over the vertices.
 
     Values are not linear in the data, so nothing but `gather` has their derivatives: by ordinary automatic
     differentiation to states, network, scale and offset. `eval_1_grad` differentiates exactly too, so bumps

@@ -47,6 +47,8 @@ class TexelField(FieldMethods):
     point's own chart; charts that are at least 1.5 texels apart, with padding between them or without, ensure
     it (1 texel if their borders run along the axes).
 
+    Variants: as `vertex_field`.
+
     Gradients flow to `data` with the transposed weights, and to `si.uv` where it is attached. Other Mitex
     code reads all channels: it is a `mitex.textures.field.Field`. `mean` and `max` go over the used texels.
     """

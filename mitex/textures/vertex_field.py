@@ -35,8 +35,11 @@ class VertexField(VertexRows):
          `eval_3` (roughness, normal maps, bump maps) and the `feature` integrator never convert. (Default:
          false)
 
-    The texture works on triangle meshes of JIT variants, with one instance per mesh; on another shape, or
-    where a triangle refers to a vertex beyond the data, it is `offset`. `eval` needs an rgb or mono variant.
+    Variants: llvm and cuda ones; colours (`eval`) in rgb and mono, the rest in spectral ones, too. Others are
+    a ConfigError.
+
+    It is put on triangle meshes, with one instance per mesh; other shapes show `offset`. Rendering a mesh
+    with another number of vertices than `data` has rows is a ConfigError.
 
     Barycentric weights: a mesh without UVs gives them exactly, in `si.uv`; with UVs they are solved from
     `si.p`, which is in world space, so such a mesh must not be placed through an `instance`.
