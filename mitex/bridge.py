@@ -11,7 +11,8 @@ import torch
 from torch.autograd.function import once_differentiable
 
 from mitex.errors import ConfigError
-from mitex.integrators.feature import FeatureMethods
+from mitex.integrators.feature import FeatureIntegrator
+from mitex.runtime import raise_causes
 from mitex.runtime.jit import dr, mi
 from mitex.scenes.stage import Visibility, background_values
 from mitex.sparse import transposed_product
@@ -110,9 +111,14 @@ def call(function: Callable[..., Any], *tensors: torch.Tensor) -> Any:
 
     Returns:
         The same as torch tensors; no second derivatives.
+
+    Raises:
+        Exception: what the function raises, also inside Dr.Jit's custom operations and loops.
     """
     # Dr.Jit does not convert an nn.Parameter, a view of it is a plain tensor with the same gradient.
-    return dr.wrap(source="torch", target="drjit")(function)(*(tensor.view_as(tensor) for tensor in tensors))
+    views = (tensor.view_as(tensor) for tensor in tensors)
+    with raise_causes():
+        return dr.wrap(source="torch", target="drjit")(function)(*views)
 
 
 @dataclass(frozen=True)
@@ -172,7 +178,7 @@ def _parameter(table: Mapping[str, _Target], name: str) -> _Target:
     return table[name]
 
 
-def _only_field(scene: mi.Scene, integrator: FeatureMethods) -> _Target:
+def _only_field(scene: mi.Scene, integrator: FeatureIntegrator) -> _Target:
     textures: list[mi.Texture] = [texture for _, texture in integrator.fields(scene)]
     fields = {id(texture): texture for texture in textures if isinstance(texture, Field)}
     if len(fields) != 1:

@@ -1,37 +1,66 @@
-"""A captured texture on a vase, an automaton's texture on a mesh, and a ball of glass, in one picture.
+"""A radiance field, a mesh with a grown texture, and a ball of glass, in one path-traced picture.
 
-repetition: python scenes/shell_texture.py RUN [OUT.png]
+usage: python scenes/shell_texture.py [OUT.png [RUN]]
 
-RUN is a finished run of `mitex fit nerf`.
+RUN is a finished run of `mitex fit nerf`: its captured texture is then shown on a vase. Without one, the
+field is a sponge by formula.
 """
 
 from __future__ import annotations
 
 import sys
+from typing import Any
 
 import numpy as np
 
 import mitex
-from mitex.colour import srgb_to_linear
 from mitex.images import write_image
 from mitex.mesh import Similarity, embedded
 from mitex.methods.nca import NcaTexture
-from mitex.methods.nerf import NerfTexture
 from mitex.render import tone
-from mitex.scenes.stage import mesh_shape
+from mitex.runtime.jit import dr, mi
+from mitex.scenes import mesh_shape
+from mitex.textures.shell_field import shell_field
 
-mi = mitex.init()
+mitex.init()
 
 FLOOR = -1.0  # its height
 
 
-def main(run: str, out: str = "shell.png", size: int = 1024, resolution: int = 384, spp: int = 32) -> None:
-    """Mitsuba's own dictionaries, with the field given to the integrator as an object."""
-    from mitex.textures.shell_field import shell_field
+class Sponge:
+    """A ball of radius 0.9 of a gyroid: all that a `shell_field` needs to know of what it carries."""
 
-    applied = NerfTexture.load(run).apply(embedded("vase"), size=size)
-    # The vase keeps its size in the scene; the field's cube goes with it.
-    field = shell_field(applied, Similarity(np.array([-0.9, 0.0, 0.0]), 1.0))
+    step = 1 / 64  # between samples along a ray [half sides of the cube]
+
+    def __init__(self) -> None:
+        self.mask = mi.TensorXu8(np.ones((8, 8, 8), np.uint8))  # all cells of the cube may have matter
+
+    def evaluate(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, mi.Float, mi.Color3f]:
+        """Which points have matter, their density, and their colour, darker towards the middle."""
+        x, y, z = (9 * p for p in points)
+        gyroid = dr.sin(x) * dr.cos(y) + dr.sin(y) * dr.cos(z) + dr.sin(z) * dr.cos(x)
+        index = mi.UInt32(dr.compress((gyroid > 0.3) & (dr.norm(points) < 0.9)))
+        if not dr.width(index):
+            return index, mi.Float(), mi.Color3f()
+        light = dr.square(dr.norm(dr.gather(mi.Point3f, points, index)))
+        return index, dr.full(mi.Float, 60.0, dr.width(index)), mi.Color3f(0.95, 0.62, 0.3) * light
+
+
+def load_field(run: str | None, size: int) -> Any:
+    """The captured texture of a run on a vase, or the sponge."""
+    if run is None:
+        return Sponge()
+    from mitex.methods.nerf import NerfTexture
+
+    return NerfTexture.load(run).apply(embedded("vase"), size=size)
+
+
+def main(
+    out: str = "shell.png", run: str | None = None, size: int = 1024, resolution: int = 384, spp: int = 32
+) -> None:
+    """Mitsuba's own dictionaries, with the field given to the integrator as an object."""
+    # The field's cube keeps its size in the scene, and is moved to the left.
+    field = shell_field(load_field(run, size), Similarity(np.array([-0.9, 0.0, 0.0]), 1.0))
     grown = NcaTexture.load("pebbles").apply(embedded("octopus"), resolution=None, keep_dense=True)
     scene = {
         "type": "scene",
@@ -69,12 +98,9 @@ def textured(asset, place):
     mesh = asset.mesh.normalised()[0]
     vertices = 0.85 * mesh.vertices
     vertices += np.array([place[0], FLOOR - vertices[:, 1].min(), place[1]])
-    colour = {"type": "mesh_attribute", "name": "vertex_color"}
-    matte = mi.load_dict({"type": "diffuse", "reflectance": colour})
-    shape = mesh_shape(mesh.with_vertices(vertices), matte, smooth=True)
-    shape.add_attribute("vertex_color", 3, srgb_to_linear(asset.vertex_maps["albedo"]).ravel())
-    return shape
+    colour = {"type": "vertex_field", "data": mi.TensorXf(asset.vertex_maps["albedo"])}
+    return mesh_shape(mesh.with_vertices(vertices), {"type": "diffuse", "reflectance": colour}, smooth=True)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else "shell.png")
+    main(sys.argv[1] if len(sys.argv) > 1 else "shell.png", sys.argv[2] if len(sys.argv) > 2 else None)

@@ -4,7 +4,7 @@ The map has eight channels: a colour, a roughness, a height, and the colour of t
 to. `texel_field` hands the first five to a principled BSDF below a bump map; since it knows the charts, it
 filters without mixing neighbours in the map that are none on the vase. Run it as
 
-    python scenes/texel_field.py vase.png
+    python scenes/texel_field.py [OUT.png]
 
 and look at vase.png: the path-traced vase, and its charts as `feature` sees them.
 """
@@ -20,6 +20,7 @@ from scipy.sparse.csgraph import connected_components
 from mitex.atlas import Atlas
 from mitex.geometry.tangents import Split, split_at_seams
 from mitex.mesh import embedded
+from mitex.scenes import mesh_shape
 
 mi.set_variant("llvm_ad_rgb")
 
@@ -67,21 +68,11 @@ def load_vase() -> mi.Mesh:
         "roughness": shared | {"channel": 3},
         "specular": 0.5,
     }
-    props = mi.Properties()
-    props["bsdf"] = mi.load_dict({"type": "bumpmap", "height": shared | {"channel": 4}, "material": material})
-    options = {"has_vertex_normals": True, "has_vertex_texcoords": True}
-    mesh = mi.Mesh("vase", len(split.uv), len(split.faces), props, **options)
-    params = mi.traverse(mesh)
-    params["vertex_positions"] = vase.vertices[split.source].ravel()
-    params["faces"] = split.faces.astype(np.uint32).ravel()
-    params["vertex_texcoords"] = split.uv.ravel()
-    params.update()
-    params["vertex_normals"] = split.normals.ravel()  # last: new positions make Mitsuba compute normals anew
-    params.update()
-    return mesh
+    bsdf = {"type": "bumpmap", "height": shared | {"channel": 4}, "material": material}
+    return mesh_shape(vase, bsdf, smooth=True, split=split)
 
 
-def main(path: str, spp: int = 128) -> None:
+def main(path: str = "vase.png", spp: int = 128) -> None:
     """Renders the picture to `path` with `spp` paths per pixel."""
     camera = mi.ScalarTransform4f().look_at(origin=[0, 1.6, 4.2], target=[0, -0.05, 0], up=[0, 1, 0])
     lamp = mi.ScalarTransform4f().look_at(origin=[-2.5, 4, 2.5], target=[0, 0, 0], up=[0, 1, 0])

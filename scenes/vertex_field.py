@@ -1,9 +1,9 @@
-"""A plain Mitsuba scene with the Mitex plugins `vertex_field` and `feature`, and nothing else of Mitex.
+"""A Mitsuba scene with the plugins `vertex_field` and `feature`: a ring with five channels at its vertices.
 
-A ring carries five channels per vertex: a colour, a roughness and a height. `vertex_field` hands them to a
+The channels are a colour, a roughness and a height. `vertex_field` hands them to a
 principled BSDF below a bump map, `feature` images all five at once. Run it as
 
-    python scenes/vertex_field.py ring.png
+    python scenes/vertex_field.py [OUT.png]
 
 and look at ring.png: the path-traced ring, then its colour, roughness and height as `feature` sees them.
 """
@@ -13,6 +13,9 @@ import sys
 import mitex.plugins  # noqa: F401  # isort: skip  (before Mitsuba: it finds the LLVM that Dr.Jit needs)
 import mitsuba as mi
 import numpy as np
+
+from mitex.mesh import Mesh
+from mitex.scenes import mesh_shape
 
 mi.set_variant("llvm_ad_rgb")
 
@@ -48,7 +51,7 @@ def channels(angles: np.ndarray) -> np.ndarray:
 
 
 def load_ring() -> mi.Mesh:
-    """The ring as a Mitsuba mesh; the mesh needs no UVs."""
+    """The ring as a Mitsuba mesh, which needs no UVs."""
     vertices, faces, angles = ring()
     data = mi.TensorXf(channels(angles))
     bsdf = {
@@ -61,17 +64,10 @@ def load_ring() -> mi.Mesh:
             "specular": 0.5,
         },
     }
-    props = mi.Properties()
-    props["bsdf"] = mi.load_dict(bsdf)
-    mesh = mi.Mesh("ring", len(vertices), len(faces), props, has_vertex_normals=True)
-    params = mi.traverse(mesh)
-    params["vertex_positions"] = vertices.astype(np.float32).ravel()
-    params["faces"] = faces.astype(np.uint32).ravel()
-    params.update()
-    return mesh
+    return mesh_shape(Mesh(vertices, faces, name="ring"), bsdf, smooth=True)
 
 
-def main(path: str, spp: int = 128) -> None:
+def main(path: str = "ring.png", spp: int = 128) -> None:
     """Renders the picture to `path` with `spp` paths per pixel."""
     camera = mi.ScalarTransform4f().look_at(origin=[0, 2.9, 4.0], target=[0, -0.1, 0], up=[0, 1, 0])
     lamp = mi.ScalarTransform4f().look_at(origin=[-2.5, 4, 2.5], target=[0, 0, 0], up=[0, 1, 0])

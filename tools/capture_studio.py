@@ -12,10 +12,12 @@ from capture_kit import Part, ball
 from PIL import Image
 
 from mitex.colour import linear_to_srgb
+from mitex.geometry.tangents import split_at_hard_edges
 from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh
 from mitex.paths import atomic_write
 from mitex.runtime import init
+from mitex.scenes import mesh_shape
 
 FOV = math.radians(36.0)
 MARGIN = 1.01  # around the object in the narrowest view
@@ -178,16 +180,9 @@ def _shape(mi: Any, part: Part) -> Any:
         "roughness": {"type": "mesh_attribute", "name": "vertex_roughness"},
         "specular": 0.5,
     }
-    props = mi.Properties()
-    props["bsdf"] = mi.load_dict(bsdf)
-    shape = mi.Mesh("object", len(mesh.vertices), len(mesh.faces), has_vertex_normals=True, props=props)
-    shape.add_attribute("vertex_color", 3, part.colours.astype(np.float32).ravel())
-    shape.add_attribute("vertex_roughness", 1, part.roughness.astype(np.float32).ravel())
-    params = mi.traverse(shape)
-    params["vertex_positions"] = mesh.vertices.ravel()
-    params["vertex_normals"] = mesh.normals.ravel()
-    params["faces"] = mesh.faces.astype(np.uint32).ravel()
-    params.update()
+    shape = mesh_shape(mesh, bsdf, smooth=True, split=split_at_hard_edges(mesh))
+    shape.add_attribute("vertex_color", 3, part.colours.astype(np.float32).ravel().tolist())
+    shape.add_attribute("vertex_roughness", 1, part.roughness.astype(np.float32).ravel().tolist())
     return shape
 
 

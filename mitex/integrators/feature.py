@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
+from mitex.errors import ConfigError
 from mitex.runtime.jit import dr, mi
 from mitex.textures.field import Field
-from mitex.textures.variant import for_variant, init_base, option
+from mitex.textures.shown import nested
+from mitex.textures.variant import for_variant, init_base, option, require_variant
 
 
-class FeatureMethods:
+class FeatureIntegrator:
     """Images a texture on the visible surface: H x W x C values, no light, any sensor including `batch`.
 
     .. pluginparameters::
@@ -35,6 +38,8 @@ class FeatureMethods:
          sample at the pixel's centre. An `spp` given to `mi.render` replaces it and must be a square number.
          (Default: 1)
 
+    Variants: llvm and cuda ones; in spectral ones only the fields of Mitex.
+
     The sensor's sampler and reconstruction filter are not used: the image is deterministic, the seed has no
     effect. The result is returned and not stored in the film, which has no room for C channels.
 
@@ -48,22 +53,22 @@ class FeatureMethods:
 
     def __init__(self, props: mi.Properties) -> None:
         init_base(mi.CppADIntegrator, self, props)
-        if not dr.is_jit_v(mi.Float):
-            raise RuntimeError(f"feature: variant '{mi.variant()}' is not supported; use an llvm or cuda one")
+        require_variant("feature", dr.is_jit_v(mi.Float), "an llvm or cuda one")
         field = props.get("field")
         self.name = option(props, "name", "")
         if (field is None) == (not self.name):
-            raise RuntimeError(
-                "feature: give either a nested texture 'field' or the 'name' of each shape's texture"
+            raise ConfigError(
+                f"feature: {'no' if field is None else 'both'} 'field' and 'name'",
+                "give either a nested texture 'field' or the 'name' of each shape's texture",
             )
         if field is not None and not isinstance(field, mi.Texture):
-            raise RuntimeError(f"feature: 'field' is a {type(field).__name__}; give a texture")
+            raise ConfigError(f"feature: 'field' is a {type(field).__name__}", "give a texture")
         self.field = field
         background = props.get("background", 0.0)
         self.background = mi.Float(background.array if isinstance(background, mi.TensorXf) else background)
         self.antialias = option(props, "antialias", 1)
         if self.antialias < 1:
-            raise RuntimeError(f"feature: 'antialias' is {self.antialias}; use 1 or more")
+            raise ConfigError(f"feature: 'antialias' is {self.antialias}", "use 1 or more")
 
     def traverse(self, callback: mi.TraversalCallback) -> None:
         if self.field is not None:
@@ -92,7 +97,7 @@ class FeatureMethods:
     ) -> mi.TensorXf:
         """The image, `mi.TensorXf` (H, W, C); attached where parameters and the AD mode are."""
         if not develop:
-            raise RuntimeError("feature: the film holds no result, so develop=True is needed")
+            raise ConfigError("feature: the film holds no result", "render with develop=True")
         image = self._image(scene, sensor, spp)[1]
         if evaluate:
             dr.eval(image)
@@ -156,11 +161,13 @@ class FeatureMethods:
         values: list[mi.Float] = []
         covered = mi.Bool(False)
         for shape, texture in fields:
+            _check_shapes(texture, scene.shapes() if shape is None else [shape])
             mask = hit if shape is None else hit & (si.shape == mi.ShapePtr(shape))
             new = _evaluate(texture, si, mask)
             if values and len(values) != len(new):
-                raise RuntimeError(
-                    f"feature: the textures called '{self.name}' differ in their number of channels"
+                raise ConfigError(
+                    f"feature: the textures called '{self.name}' have {len(values)} and {len(new)} channels",
+                    "give all of them the same number of channels",
                 )
             values = [dr.select(mask, a, b) for a, b in zip(new, values or new, strict=True)]
             covered |= mask
@@ -172,8 +179,8 @@ class FeatureMethods:
             return self.antialias
         side = math.isqrt(spp)
         if side * side != spp:
-            raise RuntimeError(
-                f"feature: spp = {spp} cannot be a regular grid; use a square number such as 4 or 16"
+            raise ConfigError(
+                f"feature: spp = {spp} cannot be a regular grid", "use a square number such as 4 or 16"
             )
         return side
 
@@ -184,34 +191,35 @@ class FeatureMethods:
         named = ((shape, textures_named(shape, self.name)) for shape in scene.shapes())
         pairs = [(shape, textures[0]) for shape, textures in named if textures]
         if not pairs:
-            raise RuntimeError(f"feature: no shape of the scene has a texture called '{self.name}'")
+            raise ConfigError(
+                f"feature: no shape of the scene has a texture called '{self.name}'",
+                "give the name of a parameter of a shape or BSDF, see mi.traverse(scene)",
+            )
         return pairs
 
     def _backgrounds(self, channels: int) -> list[mi.Float]:
         count = dr.width(self.background)
         if count not in (1, channels):
-            raise RuntimeError(
-                f"feature: 'background' has {count} values for {channels} channels; give 1 or {channels}"
+            raise ConfigError(
+                f"feature: 'background' has {count} values for {channels} channels", f"give 1 or {channels}"
             )
         return [dr.gather(mi.Float, self.background, c if count > 1 else 0) for c in range(channels)]
 
 
 def textures_named(thing: mi.Shape | mi.BSDF, name: str) -> list[mi.Texture]:
     """Textures with the parameter name `name` in a shape or BSDF or nested in it, outermost first."""
-    textures: list[mi.Texture] = []
-    nested: list[mi.BSDF] = []
-
-    class Callback(mi.TraversalCallback):
-        def put(self, key: str, value: object, *_flags: object) -> None:
-            if isinstance(value, mi.Texture) and key == name:
-                textures.append(value)
-            elif isinstance(value, mi.BSDF):
-                nested.append(value)
-
-    thing.traverse(Callback())
-    for child in nested:
-        textures += textures_named(child, name)
+    objects = nested(thing)
+    textures = [value for key, value in objects.items() if key == name and isinstance(value, mi.Texture)]
+    for child in objects.values():
+        if isinstance(child, mi.BSDF):
+            textures += textures_named(child, name)
     return textures
+
+
+def _check_shapes(texture: mi.Texture, shapes: Iterable[mi.Shape]) -> None:
+    if isinstance(texture, Field):
+        for shape in shapes:
+            texture.check_shape(shape)
 
 
 def _evaluate(texture: mi.Texture, si: mi.SurfaceInteraction3f, active: mi.Bool) -> list[mi.Float]:
@@ -221,7 +229,10 @@ def _evaluate(texture: mi.Texture, si: mi.SurfaceInteraction3f, active: mi.Bool)
             located = texture.locate(si, active)
         return texture.gather(located)
     if mi.is_spectral:
-        raise RuntimeError("feature: in spectral variants only the fields of Mitex can be imaged")
+        raise ConfigError(
+            f"feature: in the spectral variant '{mi.variant()}' it does not image Mitsuba's own textures",
+            "use a field of Mitex, or an rgb or mono variant",
+        )
     return list(texture.eval(si, active))
 
 
@@ -245,5 +256,5 @@ def _first_hits(scene: mi.Scene, sensor: mi.Sensor | int, n: int) -> mi.SurfaceI
 
 def register() -> None:
     """Registers the integrator for the current variant."""
-    cls = for_variant("FeatureIntegrator", mi.CppADIntegrator, FeatureMethods)
+    cls = for_variant(mi.CppADIntegrator, FeatureIntegrator)
     mi.register_integrator("feature", lambda props: cls(props))

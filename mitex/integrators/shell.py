@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+from mitex.errors import ConfigError
 from mitex.runtime.jit import dr, mi
-from mitex.textures.shell_field import ShellFieldMethods
-from mitex.textures.variant import for_variant, init_base, option
+from mitex.textures.shell_field import ShellField, works_in_variant
+from mitex.textures.variant import for_variant, init_base, option, require_variant
 
 TOE, SLOPE = 0.04045, 12.92  # of the sRGB curve
 
 
-class ShellMethods:
+class ShellIntegrator:
     """Ordinary geometry by path tracing, with a radiance field composited by depth on every segment.
 
     A field gives what it emits towards the viewer under its own light and hides what is behind: paths that
@@ -30,20 +31,21 @@ class ShellMethods:
        - |bool|
        - Show nothing where the camera sees light sources directly. (Default: no)
 
+    Variants: llvm_ad_rgb and cuda_ad_rgb.
+
     Images are differentiable in the field's parameters.
     """
 
     def __init__(self, props: mi.Properties) -> None:
         init_base(mi.SamplingIntegrator, self, props)
-        if not dr.is_jit_v(mi.Float) or mi.is_spectral or mi.is_polarized:
-            raise RuntimeError(f"shell: variant '{mi.variant()}' is not supported; use llvm_ad_rgb")
+        require_variant("shell", works_in_variant(), "llvm_ad_rgb or cuda_ad_rgb")
         field: Any = props.get("field")
         if not hasattr(field, "march"):
-            raise RuntimeError("shell: 'field' is not a shell_field; see mitex.textures.shell_field")
-        self.field: ShellFieldMethods = field
+            raise ConfigError("shell: 'field' is not a shell_field", "see mitex.textures.shell_field")
+        self.field: ShellField = field
         self.max_depth = option(props, "max_depth", 6)
         if self.max_depth < 1:
-            raise RuntimeError(f"shell: 'max_depth' is {self.max_depth}; use 1 or more")
+            raise ConfigError(f"shell: 'max_depth' is {self.max_depth}", "use 1 or more")
         self.hidden = option(props, "hide_emitters", False)
 
     def traverse(self, callback: mi.TraversalCallback) -> None:
@@ -150,5 +152,5 @@ def _linear(display: mi.Color3f, opacity: mi.Float) -> mi.Spectrum:
 
 def register() -> None:
     """Registers the integrator for the current variant."""
-    cls = for_variant("ShellIntegrator", mi.SamplingIntegrator, ShellMethods)
+    cls = for_variant(mi.SamplingIntegrator, ShellIntegrator)
     mi.register_integrator("shell", lambda props: cls(props))

@@ -20,6 +20,7 @@ from mitex.mesh.mesh import Similarity
 from mitex.progress import announce
 from mitex.render.framing import FOV, View, fit_view, hull, rotation
 from mitex.render.studio import GREY, backdrop, lights
+from mitex.runtime import raise_causes
 
 if TYPE_CHECKING:
     from mitex.runtime.jit import mi
@@ -64,6 +65,10 @@ class OrbitRenderer:
         floating: bool = False,
         like: Mesh | None = None,
     ):
+        from mitex.plugins import init
+        from mitex.scenes.shapes import mesh_shape
+
+        init(needs="ad_rgb")
         if not 16 <= resolution <= 4096:
             raise ConfigError(f"a picture of {resolution} pixels is not possible", "use 16 to 4096")
         if not -0.5 <= displacement <= 0.5:
@@ -74,15 +79,14 @@ class OrbitRenderer:
         self._floating = floating
         _, place = (like or asset.mesh).normalised()
         if asset.atlas is None:  # a vertex for each normal, and for each UV
-            split, uv = split_at_hard_edges(asset.mesh), None
+            split = split_at_hard_edges(asset.mesh)
         else:
             split = split_at_seams(asset.mesh, asset.atlas.uv)
-            uv = split.uv[split.faces]
         self._positions, self._normals, self._detail = _surface(asset, split, place, displacement)
         framed = self._positions if like is None else place.apply(like.vertices)
         self._hull, self._floor = hull(framed), float(framed[:, 1].min())
-        mesh = Mesh(asset.mesh.vertices[split.source], split.faces, uv, asset.mesh.name)
-        self._scene, self._params = self._build(_bsdf(asset, split, ao), mesh)
+        material = {"type": "twosided", "bsdf": _bsdf(asset, split, ao)}
+        self._scene, self._params = self._build(mesh_shape(asset.mesh, material, smooth=True, split=split))
 
     def fit_view(self, azimuths: float | Sequence[float] = 0.0, elevation: float = 18.0) -> View:
         """The camera from which the object, at any of the azimuths [degrees], fills the picture.
@@ -113,16 +117,14 @@ class OrbitRenderer:
         self._turn(azimuth, view)
         return accumulated(self._scene, self.resolution, spp, seed)
 
-    def _build(self, bsdf: dict[str, object], mesh: Mesh) -> tuple[mi.Scene, mi.SceneParameters]:
-        from mitex.plugins import init
+    def _build(self, shape: mi.Mesh) -> tuple[mi.Scene, mi.SceneParameters]:
         from mitex.runtime.jit import mi
 
-        init(needs="ad_rgb")
         scene = {
             "type": "scene",
             "integrator": {"type": "path", "max_depth": MAX_DEPTH, "rr_depth": 99, "hide_emitters": True},
             "sensor": sensor(self.resolution),
-            "object": shape("object", mesh, {"type": "twosided", "bsdf": bsdf}, normals=True),
+            "object": shape,
             **lights(),
         }
         if not self._floating:
@@ -174,7 +176,8 @@ def accumulated(scene: mi.Scene, resolution: int, spp: int, seed: int) -> np.nda
     try:
         for k in range(passes):
             announce("rendering", k, passes if passes > 1 else 0)
-            picture = mi.render(scene, spp=math.ceil(spp / passes), seed=mi.UInt32(seed * 4096 + k))
+            with raise_causes():
+                picture = mi.render(scene, spp=math.ceil(spp / passes), seed=mi.UInt32(seed * 4096 + k))
             total += np.array(picture)
     finally:
         mi.set_log_level(level)
@@ -257,28 +260,10 @@ def _facing(detail: np.ndarray, normals: np.ndarray, to_camera: np.ndarray) -> n
 
 def paper_sweep(floor: float) -> mi.Mesh:
     """The backdrop at height `floor` as a Mitsuba shape."""
+    from mitex.scenes.shapes import mesh_shape
+
     paper = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [GREY] * 3}}
-    return shape("backdrop", backdrop(floor), {"type": "twosided", "bsdf": paper})
-
-
-def shape(name: str, mesh: Mesh, bsdf: dict[str, object], normals: bool = False) -> mi.Mesh:
-    """A Mitsuba mesh, with UVs if the mesh has a vertex for each."""
-    from mitex.runtime.jit import mi
-
-    props = mi.Properties()
-    props["bsdf"] = mi.load_dict(bsdf)
-    counts = len(mesh.vertices), len(mesh.faces)
-    textured = mesh.uv is not None
-    shape = mi.Mesh(name, *counts, has_vertex_normals=normals, has_vertex_texcoords=textured, props=props)
-    params = mi.traverse(shape)
-    if mesh.uv is not None:  # every vertex has one
-        texcoords = np.zeros((len(mesh.vertices), 2), np.float32)
-        texcoords[mesh.faces] = mesh.uv
-        params["vertex_texcoords"] = texcoords.ravel()
-    params["vertex_positions"] = mesh.vertices.ravel()
-    params["faces"] = mesh.faces.astype(np.uint32).ravel()
-    params.update()
-    return shape
+    return mesh_shape(backdrop(floor), {"type": "twosided", "bsdf": paper})
 
 
 def sensor(resolution: int) -> dict[str, object]:

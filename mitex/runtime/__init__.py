@@ -1,5 +1,6 @@
 """What Mitex runs on: LLVM, Mitsuba and its variant, threads, seeds, number formats, and their report."""
 
+from mitex.runtime.causes import raise_causes
 from mitex.runtime.health import Check, doctor
 from mitex.runtime.memory import available_memory, keep_freed_memory
 from mitex.runtime.precision import bfloat16_is_fast
@@ -17,6 +18,7 @@ __all__ = [
     "let_idle_threads_sleep",
     "load_mitsuba",
     "lower_worker_priority",
+    "raise_causes",
     "seed_everything",
     "set_workers",
     "threads",

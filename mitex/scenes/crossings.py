@@ -8,7 +8,7 @@ from mitex.mesh import Mesh
 from mitex.mesh.topology import mesh_edges
 from mitex.runtime import init
 from mitex.runtime.jit import mi
-from mitex.scenes.stage import mesh_shape
+from mitex.scenes.shapes import mesh_shape
 
 PAST = 1e-4  # part of an edge by which a ray goes on behind a face that it may touch
 

@@ -10,11 +10,11 @@ from torch.autograd.function import once_differentiable
 
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh
-from mitex.runtime import init
+from mitex.runtime import init, raise_causes
 from mitex.runtime.jit import dr, mi
 from mitex.scenes.cameras import Cameras
 from mitex.scenes.lights import environment
-from mitex.scenes.stage import mesh_shape
+from mitex.scenes.shapes import mesh_shape
 
 
 class GeometryRenderer:
@@ -76,10 +76,11 @@ class GeometryRenderer:
     def images(self, vertices: np.ndarray, seed: int) -> np.ndarray:
         """(K, H, W, 3) float32 linear radiance of vertices (V, 3) float32, without derivatives."""
         self._move(mi.Float(vertices.ravel()))
-        images = [
-            mi.render(self.scene, sensor=sensor, seed=seed + k, spp=self.samples)
-            for k, sensor in enumerate(self.sensors)
-        ]
+        with raise_causes():
+            images = [
+                mi.render(self.scene, sensor=sensor, seed=seed + k, spp=self.samples)
+                for k, sensor in enumerate(self.sensors)
+            ]
         return np.stack([np.asarray(image) for image in images])
 
     def pull_back(self, vertices: np.ndarray, gradient: np.ndarray, seed: int) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 from mitex.mesh import Mesh
 from mitex.runtime import init
 from mitex.runtime.jit import dr, mi
-from mitex.scenes.stage import mesh_shape
+from mitex.scenes.shapes import mesh_shape
 
 RAYS = 1 << 23  # traced at once
 OFFSET = 1e-4  # how far above the surface rays start, as a part of the mesh's extent

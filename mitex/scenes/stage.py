@@ -15,6 +15,7 @@ from mitex.mesh import Mesh
 from mitex.plugins import init
 from mitex.runtime.jit import dr, mi
 from mitex.scenes.cameras import Cameras
+from mitex.scenes.shapes import mesh_shape
 from mitex.sparse import csr
 
 
@@ -129,7 +130,7 @@ class Stage:
                     "name": "reflectance",
                     "background": mi.TensorXf(np.array([self.background], np.float32)),
                 },
-                "mesh": mesh_shape(mesh, mi.load_dict({"type": "diffuse", "reflectance": field})),
+                "mesh": mesh_shape(mesh, {"type": "diffuse", "reflectance": field}),
             }
         )
         self._faces = torch.tensor(mesh.faces)
@@ -196,25 +197,6 @@ class Stage:
 
 def _tensor(array: dr.ArrayBase) -> torch.Tensor:
     return cast(torch.Tensor, array.torch())
-
-
-def mesh_shape(mesh: Mesh, bsdf: mi.BSDF | None = None, smooth: bool = False) -> mi.Mesh:
-    """A Mitsuba mesh with the vertices and faces of `mesh`, without UVs.
-
-    Args:
-        mesh: the mesh.
-        bsdf: a loaded Mitsuba BSDF, or None for the default one.
-        smooth: shade with vertex normals, which Mitsuba finds and keeps up when vertices move.
-    """
-    props = mi.Properties()
-    if bsdf is not None:
-        props["bsdf"] = bsdf
-    shape = mi.Mesh(mesh.name, len(mesh.vertices), len(mesh.faces), has_vertex_normals=smooth, props=props)
-    params = mi.traverse(shape)
-    params["vertex_positions"] = mesh.vertices.ravel()
-    params["faces"] = mesh.faces.astype(np.uint32).ravel()
-    params.update()
-    return shape
 
 
 def _rays(cameras: Cameras, n: int) -> mi.Ray3f:

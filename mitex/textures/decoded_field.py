@@ -7,21 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from mitex.errors import MeshError
+from mitex.errors import ConfigError, MeshError, MitexError
 from mitex.mesh import Mesh
 from mitex.mesh.gradients import values_and_gradients
 from mitex.runtime.jit import dr, mi
-from mitex.textures.field import FieldMethods, Located
+from mitex.textures.field import Located
 from mitex.textures.interpolation import Corners, linear, smooth
 from mitex.textures.local_coordinates import BARYCENTRIC, Waves
 from mitex.textures.sine_network import SineNetwork
 from mitex.textures.triangle import TrianglePoints, edges, solve, triangle_points
-from mitex.textures.variant import for_variant, option
+from mitex.textures.variant import for_variant, option, require_variant
+from mitex.textures.vertex_rows import VertexRows
 
 INTERPOLATIONS = {"smooth": smooth, "linear": linear}
 
 
-class DecodedFieldMethods(FieldMethods):
+class DecodedField(VertexRows):
     """value(p) = g(s(p), u(p)): s is interpolated between states at the vertices of a mesh, u are local
     coordinates, g is a sine network (Cells2Pixels, section 3.2). It has detail far below the distance of
     vertices.
@@ -65,9 +66,9 @@ class DecodedFieldMethods(FieldMethods):
        - Every value is `scale * decoded + offset`. (Default: 1 and 0)
        - exposed, differentiable
 
-    The texture works on triangle meshes of LLVM variants, with one instance per mesh; on another shape, or
-    where a triangle refers to a vertex beyond the data, it is `offset`. Points of the shape are found as by
-    `vertex_field`. `mean` and `max` go over the vertices.
+    Variants: llvm ones; colours (`eval`) in rgb and mono, the rest in spectral ones, too. Others are a
+    ConfigError, and so is rendering a mesh with another number of vertices than `data` has rows. Other shapes
+    show `offset`. Points of the shape are found as by `vertex_field`. `mean` and `max` go over the vertices.
 
     Values are not linear in the data, so nothing but `gather` has their derivatives: by ordinary automatic
     differentiation to states, network, scale and offset. `eval_1_grad` differentiates exactly too, so bumps
@@ -78,13 +79,13 @@ class DecodedFieldMethods(FieldMethods):
     plugin = "decoded_field"
 
     def __init__(self, props: mi.Properties) -> None:
+        require_variant(self.plugin, dr.backend_v(mi.Float) == dr.JitBackend.LLVM, "an llvm one")
         self._read(props)
-        if dr.backend_v(mi.Float) != dr.JitBackend.LLVM:
-            raise RuntimeError(f"decoded_field: variant '{mi.variant()}' is not supported; use an llvm one")
         self.interpolation = option(props, "interpolation", "smooth")
         if self.interpolation not in INTERPOLATIONS:
-            raise RuntimeError(
-                f"decoded_field: 'interpolation' is '{self.interpolation}'; use {' or '.join(INTERPOLATIONS)}"
+            raise ConfigError(
+                f"decoded_field: 'interpolation' is '{self.interpolation}'",
+                f"use {' or '.join(INTERPOLATIONS)}",
             )
         self._read_coordinates(props)
         self._read_network(props)
@@ -96,10 +97,10 @@ class DecodedFieldMethods(FieldMethods):
         known = ("waves", *BARYCENTRIC)
         if not set(self.coordinates) <= set(known):
             names = " ".join(self.coordinates)
-            raise RuntimeError(f"decoded_field: 'coordinates' is '{names}'; use some of {', '.join(known)}")
+            raise ConfigError(f"decoded_field: 'coordinates' is '{names}'", f"use some of {', '.join(known)}")
         table = np.array(mi.TensorXf(props["waves"])) if "waves" in self.coordinates else np.empty((0, 4))
         if table.ndim != 2 or table.shape[1] != 4:
-            raise RuntimeError(f"decoded_field: 'waves' has shape {table.shape}; give one of shape (N, 4)")
+            raise ConfigError(f"decoded_field: 'waves' has shape {table.shape}", "give one of shape (N, 4)")
         self._waves = Waves(table, option(props, "amplitude", 1.0))
 
     def _read_network(self, props: mi.Properties) -> None:
@@ -109,8 +110,8 @@ class DecodedFieldMethods(FieldMethods):
         )
         try:
             self._network = SineNetwork(weights, biases, option(props, "omega", 10.0))
-        except ValueError as e:
-            raise RuntimeError(f"decoded_field: {e}") from e
+        except ConfigError as e:
+            raise _named(e) from e
 
     def _read_mesh(self, props: mi.Properties) -> None:
         """What lookups need of the mesh at rest."""
@@ -120,7 +121,7 @@ class DecodedFieldMethods(FieldMethods):
         try:
             mesh = Mesh(vertices, whole if (whole == faces).all() else faces, name="the mesh at rest")
         except MeshError as e:
-            raise RuntimeError(f"decoded_field: {e}") from e
+            raise _named(e) from e
         self._count = len(mesh.vertices)
         self._positions, self._normals = mi.Float(mesh.vertices.ravel()), mi.Float(mesh.normals.ravel())
         self._edges = mi.Float(mesh.edge_lengths.astype(np.float32))
@@ -135,7 +136,7 @@ class DecodedFieldMethods(FieldMethods):
         return self._network.outputs
 
     def traverse(self, callback: mi.TraversalCallback) -> None:
-        FieldMethods.traverse(self, callback)
+        VertexRows.traverse(self, callback)
         pairs = zip(self._network.weights, self._network.biases, strict=True)
         for k, (weight, bias) in enumerate(pairs):
             callback.put(f"weight_{k}", weight, mi.ParamFlags.Differentiable)
@@ -143,19 +144,20 @@ class DecodedFieldMethods(FieldMethods):
 
     def _check_data(self) -> None:
         if self.data.ndim != 2 or self.data.shape[0] != self._count or self.data.shape[1] == 0:
-            raise RuntimeError(
-                f"decoded_field: 'data' has shape {self.data.shape}; give one of shape ({self._count}, C)"
+            raise ConfigError(
+                f"decoded_field: 'data' has shape {self.data.shape}", f"give one of shape ({self._count}, C)"
             )
         try:
             self._network.check()
-        except ValueError as e:
-            raise RuntimeError(f"decoded_field: {e}") from e
+        except ConfigError as e:
+            raise _named(e) from e
         own = {"waves": len(self._waves.table)} | {name: count for name, (count, _) in BARYCENTRIC.items()}
         inputs = self.data.shape[1] + sum(own[name] for name in self.coordinates)
         count = self._network.inputs
         if count != inputs:
-            raise RuntimeError(
-                f"decoded_field: 'weight_0' has {count} inputs; state and coordinates are {inputs}"
+            raise ConfigError(
+                f"decoded_field: 'weight_0' has {count} inputs, but state and coordinates are {inputs}",
+                "give the network as many inputs",
             )
         self._table = self._rows_to_read()
         dr.eval(self._table)
@@ -217,6 +219,7 @@ class DecodedFieldMethods(FieldMethods):
 
     def eval_1_grad(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Vector2f:
         """Derivatives along `si.dp_du` and `si.dp_dv`."""
+        self._lookup(si, active)
         points = triangle_points(si, self._count, active)
         _, e1, e2 = edges(mi.MeshPtr(si.shape), points.index, points.active)
         located = self._at(*points)
@@ -257,7 +260,12 @@ def _mix(weights: Sequence[mi.Float], values: Sequence[Any]) -> Any:
     return sum(w * v for w, v in zip(weights, values, strict=True))
 
 
+def _named(error: MitexError) -> ConfigError:
+    """The same error, which says that it is of this plugin."""
+    return ConfigError(f"decoded_field: {error.problem}", error.remedy)
+
+
 def register() -> None:
     """Registers the texture for the current variant."""
-    cls = for_variant("DecodedField", mi.Texture, DecodedFieldMethods)
+    cls = for_variant(mi.Texture, DecodedField)
     mi.register_texture("decoded_field", lambda props: cls(props))

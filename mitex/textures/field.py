@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol, runtime_checkable
 
+from mitex.errors import ConfigError
 from mitex.runtime.jit import dr, mi
-from mitex.textures.variant import init_base, option
+from mitex.textures.variant import init_base, option, require_variant
 
 
 class Located(NamedTuple):
@@ -42,9 +43,15 @@ class Field(Protocol):
         """Values times `scale` plus `offset` of the channels (default: all), one Float each."""
         ...
 
+    def check_shape(self, shape: mi.Shape) -> None:
+        """Raises a ConfigError if the field cannot be put on a shape."""
+        ...
+
 
 class FieldMethods:
     """Members of a field's plugin class; a subclass adds `locate`, `eval_1_grad`, `_check_data` and `_rows`.
+
+    Mitsuba calls `eval` and its like, which check first whether the field fits the shapes that show it.
 
     `data` is a tensor whose last axis are the C channels; all others together are its rows, in memory order.
     """
@@ -54,11 +61,8 @@ class FieldMethods:
 
     def _read(self, props: mi.Properties) -> None:
         """Reads the properties that all fields have."""
+        require_variant(self.plugin, dr.is_jit_v(mi.Float), "an llvm or cuda one")
         init_base(mi.Texture, self, props)
-        if not dr.is_jit_v(mi.Float):
-            raise RuntimeError(
-                f"{self.plugin}: variant '{mi.variant()}' is not supported; use an llvm or cuda one"
-            )
         self.data = mi.TensorXf(props["data"])
         self.channel = option(props, "channel", 0)
         self.scale = mi.Float(props.get("scale", 1.0))
@@ -80,22 +84,29 @@ class FieldMethods:
     def _check(self) -> None:
         self._check_data()
         if not 0 <= self.channel < self.channel_count:
-            raise RuntimeError(
-                f"{self.plugin}: 'channel' is {self.channel}; use 0 to {self.channel_count - 1}"
+            raise ConfigError(
+                f"{self.plugin}: 'channel' is {self.channel}", f"use 0 to {self.channel_count - 1}"
             )
         # A virtual function call cannot evaluate what it captures.
         dr.eval(self.data)
 
     def _check_data(self) -> None:
-        """Raises a RuntimeError if the data has a wrong shape."""
+        """Raises a ConfigError if the data has a wrong shape."""
         raise NotImplementedError
 
     def _rows(self) -> mi.UInt32:
         """Rows of the data (UInt32) over which `mean` and `max` go."""
         raise NotImplementedError
 
+    def check_shape(self, shape: mi.Shape) -> None:
+        """Raises a ConfigError if the field cannot be put on a shape; this one can be put on any."""
+
     def locate(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> Located:
         raise NotImplementedError
+
+    def _lookup(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool) -> Located:
+        """`locate`, after a check of the shapes."""
+        return self.locate(si, active)
 
     def gather(self, located: Located, channels: range | None = None) -> list[mi.Float]:
         """Interpolated `scale * data + offset` of the channels (default: all), one Float each."""
@@ -112,13 +123,13 @@ class FieldMethods:
         return [dr.gather(mi.Float, self.data.array, row, located.active) for row in rows]
 
     def eval(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Color3f | mi.Color1f:
-        return self._color(self._three(self.locate(si, active)))
+        return self._color(self._three(self._lookup(si, active)))
 
     def eval_1(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Float:
-        return self.gather(self.locate(si, active), range(self.channel, self.channel + 1))[0]
+        return self.gather(self._lookup(si, active), range(self.channel, self.channel + 1))[0]
 
     def eval_3(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Color3f:
-        return self._three(self.locate(si, active))
+        return self._three(self._lookup(si, active))
 
     def mean(self) -> mi.Float:
         """Mean over the data's rows of what `eval` returns."""
@@ -149,8 +160,8 @@ class FieldMethods:
 
     def _color(self, rgb: mi.Color3f) -> mi.Color3f | mi.Color1f:
         if mi.is_spectral:
-            raise RuntimeError(
-                f"{self.plugin}: colours need an rgb or mono variant; roughness and normals work in any"
+            raise ConfigError(
+                f"{self.plugin}: colours need an rgb or mono variant", "roughness and normals work in any"
             )
         if not self.raw:
             rgb = mi.math.srgb_to_linear(dr.clip(rgb, 0, 1))

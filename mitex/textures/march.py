@@ -73,7 +73,7 @@ class DifferentiableField(RadianceField, Protocol):
         ...
 
     def parameters_changed(self) -> None:
-        """Takes over new values; RuntimeError if they cannot be used."""
+        """Takes over new values; ConfigError if they cannot be used."""
         ...
 
 

@@ -14,12 +14,12 @@ import numpy as np
 from mitex.mesh import Similarity
 from mitex.runtime.jit import dr, mi
 from mitex.textures.march import Composite, DifferentiableField, RadianceField, composite
-from mitex.textures.variant import for_variant, init_base
+from mitex.textures.variant import for_variant, init_base, require_variant
 
 CHUNK = 1 << 16  # rays that are marched at a time
 
 
-class ShellFieldMethods:
+class ShellField:
     """A radiance field somewhere in the world.
 
     Args:
@@ -85,5 +85,11 @@ class ShellFieldMethods:
 
 
 def shell_field(field: RadianceField, similarity: Similarity, turn: np.ndarray | None = None) -> mi.Volume:
-    """An `mi.Volume` of the current variant that carries a radiance field; see `ShellFieldMethods`."""
-    return for_variant("ShellField", mi.Volume, ShellFieldMethods)(field, similarity, turn)
+    """An `mi.Volume` of the current variant that carries a radiance field; see `ShellField`."""
+    require_variant("shell_field", works_in_variant(), "llvm_ad_rgb or cuda_ad_rgb")
+    return for_variant(mi.Volume, ShellField)(field, similarity, turn)
+
+
+def works_in_variant() -> bool:
+    """Whether the current variant can march through fields, whose colours are red, green and blue."""
+    return dr.is_jit_v(mi.Float) and not (mi.is_spectral or mi.is_monochromatic or mi.is_polarized)

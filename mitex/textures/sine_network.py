@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from mitex.errors import ConfigError
 from mitex.runtime.jit import dr, mi
 
 
@@ -18,7 +19,7 @@ class SineNetwork:
         omega: the factor.
 
     Raises:
-        ValueError: the shapes do not fit each other.
+        ConfigError: the shapes do not fit each other.
     """
 
     def __init__(
@@ -38,19 +39,24 @@ class SineNetwork:
         return self.weights[-1].shape[0]
 
     def check(self) -> None:
-        """Raises a ValueError if a layer does not fit the one before or its bias; evaluates the weights."""
+        """Raises a ConfigError if a layer does not fit the one before or its bias; evaluates the weights."""
         if not self.weights or len(self.weights) != len(self.biases):
-            raise ValueError(f"{len(self.weights)} weights and {len(self.biases)} biases; give pairs of both")
+            raise ConfigError(
+                f"{len(self.weights)} weights and {len(self.biases)} biases", "give pairs of both"
+            )
         for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             if weight.ndim != 2 or 0 in weight.shape:
-                raise ValueError(
-                    f"'weight_{k}' has shape {weight.shape}; give one of shape (outputs, inputs)"
+                raise ConfigError(
+                    f"'weight_{k}' has shape {weight.shape}", "give one of shape (outputs, inputs)"
                 )
             if bias.shape != weight.shape[:1]:
-                raise ValueError(f"'bias_{k}' has shape {bias.shape}; give {weight.shape[:1]}")
+                raise ConfigError(f"'bias_{k}' has shape {bias.shape}", f"give {weight.shape[:1]}")
             if k and weight.shape[1] != self.weights[k - 1].shape[0]:
                 width = self.weights[k - 1].shape[0]
-                raise ValueError(f"'weight_{k}' has {weight.shape[1]} inputs; the layer before gives {width}")
+                raise ConfigError(
+                    f"'weight_{k}' has {weight.shape[1]} inputs, but the layer before gives {width}",
+                    "give it as many inputs",
+                )
         dr.eval(self.weights, self.biases)
 
     def __call__(self, values: Sequence[mi.Float]) -> list[mi.Float]:

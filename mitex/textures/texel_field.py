@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from mitex.errors import ConfigError
 from mitex.runtime.jit import dr, mi
 from mitex.textures.field import FieldMethods, Located
 from mitex.textures.variant import for_variant, option
@@ -14,7 +15,7 @@ MAX_CHART = 2.0**24  # beyond, float32 skips integers
 INSET = 1e-6  # [texel] see `_Footprint.around`
 
 
-class TexelFieldMethods(FieldMethods):
+class TexelField(FieldMethods):
     """Values on the texels of a UV layout, filtered within charts.
 
     .. pluginparameters::
@@ -46,6 +47,8 @@ class TexelFieldMethods(FieldMethods):
     point's own chart; charts that are at least 1.5 texels apart, with padding between them or without, ensure
     it (1 texel if their borders run along the axes).
 
+    Variants: as `vertex_field`.
+
     Gradients flow to `data` with the transposed weights, and to `si.uv` where it is attached. Other Mitex
     code reads all channels: it is a `mitex.textures.field.Field`. `mean` and `max` go over the used texels.
     """
@@ -57,11 +60,13 @@ class TexelFieldMethods(FieldMethods):
         self.charts = mi.TensorXf(props["charts"]) if "charts" in props else None
         self.filter = option(props, "filter", "bilinear")
         if self.filter not in FILTERS:
-            raise RuntimeError(f"texel_field: 'filter' is '{self.filter}'; use {' or '.join(FILTERS)}")
+            raise ConfigError(f"texel_field: 'filter' is '{self.filter}'", f"use {' or '.join(FILTERS)}")
         self._chart = self._charts()
         self._check()
         if not dr.all(dr.isfinite(self.data.array)):
-            raise RuntimeError("texel_field: 'data' has values that are not finite; unused texels may hold 0")
+            raise ConfigError(
+                "texel_field: 'data' has values that are not finite", "unused texels may hold 0"
+            )
 
     def traverse(self, callback: mi.TraversalCallback) -> None:
         FieldMethods.traverse(self, callback)
@@ -76,10 +81,11 @@ class TexelFieldMethods(FieldMethods):
     def _check_data(self) -> None:
         shape = self.data.shape
         if len(shape) != 3 or 0 in shape:
-            raise RuntimeError(f"texel_field: 'data' has shape {shape}; give one of shape (H, W, C)")
+            raise ConfigError(f"texel_field: 'data' has shape {shape}", "give one of shape (H, W, C)")
         if self.charts is not None and self.charts.shape != shape[:2]:
-            raise RuntimeError(
-                f"texel_field: 'charts' has shape {self.charts.shape}; give {shape[:2]}, one number per texel"
+            raise ConfigError(
+                f"texel_field: 'charts' has shape {self.charts.shape}",
+                f"give {shape[:2]}, one number per texel",
             )
 
     def _charts(self) -> mi.Int32 | None:
@@ -88,9 +94,14 @@ class TexelFieldMethods(FieldMethods):
             return None
         number = dr.detach(self.charts.array)
         if not dr.all((number >= -1) & (number < MAX_CHART) & (number == dr.round(number))):
-            raise RuntimeError("texel_field: 'charts' holds numbers that are no integers from 0 on, or -1")
+            raise ConfigError(
+                "texel_field: 'charts' holds numbers that are no integers from 0 on, or -1",
+                "number the charts from 0 on, and give unused texels -1",
+            )
         if not dr.any(number >= 0):
-            raise RuntimeError("texel_field: 'charts' is -1 everywhere; no texel is used")
+            raise ConfigError(
+                "texel_field: 'charts' is -1 everywhere, so no texel is used", "number the charts from 0 on"
+            )
         chart = mi.Int32(number)
         dr.eval(chart)
         return chart
@@ -209,5 +220,5 @@ def _between(t: mi.Float, size: int) -> tuple[mi.UInt32, mi.UInt32, mi.Float]:
 
 def register() -> None:
     """Registers the texture for the current variant."""
-    cls = for_variant("TexelField", mi.Texture, TexelFieldMethods)
+    cls = for_variant(mi.Texture, TexelField)
     mi.register_texture("texel_field", lambda props: cls(props))

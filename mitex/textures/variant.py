@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import Any, TypeVar, cast
 
-if TYPE_CHECKING:
-    from mitex.runtime.jit import mi
+from mitex.errors import ConfigError
+from mitex.runtime.jit import mi
 
 B = TypeVar("B")
 T = TypeVar("T", bool, int, float, str)
 
 
-def for_variant(name: str, base: type[B], methods: type) -> Callable[..., B]:
-    """A class called `name` with Mitsuba's `base` of the current variant and the members of `methods`.
+def for_variant(base: type[B], methods: type) -> Callable[..., B]:
+    """A class with Mitsuba's `base` of the current variant, and the name and members of `methods`.
 
     Every variant has its own base classes, and they allow neither a second base nor another metaclass, so the
     members are copied, inherited ones too. They call the base's constructor through `init_base`, not through
@@ -22,7 +22,25 @@ def for_variant(name: str, base: type[B], methods: type) -> Callable[..., B]:
     members: dict[str, Any] = {}
     for cls in reversed(methods.__mro__[:-1]):  # without `object`
         members |= {key: value for key, value in vars(cls).items() if key not in ("__dict__", "__weakref__")}
-    return cast(Callable[..., B], type(name, (base,), members))
+    return cast(Callable[..., B], type(methods.__name__, (base,), members))
+
+
+def require_variant(plugin: str, works: bool, variants: str) -> None:
+    """Refuses a variant.
+
+    Args:
+        plugin: its type.
+        works: whether it works in the current variant.
+        variants: those in which it does, in words.
+
+    Raises:
+        ConfigError: it does not.
+    """
+    if not works:
+        raise ConfigError(
+            f"{plugin}: it does not work in the variant '{mi.variant()}'",
+            f"use {variants}: mi.set_variant('llvm_ad_rgb') before the scene is loaded",
+        )
 
 
 def option(props: mi.Properties, name: str, default: T) -> T:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from mitex.errors import ConfigError
 from mitex.runtime.jit import dr, mi
-from mitex.textures.field import FieldMethods, Located
+from mitex.textures.field import Located
 from mitex.textures.triangle import combine, edges, triangle_points
 from mitex.textures.variant import for_variant
+from mitex.textures.vertex_rows import VertexRows
 
 
-class VertexFieldMethods(FieldMethods):
+class VertexField(VertexRows):
     """Values at the vertices of a mesh, interpolated linearly over each triangle.
 
     .. pluginparameters::
@@ -33,8 +35,11 @@ class VertexFieldMethods(FieldMethods):
          `eval_3` (roughness, normal maps, bump maps) and the `feature` integrator never convert. (Default:
          false)
 
-    The texture works on triangle meshes of JIT variants, with one instance per mesh; on another shape, or
-    where a triangle refers to a vertex beyond the data, it is `offset`. `eval` needs an rgb or mono variant.
+    Variants: llvm and cuda ones; colours (`eval`) in rgb and mono, the rest in spectral ones, too. Others are
+    a ConfigError.
+
+    It is put on triangle meshes, with one instance per mesh; other shapes show `offset`. Rendering a mesh
+    with another number of vertices than `data` has rows is a ConfigError.
 
     Barycentric weights: a mesh without UVs gives them exactly, in `si.uv`; with UVs they are solved from
     `si.p`, which is in world space, so such a mesh must not be placed through an `instance`.
@@ -52,7 +57,7 @@ class VertexFieldMethods(FieldMethods):
 
     def _check_data(self) -> None:
         if self.data.ndim != 2 or 0 in self.data.shape:
-            raise RuntimeError(f"vertex_field: 'data' has shape {self.data.shape}; give one of shape (V, C)")
+            raise ConfigError(f"vertex_field: 'data' has shape {self.data.shape}", "give one of shape (V, C)")
 
     def _rows(self) -> mi.UInt32:
         return dr.arange(mi.UInt32, self.data.shape[0])
@@ -67,7 +72,7 @@ class VertexFieldMethods(FieldMethods):
         On a mesh without UVs those two are an orthonormal frame and `si.uv` has other units, so differences
         of vertex values over `si.uv` would be wrong.
         """
-        located = self.locate(si, active)
+        located = self._lookup(si, active)
         _, e1, e2 = edges(mi.MeshPtr(si.shape), located.rows, located.active)
         corner = self._row_values(located, self.channel)
         a, b = combine(e1, e2, corner[1] - corner[0], corner[2] - corner[0])
@@ -80,5 +85,5 @@ class VertexFieldMethods(FieldMethods):
 
 def register() -> None:
     """Registers the texture for the current variant."""
-    cls = for_variant("VertexField", mi.Texture, VertexFieldMethods)
+    cls = for_variant(mi.Texture, VertexField)
     mi.register_texture("vertex_field", lambda props: cls(props))

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 import torch
 
+from mitex.errors import ConfigError
+from mitex.geometry.tangents import split_at_seams
 from mitex.mesh import Mesh, icosphere
 from mitex.scenes import Cameras, random_views
-from mitex.scenes.stage import mesh_shape
+from mitex.scenes.shapes import mesh_shape
 from tests.scenes.helpers import front_camera, gradient
 from tests.scenes.reference import images, matrix
 
@@ -62,14 +64,9 @@ def test_picture_equals_the_slow_lookup(mi, mesh, data, kind: str, antialias: in
 
 def test_uvs_do_not_matter(mi, mesh, data, rng):
     views = cameras()
-    bsdf = mi.load_dict({"type": "diffuse", "reflectance": field(mi, data)})
-    props = mi.Properties()
-    props["bsdf"] = bsdf
-    shape = mi.Mesh("uv", len(mesh.vertices), len(mesh.faces), props, has_vertex_texcoords=True)
-    params = mi.traverse(shape)
-    params["vertex_positions"], params["faces"] = mesh.vertices.ravel(), mesh.faces.astype(np.uint32).ravel()
-    params["vertex_texcoords"] = rng.uniform(0, 1, 2 * len(mesh.vertices)).astype(np.float32)
-    params.update()
+    split = split_at_seams(mesh, rng.uniform(0, 1, (len(mesh.faces), 3, 2)))
+    bsdf = {"type": "diffuse", "reflectance": field(mi, data[split.source])}
+    shape = mesh_shape(mesh, bsdf, split=split)
     integrator = {"type": "feature", "name": "reflectance"}
     world = mi.load_dict(
         {"type": "scene", "mesh": shape, "sensor": views.sensors()[0], "integrator": integrator}
@@ -270,7 +267,7 @@ def test_bad_renders_are_refused(mi, mesh, data, integrator: dict, options: dict
         integrator = integrator | {"background": mi.TensorXf(np.zeros((1, 2), np.float32))}
     bsdf = mi.load_dict({"type": "diffuse", "reflectance": field(mi, data)})
     world = scene(mi, mesh, cameras(), integrator, bsdf)
-    with pytest.raises(RuntimeError, match=problem):
+    with pytest.raises(ConfigError, match=problem):
         world.integrator().render(world, **options)
 
 

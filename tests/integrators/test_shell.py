@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from mitex.colour import srgb_to_linear
+from mitex.errors import ConfigError
 from mitex.mesh import Similarity
 from mitex.plugins import init
 from mitex.runtime.jit import dr, mi
@@ -210,3 +211,16 @@ def test_one_mask_stands_for_all_rays():
     ray = mi.Ray3f(mi.Point3f([0.0, 0.1, 0.9], 0, -2), mi.Vector3f([0.0, 0.0, 0.0], 0, 1))
     pixels = field.march(ray, dr.full(mi.Float, 0.5, 3), mi.Bool(True))
     np.testing.assert_allclose(np.array(pixels.transmittance), [0, 0, 1], atol=1e-3)
+
+
+@pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_mono", "llvm_ad_spectral"])
+def test_other_variants_are_refused_in_words(variant):
+    before = mi.variant()
+    try:
+        mi.set_variant(variant)
+        with pytest.raises(RuntimeError, match=f"'{variant}'; use llvm_ad_rgb or cuda_ad_rgb"):
+            mi.load_dict({"type": "shell"})
+        with pytest.raises(ConfigError, match="shell_field: it does not work"):
+            shell_field(object(), Similarity(np.zeros(3), 1.0))  # pyright: ignore[reportArgumentType]
+    finally:
+        mi.set_variant(before)

@@ -1,5 +1,6 @@
 """The example scripts in scenes/ run and make their pictures."""
 
+import ast
 import importlib.util
 from pathlib import Path
 from types import ModuleType
@@ -9,6 +10,7 @@ import pytest
 
 from mitex.exemplar import Exemplar
 from mitex.images import read_image
+from mitex.mesh import icosphere
 
 pytestmark = pytest.mark.usefixtures("own_cache")
 SCRIPTS = Path(__file__).parents[2] / "scenes"
@@ -56,6 +58,38 @@ def test_texel_field_script(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     warm = traced[vase][:, 0] > 1.5 * traced[vase][:, 2]
     cool = traced[vase][:, 2] > 1.5 * traced[vase][:, 0]
     assert warm.mean() > 0.15 and cool.mean() > 0.1
+
+
+@pytest.mark.slow
+def test_decoded_field_script(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A ball with heights that differ; most of the time goes into one kernel."""
+    script = load("decoded_field")
+    monkeypatch.setattr(script, "embedded", lambda _name: icosphere(6))
+    script.main(str(tmp_path / "a.png"), steps=20, resolution=48, spp=2)
+    picture = read_image(tmp_path / "a.png")
+    assert picture.shape == (48, 96, 3)
+    height = picture[:, 48:]
+    ball = height.max(axis=2) > 0
+    assert 0.05 < ball.mean() < 0.9 and np.ptp(height[ball]) > 0.02
+
+
+@pytest.mark.slow
+def test_shell_texture_script(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The orange sponge on the left, darker than its surroundings."""
+    script = load("shell_texture")
+    monkeypatch.setattr(script, "embedded", lambda _name: icosphere(3))
+    script.main(str(tmp_path / "a.png"), resolution=24, spp=1)
+    sponge = read_image(tmp_path / "a.png")[6:16, 3:14].reshape(-1, 3).mean(0)
+    assert sponge[0] > 1.3 * sponge[2]
+
+
+@pytest.mark.parametrize("path", sorted(SCRIPTS.glob("*.py")), ids=lambda path: path.stem)
+def test_scripts_need_no_arguments(path: Path):
+    """Their main() has a default for every parameter."""
+    tree = ast.parse(path.read_text())
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef) and node.name == "main":
+            assert len(node.args.args) == len(node.args.defaults)
 
 
 def test_surface_synthesis_script(mi, tmp_path: Path):

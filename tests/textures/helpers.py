@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from mitex.mesh import icosphere
-from mitex.scenes.stage import mesh_shape
+from mitex.geometry.tangents import Split
+from mitex.mesh import Mesh, icosphere
+from mitex.scenes.shapes import mesh_shape
 
 QUAD = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32)
 FACES = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
@@ -11,16 +12,10 @@ FACES = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
 
 def quad(mi, bsdf: dict, uv: np.ndarray | None = None):
     """A quad in the xy plane that faces +z."""
-    props = mi.Properties()
-    props["bsdf"] = mi.load_dict(bsdf)
-    shape = mi.Mesh("quad", 4, 2, props, has_vertex_texcoords=uv is not None)
-    params = mi.traverse(shape)
-    params["vertex_positions"] = QUAD.ravel()
-    params["faces"] = FACES.ravel()
+    mesh, split = Mesh(QUAD, FACES, name="quad"), None
     if uv is not None:
-        params["vertex_texcoords"] = uv.ravel()
-    params.update()
-    return shape
+        split = Split(np.arange(4), mesh.faces, mesh.normals, uv, tangents=np.zeros((4, 4)))
+    return mesh_shape(mesh, bsdf, split=split)
 
 
 def radiance(mi, shape, x: np.ndarray, y: np.ndarray, light=(0.0, 0.0, -1.0)) -> np.ndarray:
@@ -52,6 +47,6 @@ def sphere_picture(mi, bsdf: dict) -> np.ndarray:
     film = {"type": "hdrfilm", "width": 16, "height": 16}
     sensor = {"type": "perspective", "fov": 28, "to_world": to_world, "film": film}
     light = {"type": "point", "position": [3, 4, 5], "intensity": 40.0}
-    ball = mesh_shape(icosphere(4), mi.load_dict(bsdf))
+    ball = mesh_shape(icosphere(4), bsdf)
     scene = {"type": "scene", "integrator": {"type": "path"}, "sensor": sensor, "light": light, "ball": ball}
     return np.array(mi.render(mi.load_dict(scene), spp=4))

@@ -7,6 +7,7 @@ from torch import nn
 
 from mitex.bridge import render
 from mitex.colour import srgb_to_linear
+from mitex.errors import ConfigError
 from mitex.mesh import Mesh, icosphere, scattered_sphere
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.decoder.decoder import OFFSET, Decoder
@@ -15,7 +16,8 @@ from mitex.methods.nca.field import fields
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.views import render_views
 from mitex.scenes import random_views
-from mitex.scenes.stage import Stage, mesh_shape
+from mitex.scenes.shapes import mesh_shape
+from mitex.scenes.stage import Stage
 from mitex.textures.interpolation import Kind
 from tests.scenes.helpers import gradient
 from tests.textures.helpers import FACES, QUAD, interaction, quad, radiance, sphere_picture
@@ -428,8 +430,8 @@ def tensor(*shape: int, value: float = 0.0):
         ({"data": tensor(3, 3)}, r"'data' has shape \(3, 3\); give one of shape \(4, C\)"),
         ({"data": tensor(4, 0)}, "'data' has shape"),
         ({"data": tensor(4)}, "'data' has shape"),
-        ({"data": tensor(4, 2)}, "3 inputs; state and coordinates are 2"),
-        ({"coordinates": "polynomials"}, "3 inputs; state and coordinates are 5"),
+        ({"data": tensor(4, 2)}, "3 inputs, but state and coordinates are 2"),
+        ({"coordinates": "polynomials"}, "3 inputs, but state and coordinates are 5"),
         ({"coordinates": "waves"}, "waves"),
         ({"coordinates": "waves", "waves": tensor(2, 3)}, r"'waves' has shape \(2, 3\)"),
         ({"coordinates": "wave"}, "'wave'; use some of waves, barycentrics, polynomials"),
@@ -446,7 +448,7 @@ def tensor(*shape: int, value: float = 0.0):
         ({"weight_0": tensor(3)}, r"'weight_0' has shape \(3,\)"),
         ({"weight_0": tensor(0, 3)}, r"'weight_0' has shape \(0, 3\)"),
         ({"bias_0": tensor(2)}, r"'bias_0' has shape \(2,\); give \(3,\)"),
-        ({"weight_1": tensor(3, 4), "bias_1": tensor(3)}, "has 4 inputs; the layer before gives 3"),
+        ({"weight_1": tensor(3, 4), "bias_1": tensor(3)}, "has 4 inputs, but the layer before gives 3"),
     ],
 )
 def test_bad_properties_are_refused(mi, options: dict, problem: str):
@@ -460,7 +462,7 @@ def test_bad_properties_are_refused(mi, options: dict, problem: str):
 def test_bad_updates_are_refused(mi, name: str, shape: tuple[int, ...]):
     params = mi.traverse(mi.load_dict(constant(mi, [0.0] * 3)))
     params[name] = mi.TensorXf(np.zeros(shape, np.float32))
-    with pytest.raises(RuntimeError, match=name):
+    with pytest.raises(ConfigError, match=name):
         params.update()
 
 

@@ -8,6 +8,7 @@ import torch
 
 from mitex.bridge import render
 from mitex.colour import srgb_to_linear
+from mitex.errors import ConfigError
 from tests.textures.helpers import QUAD, quad, radiance, sphere_picture
 
 UNIT = (QUAD[:, :2] + 1) / 2  # uv of the quad whose map covers it once
@@ -342,7 +343,7 @@ def test_update_through_traverse(mi, points):
     for name, bad in (("data", (4, 12)), ("data", (4, 5, 3)), ("charts", (4, 4, 1))):
         good = mi.TensorXf(params[key + name])
         params[key + name] = mi.TensorXf(np.zeros(bad, np.float32))
-        with pytest.raises(RuntimeError, match="shape"):
+        with pytest.raises(ConfigError, match="shape"):
             params.update()
         params[key + name] = good
         params.update()
@@ -403,7 +404,7 @@ def test_other_variants(mi, points):
         mi.set_variant("llvm_ad_spectral")
         colour = mi.load_dict(field(mi, np.zeros((4, 4, 3))))
         assert colour.eval_1(at(mi, np.array([(0.2, 0.3)])))[0] == 0
-        with pytest.raises(RuntimeError, match="texel_field: colours need an rgb or mono"):
+        with pytest.raises(ConfigError, match="texel_field: colours need an rgb or mono"):
             colour.eval(at(mi, np.array([(0.2, 0.3)])))
         mi.set_variant("scalar_rgb")
         with pytest.raises(RuntimeError, match="llvm or cuda"):

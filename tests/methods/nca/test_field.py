@@ -8,7 +8,7 @@ from mitex.mesh import icosphere
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.look import Look
-from mitex.scenes.stage import mesh_shape
+from mitex.scenes.shapes import mesh_shape
 from tests.textures.helpers import interaction
 
 MAPS = ("albedo", "height", "roughness")

@@ -10,7 +10,7 @@ import numpy as np
 from mitex.mesh import Mesh, Similarity, icosphere
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.runtime import init
-from mitex.scenes.stage import mesh_shape
+from mitex.scenes.shapes import mesh_shape
 
 FOV = 40.0
 DISTANCE = 2.2

@@ -24,7 +24,7 @@ from mitex.mesh import Mesh, subdivide_midpoint
 from mitex.methods.baselines.displacement import METHOD
 from mitex.runtime import init
 from mitex.runtime.jit import mi
-from mitex.scenes.stage import mesh_shape
+from mitex.scenes.shapes import mesh_shape
 from mitex.training import model_file
 
 ATLAS = 1024  # resolution that the target's charts are packed for

@@ -19,7 +19,7 @@ from mitex.mesh import Mesh
 from mitex.methods.nerf.field.nearest import NearestVertices
 from mitex.runtime import init
 from mitex.runtime.jit import dr, mi
-from mitex.scenes.stage import mesh_shape
+from mitex.scenes.shapes import mesh_shape
 
 MISSED = 10.0  # the distance of points without a foot
 BACK = 1e-5  # of the mesh's extent: rays start so far behind the point, which may lie on the surface

@@ -11,7 +11,7 @@ from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.field.tensors import channels, rows
 from mitex.runtime import init
 from mitex.runtime.jit import mi
-from mitex.scenes.stage import mesh_shape
+from mitex.scenes.shapes import mesh_shape
 
 
 @dataclass(frozen=True, eq=False)

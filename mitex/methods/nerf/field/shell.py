@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from scipy import ndimage
 
+from mitex.errors import ConfigError
 from mitex.methods.nerf.field.decoder import HIGHEST, Decoder
 from mitex.methods.nerf.field.encoding import Encoding
 from mitex.methods.nerf.field.lighting import shade, to_display
@@ -172,12 +173,12 @@ class Shell:
         """Takes over new values of the parameters; cells of the mask that were empty stay empty.
 
         Raises:
-            RuntimeError: a parameter has another shape than before.
+            ConfigError: a parameter has another shape than before.
         """
         for name, value in self.parameters().items():
             if dr.shape(value) != self._shapes[name]:
-                raise RuntimeError(
-                    f"shell_field: '{name}' has shape {dr.shape(value)}; give {self._shapes[name]}"
+                raise ConfigError(
+                    f"shell_field: '{name}' has shape {dr.shape(value)}", f"give {self._shapes[name]}"
                 )
         self.decoder.pack()
 

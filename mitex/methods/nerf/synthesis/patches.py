@@ -22,7 +22,7 @@ from mitex.mesh.topology import mesh_edges
 from mitex.methods.nerf.synthesis.matching import HORIZONTAL, VERTICAL
 from mitex.runtime import init
 from mitex.runtime.jit import dr, mi
-from mitex.scenes.stage import mesh_shape
+from mitex.scenes.shapes import mesh_shape
 
 SIZE = 128  # side of a patch [texels]
 PATTERN_RATE = 1 / 8  # gap between texels [mean edges of the base shape]

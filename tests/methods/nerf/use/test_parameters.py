@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 
+from mitex.errors import ConfigError
 from mitex.mesh import Similarity, icosphere
 from mitex.methods.nerf import NerfTexture
 from mitex.methods.nerf.field.networks import LAYERS
@@ -167,5 +168,5 @@ def test_values_of_another_shape_are_refused():
     scene = scene_of(applied())
     params, key = parameter(scene, "weights.density.0")
     params[key] = mi.TensorXf(np.zeros((3, 3), np.float32))
-    with pytest.raises(RuntimeError, match=r"weights\.density\.0"):
+    with pytest.raises(ConfigError, match=r"weights\.density\.0"):
         params.update()
