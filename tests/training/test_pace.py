@@ -31,7 +31,9 @@ def errors(*how) -> list[float]:
         now += seconds(step - 1)
         pace.mark(now, step)
         truth = sum(map(seconds, range(step, STEPS)))
-        off.append(abs(pace.left(step) / truth - 1))
+        left = pace.left(step)
+        assert left is not None
+        off.append(abs(left / truth - 1))
     return off[2:]
 
 

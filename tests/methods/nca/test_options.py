@@ -1,6 +1,7 @@
 """Every key of the config does what it says: each check fails where its key is ignored."""
 
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 import pytest
@@ -188,8 +189,7 @@ def normals_that_follow_from_heights(build):
         ("flat", 0, None),
         ("even", 1, None),
     ):
-        settings = build(f"surfaces={surface}", f"relief_weight={weight}").config
-        task = NcaTask(settings, exemplar)
+        task: Any = NcaTask(build(f"surfaces={surface}", f"relief_weight={weight}").config, exemplar)
         assert (task.relief is None) == (weight == 0)
         task.relief = task.relief and (lambda views, _: views.new_tensor(0.25))
         assert _loss(task)[1].get("relief") == expected

@@ -74,8 +74,8 @@ def test_azimuth_turns_what_a_cell_perceives_and_not_what_is_seen():
     assert torch.allclose(blocks[0][:, [0, 1, 4]], blocks[1][:, [0, 1, 4]], atol=1e-4)
     assert torch.allclose(blocks[0][:, 3], -blocks[1][:, 2], atol=1e-4)
     plain = _look(None)
-    pictures = [plane.whole(plain, state, 24) for plane in (front, side)]
-    assert torch.allclose(*pictures, atol=1e-4)
+    one, other = (plane.whole(plain, state, 24) for plane in (front, side))
+    assert torch.allclose(one, other, atol=1e-4)
 
 
 def test_gradients_reach_state_and_decoder():

@@ -11,6 +11,7 @@ from mitex.errors import CheckpointError
 from mitex.exemplar import Exemplar
 from mitex.mesh import icosphere
 from mitex.methods.nca import task as training
+from mitex.methods.nca.surfaces import TrainingSphere
 from mitex.methods.nca.task import NcaTask
 from mitex.runtime import threads
 from mitex.training import train
@@ -34,6 +35,10 @@ def exemplar():
 @pytest.fixture(scope="module")
 def task(exemplar):
     return NcaTask(config(), exemplar)
+
+
+def _spheres(task) -> list[TrainingSphere]:
+    return [surface for surface in task.surfaces if isinstance(surface, TrainingSphere)]
 
 
 def _fresh(task):
@@ -65,7 +70,7 @@ def test_a_step_evolves_a_state_of_the_pool(task):
 def test_states_grow_on_both_spheres_in_turns(exemplar):
     """Even ones of the pool on the icosphere, the others on scattered vertices."""
     task = NcaTask(config("surfaces=even,uneven"), exemplar)
-    even, uneven = task.surfaces
+    even, uneven = _spheres(task)
     assert np.array_equal(even.mesh.vertices, icosphere(8).vertices)
     assert len(uneven.mesh.vertices) == 642 and uneven.mesh.edges.indptr[-1] == even.mesh.edges.indptr[-1]
     assert [task.surface(k) for k in range(4)] == [even, uneven, even, uneven]
@@ -128,7 +133,7 @@ def test_loss_is_the_mean_over_the_zooms(exemplar):
     generator = torch.Generator().manual_seed(0)
     torch.randint(4, (), generator=generator)
     steps = int(torch.randint(2, 5, (), generator=generator))
-    sphere, state = task.surfaces[0], _grow(task, torch.zeros(1, 642, 16), steps, generator)[0]
+    (sphere,), state = _spheres(task), _grow(task, torch.zeros(1, 642, 16), steps, generator)[0]
     means = []
     for size in (128, 256, 512):
         cameras = task.cameras(sphere, size, generator)
@@ -210,7 +215,7 @@ def test_a_larger_exemplar_is_seen_closer(task):
 @pytest.mark.parametrize("kind", ["even", "uneven"])
 def test_every_pixel_of_a_patch_is_surface(exemplar, kind, size):
     """Also of the widest patches."""
-    (sphere,) = NcaTask(config(f"surfaces={kind}"), exemplar).surfaces
+    (sphere,) = _spheres(NcaTask(config(f"surfaces={kind}"), exemplar))
     task = NcaTask(config("view_count=30"), exemplar)
     cameras = task.cameras(sphere, size, torch.Generator().manual_seed(0))
     assert (sphere.stage.visibility(cameras).coverage == 1).all()
