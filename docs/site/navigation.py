@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from fnmatch import fnmatchcase
-
 from sphinx.application import Sphinx
+from sphinx.util.matching import patfilter
 
-# Group -> its pages as patterns. A page belongs to the first pattern that it matches.
+# Group -> its pages as patterns, whose `*` ends at a slash. A page belongs to the first that it matches.
 GROUPS = {
     "Tutorials": ["docs/tutorials/texture-a-mesh", "docs/tutorials/*"],
     "Methods": ["docs/nca", "docs/surface", "docs/geometric", "docs/nerf"],
-    "Guides": ["docs/blender", "docs/plugins", "docs/embedding", "docs/settings", "docs/runs", "docs/times"],
+    "Guides": [
+        *(f"docs/{name}" for name in ("blender", "plugins", "embedding", "settings", "runs", "times")),
+        "docs/*",
+    ],
     "Reference": ["docs/reference/mitex", "docs/reference/*"],
     "Results": ["docs/results/*"],
     "Developers": ["docs/developers/*", "CONTRIBUTING", "CHANGELOG"],
@@ -22,8 +24,8 @@ def groups(pages: set[str], root: str) -> dict[str, list[str]]:
     """The pages of each group in order, each page once; the root is in none."""
     left, grouped = sorted(pages - {root}), {}
     for name, patterns in GROUPS.items():
-        grouped[name] = [page for pattern in patterns for page in left if fnmatchcase(page, pattern)]
-        grouped[name] = list(dict.fromkeys(grouped[name]))
+        matches = [page for pattern in patterns for page in patfilter(left, pattern)]
+        grouped[name] = list(dict.fromkeys(matches))
         left = [page for page in left if page not in grouped[name]]
     return {name: members for name, members in grouped.items() if members}
 
