@@ -89,6 +89,12 @@ def test_the_command_is_there(installed: Path, tmp_path: Path):
     assert run_installed(installed, tmp_path, "from mitex.cli import main; print(callable(main))") == "True"
 
 
+def test_the_citation_is_of_this_version():
+    declared = re.search(r'^__version__ = "(.*)"', (ROOT / "mitex" / "__init__.py").read_text(), re.MULTILINE)
+    cited = re.search(r"^version: (.*)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
+    assert declared and cited and declared[1] == cited[1]
+
+
 def test_pins_agree_with_the_declared_ranges():
     pins = (ROOT / "constraints.txt").read_text().split()
     assert pins == ["torch==2.13.0"]

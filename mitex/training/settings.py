@@ -6,7 +6,7 @@ import typing
 from collections.abc import Sequence
 from dataclasses import Field, dataclass, field, fields
 from pathlib import Path
-from typing import Any, Literal, TypedDict, get_args, get_origin
+from typing import Any, Literal, NamedTuple, TypedDict, get_args, get_origin
 
 from mitex.errors import ConfigError
 from mitex.training import values
@@ -84,19 +84,42 @@ def bounds(config: type[FitConfig], one: Field) -> tuple[float | None, float | N
     return _metadata(config, one)["range"]
 
 
+class Row(NamedTuple):
+    """A key of a config as people read it: name, value, what it can be ("" for anything), and meaning."""
+
+    name: str
+    value: str
+    allowed: str
+    meaning: str
+
+
+def rows(config: FitConfig) -> list[Row]:
+    """Every key of a config, in the order of its declaration."""
+    kinds = typing.get_type_hints(type(config))
+    return [
+        Row(
+            one.name,
+            _written(getattr(config, one.name)),
+            _allowed(kinds[one.name], *bounds(type(config), one)),
+            meaning(type(config), one),
+        )
+        for one in fields(config)
+    ]
+
+
 def table(config: FitConfig) -> str:
     """The text of `--settings`: a line for each key, with its value in this config, its range and meaning."""
-    rows = []
-    kinds = typing.get_type_hints(type(config))
-    for one in fields(config):
-        value = getattr(config, one.name)
-        text = ",".join(map(str, value)) if isinstance(value, tuple) else str(value).lower()
-        allowed = _allowed(kinds[one.name], *bounds(type(config), one))
-        rows.append((f"{one.name} = {text}", allowed, meaning(type(config), one)))
-    width = min(max(len(row[0]) for row in rows), 30)
+    lines = [(f"{row.name} = {row.value}", row) for row in rows(config)]
+    width = min(max(len(setting) for setting, _ in lines), 30)
     return "\n".join(
-        f"{setting:{width}}  {text}{f' ({allowed})' if allowed else ''}" for setting, allowed, text in rows
+        f"{setting:{width}}  {row.meaning}{f' ({row.allowed})' if row.allowed else ''}"
+        for setting, row in lines
     )
+
+
+def _written(value: Any) -> str:
+    """A value as `--set` takes it."""
+    return ",".join(map(str, value)) if isinstance(value, tuple) else str(value).lower()
 
 
 def _metadata(config: type, one: Field) -> Any:

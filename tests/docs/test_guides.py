@@ -1,0 +1,67 @@
+"""The guides: one outline for all methods, short, with pictures that exist, described and attributed."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from mitex.methods.registry import PACKAGES, methods
+
+DOCS = Path(__file__).parents[2] / "docs"
+OUTLINE = [
+    "What it is for",
+    "Three commands",
+    "What comes out",
+    "The five settings that matter",
+    "When to use another method",
+    "Limits",
+]
+MOST_WORDS = 900
+METHODS = [
+    name
+    for name, method in methods().items()
+    if method.presets.startswith(PACKAGES[0]) and not method.baseline
+]
+PICTURE = re.compile(r"!\[(.*?)\]\((.*?)\)")
+NAMED_TEXTURE = re.compile(r"\b[A-Z][\w-]*_\d{3}\b")  # as 3dtextures.me names them
+PAGES = [DOCS.parent / "README.md", *sorted(DOCS.rglob("*.md"))]
+
+
+def read(page: Path) -> str:
+    return page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", METHODS)
+class TestGuide:
+    def test_its_outline_is_that_of_all(self, name):
+        assert re.findall(r"^## (.*)$", read(DOCS / f"{name}.md"), re.MULTILINE) == OUTLINE
+
+    def test_it_is_short(self, name):
+        assert len(read(DOCS / f"{name}.md").split()) <= MOST_WORDS
+
+    def test_it_begins_with_a_picture_and_names_five_settings(self, name):
+        _, purpose, *_, settings, _, _ = re.split(r"^## ", read(DOCS / f"{name}.md"), flags=re.MULTILINE)
+        assert PICTURE.search(purpose)
+        head, _, *rows = [line for line in settings.splitlines() if line.startswith("| ")]
+        assert head.startswith("| setting |") and len(rows) == 5
+
+    def test_there_are_pages_of_its_results_and_of_its_inside(self, name):
+        assert (DOCS / "results" / f"{name}.md").is_file()
+        assert (DOCS / "developers" / f"{name}.md").is_file()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(DOCS.parent)))
+def test_pictures_exist_and_are_described(page):
+    for description, target in PICTURE.findall(read(page)):
+        assert description.strip(), target
+        assert (page.parent / target).is_file(), target
+
+
+def test_every_sheet_of_the_gallery_is_shown():
+    shown = {(page.parent / target).resolve() for page in PAGES for _, target in PICTURE.findall(read(page))}
+    assert {sheet.resolve() for sheet in (DOCS / "gallery").iterdir()} <= shown
+
+
+def test_every_texture_of_others_that_a_page_names_is_attributed():
+    named = {name for page in PAGES for name in NAMED_TEXTURE.findall(read(page))}
+    assert named and named <= set(NAMED_TEXTURE.findall(read(DOCS / "attributions.md")))
