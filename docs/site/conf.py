@@ -21,6 +21,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
     "navigation",
+    "links",
     "lazy_names",
     "plugin_reference",
 ]

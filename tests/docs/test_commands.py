@@ -1,8 +1,8 @@
 """Every command and every snippet of README and the guides, as they stand.
 
-The blocks of a page are run in their order in one folder, Python in one namespace, as a reader would. `mitex` is run by
-its own command line; `make`, `pip` and `python` are looked up (the target, the extra, the script). What is small
-meanwhile says `small.py`. Comments before a block mark the others:
+The blocks of a page are run in their order in one folder, Python in one namespace, as a reader would. `mitex`
+is run by its own command line; `make`, `pip` and `python` are looked up: the target, the extra, the script.
+`small.py` says what is made small meanwhile. A comment before a block marks one that cannot be run:
 
     <!-- not run: why -->       commands are parsed by the real command line, Python is compiled
     <!-- part of: file -->      each line stands in that file of the repository
@@ -18,11 +18,12 @@ import pytest
 from mitex.cli import commands, main
 from mitex.cli.usage import parse
 from mitex.methods.registry import methods
+from mitex.training.locate import bundled_files
 from tests.docs import small
 from tests.docs.blocks import PAGES, PROGRAMS, ROOT, Block, blocks
 
 LANGUAGES = {"python", "sh", "toml", "json", "text", ""}
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+EXTRAS = set(tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"])
 RUN = [page for page in PAGES if any(block.language in ("python", "sh") for block in blocks(page))]
 
 
@@ -69,10 +70,8 @@ def run(words, place, capsys):
             targets = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
             assert {word for word in rest if "=" not in word} <= set(targets), place
         case "pip":
-            extras = re.findall(r"mitex\[([\w,]+)\]", " ".join(rest))
-            assert {name for some in extras for name in some.split(",")} <= PROJECT[
-                "optional-dependencies"
-            ].keys(), place
+            named = re.findall(r"mitex\[([\w,]+)\]", " ".join(rest))
+            assert {extra for names in named for extra in names.split(",")} <= EXTRAS, place
         case "python":
             assert rest[0] == "-m" or (ROOT / rest[0]).is_file(), place
         case _:
@@ -90,7 +89,8 @@ def check_marked(block: Block):
         ast.parse(block.text, block.place)
     elif block.language == "sh":
         for program, *words in block.commands():
-            if program == "mitex":
+            bundled = words[0] not in commands.OF_MODELS or words[1] in bundled_files()
+            if program == "mitex" and bundled:  # the options of another model are known once it is there
                 call = commands.find(words)
                 parse(call.command, call.words, call.program)
 
