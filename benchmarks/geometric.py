@@ -56,10 +56,10 @@ def toy(levels: int) -> GeometricTask:
     hierarchy = Hierarchy.of(ball, levels)
     generator = torch.Generator().manual_seed(0)
     meshes = [
-        torch.from_numpy(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=generator)
+        torch.tensor(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=generator)
         for k, mesh in enumerate(hierarchy.meshes)
     ]
-    return GeometricTask(config, hierarchy, torch.from_numpy(ball.vertices), meshes, ball)
+    return GeometricTask(config, hierarchy, torch.tensor(ball.vertices), meshes, ball)
 
 
 def main() -> None:

@@ -44,7 +44,7 @@ class MessagePassing:
         offsets = points[neighbours] - points[receivers]
         directions = offsets / (np.linalg.norm(offsets, axis=1, keepdims=True) + 1e-8)
         values = torch.from_numpy(harmonics(directions, degree)).to(dtype)
-        return MessagePassing(torch.from_numpy(receivers), torch.from_numpy(neighbours), values)
+        return MessagePassing(torch.tensor(receivers), torch.tensor(neighbours), values)
 
     def perceive(self, state: torch.Tensor) -> torch.Tensor:
         """State (B, V, C) -> (B, V, (h + 1) C)."""

@@ -29,6 +29,7 @@ from mitex.methods.nca import PRESETS, NcaConfig, NcaTexture
 from mitex.methods.nca.decoder.decoder import OFFSET
 from mitex.methods.nca.decoder.surface import Points
 from mitex.methods.nca.model import FIRE_RATE
+from mitex.methods.nca.surfaces import TrainingSphere
 from mitex.methods.nca.task import NcaTask
 from mitex.runtime.precision import bfloat16_flags
 from mitex.scenes.cameras import Cameras
@@ -68,7 +69,7 @@ class Bench:
         self.task = NcaTask(config, exemplar)
         ((self.size, self.appearance),) = self.task.zooms.items()
         self.config, self.rule, self.network = config, self.task.look.rule, self.appearance.network
-        self.sphere = self.task.spheres[0]
+        self.sphere = TrainingSphere.of(icosphere(config.frequency), self.task.look)
         self.adam = Adam(self.task.parameters)
         generator = torch.Generator().manual_seed(0)
         self.task.pool.uniform_(-0.2, 0.2, generator=generator)  # as full of states as in a training
@@ -86,7 +87,7 @@ class Bench:
         self.plain, self.passing = naive.vgg_weights(), naive.MessagePassing.of(self.sphere.mesh)
 
     def _cameras(self, generator: torch.Generator) -> Cameras:
-        return self.task.cameras(self.sphere.mesh, self.size, generator)
+        return self.task.cameras(self.sphere, self.size, generator)
 
     def _targets(self, generator: torch.Generator) -> tuple[dict[str, torch.Tensor], dict[str, torch.Tensor]]:
         """Places to sample in the views, and as many vectors of the exemplar."""
@@ -222,7 +223,7 @@ class Bench:
 
 def apply_step(frequency: int, repetitions: int) -> float:
     """One step of the automaton without gradients [ms], averaged over fifty."""
-    mesh, texture = icosphere(frequency), NcaTexture.load("waffle")
+    mesh, texture = icosphere(frequency), NcaTexture.load("cobblestone")
     return best(lambda: texture.grow(mesh, steps=50), repetitions) / 50
 
 

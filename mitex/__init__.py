@@ -3,40 +3,85 @@
 Names are resolved on first use, so that `import mitex` stays quick and loads neither torch nor Mitsuba.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from mitex.lazy import attributes
 
 __version__ = "0.1.0"
 
-__all__ = ["Asset", "Exemplar", "Mesh", "__version__", "init", "load", "methods"]
+__all__ = [
+    "Asset",
+    "Cancelled",
+    "CaptureError",
+    "CaptureWarning",
+    "CheckpointError",
+    "ConfigError",
+    "Exemplar",
+    "ImageError",
+    "Interrupted",
+    "Mesh",
+    "MeshError",
+    "MeshWarning",
+    "MitexError",
+    "MitexWarning",
+    "OutputError",
+    "Progress",
+    "RuntimeUnavailable",
+    "TextureWarning",
+    "TrainingDiverged",
+    "WeightsError",
+    "__version__",
+    "init",
+    "load",
+    "methods",
+]
 
-_HOMES = {
-    "Asset": ("mitex.asset", "Asset"),
-    "Exemplar": ("mitex.exemplar", "Exemplar"),
-    "Mesh": ("mitex.mesh", "Mesh"),
-    "init": ("mitex.plugins", "init"),
-    "load": ("mitex.methods.registry", "load"),
-    "methods": ("mitex.methods", None),
-}
+_ERRORS = (
+    *("CaptureError", "CheckpointError", "ConfigError", "ImageError", "MeshError", "MitexError"),
+    *("OutputError", "RuntimeUnavailable", "WeightsError"),
+    *("CaptureWarning", "MeshWarning", "MitexWarning", "TextureWarning"),
+)
+
+__getattr__ = attributes(
+    __name__,
+    {
+        **dict.fromkeys(_ERRORS, "mitex.errors"),
+        **dict.fromkeys(("Cancelled", "Interrupted", "TrainingDiverged"), "mitex.training.errors"),
+        "Asset": "mitex.asset",
+        "Exemplar": "mitex.exemplar",
+        "Mesh": "mitex.mesh",
+        "Progress": "mitex.training.control",
+        "init": "mitex.plugins",
+        "load": "mitex.methods.registry",
+        "methods": "",
+    },
+)
 
 if TYPE_CHECKING:
     from mitex import methods
     from mitex.asset import Asset
+    from mitex.errors import (
+        CaptureError,
+        CaptureWarning,
+        CheckpointError,
+        ConfigError,
+        ImageError,
+        MeshError,
+        MeshWarning,
+        MitexError,
+        MitexWarning,
+        OutputError,
+        RuntimeUnavailable,
+        TextureWarning,
+        WeightsError,
+    )
     from mitex.exemplar import Exemplar
     from mitex.mesh import Mesh
     from mitex.methods.registry import load
     from mitex.plugins import init
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'mitex' has no attribute {name!r}")
-    module, attribute = _HOMES[name]
-    loaded = import_module(module)
-    value = loaded if attribute is None else getattr(loaded, attribute)
-    globals()[name] = value
-    return value
+    from mitex.training.control import Progress
+    from mitex.training.errors import Cancelled, Interrupted, TrainingDiverged
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOMES})
+    return sorted({*globals(), *__all__})

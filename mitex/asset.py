@@ -6,6 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from mitex.atlas import Atlas
 from mitex.errors import ConfigError
 from mitex.exemplar import MAPS
+from mitex.geometry.constant import constant, sealed
 from mitex.geometry.normal_maps import decode_at_vertices
 from mitex.geometry.tangents import HardSplit, split_at_hard_edges
 from mitex.mesh import Mesh
@@ -22,7 +24,7 @@ CLAY = 0.7  # sRGB
 
 @dataclass(frozen=True, eq=False)
 class Asset:
-    """A mesh with its material maps. Immutable; values are clipped to [0, 1] when it is made.
+    """A mesh with its material maps. Immutable, its arrays too; values are clipped to [0, 1] when it is made.
 
     Attributes:
         mesh: the mesh, V vertices and F faces.
@@ -53,7 +55,7 @@ class Asset:
             raise ConfigError("the asset has no maps", f"give at least one of {', '.join(MAPS)}")
         vertices = len(self.mesh.vertices)
         maps = {k: _checked(k, v, (vertices,), "vertex") for k, v in sorted(self.vertex_maps.items())}
-        object.__setattr__(self, "vertex_maps", maps)
+        object.__setattr__(self, "vertex_maps", MappingProxyType(maps))
         if self.tangents is not None:
             object.__setattr__(self, "tangents", _checked_tangents(self.tangents, vertices))
         elif "normal" in maps:
@@ -65,7 +67,7 @@ class Asset:
                 raise ConfigError("the atlas belongs to another mesh", "bake the asset again")
             shape = self.atlas.face.shape
             textures = {k: _checked(k, v, shape, "texture") for k, v in sorted(self.texture_maps.items())}
-            object.__setattr__(self, "texture_maps", textures)
+            object.__setattr__(self, "texture_maps", MappingProxyType(textures))
 
     @property
     def maps(self) -> Mapping[str, np.ndarray]:
@@ -173,11 +175,11 @@ def _checked(name: str, values: np.ndarray, shape: tuple[int, ...], kind: str) -
         raise ConfigError(f"{kind} map {name} has shape {values.shape}", f"it must be {(*shape, MAPS[name])}")
     if not np.isfinite(values).all():
         raise ConfigError(f"{kind} map {name} holds NaN or infinite values", "check the step that made it")
-    return np.clip(values, 0.0, 1.0)
+    return sealed(np.clip(values, 0.0, 1.0))
 
 
 def _checked_tangents(tangents: np.ndarray, vertices: int) -> np.ndarray:
-    tangents = np.asarray(tangents, np.float32)
+    tangents = constant(tangents, np.float32)
     if tangents.shape != (vertices, 3):
         raise ConfigError(f"tangents have shape {tangents.shape}", f"they must be {(vertices, 3)}")
     if not np.isfinite(tangents).all():

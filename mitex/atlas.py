@@ -10,6 +10,7 @@ import xatlas
 from scipy.ndimage import distance_transform_edt
 
 from mitex.errors import ConfigError, MeshError
+from mitex.geometry.constant import constant, sealed
 from mitex.geometry.normal_maps import FLAT, encode
 from mitex.geometry.raster import covered_texels, rasterize
 from mitex.geometry.tangents import Split, split_at_seams
@@ -27,7 +28,7 @@ FULL = 1.001  # the area of the unit square, and some rounding
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """A square UV layout and its texels.
+    """A square UV layout and its texels. Immutable: the arrays that it is made of become read-only.
 
     Row 0 of a map is its top: texel (r, c) of N x N shows u = (c + 0.5) / N, v = 1 - (r + 0.5) / N.
 
@@ -44,6 +45,10 @@ class Atlas:
     face: np.ndarray
     barycentric: np.ndarray
     inside: np.ndarray
+
+    def __post_init__(self) -> None:
+        for array in (self.uv, self.face, self.barycentric, self.inside):
+            sealed(array)
 
     @property
     def resolution(self) -> int:
@@ -148,7 +153,7 @@ class Atlas:
         source = face[row, column]
         near = away <= padding
         return Atlas(
-            uv=np.ascontiguousarray(uv, np.float32),
+            uv=constant(uv, np.float32),
             face=np.where(near, source, -1).astype(np.int32),
             barycentric=np.where(near[..., None], barycentric[row, column], 0.0).astype(np.float32),
             inside=(face >= 0) & (distance == 0),

@@ -36,6 +36,7 @@ def cached(
     compute: Callable[[], Result],
     read: Callable[[Path], Result],
     write: Callable[[Path, Result], None],
+    keep: bool = True,
 ) -> Result:
     """The result kept in the folder `place`, else that of `compute`, which is kept then.
 
@@ -46,10 +47,13 @@ def cached(
         compute: the long computation.
         read: gives the result from a folder; OSError, EOFError, ValueError or KeyError if it is not whole.
         write: fills an empty folder, which is renamed afterwards, so that all files appear together.
+        keep: whether a computed result is kept; without, nothing is written.
     """
     with suppress(OSError, EOFError, ValueError, KeyError):  # EOFError: numpy's of an empty file
         return read(place)
     result = compute()
+    if not keep:
+        return result
     with suppress(OSError):
         place.parent.mkdir(parents=True, exist_ok=True)
         filling = Path(tempfile.mkdtemp(prefix=".filling-", dir=place.parent))

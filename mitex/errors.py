@@ -4,6 +4,9 @@
 class MitexError(Exception):
     """Something the user can mend; the command line prints it as one `error:` line and exits with code 2.
 
+    Both texts speak to a Python caller. An argument stands in backticks, as `out` or `resume=True`, so that
+    the command line can name it as its option.
+
     Args:
         problem: What is wrong, naming the file, key or value.
         remedy: What to do about it.
@@ -40,6 +43,10 @@ class OutputError(MitexError):
 
 class CheckpointError(MitexError):
     """A run folder, checkpoint or model file that cannot be used."""
+
+
+class WeightsError(MitexError):
+    """Weights of a frozen network are missing or not the expected file."""
 
 
 class RuntimeUnavailable(MitexError):

@@ -49,7 +49,7 @@ def prepare_output(
         if target.exists() and not os.access(target, os.W_OK):
             raise OutputError(f"'{path}' is write-protected", "change its permissions or name another file")
         if any(_same_file(target, source) for source in inputs if source is not None):
-            raise OutputError(f"'{path}' is an input, and would be overwritten", "name another --out")
+            raise OutputError(f"'{path}' is an input, and would be overwritten", "name another file")
     except OSError as e:
         raise _translated(e, target) from e
     return target

@@ -11,6 +11,12 @@ import numpy as np
 import torch
 from torch.autograd.function import once_differentiable
 
+# Torch warns once a process that these tensors are new. It does so here, rather than at some call, since the
+# filters of warnings are those of all threads.
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")
+    torch.sparse_csr_tensor(torch.tensor([0, 0]), torch.tensor([]), torch.tensor([]), (1, 1))
+
 
 def csr_tensor(matrix: Any, device: torch.device | str = "cpu") -> torch.Tensor:
     """A scipy CSR array or matrix (N, M) as a sparse float32 tensor with 32-bit indices.
@@ -40,9 +46,7 @@ def csr(
         values: (E,) float32.
         shape: (N, M).
     """
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Sparse CSR tensor support is in beta")
-        return torch.sparse_csr_tensor(indptr, indices, values, size=shape, check_invariants=False)
+    return torch.sparse_csr_tensor(indptr, indices, values, size=shape, check_invariants=False)
 
 
 def transposed_product(

@@ -3,7 +3,6 @@
 usage: python scenes/grow.py [OUT.png]
 """
 
-import math
 import sys
 
 from mitex.images import write_image
@@ -13,6 +12,6 @@ from mitex.render import sheet, still, tone
 
 mesh = embedded("knot")
 pebbles = NcaTexture.load("pebbles").apply(mesh, seed=1)
-waffle = NcaTexture.load("waffle").apply(mesh, seed=1, orientation=math.radians(45))
+waffle = NcaTexture.load("waffle").apply(mesh, seed=1, orientation=45)
 pictures = [tone(still(asset, resolution=384, spp=64)) for asset in (pebbles, waffle)]
 print(write_image(sys.argv[1] if len(sys.argv) > 1 else "grow.png", sheet(pictures, columns=2)))

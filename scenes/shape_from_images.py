@@ -40,10 +40,10 @@ def main(out: str = "shape.png", steps: int = 60, resolution: int = 64, spp: int
     ball = icosphere(16)
     bumps = 1 + 0.12 * np.sin(5 * ball.vertices).prod(1, keepdims=True)
     wanted = ball.with_vertices(ball.vertices * bumps)
-    renderer = GeometryRenderer(ball, orbit(8, elevation=0.3, resolution=resolution))
-    pictures = renderer.render(torch.from_numpy(wanted.vertices), seed=1)
+    renderer = GeometryRenderer(ball, orbit(8, elevation=17, resolution=resolution))
+    pictures = renderer.render(torch.tensor(wanted.vertices), seed=1)
 
-    vertices = torch.from_numpy(ball.vertices).clone().requires_grad_()
+    vertices = torch.tensor(ball.vertices).clone().requires_grad_()
     optimizer, spread, losses = Adam([vertices], shared=True), smoother(ball), []
     for step in range(steps):
         optimizer.clear()

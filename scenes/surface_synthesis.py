@@ -5,7 +5,6 @@ usage: python scenes/surface_synthesis.py [OUT.png]
 Takes minutes; the run folder beside the picture keeps checkpoints and previews.
 """
 
-import math
 import sys
 from collections.abc import Sequence
 
@@ -21,9 +20,9 @@ def main(
     out: str = "octopus.png", run: str = "runs/octopus", settings: Sequence[str] = (), spp: int = 64
 ) -> None:
     mesh = embedded("octopus")
-    asset = surface.fit("scales", mesh, run, overrides=settings).apply()
+    asset = surface.fit("scales", mesh, run, set=settings).apply()
     print(asset.export(f"{run}/octopus.glb"))
-    sides = [still(asset, resolution=512, spp=spp, azimuth=math.radians(a)) for a in (20, 200)]
+    sides = [still(asset, resolution=512, spp=spp, azimuth=a) for a in (20, 200)]
     print(write_image(out, np.hstack([tone(side) for side in sides])))
 
 

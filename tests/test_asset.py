@@ -27,6 +27,24 @@ def test_values_are_clipped_float32():
         asset.name = "other"  # pyright: ignore[reportAttributeAccessIssue]
 
 
+def test_nothing_of_an_asset_can_be_changed():
+    """Neither through its own arrays, nor through those that it was made from."""
+    east = np.tile(np.array([1, 0, 0], np.float32), (42, 1))
+    maps = {"albedo": np.full((42, 3), 0.5, np.float32), **NORMAL}
+    asset = Asset(MESH, maps, east).baked(32)
+    assert asset.atlas is not None and asset.tangents is not None and asset.texture_maps is not None
+    for array in (
+        *(asset.tangents, *asset.vertex_maps.values(), *asset.texture_maps.values()),
+        *(asset.atlas.uv, asset.atlas.face, asset.atlas.barycentric, asset.atlas.inside),
+    ):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+    with pytest.raises(TypeError):
+        asset.vertex_maps["albedo"] = maps["albedo"]  # pyright: ignore[reportIndexIssue]
+    maps["albedo"][:] = east[:] = 0
+    assert asset.vertex_maps["albedo"].min() == 0.5 and asset.tangents[:, 0].min() == 1
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

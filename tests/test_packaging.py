@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+import mitex
+
 ROOT = Path(__file__).parents[1]
 
 
@@ -57,6 +59,7 @@ def test_everything_in_the_package_is_in_the_wheel_and_nothing_else(wheel: Path)
     tracked = {name for name in listed.stdout.splitlines() if (ROOT / name).exists()}
     names = {name for name in zipfile.ZipFile(wheel).namelist() if not name.endswith("/")}
     assert tracked - names == set()
+    assert "mitex/py.typed" in names  # type checkers read the annotations
     assert {name for name in names if not re.match(r"mitex(-[\d.]+\.dist-info)?/", name)} == set()
 
 
@@ -81,7 +84,7 @@ def test_the_installed_copy_works_outside_the_checkout(installed: Path, tmp_path
 
 def test_public_names_resolve_in_the_installed_copy(installed: Path, tmp_path: Path):
     code = "import mitex; print(*[type(getattr(mitex, n)).__name__ for n in mitex.__all__])"
-    assert len(run_installed(installed, tmp_path, code).split()) == 7
+    assert len(run_installed(installed, tmp_path, code).split()) == len(mitex.__all__)
 
 
 def test_the_command_is_there(installed: Path, tmp_path: Path):

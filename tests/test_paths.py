@@ -75,7 +75,7 @@ def test_an_output_that_is_an_input_is_refused(
     (tmp_path / "hard.obj").hardlink_to("mesh.obj")
     (tmp_path / "folder").symlink_to(".")
     for inputs in ([source], [None, "vase", "mesh.obj"], [tmp_path / "soft.obj"]):
-        with pytest.raises(OutputError, match=rf"'{spelling}' is an input.*; name another --out"):
+        with pytest.raises(OutputError, match=rf"'{spelling}' is an input.*; name another file"):
             prepare_output(spelling, (".obj",), inputs)
     assert source.read_text() == "v 0 0 0"
 

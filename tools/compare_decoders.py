@@ -26,7 +26,7 @@ from mitex.mesh import Mesh, icosphere, scattered_sphere
 from mitex.methods.nca import NcaTexture, fit
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
-from mitex.methods.nca.spheres import TrainingSphere
+from mitex.methods.nca.surfaces import TrainingSphere
 from mitex.render import sheet
 from mitex.scenes.cameras import patch_views
 from mitex.training import checkpoint
@@ -50,7 +50,7 @@ def main() -> None:
     for name, own in KINDS.items():
         run = runs / name.replace(", ", "-").replace(" ", "-")
         resume = (run / checkpoint.NAME).is_file()
-        texture = fit(exemplar, run, overrides=[*settings, *own], resume=resume, quiet=True)
+        texture = fit(exemplar, run, set=[*settings, *own], resume=resume)
         wide, close = views(texture)
         print(f"| {name} | " + " | ".join(row(texture, run, exemplar, wide)) + " |", flush=True)
         cells += [wide, close]

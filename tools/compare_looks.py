@@ -25,7 +25,7 @@ from mitex.features import Vgg16
 from mitex.losses import relaxed_transport
 from mitex.mesh import icosphere
 from mitex.methods.nca import NcaTexture
-from mitex.methods.nca.spheres import TrainingSphere
+from mitex.methods.nca.surfaces import TrainingSphere
 from mitex.scenes.cameras import patch_views
 
 PATCHES, WIDEST, SIDE = 6, 0.65, 256

@@ -40,7 +40,7 @@ def main() -> None:
             capture,
             folder,
             preset=about["preset"],
-            overrides=[f"seconds={about['seconds']}"],
+            set=[f"seconds={about['seconds']}"],
             resume=(folder / checkpoint.NAME).exists(),
         )
         held_out = capture.split()[1]

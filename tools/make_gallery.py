@@ -4,7 +4,8 @@ it.
 usage: python tools/make_gallery.py EXEMPLARS MESHES [NAME | SHEET=EXEMPLAR=RUN ...]
 
 EXEMPLARS and MESHES are folders; the sheets go to docs/gallery/NAME.jpg, or SHEET.jpg for a run folder. Below
-the path-traced pictures are the maps as they are, to see that they are in register.
+the path-traced pictures are the maps as they are, to see that they are in register. Without names, the row of
+pictures that README begins with, and the thumbnails of all models beside their exemplars, are made too.
 """
 
 from __future__ import annotations
@@ -17,15 +18,15 @@ import torch
 
 from mitex.exemplar import Exemplar
 from mitex.exemplar import names as exemplar_names
-from mitex.images import write_image
+from mitex.images import read_image, write_image
 from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods.nca import NcaTexture
-from mitex.methods.nca.spheres import TrainingSphere
+from mitex.methods.nca.surfaces import TrainingSphere
 from mitex.render import sheet, still, tone
 from mitex.scenes.cameras import orbit
 
 sys.path.insert(0, str(Path(__file__).parent))
-from make_models import RECIPES  # noqa: E402
+from make_models import MODELS, RECIPES  # noqa: E402
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 UNSEEN = ("spot", "fish", "mug")
@@ -63,15 +64,30 @@ def teaser() -> np.ndarray:
     return np.concatenate(pictures, axis=1)
 
 
+def thumbnails(exemplars: Path) -> np.ndarray:
+    """Every bundled model's exemplar, and its thumbnail."""
+    cells, labels = [], []
+    for name, recipe in sorted(RECIPES.items()):
+        cells += [_exemplar(recipe.exemplar, exemplars).resized(CELL).maps["albedo"]]
+        cells += [read_image(MODELS / f"{name}.png")[..., :3]]
+        labels += [f"exemplar {recipe.exemplar}", name]
+    return sheet(cells, columns=6, labels=labels, cell=CELL)
+
+
+def _exemplar(name: str, folder: Path) -> Exemplar:
+    return Exemplar.load(name if name in exemplar_names() else folder / name)
+
+
 def main() -> None:
     exemplars, meshes = Path(sys.argv[1]), Path(sys.argv[2])
     GALLERY.mkdir(parents=True, exist_ok=True)
     if len(sys.argv) == 3:
         write_image(GALLERY / "teaser.jpg", teaser())
+        write_image(GALLERY / "models.jpg", thumbnails(exemplars))
     for word in sys.argv[3:] or RECIPES:
         name, source, model = word.split("=") if "=" in word else (word, RECIPES[word].exemplar, word)
-        exemplar = Exemplar.load(source if source in exemplar_names() else exemplars / source)
-        write_image(GALLERY / f"{name}.jpg", one(NcaTexture.load(model), exemplar, meshes))
+        picture = one(NcaTexture.load(model), _exemplar(source, exemplars), meshes)
+        write_image(GALLERY / f"{name}.jpg", picture)
 
 
 if __name__ == "__main__":

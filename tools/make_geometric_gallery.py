@@ -18,7 +18,6 @@ each level, so that all end alike.
 
 from __future__ import annotations
 
-import math
 import sys
 import time
 from pathlib import Path
@@ -39,7 +38,7 @@ from mitex.render import sheet, still, tone
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 CELL = 224  # side of a picture [px]
 LEVELS = range(4)  # to start at, on a sheet of them
-AZIMUTH = math.radians(20)
+AZIMUTH = 20  # [degrees]
 
 
 def picture(mesh: Mesh) -> np.ndarray:

@@ -160,7 +160,7 @@ SHAPES: dict[str, Callable[[], Mesh]] = {
     "shaderball": lambda: solid(
         "shaderball", shaderball(), ((-1.2, -1.4, -1.2), (1.2, 1.4, 1.2)), 12_000, 110
     ),
-    "vase": lambda: relax(remesh(vase(), 10_000, feature_angle=np.pi), None, 3),
+    "vase": lambda: relax(remesh(vase(), 10_000, feature_angle=180.0), None, 3),
 }
 
 

@@ -4,8 +4,8 @@ The settings are those of the models that ship, as far as their files tell, whic
 
 usage: python tools/make_models.py EXEMPLARS [NAME ...]
 
-EXEMPLARS is a folder with one folder of maps per exemplar. Each model takes about 20 minutes on two cores;
-its run folder under runs/models/ can be resumed by calling the script again.
+EXEMPLARS is a folder with one folder of maps per exemplar. The parent takes 15 minutes on two cores, each
+other model five; its run folder under runs/models/ can be resumed by calling the script again.
 """
 
 from __future__ import annotations
@@ -24,14 +24,7 @@ from mitex.training import checkpoint, resolve
 RUNS = Path("runs/models")
 MODELS = Path(__file__).parents[1] / "mitex" / "data" / "models"
 PARENT = "ceramic"
-SHORT = ("steps=350", "milestones=200,290")  # enough from the parent
-# The settings before there was a decoder, of the models that have not been trained anew.
-UNDECODED = (
-    *("decoder=false", "sphere=even", "aggregation=sum", "order_weight=0", "overflow_weight=1e4"),
-    *("frequency=48", "min_steps=20", "max_steps=32", "zooms=1", "view_count=8", "resolution=64"),
-    *("density=96", "exemplar_size=128", "pooling=average", "steps=1000", "milestones=750,900"),
-    "layers=relu1_1,relu1_2,relu2_1,relu2_2,relu3_1,relu3_2,relu3_3,relu4_3,relu5_3",
-)
+SHORT = ("steps=300", "milestones=180,250")  # enough from the parent
 
 
 @dataclass(frozen=True)
@@ -49,15 +42,26 @@ class Recipe:
     settings: tuple[str, ...] = SHORT
 
 
+FINE = (*SHORT, "density=48")  # patterns that are small in their exemplar
+QUICK = ("steps=200", "milestones=120,170")  # without order
+SMALL = ("view_count=8",)  # exemplars of 128 pixels have one zoom, so more views of it
 RECIPES = {
     PARENT: Recipe("scales", None, ()),
+    "bricks": Recipe("bricks"),
     "cobblestone": Recipe("cobblestone"),
+    "fur": Recipe("Stylized_Fur_001", settings=(*QUICK, "density=48", *SMALL)),
+    "hexagons": Recipe("hexagons"),
+    "honeycomb": Recipe("Honeycomb_002", settings=(*FINE, *SMALL)),
+    "knit": Recipe("knit", settings=FINE),
     "lava": Recipe("lava"),
-    # The waffle's bars are coarse: fewer vertices to the exemplar leave more of them in a view.
-    "waffle": Recipe("Waffle_001", None, (*UNDECODED, "density=64", "resolution=80")),
-    "pebbles": Recipe("Pebbles_025", "waffle", (*UNDECODED, "steps=1450", "milestones=1200,1400")),
-    "bricks": Recipe("Bricks_Terracotta_003", "waffle", (*UNDECODED, "steps=2050", "milestones=1800,1950")),
-    "honeycomb": Recipe("Honeycomb_002", "waffle", (*UNDECODED, "steps=900", "milestones=500,800")),
+    "leather": Recipe("leather", settings=(*QUICK, "density=64")),
+    "mosaic": Recipe("Abstract_008", settings=(*QUICK, *SMALL)),
+    "pebbles": Recipe("Pebbles_025", settings=(*QUICK, "density=64", *SMALL)),
+    "planks": Recipe("planks"),
+    "rust": Recipe("rust", settings=QUICK),
+    "shells": Recipe("Wall_Shells_001", settings=(*FINE, *SMALL)),
+    "waffle": Recipe("Waffle_001", settings=(*SHORT, *SMALL)),
+    "wicker": Recipe("wicker"),
 }
 
 
@@ -77,7 +81,7 @@ def train(name: str, exemplars: Path) -> NcaTexture:
     texture = fit(
         recipe.exemplar if embedded_one else exemplars / recipe.exemplar,
         run,
-        overrides=recipe.settings,
+        set=recipe.settings,
         init=MODELS / f"{recipe.parent}.safetensors" if recipe.parent else None,
         resume=(run / checkpoint.NAME).is_file(),
     )

@@ -10,7 +10,6 @@ The quality of all held-out views is printed.
 
 from __future__ import annotations
 
-import math
 import sys
 import time
 from pathlib import Path
@@ -49,7 +48,7 @@ def picture(applied: AppliedTexture, elevation: float) -> np.ndarray:
             applied.outline,
             resolution=CELL,
             spp=SPP,
-            elevation=math.radians(elevation),
+            elevation=elevation,
         )
     )
 

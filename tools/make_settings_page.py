@@ -25,7 +25,7 @@ mitex fit nca --settings
 mitex fit nca --settings --preset paper
 ```
 
-In Python the same settings go to `fit` as `overrides=["density=48", "samples=512"]`. A TOML file with any
+In Python the same settings go to `fit` as `set={"density": 48, "samples": 512}`. A TOML file with any
 of them can be named with `--config`. Every run folder keeps the settings of its fit in `config.toml`, which
 `--config` reads as well.
 

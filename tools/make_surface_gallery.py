@@ -15,7 +15,6 @@ Settings change the synthesis, of one MESH=EXEMPLAR or of all (`resolution=512`,
 
 from __future__ import annotations
 
-import math
 import re
 import sys
 from dataclasses import fields, replace
@@ -105,15 +104,13 @@ def texture(exemplar: Exemplar, mesh: Mesh, run: Path, settings: dict[str, str])
         return surface.SurfaceTexture.load(run)
     overrides = [f"{key}={value}" for key, value in settings.items() if key != "content"]
     resume = (run / checkpoint.NAME).is_file()
-    return surface.fit(
-        exemplar, mesh, run, overrides=overrides, content=settings.get("content"), resume=resume
-    )
+    return surface.fit(exemplar, mesh, run, set=overrides, content=settings.get("content"), resume=resume)
 
 
 def pictures(result: surface.SurfaceTexture, count: int, side: int) -> list[np.ndarray]:
     """The mesh from `count` of its sides, each picture with `side` pixels in rows and columns."""
     asset, sides = result.apply(), SIDES.get(result.mesh.name, OTHER_SIDES)[:count]
-    return [tone(still(asset, resolution=side, spp=64, azimuth=math.radians(a))) for a in sides]
+    return [tone(still(asset, resolution=side, spp=64, azimuth=a)) for a in sides]
 
 
 def main() -> None:

@@ -164,7 +164,7 @@ def solid(
 ) -> Mesh:
     """A closed mesh of a zero set within `box` = (low, high)."""
     dense = trace(field, box[0], box[1], cells)
-    coarse = remesh(relax(dense, field, 3), vertices, feature_angle=np.pi)
+    coarse = remesh(relax(dense, field, 3), vertices, feature_angle=180.0)
     for stage in (dense, coarse):
         if len(non_manifold_edges(stage.faces, len(stage.vertices))):
             raise ValueError(f"{name} has parts that are too thin or too close")

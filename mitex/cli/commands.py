@@ -8,16 +8,15 @@ from dataclasses import dataclass
 
 from mitex.cli.usage import UsageError, refuse_unknown_options
 from mitex.lazy import load
-from mitex.methods.method import Method
 from mitex.methods.registry import method_of, methods
 
 # Word -> dataclass of the command, and its line in the overview. Only the called one is imported.
 COMMANDS = {
     "doctor": ("mitex.cli.doctor:Doctor", "check that everything Mitex needs works here"),
+    "demo": ("mitex.demo:Demo", "synthesize, grow, render and export textures in a few minutes"),
     "models": ("mitex.cli.models:Models", "list the textures that ship with Mitex"),
     "render": ("mitex.cli.render:Render", "path-trace an asset: a still or a turntable"),
 }
-DEMO = "learn, apply, render and export a texture in a few minutes"
 # Commands whose options are those of the model's method.
 OF_MODELS = {
     "apply": "put a learned texture on a mesh",
@@ -46,8 +45,8 @@ def lines(group: str = "") -> dict[str, str]:
     fits = {f"fit {method.name}": method.title for method in methods().values()}
     if group:
         return {name: line for name, line in fits.items() if name.startswith(f"{group} ")}
-    doctor, *others = [(word, line) for word, (_, line) in COMMANDS.items()]
-    return dict([doctor, ("demo", DEMO), *fits.items(), *OF_MODELS.items(), *others])
+    doctor, demo, *others = [(word, line) for word, (_, line) in COMMANDS.items()]
+    return dict([doctor, demo, *fits.items(), *OF_MODELS.items(), *others])
 
 
 def find(words: Sequence[str]) -> Call:
@@ -60,8 +59,6 @@ def find(words: Sequence[str]) -> Call:
     word, rest = words[0], list(words[1:])
     if word in COMMANDS:
         return Call(f"mitex {word}", load(COMMANDS[word][0]), rest)
-    if word == "demo":
-        return Call("mitex demo", load(_demonstrated().demo or ""), rest)
     if word in OF_MODELS:
         return _of_model(word, rest)
     if word == "fit" and rest and rest[0] in methods():
@@ -95,10 +92,6 @@ def _model(words: list[str]) -> str | None:
     free = [k for k, word in enumerate(words) if not word.startswith("-")]
     alone = [k for k in free if k == 0 or not words[k - 1].startswith("--") or "=" in words[k - 1]]
     return next((words[k] for k in alone or free), None)
-
-
-def _demonstrated() -> Method:
-    return next(method for method in methods().values() if method.demo)
 
 
 def _no_such_command(words: Sequence[str]) -> UsageError:

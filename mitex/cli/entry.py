@@ -6,15 +6,18 @@ with what could be saved saved; anything else that escapes is a bug and shows it
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 import warnings
 from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any
 
 import mitex
 from mitex.cli import commands, overview
 from mitex.cli.settings import settings_text
-from mitex.cli.usage import UsageError, parse
+from mitex.cli.usage import UsageError, as_options, parse
 from mitex.errors import MitexError, MitexWarning
 
 
@@ -28,45 +31,68 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit code: 0, 2 or 130, or what the command says (`doctor`: 1 if something is missing).
     """
     words = list(sys.argv[1:] if argv is None else argv)
+    command = None
     with warnings.catch_warnings():
         _route_warnings()
         try:
-            code = _run(words)
+            command = _command(words)
+            code = 0 if command is None else _run(command)
             sys.stdout.flush()
             return code
         except MitexError as e:
-            _say(f"error: {e}")
+            _say(as_options(f"error: {e}", command))
             return 2
         except KeyboardInterrupt as e:
-            _say(str(e) or "interrupted")
+            _say(as_options(str(e) or "interrupted", command))
             return 130
         except BrokenPipeError:  # `mitex models | head`: nobody reads on, which is no error
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 0
 
 
-def _run(words: list[str]) -> int:
+def _command(words: list[str]) -> Any:
+    """The command that the words ask for, with its options; None if all they ask for has been printed."""
     if not words:
         raise UsageError("no command given", "see `mitex --help`")
     if words[0] in ("-h", "--help", "help"):
         print(overview.overview())
-        return 0
+        return None
     if words[0] == "--version":
         print(f"mitex {mitex.__version__}")
-        return 0
+        return None
     if words[1:] and set(words[1:]) <= commands.HELP:
         if words[0] in commands.OF_MODELS:
             print(overview.model_help(words[0]))
-            return 0
+            return None
         if commands.lines(words[0]):
             print(overview.group_help(words[0]))
-            return 0
+            return None
     if words[0] == "fit" and "--settings" in words:
         print(settings_text(words[1:]))
-        return 0
+        return None
     call = commands.find(words)
-    command = parse(call.command, call.words, call.program)
-    return 0 if command is None else command.run() or 0
+    return parse(call.command, call.words, call.program)
+
+
+def _run(command: Any) -> int:
+    """Runs a command, with what Mitex logs as lines on stderr, but for --quiet."""
+    log, lines = logging.getLogger("mitex"), _Lines()
+    level = log.level
+    log.addHandler(lines)
+    log.setLevel(logging.WARNING if getattr(command, "quiet", False) else logging.INFO)
+    try:
+        return command.run() or 0
+    finally:
+        log.setLevel(level)
+        log.removeHandler(lines)
+
+
+class _Lines(logging.Handler):
+    """Log records as lines on stderr, unbuffered: one may come from a signal handler inside of a print."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        with suppress(OSError):
+            os.write(2, f"{self.format(record)}\n".encode())
 
 
 def _route_warnings() -> None:

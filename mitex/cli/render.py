@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -22,7 +21,7 @@ class Render:
 
     examples:
       mitex render bunny.glb --out bunny.png
-      mitex render bunny.glb --out bunny.exr --size 1024 --spp 256 --azimuth 30 --elevation 15
+      mitex render bunny.glb --out bunny.exr --resolution 1024 --spp 256 --azimuth 30 --elevation 15
       mitex render bunny.glb --out bunny.mp4 --frames 120 --displacement 0.02
     """
 
@@ -32,7 +31,9 @@ class Render:
     out: Annotated[Path, arg(metavar="FILE")]
     """Image or movie to write."""
 
-    size: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 512; turntables 384)")] = None
+    resolution: Annotated[
+        int | None, arg(metavar="N", help_behavior_hint="(default: 512; turntables 384)")
+    ] = None
     """Width and height [pixels]."""
 
     spp: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 64; turntables 32)")] = None
@@ -83,7 +84,7 @@ class Render:
         print(self.out)
 
     def _check_ranges(self) -> None:
-        in_range("--size", self.size, 16, 4096)
+        in_range("--resolution", self.resolution, 16, 4096)
         in_range("--spp", self.spp, 1, 65536)
         in_range("--azimuth", self.azimuth, -360.0, 360.0)
         in_range("--elevation", self.elevation, -85.0 if self.floating else 0.0, 85.0)
@@ -94,15 +95,8 @@ class Render:
 
     def _options(self) -> dict[str, Any]:
         """Keyword arguments of `still` and `turntable`; what was not given is left to their defaults."""
-        options = {
-            "resolution": self.size,
-            "spp": self.spp,
-            "azimuth": None if self.azimuth is None else math.radians(self.azimuth),
-            "elevation": None if self.elevation is None else math.radians(self.elevation),
-            "displacement": self.displacement,
-            "exposure": self.exposure,
-            "backdrop": not self.floating,
-            "frames": self.frames,
-            "fps": self.fps,
+        return {
+            name: value
+            for name, value in vars(self).items()
+            if name not in ("asset", "out") and value is not None
         }
-        return {key: value for key, value in options.items() if value is not None}

@@ -66,6 +66,27 @@ def refuse_unknown_options(command: type, words: Sequence[str], whose: str, reme
             )
 
 
+def as_options(message: str, command: Any) -> str:
+    """A message about a Python call in the words of the command line.
+
+    Messages have arguments in backticks, as `out` and `resume=True`; those that are options of the command
+    become --out and --resume.
+
+    Args:
+        message: the message.
+        command: an instance of its dataclass, or None before it is known.
+    """
+    names = set() if command is None else {field.name for field in fields(command)}
+
+    def option(match: re.Match[str]) -> str:
+        name, value = match[1], match[2]
+        if name not in names:
+            return match[0]
+        return f"--{name.replace('_', '-')}" + (f" {value}" if value not in (None, "True") else "")
+
+    return re.sub(r"`([a-z_]+)(?:=([^`\s]+))?`", option, message)
+
+
 def one_line(complaint: str) -> str:
     """What tyro says in a box (of Unicode or ASCII strokes), as a phrase; any wording gives one line."""
     lines = [line for line in re.sub(r"\x1b\[[0-9;]*m", "", complaint).splitlines() if line.strip()]

@@ -32,7 +32,7 @@ def check_files(files: Iterable[Path], whole: str, inputs: Inputs = ()) -> None:
         if os.path.lexists(place) and not is_ours(place):
             raise OutputError(
                 f"'{whole}' comes with '{place}', and a file of that name exists that Mitex did not write",
-                "name another --out",
+                "name another place",
             )
 
 

@@ -7,14 +7,10 @@ import os
 from functools import cache
 from pathlib import Path
 
-from mitex.errors import MitexError
+from mitex.errors import WeightsError
 
 VGG16_FILE = "vgg16_conv_fp16.safetensors"
 VGG16_SHA256 = "bb5788b61d3a34c37ba2a93772a503da31be4676f46e9bc45243f09542557316"
-
-
-class WeightsError(MitexError):
-    """Weights of a frozen network are missing or not the expected file."""
 
 
 def vgg16_path() -> Path:

@@ -3,6 +3,7 @@
 from mitex.losses.autocorrelation import autocorrelation_distance
 from mitex.losses.gram import gram_distance, gram_loss, gram_matrix
 from mitex.losses.overflow import overflow_loss
+from mitex.losses.slopes import slope_correlation
 from mitex.losses.transport import channel_transport, moment_distance, relaxed_transport
 
 __all__ = [
@@ -14,4 +15,5 @@ __all__ = [
     "moment_distance",
     "overflow_loss",
     "relaxed_transport",
+    "slope_correlation",
 ]

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from mitex.errors import MeshError
+from mitex.geometry.constant import constant, sealed
 from mitex.geometry.triangles import triangle_crosses
 from mitex.geometry.vectors import scatter_add, unit_normals
 from mitex.mesh.polygons import Polygons
@@ -22,7 +23,7 @@ SIMILAR = 1e-5  # how far moved vertices may be from a shifted and scaled mesh [
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A triangle mesh. Its arrays are shared, not copied: treat them as constant.
+    """A triangle mesh. Immutable: its arrays are read-only, and copies of what can be changed elsewhere.
 
     Attributes:
         vertices: (V, 3) float32 positions, finite [mesh units].
@@ -49,12 +50,12 @@ class Mesh:
         for name in ("vertices", "uv", "corner_normals"):
             values = getattr(self, name)
             with np.errstate(over="ignore", invalid="ignore"):
-                values = None if values is None else np.ascontiguousarray(values, np.float32)
+                values = None if values is None else constant(values, np.float32)
             object.__setattr__(self, name, values)
         object.__setattr__(self, "faces", np.asarray(self.faces))
         for problem, remedy in _problems(self):
             raise MeshError(f"{self.name}: {problem}", remedy)
-        object.__setattr__(self, "faces", np.ascontiguousarray(self.faces, np.int32))
+        object.__setattr__(self, "faces", constant(self.faces, np.int32))
 
     @staticmethod
     def load(path: str | os.PathLike[str], max_vertices: int = 2_000_000) -> Mesh:
@@ -77,29 +78,29 @@ class Mesh:
         lengths = np.linalg.norm(self.vertices[graph.indices] - self.vertices[graph.rows], axis=1)
         total = np.bincount(graph.rows, lengths, len(self.vertices))
         mean = float(lengths.mean()) if len(lengths) else 1.0
-        return np.where(total > 0, total / np.maximum(graph.valence, 1), mean)
+        return sealed(np.where(total > 0, total / np.maximum(graph.valence, 1), mean))
 
     @cached_property
     def face_crosses(self) -> np.ndarray:
         """(F, 3) float64 normals whose lengths are twice the faces' areas [mesh units^2]."""
-        return triangle_crosses(self.vertices[self.faces].astype(np.float64))
+        return sealed(triangle_crosses(self.vertices[self.faces].astype(np.float64)))
 
     @cached_property
     def face_areas(self) -> np.ndarray:
         """(F,) float32 areas [mesh units^2]."""
-        return (0.5 * np.linalg.norm(self.face_crosses, axis=1)).astype(np.float32)
+        return sealed((0.5 * np.linalg.norm(self.face_crosses, axis=1)).astype(np.float32))
 
     @cached_property
     def face_normals(self) -> np.ndarray:
         """(F, 3) float32 unit normals; +z where a face has no area."""
-        return unit_normals(self.face_crosses).astype(np.float32)
+        return sealed(unit_normals(self.face_crosses).astype(np.float32))
 
     @cached_property
     def normals(self) -> np.ndarray:
         """(V, 3) float32 unit normals, the area-weighted mean of the faces around; +z where that is zero."""
         crosses = np.repeat(self.face_crosses, 3, axis=0)
         total = scatter_add(self.faces.ravel(), crosses, len(self.vertices))
-        return unit_normals(total).astype(np.float32)
+        return sealed(unit_normals(total).astype(np.float32))
 
     @property
     def shading_normals(self) -> np.ndarray:

@@ -21,7 +21,7 @@ FINER = 2
 LONGER = 1.04
 
 
-def remesh(mesh: Mesh, vertices: int, feature_angle: float = math.radians(60.0)) -> Mesh:
+def remesh(mesh: Mesh, vertices: int, feature_angle: float = 60.0) -> Mesh:
     """Replaces the triangles by nearly equilateral ones of one size, as the MeshNCA paper asks for.
 
     Explicit isotropic remeshing (Botsch and Kobbelt 2004) with an edge length that is corrected until the
@@ -30,7 +30,7 @@ def remesh(mesh: Mesh, vertices: int, feature_angle: float = math.radians(60.0))
     Args:
         mesh: any mesh.
         vertices: wanted number of vertices, at least 12.
-        feature_angle: edges where the surface bends by more than this stay [rad].
+        feature_angle: edges where the surface bends by more than this stay [degrees].
 
     Returns:
         A new mesh of the same name in the same place.
@@ -81,7 +81,7 @@ def _isotropic(mesh: Mesh, length: float, feature_angle: float) -> Mesh:
         meshes.meshing_isotropic_explicit_remeshing(
             iterations=12,
             targetlen=_pymeshlab().PureValue(length),
-            featuredeg=math.degrees(feature_angle),
+            featuredeg=feature_angle,
         )
 
     return _filtered(mesh, remeshed)

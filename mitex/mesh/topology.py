@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mitex.geometry.constant import sealed
+
 
 @dataclass(frozen=True, eq=False)
 class EdgeGraph:
@@ -18,6 +20,10 @@ class EdgeGraph:
 
     indptr: np.ndarray
     indices: np.ndarray
+
+    def __post_init__(self) -> None:
+        sealed(self.indptr)
+        sealed(self.indices)
 
     @property
     def rows(self) -> np.ndarray:

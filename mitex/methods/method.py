@@ -25,7 +25,6 @@ class Method:
         fit, apply: references to the dataclasses of its options, a `FitOptions` and an `ApplyOptions`.
         texture: reference to its `Texture`.
         animate: reference to the options of `mitex animate`, for textures that grow or change.
-        demo: reference to the options of `mitex demo`, for the method that it shows.
         tensors: names of the tensors in weights that the authors published: such files tell nothing else of
             their method.
         baseline: whether other methods are compared with it, rather than it being one to use.
@@ -38,7 +37,6 @@ class Method:
     apply: str
     texture: str
     animate: str | None = None
-    demo: str | None = None
     tensors: frozenset[str] = frozenset()
     baseline: bool = False
 

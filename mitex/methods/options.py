@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -9,10 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tyro.conf import Positional, UseAppendAction, arg
 
 from mitex.methods.checks import SEEDS, in_range, merged_settings, reject_unused
-from mitex.training.settings import RunOptions
+from mitex.training.settings import RunSettings
 
 if TYPE_CHECKING:
     from mitex.methods.interface import Applied
+    from mitex.training.progress import ProgressDisplay
 
 EXPORTS = (".glb", ".obj", ".ply", ".exr")
 PICTURES = (".png", ".jpg", ".jpeg")
@@ -51,15 +53,20 @@ class FitOptions:
         """Fits, and prints the run folder."""
         raise NotImplementedError
 
-    def run_options(self, **flags: object) -> RunOptions:
+    def run_options(self, **flags: object) -> RunSettings:
         """Checks the seed; what every `fit` takes, with further `flags` as settings."""
         in_range("--seed", self.seed, *SEEDS)
-        return RunOptions(
+        return RunSettings(
             preset=self.preset,
             config=self.config,
-            overrides=merged_settings(self.set, seed=self.seed, **flags),
-            quiet=self.quiet,
+            set=merged_settings(self.set, seed=self.seed, **flags),
         )
+
+    def progress(self) -> AbstractContextManager[ProgressDisplay | None]:
+        """What shows the steps, as the `on_step` of a fit; None with --quiet."""
+        from mitex.training.progress import ProgressDisplay
+
+        return nullcontext() if self.quiet else ProgressDisplay()
 
     def folder(self, name: str) -> Path:
         """The run folder: --out, else one of that name in runs/."""
@@ -76,7 +83,7 @@ class TrainingOptions(FitOptions):
     steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the preset's)")] = None
     """Training steps."""
 
-    def run_options(self, **flags: object) -> RunOptions:
+    def run_options(self, **flags: object) -> RunSettings:
         in_range("--steps", self.steps, 1)
         return {**super().run_options(steps=self.steps, **flags), "resume": self.resume}
 

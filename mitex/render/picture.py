@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -20,7 +19,7 @@ from mitex.render.renderer import OrbitRenderer
 from mitex.render.video import check_video, write_video
 
 STILL_SUFFIXES = (".png", ".jpg", ".jpeg", ".exr")
-AZIMUTH, ELEVATION = math.radians(25), math.radians(18)
+AZIMUTH, ELEVATION = 25.0, 18.0  # [degrees]
 
 
 def tone(linear: np.ndarray, exposure: float = 0.0) -> np.ndarray:
@@ -48,15 +47,15 @@ def still(
     elevation: float = ELEVATION,
     displacement: float = 0.0,
     ao: bool = True,
-    backdrop: bool = True,
+    floating: bool = False,
     seed: int = 0,
 ) -> np.ndarray:
     """A path-traced picture of an asset.
 
     Args:
-        azimuth: from where the object is seen [rad]: 0 is its +z side, pi / 2 its +x side.
-        elevation: of the camera [rad], 0 to 85 degrees; from -85 without backdrop.
-        resolution, displacement, ao, backdrop: as in `OrbitRenderer`.
+        azimuth: from where the object is seen [degrees]: 0 is its +z side, 90 its +x side.
+        elevation: of the camera [degrees], 0 to 85; from -85 if `floating`.
+        resolution, displacement, ao, floating: as in `OrbitRenderer`.
         spp, seed: samples per pixel and the seed of their noise.
 
     Returns:
@@ -66,7 +65,7 @@ def still(
         ConfigError: an option out of range.
     """
     renderer = OrbitRenderer(
-        asset, resolution=resolution, displacement=displacement, ao=ao, backdrop=backdrop
+        asset, resolution=resolution, displacement=displacement, ao=ao, floating=floating
     )
     return renderer.render(azimuth, renderer.fit_view(azimuth, elevation), spp, seed)
 
@@ -103,7 +102,7 @@ def turntable(
     exposure: float = 0.0,
     displacement: float = 0.0,
     ao: bool = True,
-    backdrop: bool = True,
+    floating: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Renders one full turn of the asset as a video, .mp4 (H.264) or .gif, that loops without a jump.
@@ -114,7 +113,7 @@ def turntable(
         fps: frames per second, 1 to 60.
         resolution: side [px]; even for .mp4.
         progress: called with (frames done, frames) after each one.
-        spp, elevation, exposure, displacement, ao, backdrop: as in `still` and `tone`.
+        spp, elevation, exposure, displacement, ao, floating: as in `still` and `tone`.
 
     Returns:
         The path written.
@@ -126,9 +125,9 @@ def turntable(
     target = check_video(path, frames, fps, resolution)
     check_exposure(exposure)
     renderer = OrbitRenderer(
-        asset, resolution=resolution, displacement=displacement, ao=ao, backdrop=backdrop
+        asset, resolution=resolution, displacement=displacement, ao=ao, floating=floating
     )
-    angles = AZIMUTH + np.linspace(0.0, 2.0 * math.pi, frames, endpoint=False)
+    angles = AZIMUTH + np.linspace(0.0, 360.0, frames, endpoint=False)
     view = renderer.fit_view(angles.tolist(), elevation)
     # The same seed: noise that stands still compresses better and disturbs less.
     pictures = (tone(renderer.render(float(angle), view, spp), exposure) for angle in angles)

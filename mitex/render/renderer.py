@@ -45,7 +45,7 @@ class OrbitRenderer:
             undisplaced surface, since the normal map holds the same relief already; without a normal map
             they are taken from the displaced surface, which is smooth at hard edges too.
         ao: whether ambient occlusion darkens the base colour.
-        backdrop: whether the object stands on a grey sweep; without, it floats before plain white.
+        floating: show the object before plain white instead of standing on a grey sweep.
         like: the mesh that is normalised to radius 1, and stands on the backdrop; the asset moves with it, so
             that several assets can be compared. The asset's own mesh if None.
 
@@ -60,7 +60,7 @@ class OrbitRenderer:
         resolution: int = 512,
         displacement: float = 0.0,
         ao: bool = True,
-        backdrop: bool = True,
+        floating: bool = False,
         like: Mesh | None = None,
     ):
         if not 16 <= resolution <= 4096:
@@ -70,7 +70,7 @@ class OrbitRenderer:
         if displacement and "height" not in asset.vertex_maps:
             raise ConfigError("displacement needs a height map", "leave it out or use a model with height")
         self.resolution = resolution
-        self._on_backdrop = backdrop
+        self._floating = floating
         _, place = (like or asset.mesh).normalised()
         if asset.atlas is None:  # a vertex for each normal, and for each UV
             split, uv = split_at_hard_edges(asset.mesh), None
@@ -83,21 +83,22 @@ class OrbitRenderer:
         mesh = Mesh(asset.mesh.vertices[split.source], split.faces, uv, asset.mesh.name)
         self._scene, self._params = self._build(_bsdf(asset, split, ao), mesh)
 
-    def fit_view(self, azimuths: float | Sequence[float] = 0.0, elevation: float = math.radians(18)) -> View:
-        """The camera from which the object, at any of the azimuths [rad], fills the picture.
+    def fit_view(self, azimuths: float | Sequence[float] = 0.0, elevation: float = 18.0) -> View:
+        """The camera from which the object, at any of the azimuths [degrees], fills the picture.
 
         Raises:
-            ConfigError: the elevation [rad] is beyond +-85 degrees, or below the floor of the backdrop.
+            ConfigError: the elevation [degrees] is beyond +-85 degrees, or below the floor of the backdrop.
         """
-        check_elevation(elevation, self._on_backdrop)
-        angles = np.atleast_1d(np.asarray(azimuths, np.float64))
-        return fit_view(np.concatenate([self._hull @ rotation(a).T for a in angles]), elevation)
+        check_elevation(elevation, self._floating)
+        angles = np.radians(np.atleast_1d(np.asarray(azimuths, np.float64)))
+        points = np.concatenate([self._hull @ rotation(a).T for a in angles])
+        return fit_view(points, math.radians(elevation))
 
     def render(self, azimuth: float, view: View, spp: int = 64, seed: int = 0) -> np.ndarray:
         """One picture.
 
         Args:
-            azimuth: from where the object is seen [rad], 0 is its +z side, pi / 2 its +x side.
+            azimuth: from where the object is seen [degrees]: 0 is its +z side, 90 its +x side.
             view: the camera, from `fit_view`.
             spp: samples per pixel, 1 to 65536.
             seed: of the noise.
@@ -115,7 +116,7 @@ class OrbitRenderer:
         from mitex.plugins import init
         from mitex.runtime.jit import mi
 
-        init()
+        init(needs="ad_rgb")
         scene = {
             "type": "scene",
             "integrator": {"type": "path", "max_depth": MAX_DEPTH, "rr_depth": 99, "hide_emitters": True},
@@ -123,7 +124,7 @@ class OrbitRenderer:
             "object": shape("object", mesh, {"type": "twosided", "bsdf": bsdf}, normals=True),
             **lights(),
         }
-        if self._on_backdrop:
+        if not self._floating:
             scene["backdrop"] = paper_sweep(self._floor)
         loaded = mi.load_dict(scene)
         return loaded, mi.traverse(loaded)
@@ -132,7 +133,7 @@ class OrbitRenderer:
         """Updates the scene's parameters; a new `load_dict` per picture would leak memory."""
         from mitex.runtime.jit import mi
 
-        turn = rotation(azimuth).T
+        turn = rotation(math.radians(azimuth)).T
         positions, normals, detail = (a @ turn for a in (self._positions, self._normals, self._detail))
         shading = _facing(detail, normals, unit(view.origin - positions))
         # Both together: a change of positions alone makes Mitsuba recompute the normals.
@@ -144,13 +145,13 @@ class OrbitRenderer:
         self._params.update()
 
 
-def check_elevation(elevation: float, backdrop: bool) -> None:
-    """Raises a ConfigError if a camera at this elevation [rad] would look from below the floor."""
-    lowest = 0.0 if backdrop else -math.radians(85)
-    if not lowest <= elevation <= math.radians(85):
+def check_elevation(elevation: float, floating: bool) -> None:
+    """Raises a ConfigError if a camera at this elevation [degrees] would look from below the floor."""
+    lowest = -85 if floating else 0
+    if not lowest <= elevation <= 85:
         raise ConfigError(
-            f"camera elevation {math.degrees(elevation):.0f} degrees is out of range",
-            f"use {math.degrees(lowest):.0f} to 85" + (", or no backdrop" if backdrop else ""),
+            f"camera elevation {elevation:.0f} degrees is out of range",
+            f"use {lowest} to 85" + ("" if floating else ", or `floating=True`"),
         )
 
 
@@ -201,7 +202,7 @@ def _bsdf(asset: Asset, split: HardSplit, ao: bool) -> dict[str, object]:
     from mitex.plugins import init
     from mitex.runtime.jit import mi
 
-    init()
+    init(needs="ad_rgb")
     maps, kind = {k: v[split.source] for k, v in asset.vertex_maps.items()}, "vertex_field"
     if asset.texture_maps is not None:
         maps, kind = asset.texture_maps, "texel_field"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from typing import Any
@@ -32,7 +33,7 @@ def shell_still(
     spp: int = 16,
     azimuth: float = AZIMUTH,
     elevation: float = ELEVATION,
-    backdrop: bool = True,
+    floating: bool = False,
     seed: int = 0,
 ) -> np.ndarray:
     """A path-traced picture of a radiance field; what is not named here is as in `still`.
@@ -51,16 +52,16 @@ def shell_still(
     """
     if not 16 <= resolution <= 8192:
         raise ConfigError(f"a picture of {resolution} pixels is not possible", "use 16 to 8192")
-    check_elevation(elevation, backdrop)
-    init()
+    check_elevation(elevation, floating)
+    init(needs="ad_rgb")
     from mitex.textures.shell_field import shell_field
 
     centre = outline.mean(0)
     radius = float(np.linalg.norm(outline - centre, axis=1).max())
     place = Similarity((similarity.center - centre) / radius, similarity.scale / radius)
-    turn = rotation(azimuth)
+    turn = rotation(math.radians(azimuth))
     points = (outline - centre) / radius @ turn.T
-    view = fit_view(hull(points), elevation)
+    view = fit_view(hull(points), math.radians(elevation))
     look_at = mi.ScalarTransform4f().look_at(view.origin.tolist(), view.target.tolist(), [0.0, 1.0, 0.0])
     scene = {
         "type": "scene",
@@ -73,7 +74,7 @@ def shell_still(
         "sensor": sensor(resolution) | {"to_world": look_at},
         **lights(),
     }
-    if backdrop:
+    if not floating:
         scene["backdrop"] = paper_sweep(float(points[:, 1].min()))
     return accumulated(mi.load_dict(scene), resolution, spp, seed)
 

@@ -10,7 +10,7 @@ from mitex.runtime import llvm, workers
 DEFAULT_VARIANT = "llvm_ad_rgb"
 
 
-def init(variant: str = DEFAULT_VARIANT) -> Any:
+def init(variant: str = DEFAULT_VARIANT, needs: str = "") -> Any:
     """Makes Mitsuba ready and returns the module `mitsuba`; cheap to call again.
 
     A variant that has been set already stays; use `mitsuba.set_variant` to change it. As `mitex.init` it also
@@ -18,9 +18,11 @@ def init(variant: str = DEFAULT_VARIANT) -> Any:
 
     Args:
         variant: The variant to set when none is set.
+        needs: Parts that the name of the variant in use must have, joined by underscores: "ad" of what is
+            computed on whole arrays, "ad_rgb" of pictures.
 
     Raises:
-        ConfigError: This Mitsuba has no such variant.
+        ConfigError: This Mitsuba has no such variant, or the one in use lacks what is needed.
         RuntimeUnavailable: Mitsuba is not installed, or the variant needs LLVM and none is usable.
     """
     loaded = sys.modules.get("mitsuba")
@@ -36,7 +38,26 @@ def init(variant: str = DEFAULT_VARIANT) -> Any:
             raise RuntimeUnavailable(
                 f"Mitsuba cannot start '{variant}' ({e})", "choose another variant or run `mitex doctor`"
             ) from e
+    check_variant(needs)
     return mi
+
+
+def check_variant(needs: str) -> None:
+    """Checks the variant that the program has chosen, if it has; loads nothing.
+
+    Args:
+        needs: As of `init`.
+
+    Raises:
+        ConfigError: The variant lacks what is needed.
+    """
+    loaded = sys.modules.get("mitsuba")
+    variant = loaded.variant() if loaded else None
+    if variant is not None and not set(filter(None, needs.split("_"))) <= set(variant.split("_")):
+        raise ConfigError(
+            f"this does not work in Mitsuba's variant '{variant}', which is in use",
+            f"call mitsuba.set_variant('{DEFAULT_VARIANT}') first, or do it in another process",
+        )
 
 
 def load_mitsuba(needs_llvm: bool = True) -> Any:

@@ -33,7 +33,7 @@ class Cameras:
         origin: camera positions, (K, 3) float32.
         target: points looked at, (K, 3) float32.
         up: vectors that point up in the image, (K, 3) float32; need not be orthogonal to the view direction.
-        fov: vertical field of view [rad]; perspective only.
+        fov: vertical field of view [degrees]; perspective only.
         half_width: half of the image's height [mesh units]; orthographic only. A square image spans
             2 half_width on both axes.
         width, height: image size [px].
@@ -47,7 +47,7 @@ class Cameras:
     origin: Array
     target: Array
     up: Array
-    fov: float = math.radians(60)
+    fov: float = 60.0
     half_width: float = 1.0
     width: int = 320
     height: int = 320
@@ -87,7 +87,7 @@ class Cameras:
         aspect = np.float32(self.width / self.height)
         zero = np.zeros_like(right)
         if self.kind == "perspective":
-            slope = np.float32(math.tan(0.5 * self.fov))
+            slope = np.float32(math.tan(0.5 * math.radians(self.fov)))
             return (
                 np.stack((self.origin, zero, zero), axis=1),
                 np.stack((forward, slope * aspect * right, slope * up), axis=1),
@@ -131,7 +131,7 @@ class Cameras:
             },
         }
         if self.kind == "perspective":
-            sensor |= {"fov": math.degrees(self.fov), "fov_axis": "y", "near_clip": 1e-3, "far_clip": 1e4}
+            sensor |= {"fov": self.fov, "fov_axis": "y", "near_clip": 1e-3, "far_clip": 1e4}
         else:
             # Mitsuba's orthographic image spans [-1, 1] in x; the height follows from the aspect ratio.
             half = self.half_width * self.width / self.height
@@ -144,7 +144,7 @@ def random_views(
     generator: torch.Generator,
     count: int,
     distance: float = 2.5,
-    fov: float = math.radians(60),
+    fov: float = 60.0,
     resolution: int = 320,
 ) -> Cameras:
     """The paper's training views: uniform over a sphere around the origin, which they look at, up +y.
@@ -155,7 +155,7 @@ def random_views(
         generator: source of all randomness.
         count: number of views K.
         distance: of the camera from the origin [mesh units].
-        fov: vertical field of view [rad].
+        fov: vertical field of view [degrees].
         resolution: image height and width [px].
     """
     import torch
@@ -168,31 +168,31 @@ def random_views(
 
 def orbit(
     count: int,
-    elevation: float = 0.3,
+    elevation: float = 17.0,
     distance: float = 2.5,
-    fov: float = math.radians(60),
+    fov: float = 60.0,
     resolution: int = 320,
     start: float = 0.0,
 ) -> Cameras:
     """`count` views on a circle around the +y axis, looking at the origin.
 
     Args:
-        count: number of views K, at azimuths `start + 2 pi k / K`.
-        elevation: above the horizon [rad].
+        count: number of views K, at azimuths `start + 360 k / K`.
+        elevation: above the horizon [degrees].
         distance: of the camera from the origin [mesh units].
-        fov: vertical field of view [rad].
+        fov: vertical field of view [degrees].
         resolution: image height and width [px].
-        start: azimuth of the first view [rad].
+        start: azimuth of the first view [degrees].
     """
-    azimuth = start + 2 * math.pi * np.arange(count) / max(count, 1)
-    return _around(azimuth, np.full(count, elevation), distance, fov, resolution)
+    azimuth = math.radians(start) + 2 * math.pi * np.arange(count) / max(count, 1)
+    return _around(azimuth, np.full(count, math.radians(elevation)), distance, fov, resolution)
 
 
 def turntable(
     frames: int,
-    elevation: float = 0.3,
+    elevation: float = 17.0,
     distance: float = 2.5,
-    fov: float = math.radians(40),
+    fov: float = 40.0,
     resolution: int | tuple[int, int] = 512,
 ) -> Cameras:
     """One turn of the camera around the object in `frames` frames, such that the last frame meets the first.
@@ -202,7 +202,7 @@ def turntable(
     """
     size = (resolution, resolution) if isinstance(resolution, int) else resolution
     azimuth = math.pi / 2 + 2 * math.pi * np.arange(frames) / max(frames, 1)
-    return _around(azimuth, np.full(frames, elevation), distance, fov, size)
+    return _around(azimuth, np.full(frames, math.radians(elevation)), distance, fov, size)
 
 
 def patch_views(
@@ -296,8 +296,8 @@ def _check(cameras: Cameras) -> None:
         raise ConfigError(
             f"image size {cameras.width} x {cameras.height}", "both sides must be at least 1 pixel"
         )
-    if cameras.kind == "perspective" and not 0 < cameras.fov < math.pi:
-        raise ConfigError(f"field of view {cameras.fov} rad", "choose one between 0 and pi")
+    if cameras.kind == "perspective" and not 0 < cameras.fov < 180:
+        raise ConfigError(f"field of view {cameras.fov} degrees", "choose one between 0 and 180")
     if cameras.kind == "orthographic" and not 0 < cameras.half_width < math.inf:
         raise ConfigError(f"half_width {cameras.half_width}", "choose a positive number of mesh units")
     forward = cameras.target.astype(np.float64) - cameras.origin

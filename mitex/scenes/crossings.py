@@ -18,7 +18,7 @@ def crossing_edges(mesh: Mesh) -> np.ndarray:
 
     Two faces that cross have at least one such edge; faces that lie in one plane are not found.
     """
-    init()
+    init(needs="ad")
     scene = mi.load_dict({"type": "scene", "mesh": mesh_shape(mesh)})
     pairs, _ = mesh_edges(mesh.faces, len(mesh.vertices))
     start, end = (mesh.vertices[pairs[:, k]] for k in range(2))

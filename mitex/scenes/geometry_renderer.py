@@ -41,7 +41,7 @@ class GeometryRenderer:
         samples: int = 16,
         gradient_samples: int = 16,
     ) -> None:
-        init()
+        init(needs="ad")
         self.samples, self.gradient_samples = samples, gradient_samples
         self.shape = mesh.vertices.shape
         matte = mi.load_dict({"type": "diffuse", "reflectance": {"type": "rgb", "value": [reflectance] * 3}})

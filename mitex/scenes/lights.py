@@ -45,12 +45,12 @@ def studio_image(height: int = 128) -> np.ndarray:
     return image.astype(np.float32)
 
 
-def environment(strength: float = 1.0, azimuth: float = math.pi / 2, height: int = 128) -> dict[str, Any]:
+def environment(strength: float = 1.0, azimuth: float = 90.0, height: int = 128) -> dict[str, Any]:
     """A Mitsuba `envmap` of `studio_image`, which needs no file.
 
     Args:
         strength: factor on the radiance.
-        azimuth: turns the studio about +y [rad]; the light then follows a camera that turns by the same
+        azimuth: turns the studio about +y [degrees]; the light then follows a camera that turns by the same
             angle.
         height: rows of the image.
     """
@@ -60,7 +60,7 @@ def environment(strength: float = 1.0, azimuth: float = math.pi / 2, height: int
         "type": "envmap",
         "bitmap": mi.Bitmap(studio_image(height)),
         "scale": strength,
-        "to_world": mi.ScalarTransform4f().rotate([0, 1, 0], 90 - math.degrees(azimuth)),
+        "to_world": mi.ScalarTransform4f().rotate([0, 1, 0], 90 - azimuth),
     }
 
 

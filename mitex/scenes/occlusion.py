@@ -28,7 +28,7 @@ def ambient_occlusion(
     Returns:
         (N,) float32 in [0, 1], 1 where the sky is free.
     """
-    init()
+    init(needs="ad")
     scene = mi.load_dict({"type": "scene", "mesh": mesh_shape(mesh)})
     offset = OFFSET * float(np.ptp(mesh.vertices, axis=0).max())
     openness = np.empty(len(points), np.float32)

@@ -112,7 +112,7 @@ class Stage:
     FIELD = "mesh.bsdf.reflectance.data"
 
     def __init__(self, mesh: Mesh, channels: int = 3, background: Sequence[float] | float = 0.0) -> None:
-        init()
+        init(needs="ad")
         if not dr.is_jit_v(mi.Float):
             raise ConfigError(f"the variant is '{mi.variant()}'", "set an llvm or cuda one, or none")
         if channels < 1:
@@ -132,7 +132,7 @@ class Stage:
                 "mesh": mesh_shape(mesh, mi.load_dict({"type": "diffuse", "reflectance": field})),
             }
         )
-        self._faces = torch.from_numpy(np.ascontiguousarray(mesh.faces, dtype=np.int32))
+        self._faces = torch.tensor(mesh.faces)
 
     def move(self, vertices: np.ndarray) -> None:
         """Gives the mesh other vertex positions, (V, 3), and keeps its faces.

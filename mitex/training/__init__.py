@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 from mitex.lazy import attributes
 
 __all__ = [
+    "Cancelled",
     "Change",
     "Interrupted",
     "ParameterTask",
+    "Progress",
     "Step",
     "Task",
     "TrainResult",
@@ -22,9 +24,11 @@ __all__ = [
 __getattr__ = attributes(
     __name__,
     {
+        "Cancelled": "mitex.training.errors",
         "Change": "mitex.training.task",
         "Interrupted": "mitex.training.errors",
         "ParameterTask": "mitex.training.task",
+        "Progress": "mitex.training.control",
         "Step": "mitex.training.task",
         "Task": "mitex.training.task",
         "TrainResult": "mitex.training.loop",
@@ -36,6 +40,7 @@ __getattr__ = attributes(
 
 if TYPE_CHECKING:
     from mitex.training.config import resolve
-    from mitex.training.errors import Interrupted, TrainingDiverged
+    from mitex.training.control import Progress
+    from mitex.training.errors import Cancelled, Interrupted, TrainingDiverged
     from mitex.training.loop import TrainResult, train
     from mitex.training.task import Change, ParameterTask, Step, Task

@@ -110,8 +110,8 @@ def load(folder: Path) -> Checkpoint:
             )
         return checkpoint
     if problems:
-        raise CheckpointError("; ".join(problems), "restore the file or start again with another --out")
-    raise CheckpointError(f"no checkpoint in '{folder}'", "leave out --resume to start from the beginning")
+        raise CheckpointError("; ".join(problems), "restore the file or start again with another `out`")
+    raise CheckpointError(f"no checkpoint in '{folder}'", "leave out `resume` to start from the beginning")
 
 
 def read(path: Path) -> Checkpoint:

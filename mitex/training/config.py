@@ -20,7 +20,7 @@ def resolve(
     presets: Mapping[str, Config],
     preset: str | None = None,
     file: Path | None = None,
-    overrides: Sequence[str] = (),
+    overrides: Mapping[str, Any] | Sequence[str] = (),
 ) -> Config:
     """Builds a config: the preset's values, then those of the file, then the overrides, checked together.
 
@@ -28,7 +28,8 @@ def resolve(
         presets: Configs by name, all of one dataclass; the first is the default.
         preset: Name of the preset; None leaves the choice to `preset` in the overrides or the file.
         file: TOML file with any subset of the keys, or a run folder's config.toml.
-        overrides: `key=value` strings as after `--set`; any key, lists with commas, `none` where allowed.
+        overrides: values by key, for any keys; or `key=value` texts, in which lists have commas and `none`
+            stands for None. Values that are texts are read in the same way.
 
     Returns:
         A new config of the presets' class, whose own `__post_init__` has checked it.
@@ -44,13 +45,20 @@ def resolve(
             f"preset '{preset}' contradicts preset '{changes['preset']}' in '{file}'",
             "leave out one of the two",
         )
-    for setting in overrides:
-        key, text = _split(setting)
-        changes[key] = _read(key, text, kinds, values.parse)
+    changes |= {key: _read(key, value, kinds, _value) for key, value in by_key(overrides).items()}
     name = changes.get("preset", preset) or next(iter(presets))
     if name not in presets:
         raise ConfigError(f"there is no preset '{name}'", f"use {_choices(name, presets)}")
     return replace(presets[name], **(changes | {"preset": name}))  # type: ignore[type-var]
+
+
+def by_key(overrides: Mapping[str, Any] | Sequence[str]) -> dict[str, Any]:
+    """Settings by key, from such or from `key=value` texts, of which the last one counts.
+
+    Raises:
+        ConfigError: A text is no setting.
+    """
+    return dict(overrides if isinstance(overrides, Mapping) else map(_split, overrides))
 
 
 def _kinds(example: Any) -> dict[str, Any]:
@@ -63,6 +71,10 @@ def _split(setting: str) -> tuple[str, str]:
     if not equals or not key.strip():
         raise ConfigError(f"'{setting}' is not a setting", "write key=value")
     return key.strip(), text.strip()
+
+
+def _value(value: Any, kind: Any) -> Any:
+    return values.parse(value, kind) if isinstance(value, str) else values.check(value, kind)
 
 
 def _from_file(file: Path, kinds: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """The one training loop: every method hands it a task."""
 
-import json
+import logging
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,17 +10,15 @@ from typing import Any
 import torch
 
 from mitex.errors import ConfigError
-from mitex.images import write_image
-from mitex.paths import atomic_write
-from mitex.training import checkpoint, optim, run
-from mitex.training.errors import Interrupted, TrainingDiverged
-from mitex.training.metrics import Metrics, plain
-from mitex.training.progress import Progress
+from mitex.training import keeping, optim
+from mitex.training.control import ALONE, Control, Pace, Progress
+from mitex.training.errors import Cancelled, Interrupted, TrainingDiverged
 from mitex.training.signals import StopSignals
 from mitex.training.state import TrainState
 from mitex.training.task import Task
 
 PATIENCE = 3  # non-finite steps in a row that end a run
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ class TrainResult:
 def train(
     task: Task,
     config: Any,
-    out: str | Path,
+    out: str | Path | None,
     *,
     lr: float | Callable[[int], float],
     milestones: Sequence[int] = (),
@@ -54,7 +52,7 @@ def train(
     normalise_gradients: bool = False,
     optimizer: Callable[[Sequence[torch.Tensor]], optim.Optimizer] = optim.Adam,
     resume: bool = False,
-    quiet: bool = False,
+    control: Control = ALONE,
 ) -> TrainResult:
     """Trains a task, and keeps a run folder from which it can go on after any end.
 
@@ -65,7 +63,7 @@ def train(
         config: The method's resolved config, a flat dataclass with `steps`, `seed`, `checkpoint_every` (one
             more is saved at the end) and `preview_every` (one more is made at the end; 0 makes none).
         out: Run folder: missing, empty, or of a run that never reached a checkpoint; with `resume`, one with
-            a checkpoint.
+            a checkpoint. None trains in memory and writes no file.
         lr: Learning rate, or a function from the step (from 0) to it.
         milestones: Steps from which on the learning rate is multiplied by `decay` once more.
         decay: Factor at each milestone.
@@ -73,7 +71,7 @@ def train(
         optimizer: Makes the optimizer of the task's parameters.
         resume: Go on from the folder's checkpoint. On one thread the result is bit-identical with that of an
             uninterrupted run. The config may differ in `mitex.training.state.FREE_KEYS` only.
-        quiet: Show no progress.
+        control: Is told of every step, and may stop the training.
 
     Returns:
         How the training ended.
@@ -82,75 +80,54 @@ def train(
         OutputError: The folder holds a run already (without `resume`), is in use, or cannot be written.
         CheckpointError: There is nothing to resume, or it belongs to another config or method.
         TrainingDiverged: Loss, gradients or a metric of `Task.begin` were not finite three steps in a row.
-        Interrupted: SIGINT or SIGTERM; a checkpoint of the last whole step has been saved.
+        Cancelled: By `control`; a checkpoint of the last whole step has been saved if there is a folder.
+        Interrupted: SIGINT or SIGTERM; likewise. Only in the main thread.
     """
     if config.checkpoint_every < 1 or config.preview_every < 0:
         raise ConfigError("checkpoints and previews need a spacing", "set checkpoint_every to 1 or more")
     schedule = lr if callable(lr) else optim.multistep(lr, milestones, decay)
-    with run.opened(out, resume) as (folder, metrics):
+    with keeping.opened(out, resume, config.checkpoint_every, config.preview_every) as kept:
         state = TrainState(task, config, schedule, normalise_gradients, optimizer)
-        if resume:
-            state.restore(checkpoint.load(folder))
-        run.prepare(folder, config, task.metadata())
-        metrics.truncate(state.step)
-        every = config.checkpoint_every, config.preview_every
-        writer = _Writer(folder, state, metrics, *every, saved=state.step if resume else -1)
-        title = task.metadata().get("method", "training")
-        with Progress(title, folder, state.step, config.steps, quiet) as progress, StopSignals(quiet) as stop:
-            while state.step < config.steps and not stop.requested:
+        kept.begin(state)
+        tell = _teller(state, kept.place, control)
+        with StopSignals() as stop:
+            while state.step < config.steps and not (stop.requested or control.cancelled):
                 record = state.advance()
-                metrics.write(record)
-                progress.update(state.step, state.loss)
+                kept.write(record)
                 if state.skipped >= PATIENCE:
-                    raise _diverged(folder, record, state)
-                writer.after_step(last=state.step == config.steps)
-            writer.save()
+                    raise _diverged(record, state, kept)
+                kept.after_step(state, last=state.step == config.steps)
+                tell(record)
+            kept.save(state)
     if stop.requested:
-        raise Interrupted(folder / checkpoint.NAME, state.step)
+        raise Interrupted(kept.checkpoint, state.step)
+    if state.step < config.steps:
+        raise Cancelled(kept.checkpoint, state.step)
     return TrainResult(state.step, state.loss, state.seconds)
 
 
-@dataclass
-class _Writer:
-    """Saves checkpoints and previews when they are due; `saved` is the step of the newest checkpoint."""
+def _teller(state: TrainState, place: str, control: Control) -> Callable[[dict[str, Any]], None]:
+    """Tells the caller that the training starts; returns what tells of each step, given its record."""
+    stage, steps = state.task.metadata().get("method", "training"), state.config.steps
+    verb = f"continues at step {state.step} of {steps}" if state.step else f"starts, {steps} steps"
+    log.info("%s %s; output in %s", stage, verb, place)
+    pace = Pace(state.step, steps)
 
-    folder: Path
-    state: TrainState
-    metrics: Metrics
-    checkpoint_every: int
-    preview_every: int
-    saved: int
+    def tell(record: dict[str, Any]) -> None:
+        if control.on_step is not None:
+            measured = pace.measure(state.step) if record else {}
+            progress = Progress(stage, state.step, steps, state.loss, record, state.seconds, **measured)
+            control.on_step(progress)
 
-    def after_step(self, last: bool) -> None:
-        step = self.state.step
-        # In a row of skipped steps a checkpoint waits: the parameters may be what makes the loss non-finite.
-        if last or (step % self.checkpoint_every == 0 and not self.state.skipped):
-            self.save()
-        if self.preview_every and (last or step % self.preview_every == 0):
-            picture = self.state.task.preview(step)
-            if picture is not None:
-                write_image(self.folder / run.PREVIEWS / f"{step:06}.png", picture)
-
-    def save(self) -> None:
-        if self.saved != self.state.step:
-            self.metrics.sync()
-            checkpoint.save(self.folder, self.state.snapshot())
-            self.saved = self.state.step
+    tell({})
+    return tell
 
 
-def _diverged(folder: Path, record: dict[str, Any], state: TrainState) -> TrainingDiverged:
-    kind = record["skipped"]
-    norms = optim.gradient_norms(state.optimizer.parameters).tolist() if kind == "gradient" else []
-    with atomic_write(folder / run.DIVERGED) as temporary:
-        dump = plain(record) | {"gradient_norms": [str(norm) for norm in norms]}
-        temporary.write_text(json.dumps(dump, indent=1) + "\n", encoding="utf-8")
-    name = kind.replace("_", " ")
-    newest = folder / checkpoint.NAME
-    last_good, again = "no checkpoint had been reached", "set"
-    if newest.exists():
-        last_good, again = f"the last good checkpoint is '{newest}'", "add --resume and set"
+def _diverged(record: dict[str, Any], state: TrainState, kept: keeping.Nothing) -> TrainingDiverged:
+    name = record["skipped"].replace("_", " ")
+    again = "add `resume=True` and set" if kept.checkpoint else "set"
     return TrainingDiverged(
-        f"the {name} was not finite in {PATIENCE} steps in a row, up to step {state.step}; {last_good}, and "
-        f"'{folder / run.DIVERGED}' has the step's numbers",
+        f"the {name} was not finite in {PATIENCE} steps in a row, up to step {state.step}; "
+        f"{kept.diverged(record, state)}",
         f"{again} a smaller learning rate, or another seed for a new run",
     )

@@ -38,7 +38,7 @@ class Metrics:
             except BlockingIOError as e:
                 self._file.close()
                 raise OutputError(
-                    f"another process is training in '{path.parent}'", "wait for it or name another --out"
+                    f"another process is training in '{path.parent}'", "wait for it or name another `out`"
                 ) from e
             except OSError:
                 pass  # a file system without locks

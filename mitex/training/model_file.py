@@ -45,7 +45,7 @@ def opened(source: str | Path, kind: str) -> Iterator[tuple[dict[str, torch.Tens
     path = locate(source)[0]
     if path.name in (CHECKPOINT, PREVIOUS):
         raise CheckpointError(
-            f"there is no finished {kind} texture at '{source}'", f"go on with mitex fit {kind} --resume"
+            f"there is no finished {kind} texture at '{source}'", "finish its fit, which can be resumed"
         )
     try:
         tensors, metadata = read(path)
@@ -54,7 +54,7 @@ def opened(source: str | Path, kind: str) -> Iterator[tuple[dict[str, torch.Tens
         yield tensors, json.loads(metadata["about"])
     except (SafetensorError, MeshError, OSError, ValueError, KeyError, TypeError, RuntimeError) as e:
         raise CheckpointError(
-            f"'{path}' is not a {kind} texture ({e})", f"name the run folder of mitex fit {kind}"
+            f"'{path}' is not a {kind} texture ({e})", f"name the run folder of a {kind} fit"
         ) from e
 
 

@@ -1,87 +1,71 @@
-"""What a person sees of a training: a bar on a terminal, now and then a line elsewhere, nothing if quiet."""
+"""What a person sees of a training: a bar on a terminal, now and then a line elsewhere."""
 
 import math
 import sys
 import time
-from collections import deque
-from pathlib import Path
 from typing import Any, TextIO
+
+from mitex.training.control import Progress
 
 REFRESH = 0.2  # [s]
 LINE_EVERY = 30.0  # [s]
 
 
-class Progress:
-    """Shows step, smoothed loss, speed, time left and the place of the output, on stderr.
+class ProgressDisplay:
+    """An `on_step` that shows step, smoothed loss, speed and time left; a context, which ends its bar.
 
     Args:
-        title: What is being trained.
-        out: Run folder, named at the start.
-        step: Steps done before.
-        steps: Steps in all.
-        quiet: Show nothing.
         stream: Where to; None is stderr.
     """
 
-    def __init__(
-        self, title: str, out: Path, step: int, steps: int, quiet: bool, stream: TextIO | None = None
-    ):
-        self.title = title
-        self.steps = steps
+    def __init__(self, stream: TextIO | None = None):
         self._stream = sys.stderr if stream is None else stream
-        self._last_shown = time.monotonic()
-        self._times: deque[tuple[float, int]] = deque([(self._last_shown, step)], maxlen=50)
-        self._latest: tuple[int, float] | None = None
+        self._last_shown = -math.inf
+        self._latest: Progress | None = None
         self._bar: Any = None
-        self._quiet = quiet
-        if not quiet:
-            verb = f"continues at step {step} of {steps}" if step else f"starts, {steps} steps"
-            self._say(f"{title} {verb}; output in {out}")
+
+    def __call__(self, progress: Progress) -> None:
+        begins = not progress.metrics
+        if begins:
+            self._end()
             if self._stream.isatty():
-                self._open_bar(step)
-
-    def update(self, step: int, loss: float) -> None:
-        """Reports that `step` steps are done."""
-        if self._quiet:
-            return
-        self._latest = (step, loss)
-        now = time.monotonic()
-        if now - self._times[-1][0] >= REFRESH or step == self.steps:
-            self._times.append((now, step))
-        due = REFRESH if self._bar else LINE_EVERY
-        if now - self._last_shown >= due or step == self.steps:
+                self._open_bar(progress)
+        self._latest = progress
+        now, due = time.monotonic(), REFRESH if self._bar else LINE_EVERY
+        if begins:
             self._last_shown = now
-            self._show(step, loss)
+        elif now - self._last_shown >= due or progress.step == progress.steps:
+            self._last_shown = now
+            self._show(progress)
 
-    def __enter__(self) -> "Progress":
+    def __enter__(self) -> "ProgressDisplay":
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._end()
+
+    def _end(self) -> None:
         if self._bar:
             if self._latest:  # the bar stays on the screen, so it should end with what was reached
-                self._show(*self._latest)
+                self._show(self._latest)
             self._bar.stop()
+            self._bar = None
 
-    @property
-    def speed(self) -> float:
-        """Steps per second, over the last 50 steps or 10 s, whichever is longer."""
-        (t0, s0), (t1, s1) = self._times[0], self._times[-1]
-        return (s1 - s0) / (t1 - t0) if t1 > t0 else 0.0
-
-    def _show(self, step: int, loss: float) -> None:
-        speed = self.speed
-        pace = f"{speed:.2f} steps/s" if speed >= 1 or speed == 0 else f"{1 / speed:.2f} s/step"
-        left = clock((self.steps - step) / speed) if speed else "?"
+    def _show(self, progress: Progress) -> None:
+        pace, left = "-", "?"
+        if progress.speed and progress.seconds_left is not None:
+            slow = progress.speed < 1
+            pace = f"{1 / progress.speed:.2f} s/step" if slow else f"{progress.speed:.2f} steps/s"
+            left = clock(progress.seconds_left)
+        step, steps, loss = progress.step, progress.steps, f"{progress.loss:.4g}"
         if self._bar:
-            self._bar.update(self._row, completed=step, loss=f"{loss:.4g}", pace=pace, left=left)
+            self._bar.update(self._row, completed=step, loss=loss, pace=pace, left=left)
             self._bar.refresh()
         else:
-            self._say(f"{self.title} step {step}/{self.steps}, loss {loss:.4g}, {pace}, {left} left")
+            line = f"{progress.stage} step {step}/{steps}, loss {loss}, {pace}, {left} left"
+            print(line, file=self._stream, flush=True)
 
-    def _say(self, line: str) -> None:
-        print(line, file=self._stream, flush=True)
-
-    def _open_bar(self, step: int) -> None:
+    def _open_bar(self, progress: Progress) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
         from rich.progress import Progress as Bar
@@ -96,9 +80,8 @@ class Progress:
             console=Console(file=self._stream),
             auto_refresh=False,
         )
-        self._row = self._bar.add_task(
-            self.title, total=self.steps, completed=step, loss="-", pace="-", left="?"
-        )
+        start = {"total": progress.steps, "completed": progress.step}
+        self._row = self._bar.add_task(progress.stage, **start, loss="-", pace="-", left="?")
         self._bar.start()
 
 

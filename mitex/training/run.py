@@ -24,8 +24,10 @@ PREVIEWS = "previews"
 DIVERGED = "diverged.json"
 
 
-def check(out: str | os.PathLike[str], resume: bool = False) -> None:
+def check(out: str | os.PathLike[str] | None, resume: bool = False) -> None:
     """Checks, before any long work, that a run can start or go on in a folder. Creates nothing.
+
+    None stands for no folder, which has nothing to go on from.
 
     Without `resume` the folder may be missing, empty, or of a run that never reached a checkpoint: that its
     config.toml tells, since other programs write files of the same names.
@@ -34,25 +36,29 @@ def check(out: str | os.PathLike[str], resume: bool = False) -> None:
         OutputError: There is a run already, or other files.
         CheckpointError: There is nothing to resume.
     """
+    if out is None:
+        if resume:
+            raise CheckpointError("there is nothing to resume in memory", "name the run folder with `out`")
+        return
     folder = expanded(out)
     try:
         begun = any((folder / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
         finished = not begun and _is_run(folder) and (folder / RESULT).exists()
         foreign = not begun and folder.is_dir() and not (_is_run(folder) or _is_empty(folder))
     except (OSError, ValueError) as e:  # ValueError: a null byte in the name
-        raise OutputError(f"cannot use '{out}' as a run folder ({e})", "name another --out") from e
+        raise OutputError(f"cannot use '{out}' as a run folder ({e})", "name another `out`") from e
     if resume and not begun:
         raise CheckpointError(
-            f"there is no checkpoint in '{out}' to resume", "leave out --resume to start from the beginning"
+            f"there is no checkpoint in '{out}' to resume", "leave out `resume` to start from the beginning"
         )
     if begun and not resume:
         raise OutputError(
-            f"'{out}' holds a run already", "add --resume to continue it, or name another --out"
+            f"'{out}' holds a run already", "add `resume=True` to continue it, or name another `out`"
         )
     if finished:  # by a method that leaves no checkpoint
-        raise OutputError(f"'{out}' holds a finished run", "name another --out")
+        raise OutputError(f"'{out}' holds a finished run", "name another `out`")
     if foreign:
-        raise OutputError(f"'{out}' holds other files", "name a new or empty folder with --out")
+        raise OutputError(f"'{out}' holds other files", "name a new or empty folder with `out`")
 
 
 @contextmanager

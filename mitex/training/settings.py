@@ -3,33 +3,48 @@
 from __future__ import annotations
 
 import typing
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypedDict, get_args, get_origin
 
 from mitex.errors import ConfigError
 from mitex.training import values
+from mitex.training.control import Cancel, Progress
 
 LARGEST_SEED = 2**32 - 1
 
 
-class RunOptions(TypedDict, total=False):
-    """What every `fit` takes besides what it learns from.
+class RunSettings(TypedDict, total=False):
+    """How a fit is set up.
 
     Attributes:
         preset: Name of the preset to start from; the first one if None.
         config: TOML file with any of the settings, or a run's config.toml.
-        overrides: `key=value` strings, for any key.
+        set: Any settings, by key; or `key=value` texts.
+        seed: Of all randomness.
+        steps: Training steps.
         resume: Go on from the run's checkpoint, with its config as far as no other is given.
-        quiet: Show no progress.
     """
 
     preset: str | None
-    config: Path | None
-    overrides: Sequence[str]
+    config: str | Path | None
+    set: Mapping[str, Any] | Sequence[str]
+    seed: int | None
+    steps: int | None
     resume: bool
-    quiet: bool
+
+
+class RunOptions(RunSettings, total=False):
+    """What every `fit` takes besides what it learns from: `RunSettings`, and what its caller hears and says.
+
+    Attributes:
+        on_step: Called with a `Progress` at the start and after every step, in the fit's own thread.
+        cancel: Stops the fit before the next step once its `is_set()` is true, as of a `threading.Event`.
+    """
+
+    on_step: Callable[[Progress], None] | None
+    cancel: Cancel | None
 
 
 def key(default: Any, meaning: str, low: float | None = None, high: float | None = None) -> Any:

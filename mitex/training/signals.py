@@ -1,13 +1,12 @@
 """Stopping on Ctrl-C and SIGTERM between two steps rather than inside one."""
 
-import os
+import logging
 import signal
 import threading
-from contextlib import suppress
 from types import FrameType
 from typing import Any
 
-NOTICE = b"\nstopping after this step; once more to stop at once\n"
+log = logging.getLogger(__name__)
 
 
 class StopSignals:
@@ -16,14 +15,10 @@ class StopSignals:
     Outside the main thread, where Python allows no handlers, it does nothing. A signal that the parent
     process asked to ignore (`nohup`, a script's background job) stays ignored. Earlier handlers come back at
     exit.
-
-    Args:
-        quiet: Do not answer the first signal on stderr.
     """
 
-    def __init__(self, quiet: bool = True):
+    def __init__(self) -> None:
         self.requested = False
-        self._quiet = quiet
         self._earlier: dict[int, Any] = {}
 
     def __enter__(self) -> "StopSignals":
@@ -42,6 +37,5 @@ class StopSignals:
         if self.requested:
             raise KeyboardInterrupt
         self.requested = True
-        if not self._quiet:
-            with suppress(OSError):
-                os.write(2, NOTICE)  # print() might be what has been interrupted, and cannot be re-entered
+        # The lock of `logging` lets its own thread in again; a handler that writes unbuffered is safe here.
+        log.info("stopping after this step; once more to stop at once")

@@ -120,7 +120,7 @@ class TrainState:
         Raises:
             CheckpointError: It is of another method, exemplar, config or shape.
         """
-        remedy = "resume with the settings it was made with, or name another --out"
+        remedy = "resume with the settings it was made with, or name another `out`"
         for old, new in ((saved.metadata, self.task.metadata()), (saved.config, as_json(self.config))):
             for key in sorted(old.keys() | new.keys()):
                 if key not in FREE_KEYS and old.get(key) != new.get(key):

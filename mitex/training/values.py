@@ -5,7 +5,7 @@ Types: int, float, bool, str, None, Literal, tuples of these (any or fixed lengt
 
 import math
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, Union, get_args, get_origin
 
 Reader = Callable[[Any, Any], Any]  # from a value and its type to the value that it stands for
@@ -51,13 +51,15 @@ def parse(text: str, kind: Any) -> Any:
 
 
 def check(value: Any, kind: Any) -> Any:
-    """Reads a value that TOML has typed already; lists become tuples, and "none" None where that is allowed.
+    """Reads a value that has a type already, as from TOML; lists become tuples.
+
+    "none" stands for None, which TOML does not have, where that is allowed.
 
     Raises:
         ValueError: It is no value of this type.
     """
     if kind is types.NoneType:
-        return _one_of({"none": None}, value)
+        return None if value is None else _one_of({"none": None}, value)
     if kind is float and type(value) in (int, float):
         return _finite(float(value))
     if kind in NAMES and type(value) is kind:  # an exact match, since True would pass as an int
@@ -67,7 +69,7 @@ def check(value: Any, kind: Any) -> Any:
             if type(choice) is type(value) and choice == value:
                 return choice
         raise ValueError(value)
-    if get_origin(kind) is tuple and isinstance(value, list):
+    if get_origin(kind) is tuple and isinstance(value, list | tuple):
         return _each(check, value, kind)
     return _first(check, value, kind)
 
@@ -100,7 +102,7 @@ def _finite(number: float) -> float:
     return number
 
 
-def _each(reader: Reader, items: list[Any], kind: Any) -> tuple[Any, ...]:
+def _each(reader: Reader, items: Sequence[Any], kind: Any) -> tuple[Any, ...]:
     kinds = get_args(kind)
     if kinds[-1] is ...:
         kinds = (kinds[0],) * len(items)

@@ -66,6 +66,15 @@ class TestExitCodes:
         assert main(["try"]) == 2
         assert capsys.readouterr() == ("", "error: this is wrong; do that\n")
 
+    def test_arguments_of_python_calls_are_named_as_options(self, command, capsys):
+        """Those that the command has; `mitex doctor` and the like stay as they are."""
+        command.action = fail(
+            ConfigError("`count` is wrong", "give `count=3`, or `resume=True`, or `mitex x`")
+        )
+        assert main(["try"]) == 2
+        words = "--count is wrong; give --count 3, or `resume=True`, or `mitex x`"
+        assert capsys.readouterr().err == f"error: {words}\n"
+
     def test_interrupted(self, command, capsys, tmp_path):
         command.action = fail(Interrupted(tmp_path / "c", 7))
         assert main(["try"]) == 130

@@ -1,4 +1,4 @@
-"""The commands doing their work, in small: fit, apply, render, models, demo."""
+"""The commands doing their work, in small: fit, apply, render, models."""
 
 import json
 import os
@@ -16,10 +16,7 @@ from mitex.asset import Asset
 from mitex.cli import main
 from mitex.cli.models import listing
 from mitex.exemplar import MAPS
-from mitex.exemplar import names as exemplar_names
 from mitex.images import read_image
-from mitex.mesh import embedded_names
-from mitex.methods.nca import demo
 from tests.cli import bad_files
 
 TINY = [
@@ -74,7 +71,7 @@ def test_fit_apply_render(folder, capsys):
     dense = Asset.load("d.glb")
     assert len(dense.mesh.faces) == 12 * 16 and dense.atlas is not None
 
-    render = ["render", "a.glb", "--size", "16", "--spp", "1"]
+    render = ["render", "a.glb", "--resolution", "16", "--spp", "1"]
     assert run(*render, "--out", "a.png", "--azimuth", "-30", "--elevation", "40") == "a.png"
     assert read_image("a.png").shape == (16, 16, 3)
     assert run(*render, "--out", "a.gif", "--frames", "3", "--floating", "--elevation", "-10") == "a.gif"
@@ -95,7 +92,7 @@ def test_options_reach_the_library(folder, monkeypatch, capsys):
         "apply m.safetensors --mesh cube.obj --out a.ply --subdivide 0 --steps 1 --orientation 90 --seed 5"
     )
     assert main(words.split()) == 0
-    expected = {"seed": 5, "steps": 1, "subdivide": 0, "orientation": np.pi / 2, "scale": 1.0}
+    expected = {"seed": 5, "steps": 1, "subdivide": 0, "orientation": 90, "scale": 1.0}
     assert options == expected | {"resolution": None, "keep_dense": False}
     assert main([*words.split(), "--keep-dense"]) == 0
     assert options == expected | {"resolution": None, "keep_dense": True}
@@ -104,8 +101,13 @@ def test_options_reach_the_library(folder, monkeypatch, capsys):
         "mitex.render.picture.still", lambda asset, **o: options.update(o) or np.zeros((4, 4, 3))
     )
     options.clear()
-    assert main(["render", "a.ply", "--out", "a.png", "--azimuth", "180", "--size", "32"]) == 0
-    assert options == {"resolution": 32, "azimuth": np.pi, "displacement": 0.0, "backdrop": True}
+    assert main(["render", "a.ply", "--out", "a.png", "--azimuth", "180", "--resolution", "32"]) == 0
+    assert options == {
+        "resolution": 32,
+        "azimuth": 180,
+        "displacement": 0.0,
+        "floating": False,
+    }
 
 
 def test_models(folder, monkeypatch, capsys):
@@ -127,33 +129,6 @@ def test_bundled_models_are_listed_with_how_they_were_made():
     for model in listing():
         assert {"name", "method", "path", "thumbnail", "preset", "steps", "seconds", "loss"} <= set(model)
         assert model["thumbnail"] and (model["method"] == "geometric" or model["maps"])
-
-
-def test_what_the_demo_shows_is_there():
-    assert demo.EXEMPLAR in exemplar_names() and set(demo.MESHES) <= set(embedded_names())
-
-
-def test_demo(folder, monkeypatch, capsys):
-    """All of it, at toy size; the second call goes on from the first."""
-    from mitex.methods import nca
-
-    fit, grow, bake = nca.fit, nca.NcaTexture.apply, Asset.baked
-
-    def tiny_fit(*arguments, overrides, init, **options):
-        return fit(*arguments, overrides=[*overrides, *TINY], **options, quiet=True)
-
-    monkeypatch.setattr(nca, "fit", tiny_fit)
-    monkeypatch.setattr(nca.NcaTexture, "apply", lambda *a, **o: grow(*a, **o, subdivide=1, steps=2))
-    monkeypatch.setattr(Asset, "baked", lambda self, resolution, **o: bake(self, 64, **o))
-    monkeypatch.setattr(demo, "MESHES", ("cube.obj",))
-    monkeypatch.setattr(demo, "SIZE", 16)
-    monkeypatch.setattr(demo, "SAMPLES", 1)
-    for start in (f"model '{demo.PARENT}'", "the run in the folder"):
-        assert main(["demo", "--out", "shown", "--steps", "2"]) == 0
-        assert f"starting from {start}" in capsys.readouterr().out
-    names = {path.name for path in (folder / "shown").iterdir()}
-    assert names == {"run", "cube.glb", "cube.png", "demo.png"}
-    assert read_image(folder / "shown" / "demo.png").shape == (16, 32, 3)
 
 
 @pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])

@@ -62,7 +62,7 @@ class TestFullDisks:
         bad.model(files / "m.safetensors")
         assert main(apply("--subdivide 0 --steps 1 --vertex-colors", model="m.safetensors")) == 0
         capsys.readouterr()
-        words = f"render out/a.glb --out out/{name} --size 16 --spp 1".split()
+        words = f"render out/a.glb --out out/{name} --resolution 16 --spp 1".split()
         fill(moment)
         check_refused(files, words + ["--frames", "2"] * name.endswith("gif"), "space", capsys)
 

@@ -44,7 +44,7 @@ def test_fit_apply_render(files, capsys):
     assert capsys.readouterr().out.strip() == "out/run"
     assert main(apply("--start-level 0 --end-level 1 --seed 3")) == 0
     assert len(Mesh.load(files / "out" / "a.ply").faces) == 4 * 12
-    assert main(["render", "out/a.ply", "--out", "out/a.png", "--size", "32", "--spp", "1"]) == 0
+    assert main(["render", "out/a.ply", "--out", "out/a.png", "--resolution", "32", "--spp", "1"]) == 0
 
 
 def test_further_levels_by_resuming(files, run):
@@ -71,7 +71,7 @@ def test_advice_on_the_size(files, run, capsys):
 
 
 def animate(words="", mesh="good.obj", model="out/run", out="out/a.gif"):
-    return f"animate {model} --mesh {mesh} --out {out} --size 32 --spp 1 {words}".split()
+    return f"animate {model} --mesh {mesh} --out {out} --resolution 32 --spp 1 {words}".split()
 
 
 @pytest.mark.parametrize(
@@ -101,8 +101,8 @@ BAD_FILMS = {
     "a still": (animate(out="out/a.png"), ".mp4"),
     "one frame": (animate("--frames 1"), "--frames"),
     "no frames a second": (animate("--fps 0"), "--fps"),
-    "huge pictures": (animate("--size 9999"), "--size"),
-    "odd size": (animate("--size 33", out="out/a.mp4"), "even size"),
+    "huge pictures": (animate("--resolution 9999"), "--resolution"),
+    "odd size": (animate("--resolution 33", out="out/a.mp4"), "even size"),
     "level beyond": (animate("--end-level 5"), "this texture has the levels 0 to 1"),
     "missing mesh": (animate(mesh="none.obj"), "none.obj"),
     "another method": (animate(model="pebbles"), "name a run of geometric"),

@@ -45,7 +45,7 @@ def test_fit_apply_render(files, run, capsys):
     assert geometry.visual.material.baseColorTexture.size == (32, 32)
     cube = Mesh.load(files / "good.obj").vertices
     assert np.allclose(geometry.bounds, [cube.min(0), cube.max(0)], atol=1e-6)
-    assert main(["render", "out/a.glb", "--out", "out/a.png", "--size", "32", "--spp", "1"]) == 0
+    assert main(["render", "out/a.glb", "--out", "out/a.png", "--resolution", "32", "--spp", "1"]) == 0
     assert main(["apply", "out/run", "--mesh", "good.obj", "--out", "out/a.ply"]) == 0
     assert "out/a.ply" in capsys.readouterr().out
 

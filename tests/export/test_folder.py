@@ -98,7 +98,7 @@ def test_files_of_others_are_kept(baked, tmp_path, name, content):
     before = _contents(tmp_path)
     kind: Any = "exr" if name.endswith(".exr") else "png"
     for write in (baked.export, prepare_export):
-        with pytest.raises(OutputError, match=f"{name}'.* that Mitex did not write; name another --out"):
+        with pytest.raises(OutputError, match=f"{name}'.* that Mitex did not write; name another place"):
             write(tmp_path, maps_format=kind)
     assert _contents(tmp_path) == before
 

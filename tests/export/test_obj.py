@@ -101,7 +101,7 @@ def test_files_beside_it_that_others_wrote_are_kept(baked, tmp_path, name, conte
         file.write_text("newmtl Mitex\n" if content == "text" else "")
     before = {} if content == "link" else _contents(tmp_path)
     for write in (baked.export, prepare_export):
-        with pytest.raises(OutputError, match=rf"'a.obj' comes with '.*{name}'.*; name another --out"):
+        with pytest.raises(OutputError, match=rf"'a.obj' comes with '.*{name}'.*; name another place"):
             write(tmp_path / "a.obj")
     assert content == "link" or _contents(tmp_path) == before
 

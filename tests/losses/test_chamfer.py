@@ -43,7 +43,7 @@ def test_nearest_by_brute_force():
 def test_both_normal_terms_work():
     """Turning one surface inside out changes both by 2: neither is stuck at its best value."""
     mesh = icosphere(8)
-    points, faces = torch.from_numpy(mesh.vertices), torch.from_numpy(mesh.faces).long()
+    points, faces = torch.tensor(mesh.vertices), torch.from_numpy(mesh.faces).long()
     theirs = sample_surface(points, faces, 4_000, seeded(1))
     ours = sample_surface(points, faces, 4_000, seeded(2))
     turned = sample_surface(points, faces.flip(1), 4_000, seeded(2))
@@ -53,7 +53,7 @@ def test_both_normal_terms_work():
 
 def test_two_parallel_squares():
     mesh = grid(4, 4)
-    points, faces = torch.from_numpy(mesh.vertices), torch.from_numpy(mesh.faces).long()
+    points, faces = torch.tensor(mesh.vertices), torch.from_numpy(mesh.faces).long()
     lower = sample_surface(points, faces, 20_000, seeded(1))
     upper = sample_surface(points + torch.tensor([0.0, 0, 0.5]), faces, 20_000, seeded(2))
     to, back, normals, _ = chamfer(lower, upper)
@@ -63,8 +63,8 @@ def test_two_parallel_squares():
 
 def test_gradients_by_finite_differences():
     mesh = icosphere(2)
-    faces = torch.from_numpy(mesh.faces).long()
-    target = sample_surface(torch.from_numpy(mesh.vertices).double() * 1.2, faces, 400, seeded(1))
+    faces = torch.tensor(mesh.faces).long()
+    target = sample_surface(torch.tensor(mesh.vertices).double() * 1.2, faces, 400, seeded(1))
     start = torch.from_numpy(mesh.vertices + np.random.default_rng(0).normal(0, 0.05, mesh.vertices.shape))
 
     def distance(points: torch.Tensor) -> torch.Tensor:

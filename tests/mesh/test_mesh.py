@@ -41,6 +41,25 @@ def test_refuses_wrong_arrays(vertices, faces, uv, words):
     assert error.value.remedy
 
 
+def test_nothing_of_a_mesh_can_be_changed():
+    """Neither through its own arrays, nor through those that it was made from."""
+    ball = icosphere(1)
+    arrays = [ball.vertices.copy(), ball.faces.copy(), np.zeros((20, 3, 2), np.float32)]
+    mesh = Mesh(*arrays, corner_normals=ball.normals[ball.faces])
+    computed = [mesh.normals, mesh.face_normals, mesh.face_areas, mesh.face_crosses, mesh.edge_lengths]
+    graph = [mesh.edges.indptr, mesh.edges.indices]
+    assert mesh.uv is not None and mesh.corner_normals is not None
+    for array in (mesh.vertices, mesh.faces, mesh.uv, mesh.corner_normals, *computed, *graph):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+    for array in arrays:
+        array += 1
+    np.testing.assert_array_equal(mesh.vertices, ball.vertices)
+    np.testing.assert_array_equal(mesh.faces, ball.faces)
+    assert not mesh.uv.any()
+    assert mesh.with_vertices(2 * mesh.vertices).faces is mesh.faces  # what is constant is shared
+
+
 def test_indices_that_overflow_int32_are_refused():
     with pytest.raises(MeshError, match="4294967296"):
         Mesh(FAN_POINTS, np.array([[0, 1, 2**32]]))

@@ -3,22 +3,30 @@
 import json
 import subprocess
 import sys
+import threading
 import tomllib
 from dataclasses import fields
+from importlib import import_module
+from inspect import signature
 from pathlib import Path
 
+import numpy as np
 import pytest
+import torch
 
+import mitex
 from mitex.cli import main
+from mitex.cli.usage import parse
 from mitex.errors import CheckpointError
 from mitex.images import read_image
 from mitex.lazy import load as resolve_reference
 from mitex.methods.options import ApplyOptions, FitOptions
 from mitex.methods.registry import load, method_of, methods
-from mitex.training import checkpoint
+from mitex.training import checkpoint, model_file
 from mitex.training.locate import NAME
 from mitex.training.settings import FitConfig, meaning
 from tests.methods.fits import FITS, prepare
+from tests.state import in_thread, program_state
 
 SIDE = 48  # of pictures [pixels]
 TOY = Path(__file__).parents[1] / "toy"
@@ -53,8 +61,10 @@ def runs(workplace, toy, own_cache):
         if name not in folders:
             with pytest.MonkeyPatch.context() as patch:
                 patch.chdir(workplace)
-                words = f"fit {name} --out runs/{name} --quiet {FITS[name].fit}".split()
-                assert main(words) == 0
+                words = f"--out runs/{name} --quiet {FITS[name].fit}".split()
+                command, before = parse(methods()[name].load_fit(), words, "fit"), program_state()
+                command.run()
+                assert program_state() == before
             folders[name] = workplace / "runs" / name
         return folders[name]
 
@@ -92,6 +102,68 @@ def test_an_installed_method_cannot_take_a_built_in_one_s_name(monkeypatch, toy)
     methods.cache_clear()
 
 
+def python_fit(name, **options):
+    """The fit of the words in Python: the names are the same."""
+    method = methods()[name]
+    command = parse(method.load_fit(), FITS[name].fit.split(), "fit")
+    fit = import_module(method.texture.partition(":")[0].rpartition(".")[0] or "checkerboard").fit
+    inputs = {key: getattr(command, key) for key in signature(fit).parameters if hasattr(command, key)}
+    return fit(**(inputs | {"out": None}), **command.run_options(), **options)
+
+
+@pytest.mark.parametrize("name", ["checkerboard", "displacement"])
+def test_a_fit_in_memory_gives_the_texture_of_the_run_folder(name, runs, workplace, tmp_path, monkeypatch):
+    run = runs(name)
+    monkeypatch.chdir(workplace)
+    files = set(workplace.rglob("*"))
+    texture = python_fit(name)
+    assert set(workplace.rglob("*")) == files and type(texture) is methods()[name].load_texture()
+    (expected, _), (actual, _) = map(model_file.read, (run / NAME, texture.save(tmp_path / NAME)))
+    assert expected.keys() == actual.keys()
+    assert all(torch.equal(value, expected[key]) for key, value in actual.items())
+
+
+def test_a_fit_that_computes_in_one_go_is_cancelled_before(runs, workplace, monkeypatch, toy):
+    monkeypatch.chdir(workplace)
+    stop = threading.Event()
+    stop.set()
+    with pytest.raises(mitex.Cancelled):
+        python_fit("displacement", cancel=stop)
+
+
+def test_settings_by_name(workplace, monkeypatch, toy):
+    fit = import_module("checkerboard").fit
+    exemplar, heard = mitex.Exemplar.load("lava"), []
+    fit(exemplar, steps=3, seed=5, set={"cell": 0.5}, on_step=heard.append)
+    assert heard[-1].steps == 3
+    with pytest.raises(mitex.ConfigError, match="steps is set to 4 and to 3; give it once"):
+        fit(exemplar, steps=3, set=["steps=4"])
+    with pytest.raises(mitex.ConfigError, match="no key 'sell'; use 'cell'"):
+        fit(exemplar, set={"sell": 0.5})
+
+
+def test_another_variant_gets_what_works_or_an_error(mi, workplace, monkeypatch, toy):
+    monkeypatch.chdir(workplace)
+    mesh, texture = mitex.Mesh.load("cube.obj"), load("pebbles")
+    asset = texture.apply(mesh, steps=1, subdivide=1, resolution=None)
+    mi.set_variant("llvm_ad_mono")  # has arrays, but no colours
+    again = texture.apply(mesh, steps=1, subdivide=1, resolution=None)
+    assert np.array_equal(again.maps["albedo"], asset.maps["albedo"])
+    with pytest.raises(mitex.ConfigError, match="'llvm_ad_mono', which is in use; call mitsuba.set_variant"):
+        asset.render("a.png", resolution=16, spp=1)
+    mi.set_variant("scalar_rgb")
+    for call in (
+        lambda: texture.apply(mesh, steps=1, subdivide=1),
+        lambda: asset.render("a.png", resolution=16, spp=1),
+        lambda: python_fit("checkerboard"),
+    ):
+        with pytest.raises(
+            mitex.ConfigError, match="'scalar_rgb', which is in use; call mitsuba.set_variant"
+        ):
+            call()
+    assert asset.export("a.ply").is_file() and mi.variant() == "scalar_rgb"
+
+
 @pytest.mark.parametrize("name", FITS)
 class TestDescription:
     def test_its_references_lead_somewhere(self, name):
@@ -100,8 +172,7 @@ class TestDescription:
         assert issubclass(method.load_fit(), FitOptions) and issubclass(method.load_apply(), ApplyOptions)
         texture = method.load_texture()
         assert all(hasattr(texture, attribute) for attribute in ("load", "save", "apply"))
-        for reference in (method.animate, method.demo):
-            assert reference is None or callable(resolve_reference(reference).run)
+        assert method.animate is None or callable(resolve_reference(method.animate).run)
 
     def test_the_default_config_is_the_first_preset_and_every_key_is_explained(self, name):
         presets = methods()[name].load_presets()
@@ -163,6 +234,26 @@ class TestRun:
         before = (runs(name) / NAME).read_bytes()
         assert main(f"fit {name} --out runs/{name} --quiet {FITS[name].fit}".split()) == 2
         assert "holds a" in capsys.readouterr().err and (runs(name) / NAME).read_bytes() == before
+
+    def test_in_memory_it_is_cancelled_and_writes_nothing(self, name, runs, workplace, tmp_path, monkeypatch):
+        """In a thread that is not the main one. `nerf` is cancelled in the coarse field that comes first."""
+        if not FITS[name].resume:
+            pytest.skip("a method that does not train")
+        monkeypatch.chdir(workplace)
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+        files, before = set(workplace.rglob("*")), program_state()
+        reports, stop = [], threading.Event()
+
+        def on_step(progress):
+            reports.append(progress)
+            if progress.step:
+                stop.set()
+
+        with pytest.raises(mitex.Cancelled, match="after step 1; nothing has been kept"):
+            in_thread(lambda: python_fit(name, on_step=on_step, cancel=stop))
+        assert [report.step for report in reports] == [0, 1] and reports[0].steps >= 2
+        assert set(workplace.rglob("*")) == files and not list(tmp_path.iterdir())
+        assert program_state() == before
 
     def test_it_is_resumed(self, name, runs, workplace, monkeypatch):
         if not FITS[name].resume:

@@ -41,7 +41,7 @@ def middle(image: np.ndarray) -> np.ndarray:
 
 
 def test_background_is_white_and_the_exposure_right():
-    image = picture(Asset(SPHERE, GREY), backdrop=False, spp=64)
+    image = picture(Asset(SPHERE, GREY), floating=True, spp=64)
     np.testing.assert_allclose(image[[0, 0, -1, -1], [0, -1, 0, -1]], 1.0, atol=1e-6)
     lit = image[6:12, 7:13]  # turned to the key light
     assert 0.35 < lit.mean() < 0.75  # of the half that it reflects
@@ -50,14 +50,14 @@ def test_background_is_white_and_the_exposure_right():
 
 
 def test_paper_is_light_grey():
-    image = picture(Asset(SPHERE, GREY), elevation=0.3)
+    image = picture(Asset(SPHERE, GREY), elevation=17)
     corners = image[[0, 0, -1], [0, -1, 0]]
     assert corners.min() > 0.6 and corners.max() < 1.1
 
 
 def test_light_comes_from_the_upper_left_at_every_azimuth():
-    renderer = OrbitRenderer(Asset(SPHERE, GREY), resolution=SIDE, backdrop=False)
-    for azimuth in (0.0, 2.0, 4.0):
+    renderer = OrbitRenderer(Asset(SPHERE, GREY), resolution=SIDE, floating=True)
+    for azimuth in (0.0, 115.0, 230.0):
         image = renderer.render(azimuth, renderer.fit_view(azimuth, 0.0), 16).mean(axis=2)
         assert image[5:9, 6:10].mean() > 2.0 * image[15:19, 14:18].mean()
 
@@ -65,22 +65,22 @@ def test_light_comes_from_the_upper_left_at_every_azimuth():
 def test_azimuth_shows_the_named_side():
     x, _, z = np.abs(SPHERE.vertices).T
     albedo = np.stack([x > 0.6, z > 0.6, 0 * x], axis=1).astype(np.float32) * 0.8
-    renderer = OrbitRenderer(Asset(SPHERE, {"albedo": albedo}), resolution=SIDE, backdrop=False)
-    front, right = (middle(renderer.render(a, renderer.fit_view(a, 0.0), 16)) for a in (0.0, math.pi / 2))
+    renderer = OrbitRenderer(Asset(SPHERE, {"albedo": albedo}), resolution=SIDE, floating=True)
+    front, right = (middle(renderer.render(a, renderer.fit_view(a, 0.0), 16)) for a in (0.0, 90.0))
     assert front[1] > 5 * front[0] and right[0] > 5 * right[1]
 
 
 def test_map_normals_that_lean_into_the_light_are_brighter():
     """The key light stands to the upper left, where -x and +y of the map point on the front."""
-    west, eastern = (middle(picture(bent(x, 0.0), backdrop=False)).mean() for x in (-0.5, 0.5))
-    north, south = (middle(picture(bent(0.0, y), backdrop=False)).mean() for y in (0.5, -0.5))
+    west, eastern = (middle(picture(bent(x, 0.0), floating=True)).mean() for x in (-0.5, 0.5))
+    north, south = (middle(picture(bent(0.0, y), floating=True)).mean() for y in (0.5, -0.5))
     assert west > 1.3 * eastern
     assert north > 1.3 * south
 
 
 def test_no_pixel_is_black_where_normals_turn_away():
     for x, y in ((0.9, 0.0), (-0.9, 0.0), (0.0, 0.9)):
-        assert picture(bent(x, y), backdrop=False, spp=64).min() > 0.01
+        assert picture(bent(x, y), floating=True, spp=64).min() > 0.01
 
 
 def test_facing_changes_only_what_looks_away(rng):
@@ -142,7 +142,7 @@ def test_hard_edges_look_as_if_the_vertices_were_split(bake):
         if bake:
             layout = np.random.default_rng(0).random((12, 3, 2)).astype(np.float32)
             asset = asset.baked(64, layout=layout)
-        images.append(picture(asset, azimuth=0.5, elevation=0.4))
+        images.append(picture(asset, azimuth=30, elevation=23))
     np.testing.assert_allclose(images[0], images[1], atol=1e-4)
     assert np.abs(images[0] - images[2]).max() > 0.05
 
@@ -155,7 +155,7 @@ def test_the_size_of_the_mesh_does_not_matter():
 
 def test_passes_add_up_to_the_same_picture(monkeypatch):
     renderer = OrbitRenderer(Asset(SPHERE, GREY), resolution=SIDE)
-    view = renderer.fit_view(0.0, 0.3)
+    view = renderer.fit_view(0.0, 17.0)
     once = renderer.render(0.0, view, 64)
     monkeypatch.setattr("mitex.render.renderer.SAMPLES_PER_PASS", SIDE * SIDE * 16)
     four = renderer.render(0.0, view, 64)
@@ -164,7 +164,7 @@ def test_passes_add_up_to_the_same_picture(monkeypatch):
 
 def test_seeds_make_the_noise():
     renderer = OrbitRenderer(Asset(SPHERE, GREY), resolution=SIDE)
-    view = renderer.fit_view(0.0, 0.3)
+    view = renderer.fit_view(0.0, 17.0)
     first, again, other = (renderer.render(0.0, view, 4, seed) for seed in (0, 0, 1))
     np.testing.assert_allclose(first, again, atol=1e-4)
     assert np.abs(first - other).max() > 1e-2
@@ -188,13 +188,13 @@ def test_wrong_options(options, message):
 def test_wrong_views():
     asset = Asset(icosphere(1), {"albedo": np.zeros((12, 3))})
     renderer = OrbitRenderer(asset, resolution=16)
-    for elevation in (-0.1, 1.55, math.nan):
+    for elevation in (-0.1, 85.1, math.nan):
         with pytest.raises(ConfigError, match="elevation"):
             renderer.fit_view(0.0, elevation)
     for spp in (0, 70000):
         with pytest.raises(ConfigError, match="samples per pixel"):
             renderer.render(0.0, renderer.fit_view(0.0), spp)
-    OrbitRenderer(asset, resolution=16, backdrop=False).fit_view(0.0, -1.0)
+    OrbitRenderer(asset, resolution=16, floating=True).fit_view(0.0, -85.0)
 
 
 @pytest.mark.parametrize("lean", [(0.0, 0.0), (0.5, 0.2), (-0.4, 0.4)])

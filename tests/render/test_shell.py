@@ -46,7 +46,7 @@ def test_wrong_options(options, message):
 
 def test_a_camera_may_look_from_below_where_there_is_no_floor():
     picture = shell.shell_still(
-        Nothing(), SIMILARITY, OUTLINE, resolution=16, spp=1, elevation=-0.5, backdrop=False
+        Nothing(), SIMILARITY, OUTLINE, resolution=16, spp=1, elevation=-30, floating=True
     )
     assert picture.shape == (16, 16, 3) and np.isfinite(picture).all()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import Annotated, Any, Unpack
 
 import numpy as np
 import torch
@@ -16,7 +16,7 @@ from mitex.methods.method import Method
 from mitex.methods.options import ExemplarOptions, MeshOptions
 from mitex.training import ParameterTask, Step, model_file
 from mitex.training.fit import Run
-from mitex.training.settings import TrainingConfig, key
+from mitex.training.settings import RunOptions, TrainingConfig, key
 
 METHOD = Method(
     name="checkerboard",
@@ -71,6 +71,17 @@ class Task(ParameterTask):
         return {"method": METHOD.name, "exemplar": self.exemplar.name}
 
 
+def fit(exemplar: Exemplar | str, out=None, **options: Unpack[RunOptions]) -> Checkerboard:
+    run = Run.of(PRESETS, out, **options)
+    exemplar = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
+    task, cell = Task(run.config, exemplar), run.config.cell
+
+    def texture(about: dict[str, Any]) -> Checkerboard:
+        return Checkerboard(task.named["colours"].detach().clamp(0, 1), about | {"cell": cell})
+
+    return run.train(task, exemplar.name, texture, lr=run.config.lr)
+
+
 @dataclass(kw_only=True)
 class Fit(ExemplarOptions):
     """Learn two colours of an image.
@@ -81,14 +92,10 @@ class Fit(ExemplarOptions):
 
     def run(self) -> None:
         exemplar = Exemplar.load(self.exemplar)
-        run = Run.of(PRESETS, self.folder(exemplar.name), **self.run_options())
-        task, cell = Task(run.config, exemplar), run.config.cell
-
-        def texture(about: dict[str, Any]) -> Checkerboard:
-            return Checkerboard(task.named["colours"].detach().clamp(0, 1), about | {"cell": cell})
-
-        run.train(task, exemplar.name, texture, lr=run.config.lr)
-        print(run.folder)
+        out = self.folder(exemplar.name)
+        with self.progress() as on_step:
+            fit(exemplar, out, on_step=on_step, **self.run_options())
+        print(out)
 
 
 @dataclass(kw_only=True)

@@ -25,7 +25,7 @@ POOL = 2_000_000  # 8 MB: much of the time goes into writing
 def fit(out: Path, steps: int, pool: int) -> None:
     begun = any((out / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
     config = SmallConfig(steps=steps, checkpoint_every=EVERY)
-    train(SmallTask(pool=pool), config, out, lr=0.01, resume=begun, quiet=True)
+    train(SmallTask(pool=pool), config, out, lr=0.01, resume=begun)
 
 
 def child(work, *arguments) -> int:

@@ -6,6 +6,7 @@ import os
 import signal
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import Any
 from unittest.mock import patch
 
 import pytest
@@ -28,8 +29,8 @@ def _one_thread():
 def _train(out, task=None, config=None, **options):
     task = task or SmallTask()
     config = config or SmallConfig()
-    options = {"lr": config.lr, "quiet": True} | options
-    return task, train(task, config, out, **options)
+    arguments: dict[str, Any] = {"lr": config.lr} | options
+    return task, train(task, config, out, **arguments)
 
 
 def _nan(task, loss):
@@ -154,7 +155,7 @@ def test_lr_may_be_a_function(tmp_path):
 def test_folders_are_not_overwritten(tmp_path):
     _train(tmp_path)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    with pytest.raises(OutputError, match="--resume"):
+    with pytest.raises(OutputError, match="resume=True"):
         _train(tmp_path)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
     with pytest.raises(CheckpointError, match="no checkpoint"):
@@ -252,7 +253,7 @@ def test_an_interrupted_run_saves_and_goes_on(tmp_path, number):
     out = tmp_path / "run"
     before = signal.signal(number, signal.default_int_handler)
     try:
-        with pytest.raises(Interrupted, match="after step 8.*--resume") as error:
+        with pytest.raises(Interrupted, match="after step 8.*resume=True") as error:
             _train(out, SmallTask(faults={7: _signal(number)}))
         assert signal.getsignal(number) is signal.default_int_handler
     finally:

@@ -107,7 +107,7 @@ def test_a_run_that_died_before_its_first_checkpoint_may_start_again(tmp_path):
 @pytest.mark.parametrize("name", ["checkpoint.safetensors", "checkpoint.previous.safetensors"])
 def test_a_run_is_not_overwritten(tmp_path, name):
     (tmp_path / name).touch()
-    with pytest.raises(OutputError, match="holds a run already; add --resume"):
+    with pytest.raises(OutputError, match="holds a run already; add `resume=True`"):
         run.check(tmp_path)
     run.check(tmp_path, resume=True)
 
@@ -117,7 +117,7 @@ def test_a_finished_result_is_not_overwritten(tmp_path):
     run.prepare(tmp_path, SmallConfig(), {"method": "small"})
     run.check(tmp_path)
     (tmp_path / "texture.safetensors").write_bytes(b"hours of work")
-    with pytest.raises(OutputError, match="holds a finished run; name another --out"):
+    with pytest.raises(OutputError, match="holds a finished run; name another `out`"):
         run.check(tmp_path)
     with pytest.raises(CheckpointError, match="no checkpoint"):
         run.check(tmp_path, resume=True)
@@ -132,7 +132,7 @@ def test_other_files_are_left_alone(tmp_path):
 
 @pytest.mark.parametrize("name", [".", "missing"])
 def test_nothing_to_resume(tmp_path, name):
-    with pytest.raises(CheckpointError, match="no checkpoint in .* to resume; leave out --resume"):
+    with pytest.raises(CheckpointError, match="no checkpoint in .* to resume; leave out `resume`"):
         run.check(tmp_path / name, resume=True)
     assert not _files(tmp_path)
 

@@ -29,7 +29,7 @@ import sys, tempfile
 from mitex.training import train
 from tests.training.task import SmallConfig, SmallTask
 with tempfile.TemporaryDirectory() as out:
-    train(SmallTask(), SmallConfig(), out, lr=0.1, quiet=True)
+    train(SmallTask(), SmallConfig(), out, lr=0.1)
 sys.exit(len({'torch._dynamo', 'mitsuba', 'drjit'} & set(sys.modules)))
 """
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT).returncode == 0

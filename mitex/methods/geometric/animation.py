@@ -48,7 +48,7 @@ class Animate(GrowthOptions):
     meshes: Annotated[Path | None, arg(metavar="FOLDER", help_behavior_hint="")] = None
     """Write the mesh of each frame there too, as 0000.ply and so on."""
 
-    size: Annotated[int, arg(metavar="N")] = 384
+    resolution: Annotated[int, arg(metavar="N")] = 384
     """Width and height [pixels]."""
 
     spp: Annotated[int, arg(metavar="N")] = 32
@@ -62,7 +62,7 @@ class Animate(GrowthOptions):
         in_range("--seed", self.seed, *SEEDS)
         in_range("--to-seed", self.to_seed, *SEEDS)
         in_range("--frames", self.frames, 2, 3600)
-        in_range("--size", self.size, 16, 4096)
+        in_range("--resolution", self.resolution, 16, 4096)
         in_range("--spp", self.spp, 1, 65536)
         in_range("--fps", self.fps, 1, 60)
         from mitex.mesh.files import mesh_files
@@ -81,7 +81,7 @@ class Animate(GrowthOptions):
         else:
             mesh = self.even_mesh(self.mesh)
         meshes = list(self._sequence(texture, mesh, start))
-        check_video(out, len(meshes), self.fps, self.size)
+        check_video(out, len(meshes), self.fps, self.resolution)
         if self.meshes is not None:
             folder = prepare_folder(self.meshes)
             places = [prepare_output(folder / f"{k:04}.ply", inputs=inputs) for k in range(len(meshes))]
@@ -94,7 +94,7 @@ class Animate(GrowthOptions):
                 frames=len(meshes),
                 like=meshes[-1],
                 fps=self.fps,
-                resolution=self.size,
+                resolution=self.resolution,
                 spp=self.spp,
                 progress=progress,
             )

@@ -51,7 +51,8 @@ class Fit(TrainingOptions):
 
         reference = find_reference(self.reference)
         out = self.folder(reference.name)
-        geometric.fit(reference, out, template=self.template, **options)
+        with self.progress() as on_step:
+            geometric.fit(reference, out, template=self.template, on_step=on_step, **options)
         print(out)
 
 

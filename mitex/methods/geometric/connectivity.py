@@ -45,7 +45,7 @@ class FaceGraph:
         opposite = faces[neighbours, (partner + 2 - 3 * neighbours) % 3]
         incident = np.maximum(np.bincount(faces.ravel(), minlength=vertices), 1).astype(np.float32)
         arrays = (faces, neighbours, opposite, ~closed, incident)
-        return FaceGraph(*(torch.from_numpy(np.ascontiguousarray(a)) for a in arrays))
+        return FaceGraph(*(torch.tensor(a) for a in arrays))
 
     def __len__(self) -> int:
         return len(self.faces)

@@ -32,7 +32,7 @@ def save(
         for level, generator in enumerate(generators)
         for k, value in enumerate(generator.parameters)
     }
-    tensors |= {"vertices": torch.from_numpy(template.vertices), "faces": torch.from_numpy(template.faces)}
+    tensors |= {"vertices": torch.tensor(template.vertices), "faces": torch.tensor(template.faces)}
     tensors["fixed"] = fixed
     return model_file.save(path, tensors, METHOD.name, about)
 

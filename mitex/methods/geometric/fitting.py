@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import logging
 from functools import partial
 from pathlib import Path
 from typing import Unpack
@@ -22,16 +22,18 @@ from mitex.methods.geometric.texture import GeometricTexture
 from mitex.methods.geometric.training_meshes import fit_level
 from mitex.paths import cache_dir
 from mitex.runtime import keep_freed_memory
+from mitex.training.control import ALONE, Control
 from mitex.training.fit import Run
 from mitex.training.optim import Adam
 from mitex.training.settings import RunOptions
 
 VERSION = 1  # of the training meshes in the cache
+log = logging.getLogger(__name__)
 
 
 def fit(
     reference: Mesh | str | Path,
-    out: str | Path,
+    out: str | Path | None = None,
     *,
     template: Mesh | str | Path | None = None,
     **options: Unpack[RunOptions],
@@ -43,15 +45,17 @@ def fit(
     Args:
         reference: a mesh, what `Mesh.load` takes, or a name of `REFERENCES`.
         out: run folder; must be new or empty, or hold a run to resume (with more `steps`, to further levels).
+            None writes no file.
         template: where the training meshes start from; None chooses by genus.
-        options: preset ("fast" or "paper"), config, overrides, resume, quiet, as of `RunOptions`.
+        options: preset ("fast" or "paper"), and those of `RunOptions`.
 
     Returns:
-        The texture, also saved as `texture.safetensors` in `out`.
+        The texture, also saved as `texture.safetensors` in `out` if that is given.
 
     Raises:
         MitexError: bad input of any kind; nothing has been written then.
-        Interrupted: a checkpoint has been saved.
+        Cancelled: by `cancel`; a checkpoint has been saved if there is a folder.
+        Interrupted: by Ctrl-C, likewise.
     """
     run = Run.of(PRESETS, out, **options)
     config = run.config
@@ -59,9 +63,9 @@ def fit(
     template = Mesh.load(template) if isinstance(template, str | Path) else template
     shape, start = normalised(shape, find_template(shape, template))
     keep_freed_memory()
-    meshes, reports = training_meshes(shape, start, config, run.quiet)
+    meshes, reports = training_meshes(shape, start, config, run.control, keep=run.folder is not None)
     hierarchy = Hierarchy.of(start, config.levels)
-    task = GeometricTask(config, hierarchy, torch.from_numpy(start.vertices), meshes, shape)
+    task = GeometricTask(config, hierarchy, torch.tensor(start.vertices), meshes, shape)
     origin = {key: getattr(config, key) for key in ("levels", "noise", "remeasure")}
     origin["fit"] = [vars(r) for r in reports]
     return run.train(
@@ -74,30 +78,38 @@ def fit(
 
 
 def training_meshes(
-    reference: Mesh, template: Mesh, config: GeometricConfig, quiet: bool = True
+    reference: Mesh,
+    template: Mesh,
+    config: GeometricConfig,
+    control: Control = ALONE,
+    keep: bool = True,
 ) -> tuple[list[torch.Tensor], list[FitReport]]:
     """Vertices (V, 3) of the training mesh of each level, from the cache where it has them, and how they fit.
 
     Args:
         reference, template: from `normalised`.
         config: settings.
-        quiet: say nothing; else a line for each level goes to stderr.
+        control: may stop the work before each level.
+        keep: whether meshes that had to be computed are kept in the cache.
+
+    Raises:
+        Cancelled: by `control`.
     """
     hierarchy = Hierarchy.of(template, config.levels)
     options = {key: value for key, value in vars(config).items() if key.startswith("fit_")}
     arrays = (reference.vertices, reference.faces, template.vertices, template.faces)
     meshes, reports = [], []
     for level, mesh in enumerate(hierarchy.meshes):
+        control.check()
         place = cache_dir() / "geometric" / content_key(VERSION, *arrays, (config.seed, options, level))
-        start = hierarchy.finer(meshes[-1], level - 1) if meshes else torch.from_numpy(template.vertices)
+        start = hierarchy.finer(meshes[-1], level - 1) if meshes else torch.tensor(template.vertices)
 
         def compute(start: torch.Tensor = start, level: int = level) -> torch.Tensor:
             return fit_level(reference, start, hierarchy.graphs[level], level, config)
 
-        meshes.append(cached(place, compute, _read, _write))
+        meshes.append(cached(place, compute, _read, _write, keep))
         reports.append(report(mesh.with_vertices(meshes[-1].numpy() / 2**level), reference))
-        if not quiet:
-            print(f"training mesh {level}: {reports[-1]}", file=sys.stderr, flush=True)
+        log.info("training mesh %d: %s", level, reports[-1])
     return meshes, reports
 
 

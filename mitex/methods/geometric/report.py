@@ -64,5 +64,5 @@ def report(mesh: Mesh, reference: Mesh, seed: int = 0) -> FitReport:
 
 
 def _samples(mesh: Mesh, generator: torch.Generator) -> Samples:
-    faces = torch.from_numpy(mesh.faces).long()
-    return sample_surface(torch.from_numpy(mesh.vertices), faces, SAMPLES, generator)
+    faces = torch.tensor(mesh.faces).long()
+    return sample_surface(torch.tensor(mesh.vertices), faces, SAMPLES, generator)

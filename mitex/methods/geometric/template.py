@@ -39,7 +39,7 @@ def find_template(reference: Mesh, template: Mesh | None = None) -> Mesh:
         raise ConfigError(
             f"template {template.name} has {_description(actual)}, "
             f"reference {reference.name} has {_description(expected)}",
-            "give a --template of the same kind",
+            "give a `template` of the same kind",
         )
     return template
 
@@ -48,7 +48,7 @@ def normalised(reference: Mesh, template: Mesh) -> tuple[Mesh, Mesh]:
     """Both meshes centred, and scaled so that they are equally large and the template's mean edge is 1."""
     reference, template = _boxed(reference), _boxed(template)
     graph = FaceGraph.of(template.faces, len(template.vertices))
-    unit = float(mean_edge(torch.from_numpy(template.vertices), graph))
+    unit = float(mean_edge(torch.tensor(template.vertices), graph))
     return reference.with_vertices(reference.vertices / unit), template.with_vertices(
         template.vertices / unit
     )

@@ -32,8 +32,8 @@ def fit_level(
         config: settings.
     """
     generator = torch.Generator().manual_seed(config.seed + level)
-    target = torch.from_numpy(reference.vertices) * 2**level
-    faces = torch.from_numpy(reference.faces).long()
+    target = torch.tensor(reference.vertices) * 2**level
+    faces = torch.tensor(reference.faces).long()
     return Fitting(graph, target, faces, config, config.fit_samples * (level + 1)).run(vertices, generator)
 
 

@@ -12,7 +12,6 @@ METHOD = Method(
     fit="mitex.methods.nca.cli:Fit",
     apply="mitex.methods.nca.cli:Apply",
     texture="mitex.methods.nca.texture:NcaTexture",
-    demo="mitex.methods.nca.demo:Demo",
     tensors=frozenset({"fc1.weight", "fc1.bias", "fc2.weight", "fc2.bias"}),
 )
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,7 +10,7 @@ from tyro.conf import arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
-from mitex.methods.nca.ranges import TILE_CELLS, TILE_SIDES
+from mitex.methods.nca.ranges import MOST_STEPS, TILE_CELLS, TILE_SIDES
 from mitex.methods.options import EXPORTS, PICTURES, ExemplarOptions, OptionalMeshOptions
 
 if TYPE_CHECKING:
@@ -54,7 +53,8 @@ class Fit(ExemplarOptions):
         out = self.folder(exemplar.name)
         from mitex.methods import nca
 
-        nca.fit(exemplar, out, init=self.init, **options)
+        with self.progress() as on_step:
+            nca.fit(exemplar, out, init=self.init, on_step=on_step, **options)
         print(out)
 
 
@@ -74,8 +74,8 @@ class Apply(OptionalMeshOptions):
     seed: Annotated[int, arg(metavar="N")] = 0
     """Random seed: another seed, another variant of the texture."""
 
-    steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 200)")] = None
-    """Steps of the automaton."""
+    steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the model's)")] = None
+    """Steps of the automaton; more make the pattern more regular."""
 
     subdivide: Annotated[str, arg(metavar="auto|N")] = "auto"
     """How often to subdivide the automaton's copy of the mesh; auto: to the training's density."""
@@ -111,7 +111,7 @@ class Apply(OptionalMeshOptions):
         in_range("--variants", self.variants, 1, MOST_VARIANTS)
         in_range("--seed", self.seed, *SEEDS)
         in_range("--seed", self.seed + self.variants - 1, *SEEDS)
-        in_range("--steps", self.steps, 1, 10_000)
+        in_range("--steps", self.steps, 1, MOST_STEPS)
         in_range("--orientation", self.orientation, -360.0, 360.0)
         in_range("--scale", self.scale, 0.05, 20.0)
         in_range("--resolution", self.resolution, 64, 8192)
@@ -200,7 +200,7 @@ class Apply(OptionalMeshOptions):
         return {
             "steps": self.steps,
             "subdivide": self._levels(),
-            "orientation": math.radians(self.orientation),
+            "orientation": self.orientation,
             "scale": self.scale,
             "resolution": (self.resolution or RESOLUTION) if textures else None,
             "keep_dense": self.keep_dense,

@@ -10,6 +10,7 @@ from mitex.features.layers import LAYERS
 from mitex.methods.nca.decoder.shape import COORDINATES, DecoderShape
 from mitex.training.settings import TrainingConfig, key
 
+SURFACES = ("even", "uneven", "flat")
 # Keys that shape the decoder -> attributes of its shape.
 DECODER_KEYS = {
     "interpolation": "interpolation",
@@ -34,8 +35,9 @@ class NcaConfig(TrainingConfig):
     degree: int = key(1, "highest degree of the spherical harmonics of the perception", 0, 2)
     gain: float = key(0.1, "gain of the initial weights of the last layer (the authors: 1.2)", 0)
     frequency: int = key(32, "of the icosphere that is trained on; 10 f^2 + 2 vertices", 1, 4096)
-    sphere: Literal["both", "even", "uneven"] = key(
-        "both", "triangles of the sphere: the icosphere's, or of scattered vertices, or both in turns"
+    surfaces: tuple[str, ...] = key(
+        ("even", "flat", "uneven", "flat"),
+        "that states grow on in turns: even (icosphere), uneven (scattered sphere), flat (square)",
     )
     pool: int = key(64, "states kept between steps", 1, 4096)
     aggregation: Literal["mean", "sum"] = key(
@@ -65,6 +67,9 @@ class NcaConfig(TrainingConfig):
     colour_histogram: bool = key(True, "compare the histograms of the channels too")
     moment_weight: float = key(0.1, "of the moment terms, beside the transport terms", 0)
     order_weight: float = key(10.0, "of the autocorrelation of the coarsest views, for regular patterns", 0)
+    relief_weight: float = key(
+        1.0, "of normals that follow from the height as far as the exemplar's do; on flat surfaces", 0
+    )
     appearance_weight: float = key(2.0, "of the appearance loss", 0)
     overflow_weight: float = key(100.0, "of the overflow loss", 0)
     decoder: bool = key(
@@ -94,6 +99,13 @@ class NcaConfig(TrainingConfig):
         unknown = [layer for layer in self.layers if layer not in LAYERS]
         if unknown or not self.layers:
             raise ConfigError(f"layers holds {unknown or 'nothing'}", f"use some of {', '.join(LAYERS)}")
+        unknown = [name for name in self.surfaces if name not in SURFACES]
+        if unknown or not self.surfaces:
+            raise ConfigError(
+                f"surfaces holds {unknown or 'nothing'}", f"use one or more of {', '.join(SURFACES)}"
+            )
+        if self.views == "full" and "flat" in self.surfaces:
+            raise ConfigError("full views need spheres, and surfaces holds 'flat'", "use even or uneven")
         if self.order_weight and ("relu3_1" not in self.layers or self.views == "full"):
             raise ConfigError("order_weight needs patches and the layer relu3_1", "set it to 0, or these")
         unknown = [name for name in self.coordinates if name not in COORDINATES]
@@ -134,8 +146,9 @@ PRESETS = {
         pooling="average",
         aggregation="sum",
         overflow_weight=1e4,
-        sphere="even",
+        surfaces=("even",),
         order_weight=0.0,
+        relief_weight=0.0,
         decoder=False,
         interpolation="linear",
         blend=False,

@@ -7,12 +7,22 @@ shape takes some time, so callers round row counts up to a few that come again.
 
 from __future__ import annotations
 
+from typing import cast
+
 import torch
 import torch.nn.functional as F
+from torch import nn
 from torch.nn.grad import conv2d_weight
 
 # Rows are split into so many images; with fewer than 16, torch does not ask oneDNN.
 IMAGES = 64
+
+
+def layer(inputs: int, outputs: int) -> nn.Linear:
+    """A linear layer of zeros: torch's own draws weights, from the generator that all of a program shares."""
+    linear = cast(nn.Linear, nn.utils.skip_init(nn.Linear, inputs, outputs))
+    linear.load_state_dict({"weight": torch.zeros(outputs, inputs), "bias": torch.zeros(outputs)})
+    return linear
 
 
 def product(x: torch.Tensor, weight: torch.Tensor, bias: torch.Tensor | None = None) -> torch.Tensor:

@@ -13,6 +13,7 @@ from mitex.methods.nca.config import PRESETS, NcaConfig
 from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.palette import Palette
+from mitex.methods.nca.settling import settling_steps
 from mitex.methods.nca.task import NcaTask
 from mitex.methods.nca.texture import NcaTexture
 from mitex.training.fit import Run
@@ -21,7 +22,7 @@ from mitex.training.settings import RunOptions
 
 def fit(
     exemplar: Exemplar | str | Path,
-    out: str | Path,
+    out: str | Path | None = None,
     *,
     init: str | Path | None = None,
     **options: Unpack[RunOptions],
@@ -30,16 +31,17 @@ def fit(
 
     Args:
         exemplar: maps, or what `Exemplar.load` takes.
-        out: run folder; must be new or empty, or hold a run to resume.
+        out: run folder; must be new or empty, or hold a run to resume; None writes no file.
         init: model to start from: the parent, if the two shall be graftable (section 4.4).
-        options: preset ("patch" or "paper"), config, overrides, resume, quiet, as of `RunOptions`.
+        options: preset ("patch" or "paper"), and those of `RunOptions`.
 
     Returns:
-        The texture, also saved as `texture.safetensors` in `out`.
+        The texture, also saved as `texture.safetensors` in `out` if that is given.
 
     Raises:
         MitexError: bad input of any kind; nothing has been written then.
-        Interrupted: a checkpoint has been saved.
+        Cancelled: by `cancel`; a checkpoint has been saved if there is a folder.
+        Interrupted: by Ctrl-C, likewise.
     """
     run = Run.of(PRESETS, out, **options)
     config = run.config
@@ -52,10 +54,15 @@ def fit(
         parent, about = _parent(init, config, sorted(maps.maps))
         origin["parent"] = str(about["name"])
     task = NcaTask(config, maps, parent)
+
+    def texture(about: dict[str, Any]) -> NcaTexture:
+        steps = settling_steps(task.look, task.exemplar, config.density)
+        return NcaTexture(task.look, about | origin | {"growth_steps": steps})
+
     return run.train(
         task,
         maps.name,
-        lambda about: NcaTexture(task.look, about | origin),
+        texture,
         lr=config.lr,
         milestones=config.milestones,
         decay=config.decay,

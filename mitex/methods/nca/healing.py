@@ -44,8 +44,7 @@ def healed(
         if not inner(cells.mesh, places).any():
             return state
         state = torch.where(torch.from_numpy(_around(cells, places))[:, None], 0.0, state)
-        for _ in range(STEPS):
-            state = look.bounded(look.rule.evolve(state[None], operator, 1, generator))[0]
+        state = look.evolve(state[None], operator, STEPS, generator)[0]
     places = foreign()
     if inner(cells.mesh, places).any():
         warnings.warn(

@@ -12,6 +12,7 @@ from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.decoder.decoder import Decoder, Readout
 from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.methods.nca.model import MeshNCA
+from mitex.methods.nca.perception import Perception
 from mitex.methods.nca.targets import value_layout
 from mitex.textures.interpolation import Kind
 
@@ -87,6 +88,14 @@ class Look(nn.Module):
         """Lets the bounds follow the smallest and largest values of a state (V, C) of the training."""
         self.low.lerp_(state.amin(0), RATE)
         self.high.lerp_(state.amax(0), RATE)
+
+    def evolve(
+        self, state: torch.Tensor, operator: Perception, steps: int, generator: torch.Generator
+    ) -> torch.Tensor:
+        """`steps` steps of the rule from a state (B, V, C), held within the bounds after each."""
+        for _ in range(steps):
+            state = self.bounded(self.rule.evolve(state, operator, 1, generator))
+        return state
 
     def bounded(self, state: torch.Tensor) -> torch.Tensor:
         """The state (..., C) held where the training's states were: on meshes unlike the sphere it may grow

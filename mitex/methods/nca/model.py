@@ -34,8 +34,8 @@ class MeshNCA(nn.Module):
         if degree not in HARMONICS:
             raise ConfigError(f"spherical harmonics of degree {degree}", "use 0, 1 or 2")
         self.channels, self.hidden, self.condition, self.degree = channels, hidden, condition, degree
-        self.fc1 = nn.Linear((HARMONICS[degree] + 1) * channels + condition, hidden)
-        self.fc2 = nn.Linear(hidden, channels)
+        self.fc1 = dense.layer((HARMONICS[degree] + 1) * channels + condition, hidden)
+        self.fc2 = dense.layer(hidden, channels)
 
     def initialise(self, generator: torch.Generator, gain: float = 1.2) -> None:
         """The authors' initial weights: Xavier normal, gains 0.2 and `gain`, no bias in the last layer."""

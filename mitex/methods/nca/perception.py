@@ -95,7 +95,7 @@ def perception(
     if np.ndim(orientation) and np.shape(orientation) != (len(mesh.vertices),):
         raise ConfigError(f"orientations of shape {np.shape(orientation)}", "give one angle, or one a vertex")
     if not np.isfinite(orientation).all():
-        raise ConfigError("an orientation that is not finite", "give angles in radians")
+        raise ConfigError("an orientation that is not finite", "give finite angles")
     key = (degree, np.asarray(orientation, np.float64).tobytes(), str(device), mean)
     operators = _cache.setdefault(mesh, {})
     if key not in operators:

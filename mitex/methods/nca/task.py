@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 
 import numpy as np
@@ -11,24 +10,23 @@ import torch
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
 from mitex.losses import overflow_loss
-from mitex.mesh import Mesh
 from mitex.methods.nca.appearance import Appearance
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.look import Look
-from mitex.methods.nca.spheres import TrainingSphere, training_spheres
+from mitex.methods.nca.relief import Relief
+from mitex.methods.nca.surfaces import TrainingPlane, TrainingSphere, TrainingSurface, training_surfaces
 from mitex.methods.nca.targets import Targets, enlarged
 from mitex.runtime import keep_freed_memory
-from mitex.scenes.cameras import Cameras, orbit, patch_views, random_views
+from mitex.scenes.cameras import Cameras, random_views
 from mitex.training import Step
 from mitex.triples import channel_triples, triple_images
 
-SMALLEST = 64  # side of the exemplar at the coarsest zoom [px], at least
+SMALLEST = 128  # side of the exemplar at the coarsest zoom [px], at least: a quarter is left at relu3_1
 PREVIEW = 256  # side of a preview's pictures [px]
-WIDEST = 0.65  # half the side of a patch of the unit sphere: wider ones would look past it
 
 
 class NcaTask:
-    """Trains a look: states from a pool evolve on spheres, and their views are compared at several zooms.
+    """Trains a look: states from a pool evolve on surfaces, and their views are compared at several zooms.
 
     Args:
         config: settings.
@@ -46,9 +44,14 @@ class NcaTask:
             self.look.initialise(torch.Generator().manual_seed(config.seed), config.gain)
         else:
             self.look.load_state_dict(init.state_dict())
-        self.spheres = training_spheres(config, self.look)
+        self.surfaces = training_surfaces(config, self.look)
         self.zooms = self._appearances()
-        self.pool = torch.zeros(config.pool, len(self.spheres[0].mesh.vertices), config.channels)
+        self.relief = None
+        if config.relief_weight and {"height", "normal"} <= exemplar.maps.keys():
+            self.relief = Relief(self.exemplar, self.look.layout, self.zooms)
+        # Rows beyond the cells of a state's surface stay zero.
+        most = max(surface.perception.vertices for surface in self.surfaces)
+        self.pool = torch.zeros(config.pool, most, config.channels)
         self._touched = torch.zeros(config.pool, dtype=torch.bool)
 
     def _appearances(self) -> dict[int, Appearance]:
@@ -78,45 +81,57 @@ class NcaTask:
         """Appearance and overflow of a state of the pool after some steps; `commit` puts it back, evolved."""
         config = self.config
         index = int(torch.randint(config.pool, (), generator=generator))
-        state = self.pool[index][None]
+        surface, state = self.surface(index), self.grown(index)
         if step % config.inject_every == 0:
             state = torch.zeros_like(state)
         steps = int(torch.randint(config.min_steps, config.max_steps + 1, (), generator=generator))
-        sphere = self.sphere(index)
-        state = self.look.rule.evolve(state, sphere.perception, steps, generator)
-        losses = []
+        state = self.look.rule.evolve(state, surface.perception, steps, generator)
+        terms: dict[str, list[torch.Tensor]] = {"appearance": [], "relief": []}
         for size, appearance in self.zooms.items():
-            views = sphere.views(self.look, state[0], self.cameras(sphere.mesh, size, generator))
-            losses.append(appearance(views, generator))
-        appearance, overflow = torch.stack(losses).mean(), overflow_loss(state)
+            views = self.views(surface, state[0], size, generator)
+            terms["appearance"].append(appearance(views, generator))
+            if self.relief and isinstance(surface, TrainingPlane):  # on spheres, "right" turns in a view
+                terms["relief"].append(config.relief_weight * self.relief(views, size))
+        means = {name: torch.stack(values).mean() for name, values in terms.items() if values}
+        means["overflow"] = overflow_loss(state)
+        weights = {"overflow": config.overflow_weight}
         return Step(
-            appearance + config.overflow_weight * overflow,
-            {"appearance": appearance.item(), "overflow": overflow.item()},
+            torch.stack([weights.get(name, 1.0) * mean for name, mean in means.items()]).sum(),
+            {name: mean.item() for name, mean in means.items()},
             partial(self._put_back, index, state.detach()[0]),
         )
 
     def _put_back(self, index: int, state: torch.Tensor) -> None:
-        self.pool[index], self._touched[index] = state, True
+        self.pool[index, : len(state)], self._touched[index] = state, True
         self.look.track(state)
 
-    def sphere(self, index: int) -> TrainingSphere:
+    def surface(self, index: int) -> TrainingSurface:
         """Where a state of the pool grows."""
-        return self.spheres[index % len(self.spheres)]
+        return self.surfaces[index % len(self.surfaces)]
 
-    def cameras(self, mesh: Mesh, size: int, generator: torch.Generator) -> Cameras:
-        """The views of one step in which the exemplar is `size` [px] wide."""
+    def grown(self, index: int) -> torch.Tensor:
+        """A state of the pool, (1, V, C)."""
+        return self.pool[index][None, : self.surface(index).perception.vertices]
+
+    def views(
+        self, surface: TrainingSurface, state: torch.Tensor, size: int, generator: torch.Generator
+    ) -> torch.Tensor:
+        """The views (K, H, W, C) of one step in which the exemplar is `size` [px] wide."""
+        if isinstance(surface, TrainingSphere):
+            return surface.views(self.look, state, self.cameras(surface, size, generator))
+        config, width = self.config, self._width(size)
+        return surface.patches(self.look, state, width, config.view_count, config.resolution, generator)
+
+    def cameras(self, sphere: TrainingSphere, size: int, generator: torch.Generator) -> Cameras:
+        """The cameras of `views`."""
         config = self.config
         if config.views == "full":
-            fov = math.radians(config.fov)
-            return random_views(generator, config.view_count, config.distance, fov, config.resolution)
-        half = min(0.5 * self.width * config.resolution / size, WIDEST)
-        return patch_views(generator, mesh, config.view_count, half, config.resolution)
+            return random_views(generator, config.view_count, config.distance, config.fov, config.resolution)
+        return sphere.cameras(self._width(size), config.view_count, config.resolution, generator)
 
-    @property
-    def width(self) -> float:
-        """Of the exemplar on the sphere [mesh units], from the `density`."""
-        edge = math.sqrt(8 * math.pi / math.sqrt(3) / self.pool.shape[1])  # of equilateral faces
-        return self.config.density * edge
+    def _width(self, size: int) -> float:
+        """Of a close-up in which the exemplar is `size` [px] wide [edges]."""
+        return self.config.density * self.config.resolution / size
 
     def state(self) -> dict[str, torch.Tensor]:
         """Weights, and the pool's states that are no longer the seed."""
@@ -132,17 +147,18 @@ class NcaTask:
 
     @torch.no_grad()
     def preview(self, step: int) -> np.ndarray:
-        """For each map a row: the exemplar, a patch as wide, a quarter of that, and the whole sphere of an
+        """For each map a row: the exemplar, a patch as wide, a quarter of that, and the whole surface of an
         evolved state.
         """
         generator = torch.Generator().manual_seed(step)
         index = int(torch.randint(self.config.pool, (), generator=generator))
-        sphere, state = self.sphere(index), self.pool[index][None]
-        state = self.look.rule.evolve(state, sphere.perception, self.config.max_steps, generator)[0]
-        wide = min(0.5 * self.width, WIDEST)
-        cameras = [patch_views(generator, sphere.mesh, 1, half, PREVIEW) for half in (wide, wide / 4)]
-        cameras.append(orbit(1, distance=2.05, resolution=PREVIEW))
-        views = [sphere.views(self.look, state, c, antialias=2)[0].numpy() for c in cameras]
+        surface, look = self.surface(index), self.look
+        state = look.rule.evolve(self.grown(index), surface.perception, self.config.max_steps, generator)[0]
+        views = [
+            surface.patches(look, state, width, 1, PREVIEW, generator, antialias=2)[0]
+            for width in (self.config.density, self.config.density / 4)
+        ]
+        views = [view.numpy() for view in (*views, surface.whole(look, state, PREVIEW))]
         triples = channel_triples(self.look.layout, False, 0)
         images = triple_images(self.exemplar.resized(PREVIEW), triples, self.look.layout)
         rows = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -22,11 +23,11 @@ from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import Perception, lattice_perception, perception
-from mitex.methods.nca.ranges import TILE_CELLS
+from mitex.methods.nca.ranges import MOST_STEPS, TILE_CELLS
 from mitex.methods.nca.tile import flat_cells, tile_maps
 from mitex.runtime import keep_freed_memory
 
-STEPS = 200  # enough for the pattern to settle at every density tried
+STEPS = 200  # of models that do not say it; enough to cover a surface
 DENSITY = 32.0  # cells along the exemplar's width, of models that do not say it
 REPEATS = 2
 
@@ -76,9 +77,9 @@ class NcaTexture:
         Args:
             mesh: any mesh; near-uniform edges and valence 6 give the best texture (`mitex.mesh.quality`).
             seed: of the random updates.
-            steps: of the automaton; 200 if None.
+            steps: of the automaton; None for as many as the model's pattern needs to be in order.
             subdivide: levels of subdivision, or "auto": as many as bring the copy to 8,000 vertices.
-            orientation: turns the texture about the normals, counter-clockwise [rad].
+            orientation: turns the texture about the normals, counter-clockwise [degrees].
             scale: size of the pattern, 1 for what the density gives; others need a remeshing of the copy to
                 the fitting density (extra `remesh`).
             resolution: of the baked textures [texels], on the mesh's own UVs if nothing in them overlaps,
@@ -95,8 +96,9 @@ class NcaTexture:
         self._check_unconditioned()
         laid = mesh if resolution is None or (keep_dense and scale != 1.0) else laid_out(mesh, resolution)
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
-        state = self._healthy(cells, seed, STEPS if steps is None else steps, orientation)
-        grown = Grown(self.look, state, cells, orientation)
+        turn = math.radians(orientation)
+        state = self._healthy(cells, seed, self.steps if steps is None else steps, turn)
+        grown = Grown(self.look, state, cells, turn)
         asset = grown.asset()
         if resolution is None:
             return asset
@@ -104,7 +106,7 @@ class NcaTexture:
         return replace(asset, atlas=atlas, texture_maps=grown.textures(atlas))
 
     def fields(
-        self, mesh: Mesh, *, seed: int = 0, steps: int = STEPS, orientation: float = 0.0
+        self, mesh: Mesh, *, seed: int = 0, steps: int | None = None, orientation: float = 0.0
     ) -> dict[str, dict[str, Any]]:
         """Grows the texture on a mesh and returns it as textures of a Mitsuba scene, by map, which are
         decoded where rays meet the surface: `{"type": "principled", "base_color": fields["albedo"], ...}`.
@@ -112,7 +114,8 @@ class NcaTexture:
         A cell sits at each vertex of the mesh, and the shape in the scene must have these vertices; see
         `mitex.mesh.subdivide_midpoint`. Other arguments and errors as of `apply`.
         """
-        return fields(self.look, self._healthy(Cells(mesh, 0, mesh), seed, steps, orientation), mesh)
+        cells, steps = Cells(mesh, 0, mesh), self.steps if steps is None else steps
+        return fields(self.look, self._healthy(cells, seed, steps, math.radians(orientation)), mesh)
 
     def variants(
         self, mesh: Mesh, seeds: Iterable[int], *, resolution: int | None = 1024, **options: Any
@@ -144,21 +147,21 @@ class NcaTexture:
         """
         lattice = flat_cells(self._tile_cells() if cells is None else cells, resolution)
         operator = lattice_perception(lattice, self.look.rule.degree, self.look.mean)
-        state = self.grow(operator, seed=seed, steps=STEPS if steps is None else steps)
+        state = self.grow(operator, seed=seed, steps=steps)
         state = self._healed(state, Cells(lattice.joined, 0, lattice.joined), operator, seed)
         return tile_maps(self.look, state, lattice, resolution)
 
     @torch.no_grad()
     def grow(
-        self, mesh: Mesh | Perception, *, seed: int = 0, steps: int = STEPS, orientation: float = 0.0
+        self, mesh: Mesh | Perception, *, seed: int = 0, steps: int | None = None, orientation: float = 0.0
     ) -> torch.Tensor:
         """The state of the automaton after some steps, held within the bounds of the training's.
 
         Args:
             mesh: any mesh, or its perception operator, which has an orientation of its own.
             seed: of the random updates.
-            steps: from the initial state, which is zero.
-            orientation: as in `apply` [rad].
+            steps: from the initial state, which is zero; None as of `apply`.
+            orientation: as in `apply`.
 
         Returns:
             (V, C) float32.
@@ -167,17 +170,21 @@ class NcaTexture:
             ConfigError: steps below 0, or the model needs a condition.
         """
         self._check_unconditioned()
+        steps = self.steps if steps is None else steps
         if steps < 0:
             raise ConfigError(f"{steps} steps", "give 0 or more")
         keep_freed_memory()
         rule, operator = self.look.rule, mesh
         if isinstance(operator, Mesh):
-            operator = perception(operator, rule.degree, orientation, mean=self.look.mean)
+            operator = perception(operator, rule.degree, math.radians(orientation), mean=self.look.mean)
         generator = torch.Generator().manual_seed(seed)
-        state = rule.seed(operator)
-        for _ in range(steps):
-            state = self.look.bounded(rule.evolve(state, operator, 1, generator))
-        return state[0]
+        return self.look.evolve(rule.seed(operator), operator, steps, generator)[0]
+
+    @property
+    def steps(self) -> int:
+        """Of the automaton, until the pattern is in order (`settling_steps`)."""
+        steps = self.about.get("growth_steps")
+        return steps if isinstance(steps, int) and 0 < steps <= MOST_STEPS else STEPS
 
     def _tile_cells(self) -> int:
         density = self.about.get("density")
@@ -186,9 +193,9 @@ class NcaTexture:
         low, high = TILE_CELLS
         return round(min(max(REPEATS * density, low), high))
 
-    def _healthy(self, cells: Cells, seed: int, steps: int, orientation: float) -> torch.Tensor:
-        """What grows on an automaton's mesh, with the exemplar's colours."""
-        operator = perception(cells.mesh, self.look.rule.degree, orientation, mean=self.look.mean)
+    def _healthy(self, cells: Cells, seed: int, steps: int, turn: float) -> torch.Tensor:
+        """What grows on an automaton's mesh, turned by an angle [rad], with the exemplar's colours."""
+        operator = perception(cells.mesh, self.look.rule.degree, turn, mean=self.look.mean)
         return self._healed(self.grow(operator, seed=seed, steps=steps), cells, operator, seed)
 
     def _healed(self, state: torch.Tensor, cells: Cells, operator: Perception, seed: int) -> torch.Tensor:

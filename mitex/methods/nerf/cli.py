@@ -49,7 +49,8 @@ class Fit(TrainingOptions):
 
         capture = nerf.load_capture(self.capture)
         out = self.folder(capture.name)
-        nerf.fit(capture, out, base_mesh=self.base_mesh, **options)
+        with self.progress() as on_step:
+            nerf.fit(capture, out, base_mesh=self.base_mesh, on_step=on_step, **options)
         print(out)
 
 

@@ -70,8 +70,8 @@ def save(path: Path, model: Model) -> Path:
     """
     base = model.base
     tensors = {
-        "vertices": torch.from_numpy(base.mesh.vertices),
-        "faces": torch.from_numpy(base.mesh.faces),
+        "vertices": torch.tensor(base.mesh.vertices),
+        "faces": torch.tensor(base.mesh.faces),
         "scan": torch.from_numpy(base.scan),
         "frames": torch.from_numpy(model.frames),
         "tables/f": model.tables[0],
@@ -89,7 +89,7 @@ def load(source: str | Path) -> Model:
     Raises:
         CheckpointError: there is none, or it is damaged.
     """
-    init()
+    init(needs="ad")
     with model_file.opened(source, METHOD.name) as (tensors, about):
         if not all(tensor.isfinite().all() for tensor in tensors.values()):
             raise ValueError("values that are not finite")

@@ -25,7 +25,7 @@ from mitex.training.settings import RunOptions
 
 def fit(
     capture: Capture | str | Path,
-    out: str | Path,
+    out: str | Path | None = None,
     *,
     base_mesh: Mesh | str | Path | None = None,
     **options: Unpack[RunOptions],
@@ -37,16 +37,17 @@ def fit(
 
     Args:
         capture: photos with masks and cameras, or the folder that `load_capture` takes.
-        out: run folder; must be new or empty, or hold a run to resume.
+        out: run folder; must be new or empty, or hold a run to resume; None writes no file.
         base_mesh: the shape without its texture, in the capture's world; None finds it.
-        options: preset ("fast" or "paper"), config, overrides, resume, quiet, as of `RunOptions`.
+        options: preset ("fast" or "paper"), and those of `RunOptions`.
 
     Returns:
-        The texture, also saved as `texture.safetensors` in `out`.
+        The texture, also saved as `texture.safetensors` in `out` if that is given.
 
     Raises:
         MitexError: bad input of any kind; nothing has been written then.
-        Interrupted: a checkpoint has been saved.
+        Cancelled: by `cancel`; a checkpoint has been saved if there is a folder.
+        Interrupted: by Ctrl-C, likewise.
     """
     run = Run.of(PRESETS, out, **options)
     config = run.config
@@ -55,10 +56,10 @@ def fit(
         base_mesh = Mesh.load(base_mesh)
     if base_mesh is not None:
         base_mesh = base_mesh.with_vertices(photos.similarity.apply(base_mesh.vertices))
-    init()
+    init(needs="ad")
     keep_freed_memory()
     training, held_out = photos.split()
-    base = find_base(training, config, base_mesh, run.quiet)
+    base = find_base(training, config, base_mesh, run.control, keep=run.folder is not None)
     frames = face_frames(base.mesh)
     reach = shell_reach(base.thickness, config.occupancy)
     projection = Projection(base.mesh, neighbours=config.neighbours, repulsion=config.repulsion, reach=reach)

@@ -53,7 +53,7 @@ class NerfTexture:
     """
 
     def __init__(self, model: files.Model) -> None:
-        init()
+        init(needs="ad")
         self.model = model
 
     @property

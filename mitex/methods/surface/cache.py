@@ -15,15 +15,19 @@ from mitex.paths import cache_dir
 VERSION = "3"  # part of the keys; to be raised when levels are computed in another way
 
 
-def cached_levels(key: str, find: Callable[[], Levels], folder: Path | None = None) -> Levels:
+def cached_levels(
+    key: str, find: Callable[[], Levels], folder: Path | None = None, keep: bool = True
+) -> Levels:
     """The levels kept under `key`, else those that `find` finds, which are kept then (`mitex.cache.cached`).
 
     Args:
         key: of the content.
         find: the precomputation.
         folder: where the cache is; the user's cache folder if None.
+        keep: whether they are kept.
     """
-    return cached((cache_dir() / "surface" if folder is None else folder) / key, find, _read, _write)
+    place = (cache_dir() / "surface" if folder is None else folder) / key
+    return cached(place, find, _read, _write, keep)
 
 
 def _read(place: Path) -> Levels:

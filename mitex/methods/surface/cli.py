@@ -70,15 +70,17 @@ class Fit(ExemplarOptions):
         out = self.folder(f"{exemplar.name}-{'tile' if mesh is None else mesh.name}")
         from mitex.methods import surface
 
-        surface.fit(
-            exemplar,
-            mesh,
-            out,
-            keep_uvs=self.keep_uvs,
-            content=self.content,
-            orientation=self.orientation,
-            **options,
-        )
+        with self.progress() as on_step:
+            surface.fit(
+                exemplar,
+                mesh,
+                out,
+                keep_uvs=self.keep_uvs,
+                content=self.content,
+                orientation=self.orientation,
+                on_step=on_step,
+                **options,
+            )
         print(out)
 
     def _check_tile(self) -> None:

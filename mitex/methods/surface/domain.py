@@ -32,6 +32,7 @@ class SurfaceDomain:
         orientation: (V, 3) where the exemplar's right shall point, in place of `frames`.
         correct, continued: how levels are computed, see `SurfaceConfig`.
         depth: number of levels.
+        keep: whether levels that had to be computed are kept in the cache on disk.
     """
 
     mesh: Mesh
@@ -42,9 +43,12 @@ class SurfaceDomain:
     correct: bool = True
     continued: bool = True
     depth: int = POOLS
+    keep: bool = True
 
     @staticmethod
-    def of(mesh: Mesh, config: SurfaceConfig, orientation: np.ndarray | None = None) -> SurfaceDomain:
+    def of(
+        mesh: Mesh, config: SurfaceConfig, orientation: np.ndarray | None = None, keep: bool = True
+    ) -> SurfaceDomain:
         """The domain that a synthesis with these settings works on."""
         return SurfaceDomain(
             mesh,
@@ -55,6 +59,7 @@ class SurfaceDomain:
             config.correct,
             config.continued,
             POOLS + config.scales,
+            keep,
         )
 
     @property
@@ -91,9 +96,8 @@ class SurfaceDomain:
             *(self.resolution, self.frames, math.radians(self.angle), self.correct, self.continued),
             *(self.depth, self.orientation),
         )
-        return cached_levels(
-            content_key(VERSION, self.mesh.vertices, self.mesh.faces, self.uv, *options), self.compute_levels
-        )
+        key = content_key(VERSION, self.mesh.vertices, self.mesh.faces, self.uv, *options)
+        return cached_levels(key, self.compute_levels, keep=self.keep)
 
     def compute_levels(self) -> Levels:
         """The levels, computed anew."""

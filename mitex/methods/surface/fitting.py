@@ -36,8 +36,8 @@ PADDING = 2  # texels between charts: bilinear taps of one never see the other
 
 def fit(
     exemplar: Exemplar | str | Path,
-    mesh: Mesh | str | Path | None,
-    out: str | Path,
+    mesh: Mesh | str | Path | None = None,
+    out: str | Path | None = None,
     *,
     keep_uvs: bool = False,
     content: str | Path | None = None,
@@ -49,21 +49,21 @@ def fit(
     Args:
         exemplar: maps, or what `Exemplar.load` takes.
         mesh: or what `Mesh.load` takes; None for a flat tile that repeats without a seam.
-        out: run folder; must be new or empty, or hold a run to resume.
+        out: run folder; must be new or empty, or hold a run to resume; None writes no file.
         keep_uvs: use the mesh's own UVs.
         content: style transfer: a texture on the mesh's own UVs (an image file), which are kept then, or "ao"
             for the mesh's ambient occlusion.
         orientation: (V, 3) where the exemplar's right shall point, or what `read_orientation` takes; else the
             frames follow the config.
-        options: preset ("fast", "paper", or "style", the default with `content`), config, overrides, resume,
-            quiet, as of `RunOptions`.
+        options: preset ("fast", "paper", or "style", the default with `content`), and those of `RunOptions`.
 
     Returns:
-        The texture, also saved as `texture.safetensors` in `out`.
+        The texture, also saved as `texture.safetensors` in `out` if that is given.
 
     Raises:
         MitexError: bad input of any kind; nothing has been written then.
-        Interrupted: a checkpoint has been saved.
+        Cancelled: by `cancel`; a checkpoint has been saved if there is a folder.
+        Interrupted: by Ctrl-C, likewise.
     """
     presets = PRESETS if content is None else {"style": PRESETS["style"], **PRESETS}
     run = Run.of(presets, out, **options)
@@ -80,7 +80,8 @@ def fit(
             mesh if isinstance(mesh, Mesh) else Mesh.load(mesh), settings, keep_uvs or image
         )
         field = read_orientation(orientation, surface) if isinstance(orientation, str | Path) else orientation
-        domain = SurfaceDomain.of(surface, settings, field)
+        domain = SurfaceDomain.of(surface, settings, field, keep=run.folder is not None)
+    run.control.check()
     check_memory(domain.mesh, settings, len(target.maps))
     start = None if content is None else content_colours(content, domain)
     inputs = {"content": content_key(start), "orientation": content_key(field)}
@@ -106,11 +107,11 @@ def with_layout(mesh: Mesh, config: SurfaceConfig, keep_uvs: bool) -> Mesh:
     if not keep_uvs:
         return replace(mesh, uv=unwrap(mesh, config.resolution, PADDING))
     if mesh.uv is None:
-        raise ConfigError(f"mesh '{mesh.name}' has no UVs to keep", "leave out --keep-uvs")
+        raise ConfigError(f"mesh '{mesh.name}' has no UVs to keep", "leave out `keep_uvs`")
     if not usable_uv(mesh, mesh.uv):
         raise ConfigError(
             f"the UVs of mesh '{mesh.name}' overlap, leave [0, 1] or are incomplete",
-            "leave out --keep-uvs to have it unwrapped",
+            "leave out `keep_uvs` to have it unwrapped",
         )
     return mesh
 
@@ -131,5 +132,5 @@ def check_memory(mesh: Mesh, config: SurfaceConfig, maps: int = 1) -> None:
         raise ConfigError(
             f"a texture of {config.resolution}^2 needs about {memory / 1e9:.1f} GB of memory, "
             f"and {free / 1e9:.1f} GB are free",
-            f"set --resolution {max(fits, 1)} or less",
+            f"set resolution to {max(fits, 1)} or less",
         )

@@ -59,7 +59,7 @@ def tangent_frames(
         ConfigError: unknown kind; a field that does not fit or is not finite; an angle that is not finite.
     """
     if not np.isfinite(angle):
-        raise ConfigError(f"an orientation of {angle}", "give an angle in radians")
+        raise ConfigError(f"an orientation of {angle}", "give a finite angle")
     return interpolate_frames(mesh, face, barycentric, vertex_directions(mesh, kind, field), angle)
 
 

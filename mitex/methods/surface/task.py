@@ -69,11 +69,12 @@ class SurfaceTask(ParameterTask):
         self.inputs, self.views = dict(inputs or {}), Views(domain, VIEW)
         if content is not None and (list(exemplar.maps) != ["albedo"] or config.scales):
             raise ConfigError(
-                "style transfer takes one image and one scale", "give an image as --exemplar, and scales=0"
+                "style transfer takes one image and one scale",
+                "give an image as `exemplar`, and set scales=0",
             )
         self.layout = texel_layout(list(exemplar.maps))
         if config.optimizer == "lbfgs" and len(self.layout) > 1:
-            raise ConfigError("lbfgs takes one map", "give an image as --exemplar, or set optimizer=adam")
+            raise ConfigError("lbfgs takes one map", "give an image as `exemplar`, or set optimizer=adam")
         self.triples = channel_triples(self.layout, True, config.seed)
         generator = torch.Generator().manual_seed(config.seed)
         self.space = (

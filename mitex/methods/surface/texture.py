@@ -69,7 +69,7 @@ class SurfaceTexture:
         if mesh is not None and not same_surface(mesh, self.mesh):
             raise ConfigError(
                 f"this texture belongs to mesh '{self.mesh.name}', not to '{mesh.name}'",
-                "synthesize it there: mitex fit surface --mesh NEW --config RUN/config.toml",
+                "synthesize it there, with the config.toml of its run folder",
             )
         texels, layout = self.domain.texels, texel_layout(list(self.maps))
         atlas = Atlas.from_uv(self.domain.uv, texels.resolution, PADDING)
@@ -90,7 +90,7 @@ class SurfaceTexture:
         arrays = mesh_arrays(self.mesh)
         if self.domain.orientation is not None:
             arrays["orientation"] = self.domain.orientation
-        tensors = {name: torch.from_numpy(np.ascontiguousarray(a)) for name, a in arrays.items()}
+        tensors = {name: torch.tensor(a) for name, a in arrays.items()}
         tensors["values"] = torch.from_numpy(np.ascontiguousarray(self.values, np.float16))
         about = {**self.about, "maps": list(self.maps), "mesh": self.mesh.name}
         return model_file.save(path, tensors, METHOD.name, about)

@@ -88,7 +88,7 @@ def test_refuses_numbers_out_of_range(options):
 
 
 def test_a_fit_is_kept_and_its_settings_count(tmp_path):
-    baked = fit(waves(), tmp_path / "run", overrides=["resolution=32", "window=0.2"])
+    baked = fit(waves(), tmp_path / "run", set=["resolution=32", "window=0.2"])
     again = DisplacementMap.load(tmp_path / "run")
     assert np.array_equal(again.heights, baked.heights) and again.heights.shape == (32, 32)
     assert again.side == pytest.approx(0.2 / np.sqrt(waves().face_areas.sum()), rel=1e-5)

@@ -65,7 +65,7 @@ def run_folder(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fitting, "PROBED", 3)
         patch.setattr(fitting, "steps_within", steps_within)
-        fit(tiny_capture(), folder, overrides=[*SMALL, "seconds=12"], quiet=True)
+        fit(tiny_capture(), folder, set=[*SMALL, "seconds=12"])
     assert calls == [(12.0, 3)]
     return folder
 
@@ -82,7 +82,7 @@ def test_a_plain_field_learns_for_the_steps_of_its_time(run_folder):
 
 def test_a_run_that_goes_on_keeps_its_steps(run_folder, monkeypatch):
     monkeypatch.setattr(fitting, "train_plain_field", None)  # which would probe again
-    texture = fit(tiny_capture(), run_folder, resume=True, quiet=True)
+    texture = fit(tiny_capture(), run_folder, resume=True)
     assert texture.about["steps"] == STEPS
 
 

@@ -102,7 +102,7 @@ def captured() -> NerfTexture:
 
 @pytest.fixture(scope="module")
 def flat(tmp_path_factory) -> QuiltedTexture:
-    return fit(captured(), tmp_path_factory.mktemp("flat") / "run", overrides=SMALL)
+    return fit(captured(), tmp_path_factory.mktemp("flat") / "run", set=SMALL)
 
 
 def test_a_fit_is_kept(flat: QuiltedTexture, tmp_path):
@@ -117,7 +117,7 @@ def test_a_fit_is_kept(flat: QuiltedTexture, tmp_path):
 
 def test_it_is_fitted_to_a_model_file_too(flat: QuiltedTexture, tmp_path):
     model = captured().save(tmp_path / "small.safetensors")
-    again = fit(model, tmp_path / "run", overrides=SMALL)
+    again = fit(model, tmp_path / "run", set=SMALL)
     assert (again.image == flat.image).all() and (
         QuiltedTexture.load(tmp_path / "run").image == again.image
     ).all()
@@ -125,7 +125,7 @@ def test_it_is_fitted_to_a_model_file_too(flat: QuiltedTexture, tmp_path):
 
 @pytest.mark.parametrize("change", ["size=144", "patches=9", "relit=false", "even=false", "seed=1"])
 def test_every_setting_changes_the_picture(flat: QuiltedTexture, tmp_path, change):
-    other = fit(captured(), tmp_path / "run", overrides=[*SMALL, change])
+    other = fit(captured(), tmp_path / "run", set=[*SMALL, change])
     assert other.image.shape != flat.image.shape or (other.image != flat.image).any()
 
 
@@ -204,5 +204,5 @@ def test_a_fit_that_fails_leaves_nothing(tmp_path, monkeypatch):
 
     monkeypatch.setattr(fitting, "render_patches", black_hole)
     with pytest.raises(ConfigError, match="NaN"):
-        fit(captured(), tmp_path / "run", overrides=SMALL)
+        fit(captured(), tmp_path / "run", set=SMALL)
     assert not list(tmp_path.iterdir())

@@ -36,7 +36,7 @@ def lattice() -> Mesh:
 
 def test_the_flat_lattice():
     mesh = lattice()
-    features = face_features(torch.from_numpy(mesh.vertices), graph_of(mesh))
+    features = face_features(torch.tensor(mesh.vertices), graph_of(mesh))
     expected = torch.tensor([0, math.sqrt(0.75), 0, 1]).expand_as(features)
     assert torch.allclose(features, expected, atol=1e-6)  # on the boundary too: mirrored
 
@@ -61,9 +61,9 @@ def test_two_faces_by_hand():
 
 def test_frames_are_orthonormal_and_point_outwards():
     mesh = bumpy()
-    frames, lengths = side_frames(torch.from_numpy(mesh.vertices), graph_of(mesh))
+    frames, lengths = side_frames(torch.tensor(mesh.vertices), graph_of(mesh))
     assert torch.allclose(frames @ frames.mT, torch.eye(3).expand_as(frames), atol=1e-5)
-    centres = torch.from_numpy(mesh.vertices)[torch.from_numpy(mesh.faces).long()].mean(1)
+    centres = torch.tensor(mesh.vertices)[torch.from_numpy(mesh.faces).long()].mean(1)
     assert ((frames[:, 0, 2] * centres).sum(1) > 0).all()
     assert (lengths > 0).all()
 
@@ -82,19 +82,19 @@ def test_features_follow_the_order_of_vertices_and_faces():
     new, faces = rng.permutation(len(mesh.vertices)), rng.permutation(len(mesh.faces))
     place = np.argsort(new)
     other = Mesh(mesh.vertices[new], place[mesh.faces][faces])
-    a = face_features(torch.from_numpy(mesh.vertices), graph_of(mesh))
-    b = face_features(torch.from_numpy(other.vertices), graph_of(other))
+    a = face_features(torch.tensor(mesh.vertices), graph_of(mesh))
+    b = face_features(torch.tensor(other.vertices), graph_of(other))
     assert torch.allclose(a[faces], b, atol=1e-6)
     turned = Mesh(mesh.vertices, np.roll(mesh.faces, 1, 1))  # another first corner: sides change places
-    c = face_features(torch.from_numpy(turned.vertices), graph_of(turned))
+    c = face_features(torch.tensor(turned.vertices), graph_of(turned))
     assert torch.allclose(a.roll(1, 1), c, atol=1e-6)
 
 
 def test_the_mean_of_the_faces_moves_a_vertex():
     mesh = lattice()
     offsets = torch.tensor([0.0, 0.0, 0.3]).expand(len(mesh.faces), 3)
-    moved = displaced(torch.from_numpy(mesh.vertices), graph_of(mesh), offsets)
-    assert torch.allclose(moved - torch.from_numpy(mesh.vertices), torch.tensor([0.0, 0, 0.3]), atol=1e-6)
+    moved = displaced(torch.tensor(mesh.vertices), graph_of(mesh), offsets)
+    assert torch.allclose(moved - torch.tensor(mesh.vertices), torch.tensor([0.0, 0, 0.3]), atol=1e-6)
 
 
 def test_a_corner_reads_the_frame_of_the_side_leaving_it():

@@ -69,7 +69,7 @@ def hill() -> Mesh:
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs") / "bumpy"
-    return folder, geometric.fit(bumpy(), folder, overrides=SMALL, quiet=True)
+    return folder, geometric.fit(bumpy(), folder, set=SMALL)
 
 
 def small_task(**changes) -> GeometricTask:
@@ -78,10 +78,10 @@ def small_task(**changes) -> GeometricTask:
     hierarchy = Hierarchy.of(ball, config.levels)
     generator = torch.Generator().manual_seed(4)
     meshes = [
-        torch.from_numpy(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=generator)
+        torch.tensor(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=generator)
         for k, mesh in enumerate(hierarchy.meshes)
     ]
-    return GeometricTask(config, hierarchy, torch.from_numpy(ball.vertices), meshes, bumpy())
+    return GeometricTask(config, hierarchy, torch.tensor(ball.vertices), meshes, bumpy())
 
 
 def test_the_run_folder(run):
@@ -171,14 +171,14 @@ def test_faces_that_name_a_vertex_twice_are_refused(run, tmp_path):
     with pytest.raises(MeshError, match="bumpy has faces that name a vertex twice: 1"):
         run[1].apply(mesh)
     with pytest.raises(MeshError, match="bumpy has faces that name a vertex twice: 1"):
-        geometric.fit(mesh, tmp_path / "run", overrides=SMALL, quiet=True)
+        geometric.fit(mesh, tmp_path / "run", set=SMALL)
     assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize("mesh", [moebius(), fan(), turned(bumpy())], ids=lambda mesh: mesh.name)
 def test_references_without_two_sides_are_refused(tmp_path, mesh):
     with pytest.raises(ConfigError, match="not a surface with two sides"):
-        geometric.fit(mesh, tmp_path / "run", overrides=SMALL, quiet=True)
+        geometric.fit(mesh, tmp_path / "run", set=SMALL)
     assert not (tmp_path / "run").exists()
 
 
@@ -189,7 +189,7 @@ def test_references_without_two_sides_are_refused(tmp_path, mesh):
 )
 def test_references_that_are_learned(tmp_path, mesh, template):
     """Their training meshes come near (templates are 0.04 to 0.12 away) and keep pieces and boundaries."""
-    texture = geometric.fit(mesh, tmp_path / "run", template=template, overrides=SMALL, quiet=True)
+    texture = geometric.fit(mesh, tmp_path / "run", template=template, set=SMALL)
     assert texture.about["fit"][-1]["chamfer"] < 0.025
     assert topology(texture.generate(seed=1)) == topology(mesh)
 
@@ -271,11 +271,11 @@ def test_resuming_changes_nothing(tmp_path):
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
-        whole = geometric.fit(bumpy(), tmp_path / "whole", overrides=SMALL, quiet=True)
+        whole = geometric.fit(bumpy(), tmp_path / "whole", set=SMALL)
         part = [*SMALL, "steps=5"]  # between two steps of one critic, whose optimizer must go on too
         # As many levels from the start: what is trained must not depend on where a run was cut.
-        geometric.fit(bumpy(), tmp_path / "part", overrides=part, quiet=True)
-        more = geometric.fit(bumpy(), tmp_path / "part", overrides=["steps=9"], resume=True, quiet=True)
+        geometric.fit(bumpy(), tmp_path / "part", set=part)
+        more = geometric.fit(bumpy(), tmp_path / "part", set=["steps=9"], resume=True)
     finally:
         torch.set_num_threads(threads)
     for a, b in zip(whole.generators, more.generators, strict=True):
@@ -451,7 +451,7 @@ def test_a_critic_that_is_not_finite_reaches_no_checkpoint(tmp_path):
         config = replace(four_levels().config, steps=steps, checkpoint_every=1, preview_every=0)
         task, resume = small_task(**vars(config)), steps > NEW_LEVEL
         with spoiled_critic(task, "critic_gradient") if resume else nullcontext():
-            train(task, config, tmp_path, lr=1e-3, resume=resume, quiet=True)
+            train(task, config, tmp_path, lr=1e-3, resume=resume)
         checkpoints.append(checkpoint.load(tmp_path))
     good, skipped = checkpoints
     assert (good.step, good.skipped, skipped.step, skipped.skipped) == (6, 0, 7, 1)

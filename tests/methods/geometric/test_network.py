@@ -68,7 +68,7 @@ def test_without_weights_nothing_moves():
     graph = FaceGraph.of(mesh.faces, len(mesh.vertices))
     net = network(0, 3, torch.Generator())
     net.load([torch.zeros_like(p) for p in net.parameters])
-    vertices = torch.from_numpy(mesh.vertices)
+    vertices = torch.tensor(mesh.vertices)
     assert torch.equal(generate(net, vertices, graph), vertices)
     noise = 0.1 * torch.randn(vertices.shape, generator=torch.Generator().manual_seed(0))
     assert torch.equal(generate(net, vertices, graph, noise), vertices)
@@ -79,9 +79,7 @@ def test_what_is_generated_turns_with_the_mesh(remeasure):
     mesh = icosphere(3)
     graph = FaceGraph.of(mesh.faces, len(mesh.vertices))
     net = network(2, 3, torch.Generator().manual_seed(0))
-    vertices = torch.from_numpy(mesh.vertices) * (
-        1 + 0.1 * torch.sin(9 * torch.from_numpy(mesh.vertices[:, :1]))
-    )
+    vertices = torch.tensor(mesh.vertices) * (1 + 0.1 * torch.sin(9 * torch.from_numpy(mesh.vertices[:, :1])))
     q, _ = torch.linalg.qr(torch.randn(3, 3, generator=torch.Generator().manual_seed(3)))
     q = q * torch.sign(torch.det(q))
     a = generate(net, vertices, graph, remeasure=remeasure) @ q.T + 2
@@ -139,7 +137,7 @@ def test_the_critics_loss(graph, features):
 @pytest.mark.parametrize("mesh", [icosphere(1), grid(3, 2)])
 def test_subdivision(mesh: Mesh):
     hierarchy = Hierarchy.of(mesh, 3)
-    vertices = torch.from_numpy(mesh.vertices)
+    vertices = torch.tensor(mesh.vertices)
     for level in range(2):
         before = mean_edge(vertices, hierarchy.graphs[level])
         faces, edges = len(hierarchy.graphs[level]), len(hierarchy.pairs[level])

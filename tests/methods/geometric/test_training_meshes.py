@@ -105,7 +105,7 @@ def test_normalised_meshes_share_a_box():
     assert size[0] == pytest.approx(size[1], rel=0.2)  # 20 faces are less round
     assert size[0].max() == pytest.approx(size[1].max(), rel=1e-5)
     graph = FaceGraph.of(template.faces, len(template.vertices))
-    assert float(mean_edge(torch.from_numpy(template.vertices), graph)) == pytest.approx(1, rel=1e-5)
+    assert float(mean_edge(torch.tensor(template.vertices), graph)) == pytest.approx(1, rel=1e-5)
 
 
 def test_training_meshes_come_near_and_stay_sound():
@@ -123,17 +123,17 @@ def test_training_meshes_come_near_and_stay_sound():
 def fitting():
     """Of a square to a smaller one that is tilted and lies higher."""
     mesh, other = grid(3, 3), grid(2, 2)
-    target = 0.5 * torch.from_numpy(other.vertices) @ torch.diag(torch.tensor([1.0, 1, 0])) + 1
+    target = 0.5 * torch.tensor(other.vertices) @ torch.diag(torch.tensor([1.0, 1, 0])) + 1
     target[:, 2] += 0.8 * target[:, 0]
     config = GeometricConfig(fit_normals=0.3, fit_uniform=0.7, fit_entropy=0.5, fit_smooth=0.9)
     graph = FaceGraph.of(mesh.faces, len(mesh.vertices))
-    return Fitting(graph, target, torch.from_numpy(other.faces).long(), config, 200), mesh
+    return Fitting(graph, target, torch.tensor(other.faces).long(), config, 200), mesh
 
 
 def test_the_distance_by_brute_force(fitting):
     """Section 3.1: the weights of both directions, and normals in both."""
     fit, mesh = fitting
-    vertices = torch.from_numpy(mesh.vertices)
+    vertices = torch.tensor(mesh.vertices)
     generator = torch.Generator().manual_seed(3)
     ours = sample_surface(vertices, fit.graph.faces, 200, generator)
     theirs = sample_surface(fit.target, fit.target_faces, 200, generator)
@@ -168,7 +168,7 @@ def test_steps_become_ten_times_smaller(fitting, monkeypatch):
     monkeypatch.setattr(Adam, "step", lambda self, rate: rates.append(rate))
     fit, mesh = fitting
     fit.config = replace(fit.config, fit_steps=10, fit_lr=0.1)
-    vertices = 2 * torch.from_numpy(mesh.vertices)
+    vertices = 2 * torch.tensor(mesh.vertices)
     assert torch.equal(fit.run(vertices, torch.Generator()), vertices)
     assert rates[0] == pytest.approx(0.1 * float(mean_edge(vertices, fit.graph)))
     assert np.allclose(np.divide(rates[1:], rates[:-1]), 0.1**0.1)

@@ -32,7 +32,7 @@ def run(tmp_path_factory, lava):
     out = tmp_path_factory.mktemp("fit") / "run"
     always_from_the_seed = ["pool=1", "inject_every=1", "min_steps=8", "max_steps=8"]
     settings = [*SETTINGS, *always_from_the_seed, "steps=40", "preview_every=20", "checkpoint_every=20"]
-    return out, nca.fit(lava, out, overrides=settings, quiet=True)
+    return out, nca.fit(lava, out, set=settings)
 
 
 def test_it_learns(run):
@@ -70,13 +70,13 @@ def test_the_model_works_on_another_mesh(run):
 
 def test_a_finished_run_is_not_overwritten(run):
     with pytest.raises(OutputError):
-        nca.fit("lava", run[0], overrides=SETTINGS, quiet=True)
+        nca.fit("lava", run[0], set=SETTINGS)
 
 
 def test_starting_from_a_parent(tmp_path, lava):
     parent = texture(seed=3, hidden=16, shape=config().decoder_shape)
     path = parent.save(tmp_path / "parent.safetensors")
-    child = nca.fit(lava, tmp_path / "run", init=path, overrides=[*SETTINGS, "steps=0"], quiet=True)
+    child = nca.fit(lava, tmp_path / "run", init=path, set=[*SETTINGS, "steps=0"])
     assert child.about["parent"] == "tiny"
     assert "loss" not in child.about  # there was no step
     own, others = (t.look.state_dict() for t in (child, parent))
@@ -96,7 +96,7 @@ def test_starting_from_a_parent(tmp_path, lava):
 def test_a_parent_of_another_shape(tmp_path, lava, parent, problem):
     path = texture(**({"shape": config().decoder_shape} | parent)).save(tmp_path / "parent.safetensors")
     with pytest.raises(CheckpointError, match=problem):
-        nca.fit(lava, tmp_path / "run", init=path, overrides=SETTINGS, quiet=True)
+        nca.fit(lava, tmp_path / "run", init=path, set=SETTINGS)
     assert not (tmp_path / "run").exists()
 
 
@@ -106,24 +106,24 @@ def test_a_parent_whose_decoder_reads_something_else(tmp_path, lava):
         shape = replace(config().decoder_shape, **changes)
         path = texture(hidden=16, shape=shape).save(tmp_path / "parent.safetensors")
         with pytest.raises(CheckpointError, match=next(iter(changes))):
-            nca.fit(lava, tmp_path / "run", init=path, overrides=SETTINGS, quiet=True)
+            nca.fit(lava, tmp_path / "run", init=path, set=SETTINGS)
 
 
 def test_resuming_takes_the_settings_of_the_run(tmp_path):
     threads(1)
     out = tmp_path / "run"
-    first = nca.fit("wicker", out, overrides=[*SETTINGS, "steps=2"], quiet=True)
-    second = nca.fit("wicker", out, overrides=["steps=3"], resume=True, quiet=True)
+    first = nca.fit("wicker", out, set=[*SETTINGS, "steps=2"])
+    second = nca.fit("wicker", out, set=["steps=3"], resume=True)
     assert (first.about["steps"], second.about["steps"]) == (2, 3)
     assert second.look.rule.hidden == 16 and len(_losses(out)) == 3
     with pytest.raises(CheckpointError, match="frequency"):
-        nca.fit("wicker", out, overrides=["steps=4", "frequency=9"], resume=True, quiet=True)
+        nca.fit("wicker", out, set=["steps=4", "frequency=9"], resume=True)
 
 
 @pytest.mark.parametrize(
     ("options", "error"),
     [
-        ({"overrides": ["hiden=3"]}, ConfigError),
+        ({"set": ["hiden=3"]}, ConfigError),
         ({"preset": "fast"}, ConfigError),
         ({"init": "no-such-model"}, CheckpointError),
         ({"resume": True}, CheckpointError),
@@ -131,5 +131,5 @@ def test_resuming_takes_the_settings_of_the_run(tmp_path):
 )
 def test_bad_input_leaves_nothing_behind(tmp_path, options, error):
     with pytest.raises(error):
-        nca.fit("lava", tmp_path / "run", quiet=True, **options)
+        nca.fit("lava", tmp_path / "run", **options)
     assert not (tmp_path / "run").exists()

@@ -141,7 +141,7 @@ def test_first_layer_has_the_layout_of_the_authors(block, expected):
     centre = next(i for i, p in enumerate(mesh.vertices) if not p.any())
     state = torch.zeros(1, 9, 2)
     state[0, :, 1] = 0.5  # the second channel; others see the first
-    points = torch.from_numpy(mesh.vertices)
+    points = torch.tensor(mesh.vertices)
     state[0, torch.all(points == torch.tensor([1.0, 0, 0]), 1), 1] += 100.0
     state[0, torch.all(points == torch.tensor([0.0, -1, 0]), 1), 1] += 1.0
     model = MeshNCA(channels=2, hidden=1)

@@ -112,10 +112,10 @@ def test_orientation_turns_the_growth_and_the_tangents(texture):
     mesh = grid(6, 6)
     turned = mesh.with_vertices(mesh.vertices @ np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]], np.float32))
     assert np.allclose(turned.vertices[:, 0], mesh.vertices[:, 1])  # by -90 degrees: y becomes x
-    oriented = texture.grow(mesh, steps=10, orientation=math.pi / 2)
+    oriented = texture.grow(mesh, steps=10, orientation=90)
     assert torch.allclose(oriented, texture.grow(turned, steps=10), atol=1e-4)
     assert (oriented - texture.grow(mesh, steps=10)).abs().max() > 1e-3
-    asset = texture.apply(mesh, steps=1, subdivide=0, orientation=math.pi / 2)
+    asset = texture.apply(mesh, steps=1, subdivide=0, orientation=90)
     assert asset.tangents is not None
     assert np.allclose(asset.tangents, [0, 1, 0], atol=1e-6)  # the exemplar's right points up
 

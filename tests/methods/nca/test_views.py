@@ -62,6 +62,6 @@ def test_gradients_reach_what_is_seen(look, sphere, state):
 
 def test_a_camera_that_sees_nothing(look, sphere, state):
     origin, target, up = np.array([[0, 0, 3.0], [0, 0, 9.0], [0, 1.0, 0]])
-    away = Cameras("perspective", origin, target, up, fov=0.5, width=6, height=4)
+    away = Cameras("perspective", origin, target, up, fov=30, width=6, height=4)
     views = _render(look, sphere, state, away)
     assert views.shape == (1, 4, 6, 4) and not views.any()

@@ -10,7 +10,7 @@ from mitex.training import resolve
 SETTINGS = (
     *("frequency=8", "resolution=32", "exemplar_size=32", "target_size=32", "density=8", "view_count=4"),
     *("layers=relu1_1,relu2_1", "pool=4", "inject_every=3", "min_steps=2", "max_steps=4", "hidden=16"),
-    *("samples=256", "checkpoint_every=100", "preview_every=0", "zooms=1", "sphere=even", "order_weight=0"),
+    *("samples=256", "checkpoint_every=100", "preview_every=0", "zooms=1", "surfaces=even", "order_weight=0"),
     *("decoder_width=12", "waves=8"),
 )
 

@@ -23,7 +23,7 @@ def run(tmp_path_factory, base) -> Path:
     folder = tmp_path_factory.mktemp("nerf")
     patch = pytest.MonkeyPatch()
     patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
-    fit(tiny_capture(), folder / "run", base_mesh=base, overrides=SETTINGS, quiet=True)
+    fit(tiny_capture(), folder / "run", base_mesh=base, set=SETTINGS)
     patch.undo()
     return folder / "run"
 

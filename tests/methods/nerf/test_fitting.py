@@ -84,7 +84,7 @@ def test_damaged_files_are_refused(texture, tmp_path, missing, monkeypatch):
 
 def test_a_used_folder_is_refused(run, base):
     with pytest.raises(OutputError):
-        fit(tiny_capture(), run, base_mesh=base, overrides=SETTINGS, quiet=True)
+        fit(tiny_capture(), run, base_mesh=base, set=SETTINGS)
 
 
 def test_maps_repeat_patches_of_the_base_shape(texture, maps):
@@ -248,7 +248,7 @@ def test_refined_cameras_make_up_for_wrong_ones(base, tmp_path, own_cache):
     errors = {}
     for name, photos, refined in (("right", capture, 0), ("wrong", wrong, 0), ("refined", wrong, 1)):
         settings = [*more, f"refine_cameras={'true' if refined else 'false'}"]
-        fit(photos, tmp_path / name, base_mesh=base, overrides=settings, quiet=True)
+        fit(photos, tmp_path / name, base_mesh=base, set=settings)
         lines = (tmp_path / name / "metrics.jsonl").read_text().splitlines()[-50:]
         errors[name] = np.mean([json.loads(line)["colour"] for line in lines])
     assert errors["refined"] < 0.5 * (errors["right"] + errors["wrong"]), errors

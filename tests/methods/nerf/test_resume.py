@@ -59,7 +59,7 @@ def whole(base, tmp_path_factory) -> Path:
 
 
 def small_fit(folder: Path, base: Mesh, *settings: str, resume: bool = False) -> None:
-    fit(tiny_capture(), folder, base_mesh=base, overrides=settings, resume=resume, quiet=True)
+    fit(tiny_capture(), folder, base_mesh=base, set=settings, resume=resume)
 
 
 def assert_same(a: Path, b: Path) -> None:
@@ -120,9 +120,7 @@ def test_a_plain_field_that_goes_on_is_that_of_one_go(tmp_path):
     settings = replace(resolve(PRESETS, overrides=SMALL), preview_every=0)
     for name, parts in (("whole", (STEPS,)), ("parts", (BEFORE, STEPS))):
         for steps in parts:
-            train_plain_field(
-                replace(settings, steps=steps), capture, (capture, 0), tmp_path / name, quiet=True
-            )
+            train_plain_field(replace(settings, steps=steps), capture, (capture, 0), tmp_path / name)
     a, b = (checkpoint.load(tmp_path / name) for name in ("whole", "parts"))
     for one, other in ((a.task, b.task), (a.optimizer, b.optimizer), ({"": a.generator}, {"": b.generator})):
         assert [name for name in one if not torch.equal(one[name], other[name])] == []

@@ -1,6 +1,7 @@
 """A small real synthesis, its texture, and what is refused."""
 
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 
 import numpy as np
@@ -53,7 +54,7 @@ def exemplar():
 @pytest.fixture(scope="module")
 def run(mesh, exemplar, tmp_path_factory):
     folder = tmp_path_factory.mktemp("run") / "run"
-    return folder, surface.fit(exemplar, mesh, folder, overrides=SMALL, quiet=True)
+    return folder, surface.fit(exemplar, mesh, folder, set=SMALL)
 
 
 def losses(folder):
@@ -64,9 +65,7 @@ def losses(folder):
 
 def test_the_loss_falls_and_the_colours_come_near(exemplar, tmp_path):
     colours = Exemplar({"albedo": exemplar.maps["albedo"]})
-    texture = surface.fit(
-        colours, embedded("vase"), tmp_path / "run", overrides=[*SMALL, "steps=60"], quiet=True
-    )
+    texture = surface.fit(colours, embedded("vase"), tmp_path / "run", set=[*SMALL, "steps=60"])
     loss = losses(tmp_path / "run")
     assert loss[-1] < 0.15 * loss[0]
     pixels = exemplar.maps["albedo"].reshape(-1, 3)
@@ -115,11 +114,11 @@ def test_resuming_changes_nothing(mesh, exemplar, tmp_path):
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
-        whole = surface.fit(exemplar, mesh, tmp_path / "whole", overrides=SMALL, quiet=True)
+        whole = surface.fit(exemplar, mesh, tmp_path / "whole", set=SMALL)
         part = [*SMALL, "steps=6"]
-        surface.fit(exemplar, mesh, tmp_path / "part", overrides=part, quiet=True)
+        surface.fit(exemplar, mesh, tmp_path / "part", set=part)
         assert method_of(tmp_path / "part") == METHOD
-        rest = surface.fit(exemplar, mesh, tmp_path / "part", overrides=["steps=12"], resume=True, quiet=True)
+        rest = surface.fit(exemplar, mesh, tmp_path / "part", set=["steps=12"], resume=True)
     finally:
         torch.set_num_threads(threads)
     assert np.array_equal(whole.values, rest.values)
@@ -128,7 +127,7 @@ def test_resuming_changes_nothing(mesh, exemplar, tmp_path):
 
 def test_resuming_on_another_mesh_is_refused(run, exemplar):
     with pytest.raises(CheckpointError):
-        surface.fit(exemplar, icosphere(7), run[0], overrides=["steps=14"], resume=True, quiet=True)
+        surface.fit(exemplar, icosphere(7), run[0], set=["steps=14"], resume=True)
 
 
 def test_optimizers_and_spaces(mesh, exemplar, tmp_path):
@@ -136,7 +135,7 @@ def test_optimizers_and_spaces(mesh, exemplar, tmp_path):
     colours, last = Exemplar({"albedo": exemplar.maps["albedo"]}), {}
     for setting in ("whitened=false noise=0.2 lr=0.1", "optimizer=adam", "optimizer=lbfgs lr=1"):
         overrides = [*SMALL, "steps=40", *setting.split()]
-        surface.fit(colours, mesh, tmp_path / setting, overrides=overrides, quiet=True)
+        surface.fit(colours, mesh, tmp_path / setting, set=overrides)
         last[setting] = losses(tmp_path / setting)[-1]
     channels, adam, lbfgs = last.values()
     assert adam < 0.7 * channels and lbfgs < 0.85 * adam
@@ -145,7 +144,7 @@ def test_optimizers_and_spaces(mesh, exemplar, tmp_path):
 def test_transport_gives_the_exemplars_colours(mesh, exemplar, tmp_path):
     colours = Exemplar({"albedo": exemplar.maps["albedo"]})
     overrides = [*SMALL, "steps=60", "loss=transport", "layers=relu1_1,relu2_1,relu3_1"]
-    texture = surface.fit(colours, mesh, tmp_path / "run", overrides=overrides, quiet=True)
+    texture = surface.fit(colours, mesh, tmp_path / "run", set=overrides)
     loss = losses(tmp_path / "run")
     assert np.mean(loss[-5:]) < 0.5 * loss[0]
     assert np.abs(texture.values.mean(0) - exemplar.maps["albedo"].mean((0, 1))).max() < 0.06
@@ -166,7 +165,7 @@ def test_transport_gives_the_exemplars_colours(mesh, exemplar, tmp_path):
 def test_settings_that_do_not_go_together(mesh, exemplar, tmp_path, settings, message):
     with pytest.raises(ConfigError, match=message):
         small = [word for word in SMALL if word != "scales=0" or "scales=1" not in settings]
-        surface.fit(exemplar, mesh, tmp_path / "run", overrides=[*small, *settings], quiet=True)
+        surface.fit(exemplar, mesh, tmp_path / "run", set=[*small, *settings])
     assert not (tmp_path / "run").exists()
 
 
@@ -191,7 +190,8 @@ def test_more_than_the_memory_is_refused_with_the_estimate(mesh, monkeypatch):
     room.check_memory(half, config)
     monkeypatch.setattr(room, "available_memory", lambda: 500_000 * room.BYTES_PER_TEXEL)
     with pytest.raises(
-        ConfigError, match=r"2000\^2 needs about 7.2 GB of memory, and 1.8 GB are free; set --resolution 1000"
+        ConfigError,
+        match=r"2000\^2 needs about 7.2 GB of memory, and 1.8 GB are free; set resolution to 1000",
     ):
         room.check_memory(half, config)
     monkeypatch.setattr(room, "available_memory", lambda: None)
@@ -202,8 +202,8 @@ class TestOrientation:
     def test_a_field_turns_the_frames_and_stays_with_the_texture(self, mesh, exemplar, tmp_path):
         down = np.tile(np.array([0.0, -1.0, 0.0], np.float32), (len(mesh.vertices), 1))
         np.save(tmp_path / "down.npy", down)
-        options = {"overrides": [*SMALL, "steps=2"], "quiet": True, "orientation": tmp_path / "down.npy"}
-        surface.fit(exemplar, mesh, tmp_path / "run", **options)
+        settings = [*SMALL, "steps=2"]
+        surface.fit(exemplar, mesh, tmp_path / "run", set=settings, orientation=tmp_path / "down.npy")
         texture = SurfaceTexture.load(tmp_path / "run")
         tangents = texture.apply().tangents
         assert texture.domain.orientation is not None and tangents is not None
@@ -212,10 +212,10 @@ class TestOrientation:
         assert (tangents[around, 1] < -0.8).all()
 
     def test_resuming_with_another_field_is_refused(self, mesh, exemplar, tmp_path):
-        options = {"overrides": [*SMALL, "steps=2"], "quiet": True}
-        surface.fit(exemplar, mesh, tmp_path / "run", **options)
+        fit = partial(surface.fit, exemplar, mesh, tmp_path / "run", set=[*SMALL, "steps=2"])
+        fit()
         with pytest.raises(CheckpointError, match="orientation"):
-            surface.fit(exemplar, mesh, tmp_path / "run", **options, orientation=mesh.vertices, resume=True)
+            fit(orientation=mesh.vertices, resume=True)
 
     @pytest.mark.parametrize(
         "kind", ["missing", "text", "shape", "words", "nan", "objects", "archive", "cut"]
@@ -290,19 +290,19 @@ def test_a_fit_computes_its_domain_once(mesh, exemplar, tmp_path, monkeypatch):
         room.Texels, "rasterize", staticmethod(lambda *args: (calls.append("texels"), rasterize(*args))[1])
     )
     overrides = [*SMALL, "resolution=47", "steps=2", "preview_every=1"]
-    surface.fit(exemplar, mesh, tmp_path / "run", overrides=overrides, quiet=True).apply()
+    surface.fit(exemplar, mesh, tmp_path / "run", set=overrides).apply()
     assert sorted(calls) == ["GeodesicTracer", "build", "texels", "vertex_directions"]
 
 
 def test_noise_start_and_range(mesh, exemplar, tmp_path):
-    texture = surface.fit(exemplar, mesh, tmp_path / "run", overrides=[*SMALL, "steps=1", "lr=0"], quiet=True)
+    texture = surface.fit(exemplar, mesh, tmp_path / "run", set=[*SMALL, "steps=1", "lr=0"])
     maps = [exemplar.maps[name] for name in texture.maps]
     assert np.abs(texture.values.mean(0) - np.concatenate([m.mean((0, 1)) for m in maps])).max() < 0.05
     spread = np.concatenate([m.std((0, 1)) for m in maps])
     # Uniform noise of width 1 deviates by 0.289; a channel that hardly varies gets a little of the floor.
     assert np.abs(texture.values.std(0) - 0.289 * spread).max() < 0.02
     overrides = [*SMALL, "steps=1", "lr=0", "whitened=false", "noise=0.2"]
-    texture = surface.fit(exemplar, mesh, tmp_path / "paper", overrides=overrides, quiet=True)
+    texture = surface.fit(exemplar, mesh, tmp_path / "paper", set=overrides)
     assert texture.values.min() >= 0 and texture.values.max() <= 0.2
     assert abs(texture.values.mean() - 0.1) < 0.005
 
@@ -312,9 +312,7 @@ def test_diffusion_wears_down_what_is_finer_than_the_taps(mesh, exemplar, tmp_pa
     textures = {}
     for amount in ("0", "0.1"):
         overrides = [*SMALL, "lr=0", f"diffusion={amount}"]
-        textures[amount] = surface.fit(
-            exemplar, mesh, tmp_path / amount, overrides=overrides, quiet=True
-        ).values
+        textures[amount] = surface.fit(exemplar, mesh, tmp_path / amount, set=overrides).values
     assert np.abs(textures["0.1"].mean(0) - textures["0"].mean(0)).max() < 0.01
     assert (textures["0.1"].std(0) < 0.6 * textures["0"].std(0)).all()
 
@@ -352,7 +350,7 @@ class TestLayouts:
 
 def test_one_triangle_is_enough(exemplar, tmp_path):
     mesh = Mesh(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]), name="one")
-    texture = surface.fit(exemplar, mesh, tmp_path / "run", overrides=[*SMALL, "steps=2"], quiet=True)
+    texture = surface.fit(exemplar, mesh, tmp_path / "run", set=[*SMALL, "steps=2"])
     assert np.isfinite(texture.values).all()
 
 
@@ -362,7 +360,7 @@ def test_size_does_not_matter(mesh, exemplar, tmp_path, power):
     threads(1)
     large = mesh.with_vertices(mesh.vertices * 2.0**power)
     a, b = (
-        surface.fit(exemplar, m, tmp_path / name, overrides=[*SMALL, "steps=3"], quiet=True)
+        surface.fit(exemplar, m, tmp_path / name, set=[*SMALL, "steps=3"])
         for name, m in (("a", mesh), ("b", large))
     )
     assert np.array_equal(a.domain.uv, b.domain.uv)
@@ -376,7 +374,7 @@ class TestStyleTransfer:
         """The result still follows the content, in the exemplar's colours."""
         mesh = embedded("mushrooms")
         image = Exemplar({"albedo": exemplar.maps["albedo"]})
-        texture = surface.fit(image, mesh, tmp_path / "run", content="ao", overrides=self.STYLE, quiet=True)
+        texture = surface.fit(image, mesh, tmp_path / "run", content="ao", set=self.STYLE)
         content = content_colours("ao", texture.domain)
         assert content.std() > 0.05 and content.min() >= 0 and content.max() <= 1
         assert np.corrcoef(content.mean(1), texture.values.mean(1))[0, 1] > 0.3
@@ -386,7 +384,7 @@ class TestStyleTransfer:
         """All weight on the content: its texture is the optimum from the start."""
         image = Exemplar({"albedo": exemplar.maps["albedo"]})
         overrides = [*self.STYLE, "content_weight=1e12", "lr=0.001", "steps=2"]
-        texture = surface.fit(image, mesh, tmp_path / "run", content="ao", overrides=overrides, quiet=True)
+        texture = surface.fit(image, mesh, tmp_path / "run", content="ao", set=overrides)
         assert np.abs(texture.values - content_colours("ao", texture.domain)).max() < 0.02
 
     def test_images_are_read_on_the_meshs_own_uvs(self, tmp_path):
@@ -401,9 +399,9 @@ class TestStyleTransfer:
     def test_an_image_needs_uvs(self, mesh, exemplar, tmp_path):
         image = Exemplar({"albedo": exemplar.maps["albedo"]})
         with pytest.raises(ConfigError, match="no UVs"):
-            surface.fit(image, mesh, tmp_path / "run", content="a.png", overrides=self.STYLE, quiet=True)
+            surface.fit(image, mesh, tmp_path / "run", content="a.png", set=self.STYLE)
 
     def test_one_image_is_transferred(self, mesh, exemplar, tmp_path):
         with pytest.raises(ConfigError, match="one image"):
-            surface.fit(exemplar, mesh, tmp_path / "run", content="ao", overrides=self.STYLE, quiet=True)
+            surface.fit(exemplar, mesh, tmp_path / "run", content="ao", set=self.STYLE)
         assert not (tmp_path / "run").exists()

@@ -62,7 +62,7 @@ def synthesize(folder, settings: dict[str, str]) -> np.ndarray:
     content = settings.pop("content", None)
     overrides = [f"{key}={value}" for key, value in settings.items()]
     mesh = embedded("octopus")
-    return surface.fit(Exemplar(maps), mesh, folder, overrides=overrides, content=content, quiet=True).values
+    return surface.fit(Exemplar(maps), mesh, folder, set=overrides, content=content).values
 
 
 @pytest.fixture(scope="module")

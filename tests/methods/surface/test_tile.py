@@ -73,7 +73,7 @@ def test_a_tile_is_synthesized_saved_and_applied(tmp_path):
     exemplar = Exemplar.load("cobblestone").resized(64)
     exemplar = Exemplar({name: exemplar.maps[name] for name in ("albedo", "normal")}, "stones")
     settings = ["resolution=64", "exemplar_size=64", "steps=3", "scales=1", "preview_every=2"]
-    texture = surface.fit(exemplar, None, tmp_path / "run", overrides=settings, quiet=True)
+    texture = surface.fit(exemplar, None, tmp_path / "run", set=settings)
     assert list((tmp_path / "run" / "previews").iterdir())
     asset = SurfaceTexture.load(tmp_path / "run").apply()
     assert asset.texture_maps is not None and asset.texture_maps["albedo"].shape == (64, 64, 3)
@@ -102,5 +102,5 @@ def test_settings_that_do_not_fit(settings, problem):
 @pytest.mark.parametrize("option", [{"keep_uvs": True}, {"content": "ao"}, {"orientation": np.zeros((4, 3))}])
 def test_options_of_meshes_are_refused(option, tmp_path):
     with pytest.raises(ConfigError, match="a tile takes no"):
-        surface.fit("lava", None, tmp_path / "run", overrides=["resolution=128"], quiet=True, **option)
+        surface.fit("lava", None, tmp_path / "run", set=["resolution=128"], **option)
     assert not (tmp_path / "run").exists()

@@ -15,17 +15,19 @@ from mitex.training.fit import Run
 from mitex.training.settings import RunOptions
 
 
-def fit(reference: Mesh | str | Path, out: str | Path, **options: Unpack[RunOptions]) -> DisplacementMap:
+def fit(
+    reference: Mesh | str | Path, out: str | Path | None = None, **options: Unpack[RunOptions]
+) -> DisplacementMap:
     """Bakes the relief of a mesh; writes a run folder with the map in it.
 
     Args:
         reference: a mesh, what `Mesh.load` takes, or a geometric texture's reference by its name; the map is
             taken off the side that faces +z.
-        out: run folder; must be new or empty.
-        options: config, overrides, quiet, as of `RunOptions`.
+        out: run folder; must be new or empty; None writes no file.
+        options: those of `RunOptions` but `steps` and `resume`; `on_step` is not called.
 
     Returns:
-        The map, also saved as `texture.safetensors` in `out`.
+        The map, also saved as `texture.safetensors` in `out` if that is given.
 
     Raises:
         MitexError: bad input of any kind; nothing has been written then.

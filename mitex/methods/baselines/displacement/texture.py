@@ -135,7 +135,7 @@ class DisplacementMap:
 
 def _depth(mesh: Mesh, start: np.ndarray) -> np.ndarray:
     """(N,) float64 how far along -z from points (N, 3) the mesh is first met; infinite where it is not."""
-    init()
+    init(needs="ad")
     scene = mi.load_dict({"type": "scene", "mesh": mesh_shape(mesh)})
     rays = mi.Ray3f(mi.Point3f(np.ascontiguousarray(start.T, np.float32)), mi.Vector3f(0, 0, -1))
     hits = scene.ray_intersect_preliminary(rays)

@@ -46,7 +46,8 @@ class Fit(TrainingOptions):
 
         capture = load_capture(self.capture)
         out = self.folder(f"{capture.name}-plain_field")
-        plain_field.fit(capture, out, **options)
+        with self.progress() as on_step:
+            plain_field.fit(capture, out, on_step=on_step, **options)
         print(out)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import tempfile
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,7 +14,7 @@ from mitex.methods.nerf.capture.capture import Capture, load_capture
 from mitex.methods.nerf.training.plain import PlainTask, train_plain_field
 from mitex.methods.nerf.training.radiance import schedule
 from mitex.runtime import init, keep_freed_memory
-from mitex.training import Interrupted, run
+from mitex.training.control import Control, Progress
 from mitex.training.fit import Run
 from mitex.training.settings import RunOptions
 
@@ -24,32 +22,35 @@ PROBED = 1000  # steps of the training that tells the pace
 LAST = 200  # of these, the last ones whose pace counts
 
 
-def fit(capture: Capture | str | Path, out: str | Path, **options: Unpack[RunOptions]) -> PlainFieldTexture:
+def fit(
+    capture: Capture | str | Path, out: str | Path | None = None, **options: Unpack[RunOptions]
+) -> PlainFieldTexture:
     """Learns a plain field from photos; writes a run folder with the model in it.
 
     Every eighth view is held out; previews show the first of these.
 
     Args:
         capture: photos with masks and cameras, or the folder that `load_capture` takes.
-        out: run folder; must be new or empty, or hold a run to resume.
-        options: preset ("fast" or "paper", as of the texture that it is compared with), config, overrides
-            ("seconds=..." for equal time), resume, quiet, as of `RunOptions`. A run that is resumed keeps the
-            number of steps that its time was enough for.
+        out: run folder; must be new or empty, or hold a run to resume; None writes no file.
+        options: preset ("fast" or "paper", as of the texture that it is compared with), and those of
+            `RunOptions`; the setting `seconds` is for equal time. A run that is resumed keeps the number of
+            steps that its time was enough for.
 
     Returns:
-        The field, also saved as `texture.safetensors` in `out`.
+        The field, also saved as `texture.safetensors` in `out` if that is given.
 
     Raises:
         MitexError: bad input of any kind; nothing has been written then.
-        Interrupted: a checkpoint has been saved.
+        Cancelled: by `cancel`; a checkpoint has been saved if there is a folder.
+        Interrupted: by Ctrl-C, likewise.
     """
     training_run = Run.of(PRESETS, out, **options)
     photos = capture if isinstance(capture, Capture) else load_capture(capture)
-    init()
+    init(needs="ad")
     keep_freed_memory()
     training, held_out = photos.split()
     if training_run.config.seconds and not training_run.resume:
-        config = for_its_time(training_run.config, training, training_run.quiet)
+        config = for_its_time(training_run.config, training, training_run.control)
         training_run = replace(training_run, config=config)
     config = training_run.config
     task = PlainTask(config, training, (held_out, 0))
@@ -63,20 +64,22 @@ def fit(capture: Capture | str | Path, out: str | Path, **options: Unpack[RunOpt
     )
 
 
-def for_its_time(config: PlainFieldConfig, capture: Capture, quiet: bool) -> PlainFieldConfig:
+def for_its_time(config: PlainFieldConfig, capture: Capture, control: Control) -> PlainFieldConfig:
     """The settings with as many steps as `seconds` are enough for, by the pace of a short training.
 
     Its first steps do not count for the pace: they are slow, since nothing hides anything yet.
     """
     short = replace(config, steps=PROBED, preview_every=0, checkpoint_every=PROBED)
-    with tempfile.TemporaryDirectory() as folder:
-        probe = Path(folder) / "run"
-        try:
-            train_plain_field(short, capture, (capture, 0), probe, quiet)
-        except Interrupted as e:
-            raise KeyboardInterrupt("interrupted before the first step; nothing is kept") from e
-        lines = (probe / run.METRICS).read_text().splitlines()
-    steps = steps_within(config.seconds, [json.loads(line)["seconds"] for line in lines])
+    clock = []
+
+    def on_step(progress: Progress) -> None:
+        if progress.metrics:
+            clock.append(progress.seconds)
+        if control.on_step is not None:
+            control.on_step(progress)
+
+    train_plain_field(short, capture, (capture, 0), control=replace(control, on_step=on_step))
+    steps = steps_within(config.seconds, clock)
     return replace(config, steps=steps, lr_steps=steps)
 
 

@@ -47,7 +47,7 @@ class PlainFieldTexture:
         Raises:
             CheckpointError: there is none, or it is damaged.
         """
-        init()
+        init(needs="ad")
         with model_file.opened(source, METHOD.name) as (tensors, about):
             occupied = unpacked_cells(tensors.pop("occupied"), int(about["occupancy"]))
             texture = cls(tensors, occupied, about)
@@ -75,7 +75,7 @@ class PlainFieldTexture:
     @cached_property
     def field(self) -> PlainField:
         """The field in the scene cube, ready to be marched."""
-        init()
+        init(needs="ad")
         mask = mi.TensorXu8(self.occupied)
         return PlainField.of(self.parameters, hash_grid(self.config), mask, render_step(self.config))
 

@@ -17,16 +17,18 @@ from mitex.training.fit import Run
 from mitex.training.settings import RunOptions
 
 
-def fit(texture: NerfTexture | str | Path, out: str | Path, **options: Unpack[RunOptions]) -> QuiltedTexture:
+def fit(
+    texture: NerfTexture | str | Path, out: str | Path | None = None, **options: Unpack[RunOptions]
+) -> QuiltedTexture:
     """Quilts pictures of a texture's patches, seen from above; writes a run folder with the result in it.
 
     Args:
         texture: captured, or what `NerfTexture.load` takes.
-        out: run folder; must be new or empty.
-        options: config, overrides, quiet, as of `RunOptions`.
+        out: run folder; must be new or empty; None writes no file.
+        options: those of `RunOptions` but `steps` and `resume`; `on_step` is not called.
 
     Returns:
-        The picture, also saved as `texture.safetensors` in `out`.
+        The picture, also saved as `texture.safetensors` in `out` if that is given.
 
     Raises:
         MitexError: bad input of any kind; nothing has been written then.

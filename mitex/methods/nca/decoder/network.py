@@ -7,7 +7,7 @@ import math
 import torch
 from torch import nn
 
-from mitex.methods.nca.dense import product
+from mitex.methods.nca import dense
 
 
 class SineNetwork(nn.Module):
@@ -27,7 +27,7 @@ class SineNetwork(nn.Module):
         super().__init__()
         self.omega = omega
         widths = [inputs, *[width] * depth, outputs]
-        self.layers = nn.ModuleList(nn.Linear(a, b) for a, b in zip(widths, widths[1:], strict=False))
+        self.layers = nn.ModuleList(dense.layer(a, b) for a, b in zip(widths, widths[1:], strict=False))
 
     def initialise(self, generator: torch.Generator) -> None:
         """Uniform weights: within 1 / inputs in the first layer, sqrt(6 / inputs) / omega in the others."""
@@ -42,8 +42,8 @@ class SineNetwork(nn.Module):
         """(P, inputs) -> (P, outputs)."""
         *hidden, last = self.linear
         for layer in hidden:
-            x = torch.sin(product(x, self.omega * layer.weight, self.omega * layer.bias))
-        return product(x, last.weight, last.bias)
+            x = torch.sin(dense.product(x, self.omega * layer.weight, self.omega * layer.bias))
+        return dense.product(x, last.weight, last.bias)
 
     @property
     def linear(self) -> list[nn.Linear]:

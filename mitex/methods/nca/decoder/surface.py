@@ -40,7 +40,7 @@ class Surface:
     """
 
     def __init__(self, mesh: Mesh, interpolation: Kind = "smooth") -> None:
-        init()
+        init(needs="ad")
         mesh = mesh.with_vertices(decoder_units(mesh).apply(mesh.vertices))
         self.mesh = mesh
         self._lookup = SurfaceLookup(mesh, interpolation)

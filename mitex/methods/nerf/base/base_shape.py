@@ -56,10 +56,10 @@ def base_shape(
             `nerf` is not installed.
     """
     if not np.isfinite(density).all():
-        raise MeshError("the coarse density is not finite", "lower the learning rate, or give --base-mesh")
+        raise MeshError("the coarse density is not finite", "lower the learning rate, or give `base_mesh`")
     if not (density > threshold).any():
         problem = f"the coarse density is nowhere above {threshold:g}"
-        raise MeshError(problem, "check masks and cameras, train it for longer, or give --base-mesh")
+        raise MeshError(problem, "check masks and cameras, train it for longer, or give `base_mesh`")
     # Without the clipping, linear interpolation would put the surface at the outermost samples.
     clipped = np.clip(density, 0.0, 2.0 * threshold)
     cell = 2.0 / len(density)

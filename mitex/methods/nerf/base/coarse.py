@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import logging
 import shutil
-import sys
 import time
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -24,6 +24,7 @@ from mitex.methods.nerf.training.plain import PlainTask, train_plain_field
 from mitex.paths import cache_dir
 from mitex.runtime.jit import dr, mi
 from mitex.textures.march import composite
+from mitex.training.control import ALONE, Control
 
 VERSION = 1  # of the base shapes in the cache
 # Settings of the coarse field: it needs less of all this than the texture.
@@ -42,6 +43,7 @@ SCAN_SIDE = 200  # pixels of a scan along its longest side
 SOLID = 0.95  # opacity of a ray that has met the surface
 VOXEL = 0.01  # the scan keeps one point in each [scene units]
 ABANDONED = 7 * 24 * 3600.0  # a training that nobody has gone on with for so long is removed [s]
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,20 +62,24 @@ class BaseShape:
 
 
 def find_base(
-    capture: Capture, config: NerfConfig, base_mesh: Mesh | None = None, quiet: bool = True
+    capture: Capture,
+    config: NerfConfig,
+    base_mesh: Mesh | None = None,
+    control: Control = ALONE,
+    keep: bool = True,
 ) -> BaseShape:
     """Trains a coarse field on a capture, and takes base shape, scan and thickness of the shell from it.
-
-    The result is kept in the user's cache folder.
 
     Args:
         capture: the views to learn from.
         config: settings.
         base_mesh: a base shape of the user's in the scene cube; None takes it from the coarse field.
-        quiet: show no progress.
+        control: is told of the steps of that training, and may stop it.
+        keep: whether the result, and a training that is stopped, are kept in the user's cache folder.
 
     Raises:
         MeshError: there is nothing dense, or the given mesh cannot be used.
+        Cancelled: by `control`.
     """
     coarse = coarse_config(config)
     arrays = (*capture.images, capture.poses, capture.intrinsics, capture.distortion)
@@ -86,18 +92,19 @@ def find_base(
 
     def compute() -> BaseShape:
         base = None if base_mesh is None else given_base(base_mesh)  # which may be refused
-        task = _trained(coarse, capture, training, quiet)
+        task = _trained(coarse, capture, training if keep else None, control)
         if base is None:
-            _say("cutting the base shape out of the coarse field, about a minute", quiet)
+            log.info("cutting the base shape out of the coarse field, about a minute")
             base = _shape_of(task, config)
         scan = scan_surface(task)
         projection = Projection(base, neighbours=config.neighbours, repulsion=config.repulsion)
         return BaseShape(base, scan, shell_thickness(scan, projection))
 
-    base = cached(place, compute, _read, _write)
-    shutil.rmtree(training, ignore_errors=True)
-    _remove_abandoned(folder)
-    _say(f"base shape of {len(base.mesh.faces):,} faces, shell of +-{base.thickness:.3f}", quiet)
+    base = cached(place, compute, _read, _write, keep)
+    if keep:
+        shutil.rmtree(training, ignore_errors=True)
+        _remove_abandoned(folder)
+    log.info("base shape of %s faces, shell of +-%.3f", f"{len(base.mesh.faces):,}", base.thickness)
     return base
 
 
@@ -108,13 +115,14 @@ def coarse_config(config: NerfConfig) -> RadianceConfig:
     return replace(COARSE, seed=config.seed, lr=config.lr, steps=steps, lr_steps=steps)
 
 
-def _trained(coarse: RadianceConfig, capture: Capture, folder: Path, quiet: bool) -> PlainTask:
+def _trained(coarse: RadianceConfig, capture: Capture, folder: Path | None, control: Control) -> PlainTask:
     """The coarse field; an interrupted training goes on, unless its checkpoints cannot be used."""
     try:
-        return train_plain_field(coarse, capture, (capture, 0), folder, quiet)
+        return train_plain_field(coarse, capture, (capture, 0), folder, control)
     except CheckpointError:
-        shutil.rmtree(folder)
-        return train_plain_field(coarse, capture, (capture, 0), folder, quiet)
+        if folder is not None:
+            shutil.rmtree(folder)
+        return train_plain_field(coarse, capture, (capture, 0), folder, control)
 
 
 def _remove_abandoned(folder: Path) -> None:
@@ -130,11 +138,6 @@ def _shape_of(task: PlainTask, config: NerfConfig) -> Mesh:
     occupied = task.occupancy.occupied.astype(bool)
     density = sample_grid(task.field(task.mean).density_at, occupied, GRID)
     return base_shape(density, concavity=config.concavity)
-
-
-def _say(line: str, quiet: bool) -> None:
-    if not quiet:
-        print(line, file=sys.stderr, flush=True)
 
 
 def scan_surface(task: PlainTask) -> np.ndarray:

@@ -36,7 +36,7 @@ def convex_parts(mesh: Mesh, concavity: float) -> list[np.ndarray]:
     )
     parts = [corners for corners, _ in parts]
     if not parts:
-        raise MeshError(f"{mesh.name} has no convex parts", "give a base mesh with --base-mesh")
+        raise MeshError(f"{mesh.name} has no convex parts", "give a base mesh as `base_mesh`")
     return parts
 
 
@@ -55,7 +55,7 @@ def union(parts: list[np.ndarray], cell: float) -> Mesh:
     """
     hulls = [hull for corners in parts if (hull := _hull(corners)) is not None]
     if not hulls:
-        raise MeshError("the base shape has no volume", "give a base mesh with --base-mesh")
+        raise MeshError("the base shape has no volume", "give a base mesh as `base_mesh`")
     low = np.min([hull.min_bound for hull in hulls], axis=0) - MARGIN * cell
     high = np.max([hull.max_bound for hull in hulls], axis=0) + MARGIN * cell
     depth = np.full(np.ceil((high - low) / cell).astype(int) + 1, -cell, np.float32)

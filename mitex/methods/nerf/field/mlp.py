@@ -10,8 +10,10 @@ from __future__ import annotations
 import itertools
 import math
 import os
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any, TypeVar, cast
 
 import torch
@@ -25,8 +27,31 @@ CHUNK = 2560  # points of a part
 # In bfloat16 products are short work beside the calls that ask for them, and each new number of points costs
 # as much as several products: oneDNN compiles for it.
 LONG, GRAIN = 8192, 512  # points of a part there, and what their number is a multiple of
-_pool = ThreadPoolExecutor(os.cpu_count(), initializer=torch.set_num_threads, initargs=(1,))
 _relu_backward = torch.ops.aten.threshold_backward.grad_input
+
+
+_starting = threading.Lock()
+
+
+def _in_new_thread(call: Callable[[], T]) -> T:
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(call).result()
+
+
+def _use_one_thread() -> None:
+    """Makes torch use one thread in this one.
+
+    `torch.set_num_threads` also says how many threads new threads of the program get; that is taken back,
+    once torch has read it here.
+    """
+    with _starting:
+        count = _in_new_thread(torch.get_num_threads)
+        torch.set_num_threads(1)
+        torch.get_num_threads()
+        _in_new_thread(partial(torch.set_num_threads, count))
+
+
+_pool = ThreadPoolExecutor(os.cpu_count(), initializer=_use_one_thread)
 
 
 def on_threads(

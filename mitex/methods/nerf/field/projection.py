@@ -82,7 +82,7 @@ class Projection:
             )
         if not len(mesh.faces):
             raise MeshError(f"{mesh.name} has no faces to project onto", "give a surface")
-        init()
+        init(needs="ad")
         self.mesh, self.repulsion, self.reach = mesh, repulsion, reach
         # A point of a triangle with edges up to L is within L / sqrt(3) of a corner: the limit loses no foot.
         edges = _edge_lengths(mesh)

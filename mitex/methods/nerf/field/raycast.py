@@ -32,7 +32,7 @@ class Raycaster:
     """Casts the rays of a capture onto a mesh in the scene cube."""
 
     def __init__(self, mesh: Mesh, capture: Capture) -> None:
-        init()
+        init(needs="ad")
         self.capture = capture
         self._scene = mi.load_dict({"type": "scene", "mesh": mesh_shape(mesh, smooth=True)})
 

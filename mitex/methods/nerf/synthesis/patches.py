@@ -217,7 +217,7 @@ class _Caster:
     """Casts squares onto a mesh, and says which of them lie well on it."""
 
     def __init__(self, mesh: Mesh, gap: float, size: int, scan: KDTree | None, reach: float) -> None:
-        init()
+        init(needs="ad")
         self.gap, self.normals, self.scan, self.reach = gap, mesh.face_normals, scan, reach
         scene = {"type": "scene", "embree_use_robust_intersections": True, "mesh": mesh_shape(mesh)}
         self.scene = mi.load_dict(scene)

@@ -23,6 +23,7 @@ from mitex.methods.nerf.training.radiance import RadianceTask, Rendered, schedul
 from mitex.runtime.jit import dr, mi
 from mitex.textures.march import Samples, sum_rays, weights_of
 from mitex.training import checkpoint, train
+from mitex.training.control import ALONE, Control
 
 LEVELS, COARSEST, FINEST = 16, 16, 2048  # of the hash grid
 CODE = 15  # channels that the density network hands to that of the colour
@@ -135,12 +136,15 @@ def train_plain_field(
     config: RadianceConfig,
     capture: Capture,
     preview_view: tuple[Capture, int],
-    folder: str | Path,
-    quiet: bool,
+    folder: Path | None = None,
+    control: Control = ALONE,
 ) -> PlainTask:
-    """Trains a plain field in a run folder, or continues there; arguments as of `RadianceTask`."""
-    folder = Path(folder)
+    """Trains a plain field, in a run folder, where a training is continued, or in memory.
+
+    Arguments are those of `RadianceTask` and of `train`.
+    """
     task = PlainTask(config, capture, preview_view)
-    resume = any((folder / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
-    train(task, config, folder, resume=resume, quiet=quiet, **schedule(config))
+    names = (checkpoint.NAME, checkpoint.PREVIOUS)
+    resume = folder is not None and any((folder / name).exists() for name in names)
+    train(task, config, folder, resume=resume, control=control, **schedule(config))
     return task

@@ -9,6 +9,7 @@ import torch
 from mitex.methods.nerf.field import mlp
 from mitex.runtime import init, threads
 from mitex.runtime.jit import dr, mi
+from tests.state import in_thread
 
 init()
 
@@ -47,3 +48,11 @@ def test_values_and_gradients_are_those_of_autograd(arguments, learning, chunk, 
 
 def _close(actual, expected):
     np.testing.assert_allclose(np.array(actual), expected, rtol=1e-4, atol=1e-4 * float(expected.abs().max()))
+
+
+def test_new_threads_of_the_program_get_as_many_of_torch_s_threads_as_before():
+    """The pool's own use one each."""
+    before = in_thread(torch.get_num_threads)
+    own = mlp.on_threads(64, lambda parts: [torch.get_num_threads() for _ in parts])
+    assert {count for counts in own for count in counts} == {1}
+    assert in_thread(torch.get_num_threads) == before

@@ -1,0 +1,184 @@
+"""The surfaces that a rule is trained on: spheres, and flat squares that repeat.
+
+Spheres teach the rule what curved and uneven meshes are like. A pattern in rows fits on none of them without
+faults, and their patches show it foreshortened; on a flat square it can be as regular as the exemplar.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+
+from mitex.geometry.vectors import rotate_about
+from mitex.mesh import Lattice, Mesh, icosphere, scattered_sphere
+from mitex.methods.nca.config import NcaConfig
+from mitex.methods.nca.decoder.surface import Points, Surface
+from mitex.methods.nca.look import Look
+from mitex.methods.nca.perception import Perception, lattice_perception, perception
+from mitex.methods.nca.views import render_views
+from mitex.scenes.cameras import Cameras, orbit, patch_views
+from mitex.scenes.stage import Stage
+
+WIDEST = 0.65  # half the side of a patch of the unit sphere: wider ones would look past it
+LEAST = 16  # pixels along a view
+REPEATS = 2  # of the exemplar along a flat square
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingSphere:
+    """A sphere on which states grow and are seen.
+
+    Attributes:
+        mesh: the mesh.
+        perception: of its cells.
+        surface: for the decoder.
+        stage: for cameras.
+    """
+
+    mesh: Mesh
+    perception: Perception
+    surface: Surface
+    stage: Stage
+
+    @staticmethod
+    def of(mesh: Mesh, look: Look) -> TrainingSphere:
+        """For a look's rule and decoder."""
+        operator = perception(mesh, look.rule.degree, mean=look.mean)
+        return TrainingSphere(mesh, operator, Surface(mesh, look.interpolation), Stage(mesh))
+
+    @property
+    def edge(self) -> float:
+        """Length of the edges [mesh units], of as many equilateral faces."""
+        return math.sqrt(8 * math.pi / math.sqrt(3) / len(self.mesh.vertices))
+
+    def views(self, look: Look, state: torch.Tensor, cameras: Cameras, antialias: int = 1) -> torch.Tensor:
+        """Images (K, H, W, C) of a state (V, C); see `render_views`."""
+        return render_views(look.decoder, state, self.surface, self.stage, cameras, antialias)
+
+    def patches(
+        self,
+        look: Look,
+        state: torch.Tensor,
+        width: float,
+        count: int,
+        resolution: int,
+        generator: torch.Generator,
+        antialias: int = 1,
+    ) -> torch.Tensor:
+        """Close-ups (K, H, W, C) of a state at random places.
+
+        Args:
+            look: the decoder.
+            state: (V, C).
+            width: of what a close-up shows [edges]; where the surface is too small, it shows less, in fewer
+                pixels.
+            count: K.
+            resolution: H and W [px].
+            generator: of the places.
+            antialias: n for n x n samples in each pixel.
+        """
+        return self.views(look, state, self.cameras(width, count, resolution, generator), antialias)
+
+    def cameras(self, width: float, count: int, resolution: int, generator: torch.Generator) -> Cameras:
+        """Of `patches`."""
+        half = 0.5 * width * self.edge
+        share = min(WIDEST / half, 1.0)
+        return patch_views(generator, self.mesh, count, share * half, _pixels(share, resolution))
+
+    def whole(self, look: Look, state: torch.Tensor, resolution: int) -> torch.Tensor:
+        """The sphere as a camera sees it, (H, W, C)."""
+        return self.views(look, state, orbit(1, distance=2.05, resolution=resolution), antialias=2)[0]
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingPlane:
+    """A flat square on which states grow, its opposite sides joined.
+
+    Attributes:
+        lattice: the cells' places.
+        perception: of the cells in the square.
+        surface: of the lattice's mesh, for the decoder.
+    """
+
+    lattice: Lattice
+    perception: Perception
+    surface: Surface
+
+    @staticmethod
+    def of(columns: int, look: Look, azimuth: float = 0.0) -> TrainingPlane:
+        """With `columns` cells along a side, up +y, and facing +z turned about +y by `azimuth` [rad]."""
+        lattice = Lattice.of(columns)
+        axes = np.broadcast_to(np.array([0.0, 1.0, 0.0]), lattice.mesh.vertices.shape)
+        vertices = rotate_about(lattice.mesh.vertices.astype(np.float64), axes, azimuth)
+        lattice = replace(lattice, mesh=lattice.mesh.with_vertices(vertices))
+        operator = lattice_perception(lattice, look.rule.degree, look.mean)
+        return TrainingPlane(lattice, operator, Surface(lattice.mesh, look.interpolation))
+
+    def patches(
+        self,
+        look: Look,
+        state: torch.Tensor,
+        width: float,
+        count: int,
+        resolution: int,
+        generator: torch.Generator,
+        antialias: int = 1,
+    ) -> torch.Tensor:
+        """As of `TrainingSphere`; within the square, as the decoder's waves do not repeat."""
+        periods = width / self.lattice.columns
+        share = min(1 / periods, 1.0)
+        width, resolution = share * periods, _pixels(share, resolution)
+        corners = torch.rand(count, 2, generator=generator, dtype=torch.float64).numpy() * (1 - width)
+        return self._windows(look, state, corners, width, resolution, antialias)
+
+    def whole(self, look: Look, state: torch.Tensor, resolution: int) -> torch.Tensor:
+        """All of the square, (H, W, C)."""
+        return self._windows(look, state, np.zeros((1, 2)), 1.0, resolution, 2)[0]
+
+    def _windows(
+        self,
+        look: Look,
+        state: torch.Tensor,
+        corners: np.ndarray,
+        width: float,
+        resolution: int,
+        antialias: int,
+    ) -> torch.Tensor:
+        """Images (K, H, W, C) of squares with lower left corners (K, 2) and a width, in periods."""
+        samples = resolution * antialias
+        steps = (np.arange(samples) + 0.5) * (width / samples)
+        grid = np.stack(np.meshgrid(steps, steps[::-1]), axis=2)
+        face, barycentric = self.lattice.locate((corners[:, None, None] + grid).reshape(-1, 2))
+        points = Points(torch.from_numpy(face), torch.from_numpy(barycentric))
+        table = self.surface.table(state[torch.from_numpy(self.lattice.source)])
+        values = look.decoder(self.surface, table, points)
+        sides = (len(corners), resolution, antialias, resolution, antialias, -1)
+        return values.view(sides).mean((2, 4))
+
+
+def _pixels(share: float, resolution: int) -> int:
+    """A share of the pixels along a view, but as many as the features need."""
+    return max(round(share * resolution), min(LEAST, resolution))
+
+
+TrainingSurface = TrainingSphere | TrainingPlane
+
+
+def training_surfaces(config: NcaConfig, look: Look) -> list[TrainingSurface]:
+    """The surfaces that states of the pool grow on in turns; each further plane faces another way."""
+    surfaces: list[TrainingSurface] = []
+    planes = 0
+    for kind in config.surfaces:
+        if kind == "flat":
+            columns = max(round(REPEATS * config.density), 4)
+            surfaces.append(TrainingPlane.of(columns, look, 0.5 * math.pi * planes))
+            planes += 1
+        elif kind == "even":
+            surfaces.append(TrainingSphere.of(icosphere(config.frequency), look))
+        else:
+            mesh = scattered_sphere(10 * config.frequency**2 + 2, config.seed)
+            surfaces.append(TrainingSphere.of(mesh, look))
+    return surfaces

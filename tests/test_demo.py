@@ -1,0 +1,73 @@
+"""`mitex demo`, at toy size."""
+
+import pytest
+
+from mitex import demo
+from mitex.cli import main
+from mitex.exemplar import Exemplar
+from mitex.exemplar import names as exemplar_names
+from mitex.images import read_image
+from mitex.mesh import embedded_names
+from mitex.methods import surface
+from mitex.methods.nca import NcaTexture
+from mitex.training import resolve
+from mitex.training.locate import CHECKPOINT, PREVIOUS
+
+TINY = ("resolution=32", "exemplar_size=32", "steps=2", "scales=0", "weights=random", "preview_every=0")
+
+
+def test_what_it_shows_is_there():
+    """Exemplars and meshes that ship with Mitex; models with an exemplar to put beside them."""
+    assert demo.EXEMPLAR in exemplar_names()
+    assert set(demo.MAPS) <= Exemplar.load(demo.EXEMPLAR).maps.keys()
+    assert {demo.MESH, *demo.MODELS.values()} <= set(embedded_names())
+    assert all(NcaTexture.load(model).about["exemplar"] in exemplar_names() for model in demo.MODELS)
+    assert resolve(surface.PRESETS, overrides=demo.SETTINGS).preset == "fast"
+
+
+def test_it_leaves_assets_pictures_and_a_sheet(tmp_path, monkeypatch, capsys):
+    """The second call goes on from the first, and gives the same pictures."""
+    grow = NcaTexture.apply
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(demo, "SETTINGS", TINY)
+    monkeypatch.setattr(demo, "MESH", "mushrooms")
+    monkeypatch.setattr(demo, "MODELS", {"lava": "knot"})
+    monkeypatch.setattr(demo, "RESOLUTION", 64)
+    monkeypatch.setattr(demo, "SIZE", 16)
+    monkeypatch.setattr(demo, "SAMPLES", 1)
+    monkeypatch.setattr(NcaTexture, "apply", lambda *a, **o: grow(*a, **o, subdivide=0, steps=2))
+    sheets = []
+    for _ in range(2):
+        assert main(["demo", "--out", "shown"]) == 0
+        said = capsys.readouterr().out
+        assert "growing 'lava' on knot" in said and "shown/mushrooms.glb" in said
+        sheets.append((tmp_path / "shown" / "demo.png").read_bytes())
+    assert sheets[0] == sheets[1]
+    names = {path.name for path in (tmp_path / "shown").iterdir()}
+    assert names == {"run", "mushrooms.glb", "mushrooms.png", "knot.glb", "knot.png", "demo.png"}
+    height, width, _ = read_image(tmp_path / "shown" / "demo.png").shape
+    assert width > 4 * 16 and 16 < height < 32  # exemplar and picture, twice
+
+
+class Stopped(Exception):
+    """At the synthesis."""
+
+
+@pytest.mark.parametrize("left", [None, CHECKPOINT, PREVIOUS])
+def test_a_run_in_the_folder_is_continued(tmp_path, monkeypatch, left):
+    """Also below `~`, and when the process was killed between the two renames of a checkpoint."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    run = tmp_path / "demo" / "run"
+    run.mkdir(parents=True)
+    if left:
+        (run / left).touch()
+    options = {}
+
+    def fit(exemplar, mesh, out, **keywords):
+        options.update(keywords, out=out)
+        raise Stopped
+
+    monkeypatch.setattr(surface, "fit", fit)
+    with pytest.raises(Stopped):
+        demo.demo(demo.Path("~/demo"), seed=0)
+    assert options["out"] == run and options["resume"] == bool(left)
