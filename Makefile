@@ -6,7 +6,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 VENV := .venv
 STAMP := $(VENV)/.installed
 
-.PHONY: setup demo test lint bench clean
+.PHONY: setup demo test lint docs bench clean
 
 setup: $(STAMP)
 
@@ -28,6 +28,12 @@ lint: $(STAMP)
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/pyright
+
+# Executes the tutorial notebooks too; those that have not changed are taken from the last build's cache.
+docs: $(STAMP)
+	OMP_WAIT_POLICY=PASSIVE $(VENV)/bin/sphinx-build -c docs/site --fresh-env --fail-on-warning --quiet . out/docs
+	$(VENV)/bin/python docs/site/check.py out/docs
+	@echo "open out/docs/index.html"
 
 bench: $(STAMP)
 	$(VENV)/bin/python -m benchmarks.nca

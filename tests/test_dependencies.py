@@ -15,7 +15,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 CORE = PROJECT["dependencies"]
 EXTRAS = PROJECT["optional-dependencies"]
 OWN = {"mitex", "tests", "tools", "benchmarks", "scenes"}
-OPTIONAL = [name for name in EXTRAS if name not in ("test", "dev")]  # what parts of Mitex need
+OPTIONAL = [name for name in EXTRAS if name not in ("test", "docs", "dev")]  # what parts of Mitex need
 
 # Distribution -> the module that it installs, where the names differ.
 MODULES = {
@@ -29,6 +29,9 @@ WITHOUT_IMPORT = {
     "karellen-llvm-core": "Dr.Jit opens its shared library",
     "build": "test_packaging.py runs `python -m build`",
     "hatchling": "the build backend of that test's wheel",
+    "myst-nb": "Sphinx reads Markdown and executes notebooks with it",
+    "furo": "the theme of the site",
+    "sphinx-copybutton": "the site's code has a button to copy it",
     "ruff": "`make lint`",
     "pyright": "`make lint`",
 }
@@ -90,9 +93,14 @@ def test_scripts_need_nothing_further(folder):
     assert faults(set(), imports(ROOT / folder) - imports(ROOT / "mitex")) == []
 
 
+def test_of_the_site():
+    assert faults(modules(EXTRAS["docs"]), imports(ROOT / "docs") - imports(ROOT / "mitex")) == []
+
+
 def test_of_development():
     assert modules(EXTRAS["dev"]) == set()
-    assert WITHOUT_IMPORT.keys() <= distributions([*CORE, *EXTRAS["test"], *EXTRAS["dev"]])
+    everything = [*CORE, *EXTRAS["test"], *EXTRAS["docs"], *EXTRAS["dev"]]
+    assert WITHOUT_IMPORT.keys() <= distributions(everything)
 
 
 @pytest.mark.parametrize(("distribution", "module"), MODULES.items())

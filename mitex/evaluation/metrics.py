@@ -134,7 +134,7 @@ def single_image_frechet(
 def gaussian_frechet(
     mean_a: torch.Tensor, covariance_a: torch.Tensor, mean_b: torch.Tensor, covariance_b: torch.Tensor
 ) -> float:
-    """|m_a - m_b|^2 + tr(S_a + S_b - 2 (S_a S_b)^(1/2)): squared 2-Wasserstein distance of two Gaussians.
+    """Squared 2-Wasserstein distance of two Gaussians: `|m_a - m_b|^2 + tr(S_a + S_b - 2 (S_a S_b)^(1/2))`.
 
     Args:
         mean_a: (C,) float64; `mean_b` likewise.

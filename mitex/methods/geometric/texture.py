@@ -150,7 +150,7 @@ class GeometricTexture:
             mesh, start_level, end_level: as in `apply`.
 
         Returns:
-            That ratio, and with how many vertices of the mesh, `remesh`ed, it would be about 1.
+            That ratio, and the number of vertices to remesh to for a ratio of about 1.
         """
         start, _ = self._range(start_level, end_level)
         faces = len(self.template.faces) * 4**start

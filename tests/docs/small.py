@@ -1,0 +1,81 @@
+"""What makes the work of the pages' commands small, and the file that they name.
+
+Nothing of a command or a snippet is changed. What takes minutes is made small below it, whoever calls it:
+
+- fits: their settings are resolved as they were asked for, which checks them; then they get 2 steps, 3 if the
+  run is resumed, and the tiny settings of their method;
+- textures of automata are baked at 64 texels;
+- pictures are traced with one path a pixel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mitex.methods.registry import methods
+from mitex.training.run import CONFIG
+from tests.cli.test_nerf import icosphere, save
+
+STEPS, RESUMED_STEPS = 2, 3
+TEXELS = 64
+EVERY_FIT = {"checkpoint_every": 1, "preview_every": 0}
+TINY: dict[str, dict[str, Any]] = {
+    # Nothing of the architecture, which must be that of the model after `--init`.
+    "nca": {"frequency": 4, "pool": 1, "view_count": 1, "zooms": 1, "min_steps": 2, "max_steps": 2}
+    | {"resolution": 32, "target_size": 32, "exemplar_size": 32, "layers": ("relu1_1",), "order_weight": 0.0},
+    "surface": {"resolution": 32, "exemplar_size": 32, "scales": 0, "layers": ("relu1_1",)},
+    "geometric": {"level_steps": 2, "fit_steps": 10, "fit_samples": 100},
+}
+
+
+def prepare(folder: Path) -> None:
+    """Writes the file that pages name and that the user brings along."""
+    save(icosphere(6), folder / "bunny.obj")
+
+
+def shrink(patch: pytest.MonkeyPatch) -> None:
+    """Makes the work small until the patch is undone."""
+    from mitex.methods.nca import NcaTexture
+    from mitex.render import renderer, shell
+    from mitex.training import fit
+
+    patch.setattr(fit, "resolve", _with_few_steps(fit.resolve))
+    patch.setattr(NcaTexture, "apply", _with_few_texels(NcaTexture.apply))
+    patch.setattr(NcaTexture, "tile", _with_few_texels(NcaTexture.tile))
+    sketch = _with_one_path(renderer.accumulated)
+    patch.setattr(renderer, "accumulated", sketch)
+    patch.setattr(shell, "accumulated", sketch)
+
+
+def _with_few_steps(resolve: Callable[..., Any]) -> Callable[..., Any]:
+    def small(presets: Mapping[str, Any], preset: str | None, file: Path | None, settings: Any) -> Any:
+        config = resolve(presets, preset, file, settings)
+        if not hasattr(config, "steps"):
+            return config
+        name = next(name for name, method in methods().items() if method.load_presets() is presets)
+        steps = STEPS if file is None or file.name != CONFIG else RESUMED_STEPS
+        return replace(config, steps=steps, **EVERY_FIT, **TINY.get(name, {}))
+
+    return small
+
+
+def _with_few_texels(make: Callable[..., Any]) -> Callable[..., Any]:
+    def small(*arguments: Any, **options: Any) -> Any:
+        if options.get("resolution", TEXELS) is not None:
+            options["resolution"] = TEXELS
+        return make(arguments[0], **options) if make.__name__ == "tile" else make(*arguments, **options)
+
+    return small
+
+
+def _with_one_path(accumulated: Callable[..., np.ndarray]) -> Callable[..., np.ndarray]:
+    def small(scene: Any, resolution: int, spp: int, seed: int) -> np.ndarray:
+        return accumulated(scene, resolution, 1, seed)
+
+    return small
