@@ -20,6 +20,7 @@ OPTIONAL = [name for name in EXTRAS if name not in ("test", "docs", "dev")]  # w
 # Distribution -> the module that it installs, where the names differ.
 MODULES = {
     "imageio-ffmpeg": "imageio_ffmpeg",
+    "markdown-it-py": "markdown_it",
     "pillow": "PIL",
     "scikit-image": "skimage",
     "tomli-w": "tomli_w",

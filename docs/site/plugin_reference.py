@@ -1,6 +1,6 @@
 """Docstrings of Mitsuba plugins: Mitsuba's directive `pluginparameters`, and one that shows a docstring.
 
-    .. plugin:: mitex.textures.vertex_field.VertexFieldMethods
+    .. plugin:: mitex.textures.vertex_field.VertexField
 
 stands below the heading of a plugin, and shows the docstring alone: whoever uses a plugin writes its type
 into a scene and never constructs the class.

@@ -90,7 +90,7 @@ def test_the_time_left_follows_the_parts_that_are_done(monkeypatch):
     now = [0.0]
     monkeypatch.setattr(display, "time", SimpleNamespace(monotonic=lambda: now[0]))
     shows = []
-    teller = display._Teller(SimpleNamespace(show=lambda *words: shows.append(words), hide=lambda: None))
+    teller = display._Teller(SimpleNamespace(show=lambda *words: shows.append(words), hide=lambda: None))  # pyright: ignore[reportArgumentType]
     for moment, done in ((0.0, 0), (10.0, 5), (16.0, 8)):
         now[0] = moment
         teller("rendering frames", done, 20)
