@@ -104,5 +104,5 @@ class Render:
         return {
             name: value
             for name, value in vars(self).items()
-            if name not in ("asset", "out") and value is not None
+            if name not in ("asset", "out", "quiet") and value is not None
         }

@@ -221,7 +221,7 @@ def test_too_many_faces(files, run, capsys, monkeypatch):
 
 def test_an_unfinished_run(files, run, capsys):
     (run / "texture.safetensors").unlink()
-    check_refused(files, apply(), "--resume", capsys)
+    check_refused(files, apply(), "which can be resumed", capsys)
 
 
 def test_a_damaged_model(files, run, capsys):

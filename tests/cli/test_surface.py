@@ -128,7 +128,12 @@ def test_a_resolution_beyond_memory(files, monkeypatch, capsys):
 
 def test_a_run_that_is_not_finished(files, run, capsys):
     (run / "texture.safetensors").unlink()
-    check_refused(files, ["apply", "out/run", "--mesh", "good.obj", "--out", "out/a.glb"], "--resume", capsys)
+    check_refused(
+        files,
+        ["apply", "out/run", "--mesh", "good.obj", "--out", "out/a.glb"],
+        "which can be resumed",
+        capsys,
+    )
 
 
 def test_a_damaged_texture(files, run, capsys):

@@ -42,8 +42,8 @@ class Fit(ExemplarOptions):
     """Start from the weights of a model or a run."""
 
     def run(self) -> None:
-        options = self.run_options()
         mutually_exclusive("--resume", "--init", self.resume and self.init is not None)
+        options = self.run_options()
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()
