@@ -30,7 +30,7 @@ from make_models import MODELS, RECIPES  # noqa: E402
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 UNSEEN = ("spot", "fish", "mug")
-TEASER = {"ceramic": "octopus", "lava": "knot", "cobblestone": "vase", "honeycomb": "shaderball"}
+TEASER = {"ceramic": "octopus", "lava": "knot", "cobblestone": "vase", "shells": "shaderball"}
 FREQUENCY, RESOLUTION, CELL = 32, 2048, 256
 
 

@@ -14,6 +14,7 @@ from mitex.mesh import Mesh
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.surface import Points, Surface
 from mitex.methods.nca.look import Look
+from mitex.methods.nca.palette import Palette
 from mitex.progress import announce
 
 CHUNK = 1 << 18  # points that are decoded at a time
@@ -27,10 +28,18 @@ class Grown:
         state: (V, C).
         cells: the automaton's mesh.
         orientation: of the texture [rad].
+        palette: the exemplar's colours, which all albedos are held within; None for as they are.
     """
 
-    def __init__(self, look: Look, state: torch.Tensor, cells: Cells, orientation: float = 0.0) -> None:
-        self.look, self.cells, self.orientation = look, cells, orientation
+    def __init__(
+        self,
+        look: Look,
+        state: torch.Tensor,
+        cells: Cells,
+        orientation: float = 0.0,
+        palette: Palette | None = None,
+    ) -> None:
+        self.look, self.cells, self.orientation, self.palette = look, cells, orientation, palette
         self.surface = Surface(cells.mesh, look.interpolation)
         self.table = self.surface.table(state)
 
@@ -42,7 +51,11 @@ class Grown:
             chunk = slice(start, start + CHUNK)
             arrays = self.cells.locate(face[chunk], barycentric[chunk])
             points = Points(*(torch.from_numpy(np.ascontiguousarray(a)) for a in arrays))
-            parts.append(self.look.decoder(self.surface, self.table, points).clamp_(0, 1).numpy())
+            values = self.look.decoder(self.surface, self.table, points).clamp_(0, 1).numpy()
+            if self.palette is not None:
+                columns = list(self.look.layout["albedo"])
+                values[:, columns] = self.palette.held(values[:, columns])
+            parts.append(values)
         return np.concatenate(parts)
 
     def at_vertices(self) -> dict[str, np.ndarray]:

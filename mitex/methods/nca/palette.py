@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 COLOURS = 64
 PIXELS = 16_384  # that the colours are taken from
+NEARLY = np.float32(0.999)  # of a distance that rounding shall not exceed
 TOLERANCE = 0.08  # [sRGB], beyond the exemplar's own spread around the colours
 
 
@@ -37,6 +38,17 @@ class Palette:
     def unlike(self, colours: np.ndarray) -> np.ndarray:
         """Which of the colours (P, 3) are none of these: (P,) bool."""
         return KDTree(self.colours).query(colours)[0] > self.radius + TOLERANCE
+
+    def held(self, colours: np.ndarray) -> np.ndarray:
+        """Colours (P, 3) float32, of which those that are none of these are moved to the nearest one, as far
+        as it takes.
+        """
+        palette, limit = self.colours.astype(np.float32), np.float32(self.radius + TOLERANCE) * NEARLY
+        squared = (palette**2).sum(axis=1) - 2 * colours @ palette.T  # and a term that all have in common
+        nearest = palette[squared.argmin(axis=1)]
+        offsets = colours - nearest
+        distance = np.linalg.norm(offsets, axis=1, keepdims=True)
+        return nearest + offsets * np.minimum(limit / np.maximum(distance, limit), 1)
 
     def record(self) -> dict[str, object]:
         """As JSON values."""

@@ -100,7 +100,7 @@ class NcaTexture:
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
         turn = math.radians(orientation)
         state = self._healthy(cells, seed, self.steps if steps is None else steps, turn)
-        grown = Grown(self.look, state, cells, turn)
+        grown = Grown(self.look, state, cells, turn, self._palette)
         asset = grown.asset()
         if resolution is None:
             return asset
@@ -151,7 +151,7 @@ class NcaTexture:
         operator = lattice_perception(lattice, self.look.rule.degree, self.look.mean)
         state = self.grow(operator, seed=seed, steps=steps)
         state = self._healed(state, Cells(lattice.joined, 0, lattice.joined), operator, seed)
-        return tile_maps(self.look, state, lattice, resolution)
+        return tile_maps(self.look, state, lattice, resolution, self._palette)
 
     @torch.no_grad()
     def grow(
@@ -201,11 +201,16 @@ class NcaTexture:
         return self._healed(self.grow(operator, seed=seed, steps=steps), cells, operator, seed)
 
     def _healed(self, state: torch.Tensor, cells: Cells, operator: Perception, seed: int) -> torch.Tensor:
-        if "palette" not in self.about:
+        palette = self._palette
+        if palette is None:
             return state
-        palette = Palette.from_record(self.about["palette"])
         generator = torch.Generator().manual_seed(seed)
         return healed(self.look, state, cells, operator, palette, generator)
+
+    @property
+    def _palette(self) -> Palette | None:
+        record = self.about.get("palette")
+        return None if record is None else Palette.from_record(record)
 
     def _check_unconditioned(self) -> None:
         if self.look.rule.condition:

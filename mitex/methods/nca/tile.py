@@ -13,6 +13,7 @@ from mitex.methods.nca.bake import CHUNK, Grown
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.surface import decoder_units
 from mitex.methods.nca.look import Look
+from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.ranges import TILE_CELLS, TILE_SIDES
 
 
@@ -24,9 +25,11 @@ def flat_cells(cells: int, resolution: int) -> Lattice:
     return Lattice.of(cells)
 
 
-def tile_maps(look: Look, state: torch.Tensor, lattice: Lattice, resolution: int) -> dict[str, np.ndarray]:
+def tile_maps(
+    look: Look, state: torch.Tensor, lattice: Lattice, resolution: int, palette: Palette | None = None
+) -> dict[str, np.ndarray]:
     """Maps (N, N, c) of a state (V, C) of the cells in a lattice's square, as of `NcaTexture.tile`."""
-    sampled = Sampled(look, state, lattice)
+    sampled = Sampled(look, state, lattice, palette)
     maps = {name: np.empty((resolution, resolution, MAPS[name]), np.float32) for name in look.maps}
     height = max(CHUNK // resolution, 1)
     for top in range(0, resolution, height):
@@ -45,15 +48,18 @@ class Sampled:
         look: the decoder and the maps.
         state: (V, C) of the cells in the square.
         lattice: their places.
+        palette: as of `Grown`.
     """
 
-    def __init__(self, look: Look, state: torch.Tensor, lattice: Lattice) -> None:
+    def __init__(
+        self, look: Look, state: torch.Tensor, lattice: Lattice, palette: Palette | None = None
+    ) -> None:
         self.lattice = lattice
         cells = Cells(lattice.mesh, 0, lattice.mesh)
         spread = state[torch.from_numpy(lattice.source)]
         scale = decoder_units(lattice.mesh).scale
         repeating = look.repeating(lattice.columns / scale, lattice.edge / scale)
-        self.grown = Grown(repeating, spread, cells)
+        self.grown = Grown(repeating, spread, cells, palette=palette)
 
     def values(self, rows: np.ndarray, columns: np.ndarray, resolution: int) -> np.ndarray:
         """Values (R, C, K) in [0, 1] at the centres of pixels, of which `resolution` are a period.

@@ -7,12 +7,13 @@ import torch
 from mitex.errors import TextureWarning
 from mitex.exemplar import Exemplar
 from mitex.mesh import icosphere
-from mitex.methods.nca import healing
+from mitex.methods.nca import NcaTexture, healing
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import perception
+from tests.methods.nca.tiny import texture
 
 TEAL = np.array([[0.1, 0.5, 0.5]])
 
@@ -101,3 +102,31 @@ def test_dots_and_lines_are_no_regions(grown):
     line = np.abs(mesh.vertices[:, 1]) < 0.05
     assert not healing.inner(mesh, dot).any() and line.any() and not healing.inner(mesh, line).any()
     assert np.flatnonzero(healing.inner(mesh, whole)).tolist() == [7]
+
+
+def test_foreign_colours_are_moved_to_the_nearest_and_others_stay():
+    palette = Palette(np.array([[0.2, 0.2, 0.2], [0.8, 0.1, 0.1]]), radius=0.02)
+    rng = np.random.default_rng(0)
+    colours = rng.random((2000, 3), np.float32)
+    held = palette.held(colours)
+    foreign = palette.unlike(colours)
+    assert 100 < foreign.sum() < 2000 and not palette.unlike(held).any()
+    assert np.abs(held - colours)[~foreign].max() < 2e-4
+    # On the straight line to the nearest colour of the palette.
+    nearest = palette.colours[np.linalg.norm(colours[:, None] - palette.colours, axis=2).argmin(axis=1)]
+    assert np.allclose(np.cross(colours - nearest, held - nearest), 0, atol=1e-6)
+    assert np.allclose(np.linalg.norm(held - nearest, axis=1)[foreign], 0.1, atol=2e-4)
+
+
+def test_what_is_applied_has_no_foreign_colours():
+    """On a mesh and on a tile; a texture that knows no palette is as it is."""
+    plain = texture()
+    palette = Palette(np.array([[0.5, 0.5, 0.5]]), radius=0.01)
+    bounded = NcaTexture(plain.look, {"palette": palette.record()})
+    with pytest.warns(TextureWarning):
+        asset = bounded.apply(icosphere(6), resolution=64, subdivide=0, steps=30)
+        tile = bounded.tile(32, cells=8, steps=30)["albedo"]
+    assert asset.texture_maps is not None
+    for albedo in (asset.vertex_maps["albedo"], asset.texture_maps["albedo"], tile):
+        assert not palette.unlike(albedo.reshape(-1, 3)).any()
+    assert palette.unlike(plain.tile(32, cells=8, steps=30)["albedo"].reshape(-1, 3)).any()
