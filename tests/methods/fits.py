@@ -47,7 +47,7 @@ FITS = {
     "nerf": TinyFit(
         f"--capture photos --base-mesh base.obj --steps 2 --set base_steps=150 coarsest=8 "
         f"finest=32 {RADIANCE} {SMALL_RUN}",
-        "--mesh ball.obj --resolution 128 --density 200",
+        "--mesh ball.obj --size 128 --density 200",
     ),
     "plain_field": TinyFit(
         f"--capture photos --steps 2 --set {RADIANCE} {SMALL_RUN}",

@@ -139,7 +139,7 @@ def test_settings_by_name(workplace, monkeypatch, toy):
     assert heard[-1].steps == 3
     with pytest.raises(mitex.ConfigError, match="steps is set to 4 and to 3; give it once"):
         fit(exemplar, steps=3, set=["steps=4"])
-    with pytest.raises(mitex.ConfigError, match="no key 'sell'; use 'cell'"):
+    with pytest.raises(mitex.ConfigError, match="no key 'sell'; did you mean cell"):
         fit(exemplar, set={"sell": 0.5})
 
 

@@ -16,8 +16,29 @@ from mitex.training.settings import RunOptions
 
 # What only the command line has, for what is another call or another argument in Python.
 FIT_ONLY = {"quiet", "settings", "tile"}
-APPLY_ONLY = {"model", "out", "maps_format", "remesh", "vertex_colors", "variants", "tile", "tile_cells"}
-FILM_ONLY = {"model", "out", "mesh", "meshes", "remesh", "seed", "to_seed", "start_level", "end_level"}
+APPLY_ONLY = {
+    "model",
+    "out",
+    "quiet",
+    "maps_format",
+    "remesh",
+    "vertex_colors",
+    "variants",
+    "tile",
+    "tile_cells",
+}
+FILM_ONLY = {
+    "model",
+    "out",
+    "quiet",
+    "mesh",
+    "meshes",
+    "remesh",
+    "seed",
+    "to_seed",
+    "start_level",
+    "end_level",
+}
 
 
 def names(command: type) -> set[str]:
@@ -45,5 +66,5 @@ class TestMethod:
 
 
 def test_pictures_and_films():
-    assert names(Render) - parameters(still, turntable, render_still) == {"out"}
+    assert names(Render) - parameters(still, turntable, render_still) == {"out", "quiet"}
     assert names(Animate) - parameters(film) <= FILM_ONLY

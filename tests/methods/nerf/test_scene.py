@@ -11,7 +11,7 @@ from tests.scenes.test_scripts import load
 
 @pytest.mark.usefixtures("own_cache")
 def test_all_three_are_in_the_picture(run, tmp_path):
-    load("shell_texture").main(str(run), str(tmp_path / "shell.png"), size=128, resolution=64, spp=2)
+    load("shell_texture").main(str(tmp_path / "shell.png"), str(run), size=128, resolution=64, spp=2)
     picture = read_image(tmp_path / "shell.png")
     assert picture.shape == (64, 96, 3)
     texture, glass, mesh = picture[22:42, 16:34], picture[42:54, 44:58], picture[22:42, 62:82]

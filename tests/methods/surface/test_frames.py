@@ -272,7 +272,7 @@ def test_a_field_without_a_direction_falls_back_to_fixed():
     ("options", "message"),
     [
         ({"kind": "random"}, "fixed, smooth"),
-        ({"angle": np.nan}, "radians"),
+        ({"angle": np.nan}, "give a finite angle"),
         ({"field": np.full((12, 3), np.nan)}, "NaN"),
         ({"field": np.full((12, 3), np.inf)}, "NaN"),
         ({"field": np.ones((11, 3))}, "shape"),

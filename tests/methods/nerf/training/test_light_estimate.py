@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -38,7 +39,7 @@ def photographed(radiance, rng=None) -> Capture:
         colour = np.round(255 * linear.clip(0, 1) ** (1 / 2.4))
         flat = np.column_stack([colour, colour, colour, 255 * (inside > 0)])
         images.append(flat.reshape(*image.shape).astype(np.uint8))
-    return Capture(tuple(images), *(vars(capture)[k] for k in list(vars(capture))[1:]))
+    return replace(capture, images=tuple(images))
 
 
 def test_the_light_of_a_grey_ball_is_found(ball):

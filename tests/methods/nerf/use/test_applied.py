@@ -41,7 +41,7 @@ def test_textures_that_are_not_square_keep_their_proportions(mesh, rows, columns
         ({"scale": 0.0}, "0 times the size"),
         ({"scale": math.nan}, "nan times the size"),
         ({"scale": 0.0, "guide": np.zeros((4, 4, 3))}, "0 times the size"),
-        ({"density": 0.0}, "0.0 times the density"),
+        ({"density": 0.0}, "0 times the density"),
         ({"lift": 1.5}, "lifted by 1.5"),
         ({"light": np.zeros(9)}, r"a light of shape \(9,\)"),
         ({"light": np.full(16, np.inf)}, "a light"),
