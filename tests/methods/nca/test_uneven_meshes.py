@@ -7,14 +7,16 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from mitex.mesh import Mesh, icosphere, scattered_sphere, subdivide_midpoint, torus
-from mitex.methods.nca import METHOD, NcaTexture
+from mitex.methods.nca import METHOD, NcaTexture, bake
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.decoder.surface import Surface
 from mitex.methods.nca.healing import inner
 from mitex.methods.nca.palette import Palette
 from mitex.methods.registry import bundled
 
 STEPS = 100
+surface = cache(Surface)  # of a mesh, for all looks
 LOOKS = [name for name in bundled(METHOD) if "palette" in NcaTexture.load(name).about]
 
 
@@ -58,8 +60,9 @@ def meshes() -> list[Mesh]:
 
 
 @pytest.mark.parametrize("name", LOOKS)
-def test_no_region_has_foreign_colours(name):
+def test_no_region_has_foreign_colours(name, monkeypatch):
     """Not even before colours are held within the exemplar's; after it, no vertex has."""
+    monkeypatch.setattr(bake, "Surface", surface)
     texture = NcaTexture.load(name)
     palette = Palette.from_record(texture.about["palette"])
     for number, mesh in enumerate(meshes()):
