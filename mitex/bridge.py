@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +15,7 @@ from mitex.runtime import raise_causes
 from mitex.runtime.jit import dr, mi
 from mitex.scenes.stage import Visibility, background_values
 from mitex.sparse import transposed_product
+from mitex.suggestions import suggestion
 from mitex.textures.field import Field
 
 
@@ -172,8 +172,7 @@ def _parameters(scene: mi.Scene, integrator: mi.Integrator) -> dict[str, _Target
 
 def _parameter(table: Mapping[str, _Target], name: str) -> _Target:
     if name not in table:
-        close = difflib.get_close_matches(name, table, n=1)
-        remedy = f"did you mean '{close[0]}'?" if close else "print(mi.traverse(scene)) lists all"
+        remedy = suggestion(name, table, "print(mi.traverse(scene)) lists all")
         raise ConfigError(f"the scene has no parameter '{name}'", remedy)
     return table[name]
 

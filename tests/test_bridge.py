@@ -176,7 +176,7 @@ def test_render_refuses_second_derivatives(mi, stage, field):
         (lambda f: f.to(torch.uint8), "uint8"),
         (lambda f: f.to("meta"), "meta"),
         (lambda f: f[:-1], "has shape"),
-        (lambda f: {"mesh.bsdf.reflectance.dat": f}, "did you mean 'mesh.bsdf.reflectance.data'"),
+        (lambda f: {"mesh.bsdf.reflectance.dat": f}, "did you mean mesh.bsdf.reflectance.data"),
         (lambda f: {"mesh.faces": f}, "not a differentiable"),
         (lambda f: {Stage.FIELD: f.numpy()}, "ndarray"),
         (lambda f: {"integrator.background": f}, "has shape"),

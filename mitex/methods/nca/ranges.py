@@ -2,4 +2,11 @@
 
 TILE_CELLS = (8, 1024)  # along a side of a tile
 TILE_SIDES = (16, 8192)  # of its maps [px]
+REPEATS = 2  # of the exemplar along a flat square, unless something else is said
 MOST_STEPS = 10_000  # of the automaton
+
+
+def square_cells(density: float) -> int:
+    """Cells along a flat square that shows an exemplar, `density` cells wide, `REPEATS` times."""
+    low, high = TILE_CELLS
+    return round(min(max(REPEATS * density, low), high))

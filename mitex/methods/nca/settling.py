@@ -13,7 +13,8 @@ import torch
 from mitex.evaluation.regularity import regularity
 from mitex.exemplar import Exemplar
 from mitex.methods.nca.look import Look
-from mitex.methods.nca.surfaces import REPEATS, TrainingPlane
+from mitex.methods.nca.ranges import REPEATS, square_cells
+from mitex.methods.nca.surfaces import TrainingPlane
 
 STEPS = (200, 500, 1000)
 SIDE = 128  # of the exemplar when patterns are compared [px]
@@ -31,7 +32,7 @@ def settling_steps(look: Look, exemplar: Exemplar, density: float) -> int:
     """
     maps = exemplar.resized(SIDE).maps
     goal = np.mean([regularity(maps[name]) for name in look.layout])
-    plane = TrainingPlane.of(max(round(REPEATS * density), 4), look)
+    plane = TrainingPlane.of(square_cells(density), look)
     generator = torch.Generator().manual_seed(0)
     state, age = look.rule.seed(plane.perception), 0
     for steps in STEPS:

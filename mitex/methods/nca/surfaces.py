@@ -18,13 +18,34 @@ from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.decoder.surface import Points, Surface
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.perception import Perception, lattice_perception, perception
+from mitex.methods.nca.ranges import square_cells
 from mitex.methods.nca.views import render_views
 from mitex.scenes.cameras import Cameras, orbit, patch_views
 from mitex.scenes.stage import Stage
 
 WIDEST = 0.65  # half the side of a patch of the unit sphere: wider ones would look past it
 LEAST = 16  # pixels along a view
-REPEATS = 2  # of the exemplar along a flat square
+
+
+@dataclass(frozen=True)
+class CloseUps:
+    """Pictures of parts of a surface.
+
+    Attributes:
+        width: of what each one shows [edges]; where the surface is too small, it shows less, in fewer pixels.
+        count: K.
+        resolution: height and width of each [px].
+        antialias: n for n x n samples in each pixel.
+    """
+
+    width: float
+    count: int
+    resolution: int
+    antialias: int = 1
+
+    def pixels(self, share: float) -> int:
+        """Along a picture of a share of the width, but as many as the features need."""
+        return max(round(share * self.resolution), min(LEAST, self.resolution))
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,34 +80,16 @@ class TrainingSphere:
         return render_views(look.decoder, state, self.surface, self.stage, cameras, antialias)
 
     def patches(
-        self,
-        look: Look,
-        state: torch.Tensor,
-        width: float,
-        count: int,
-        resolution: int,
-        generator: torch.Generator,
-        antialias: int = 1,
+        self, look: Look, state: torch.Tensor, closeups: CloseUps, generator: torch.Generator
     ) -> torch.Tensor:
-        """Close-ups (K, H, W, C) of a state at random places.
+        """Close-ups (K, H, W, C) of a state (V, C) at random places."""
+        return self.views(look, state, self.cameras(closeups, generator), closeups.antialias)
 
-        Args:
-            look: the decoder.
-            state: (V, C).
-            width: of what a close-up shows [edges]; where the surface is too small, it shows less, in fewer
-                pixels.
-            count: K.
-            resolution: H and W [px].
-            generator: of the places.
-            antialias: n for n x n samples in each pixel.
-        """
-        return self.views(look, state, self.cameras(width, count, resolution, generator), antialias)
-
-    def cameras(self, width: float, count: int, resolution: int, generator: torch.Generator) -> Cameras:
+    def cameras(self, closeups: CloseUps, generator: torch.Generator) -> Cameras:
         """Of `patches`."""
-        half = 0.5 * width * self.edge
+        half = 0.5 * closeups.width * self.edge
         share = min(WIDEST / half, 1.0)
-        return patch_views(generator, self.mesh, count, share * half, _pixels(share, resolution))
+        return patch_views(generator, self.mesh, closeups.count, share * half, closeups.pixels(share))
 
     def whole(self, look: Look, state: torch.Tensor, resolution: int) -> torch.Tensor:
         """The sphere as a camera sees it, (H, W, C)."""
@@ -118,21 +121,16 @@ class TrainingPlane:
         return TrainingPlane(lattice, operator, Surface(lattice.mesh, look.interpolation))
 
     def patches(
-        self,
-        look: Look,
-        state: torch.Tensor,
-        width: float,
-        count: int,
-        resolution: int,
-        generator: torch.Generator,
-        antialias: int = 1,
+        self, look: Look, state: torch.Tensor, closeups: CloseUps, generator: torch.Generator
     ) -> torch.Tensor:
         """As of `TrainingSphere`; within the square, as the decoder's waves do not repeat."""
-        periods = width / self.lattice.columns
+        periods = closeups.width / self.lattice.columns
         share = min(1 / periods, 1.0)
-        width, resolution = share * periods, _pixels(share, resolution)
-        corners = torch.rand(count, 2, generator=generator, dtype=torch.float64).numpy() * (1 - width)
-        return self._windows(look, state, corners, width, resolution, antialias)
+        width = share * periods
+        corners = torch.rand(closeups.count, 2, generator=generator, dtype=torch.float64).numpy() * (
+            1 - width
+        )
+        return self._windows(look, state, corners, width, closeups.pixels(share), closeups.antialias)
 
     def whole(self, look: Look, state: torch.Tensor, resolution: int) -> torch.Tensor:
         """All of the square, (H, W, C)."""
@@ -159,11 +157,6 @@ class TrainingPlane:
         return values.view(sides).mean((2, 4))
 
 
-def _pixels(share: float, resolution: int) -> int:
-    """A share of the pixels along a view, but as many as the features need."""
-    return max(round(share * resolution), min(LEAST, resolution))
-
-
 TrainingSurface = TrainingSphere | TrainingPlane
 
 
@@ -173,7 +166,7 @@ def training_surfaces(config: NcaConfig, look: Look) -> list[TrainingSurface]:
     planes = 0
     for kind in config.surfaces:
         if kind == "flat":
-            columns = max(round(REPEATS * config.density), 4)
+            columns = square_cells(config.density)
             surfaces.append(TrainingPlane.of(columns, look, 0.5 * math.pi * planes))
             planes += 1
         elif kind == "even":

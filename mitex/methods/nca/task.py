@@ -15,7 +15,13 @@ from mitex.methods.nca.appearance import Appearance
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.relief import Relief
-from mitex.methods.nca.surfaces import TrainingPlane, TrainingSphere, TrainingSurface, training_surfaces
+from mitex.methods.nca.surfaces import (
+    CloseUps,
+    TrainingPlane,
+    TrainingSphere,
+    TrainingSurface,
+    training_surfaces,
+)
 from mitex.methods.nca.targets import Targets, enlarged
 from mitex.progress import announce
 from mitex.runtime import keep_freed_memory
@@ -122,19 +128,19 @@ class NcaTask:
         """The views (K, H, W, C) of one step in which the exemplar is `size` [px] wide."""
         if isinstance(surface, TrainingSphere):
             return surface.views(self.look, state, self.cameras(surface, size, generator))
-        config, width = self.config, self._width(size)
-        return surface.patches(self.look, state, width, config.view_count, config.resolution, generator)
+        return surface.patches(self.look, state, self._closeups(size), generator)
 
     def cameras(self, sphere: TrainingSphere, size: int, generator: torch.Generator) -> Cameras:
         """The cameras of `views`."""
         config = self.config
         if config.views == "full":
             return random_views(generator, config.view_count, config.distance, config.fov, config.resolution)
-        return sphere.cameras(self._width(size), config.view_count, config.resolution, generator)
+        return sphere.cameras(self._closeups(size), generator)
 
-    def _width(self, size: int) -> float:
-        """Of a close-up in which the exemplar is `size` [px] wide [edges]."""
-        return self.config.density * self.config.resolution / size
+    def _closeups(self, size: int) -> CloseUps:
+        """Those of one step in which the exemplar is `size` [px] wide."""
+        config = self.config
+        return CloseUps(config.density * config.resolution / size, config.view_count, config.resolution)
 
     def state(self) -> dict[str, torch.Tensor]:
         """Weights, and the pool's states that are no longer the seed."""
@@ -158,7 +164,7 @@ class NcaTask:
         surface, look = self.surface(index), self.look
         state = look.rule.evolve(self.grown(index), surface.perception, self.config.max_steps, generator)[0]
         views = [
-            surface.patches(look, state, width, 1, PREVIEW, generator, antialias=2)[0]
+            surface.patches(look, state, CloseUps(width, 1, PREVIEW, antialias=2), generator)[0]
             for width in (self.config.density, self.config.density / 4)
         ]
         views = [_padded(view, PREVIEW) for view in (*views, surface.whole(look, state, PREVIEW))]

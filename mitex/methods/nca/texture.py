@@ -23,14 +23,13 @@ from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import Perception, lattice_perception, perception
-from mitex.methods.nca.ranges import MOST_STEPS, TILE_CELLS
+from mitex.methods.nca.ranges import MOST_STEPS, square_cells
 from mitex.methods.nca.tile import flat_cells, tile_maps
 from mitex.progress import announce
 from mitex.runtime import keep_freed_memory
 
 STEPS = 200  # of models that do not say it; enough to cover a surface
 DENSITY = 32.0  # cells along the exemplar's width, of models that do not say it
-REPEATS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,8 +191,7 @@ class NcaTexture:
         density = self.about.get("density")
         if not isinstance(density, int | float) or not density > 0:
             density = DENSITY
-        low, high = TILE_CELLS
-        return round(min(max(REPEATS * density, low), high))
+        return square_cells(density)
 
     def _healthy(self, cells: Cells, seed: int, steps: int, turn: float) -> torch.Tensor:
         """What grows on an automaton's mesh, turned by an angle [rad], with the exemplar's colours."""

@@ -7,7 +7,7 @@ import torch
 from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.model import MeshNCA
-from mitex.methods.nca.surfaces import TrainingPlane
+from mitex.methods.nca.surfaces import CloseUps, TrainingPlane
 from tests.methods.nca.tiny import SHAPE
 
 COLUMNS = 16
@@ -42,14 +42,19 @@ def test_patches_have_their_width_and_stay_inside():
     look = _look(None)
     plane = TrainingPlane.of(COLUMNS, look)
     generator = torch.Generator().manual_seed(0)
-    patches = plane.patches(look, _ramp(plane), 4.0, 40, 8, generator).detach()
+    patches = plane.patches(look, _ramp(plane), CloseUps(4.0, 40, 8), generator).detach()
     steps = patches[:, 4, 4:, 0] - patches[:, 4, 3:-1, 0]
     interior = (patches[:, 4, :, 0] > 0.1).all(1) & (patches[:, 4, :, 0] < 0.9).all(1)
     assert interior.sum() > 20
     assert torch.allclose(steps[interior], torch.tensor(4.0 / COLUMNS / 8), atol=1e-4)
     assert patches[..., 0].std() > 0.15  # at many places
     # Twice as wide as the square: half of it, in half of the pixels.
-    assert plane.patches(look, _ramp(plane), 2.0 * COLUMNS, 1, 64, generator).shape == (1, 32, 32, 3)
+    assert plane.patches(look, _ramp(plane), CloseUps(2.0 * COLUMNS, 1, 64), generator).shape == (
+        1,
+        32,
+        32,
+        3,
+    )
 
 
 def test_the_cells_are_those_of_a_torus():
@@ -82,7 +87,9 @@ def test_gradients_reach_state_and_decoder():
     look = _look()
     plane = TrainingPlane.of(COLUMNS, look)
     state = torch.rand(plane.lattice.count, 16, requires_grad=True)
-    plane.patches(look, state, 8.0, 2, 16, torch.Generator().manual_seed(0)).square().sum().backward()
+    plane.patches(
+        look, state, CloseUps(8.0, 2, 16), torch.Generator().manual_seed(0)
+    ).square().sum().backward()
     assert state.grad is not None and (state.grad != 0).any(1).float().mean() > 0.2
     assert all(p.grad is not None and p.grad.any() for p in look.decoder.parameters())
 
@@ -92,7 +99,7 @@ def test_antialiased_pixels_are_means(antialias):
     look = _look()
     plane = TrainingPlane.of(COLUMNS, look)
     state = torch.rand(plane.lattice.count, 16, generator=torch.Generator().manual_seed(1))
-    fine = plane.patches(look, state, 8.0, 1, 16 * antialias, torch.Generator().manual_seed(0))
-    coarse = plane.patches(look, state, 8.0, 1, 16, torch.Generator().manual_seed(0), antialias)
+    fine = plane.patches(look, state, CloseUps(8.0, 1, 16 * antialias), torch.Generator().manual_seed(0))
+    coarse = plane.patches(look, state, CloseUps(8.0, 1, 16, antialias), torch.Generator().manual_seed(0))
     means = fine.view(1, 16, antialias, 16, antialias, 3).mean((2, 4))
     assert torch.allclose(coarse, means, atol=1e-5)
