@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 
 from mitex.errors import ConfigError
-from mitex.geometry.vectors import across
-from mitex.mesh.fields.files import READERS
+from mitex.geometry.vectors import across, unit
+from mitex.mesh.fields.files import read_npy, read_ply
 from mitex.mesh.fields.named import NAMES, named_vectors
+from mitex.mesh.fields.strokes import read_strokes, stroke_vectors
 from mitex.mesh.mesh import Mesh
 from mitex.paths import expanded
 from mitex.suggestions import suggestion
 
+READERS = {".npy": read_npy, ".ply": read_ply, ".json": read_strokes}
 FAINT = 1e-5  # parts of a vector along the surface that are shorter, relative to it, are rounding errors
 
 
@@ -44,8 +46,7 @@ def vector_field(mesh: Mesh, source: str | Path | np.ndarray) -> np.ndarray:
     if largest == 0.0:
         raise ConfigError(f"{label} is zero everywhere", "give one that moves something")
     vectors = vectors / largest  # first: squares may overflow
-    normals = mesh.normals.astype(np.float64)
-    tangent = across(vectors, normals / np.linalg.norm(normals, axis=1, keepdims=True))
+    tangent = across(vectors, unit(mesh.normals.astype(np.float64)))
     lengths = np.linalg.norm(tangent, axis=1)
     faint = lengths <= FAINT * np.linalg.norm(vectors, axis=1)
     if faint.all():
@@ -65,7 +66,7 @@ def _vectors(mesh: Mesh, source: Any) -> np.ndarray:
     if name in NAMES:
         return named_vectors(mesh, name)
     if suffix in READERS:
-        return _of_file(expanded(source), READERS[suffix])
+        return _of_file(mesh, expanded(source), READERS[suffix])
     if "," in name:
         return np.tile(_direction(name), (len(mesh.vertices), 1))
     files = ", ".join(READERS)
@@ -73,14 +74,15 @@ def _vectors(mesh: Mesh, source: Any) -> np.ndarray:
     raise ConfigError(f"there is no vector field '{name}'", suggestion(name, NAMES, everything))
 
 
-def _of_file(place: Path, reader: Callable[[Path], np.ndarray]) -> np.ndarray:
+def _of_file(mesh: Mesh, place: Path, reader: Callable[[Path], Any]) -> np.ndarray:
     if not os.path.isfile(place):  # unlike Path.is_file, also answers for impossible names
         raise ConfigError(f"there is no vector field at '{place}'", "check the path")
     try:
-        return reader(place)
+        content = reader(place)
     except OSError as e:
         reason = e.strerror or str(e)
         raise ConfigError(f"'{place}' cannot be read ({reason})", "check its permissions") from e
+    return stroke_vectors(mesh, content) if reader is read_strokes else content
 
 
 def _direction(text: str) -> np.ndarray:
@@ -105,7 +107,7 @@ def _checked(label: str, vectors: np.ndarray, mesh: Mesh) -> np.ndarray:
     bad = ~np.isfinite(vectors).all(axis=1)
     if bad.any():
         raise ConfigError(
-            f"{label} is NaN or infinite at {bad.sum():,} of {len(bad):,} vertices (first: "
+            f"{label} is NaN or infinite at {bad.sum():,} of {shape[0]:,} vertices (first: "
             f"{int(bad.argmax())})",
             "use zeros where it is unknown",
         )

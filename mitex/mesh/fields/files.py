@@ -39,11 +39,8 @@ def read_ply(place: Path) -> np.ndarray:
     except MeshError as e:
         raise ConfigError(e.problem, e.remedy) from e
     for names in PROPERTIES:
-        columns = [points.get(name) for name in names]
-        if all(isinstance(column, np.ndarray) for column in columns):
+        columns = [points[name] for name in names if isinstance(points.get(name), np.ndarray)]
+        if len(columns) == 3:
             return np.stack(columns, axis=1).astype(np.float64)
     choices = ", ".join(" ".join(names) for names in PROPERTIES)
     raise ConfigError(f"the vertices of '{place}' have no vectors", f"give them properties {choices}")
-
-
-READERS = {".npy": read_npy, ".ply": read_ply}

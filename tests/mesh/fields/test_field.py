@@ -1,5 +1,7 @@
 """`vector_field`: the fields of the MeshNCA paper, directions, files and arrays; and what it refuses."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -23,21 +25,18 @@ FORMULAS = {
 }
 
 
-def vertex_normal(mesh: Mesh, vertex: int) -> np.ndarray:
-    total = np.zeros(3)
-    for a, b, c in mesh.faces:
-        if vertex in (a, b, c):
-            p, q, r = mesh.vertices[[a, b, c]].astype(np.float64)
-            total += np.cross(q - p, r - p)
-    return total / np.linalg.norm(total)
+@cache
+def vertex_normals(mesh: Mesh) -> np.ndarray:
+    total = np.zeros((len(mesh.vertices), 3))
+    for face in mesh.faces:
+        p, q, r = mesh.vertices[face].astype(np.float64)
+        total[face] += np.cross(q - p, r - p)
+    return total / np.linalg.norm(total, axis=1, keepdims=True)
 
 
 def tangent(mesh: Mesh, vectors: list) -> np.ndarray:
     """Equations 10 and 18, one vertex after the other."""
-    parts = []
-    for vertex, u in enumerate(np.array(vectors, np.float64)):
-        n = vertex_normal(mesh, vertex)
-        parts.append(u - (u @ n) * n)
+    parts = [u - (u @ n) * n for u, n in zip(np.array(vectors), vertex_normals(mesh), strict=True)]
     return np.array(parts) / np.mean([np.linalg.norm(part) for part in parts])
 
 
@@ -57,7 +56,7 @@ def test_every_name_is_tested():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_named_fields_do_not_depend_on_place_and_size(name):
-    moved = WHEEL.with_vertices(3.0 * WHEEL.vertices + np.float32([5.0, -2.0, 1.0]))
+    moved = WHEEL.with_vertices(3.0 * WHEEL.vertices + np.array([5.0, -2.0, 1.0], np.float32))
     np.testing.assert_allclose(vector_field(moved, name), vector_field(WHEEL, name), atol=1e-5)
 
 
@@ -124,7 +123,7 @@ def test_refuses_fields_that_are_none():
 def test_refuses_names_that_are_none():
     assert "there is no vector field 'about_y'; did you mean about-y?" in refusal("about_y")
     everything = refusal("sideways")
-    assert all(name in everything for name in (*NAMES, "1,0,0", ".npy", ".ply"))
+    assert all(name in everything for name in (*NAMES, "1,0,0", ".npy, .ply, .json"))
     assert "is no direction" in refusal("1,0")
     assert "is no direction" in refusal("1,0,a")
     assert "NaN" in refusal("1,0,nan")
