@@ -19,7 +19,8 @@ from mitex.mesh.subdivide import child_points
 ENOUGH_VERTICES = 8_000  # "auto" subdivides until a mesh has them: the training has 10,242
 MOST_LEVELS = 6
 MOST_VERTICES = 4_000_000  # a gigabyte of states
-CANDIDATES = 8  # faces whose distance is computed
+CANDIDATES, MORE_CANDIDATES = 8, 64  # faces whose distance is computed
+NEAR = 1e-5  # distance of points on the surface [extents of the mesh], by rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,10 +84,29 @@ def check(mesh: Mesh, subdivide: int | str, scale: float) -> int:
     return levels
 
 
+def nearest_points(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The points of a mesh nearest to points (P, 3) on or near it: faces (P,), barycentrics (P, 3) float64.
+
+    Other than for points of an even mesh, the nearest face need not be among those with the nearest centres;
+    where they are not on the surface, more are looked at.
+    """
+    face, barycentric, distance = _candidates(mesh, points, CANDIDATES)
+    far = distance > NEAR * np.ptp(mesh.vertices, axis=0).max()
+    if far.any():
+        face[far], barycentric[far], _ = _candidates(mesh, points[far], MORE_CANDIDATES)
+    return face, barycentric
+
+
 def _nearest(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The points of a mesh that are nearest to points (P, 3), among the faces with the nearest centres."""
+    face, barycentric, _ = _candidates(mesh, points, CANDIDATES)
+    return face.astype(np.int32), barycentric.astype(np.float32)
+
+
+def _candidates(mesh: Mesh, points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Face, barycentrics and distance of the nearest point in the `count` faces with the nearest centres."""
     corners = mesh.vertices[mesh.faces].astype(np.float64)
-    count = min(CANDIDATES, len(corners))
+    count = min(count, len(corners))
     _, faces = KDTree(corners.mean(axis=1)).query(points, k=count, workers=-1)
     faces = np.asarray(faces).reshape(len(points), count)
     best, face, barycentric = np.full(len(points), np.inf), faces[:, 0].copy(), np.zeros((len(points), 3))
@@ -94,4 +114,4 @@ def _nearest(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         weights, distance = nearest_on_triangles(corners[candidate], points)
         closer = distance < best
         best[closer], face[closer], barycentric[closer] = distance[closer], candidate[closer], weights[closer]
-    return face.astype(np.int32), barycentric.astype(np.float32)
+    return face, barycentric, best
