@@ -10,7 +10,8 @@ from scipy.spatial import KDTree
 from mitex.geometry.triangles import nearest_on_triangles
 from mitex.mesh.mesh import Mesh
 
-CANDIDATES = 8  # faces whose distance is computed
+CANDIDATES, MORE_CANDIDATES = 8, 64  # faces whose distance is computed
+NEAR = 1e-5  # distance of points on the surface [extents of the mesh], by rounding
 
 _trees: weakref.WeakKeyDictionary[Mesh, KDTree] = weakref.WeakKeyDictionary()
 
@@ -21,10 +22,29 @@ def nearest_points(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarr
     Returns:
         (P,) int32 faces and (P, 3) float32 barycentric coordinates.
     """
+    face, barycentric, _ = _candidates(mesh, points, CANDIDATES)
+    return face.astype(np.int32), barycentric.astype(np.float32)
+
+
+def surface_points(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The points of a mesh nearest to points (P, 3) on or near it: faces (P,), barycentrics (P, 3) float64.
+
+    Other than for points of an even mesh, the nearest face need not be among those with the nearest centres;
+    where they are not on the surface, more are looked at.
+    """
+    face, barycentric, distance = _candidates(mesh, points, CANDIDATES)
+    far = distance > NEAR * np.ptp(mesh.vertices, axis=0).max()
+    if far.any():
+        face[far], barycentric[far], _ = _candidates(mesh, points[far], MORE_CANDIDATES)
+    return face, barycentric
+
+
+def _candidates(mesh: Mesh, points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Face, barycentrics and distance of the nearest point in the `count` faces with the nearest centres."""
     corners = mesh.vertices[mesh.faces].astype(np.float64)
     if mesh not in _trees:
         _trees[mesh] = KDTree(corners.mean(axis=1))
-    count = min(CANDIDATES, len(corners))
+    count = min(count, len(corners))
     _, faces = _trees[mesh].query(points, k=count, workers=-1)
     faces = np.asarray(faces).reshape(len(points), count)
     best, face, barycentric = np.full(len(points), np.inf), faces[:, 0].copy(), np.zeros((len(points), 3))
@@ -32,4 +52,4 @@ def nearest_points(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarr
         weights, distance = nearest_on_triangles(corners[candidate], points)
         closer = distance < best
         best[closer], face[closer], barycentric[closer] = distance[closer], candidate[closer], weights[closer]
-    return face.astype(np.int32), barycentric.astype(np.float32)
+    return face, barycentric, best

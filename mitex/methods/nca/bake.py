@@ -29,6 +29,7 @@ class Grown:
         cells: the automaton's mesh.
         orientation: of the texture [rad].
         palette: the exemplar's colours, which all albedos are held within; None for as they are.
+        surface: of the automaton's mesh, if it has been built before.
     """
 
     def __init__(
@@ -38,9 +39,10 @@ class Grown:
         cells: Cells,
         orientation: float = 0.0,
         palette: Palette | None = None,
+        surface: Surface | None = None,
     ) -> None:
         self.look, self.cells, self.orientation, self.palette = look, cells, orientation, palette
-        self.surface = Surface(cells.mesh, look.interpolation)
+        self.surface = surface or Surface(cells.mesh, look.interpolation)
         self.table = self.surface.table(state)
 
     @torch.no_grad()

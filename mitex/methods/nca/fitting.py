@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -10,13 +9,13 @@ from mitex.errors import CheckpointError
 from mitex.exemplar import Exemplar
 from mitex.methods.nca import files
 from mitex.methods.nca.config import PRESETS, NcaConfig
-from mitex.methods.nca.decoder.decoder import Decoder
-from mitex.methods.nca.look import Look
+from mitex.methods.nca.look import Look, traits
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.settling import settling_steps
 from mitex.methods.nca.task import NcaTask
 from mitex.methods.nca.texture import NcaTexture
 from mitex.training.fit import Run
+from mitex.training.locate import CHECKPOINT, PREVIOUS, header
 from mitex.training.settings import RunOptions
 
 
@@ -49,15 +48,15 @@ def fit(
     origin: dict[str, Any] = {"exemplar": maps.name, "density": config.density}
     if "albedo" in maps.maps:
         origin["palette"] = Palette.of(maps.maps["albedo"]).record()
-    parent = None
+    parent, lineage = None, _lineage(run)
     if init is not None:
         parent, about = _parent(init, config, sorted(maps.maps))
-        origin["parent"] = str(about["name"])
-    task = NcaTask(config, maps, parent)
+        lineage = {"parent": str(about["name"]), "family": about["family"]}
+    task = NcaTask(config, maps, parent, lineage)
 
     def texture(about: dict[str, Any]) -> NcaTexture:
         steps = settling_steps(task.look, task.exemplar, config.density)
-        return NcaTexture(task.look, about | origin | {"growth_steps": steps})
+        return NcaTexture(task.look, about | origin | lineage | {"growth_steps": steps})
 
     return run.train(
         task,
@@ -72,7 +71,7 @@ def fit(
 
 def _parent(init: str | Path, config: NcaConfig, maps: list[str]) -> tuple[Look, dict[str, Any]]:
     parent, about = files.load(init)
-    theirs, ours = (_traits(look) for look in (parent, Look.of(config, maps)))
+    theirs, ours = (traits(look) for look in (parent, Look.of(config, maps)))
     differing = sorted(name for name in theirs | ours if theirs.get(name) != ours.get(name))
     if differing:
         raise CheckpointError(
@@ -82,8 +81,10 @@ def _parent(init: str | Path, config: NcaConfig, maps: list[str]) -> tuple[Look,
     return parent, about
 
 
-def _traits(look: Look) -> dict[str, Any]:
-    """What two looks must have in common for the weights of one to mean the same in the other."""
-    traits: dict[str, Any] = {"maps": look.maps, "aggregation": look.mean}
-    traits |= {name: tuple(value.shape) for name, value in look.state_dict().items()}
-    return traits | (asdict(look.decoder.shape) if isinstance(look.decoder, Decoder) else {})
+def _lineage(run: Run[NcaConfig]) -> dict[str, str]:
+    """What a run that is resumed has begun from."""
+    if not run.resume or run.folder is None:
+        return {}
+    heads = [head for name in (CHECKPOINT, PREVIOUS) if (head := header(run.folder / name))]
+    texts = heads[0][1] if heads else {}
+    return {key: texts[f"task.{key}"] for key in ("parent", "family") if f"task.{key}" in texts}

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import deepcopy
+from dataclasses import asdict
+from typing import Any
 
 import torch
 from torch import nn
@@ -103,5 +105,17 @@ class Look(nn.Module):
         """The state (..., C) held where the training's states were: on meshes unlike the sphere it may grow
         without an end, as nothing has taught the rule to come back.
         """
-        margin = MARGIN * (self.high - self.low)
-        return torch.minimum(torch.maximum(state, self.low - margin), self.high + margin)
+        return held(state, self.low, self.high)
+
+
+def held(state: torch.Tensor, low: torch.Tensor, high: torch.Tensor) -> torch.Tensor:
+    """States (..., C) within bounds (..., C) and a margin beyond them."""
+    margin = MARGIN * (high - low)
+    return torch.minimum(torch.maximum(state, low - margin), high + margin)
+
+
+def traits(look: Look) -> dict[str, Any]:
+    """What two looks must have in common for the weights of one to mean the same in the other."""
+    traits: dict[str, Any] = {"maps": look.maps, "aggregation": look.mean}
+    traits |= {name: tuple(value.shape) for name, value in look.state_dict().items()}
+    return traits | (asdict(look.decoder.shape) if isinstance(look.decoder, Decoder) else {})

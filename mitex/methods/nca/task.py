@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
@@ -40,12 +41,19 @@ class NcaTask:
         config: settings.
         exemplar: maps to learn.
         init: what to start from; None draws new weights from the seed.
+        lineage: name of the model to start from, and its family, for the checkpoint.
     """
 
-    def __init__(self, config: NcaConfig, exemplar: Exemplar, init: Look | None = None) -> None:
+    def __init__(
+        self,
+        config: NcaConfig,
+        exemplar: Exemplar,
+        init: Look | None = None,
+        lineage: Mapping[str, str] | None = None,
+    ) -> None:
         keep_freed_memory()
         announce("preparing spheres and the exemplar")
-        self.config = config
+        self.config, self.lineage = config, dict(lineage or {})
         self.exemplar = exemplar.resized(min(config.exemplar_size, *exemplar.size))
         self.maps = sorted(exemplar.maps)
         self.look = Look.of(config, self.maps)
@@ -178,7 +186,7 @@ class NcaTask:
 
     def metadata(self) -> dict[str, str]:
         exemplar = {"exemplar": self.exemplar.name, "exemplar_key": self.exemplar.key}
-        return {"method": "nca", "maps": ",".join(self.maps)} | exemplar
+        return {"method": "nca", "maps": ",".join(self.maps)} | exemplar | self.lineage
 
 
 def _padded(view: torch.Tensor, side: int) -> np.ndarray:

@@ -1,8 +1,9 @@
-"""A learned texture: the cell rule, and putting what it grows on any mesh."""
+"""Learned textures: the cell rule, and putting what it grows on any mesh."""
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,13 +17,13 @@ from mitex.atlas import Atlas, laid_out
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh
 from mitex.methods.nca import files
-from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.field import fields
+from mitex.methods.nca.growth import Growth, LookGrowth
 from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.palette import Palette
-from mitex.methods.nca.perception import Perception, lattice_perception, perception
+from mitex.methods.nca.perception import lattice_perception
 from mitex.methods.nca.ranges import MOST_STEPS, square_cells
 from mitex.methods.nca.tile import flat_cells, tile_maps
 from mitex.progress import announce
@@ -32,30 +33,27 @@ STEPS = 200  # of models that do not say it; enough to cover a surface
 DENSITY = 32.0  # cells along the exemplar's width, of models that do not say it
 
 
-@dataclass(frozen=True, eq=False)
-class NcaTexture:
-    """A trained MeshNCA.
+class GrowingTexture(ABC):
+    """What automata grow on any mesh: a texture that was learned, or two of them grafted.
 
     Attributes:
-        look: the cell rule, and the decoder that shows its states.
-        about: how it was made: name, exemplar, preset, steps, seconds, loss, ...
+        about: how it was made, as JSON values; name at least.
     """
 
-    look: Look
-    about: Mapping[str, Any] = field(default_factory=dict)
+    about: Mapping[str, Any]
 
-    @classmethod
-    def load(cls, source: str | Path) -> NcaTexture:
-        """Loads a bundled model by name, a model file, or a run folder.
+    @property
+    @abstractmethod
+    def steps(self) -> int:
+        """Of the automaton, until the pattern is in order."""
+
+    @abstractmethod
+    def growth(self, cells: Cells, orientation: float = 0.0) -> Growth:
+        """The automaton on a mesh, its texture turned by an angle [rad].
 
         Raises:
-            CheckpointError: there is no such model, or it is damaged.
+            ConfigError: the model needs a condition.
         """
-        return cls(*files.load(source))
-
-    def save(self, path: str | Path) -> Path:
-        """Writes the model file (safetensors, about 50 KB)."""
-        return files.save(Path(path), self.look, self.about)
 
     def apply(
         self,
@@ -93,30 +91,16 @@ class NcaTexture:
             ConfigError: options out of range, or the model needs a condition.
             MeshError: the mesh cannot be remeshed.
         """
-        self._check_unconditioned()
         laid = mesh if resolution is None or (keep_dense and scale != 1.0) else laid_out(mesh, resolution)
         announce("preparing the mesh")
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
-        turn = math.radians(orientation)
-        state = self._healthy(cells, seed, self.steps if steps is None else steps, turn)
-        grown = Grown(self.look, state, cells, turn, self._palette)
+        growth = self.growth(cells, math.radians(orientation))
+        grown = growth.shown(_healthy(growth, seed, self.steps if steps is None else steps))
         asset = grown.asset()
         if resolution is None:
             return asset
         atlas = Atlas.build(cells.given, resolution, max(min(8, resolution // 8), 1), cells.given.uv)
         return replace(asset, atlas=atlas, texture_maps=grown.textures(atlas))
-
-    def fields(
-        self, mesh: Mesh, *, seed: int = 0, steps: int | None = None, orientation: float = 0.0
-    ) -> dict[str, dict[str, Any]]:
-        """Grows the texture on a mesh and returns it as textures of a Mitsuba scene, by map, which are
-        decoded where rays meet the surface: `{"type": "principled", "base_color": fields["albedo"], ...}`.
-
-        A cell sits at each vertex of the mesh, and the shape in the scene must have these vertices; see
-        `mitex.mesh.subdivide_midpoint`. Other arguments and errors as of `apply`.
-        """
-        cells, steps = Cells(mesh, 0, mesh), self.steps if steps is None else steps
-        return fields(self.look, self._healthy(cells, seed, steps, math.radians(orientation)), mesh)
 
     def variants(
         self, mesh: Mesh, seeds: Iterable[int], *, resolution: int | None = 1024, **options: Any
@@ -128,6 +112,44 @@ class NcaTexture:
         for seed in seeds:
             asset = self.apply(laid, seed=seed, resolution=resolution, **options)
             yield replace(asset, name=f"seed {seed}")
+
+
+@dataclass(frozen=True, eq=False)
+class NcaTexture(GrowingTexture):
+    """A trained MeshNCA.
+
+    Attributes:
+        look: the cell rule, and the decoder that shows its states.
+        about: how it was made: name, exemplar, preset, steps, seconds, loss, ...
+    """
+
+    look: Look
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def load(cls, source: str | Path) -> NcaTexture:
+        """Loads a bundled model by name, a model file, or a run folder.
+
+        Raises:
+            CheckpointError: there is no such model, or it is damaged.
+        """
+        return cls(*files.load(source))
+
+    def save(self, path: str | Path) -> Path:
+        """Writes the model file (safetensors, about 50 KB)."""
+        return files.save(Path(path), self.look, self.about)
+
+    def fields(
+        self, mesh: Mesh, *, seed: int = 0, steps: int | None = None, orientation: float = 0.0
+    ) -> dict[str, dict[str, Any]]:
+        """Grows the texture on a mesh and returns it as textures of a Mitsuba scene, by map, which are
+        decoded where rays meet the surface: `{"type": "principled", "base_color": fields["albedo"], ...}`.
+
+        A cell sits at each vertex of the mesh, and the shape in the scene must have these vertices; see
+        `mitex.mesh.subdivide_midpoint`. Other arguments and errors as of `apply`.
+        """
+        growth = self.growth(Cells(mesh, 0, mesh), math.radians(orientation))
+        return fields(self.look, _healthy(growth, seed, self.steps if steps is None else steps), mesh)
 
     def tile(
         self, resolution: int = 1024, *, cells: int | None = None, seed: int = 0, steps: int | None = None
@@ -146,20 +168,21 @@ class NcaTexture:
         Raises:
             ConfigError: options out of range, or the model needs a condition.
         """
+        self._check_unconditioned()
         lattice = flat_cells(self._tile_cells() if cells is None else cells, resolution)
         operator = lattice_perception(lattice, self.look.rule.degree, self.look.mean)
-        state = self.grow(operator, seed=seed, steps=steps)
-        state = self._healed(state, Cells(lattice.joined, 0, lattice.joined), operator, seed)
+        cells_of_square = Cells(lattice.joined, 0, lattice.joined)
+        growth = LookGrowth(self.look, cells_of_square, palette=self._palette, operator=operator)
+        state = _healthy(growth, seed, self.steps if steps is None else steps)
         return tile_maps(self.look, state, lattice, resolution, self._palette)
 
-    @torch.no_grad()
     def grow(
-        self, mesh: Mesh | Perception, *, seed: int = 0, steps: int | None = None, orientation: float = 0.0
+        self, mesh: Mesh, *, seed: int = 0, steps: int | None = None, orientation: float = 0.0
     ) -> torch.Tensor:
         """The state of the automaton after some steps, held within the bounds of the training's.
 
         Args:
-            mesh: any mesh, or its perception operator, which has an orientation of its own.
+            mesh: any mesh.
             seed: of the random updates.
             steps: from the initial state, which is zero; None as of `apply`.
             orientation: as in `apply`.
@@ -170,16 +193,12 @@ class NcaTexture:
         Raises:
             ConfigError: steps below 0, or the model needs a condition.
         """
+        growth = self.growth(Cells(mesh, 0, mesh), math.radians(orientation))
+        return grown_state(growth, seed, self.steps if steps is None else steps)
+
+    def growth(self, cells: Cells, orientation: float = 0.0) -> LookGrowth:
         self._check_unconditioned()
-        steps = self.steps if steps is None else steps
-        if steps < 0:
-            raise ConfigError(f"{steps} steps", "give 0 or more")
-        keep_freed_memory()
-        rule, operator = self.look.rule, mesh
-        if isinstance(operator, Mesh):
-            operator = perception(operator, rule.degree, math.radians(orientation), mean=self.look.mean)
-        generator = torch.Generator().manual_seed(seed)
-        return self.look.evolve(rule.seed(operator), operator, steps, generator)[0]
+        return LookGrowth(self.look, cells, orientation, self._palette)
 
     @property
     def steps(self) -> int:
@@ -193,18 +212,6 @@ class NcaTexture:
             density = DENSITY
         return square_cells(density)
 
-    def _healthy(self, cells: Cells, seed: int, steps: int, turn: float) -> torch.Tensor:
-        """What grows on an automaton's mesh, turned by an angle [rad], with the exemplar's colours."""
-        operator = perception(cells.mesh, self.look.rule.degree, turn, mean=self.look.mean)
-        return self._healed(self.grow(operator, seed=seed, steps=steps), cells, operator, seed)
-
-    def _healed(self, state: torch.Tensor, cells: Cells, operator: Perception, seed: int) -> torch.Tensor:
-        palette = self._palette
-        if palette is None:
-            return state
-        generator = torch.Generator().manual_seed(seed)
-        return healed(self.look, state, cells, operator, palette, generator)
-
     @property
     def _palette(self) -> Palette | None:
         record = self.about.get("palette")
@@ -217,3 +224,20 @@ class NcaTexture:
                 f"'{name}' needs a condition of {width} values at each vertex, and has none here",
                 "use a model that was trained without, or give the condition to MeshNCA.evolve in Python",
             )
+
+
+def grown_state(growth: Growth, seed: int, steps: int) -> torch.Tensor:
+    """The state (V, C) after some steps from the initial one, with random updates from a seed.
+
+    Raises:
+        ConfigError: steps below 0.
+    """
+    if steps < 0:
+        raise ConfigError(f"{steps} steps", "give 0 or more")
+    keep_freed_memory()
+    return growth.evolve(growth.seed(), steps, torch.Generator().manual_seed(seed))
+
+
+def _healthy(growth: Growth, seed: int, steps: int) -> torch.Tensor:
+    """The same, with the exemplar's colours."""
+    return healed(growth, grown_state(growth, seed, steps), torch.Generator().manual_seed(seed))
