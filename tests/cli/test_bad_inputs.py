@@ -352,7 +352,7 @@ class TestArchitectures:
     @pytest.mark.parametrize(
         ("words", "message"),
         [
-            ("", "'wind' needs a condition of 3 values at each vertex, and has none here; give `--field`"),
+            ("", "'wind' needs a condition of 3 values at each vertex, and has none here; give --field"),
             ("--field rihgt", "did you mean right?"),
             ("--field none.npy", "none.npy"),
             ("--field short.npy", "shape (8, 3)"),
@@ -362,12 +362,9 @@ class TestArchitectures:
     )
     def test_fields_of_a_moving_texture(self, files, capsys, words, message):
         bad.model(files / "wind.safetensors", condition=3)
-        for name, vectors in (
-            ("short", np.ones((7, 3))),
-            ("nan", np.full((8, 3), np.nan)),
-            ("zero", np.zeros((8, 3))),
-        ):
-            np.save(files / f"{name}.npy", vectors)
+        vectors = {"short": np.ones((7, 3)), "nan": np.full((8, 3), np.nan), "zero": np.zeros((8, 3))}
+        for name, values in vectors.items():
+            np.save(files / f"{name}.npy", values)
         check_refused(files, apply(words, model="wind.safetensors"), message, capsys)
 
     def test_a_field_is_not_overwritten(self, files, capsys):
