@@ -59,9 +59,9 @@ def stroke_vectors(mesh: Mesh, strokes: Sequence[np.ndarray]) -> np.ndarray:
         ConfigError: no strokes; one that is not (N, 3) finite numbers, has no length, or is far from the
             surface; strokes across the surface everywhere.
     """
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
-    tree = cKDTree(mesh.vertices)
+    tree = KDTree(mesh.vertices)
     _check(mesh, tree, strokes)
     normals = unit(mesh.normals.astype(np.float64))
     directions = across(_directions(mesh, tree, strokes), normals)
@@ -77,7 +77,7 @@ def stroke_vectors(mesh: Mesh, strokes: Sequence[np.ndarray]) -> np.ndarray:
     pairs, weights = cotangent_weights(mesh)
     carried = transport(normals, x, y, pairs)
     u = _spread(connection_laplacian(pairs, carried, np.clip(weights, *WEIGHTS), len(u)), fixed, u)
-    return u.real[:, None] * x + u.imag[:, None] * y
+    return np.real(u)[:, None] * x + np.imag(u)[:, None] * y
 
 
 def _spread(laplacian: Any, fixed: np.ndarray, u: np.ndarray) -> np.ndarray:

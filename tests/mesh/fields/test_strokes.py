@@ -47,7 +47,7 @@ def stiffness(mesh: Mesh) -> np.ndarray:
 
 
 def test_components_on_a_plane_are_harmonic():
-    mesh, fixed = even_plane(7), [8, 40]
+    mesh, fixed = even_plane(7), np.array([8, 40])
     middle = mesh.vertices[fixed].astype(np.float64)
     strokes = [middle[:1] + [[-0.1, 0, 0], [0.1, 0, 0]], middle[1:] + [[0, 0.1, 0], [0, -0.1, 0]]]
     free = np.setdiff1d(np.arange(49), fixed)
