@@ -53,7 +53,9 @@ class PreviewRenderer:
         self._hit = hits.hit.numpy()
         self.face, self.barycentric = hits.face.numpy(), hits.barycentric.numpy()
 
-    def render(self, albedo: np.ndarray, normals: np.ndarray, occlusion: np.ndarray | float = 1.0) -> np.ndarray:
+    def render(
+        self, albedo: np.ndarray, normals: np.ndarray, occlusion: np.ndarray | float = 1.0
+    ) -> np.ndarray:
         """One picture of the surface as its points are now.
 
         Args:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -19,6 +20,7 @@ from mitex.mesh import Mesh
 from mitex.methods.nca import files
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.field import fields
+from mitex.methods.nca.film import Shooting, film
 from mitex.methods.nca.growth import Growth, LookGrowth
 from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look
@@ -101,6 +103,38 @@ class GrowingTexture(ABC):
             return asset
         atlas = Atlas.build(cells.given, resolution, max(min(8, resolution // 8), 1), cells.given.uv)
         return replace(asset, atlas=atlas, texture_maps=grown.textures(atlas))
+
+    def animate(
+        self,
+        mesh: Mesh,
+        path: str | os.PathLike[str],
+        *,
+        seed: int = 0,
+        subdivide: int | str = "auto",
+        orientation: float = 0.0,
+        scale: float = 1.0,
+        resume: bool = False,
+        **shooting: Any,
+    ) -> Path:
+        """Films the texture as it grows, changes, or heals, before a camera that stays.
+
+        Args:
+            mesh: any mesh.
+            path: of the film: .mp4, .gif, or a new folder for its frames as PNG.
+            seed, subdivide, orientation, scale: as of `apply`.
+            resume: goes on with a film that was interrupted, whose frames are in a hidden folder beside it.
+            shooting: as of `mitex.methods.nca.film.Shooting`: seconds, fps, loop, damage, and others.
+
+        Returns:
+            The path written.
+
+        Raises:
+            ConfigError: an option out of range, or the model needs a condition.
+            OutputError: another kind of file, an unwritable place, or nothing there to resume.
+            KeyboardInterrupt: stopped after a whole frame.
+        """
+        options = {"seed": seed, "subdivide": subdivide, "orientation": orientation, "scale": scale}
+        return film(self, mesh, path, Shooting(**shooting), resume=resume, **options)
 
     def variants(
         self, mesh: Mesh, seeds: Iterable[int], *, resolution: int | None = 1024, **options: Any
