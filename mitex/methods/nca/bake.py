@@ -66,7 +66,7 @@ class Grown:
         face, corner = np.zeros(len(mesh.vertices), np.int32), np.zeros(len(mesh.vertices), np.int64)
         for k in range(3):
             face[mesh.faces[:, k]], corner[mesh.faces[:, k]] = np.arange(len(mesh.faces)), k
-        return self._maps(self.values(face, np.eye(3, dtype=np.float32)[corner]))
+        return self.maps(self.values(face, np.eye(3, dtype=np.float32)[corner]))
 
     def asset(self) -> Asset:
         """The given mesh with the maps at its vertices."""
@@ -82,8 +82,8 @@ class Grown:
             used = atlas.face[rows] >= 0
             face, barycentric = atlas.face[rows][used], atlas.barycentric[rows][used].clip(0)
             barycentric /= barycentric.sum(axis=1, keepdims=True)
-            for name, values in self._maps(self.values(face, barycentric)).items():
-                detail = self._detail(values, face, barycentric) if name == "normal" else values
+            for name, values in self.maps(self.values(face, barycentric)).items():
+                detail = self.object_normals(values, face, barycentric) if name == "normal" else values
                 images[name][rows][used] = detail
         empty = atlas.face < 0
         for name, image in images.items():
@@ -93,10 +93,11 @@ class Grown:
                 image[empty] = image[~empty].mean(axis=0)
         return images
 
-    def _maps(self, values: np.ndarray) -> dict[str, np.ndarray]:
+    def maps(self, values: np.ndarray) -> dict[str, np.ndarray]:
+        """The columns (P, c) of values (P, K), by map."""
         return {name: values[:, list(columns)] for name, columns in self.look.layout.items()}
 
-    def _detail(self, encoded: np.ndarray, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+    def object_normals(self, encoded: np.ndarray, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """Normals in object space (P, 3) of a normal map's values at points of the given mesh."""
         mesh = self.cells.given
         normals = unit(interpolate(barycentric, mesh.shading_normals[face]))

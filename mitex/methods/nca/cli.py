@@ -119,7 +119,7 @@ class Apply(OptionalMeshOptions):
     """Cells along a side of the tile; more make the pattern finer."""
 
     def check(self) -> None:
-        self._levels()
+        levels(self.subdivide)
         in_range("--variants", self.variants, 1, MOST_VARIANTS)
         in_range("--seed", self.seed, *SEEDS)
         in_range("--seed", self.seed + self.variants - 1, *SEEDS)
@@ -159,8 +159,7 @@ class Apply(OptionalMeshOptions):
         reject_unused("--tile", place, place.suffix.lower() in EXPORTS + PICTURES)
 
     def inputs(self) -> list[Path | str]:
-        file = self.field is not None and Path(self.field).suffix.lower() in FIELD_FILES
-        return [*super().inputs(), *([str(self.field)] if file else [])]
+        return [*super().inputs(), *field_files(self.field)]
 
     def prepared(self) -> Path:
         if self.tile is None:
@@ -217,7 +216,7 @@ class Apply(OptionalMeshOptions):
         textures = out.suffix.lower() != ".ply" and not self.vertex_colors
         return {
             "steps": self.steps,
-            "subdivide": self._levels(),
+            "subdivide": levels(self.subdivide),
             "orientation": self.orientation,
             "scale": self.scale,
             "resolution": (self.resolution or RESOLUTION) if textures else None,
@@ -226,9 +225,20 @@ class Apply(OptionalMeshOptions):
             "speed": self.speed,
         }
 
-    def _levels(self) -> int | str:
-        if self.subdivide == "auto":
-            return "auto"
-        if self.subdivide not in list("0123456"):
-            raise ConfigError(f"--subdivide cannot be {self.subdivide!r}", "use auto or a number from 0 to 6")
-        return int(self.subdivide)
+
+def field_files(field: str | None) -> list[str]:
+    """The file that --field names, if it does."""
+    return [field] if field is not None and Path(field).suffix.lower() in FIELD_FILES else []
+
+
+def levels(subdivide: str) -> int | str:
+    """What --subdivide means.
+
+    Raises:
+        ConfigError: neither auto nor a number of levels.
+    """
+    if subdivide == "auto":
+        return "auto"
+    if subdivide not in list("0123456"):
+        raise ConfigError(f"--subdivide cannot be {subdivide!r}", "use auto or a number from 0 to 6")
+    return int(subdivide)

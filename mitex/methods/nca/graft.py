@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from mitex.cache import content_key
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh
 from mitex.methods.nca.bake import Grown
@@ -105,6 +106,10 @@ class GraftedGrowth(Growth):
         self._low = torch.lerp(first.look.low, second.look.low, self._share[:, None])
         self._high = torch.lerp(first.look.high, second.look.high, self._share[:, None])
         self._of_first, self._of_second = self._share < 1, self._share > 0
+
+    @property
+    def key(self) -> str:
+        return content_key(self.first.key, self.second.key, self.weights)
 
     def seed(self) -> torch.Tensor:
         return self.first.seed()

@@ -11,7 +11,7 @@ import torch
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.surface import Surface
-from mitex.methods.nca.look import Look
+from mitex.methods.nca.look import Look, weights_key
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import Perception, perception
 
@@ -24,6 +24,11 @@ class Growth(ABC):
     """
 
     cells: Cells
+
+    @property
+    @abstractmethod
+    def key(self) -> str:
+        """A hash of the weights that it follows from."""
 
     @abstractmethod
     def seed(self) -> torch.Tensor:
@@ -66,6 +71,10 @@ class LookGrowth(Growth):
         self.condition = condition
         self.look, self.cells, self.orientation, self.palette = look, cells, orientation, palette
         self.operator = operator or perception(cells.mesh, look.rule.degree, orientation, mean=look.mean)
+
+    @property
+    def key(self) -> str:
+        return weights_key(self.look)
 
     def seed(self) -> torch.Tensor:
         return self.look.rule.seed(self.operator)[0]

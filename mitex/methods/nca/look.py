@@ -10,6 +10,7 @@ from typing import Any
 import torch
 from torch import nn
 
+from mitex.cache import content_key
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.decoder.decoder import Decoder, Readout
 from mitex.methods.nca.decoder.shape import DecoderShape
@@ -127,3 +128,9 @@ def traits(look: Look) -> dict[str, Any]:
     traits: dict[str, Any] = {"maps": look.maps, "aggregation": look.mean}
     traits |= {name: tuple(value.shape) for name, value in look.state_dict().items()}
     return traits | (asdict(look.decoder.shape) if isinstance(look.decoder, Decoder) else {})
+
+
+def weights_key(look: Look) -> str:
+    """A hash of all weights of a look."""
+    parts = ((name, value.numpy(force=True)) for name, value in sorted(look.state_dict().items()))
+    return content_key(*(part for pair in parts for part in pair))[:12]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -19,13 +20,14 @@ from mitex.mesh import Mesh
 from mitex.methods.nca import files
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.field import fields
+from mitex.methods.nca.film import Shooting, film
 from mitex.methods.nca.growth import Growth, LookGrowth
 from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look
-from mitex.methods.nca.motion.condition import WIDTH, Field, cell_vectors, flat_vectors
+from mitex.methods.nca.motion.condition import Field, cell_vectors, flat_vectors, followed_field
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import lattice_perception
-from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS, square_cells
+from mitex.methods.nca.ranges import MOST_STEPS, square_cells
 from mitex.methods.nca.tile import flat_cells, tile_maps
 from mitex.progress import announce
 from mitex.runtime import keep_freed_memory
@@ -128,6 +130,41 @@ class GrowingTexture(ABC):
         atlas = Atlas.build(cells.given, resolution, max(min(8, resolution // 8), 1), cells.given.uv)
         return replace(asset, atlas=atlas, texture_maps=grown.textures(atlas))
 
+    def animate(
+        self,
+        mesh: Mesh,
+        path: str | os.PathLike[str],
+        *,
+        seed: int = 0,
+        subdivide: int | str = "auto",
+        orientation: float = 0.0,
+        scale: float = 1.0,
+        field: Field | None = None,
+        speed: float = 1.0,
+        resume: bool = False,
+        **shooting: Any,
+    ) -> Path:
+        """Films the texture as it grows, changes, or heals, before a camera that stays.
+
+        Args:
+            mesh: any mesh.
+            path: of the film: .mp4, .gif, or a new folder for its frames as PNG.
+            seed, subdivide, orientation, scale, field, speed: as of `apply`.
+            resume: goes on with a film that was interrupted, whose frames are in a hidden folder beside it.
+            shooting: as of `mitex.methods.nca.film.Shooting`: seconds, fps, loop, damage, and others.
+
+        Returns:
+            The path written.
+
+        Raises:
+            ConfigError: an option out of range, or a field as of `apply`.
+            OutputError: another kind of file, an unwritable place, or nothing there to resume.
+            KeyboardInterrupt: stopped after a whole frame.
+        """
+        options = {"seed": seed, "subdivide": subdivide, "orientation": orientation, "scale": scale}
+        options |= {"field": field, "speed": speed}
+        return film(self, mesh, path, Shooting(**shooting), resume=resume, **options)
+
     def variants(
         self, mesh: Mesh, seeds: Iterable[int], *, resolution: int | None = 1024, **options: Any
     ) -> Iterator[Asset]:
@@ -212,7 +249,7 @@ class NcaTexture(GrowingTexture):
         lattice = flat_cells(self._tile_cells() if cells is None else cells, resolution)
         operator = lattice_perception(lattice, self.look.rule.degree, self.look.mean)
         cells_of_square = Cells(lattice.joined, 0, lattice.joined)
-        direction, condition = self._followed(field, speed, "right"), None
+        direction, condition = followed_field(self.look, self.about, field, speed, "right"), None
         if direction is not None:
             condition = torch.from_numpy(flat_vectors(lattice, direction, speed))
         growth = LookGrowth(self.look, cells_of_square, 0.0, self._palette, operator, condition)
@@ -254,7 +291,7 @@ class NcaTexture(GrowingTexture):
         orientation: float = 0.0,
         given: Mesh | None = None,
     ) -> torch.Tensor | None:
-        field = self._followed(field, speed, self.about.get("motion"))
+        field = followed_field(self.look, self.about, field, speed, self.about.get("motion"))
         if field is None:
             return None
         vectors = cell_vectors(given or cells.given, cells.mesh, field, speed, orientation)
@@ -286,30 +323,6 @@ class NcaTexture(GrowingTexture):
     def _palette(self) -> Palette | None:
         record = self.about.get("palette")
         return None if record is None else Palette.from_record(record)
-
-    def _followed(self, field: Field | None, speed: float, default: Field | None) -> Field | None:
-        """The vector field that the texture follows; None if it does not move.
-
-        Raises:
-            ConfigError: it does not move but shall; no field is known; or a speed out of range.
-        """
-        name, width = self.about.get("name", "the model"), self.look.rule.condition
-        if not SPEEDS[0] <= speed <= SPEEDS[1]:
-            raise ConfigError(f"a speed of {speed:g}", f"use {SPEEDS[0]:g} to {SPEEDS[1]:g}")
-        if not width:
-            if field is not None or speed != 1.0:
-                raise ConfigError(
-                    f"'{name}' does not move: it was trained without a vector field",
-                    "train one that does with `motion` and `init`",
-                )
-            return None
-        field = default if field is None else field
-        if width != WIDTH or field is None:
-            raise ConfigError(
-                f"'{name}' needs a condition of {width} values at each vertex, and has none here",
-                "give `field`" if width == WIDTH else "give it to MeshNCA.evolve in Python",
-            )
-        return field
 
 
 def grown_state(growth: Growth, seed: int, steps: int) -> torch.Tensor:

@@ -13,14 +13,13 @@ from mitex.images import SUFFIXES, read_image
 from mitex.mesh import Mesh
 from mitex.mesh.nearest import surface_points
 from mitex.mesh.readers.ply import read_tables
+from mitex.methods.nca.region import AXES, NUMBER
 from mitex.paths import expanded
 
 Weights = Callable[[np.ndarray], np.ndarray]
 """From points (P, 3) [mesh units] to weights (P,) float32 in [0, 1]."""
 
-AXES = {"x": 0, "y": 1, "z": 2}
 PROPERTIES = ("weight", "quality", "red")  # of a PLY file, in this order
-NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 HELP = "give 0 to 1, x, y:LOW:HIGH, X,Y,Z,RADIUS, a .npy or .ply with a value at each vertex, or a .png"
 
 

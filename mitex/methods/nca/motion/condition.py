@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +14,8 @@ from mitex.geometry.vectors import rotate_about
 from mitex.mesh import Lattice, Mesh
 from mitex.mesh.fields import vector_field
 from mitex.mesh.nearest import surface_points
+from mitex.methods.nca.look import Look
+from mitex.methods.nca.ranges import SPEEDS
 
 OF_VERTICES = (".npy", ".ply")  # files of vectors that belong to the vertices of one mesh
 WIDTH = 3  # of a vector, which is a cell's condition
@@ -58,3 +62,30 @@ def flat_vectors(lattice: Lattice, field: Field, speed: float) -> np.ndarray:
             "give a direction such as right or 1,1,0",
         )
     return vectors
+
+
+def followed_field(
+    look: Look, about: Mapping[str, Any], field: Field | None, speed: float, default: Field | None
+) -> Field | None:
+    """The vector field that a look follows: the given one or the default; None if the look does not move.
+
+    Raises:
+        ConfigError: it does not move but shall; no field is known; or a speed out of range.
+    """
+    name, width = about.get("name", "the model"), look.rule.condition
+    if not SPEEDS[0] <= speed <= SPEEDS[1]:
+        raise ConfigError(f"a speed of {speed:g}", f"use {SPEEDS[0]:g} to {SPEEDS[1]:g}")
+    if not width:
+        if field is not None or speed != 1.0:
+            raise ConfigError(
+                f"'{name}' does not move: it was trained without a vector field",
+                "train one from it: fit nca with `motion` and `init`",
+            )
+        return None
+    field = default if field is None else field
+    if width != WIDTH or field is None:
+        raise ConfigError(
+            f"'{name}' needs a condition of {width} values at each vertex, and has none here",
+            "give `field`" if width == WIDTH else "give it to MeshNCA.evolve in Python",
+        )
+    return field

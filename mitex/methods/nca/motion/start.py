@@ -41,7 +41,7 @@ def check_field(field: str) -> None:
     if any(field.lower().endswith(suffix) for suffix in (".npy", ".ply")):
         raise ConfigError(
             f"'{field}' holds the vectors of one mesh, and the training has spheres of its own",
-            "train with a name or a direction, and give the file to `mitex apply --field`",
+            "train with a name or a direction, and give the file as `field` when it is applied",
         )
     vector_field(icosphere(2), field)
 

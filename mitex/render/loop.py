@@ -1,0 +1,62 @@
+"""Films that close: where one may end so that its beginning follows, and a cross-fade over what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+NEARLY = 0.999  # of the difference of a longer loop, which a shorter one must be below
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A part of a film that is shown again and again.
+
+    Attributes:
+        start: its first frame.
+        length: how many frames it has; the one after its last resembles its first.
+        fade: frames at its beginning into which those after its end fade.
+        difference: of the frames that are faded, root of the mean square, in units of the pictures.
+    """
+
+    start: int
+    length: int
+    fade: int
+    difference: float
+
+    def pictures(self, read: Callable[[int], np.ndarray]) -> Iterator[np.ndarray]:
+        """The frames of the loop, given those of the film: frame -> (H, W, 3).
+
+        Frame t of the first `fade` is (1 - w) F(start + length + t) + w F(start + t), where
+        w = (t + 1) / (fade + 1): the first one nearly follows the last.
+        """
+        for t in range(self.length):
+            picture = read(self.start + t)
+            if t < self.fade:
+                weight = np.float32((t + 1) / (self.fade + 1))
+                after = read(self.start + self.length + t)
+                picture = after + weight * (picture - after)
+            yield picture
+
+
+def best_loop(frames: np.ndarray, fade: int, shortest: int, longest: int) -> Loop:
+    """The loop whose ends resemble each other most, over all frames that fade; the longest of equal ones.
+
+    Args:
+        frames: (N, ...) of the film, small.
+        fade: frames to fade over; 0 compares one frame and fades none.
+        shortest, longest: how many frames the loop may have; N is at least `longest` plus `fade`, or one.
+    """
+    window = max(fade, 1)
+    flat = frames.reshape(len(frames), -1).astype(np.float64)
+    best = Loop(0, longest, fade, np.inf)
+    for length in range(longest, shortest - 1, -1):
+        squares = ((flat[length:] - flat[:-length]) ** 2).mean(axis=1)
+        sums = np.convolve(squares, np.ones(window) / window, mode="valid")
+        start = int(sums.argmin())
+        difference = float(np.sqrt(max(sums[start], 0.0)))
+        if difference < best.difference * NEARLY:
+            best = Loop(start, length, fade, difference)
+    return best
