@@ -62,6 +62,7 @@ def fit(
         lineage = {"parent": str(about["name"]), "family": about["family"]}
     if config.motion:
         origin |= {"motion": config.motion, "motion_period": config.motion_period}
+        origin["motion_speed"] = config.motion_speeds[1]
     task = (MotionTask if config.motion else NcaTask)(config, maps, parent, lineage)
 
     def texture(about: dict[str, Any]) -> NcaTexture:

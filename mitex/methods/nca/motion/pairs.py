@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from mitex.evaluation.regularity import LUMINANCE
 from mitex.geometry.triangles import interpolate
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.motion.drift import Drift
 from mitex.methods.nca.surfaces import TrainingPlane, TrainingSphere, Windows
 from mitex.scenes.cameras import Cameras
 from mitex.scenes.screen import screen_motion
-
-LUMINANCE = (0.2126, 0.7152, 0.0722)  # of red, green and blue
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,8 @@ from mitex.methods.nca.motion.pairs import Pairs, plane_pairs, sphere_pairs
 from mitex.methods.nca.surfaces import TrainingSphere, TrainingSurface
 from mitex.methods.nca.task import NcaTask, Rollout
 
+FLOOR = 0.1  # of residuals: as much as a way of a third of a cell, in usual patterns
+
 
 class MotionTask(NcaTask):
     """Trains a look that moves along a vector field (MeshNCA, section 4.3); arguments as of `NcaTask`."""
@@ -60,7 +62,7 @@ class MotionTask(NcaTask):
         period, gamma = self.config.motion_period, self.config.motion_gamma
         if self.estimator is None:
             transport = drift.transport(apart / period)
-            residuals = [advection_residual(a, b, transport(a)) for a, b in pairwise(states)]
+            residuals = [advection_residual(a, b, transport(a), FLOOR) for a, b in pairwise(states)]
             return torch.stack(residuals).mean()
         pairs = self.pairs((states[-2].detach(), states[-1]), drift, generator)
         flow = self.estimator(pairs.first, pairs.second)

@@ -74,6 +74,7 @@ def test_motion_is_one_more_term(exemplar):
 def test_a_perfect_transport_would_cost_nothing(exemplar, monkeypatch):
     """Where each of the states is the one before, carried along; also the drift that the cells were told."""
     task = _grown(MotionTask(config(*MOVING, "min_steps=7", "max_steps=7", "motion_period=4"), exemplar))
+    monkeypatch.setattr(training, "FLOOR", 0.0)
     drifts = []
 
     def draw(*arguments):
