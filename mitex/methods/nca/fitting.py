@@ -66,8 +66,9 @@ def fit(
     task = (MotionTask if config.motion else NcaTask)(config, maps, parent, lineage)
 
     def texture(about: dict[str, Any]) -> NcaTexture:
-        steps = settling_steps(task.look, task.exemplar, config.density)
-        return NcaTexture(task.look, about | origin | lineage | {"growth_steps": steps})
+        look = task.look.to("cpu")
+        steps = settling_steps(look, task.exemplar, config.density)
+        return NcaTexture(look, about | origin | lineage | {"growth_steps": steps})
 
     return run.train(
         task,

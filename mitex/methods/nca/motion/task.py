@@ -44,7 +44,7 @@ class MotionTask(NcaTask):
     ) -> Rollout:
         config, rule = self.config, self.look.rule
         drift = draw_drift(config, surface, generator)
-        condition = drift.condition if rule.condition else None
+        condition = drift.condition.to(state.device) if rule.condition else None
         apart = min(config.motion_steps, steps)
         pattern = bool(state.any()) and step >= config.motion_start
         states = [rule.evolve(state, surface.perception, steps % apart, generator, condition)]
