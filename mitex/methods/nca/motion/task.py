@@ -44,7 +44,7 @@ class MotionTask(NcaTask):
     ) -> Rollout:
         config, rule = self.config, self.look.rule
         drift = draw_drift(config, surface, generator)
-        condition = drift.condition.to(state.device) if rule.condition else None
+        condition = self._told(drift)
         apart = min(config.motion_steps, steps)
         pattern = bool(state.any()) and step >= config.motion_start
         states = [rule.evolve(state, surface.perception, steps % apart, generator, condition)]
@@ -54,6 +54,16 @@ class MotionTask(NcaTask):
             return Rollout(states[-1], {})
         loss = self.motion([state[0] for state in states], drift, apart, generator)
         return Rollout(states[-1], {"motion": config.motion_weight * loss})
+
+    def evolved(
+        self, surface: TrainingSurface, state: torch.Tensor, steps: int, generator: torch.Generator
+    ) -> torch.Tensor:
+        condition = self._told(draw_drift(self.config, surface, generator))
+        return self.look.rule.evolve(state, surface.perception, steps, generator, condition)
+
+    def _told(self, drift: Drift) -> torch.Tensor | None:
+        """The condition of the cells."""
+        return drift.condition.to(self.look.device) if self.look.rule.condition else None
 
     def motion(
         self, states: Sequence[torch.Tensor], drift: Drift, apart: int, generator: torch.Generator

@@ -1,9 +1,11 @@
 """The training of motion: what it adds to the still one, and the contract of tasks."""
 
+import numpy as np
 import pytest
 import torch
 
 from mitex.exemplar import Exemplar
+from mitex.methods.nca import task as still_training
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.motion import task as training
 from mitex.methods.nca.motion.start import with_condition
@@ -134,3 +136,14 @@ def test_a_still_look_begins_as_it_was(exemplar):
     assert torch.equal(ours, theirs)
     ours.square().sum().backward()
     assert look.rule.fc1.weight.grad is not None and look.rule.fc1.weight.grad[:, -3:].any()
+
+
+@pytest.mark.parametrize("encoding", ["true", "false"])
+def test_previews_are_of_moving_states(exemplar, monkeypatch, encoding):
+    """They leave the pool alone, and are the same again."""
+    monkeypatch.setattr(still_training, "PREVIEW", 48)
+    task = _grown(MotionTask(config(*MOVING, f"motion_encoding={encoding}"), exemplar))
+    before = task.pool.clone()
+    picture = task.preview(5)
+    assert picture.shape == (48, 4 * 48, 3) and np.array_equal(task.preview(5), picture)
+    assert torch.equal(task.pool, before)
