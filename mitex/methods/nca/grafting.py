@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
+from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
+from mitex.methods.nca import METHOD
 from mitex.methods.nca.cli import RESOLUTION, levels
 from mitex.methods.nca.ranges import MOST_STEPS
 from mitex.methods.options import PICTURES, MeshOptions
+from mitex.methods.registry import method_of
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
@@ -88,6 +91,9 @@ class Grafted(MeshOptions):
         from mitex.methods.nca import Graft, NcaTexture
         from mitex.methods.nca.weights import graft_weights
 
+        for model in (self.model, self.second):
+            if (method := method_of(model)) is not METHOD:
+                raise ConfigError(f"'{model}' is a {method.name} texture", f"graft {METHOD.name} textures")
         mesh = Mesh.load(self.mesh)
         first, second = NcaTexture.load(self.model), NcaTexture.load(self.second)
         textures = out.suffix.lower() != ".ply" and not self.vertex_colors
