@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import scipy.stats
 
-from mitex.geometry.vectors import unit
+from mitex.geometry.vectors import scatter_add, unit
 from mitex.mesh import Mesh
+from mitex.mesh.cotangents import cotangent_weights
 from mitex.mesh.topology import face_edges
 
 LEAST = 1e-12
@@ -52,14 +53,9 @@ def _dihedral_angles(mesh: Mesh, sides: np.ndarray, count: int) -> np.ndarray:
 def _mean_curvature(mesh: Mesh) -> np.ndarray:
     """(V,) by the cotangent formula (Meyer et al. 2003, equation 8), with a third of the area around."""
     count, points = len(mesh.vertices), mesh.vertices.astype(np.float64)
-    total, area = np.zeros((count, 3)), np.zeros(count)
-    twice = np.maximum(np.linalg.norm(mesh.face_crosses, axis=1), LEAST)
-    for k in range(3):
-        at, a, b = (mesh.faces[:, (k + j) % 3] for j in range(3))
-        cotangent = ((points[a] - points[at]) * (points[b] - points[at])).sum(1) / twice
-        edge = cotangent[:, None] * (points[a] - points[b])
-        np.add.at(total, a, edge)
-        np.add.at(total, b, -edge)
-        np.add.at(area, at, twice / 6)
-    normal = total / (2 * np.maximum(area, LEAST)[:, None])  # 2 H n
+    pairs, weights = cotangent_weights(mesh)
+    edge = weights[:, None] * (points[pairs[:, 0]] - points[pairs[:, 1]])
+    total = scatter_add(pairs[:, 0], edge, count) - scatter_add(pairs[:, 1], edge, count)
+    area = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas / 3, 3), count)
+    normal = total / np.maximum(area, LEAST)[:, None]  # 2 H n
     return 0.5 * (normal * mesh.normals).sum(1)

@@ -9,8 +9,8 @@ from tyro.conf import Positional, arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range
-from mitex.methods.nca.cli import levels
-from mitex.methods.nca.ranges import MOST_STEPS
+from mitex.methods.nca.cli import field_files, levels
+from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS
 
 FADE = 12  # frames over which a loop fades
 SPP = 32  # of the path tracer
@@ -28,6 +28,7 @@ class Animate:
       mitex animate pebbles --mesh bunny.obj --out loop.gif --loop --seconds 3 --resolution 256
       mitex animate pebbles --mesh bunny.obj --out healing.mp4 --damage 0,0.5,0,0.3
       mitex animate pebbles --mesh bunny.obj --out frames/ --renderer path --spp 64
+      mitex animate runs/flowing --mesh bunny.obj --out flow.mp4 --start 200 --field about-y --speed 1.5
       mitex animate pebbles --mesh bunny.obj --out growth.mp4 --resume
     """
 
@@ -95,6 +96,12 @@ class Animate:
     scale: Annotated[float, arg(metavar="X")] = 1.0
     """Size of the pattern."""
 
+    field: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="(default: the training's)")] = None
+    """Vector field that a moving texture follows: a name, a direction, or a file (.npy .ply .json)."""
+
+    speed: Annotated[float, arg(metavar="X")] = 1.0
+    """Speed of a moving texture, as a factor of the field."""
+
     resume: Annotated[bool, arg(help_behavior_hint="")] = False
     """Go on with a film that was interrupted."""
 
@@ -113,7 +120,7 @@ class Animate:
         shooting = Shooting(**self._shooting())
         target = shooting.recording(self.out, {}).target
         if target.suffix.lower() in VIDEOS:
-            prepare_output(target, inputs=[self.model, *mesh_files(self.mesh)])
+            prepare_output(target, inputs=[self.model, *mesh_files(self.mesh), *field_files(self.field)])
         from mitex.mesh import Mesh
         from mitex.methods.nca import NcaTexture
         from mitex.methods.nca.film import film
@@ -128,6 +135,8 @@ class Animate:
             subdivide=levels(self.subdivide),
             orientation=self.orientation,
             scale=self.scale,
+            field=self.field,
+            speed=self.speed,
         )
         print(self.out)
 
@@ -145,6 +154,7 @@ class Animate:
         in_range("--seed", self.seed, *SEEDS)
         in_range("--orientation", self.orientation, -360.0, 360.0)
         in_range("--scale", self.scale, 0.05, 20.0)
+        in_range("--speed", self.speed, *SPEEDS)
         for option, needed, given in (
             ("--spp", "--renderer path", self.spp is not None and self.renderer != "path"),
             ("--fade", "--loop", self.fade is not None and not self.loop),

@@ -9,18 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from mitex.errors import ConfigError
-from mitex.geometry.triangles import nearest_on_triangles
+from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh, remesh, subdivide_loop, subdivide_midpoint
+from mitex.mesh.nearest import nearest_points
 from mitex.mesh.subdivide import child_points
 
 ENOUGH_VERTICES = 8_000  # "auto" subdivides until a mesh has them: the training has 10,242
 MOST_LEVELS = 6
 MOST_VERTICES = 4_000_000  # a gigabyte of states
-CANDIDATES, MORE_CANDIDATES = 8, 64  # faces whose distance is computed
-NEAR = 1e-5  # distance of points on the surface [extents of the mesh], by rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +58,7 @@ class Cells:
         if self.levels is not None:
             return child_points(face, barycentric, self.levels)
         corners = self.given.vertices[self.given.faces[face]]
-        return _nearest(self.mesh, np.einsum("pk,pkd->pd", barycentric, corners))
+        return nearest_points(self.mesh, interpolate(barycentric, corners))
 
 
 def check(mesh: Mesh, subdivide: int | str, scale: float) -> int:
@@ -82,42 +80,3 @@ def check(mesh: Mesh, subdivide: int | str, scale: float) -> int:
     if len(mesh.vertices) * 4**levels * max(1 / scale**2, 1) > MOST_VERTICES:
         raise ConfigError(f"a mesh of more than {MOST_VERTICES:,} vertices", "subdivide less")
     return levels
-
-
-def nearest_points(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The points of a mesh nearest to points (P, 3) on or near it: faces (P,), barycentrics (P, 3) float64.
-
-    On an uneven mesh the nearest face need not be among those with the nearest centres; where these are not
-    at the point, more are looked at, and the largest faces.
-    """
-    face, barycentric, distance = _candidates(mesh, points, CANDIDATES)
-    far = distance > NEAR * np.ptp(mesh.vertices, axis=0).max()
-    if far.any():
-        face[far], barycentric[far], _ = _candidates(mesh, points[far], MORE_CANDIDATES, MORE_CANDIDATES)
-    return face, barycentric
-
-
-def _nearest(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The points of a mesh that are nearest to points (P, 3), among the faces with the nearest centres."""
-    face, barycentric, _ = _candidates(mesh, points, CANDIDATES)
-    return face.astype(np.int32), barycentric.astype(np.float32)
-
-
-def _candidates(
-    mesh: Mesh, points: np.ndarray, count: int, largest: int = 0
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Face, barycentrics and distance of the nearest point in the `count` faces with the nearest centres, and
-    in some of the largest faces.
-    """
-    corners = mesh.vertices[mesh.faces].astype(np.float64)
-    count = min(count, len(corners))
-    _, faces = KDTree(corners.mean(axis=1)).query(points, k=count, workers=-1)
-    faces = np.asarray(faces).reshape(len(points), count)
-    large = np.argsort(-mesh.face_areas)[:largest]
-    faces = np.column_stack([faces, np.broadcast_to(large, (len(points), len(large)))])
-    best, face, barycentric = np.full(len(points), np.inf), faces[:, 0].copy(), np.zeros((len(points), 3))
-    for candidate in faces.T:
-        weights, distance = nearest_on_triangles(corners[candidate], points)
-        closer = distance < best
-        best[closer], face[closer], barycentric[closer] = distance[closer], candidate[closer], weights[closer]
-    return face, barycentric, best

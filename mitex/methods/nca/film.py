@@ -23,6 +23,7 @@ from mitex.mesh import Mesh
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.growth import Growth
+from mitex.methods.nca.motion.condition import Field
 from mitex.methods.nca.ranges import MOST_STEPS
 from mitex.methods.nca.region import region
 from mitex.progress import announce
@@ -115,12 +116,16 @@ def film(
     subdivide: int | str = "auto",
     orientation: float = 0.0,
     scale: float = 1.0,
+    field: Field | None = None,
+    speed: float = 1.0,
 ) -> Path:
     """Films a texture on a mesh; arguments and errors as of `GrowingTexture.animate`."""
     shooting.recording(path, {})
     laid = mesh if shooting.renderer == "preview" else laid_out(mesh, shooting.texels)
     announce("preparing the mesh")
-    growth = texture.growth(Cells.of(laid, subdivide, scale), math.radians(orientation))
+    cells, turn = Cells.of(laid, subdivide, scale), math.radians(orientation)
+    condition = texture.condition(cells, field, speed, turn, mesh)
+    growth = texture.growth(cells, turn, condition)
     start = shooting.start
     if start is None:
         start = 0 if shooting.loop is None and shooting.damage is None else texture.steps
@@ -131,6 +136,7 @@ def film(
             raise ConfigError(f"nothing of '{mesh.name}' is in '{shooting.damage}'", "choose another region")
     scene = {"mesh": content_key(laid.vertices, laid.faces), "model": growth.key, "seed": seed}
     scene |= {"subdivide": subdivide, "orientation": orientation, "scale": scale, "start": start}
+    scene |= {} if condition is None else {"condition": content_key(condition.numpy())}
     settings = {name: value for name, value in asdict(shooting).items() if name not in OF_THE_FILM}
     recording = shooting.recording(path, scene | settings)
     keep_freed_memory()

@@ -10,6 +10,8 @@ from mitex.exemplar import Exemplar
 from mitex.methods.nca import files
 from mitex.methods.nca.config import PRESETS, NcaConfig
 from mitex.methods.nca.look import Look, traits
+from mitex.methods.nca.motion.start import check_field, moving, with_condition
+from mitex.methods.nca.motion.task import MotionTask
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.settling import settling_steps
 from mitex.methods.nca.task import NcaTask
@@ -24,6 +26,7 @@ def fit(
     out: str | Path | None = None,
     *,
     init: str | Path | None = None,
+    motion: str | None = None,
     **options: Unpack[RunOptions],
 ) -> NcaTexture:
     """Trains a MeshNCA on an exemplar; writes a run folder with the texture in it.
@@ -31,8 +34,11 @@ def fit(
     Args:
         exemplar: maps, or what `Exemplar.load` takes.
         out: run folder; must be new or empty, or hold a run to resume; None writes no file.
-        init: model to start from: the parent, if the two shall be graftable (section 4.4).
-        options: preset ("patch" or "paper"), and those of `RunOptions`.
+        init: model to start from: the parent, if the two shall be graftable (section 4.4), or the still look
+            of a moving one.
+        motion: the vector field that the texture learns to move along, by name or direction (see
+            `mitex.mesh.fields`); the preset is then "motion" unless another is named.
+        options: preset ("patch", "paper", "motion" or "motion-paper"), and those of `RunOptions`.
 
     Returns:
         The texture, also saved as `texture.safetensors` in `out` if that is given.
@@ -42,8 +48,10 @@ def fit(
         Cancelled: by `cancel`; a checkpoint has been saved if there is a folder.
         Interrupted: by Ctrl-C, likewise.
     """
-    run = Run.of(PRESETS, out, **options)
+    run = Run.of(PRESETS, out, **(options if motion is None else moving(options, motion)))
     config = run.config
+    if config.motion:
+        check_field(config.motion)
     maps = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
     origin: dict[str, Any] = {"exemplar": maps.name, "density": config.density}
     if "albedo" in maps.maps:
@@ -52,7 +60,9 @@ def fit(
     if init is not None:
         parent, about = _parent(init, config, sorted(maps.maps))
         lineage = {"parent": str(about["name"]), "family": about["family"]}
-    task = NcaTask(config, maps, parent, lineage)
+    if config.motion:
+        origin |= {"motion": config.motion, "motion_period": config.motion_period}
+    task = (MotionTask if config.motion else NcaTask)(config, maps, parent, lineage)
 
     def texture(about: dict[str, Any]) -> NcaTexture:
         steps = settling_steps(task.look, task.exemplar, config.density)
@@ -71,6 +81,8 @@ def fit(
 
 def _parent(init: str | Path, config: NcaConfig, maps: list[str]) -> tuple[Look, dict[str, Any]]:
     parent, about = files.load(init)
+    if config.motion and config.motion_encoding and not parent.rule.condition:
+        parent = with_condition(parent)
     theirs, ours = (traits(look) for look in (parent, Look.of(config, maps)))
     differing = sorted(name for name in theirs | ours if theirs.get(name) != ours.get(name))
     if differing:

@@ -16,11 +16,13 @@ import torch
 
 from mitex.cache import content_key
 from mitex.errors import ConfigError
+from mitex.mesh import Mesh
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.growth import Growth, LookGrowth
 from mitex.methods.nca.look import held, traits
 from mitex.methods.nca.model import FIRE_RATE
+from mitex.methods.nca.motion.condition import Field
 from mitex.methods.nca.texture import GrowingTexture, NcaTexture
 from mitex.methods.nca.weights import Weights
 from mitex.progress import announce
@@ -59,8 +61,20 @@ class Graft(GrowingTexture):
         """As many as the slower of the two needs."""
         return max(self.first.steps, self.second.steps)
 
-    def growth(self, cells: Cells, orientation: float = 0.0) -> Growth:
-        first, second = (texture.growth(cells, orientation) for texture in (self.first, self.second))
+    def condition(
+        self,
+        cells: Cells,
+        field: Field | None,
+        speed: float,
+        orientation: float = 0.0,
+        given: Mesh | None = None,
+    ) -> torch.Tensor | None:
+        return self.first.condition(cells, field, speed, orientation, given)
+
+    def growth(self, cells: Cells, orientation: float = 0.0, condition: torch.Tensor | None = None) -> Growth:
+        first, second = (
+            texture.growth(cells, orientation, condition) for texture in (self.first, self.second)
+        )
         return GraftedGrowth(first, second, self.weights(cells.mesh.vertices.astype(np.float64)))
 
 
@@ -124,9 +138,12 @@ class GraftedGrowth(Growth):
         of 0 or 1, the state is exactly that of the single rule.
         """
         mask = torch.rand(state.shape[:2], generator=generator) < FIRE_RATE
+        parts = ((self.first, self._of_first), (self.second, self._of_second))
         first, second = (
-            growth.look.rule.step(state, growth.operator, mask & own) if own.any() else state
-            for growth, own in ((self.first, self._of_first), (self.second, self._of_second))
+            growth.look.rule.step(state, growth.operator, mask & own, growth.condition)
+            if own.any()
+            else state
+            for growth, own in parts
         )
         return held(torch.lerp(first, second, self._share[:, None]), self._low, self._high)
 

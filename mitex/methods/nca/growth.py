@@ -56,6 +56,7 @@ class LookGrowth(Growth):
         orientation: of the texture [rad].
         palette: the exemplar's colours; None if they are not known.
         operator: perception of the cells, if it is not simply that of their mesh.
+        condition: of the cells, (V, 3), of a look that moves.
     """
 
     def __init__(
@@ -65,7 +66,9 @@ class LookGrowth(Growth):
         orientation: float = 0.0,
         palette: Palette | None = None,
         operator: Perception | None = None,
+        condition: torch.Tensor | None = None,
     ) -> None:
+        self.condition = condition
         self.look, self.cells, self.orientation, self.palette = look, cells, orientation, palette
         self.operator = operator or perception(cells.mesh, look.rule.degree, orientation, mean=look.mean)
 
@@ -78,7 +81,7 @@ class LookGrowth(Growth):
 
     @torch.no_grad()
     def evolve(self, state: torch.Tensor, steps: int, generator: torch.Generator) -> torch.Tensor:
-        return self.look.evolve(state[None], self.operator, steps, generator)[0]
+        return self.look.evolve(state[None], self.operator, steps, generator, self.condition)[0]
 
     def shown(self, state: torch.Tensor) -> Grown:
         return Grown(self.look, state, self.cells, self.orientation, self.palette, self._surface)

@@ -65,7 +65,8 @@ class Look(nn.Module):
     @staticmethod
     def of(config: NcaConfig, maps: Sequence[str]) -> Look:
         """With the shapes of a config, and no weights yet."""
-        rule = MeshNCA(config.channels, config.hidden, degree=config.degree)
+        condition = 3 if config.motion and config.motion_encoding else 0
+        rule = MeshNCA(config.channels, config.hidden, condition, config.degree)
         shape = config.decoder_shape if config.decoder else None
         return Look(rule, maps, shape, config.aggregation == "mean")
 
@@ -94,12 +95,19 @@ class Look(nn.Module):
         self.high.lerp_(state.amax(0), RATE)
 
     def evolve(
-        self, state: torch.Tensor, operator: Perception, steps: int, generator: torch.Generator
+        self,
+        state: torch.Tensor,
+        operator: Perception,
+        steps: int,
+        generator: torch.Generator,
+        condition: torch.Tensor | None = None,
     ) -> torch.Tensor:
-        """`steps` steps of the rule from a state (B, V, C), held within the bounds after each."""
+        """`steps` steps of the rule from a state (B, V, C), held within the bounds after each; `condition` as
+        of `MeshNCA.step`.
+        """
         for step in range(steps):
             announce("growing the texture", step, steps)
-            state = self.bounded(self.rule.evolve(state, operator, 1, generator))
+            state = self.bounded(self.rule.evolve(state, operator, 1, generator, condition))
         return state
 
     def bounded(self, state: torch.Tensor) -> torch.Tensor:

@@ -24,6 +24,7 @@ from mitex.methods.nca.film import Shooting, film
 from mitex.methods.nca.growth import Growth, LookGrowth
 from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look
+from mitex.methods.nca.motion.condition import Field, cell_vectors, flat_vectors, followed_field
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import lattice_perception
 from mitex.methods.nca.ranges import MOST_STEPS, square_cells
@@ -50,12 +51,30 @@ class GrowingTexture(ABC):
         """Of the automaton, until the pattern is in order."""
 
     @abstractmethod
-    def growth(self, cells: Cells, orientation: float = 0.0) -> Growth:
-        """The automaton on a mesh, its texture turned by an angle [rad].
+    def condition(
+        self,
+        cells: Cells,
+        field: Field | None = None,
+        speed: float = 1.0,
+        orientation: float = 0.0,
+        given: Mesh | None = None,
+    ) -> torch.Tensor | None:
+        """What the cells are told of a vector field, (V, 3); None for a texture that does not move.
+
+        Args:
+            cells: the automaton's mesh.
+            field: see `mitex.mesh.fields`; None for the one that the texture was trained with.
+            speed: factor of the field, whose mean length is 1.
+            orientation: of the texture [rad].
+            given: whose vertices the vectors of a file or an array belong to; None for `cells.given`.
 
         Raises:
-            ConfigError: the model needs a condition.
+            ConfigError: a field of a texture that does not move, or one that cannot be used on the mesh.
         """
+
+    @abstractmethod
+    def growth(self, cells: Cells, orientation: float = 0.0, condition: torch.Tensor | None = None) -> Growth:
+        """The automaton on a mesh, its texture turned by an angle [rad]; with the cells' `condition`."""
 
     def apply(
         self,
@@ -68,6 +87,8 @@ class GrowingTexture(ABC):
         scale: float = 1.0,
         resolution: int | None = 1024,
         keep_dense: bool = False,
+        field: Field | None = None,
+        speed: float = 1.0,
     ) -> Asset:
         """Grows the texture on a mesh.
 
@@ -85,18 +106,23 @@ class GrowingTexture(ABC):
             resolution: of the baked textures [texels], on the mesh's own UVs if nothing in them overlaps,
                 else on new ones. None leaves the maps at the vertices.
             keep_dense: returns the finer mesh itself, rounded by Loop subdivision, instead of the given one.
+            field: vector field that a moving texture follows, see `mitex.mesh.fields`; None for the one that
+                it was trained with.
+            speed: factor of the field, whose mean length is 1.
 
         Returns:
             An asset on the given mesh, with one map per learned map.
 
         Raises:
-            ConfigError: options out of range, or the model needs a condition.
+            ConfigError: options out of range, a field of a texture that does not move, or one that cannot be
+                used on the mesh.
             MeshError: the mesh cannot be remeshed.
         """
         laid = mesh if resolution is None or (keep_dense and scale != 1.0) else laid_out(mesh, resolution)
         announce("preparing the mesh")
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
-        growth = self.growth(cells, math.radians(orientation))
+        turn = math.radians(orientation)
+        growth = self.growth(cells, turn, self.condition(cells, field, speed, turn, mesh))
         grown = growth.shown(_healthy(growth, seed, self.steps if steps is None else steps))
         asset = grown.asset()
         if resolution is None:
@@ -113,6 +139,8 @@ class GrowingTexture(ABC):
         subdivide: int | str = "auto",
         orientation: float = 0.0,
         scale: float = 1.0,
+        field: Field | None = None,
+        speed: float = 1.0,
         resume: bool = False,
         **shooting: Any,
     ) -> Path:
@@ -121,7 +149,7 @@ class GrowingTexture(ABC):
         Args:
             mesh: any mesh.
             path: of the film: .mp4, .gif, or a new folder for its frames as PNG.
-            seed, subdivide, orientation, scale: as of `apply`.
+            seed, subdivide, orientation, scale, field, speed: as of `apply`.
             resume: goes on with a film that was interrupted, whose frames are in a hidden folder beside it.
             shooting: as of `mitex.methods.nca.film.Shooting`: seconds, fps, loop, damage, and others.
 
@@ -129,11 +157,12 @@ class GrowingTexture(ABC):
             The path written.
 
         Raises:
-            ConfigError: an option out of range, or the model needs a condition.
+            ConfigError: an option out of range, or a field as of `apply`.
             OutputError: another kind of file, an unwritable place, or nothing there to resume.
             KeyboardInterrupt: stopped after a whole frame.
         """
         options = {"seed": seed, "subdivide": subdivide, "orientation": orientation, "scale": scale}
+        options |= {"field": field, "speed": speed}
         return film(self, mesh, path, Shooting(**shooting), resume=resume, **options)
 
     def variants(
@@ -174,7 +203,14 @@ class NcaTexture(GrowingTexture):
         return files.save(Path(path), self.look, self.about)
 
     def fields(
-        self, mesh: Mesh, *, seed: int = 0, steps: int | None = None, orientation: float = 0.0
+        self,
+        mesh: Mesh,
+        *,
+        seed: int = 0,
+        steps: int | None = None,
+        orientation: float = 0.0,
+        field: Field | None = None,
+        speed: float = 1.0,
     ) -> dict[str, dict[str, Any]]:
         """Grows the texture on a mesh and returns it as textures of a Mitsuba scene, by map, which are
         decoded where rays meet the surface: `{"type": "principled", "base_color": fields["albedo"], ...}`.
@@ -182,36 +218,53 @@ class NcaTexture(GrowingTexture):
         A cell sits at each vertex of the mesh, and the shape in the scene must have these vertices; see
         `mitex.mesh.subdivide_midpoint`. Other arguments and errors as of `apply`.
         """
-        growth = self.growth(Cells(mesh, 0, mesh), math.radians(orientation))
+        growth = self._on(mesh, orientation, field, speed)
         return fields(self.look, _healthy(growth, seed, self.steps if steps is None else steps), mesh)
 
     def tile(
-        self, resolution: int = 1024, *, cells: int | None = None, seed: int = 0, steps: int | None = None
+        self,
+        resolution: int = 1024,
+        *,
+        cells: int | None = None,
+        seed: int = 0,
+        steps: int | None = None,
+        field: Field | None = None,
+        speed: float = 1.0,
     ) -> dict[str, np.ndarray]:
         """Grows the texture on a flat square whose opposite sides are joined.
 
         Args:
             resolution: side of the maps [px], 16 to 8192.
             cells: along a side, 8 to 1024; if None, the exemplar appears about `REPEATS` times along it.
-            seed, steps: as of `apply`.
+            seed, steps, speed: as of `apply`.
+            field: as of `apply`, but the same everywhere, as any other has a seam; None for "right".
 
         Returns:
             Maps (N, N, c) float32 in [0, 1], row 0 on top, the exemplar's up upwards; they go on at their
             opposite sides.
 
         Raises:
-            ConfigError: options out of range, or the model needs a condition.
+            ConfigError: options out of range, or a field as of `apply`.
         """
-        self._check_unconditioned()
         lattice = flat_cells(self._tile_cells() if cells is None else cells, resolution)
         operator = lattice_perception(lattice, self.look.rule.degree, self.look.mean)
         cells_of_square = Cells(lattice.joined, 0, lattice.joined)
-        growth = LookGrowth(self.look, cells_of_square, palette=self._palette, operator=operator)
+        direction, condition = followed_field(self.look, self.about, field, speed, "right"), None
+        if direction is not None:
+            condition = torch.from_numpy(flat_vectors(lattice, direction, speed))
+        growth = LookGrowth(self.look, cells_of_square, 0.0, self._palette, operator, condition)
         state = _healthy(growth, seed, self.steps if steps is None else steps)
         return tile_maps(self.look, state, lattice, resolution, self._palette)
 
     def grow(
-        self, mesh: Mesh, *, seed: int = 0, steps: int | None = None, orientation: float = 0.0
+        self,
+        mesh: Mesh,
+        *,
+        seed: int = 0,
+        steps: int | None = None,
+        orientation: float = 0.0,
+        field: Field | None = None,
+        speed: float = 1.0,
     ) -> torch.Tensor:
         """The state of the automaton after some steps, held within the bounds of the training's.
 
@@ -219,20 +272,40 @@ class NcaTexture(GrowingTexture):
             mesh: any mesh.
             seed: of the random updates.
             steps: from the initial state, which is zero; None as of `apply`.
-            orientation: as in `apply`.
+            orientation, field, speed: as in `apply`.
 
         Returns:
             (V, C) float32.
 
         Raises:
-            ConfigError: steps below 0, or the model needs a condition.
+            ConfigError: steps below 0, or a field as of `apply`.
         """
-        growth = self.growth(Cells(mesh, 0, mesh), math.radians(orientation))
+        growth = self._on(mesh, orientation, field, speed)
         return grown_state(growth, seed, self.steps if steps is None else steps)
 
-    def growth(self, cells: Cells, orientation: float = 0.0) -> LookGrowth:
-        self._check_unconditioned()
-        return LookGrowth(self.look, cells, orientation, self._palette)
+    def condition(
+        self,
+        cells: Cells,
+        field: Field | None = None,
+        speed: float = 1.0,
+        orientation: float = 0.0,
+        given: Mesh | None = None,
+    ) -> torch.Tensor | None:
+        field = followed_field(self.look, self.about, field, speed, self.about.get("motion"))
+        if field is None:
+            return None
+        vectors = cell_vectors(given or cells.given, cells.mesh, field, speed, orientation)
+        return torch.from_numpy(vectors)
+
+    def growth(
+        self, cells: Cells, orientation: float = 0.0, condition: torch.Tensor | None = None
+    ) -> LookGrowth:
+        return LookGrowth(self.look, cells, orientation, self._palette, condition=condition)
+
+    def _on(self, mesh: Mesh, orientation: float, field: Field | None, speed: float) -> LookGrowth:
+        """What grows on the vertices of a mesh, turned by an angle [degrees]."""
+        cells, turn = Cells(mesh, 0, mesh), math.radians(orientation)
+        return self.growth(cells, turn, self.condition(cells, field, speed, turn))
 
     @property
     def steps(self) -> int:
@@ -250,14 +323,6 @@ class NcaTexture(GrowingTexture):
     def _palette(self) -> Palette | None:
         record = self.about.get("palette")
         return None if record is None else Palette.from_record(record)
-
-    def _check_unconditioned(self) -> None:
-        if self.look.rule.condition:
-            name, width = self.about.get("name", "the model"), self.look.rule.condition
-            raise ConfigError(
-                f"'{name}' needs a condition of {width} values at each vertex, and has none here",
-                "use a model that was trained without, or give the condition to MeshNCA.evolve in Python",
-            )
 
 
 def grown_state(growth: Growth, seed: int, steps: int) -> torch.Tensor:

@@ -11,8 +11,8 @@ import numpy as np
 from mitex.errors import ConfigError
 from mitex.images import SUFFIXES, read_image
 from mitex.mesh import Mesh
+from mitex.mesh.nearest import surface_points
 from mitex.mesh.readers.ply import read_tables
-from mitex.methods.nca.cells import nearest_points
 from mitex.methods.nca.region import AXES, NUMBER
 from mitex.paths import expanded
 
@@ -113,7 +113,7 @@ def _interpolated(mesh: Mesh, values: np.ndarray, name: str) -> Weights:
     _check(values, name)
 
     def at(points: np.ndarray) -> np.ndarray:
-        face, barycentric = nearest_points(mesh, points)
+        face, barycentric = surface_points(mesh, points)
         return _unit((barycentric * values.astype(np.float64)[mesh.faces[face]]).sum(axis=1))
 
     return at
@@ -128,7 +128,7 @@ def _painted(mesh: Mesh, path: Path) -> Weights:
     image = read_image(path)[:, :, 0].astype(np.float64)
 
     def at(points: np.ndarray) -> np.ndarray:
-        face, barycentric = nearest_points(mesh, points)
+        face, barycentric = surface_points(mesh, points)
         u, v = (barycentric[:, :, None] * uv[face]).sum(axis=1).T
         height, width = image.shape
         return _unit(

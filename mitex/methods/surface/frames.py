@@ -16,6 +16,7 @@ from mitex.errors import ConfigError
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import across, dot, orthonormal, rotate_about, scatter_add, unit, unit_normals
 from mitex.mesh import Mesh
+from mitex.mesh.connection import connection_laplacian, solve, tangent_axes, transport
 from mitex.mesh.topology import mesh_edges, welded
 
 KINDS = ("fixed", "smooth")
@@ -24,7 +25,6 @@ SPARE_UP = np.array([0.0, 0.0, -1.0])  # w', image up where the surface is level
 PARALLEL = 1e-3  # w' where 1 - |cos| of the angle between normal and w is smaller, 2.6 degrees
 FIDELITY = 100.0  # pull to the fixed field against smoothness; directions adapt over 0.13 sqrt(area)
 LEVEL_PULL = 0.05  # how strongly level places are pulled to w', relative to upright ones to w
-FOLD = 1e-6  # 1 + cos between normals: nothing is carried over edges folded onto themselves
 FAINT = 1e-6  # vectors shorter than that have no direction
 
 
@@ -116,42 +116,19 @@ def _smooth(normals: np.ndarray, areas: np.ndarray, edges: np.ndarray, spare: np
         edges: (E, 2) vertex pairs.
         spare: (V, 3) unit, across the normals, taken where the solution vanishes.
     """
+    from scipy.sparse import diags_array
+
     count = len(normals)
-    x = orthonormal(np.zeros_like(normals), normals)
-    y = np.cross(normals, x)
-    weight = FIDELITY * np.maximum(areas / max(areas.sum(), np.finfo(np.float64).tiny), 1e-6 / count)
+    x, y = tangent_axes(normals)
+    pull = FIDELITY * np.maximum(areas / max(areas.sum(), np.finfo(np.float64).tiny), 1e-6 / count)
     upright = np.cross(UP, normals)
     tilt = np.linalg.norm(upright, axis=1, keepdims=True)
     target = upright + LEVEL_PULL * np.maximum(1.0 - 2.0 * tilt, 0.0) * np.cross(SPARE_UP, normals)
     q = dot(target, x) + 1j * dot(target, y)
-    u = _solve(edges, _transport(normals, x, y, edges), weight, q)
+    laplacian = connection_laplacian(edges, transport(normals, x, y, edges), np.ones(len(edges)), count)
+    u = solve((laplacian + diags_array(pull)).tocsc(), pull * q)
     solution = _without_faint(np.real(u)[:, None] * x + np.imag(u)[:, None] * y)
     return np.where(solution.any(axis=1, keepdims=True), orthonormal(solution, normals), spare)
-
-
-def _transport(normals: np.ndarray, x: np.ndarray, y: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """(E,) r_ij: the number that the x axis of j becomes in the plane of i; 0 over folded edges."""
-    i, j = edges.T
-    cos1 = 1.0 + dot(normals[i], normals[j])
-    carried = x[j] - (dot(x[j], normals[i]) / np.maximum(cos1, FOLD))[:, None] * (normals[i] + normals[j])
-    return np.where(cos1 > FOLD, dot(carried, x[i]) + 1j * dot(carried, y[i]), 0.0)
-
-
-def _solve(edges: np.ndarray, transport: np.ndarray, weight: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """(V,) complex solution of (L + W) u = W q with the connection Laplacian L."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.linalg import splu
-
-    edges, transport = edges[transport != 0], transport[transport != 0]
-    i, j = edges.T
-    count = len(weight)
-    diagonal = weight + np.bincount(edges.ravel(), minlength=count)
-    values = np.concatenate([-transport, -transport.conj(), diagonal])
-    rows, columns = np.concatenate([i, j, np.arange(count)]), np.concatenate([j, i, np.arange(count)])
-    matrix = coo_array((values, (rows, columns)), (count, count)).tocsc()
-    # Hermitian and positive definite: no pivoting, and an ordering for symmetric patterns.
-    factors = splu(matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    return factors.solve(weight * q)
 
 
 def _checked(field: np.ndarray, vertices: int) -> np.ndarray:

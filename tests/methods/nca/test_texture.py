@@ -302,7 +302,7 @@ def test_too_many_vertices_are_refused_before_they_are_made(texture, options):
 
 def test_a_model_with_a_condition_says_what_it_needs(sphere):
     """Before any work: 200 million steps would not end."""
-    conditioned = tiny.texture(condition=3)
+    conditioned = tiny.texture(condition=4)
     for use in (conditioned.apply, conditioned.grow):
-        with pytest.raises(ConfigError, match=r"'tiny' needs a condition of 3 values .*; .*MeshNCA\.evolve"):
+        with pytest.raises(ConfigError, match=r"'tiny' needs a condition of 4 values .*; .*MeshNCA\.evolve"):
             use(sphere, steps=200_000_000)
