@@ -9,7 +9,7 @@ import torch
 
 from mitex.errors import ConfigError
 from mitex.mesh import icosphere
-from mitex.methods.nca import Graft, film
+from mitex.methods.nca import Graft, NcaTexture, film
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.weights import graft_weights
 from tests.methods.nca import tiny
@@ -61,7 +61,7 @@ def test_a_damaged_region_is_set_back_at_its_time_and_grows_again(texture):
     inside = torch.from_numpy(SPHERE.vertices[:, 1] > 0)
     for damage in (None, inside):
         shooting = film.Shooting(seconds=1, fps=4, steps_per_frame=3, damage_at=0.5)
-        shot = film._States(texture.growth(cells), shooting, 6, 0, damage)
+        shot = film.States(texture.growth(cells), shooting, 6, 0, damage)
         states[damage is not None] = list(shot.frames(0, 4))
     whole, damaged = states[False], states[True]
     assert all(torch.equal(a, b) for a, b in zip(whole[:2], damaged[:2], strict=True))
@@ -76,7 +76,7 @@ def test_films_of_damage_start_when_the_pattern_is_in_order(texture, tmp_path):
 
 
 def test_it_is_resumed_with_the_same_frames(texture, plain, tmp_path, monkeypatch):
-    picture, count = film._Preview.picture, 0
+    picture, count = film.PreviewCamera.picture, 0
 
     def stopped(camera, grown):
         nonlocal count
@@ -85,7 +85,7 @@ def test_it_is_resumed_with_the_same_frames(texture, plain, tmp_path, monkeypatc
             signal.raise_signal(signal.SIGINT)
         return picture(camera, grown)
 
-    monkeypatch.setattr(film._Preview, "picture", stopped)
+    monkeypatch.setattr(film.PreviewCamera, "picture", stopped)
     with pytest.raises(KeyboardInterrupt, match="after 2 of 4 frames"):
         shoot(texture, tmp_path / "film")
     with pytest.raises(ConfigError, match="had another model and seed"):
@@ -103,9 +103,9 @@ def test_path_traced_frames_show_the_same_states(texture, plain, tmp_path):
 
 def test_a_graft_is_filmed_too(texture, plain, tmp_path):
     other = tiny.texture(MAPS, seed=1, shape=None)
-    for one in (texture, other):
-        one.about["family"] = "one"
-    grafted = Graft(texture, other, graft_weights(SPHERE, 0))
+    pair = (NcaTexture(one.look, {"name": "a relative", "family": "one"}) for one in (texture, other))
+    first, second = pair
+    grafted = Graft(first, second, graft_weights(SPHERE, 0))
     assert np.array_equal(shoot(grafted, tmp_path / "film"), plain)
 
 

@@ -1,5 +1,7 @@
 """Two textures on one mesh: each alone where the weight says so, and the published mixture in between."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 import torch
@@ -16,7 +18,7 @@ from tests.methods.nca import tiny
 SPHERE = icosphere(4)
 CELLS = Cells(SPHERE, 0, SPHERE)
 ALL = ("albedo", "normal", "roughness")
-OPTIONS = {"seed": 3, "steps": 12, "subdivide": 1, "resolution": 64}
+OPTIONS: dict[str, Any] = {"seed": 3, "steps": 12, "subdivide": 1, "resolution": 64}
 
 
 def relative(seed, family="one", maps=ALL, reach=0.3, **options):
@@ -33,7 +35,8 @@ def pair():
 
 
 def graft(pair, source):
-    return Graft(*pair, graft_weights(SPHERE, source))
+    first, second = pair
+    return Graft(first, second, graft_weights(SPHERE, source))
 
 
 @pytest.mark.filterwarnings("ignore::mitex.errors.TextureWarning")

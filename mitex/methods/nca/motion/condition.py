@@ -25,7 +25,7 @@ Field = str | Path | np.ndarray
 
 
 def cell_vectors(
-    given: Mesh, cells: Mesh, field: Field, speed: float, orientation: float = 0.0
+    given: Mesh, cells: Mesh, field: Field, speed: float, orientation: float | np.ndarray = 0.0
 ) -> np.ndarray:
     """(V, 3) float32 vectors of the cells.
 
@@ -34,8 +34,8 @@ def cell_vectors(
         cells: V vertices; the same mesh, or one of nearly the same surface.
         field: see `Field`.
         speed: factor of the field, whose mean length is 1.
-        orientation: of the texture [rad]. Cells take what is turned by it for upright, so their vectors are
-            turned back.
+        orientation: of the texture [rad], one or (V,). Cells take what is turned by it for upright, so their
+            vectors are turned back.
 
     Raises:
         ConfigError: as of `vector_field`.
