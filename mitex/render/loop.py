@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-NEARLY = 0.999  # of the difference of a longer loop, which a shorter one must be below
+BETTER = 1e-4  # by which the difference of a shorter loop must be less
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,6 @@ def best_loop(frames: np.ndarray, fade: int, shortest: int, longest: int) -> Loo
         sums = np.convolve(squares, np.ones(window) / window, mode="valid")
         start = int(sums.argmin())
         difference = float(np.sqrt(max(sums[start], 0.0)))
-        if difference < best.difference * NEARLY:
+        if difference < best.difference - BETTER:
             best = Loop(start, length, fade, difference)
     return best

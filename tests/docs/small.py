@@ -4,7 +4,8 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
 
 - fits: their settings are resolved as they were asked for, which checks them; then they get 2 steps, 3 if the
   run is resumed, and the tiny settings of their method;
-- textures of automata are baked at 64 texels;
+- automata take 10 steps at most, and what they grow is not healed; textures are baked at 64 texels;
+- films have 4 frames of 32 pixels;
 - pictures are traced with one path a pixel.
 """
 
@@ -24,6 +25,7 @@ from tests.cli.test_nerf import icosphere, save
 
 STEPS, RESUMED_STEPS = 2, 3
 TEXELS = 64
+GROWTH_STEPS = 10
 EVERY_FIT = {"checkpoint_every": 1, "preview_every": 0}
 TINY: dict[str, dict[str, Any]] = {
     # Nothing of the architecture, which must be that of the model after `--init`.
@@ -41,12 +43,16 @@ def prepare(folder: Path) -> None:
 
 def shrink(patch: pytest.MonkeyPatch) -> None:
     """Makes the work small until the patch is undone."""
-    from mitex.methods.nca import NcaTexture
+    from mitex.methods.nca import NcaTexture, film, texture
     from mitex.render import renderer, shell
     from mitex.training import fit
 
     patch.setattr(fit, "resolve", _with_few_steps(fit.resolve))
-    patch.setattr(NcaTexture, "apply", _with_few_texels(NcaTexture.apply))
+    patch.setattr(texture, "grown_state", _with_few_growth_steps(texture.grown_state))
+    patch.setattr(texture, "healed", lambda growth, state, generator: state)
+    for module in (film, texture):
+        patch.setattr(module, "film", _with_few_frames(film.film))
+    patch.setattr(texture.GrowingTexture, "apply", _with_few_texels(texture.GrowingTexture.apply))
     patch.setattr(NcaTexture, "tile", _with_few_texels(NcaTexture.tile))
     sketch = _with_one_path(renderer.accumulated)
     patch.setattr(renderer, "accumulated", sketch)
@@ -61,6 +67,22 @@ def _with_few_steps(resolve: Callable[..., Any]) -> Callable[..., Any]:
         name = next(name for name, method in methods().items() if method.load_presets() is presets)
         steps = STEPS if file is None or file.name != CONFIG else RESUMED_STEPS
         return replace(config, steps=steps, **EVERY_FIT, **TINY.get(name, {}))
+
+    return small
+
+
+def _with_few_growth_steps(grown_state: Callable[..., Any]) -> Callable[..., Any]:
+    def small(growth: Any, seed: int, steps: int) -> Any:
+        return grown_state(growth, seed, min(steps, GROWTH_STEPS))
+
+    return small
+
+
+def _with_few_frames(film: Callable[..., Any]) -> Callable[..., Any]:
+    def small(texture: Any, mesh: Any, path: Any, shooting: Any, **options: Any) -> Any:
+        loop = None if shooting.loop is None else 1
+        short = replace(shooting, seconds=4 / shooting.fps, resolution=32, start=2, loop=loop, damage_at=0.0)
+        return film(texture, mesh, path, short, **options)
 
     return small
 

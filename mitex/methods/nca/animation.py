@@ -9,7 +9,7 @@ from tyro.conf import Positional, arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range
-from mitex.methods.nca.cli import field_files, levels
+from mitex.methods.nca.cli import field_files, levels, oriented
 from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS
 
 FADE = 12  # frames over which a loop fades
@@ -90,8 +90,8 @@ class Animate:
     subdivide: Annotated[str, arg(metavar="auto|N")] = "auto"
     """How often to subdivide the automaton's copy of the mesh; auto: to the training's density."""
 
-    orientation: Annotated[float, arg(metavar="DEG")] = 0.0
-    """Turns the texture on the surface [degrees]."""
+    orientation: Annotated[str, arg(metavar="DEG|FIELD")] = "0"
+    """Turns the texture on the surface [degrees], or lets its up follow a vector field (as of --field)."""
 
     scale: Annotated[float, arg(metavar="X")] = 1.0
     """Size of the pattern."""
@@ -120,7 +120,10 @@ class Animate:
         shooting = Shooting(**self._shooting())
         target = shooting.recording(self.out, {}).target
         if target.suffix.lower() in VIDEOS:
-            prepare_output(target, inputs=[self.model, *mesh_files(self.mesh), *field_files(self.field)])
+            prepare_output(
+                target,
+                inputs=[self.model, *mesh_files(self.mesh), *field_files(self.field, self.orientation)],
+            )
         from mitex.mesh import Mesh
         from mitex.methods.nca import NcaTexture
         from mitex.methods.nca.film import film
@@ -133,7 +136,7 @@ class Animate:
             resume=self.resume,
             seed=self.seed,
             subdivide=levels(self.subdivide),
-            orientation=self.orientation,
+            orientation=oriented(self.orientation),
             scale=self.scale,
             field=self.field,
             speed=self.speed,
@@ -152,7 +155,7 @@ class Animate:
         in_range("--elevation", self.elevation, -85.0 if self.renderer == "preview" else 0.0, 85.0)
         in_range("--damage-at", self.damage_at, 0.0, 3600.0)
         in_range("--seed", self.seed, *SEEDS)
-        in_range("--orientation", self.orientation, -360.0, 360.0)
+        oriented(self.orientation)
         in_range("--scale", self.scale, 0.05, 20.0)
         in_range("--speed", self.speed, *SPEEDS)
         for option, needed, given in (

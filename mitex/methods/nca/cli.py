@@ -91,8 +91,8 @@ class Apply(OptionalMeshOptions):
     subdivide: Annotated[str, arg(metavar="auto|N")] = "auto"
     """How often to subdivide the automaton's copy of the mesh; auto: to the training's density."""
 
-    orientation: Annotated[float, arg(metavar="DEG")] = 0.0
-    """Turns the texture on the surface [degrees]."""
+    orientation: Annotated[str, arg(metavar="DEG|FIELD")] = "0"
+    """Turns the texture on the surface [degrees], or lets its up follow a vector field (as of --field)."""
 
     scale: Annotated[float, arg(metavar="X")] = 1.0
     """Size of the pattern."""
@@ -129,7 +129,7 @@ class Apply(OptionalMeshOptions):
         in_range("--seed", self.seed, *SEEDS)
         in_range("--seed", self.seed + self.variants - 1, *SEEDS)
         in_range("--steps", self.steps, 1, MOST_STEPS)
-        in_range("--orientation", self.orientation, -360.0, 360.0)
+        oriented(self.orientation)
         in_range("--scale", self.scale, 0.05, 20.0)
         in_range("--speed", self.speed, *SPEEDS)
         in_range("--resolution", self.resolution, 64, 8192)
@@ -151,7 +151,7 @@ class Apply(OptionalMeshOptions):
         others = {
             "--mesh": self.mesh is not None,
             "--subdivide": self.subdivide != "auto",
-            "--orientation": self.orientation != 0,
+            "--orientation": oriented(self.orientation) != 0,
             "--scale": self.scale != 1,
             "--resolution": self.resolution is not None,
             "--vertex-colors": self.vertex_colors,
@@ -164,7 +164,7 @@ class Apply(OptionalMeshOptions):
         reject_unused("--tile", place, place.suffix.lower() in EXPORTS + PICTURES)
 
     def inputs(self) -> list[Path | str]:
-        return [*super().inputs(), *field_files(self.field)]
+        return [*super().inputs(), *field_files(self.field, self.orientation)]
 
     def prepared(self) -> Path:
         if self.tile is None:
@@ -222,7 +222,7 @@ class Apply(OptionalMeshOptions):
         return {
             "steps": self.steps,
             "subdivide": levels(self.subdivide),
-            "orientation": self.orientation,
+            "orientation": oriented(self.orientation),
             "scale": self.scale,
             "resolution": (self.resolution or RESOLUTION) if textures else None,
             "keep_dense": self.keep_dense,
@@ -231,9 +231,23 @@ class Apply(OptionalMeshOptions):
         }
 
 
-def field_files(field: str | None) -> list[str]:
-    """The file that --field names, if it does."""
-    return [field] if field is not None and Path(field).suffix.lower() in FIELD_FILES else []
+def field_files(*fields: str | None) -> list[str]:
+    """The files that --field and --orientation name, if they do."""
+    return [field for field in fields if field and Path(field).suffix.lower() in FIELD_FILES]
+
+
+def oriented(orientation: str) -> float | str:
+    """What --orientation means: an angle [degrees], or a vector field.
+
+    Raises:
+        ConfigError: an angle out of range.
+    """
+    try:
+        angle = float(orientation)
+    except ValueError:
+        return orientation
+    in_range("--orientation", angle, -360.0, 360.0)
+    return angle
 
 
 def levels(subdivide: str) -> int | str:

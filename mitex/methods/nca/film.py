@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
@@ -24,6 +23,7 @@ from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.growth import Growth
 from mitex.methods.nca.motion.condition import Field
+from mitex.methods.nca.orientation import Orientation, cell_turns
 from mitex.methods.nca.ranges import MOST_STEPS
 from mitex.methods.nca.region import region
 from mitex.progress import announce
@@ -114,7 +114,7 @@ def film(
     resume: bool = False,
     seed: int = 0,
     subdivide: int | str = "auto",
-    orientation: float = 0.0,
+    orientation: Orientation = 0.0,
     scale: float = 1.0,
     field: Field | None = None,
     speed: float = 1.0,
@@ -123,7 +123,8 @@ def film(
     shooting.recording(path, {})
     laid = mesh if shooting.renderer == "preview" else laid_out(mesh, shooting.texels)
     announce("preparing the mesh")
-    cells, turn = Cells.of(laid, subdivide, scale), math.radians(orientation)
+    cells = Cells.of(laid, subdivide, scale)
+    turn = cell_turns(orientation, cells.mesh, mesh)
     condition = texture.condition(cells, field, speed, turn, mesh)
     growth = texture.growth(cells, turn, condition)
     start = shooting.start
@@ -135,13 +136,18 @@ def film(
         if not damage.any():
             raise ConfigError(f"nothing of '{mesh.name}' is in '{shooting.damage}'", "choose another region")
     scene = {"mesh": content_key(laid.vertices, laid.faces), "model": growth.key, "seed": seed}
-    scene |= {"subdivide": subdivide, "orientation": orientation, "scale": scale, "start": start}
+    scene |= {
+        "subdivide": subdivide,
+        "orientation": content_key(np.asarray(turn)),
+        "scale": scale,
+        "start": start,
+    }
     scene |= {} if condition is None else {"condition": content_key(condition.numpy())}
     settings = {name: value for name, value in asdict(shooting).items() if name not in OF_THE_FILM}
     recording = shooting.recording(path, scene | settings)
     keep_freed_memory()
-    camera: Camera = (_Preview if shooting.renderer == "preview" else _Traced)(laid, shooting)
-    states = _States(growth, shooting, start, seed, damage)
+    camera: Camera = (PreviewCamera if shooting.renderer == "preview" else TracedCamera)(laid, shooting)
+    states = States(growth, shooting, start, seed, damage)
 
     def pictures(done: int) -> Iterator[np.ndarray]:
         return map(camera.picture, map(growth.shown, states.frames(done, recording.pictures)))
@@ -150,7 +156,7 @@ def film(
 
 
 @dataclass(frozen=True, eq=False)
-class _States:
+class States:
     """The states of a film's frames.
 
     Attributes:
@@ -200,7 +206,9 @@ class Camera(Protocol):
         ...
 
 
-class _Preview:
+class PreviewCamera:
+    """Direct light, in a fraction of a second a picture."""
+
     def __init__(self, mesh: Mesh, shooting: Shooting) -> None:
         self._renderer = PreviewRenderer(
             mesh,
@@ -222,7 +230,9 @@ class _Preview:
         return self._renderer.render(albedo, normals, maps.get("ambient_occlusion", 1.0))
 
 
-class _Traced:
+class TracedCamera:
+    """The path tracer, with textures baked for each picture."""
+
     def __init__(self, mesh: Mesh, shooting: Shooting) -> None:
         self._shooting = shooting
         self._atlas = Atlas.build(mesh, shooting.texels, PADDING, mesh.uv)

@@ -23,6 +23,7 @@ from mitex.methods.nca.growth import Growth, LookGrowth
 from mitex.methods.nca.look import held, traits
 from mitex.methods.nca.model import FIRE_RATE
 from mitex.methods.nca.motion.condition import Field
+from mitex.methods.nca.orientation import Turn
 from mitex.methods.nca.texture import GrowingTexture, NcaTexture
 from mitex.methods.nca.weights import Weights
 from mitex.progress import announce
@@ -66,12 +67,12 @@ class Graft(GrowingTexture):
         cells: Cells,
         field: Field | None,
         speed: float,
-        orientation: float = 0.0,
+        orientation: Turn = 0.0,
         given: Mesh | None = None,
     ) -> torch.Tensor | None:
         return self.first.condition(cells, field, speed, orientation, given)
 
-    def growth(self, cells: Cells, orientation: float = 0.0, condition: torch.Tensor | None = None) -> Growth:
+    def growth(self, cells: Cells, orientation: Turn = 0.0, condition: torch.Tensor | None = None) -> Growth:
         first, second = (
             texture.growth(cells, orientation, condition) for texture in (self.first, self.second)
         )

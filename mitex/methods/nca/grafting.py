@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
+from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
-from mitex.methods.nca.cli import RESOLUTION, levels
+from mitex.methods.nca import METHOD
+from mitex.methods.nca.cli import RESOLUTION, field_files, levels, oriented
 from mitex.methods.nca.ranges import MOST_STEPS
 from mitex.methods.options import PICTURES, MeshOptions
+from mitex.methods.registry import method_of
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
@@ -47,8 +50,9 @@ class Grafted(MeshOptions):
     subdivide: Annotated[str, arg(metavar="auto|N")] = "auto"
     """How often to subdivide the automaton's copy of the mesh; auto: to the training's density."""
 
-    orientation: Annotated[float, arg(metavar="DEG")] = 0.0
-    """Turns the textures on the surface [degrees]."""
+    orientation: Annotated[str, arg(metavar="DEG|FIELD")] = "0"
+    """Turns the textures on the surface [degrees], or lets their up follow a vector field: a name (up, right,
+    about-y, ...), a direction, or a file (.npy .ply .json)."""
 
     scale: Annotated[float, arg(metavar="X")] = 1.0
     """Size of the patterns."""
@@ -63,7 +67,7 @@ class Grafted(MeshOptions):
         levels(self.subdivide)
         in_range("--seed", self.seed, *SEEDS)
         in_range("--steps", self.steps, 1, MOST_STEPS)
-        in_range("--orientation", self.orientation, -360.0, 360.0)
+        oriented(self.orientation)
         in_range("--scale", self.scale, 0.05, 20.0)
         in_range("--resolution", self.resolution, 64, 8192)
         mutually_exclusive(
@@ -71,7 +75,7 @@ class Grafted(MeshOptions):
         )
 
     def inputs(self) -> list:
-        return [*super().inputs(), self.second, self.weights]
+        return [*super().inputs(), self.second, self.weights, *field_files(self.orientation)]
 
     def check_output(self, out) -> None:
         suffix = out.suffix.lower()
@@ -88,6 +92,9 @@ class Grafted(MeshOptions):
         from mitex.methods.nca import Graft, NcaTexture
         from mitex.methods.nca.weights import graft_weights
 
+        for model in (self.model, self.second):
+            if (method := method_of(model)) is not METHOD:
+                raise ConfigError(f"'{model}' is a {method.name} texture", f"graft {METHOD.name} textures")
         mesh = Mesh.load(self.mesh)
         first, second = NcaTexture.load(self.model), NcaTexture.load(self.second)
         textures = out.suffix.lower() != ".ply" and not self.vertex_colors
@@ -96,7 +103,7 @@ class Grafted(MeshOptions):
             seed=self.seed,
             steps=self.steps,
             subdivide=levels(self.subdivide),
-            orientation=self.orientation,
+            orientation=oriented(self.orientation),
             scale=self.scale,
             resolution=(self.resolution or RESOLUTION) if textures else None,
         )

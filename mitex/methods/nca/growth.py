@@ -12,6 +12,7 @@ from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.surface import Surface
 from mitex.methods.nca.look import Look, weights_key
+from mitex.methods.nca.orientation import Turn
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import Perception, perception
 
@@ -53,7 +54,7 @@ class LookGrowth(Growth):
     Args:
         look: the cell rule and its decoder.
         cells: the mesh.
-        orientation: of the texture [rad].
+        orientation: of the texture.
         palette: the exemplar's colours; None if they are not known.
         operator: perception of the cells, if it is not simply that of their mesh.
         condition: of the cells, (V, 3), of a look that moves.
@@ -63,7 +64,7 @@ class LookGrowth(Growth):
         self,
         look: Look,
         cells: Cells,
-        orientation: float = 0.0,
+        orientation: Turn = 0.0,
         palette: Palette | None = None,
         operator: Perception | None = None,
         condition: torch.Tensor | None = None,

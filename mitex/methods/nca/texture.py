@@ -25,6 +25,7 @@ from mitex.methods.nca.growth import Growth, LookGrowth
 from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.motion.condition import Field, cell_vectors, flat_vectors, followed_field
+from mitex.methods.nca.orientation import Orientation, Turn, cell_turns
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import lattice_perception
 from mitex.methods.nca.ranges import MOST_STEPS, square_cells
@@ -56,7 +57,7 @@ class GrowingTexture(ABC):
         cells: Cells,
         field: Field | None = None,
         speed: float = 1.0,
-        orientation: float = 0.0,
+        orientation: Turn = 0.0,
         given: Mesh | None = None,
     ) -> torch.Tensor | None:
         """What the cells are told of a vector field, (V, 3); None for a texture that does not move.
@@ -65,7 +66,7 @@ class GrowingTexture(ABC):
             cells: the automaton's mesh.
             field: see `mitex.mesh.fields`; None for the one that the texture was trained with.
             speed: factor of the field, whose mean length is 1.
-            orientation: of the texture [rad].
+            orientation: of the texture.
             given: whose vertices the vectors of a file or an array belong to; None for `cells.given`.
 
         Raises:
@@ -73,8 +74,8 @@ class GrowingTexture(ABC):
         """
 
     @abstractmethod
-    def growth(self, cells: Cells, orientation: float = 0.0, condition: torch.Tensor | None = None) -> Growth:
-        """The automaton on a mesh, its texture turned by an angle [rad]; with the cells' `condition`."""
+    def growth(self, cells: Cells, orientation: Turn = 0.0, condition: torch.Tensor | None = None) -> Growth:
+        """The automaton on a mesh, its texture turned; with the cells' `condition`."""
 
     def apply(
         self,
@@ -83,7 +84,7 @@ class GrowingTexture(ABC):
         seed: int = 0,
         steps: int | None = None,
         subdivide: int | str = "auto",
-        orientation: float = 0.0,
+        orientation: Orientation = 0.0,
         scale: float = 1.0,
         resolution: int | None = 1024,
         keep_dense: bool = False,
@@ -100,7 +101,8 @@ class GrowingTexture(ABC):
             seed: of the random updates.
             steps: of the automaton; None for as many as the model's pattern needs to be in order.
             subdivide: levels of subdivision, or "auto": as many as bring the copy to 8,000 vertices.
-            orientation: turns the texture about the normals, counter-clockwise [degrees].
+            orientation: turns the texture about the normals, counter-clockwise [degrees]; or a vector field
+                that its up follows, see `mitex.mesh.fields`.
             scale: size of the pattern, 1 for what the density gives; others need a remeshing of the copy to
                 the fitting density (extra `remesh`).
             resolution: of the baked textures [texels], on the mesh's own UVs if nothing in them overlaps,
@@ -121,7 +123,7 @@ class GrowingTexture(ABC):
         laid = mesh if resolution is None or (keep_dense and scale != 1.0) else laid_out(mesh, resolution)
         announce("preparing the mesh")
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
-        turn = math.radians(orientation)
+        turn = cell_turns(orientation, cells.mesh, mesh)
         growth = self.growth(cells, turn, self.condition(cells, field, speed, turn, mesh))
         grown = growth.shown(_healthy(growth, seed, self.steps if steps is None else steps))
         asset = grown.asset()
@@ -137,7 +139,7 @@ class GrowingTexture(ABC):
         *,
         seed: int = 0,
         subdivide: int | str = "auto",
-        orientation: float = 0.0,
+        orientation: Orientation = 0.0,
         scale: float = 1.0,
         field: Field | None = None,
         speed: float = 1.0,
@@ -208,7 +210,7 @@ class NcaTexture(GrowingTexture):
         *,
         seed: int = 0,
         steps: int | None = None,
-        orientation: float = 0.0,
+        orientation: Orientation = 0.0,
         field: Field | None = None,
         speed: float = 1.0,
     ) -> dict[str, dict[str, Any]]:
@@ -262,7 +264,7 @@ class NcaTexture(GrowingTexture):
         *,
         seed: int = 0,
         steps: int | None = None,
-        orientation: float = 0.0,
+        orientation: Orientation = 0.0,
         field: Field | None = None,
         speed: float = 1.0,
     ) -> torch.Tensor:
@@ -288,7 +290,7 @@ class NcaTexture(GrowingTexture):
         cells: Cells,
         field: Field | None = None,
         speed: float = 1.0,
-        orientation: float = 0.0,
+        orientation: Turn = 0.0,
         given: Mesh | None = None,
     ) -> torch.Tensor | None:
         field = followed_field(self.look, self.about, field, speed, self.about.get("motion"))
@@ -298,13 +300,13 @@ class NcaTexture(GrowingTexture):
         return torch.from_numpy(vectors)
 
     def growth(
-        self, cells: Cells, orientation: float = 0.0, condition: torch.Tensor | None = None
+        self, cells: Cells, orientation: Turn = 0.0, condition: torch.Tensor | None = None
     ) -> LookGrowth:
         return LookGrowth(self.look, cells, orientation, self._palette, condition=condition)
 
-    def _on(self, mesh: Mesh, orientation: float, field: Field | None, speed: float) -> LookGrowth:
+    def _on(self, mesh: Mesh, orientation: Orientation, field: Field | None, speed: float) -> LookGrowth:
         """What grows on the vertices of a mesh, turned by an angle [degrees]."""
-        cells, turn = Cells(mesh, 0, mesh), math.radians(orientation)
+        cells, turn = Cells(mesh, 0, mesh), cell_turns(orientation, mesh, mesh)
         return self.growth(cells, turn, self.condition(cells, field, speed, turn))
 
     @property

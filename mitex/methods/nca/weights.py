@@ -96,13 +96,13 @@ def _from_file(mesh: Mesh, path: Path, text: str) -> Weights:
 
 
 def _property(path: Path, text: str) -> np.ndarray:
-    """(V,) of a PLY file's vertices; colours of eight bits are of 255."""
+    """(V,) of a PLY file's vertices; colours may be of 255."""
     table = read_tables(text, path.read_bytes(), max_vertices=1 << 31)[0].get("vertex", {})
     name = next((name for name in PROPERTIES if name in table), None)
     if name is None:
         raise ConfigError(f"the vertices in '{text}' have no weights", f"use {' or '.join(PROPERTIES)}")
     values = np.asarray(table[name])
-    return values / 255 if values.dtype == np.uint8 else values
+    return values / 255 if name == "red" and values.max(initial=0) > 1 else values
 
 
 def _interpolated(mesh: Mesh, values: np.ndarray, name: str) -> Weights:

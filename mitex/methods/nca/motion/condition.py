@@ -32,7 +32,7 @@ def cell_vectors(
     cells: Mesh,
     field: Field,
     speed: float,
-    orientation: float = 0.0,
+    orientation: float | np.ndarray = 0.0,
     fastest: float = math.inf,
 ) -> np.ndarray:
     """(V, 3) float32 vectors of the cells.
@@ -42,8 +42,8 @@ def cell_vectors(
         cells: V vertices; the same mesh, or one of nearly the same surface.
         field: see `Field`.
         speed: factor of the field, whose mean length is 1.
-        orientation: of the texture [rad]. Cells take what is turned by it for upright, so their vectors are
-            turned back.
+        orientation: of the texture [rad], one or (V,). Cells take what is turned by it for upright, so their
+            vectors are turned back.
         fastest: length of the longest vectors, see `slowed`.
 
     Raises:
