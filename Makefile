@@ -40,6 +40,7 @@ bench: $(STAMP)
 	OMP_WAIT_POLICY=PASSIVE $(VENV)/bin/python -m benchmarks.nca_decoder
 	$(VENV)/bin/python -m benchmarks.surface
 	$(VENV)/bin/python -m benchmarks.geometric
+	$(VENV)/bin/python -m benchmarks.flow
 	OMP_WAIT_POLICY=PASSIVE $(VENV)/bin/python -m benchmarks.nerf
 
 clean:
