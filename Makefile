@@ -41,6 +41,7 @@ bench: $(STAMP)
 	OMP_WAIT_POLICY=PASSIVE $(VENV)/bin/python -m benchmarks.nca_motion
 	$(VENV)/bin/python -m benchmarks.surface
 	$(VENV)/bin/python -m benchmarks.geometric
+	$(VENV)/bin/python -m benchmarks.flow
 	OMP_WAIT_POLICY=PASSIVE $(VENV)/bin/python -m benchmarks.nerf
 
 clean:
