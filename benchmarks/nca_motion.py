@@ -26,7 +26,7 @@ from mitex.methods.nca.motion.task import MotionTask
 from mitex.runtime import let_idle_threads_sleep
 
 MODEL = "lava"
-ESTIMATORS = ("advection", "lucas-kanade")
+ESTIMATORS = ("advection", "lucas-kanade", "flow")
 
 
 class Motion:
@@ -81,8 +81,9 @@ def main() -> None:
     options = parser.parse_args()
     let_idle_threads_sleep()
     motion, repetitions = Motion(options.quick), 1 if options.quick else 3
+    steps, cells = motion.task.config.min_steps, motion.surface.perception.vertices
     parts: dict[str, Callable[[], object]] = {
-        f"automaton, {motion.task.config.min_steps} steps, {motion.surface.perception.vertices:,} cells": motion.rollout,
+        f"automaton, {steps} steps, {cells:,} cells": motion.rollout,
         "a field, turned at random": motion.draw,
     }
     parts |= {f"motion by {name}": lambda name=name: motion.loss(name) for name in ESTIMATORS}

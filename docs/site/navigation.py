@@ -12,7 +12,7 @@ GROUPS = {
     "Guides": [
         *(
             f"docs/{name}"
-            for name in ("moving", "blender", "plugins", "embedding", "settings", "runs", "times")
+            for name in ("moving", "flow", "blender", "plugins", "embedding", "settings", "runs", "times")
         ),
         "docs/*",
     ],

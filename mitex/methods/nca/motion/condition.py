@@ -104,12 +104,14 @@ def followed_field(
     if not SPEEDS[0] <= speed <= SPEEDS[1]:
         raise ConfigError(f"a speed of {speed:g}", f"use {SPEEDS[0]:g} to {SPEEDS[1]:g}")
     if not width:
-        if field is not None or speed != 1.0:
-            raise ConfigError(
-                f"'{name}' does not move: it was trained without a vector field",
-                "train one from it: fit nca with `motion` and `init`",
-            )
-        return None
+        if field is None and speed == 1.0:
+            return None
+        if "motion" in about:
+            raise ConfigError(f"'{name}' moves in its own way alone", "train one with motion_encoding=true")
+        raise ConfigError(
+            f"'{name}' does not move: it was trained without a vector field",
+            "train one from it: fit nca with `motion` and `init`",
+        )
     field = default if field is None else field
     if width != WIDTH or field is None:
         raise ConfigError(

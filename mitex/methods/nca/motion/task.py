@@ -32,7 +32,7 @@ class MotionTask(NcaTask):
         lineage: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__(config, exemplar, init, lineage)
-        self.estimator = load_estimator(config.motion_estimator)
+        self.estimator = load_estimator(config.motion_estimator, self.look.device)
 
     def rollout(
         self,

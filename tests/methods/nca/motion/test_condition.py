@@ -95,6 +95,14 @@ def test_a_texture_that_does_not_move_says_so(still, sphere, use, option):
         getattr(still, use)(*arguments, steps=200_000_000, **option)
 
 
+def test_a_texture_whose_cells_know_no_field(still, sphere):
+    """The paper's ablation moves, but cannot be told where."""
+    fixed = NcaTexture(still.look, {"name": "fixed", "motion": "up"})
+    assert fixed.grow(sphere, steps=2).any()
+    with pytest.raises(ConfigError, match="'fixed' moves in its own way alone"):
+        fixed.grow(sphere, steps=2, field="down")
+
+
 @pytest.mark.parametrize(
     ("option", "problem"),
     [

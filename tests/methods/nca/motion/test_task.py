@@ -104,7 +104,7 @@ def test_estimators_of_pictures_see_the_last_states(exemplar, monkeypatch):
         assert first.shape == second.shape == (4, 1, 32, 32) and second.requires_grad
         return (second - first).expand(-1, 2, -1, -1)
 
-    monkeypatch.setattr(training, "load_estimator", {"lucas-kanade": estimator}.__getitem__)
+    monkeypatch.setattr(training, "load_estimator", lambda name, device: {"lucas-kanade": estimator}[name])
     for surface in ("even", "flat"):
         settings = (*MOVING, f"surfaces={surface}", "motion_estimator=lucas-kanade", "density=8")
         values = []
