@@ -117,8 +117,11 @@ def _densities() -> Labelled:
 
 def _orientations() -> Labelled:
     texture = NcaTexture.load("planks")
-    angles = (0.0, 45.0, 90.0, "about-x", "1,1,0")
-    return [(f"--orientation {a}", _grown(texture, SPHERE, 200, orientation=a)) for a in angles]
+    rows = []
+    for turn in (0, 45, 90, "1,1,0", "about-x"):
+        azimuth = 90.0 if turn == "about-x" else 25.0  # a field around the axis is seen from its end
+        rows.append((f"--orientation {turn}", _grown(texture, SPHERE, 200, azimuth, orientation=turn)))
+    return rows
 
 
 def _growth() -> Labelled:

@@ -10,10 +10,8 @@ GROUPS = {
     "Tutorials": ["docs/tutorials/texture-a-mesh", "docs/tutorials/*"],
     "Methods": ["docs/nca", "docs/surface", "docs/geometric", "docs/nerf"],
     "Guides": [
-        *(
-            f"docs/{name}"
-            for name in ("moving", "flow", "blender", "plugins", "embedding", "settings", "runs", "times")
-        ),
+        "docs/moving",
+        *(f"docs/{name}" for name in ("blender", "plugins", "embedding", "settings", "runs", "times")),
         "docs/*",
     ],
     "Reference": ["docs/reference/mitex", "docs/reference/*"],

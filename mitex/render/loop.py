@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+SAMPLE = 16  # frames whose mean stands for all
 BETTER = 1e-4  # by which the difference of a shorter loop must be less
 
 
@@ -27,18 +28,29 @@ class Loop:
     difference: float
 
     def pictures(self, read: Callable[[int], np.ndarray]) -> Iterator[np.ndarray]:
-        """The frames of the loop, given those of the film: frame -> (H, W, 3).
+        """The frames of the loop, given those of the film: frame -> (H, W, 3) in [0, 1].
 
-        Frame t of the first `fade` is (1 - w) F(start + length + t) + w F(start + t), where
-        w = (t + 1) / (fade + 1): the first one nearly follows the last.
+        Frame t of the first `fade` is F(start + length + t) faded into F(start + t) with the weight
+        w = (t + 1) / (fade + 1), so that the first one nearly follows the last.
         """
+        sample = np.linspace(self.start, self.start + self.length - 1, SAMPLE).round().astype(int)
+        mean = np.mean([read(int(k)) for k in sample], axis=0) if self.fade else None
         for t in range(self.length):
             picture = read(self.start + t)
             if t < self.fade:
-                weight = np.float32((t + 1) / (self.fade + 1))
-                after = read(self.start + self.length + t)
-                picture = after + weight * (picture - after)
-            yield picture
+                after, weight = read(self.start + self.length + t), (t + 1) / (self.fade + 1)
+                picture = mean + _faded(after - mean, picture - mean, weight)
+            yield np.clip(picture, 0.0, 1.0)
+
+
+def _faded(first: np.ndarray, second: np.ndarray, weight: float) -> np.ndarray:
+    """(1 - w) a + w b, divided by what that takes from the contrast of unlike pictures (Heitz and Neyret
+    2018): sqrt((1 - w)^2 + w^2 + 2 w (1 - w) r), where r is their correlation.
+    """
+    scale = float(np.linalg.norm(first) * np.linalg.norm(second))
+    correlation = max(float((first * second).sum()) / scale, 0.0) if scale else 1.0
+    contrast = (1 - weight) ** 2 + weight**2 + 2 * weight * (1 - weight) * correlation
+    return ((1 - weight) * first + weight * second) / np.sqrt(contrast)
 
 
 def best_loop(frames: np.ndarray, fade: int, shortest: int, longest: int) -> Loop:
