@@ -78,9 +78,10 @@ class FlowNetwork(nn.Module):
         pyramid = [pair]
         for _ in range(LEVELS - 1):
             pyramid.append(halved(pyramid[-1]))
+        levels = [normalised_contrast(level) for level in reversed(pyramid)]
         motion, features = None, None
-        for level in (*reversed(pyramid), pair):
-            motion, features = self._pass(normalised_contrast(level), motion, features)
+        for level in (*levels, levels[-1]):
+            motion, features = self._pass(level, motion, features)
             yield motion
 
     def _pass(
