@@ -79,9 +79,10 @@ def fit(
         surface = with_layout(
             mesh if isinstance(mesh, Mesh) else Mesh.load(mesh), settings, keep_uvs or image
         )
-        field = orientation
         if isinstance(orientation, str | Path):
             field = read_vectors(surface, orientation).astype(np.float32)
+        else:
+            field = orientation
         domain = SurfaceDomain.of(surface, settings, field, keep=run.folder is not None)
     run.control.check()
     check_memory(domain.mesh, settings, len(target.maps))
