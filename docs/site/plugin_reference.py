@@ -39,7 +39,7 @@ class PluginParameters(ListTable):
         for row in [HEADER, *parameters("\n".join(self.content))]:
             lines += ["*"] + [f"  - {cell}" for cell in row]
         self.content = StringList(lines, self.name)
-        self.options |= {"header-rows": 1, "widths": [16, 12, 54, 18]}
+        self.options |= {"header-rows": 1, "widths": [16, 12, 54, 18], "class": ["parameters"]}
         return list(super().run())
 
 
