@@ -32,7 +32,7 @@ class Reader(mi.Properties):
         return super().__getitem__(key)
 
     def __contains__(self, key: object) -> bool:
-        self.defaults[str(key)] = None
+        self.defaults.setdefault(str(key), None)
         return super().__contains__(key)  # pyright: ignore[reportArgumentType]
 
     def get(self, key: str, default: Any = None) -> Any:
