@@ -29,14 +29,19 @@ MOVES = {
 }
 
 
-@pytest.mark.parametrize("name", MOVES)
-def test_derivatives_by_finite_differences(renderer, name):
-    start = torch.from_numpy(icosphere(8).vertices)
-    way, step = MOVES[name](start), 0.03
-    vertices = start.clone().requires_grad_()
+@pytest.fixture(scope="module")
+def gradient(renderer) -> torch.Tensor:
+    vertices = torch.from_numpy(icosphere(8).vertices).requires_grad_()
     weighted(renderer.render(vertices, seed=3)).backward()
     assert vertices.grad is not None
-    derivative = float((vertices.grad * way).sum())
+    return vertices.grad
+
+
+@pytest.mark.parametrize("name", MOVES)
+def test_derivatives_by_finite_differences(renderer, gradient, name):
+    start = torch.from_numpy(icosphere(8).vertices)
+    way, step = MOVES[name](start), 0.03
+    derivative = float((gradient * way).sum())
     values = [float(weighted(renderer.render(start + sign * step * way, seed=3))) for sign in (1, -1)]
     expected = (values[0] - values[1]) / (2 * step)
     assert abs(expected) > 5e-3
