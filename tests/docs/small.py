@@ -6,7 +6,7 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
   run is resumed, and the tiny settings of their method;
 - meshes that ship with Mitex are balls of 362 vertices, under their names;
 - automata grow for 2 steps on the mesh as it is, and are baked at 64 texels;
-- pictures are traced with one path a pixel.
+- pictures are traced in 16 x 16 pixels with one path each, and enlarged.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from tests.cli.test_nerf import save
 STEPS, RESUMED_STEPS = 2, 3
 GROWTH = 2  # steps of an automaton
 TEXELS = 64
+SIDE = 16  # of a picture [pixels]
 EVERY_FIT = {"checkpoint_every": 1, "preview_every": 0}
 TINY: dict[str, dict[str, Any]] = {
     # Nothing of the architecture, which must be that of the model after `--init`.
@@ -52,9 +53,10 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("mitex.mesh.load.embedded", lambda name: replace(icosphere(6), name=embedded(name).name))
     patch.setattr(NcaTexture, "apply", _small_growth(NcaTexture.apply))
     patch.setattr(NcaTexture, "tile", _small_tile(NcaTexture.tile))
-    sketch = _with_one_path(renderer.accumulated)
-    patch.setattr(renderer, "accumulated", sketch)
-    patch.setattr(shell, "accumulated", sketch)
+    sketch, sensor = _with_few_paths(renderer.accumulated), renderer.sensor
+    for module in (renderer, shell):
+        patch.setattr(module, "accumulated", sketch)
+        patch.setattr(module, "sensor", lambda resolution: sensor(SIDE))
 
 
 def _with_few_steps(resolve: Callable[..., Any]) -> Callable[..., Any]:
@@ -84,8 +86,9 @@ def _small_tile(tile: Callable[..., Any]) -> Callable[..., Any]:
     return small
 
 
-def _with_one_path(accumulated: Callable[..., np.ndarray]) -> Callable[..., np.ndarray]:
+def _with_few_paths(accumulated: Callable[..., np.ndarray]) -> Callable[..., np.ndarray]:
     def small(scene: Any, resolution: int, spp: int, seed: int) -> np.ndarray:
-        return accumulated(scene, resolution, 1, seed)
+        nearest = np.arange(resolution) * SIDE // resolution
+        return accumulated(scene, SIDE, 1, seed)[nearest][:, nearest]
 
     return small

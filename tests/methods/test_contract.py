@@ -31,7 +31,7 @@ from tests.state import in_thread, program_state
 
 SIDE = 48  # of pictures [pixels]
 TOY = Path(__file__).parents[1] / "toy"
-pytestmark = pytest.mark.usefixtures("own_cache", "toy")
+pytestmark = pytest.mark.usefixtures("own_cache", "toy", "quick_settling")
 
 
 @pytest.fixture(scope="module")
