@@ -10,7 +10,6 @@ import pytest
 
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nerf import NerfTexture, fit
-from mitex.methods.nerf.base import coarse
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.field.occupancy import hull_cells
 from mitex.methods.nerf.synthesis.maps import LatentMaps
@@ -47,7 +46,6 @@ def run(tmp_path_factory, base) -> Path:
     folder = tmp_path_factory.mktemp("nerf")
     patch = pytest.MonkeyPatch()
     patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
-    patch.setattr(coarse, "SCAN_SIDE", 64)  # a little more than the photos'
     fit(tiny_capture(), folder / "run", base_mesh=base, set=SETTINGS)
     patch.undo()
     return folder / "run"
