@@ -39,7 +39,7 @@ def toy():
 
 
 @pytest.fixture
-def place(tmp_path, monkeypatch, own_cache, toy):
+def place(tmp_path, monkeypatch, own_cache, quick_settling, toy):
     """A folder with the files that the pages name; work in it is small."""
     small.prepare(tmp_path)
     small.shrink(monkeypatch)
