@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -33,18 +33,11 @@ def check_video(path: str | os.PathLike[str], frames: int, fps: int, resolution:
     return target
 
 
-def write_video(
-    target: Path,
-    pictures: Iterable[np.ndarray],
-    frames: int,
-    fps: int,
-    side: int,
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
+def write_video(target: Path, pictures: Iterable[np.ndarray], frames: int, fps: int, side: int) -> Path:
     """Writes `frames` pictures (side, side, 3), sRGB in [0, 1], as .mp4 (H.264) or .gif, by the suffix.
 
     Pictures are drawn from the iterable as they are written, so that a film need not fit into memory as .mp4.
-    `progress` is called with (frames done, frames) after each one.
+    How many are written is announced (`mitex.progress`).
 
     Raises:
         ConfigError: there are fewer or more pictures than `frames`; nothing is left then.
@@ -57,8 +50,6 @@ def write_video(
             if done > frames:
                 raise ConfigError(f"more pictures than the {frames} frames of a video", "raise frames")
             yield np.round(picture * 255.0).astype(np.uint8)
-            if progress:
-                progress(done, frames)
         if done < frames:
             raise ConfigError(f"{done} pictures for a video of {frames} frames", "give one for each frame")
 

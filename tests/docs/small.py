@@ -4,8 +4,9 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
 
 - fits: their settings are resolved as they were asked for, which checks them; then they get 2 steps, 3 if the
   run is resumed, and the tiny settings of their method;
-- textures of automata are baked at 64 texels;
-- pictures are traced with one path a pixel.
+- meshes that ship with Mitex are balls of 362 vertices, under their names;
+- automata grow for 2 steps on the mesh as it is, and are baked at 64 texels;
+- pictures are traced in 16 x 16 pixels with one path each, and enlarged.
 """
 
 from __future__ import annotations
@@ -18,12 +19,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods.registry import methods
 from mitex.training.run import CONFIG
-from tests.cli.test_nerf import icosphere, save
+from tests.cli.test_nerf import save
 
 STEPS, RESUMED_STEPS = 2, 3
+GROWTH = 2  # steps of an automaton
 TEXELS = 64
+SIDE = 16  # of a picture [pixels]
 EVERY_FIT = {"checkpoint_every": 1, "preview_every": 0}
 TINY: dict[str, dict[str, Any]] = {
     # Nothing of the architecture, which must be that of the model after `--init`.
@@ -46,11 +50,13 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     from mitex.training import fit
 
     patch.setattr(fit, "resolve", _with_few_steps(fit.resolve))
-    patch.setattr(NcaTexture, "apply", _with_few_texels(NcaTexture.apply))
-    patch.setattr(NcaTexture, "tile", _with_few_texels(NcaTexture.tile))
-    sketch = _with_one_path(renderer.accumulated)
-    patch.setattr(renderer, "accumulated", sketch)
-    patch.setattr(shell, "accumulated", sketch)
+    patch.setattr("mitex.mesh.load.embedded", lambda name: replace(icosphere(6), name=embedded(name).name))
+    patch.setattr(NcaTexture, "apply", _small_growth(NcaTexture.apply))
+    patch.setattr(NcaTexture, "tile", _small_tile(NcaTexture.tile))
+    sketch, sensor = _with_few_paths(renderer.accumulated), renderer.sensor
+    for module in (renderer, shell):
+        patch.setattr(module, "accumulated", sketch)
+        patch.setattr(module, "sensor", lambda resolution: sensor(SIDE))
 
 
 def _with_few_steps(resolve: Callable[..., Any]) -> Callable[..., Any]:
@@ -65,17 +71,24 @@ def _with_few_steps(resolve: Callable[..., Any]) -> Callable[..., Any]:
     return small
 
 
-def _with_few_texels(make: Callable[..., Any]) -> Callable[..., Any]:
-    def small(*arguments: Any, **options: Any) -> Any:
-        if options.get("resolution", TEXELS) is not None:
-            options["resolution"] = TEXELS
-        return make(arguments[0], **options) if make.__name__ == "tile" else make(*arguments, **options)
+def _small_growth(apply: Callable[..., Any]) -> Callable[..., Any]:
+    def small(texture: Any, mesh: Mesh, **options: Any) -> Any:
+        texels = None if options.get("resolution", TEXELS) is None else TEXELS
+        return apply(texture, mesh, **options | {"resolution": texels, "steps": GROWTH, "subdivide": 0})
 
     return small
 
 
-def _with_one_path(accumulated: Callable[..., np.ndarray]) -> Callable[..., np.ndarray]:
+def _small_tile(tile: Callable[..., Any]) -> Callable[..., Any]:
+    def small(texture: Any, resolution: int = TEXELS, **options: Any) -> Any:
+        return tile(texture, TEXELS, **options | {"steps": GROWTH})
+
+    return small
+
+
+def _with_few_paths(accumulated: Callable[..., np.ndarray]) -> Callable[..., np.ndarray]:
     def small(scene: Any, resolution: int, spp: int, seed: int) -> np.ndarray:
-        return accumulated(scene, resolution, 1, seed)
+        nearest = np.arange(resolution) * SIDE // resolution
+        return accumulated(scene, SIDE, 1, seed)[nearest][:, nearest]
 
     return small

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import arg
 
@@ -41,9 +41,14 @@ class Fit(ExemplarOptions):
     init: Annotated[str | None, arg(metavar="MODEL|RUN", help_behavior_hint="")] = None
     """Start from the weights of a model or a run."""
 
+    device: Annotated[
+        Literal["cpu", "cuda"] | None, arg(metavar="cpu|cuda", help_behavior_hint="(default: cpu)")
+    ] = None
+    """Train on the processor, or on the first CUDA graphics card."""
+
     def run(self) -> None:
         mutually_exclusive("--resume", "--init", self.resume and self.init is not None)
-        options = self.run_options()
+        options = self.run_options(device=self.device)
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()

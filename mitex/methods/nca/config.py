@@ -30,6 +30,7 @@ class NcaConfig(TrainingConfig):
 
     preset: str = "patch"
     steps: int = key(900, "training steps", 0)
+    device: Literal["cpu", "cuda"] = key("cpu", "that trains: the processor, or the first CUDA graphics card")
     channels: int = key(16, "channels of a cell's state", 12, 256)
     hidden: int = key(128, "width of the hidden layer", 1, 4096)
     degree: int = key(1, "highest degree of the spherical harmonics of the perception", 0, 2)

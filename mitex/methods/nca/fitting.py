@@ -56,8 +56,9 @@ def fit(
     task = NcaTask(config, maps, parent)
 
     def texture(about: dict[str, Any]) -> NcaTexture:
-        steps = settling_steps(task.look, task.exemplar, config.density)
-        return NcaTexture(task.look, about | origin | {"growth_steps": steps})
+        look = task.look.to("cpu")
+        steps = settling_steps(look, task.exemplar, config.density)
+        return NcaTexture(look, about | origin | {"growth_steps": steps})
 
     return run.train(
         task,

@@ -24,7 +24,7 @@ from mitex.methods.nca.surfaces import (
 )
 from mitex.methods.nca.targets import Targets, enlarged
 from mitex.progress import announce
-from mitex.runtime import keep_freed_memory
+from mitex.runtime import available_device, keep_freed_memory
 from mitex.scenes.cameras import Cameras, random_views
 from mitex.training import Step
 from mitex.triples import channel_triples, triple_images
@@ -43,6 +43,7 @@ class NcaTask:
     """
 
     def __init__(self, config: NcaConfig, exemplar: Exemplar, init: Look | None = None) -> None:
+        device = available_device(config.device)
         keep_freed_memory()
         announce("preparing spheres and the exemplar")
         self.config = config
@@ -53,6 +54,7 @@ class NcaTask:
             self.look.initialise(torch.Generator().manual_seed(config.seed), config.gain)
         else:
             self.look.load_state_dict(init.state_dict())
+        self.look.to(device)
         self.surfaces = training_surfaces(config, self.look)
         self.zooms = self._appearances()
         self.relief = None
@@ -60,12 +62,12 @@ class NcaTask:
             self.relief = Relief(self.exemplar, self.look.layout, self.zooms)
         # Rows beyond the cells of a state's surface stay zero.
         most = max(surface.perception.vertices for surface in self.surfaces)
-        self.pool = torch.zeros(config.pool, most, config.channels)
+        self.pool = torch.zeros(config.pool, most, config.channels, device=self.look.device)
         self._touched = torch.zeros(config.pool, dtype=torch.bool)
 
     def _appearances(self) -> dict[int, Appearance]:
         """Size of the exemplar [px] -> comparison with it at that size; from the coarsest on."""
-        config, network = self.config, Vgg16(self.config.pooling)
+        config, network = self.config, Vgg16(self.config.pooling, device=str(self.look.device))
         layout = self.look.layout
         pictures = channel_triples(layout, config.blend, config.seed)
         finest = self.exemplar.size[0]
@@ -152,7 +154,7 @@ class NcaTask:
         self.look.load_state_dict(weights)
         self._touched = state["pool.touched"]
         self.pool.zero_()
-        self.pool[self._touched] = state["pool.states"]
+        self.pool[self._touched] = state["pool.states"].to(self.pool.device)
 
     @torch.no_grad()
     def preview(self, step: int) -> np.ndarray:
@@ -185,4 +187,4 @@ def _padded(view: torch.Tensor, side: int) -> np.ndarray:
     """A square view (h, h, C) in the middle of (side, side, C) zeros."""
     before = (side - len(view)) // 2
     after = side - len(view) - before
-    return F.pad(view, (0, 0, before, after, before, after)).numpy()
+    return F.pad(view, (0, 0, before, after, before, after)).cpu().numpy()

@@ -15,6 +15,8 @@ from mitex.methods.nca.task import NcaTask
 from mitex.runtime import threads
 from tests.methods.nca.tiny import SETTINGS, config
 
+pytestmark = pytest.mark.usefixtures("quick_settling")
+
 # As many samples as there are places: the loss depends on no choice of them.
 ALL_PLACES = ("samples=4096", "view_count=2", "pool=1", "blend=false", "min_steps=3", "max_steps=3")
 
@@ -344,10 +346,13 @@ def test_the_check_of_a_key_fails_where_it_is_ignored(build, key):
 
 OF_THE_FIT = {"lr", "milestones", "decay", "normalise_gradients"}
 OF_THE_LOOP = {"preset", "steps", "checkpoint_every", "preview_every"}  # tests/training
+OF_THE_DEVICE = {"device"}  # test_device
 
 
 def test_no_key_is_left_out():
-    assert {field.name for field in fields(NcaConfig)} == set(CHECKS) | OF_THE_FIT | OF_THE_LOOP
+    assert {field.name for field in fields(NcaConfig)} == set(
+        CHECKS
+    ) | OF_THE_FIT | OF_THE_LOOP | OF_THE_DEVICE
 
 
 @pytest.fixture

@@ -269,7 +269,7 @@ def test_a_fit_computes_its_domain_once(mesh, exemplar, tmp_path, monkeypatch):
     monkeypatch.setattr(
         room.Texels, "rasterize", staticmethod(lambda *args: (calls.append("texels"), rasterize(*args))[1])
     )
-    overrides = [*SMALL, "resolution=47", "steps=2", "preview_every=1"]
+    overrides = [*SMALL, "resolution=47", "steps=2", "preview_every=2"]
     surface.fit(exemplar, mesh, tmp_path / "run", set=overrides).apply()
     assert sorted(calls) == ["GeodesicTracer", "build", "texels", "vertex_directions"]
 
