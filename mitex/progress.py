@@ -26,9 +26,11 @@ def announce(work: str, done: int = 0, total: int = 0) -> None:
         listener(work, done, total)
 
 
-def counted(work: str, items: Iterable[Item], total: int) -> Iterator[Item]:
-    """The items, announced as parts of one work; what computing them would announce is not heard."""
-    iterator, end, done = iter(items), object(), 0
+def counted(work: str, items: Iterable[Item], total: int, done: int = 0) -> Iterator[Item]:
+    """The items, announced as parts of one work, of which some were done before; what computing them would
+    announce is not heard.
+    """
+    iterator, end = iter(items), object()
     while True:
         announce(work, done, total)
         with listening(None):

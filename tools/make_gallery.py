@@ -5,12 +5,14 @@ usage: python tools/make_gallery.py EXEMPLARS MESHES [NAME | SHEET=EXEMPLAR=RUN 
 
 EXEMPLARS and MESHES are folders; the sheets go to docs/gallery/NAME.jpg, or SHEET.jpg for a run folder. Below
 the path-traced pictures are the maps as they are, to see that they are in register. Without names, the row of
-pictures that README begins with, and the thumbnails of all models beside their exemplars, are made too.
+pictures that README begins with, the thumbnails of all models beside their exemplars, and the sheet of the
+controls are made too.
 """
 
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +22,14 @@ from mitex.exemplar import Exemplar
 from mitex.exemplar import names as exemplar_names
 from mitex.images import read_image, write_image
 from mitex.mesh import Mesh, embedded, icosphere
-from mitex.methods.nca import NcaTexture
+from mitex.methods.nca import Graft, NcaTexture
+from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.film import PreviewCamera, Shooting, States
+from mitex.methods.nca.orientation import Orientation, cell_turns
+from mitex.methods.nca.region import region
 from mitex.methods.nca.surfaces import TrainingSphere
+from mitex.methods.nca.texture import GrowingTexture, grown_state
+from mitex.methods.nca.weights import graft_weights
 from mitex.render import sheet, still, tone
 from mitex.scenes.cameras import orbit
 
@@ -32,6 +40,7 @@ GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 UNSEEN = ("spot", "fish", "mug")
 TEASER = {"ceramic": "octopus", "lava": "knot", "cobblestone": "vase", "shells": "shaderball"}
 FREQUENCY, RESOLUTION, CELL = 32, 2048, 256
+SPHERE = icosphere(26)  # of the controls: large patterns are seen better
 
 
 def unlit(texture: NcaTexture) -> list[np.ndarray]:
@@ -64,6 +73,77 @@ def teaser() -> np.ndarray:
     return np.concatenate(pictures, axis=1)
 
 
+def controls() -> np.ndarray:
+    """What can be done with trained models: grafts, healing, density, orientation, steps; a row each."""
+    rows = [*_grafts(), *_healing(), *_densities(), *_orientations(), *_growth()]
+    labels, pictures = zip(*rows, strict=True)
+    return sheet(pictures, columns=5, labels=labels, cell=CELL)
+
+
+Labelled = list[tuple[str, np.ndarray]]
+
+
+def _grafts() -> Labelled:
+    places = {
+        ("ceramic", "bricks"): "x:-0.4:0.4",
+        ("lava", "shells"): "x:-0.4:0.4",
+        ("cobblestone", "lava"): "0,0.25,1,0.9",
+        ("honeycomb", "hexagons"): "y:-0.4:0.4",
+        ("wicker", "knit"): "x:-0.4:0.4",
+    }
+    rows = []
+    for (first, second), weights in places.items():
+        graft = Graft(NcaTexture.load(first), NcaTexture.load(second), graft_weights(SPHERE, weights))
+        rows.append((f"{first} into {second}", _grown(graft, SPHERE, 300, azimuth=0.0)))
+    return rows
+
+
+def _healing() -> Labelled:
+    """A ball of cells is set back to the seed in the second picture."""
+    mesh, shooting = embedded("vase"), Shooting(resolution=CELL, damage_at=1 / 24)
+    cells = Cells.of(mesh, 0)
+    growth, camera = NcaTexture.load("lava").growth(cells), PreviewCamera(mesh, shooting)
+    inside = torch.from_numpy(region("0.25,0.1,0.55,0.3")(cells.mesh.vertices))
+    states = States(growth, replace(shooting, steps_per_frame=10), 200, 0, inside)
+    frames = dict(zip(range(17), states.frames(0, 17), strict=True))
+    steps = {0: "before", 1: "damaged", 2: "10 steps later", 5: "40 steps later", 16: "150 steps later"}
+    return [(label, camera.picture(growth.shown(frames[k]))) for k, label in steps.items()]
+
+
+def _densities() -> Labelled:
+    scales, texture = (0.5, 0.7, 1.0, 1.4, 2.0), NcaTexture.load("hexagons")
+    return [(f"--scale {s:g}", _grown(texture, SPHERE, 500, scale=s)) for s in scales]
+
+
+def _orientations() -> Labelled:
+    texture = NcaTexture.load("planks")
+    rows = []
+    for turn in (0, 45, 90, "1,1,0", "about-x"):
+        azimuth = 90.0 if turn == "about-x" else 25.0  # a field around the axis is seen from its end
+        rows.append((f"--orientation {turn}", _grown(texture, SPHERE, 200, azimuth, orientation=turn)))
+    return rows
+
+
+def _growth() -> Labelled:
+    texture = NcaTexture.load("ceramic")
+    return [(f"--steps {n}", _grown(texture, SPHERE, n)) for n in (20, 60, 120, 300, 1000)]
+
+
+def _grown(
+    texture: GrowingTexture,
+    mesh: Mesh,
+    steps: int,
+    azimuth: float = 25.0,
+    scale: float = 1.0,
+    orientation: Orientation = 0.0,
+) -> np.ndarray:
+    """A preview (H, W, 3) of a texture on a mesh."""
+    cells = Cells.of(mesh, 0, scale)
+    growth = texture.growth(cells, cell_turns(orientation, cells.mesh, mesh))
+    camera = PreviewCamera(mesh, Shooting(resolution=CELL, azimuth=azimuth))
+    return camera.picture(growth.shown(grown_state(growth, 0, steps)))
+
+
 def thumbnails(exemplars: Path) -> np.ndarray:
     """Every bundled model's exemplar, and its thumbnail."""
     cells, labels = [], []
@@ -84,6 +164,7 @@ def main() -> None:
     if len(sys.argv) == 3:
         write_image(GALLERY / "teaser.jpg", teaser())
         write_image(GALLERY / "models.jpg", thumbnails(exemplars))
+        write_image(GALLERY / "nca-controls.jpg", controls())
     for word in sys.argv[3:] or RECIPES:
         name, source, model = word.split("=") if "=" in word else (word, RECIPES[word].exemplar, word)
         picture = one(NcaTexture.load(model), _exemplar(source, exemplars), meshes)

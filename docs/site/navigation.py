@@ -10,6 +10,7 @@ GROUPS = {
     "Tutorials": ["docs/tutorials/texture-a-mesh", "docs/tutorials/*"],
     "Methods": ["docs/nca", "docs/surface", "docs/geometric", "docs/nerf"],
     "Guides": [
+        "docs/moving",
         *(f"docs/{name}" for name in ("blender", "plugins", "embedding", "settings", "runs", "times")),
         "docs/*",
     ],

@@ -47,7 +47,14 @@ def lines(group: str = "") -> dict[str, str]:
     if group:
         return {name: line for name, line in fits.items() if name.startswith(f"{group} ")}
     doctor, demo, *others = [(word, line) for word, (_, line) in COMMANDS.items()]
-    return dict([doctor, demo, *fits.items(), *OF_MODELS.items(), *others])
+    own = {word: line for word, (_, line) in of_methods().items()}
+    return dict([doctor, demo, *fits.items(), *OF_MODELS.items(), *own.items(), *others])
+
+
+def of_methods() -> dict[str, tuple[str, str]]:
+    """The further commands of all methods, as of `Method.commands`; none has the name of a shared one."""
+    own = {word: command for method in methods().values() for word, command in method.commands.items()}
+    return {word: command for word, command in own.items() if word not in (*COMMANDS, *OF_MODELS, "fit")}
 
 
 def find(words: Sequence[str]) -> Call:
@@ -60,8 +67,8 @@ def find(words: Sequence[str]) -> Call:
     word, rest = words[0], list(words[1:])
     if word in OF_MODELS:
         return _of_model(word, rest)
-    if word in COMMANDS:
-        call = Call(f"mitex {word}", load(COMMANDS[word][0]), rest)
+    if word in (single := COMMANDS | of_methods()):
+        call = Call(f"mitex {word}", load(single[word][0]), rest)
     elif word == "fit" and rest and rest[0] in methods():
         method = methods()[rest[0]]
         call = Call(f"mitex fit {method.name}", method.load_fit(), rest[1:])

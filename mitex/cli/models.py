@@ -39,6 +39,17 @@ class Models:
             print(f"{'':16}  {', '.join(origin)}")
             if model["thumbnail"]:
                 print(f"{'':16}  {model['thumbnail']}")
+        for family, names in _families(models).items():
+            print(f"family {family}, which can be grafted with each other: {', '.join(names)}")
+
+
+def _families(models: list[dict[str, Any]]) -> dict[str, list[str]]:
+    """Families of two models or more, and their names."""
+    names: dict[str, list[str]] = {}
+    for model in models:
+        if "family" in model:
+            names.setdefault(model["family"], []).append(model["name"])
+    return {family: members for family, members in names.items() if len(members) > 1}
 
 
 def _text(value: object) -> str:

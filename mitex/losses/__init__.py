@@ -1,18 +1,23 @@
 """Losses on images, features and states: pure torch."""
 
+from mitex.losses.advection import advection_residual
 from mitex.losses.autocorrelation import autocorrelation_distance
 from mitex.losses.gram import gram_distance, gram_loss, gram_matrix
+from mitex.losses.motion import MotionLoss, motion_loss
 from mitex.losses.overflow import overflow_loss
 from mitex.losses.slopes import slope_correlation
 from mitex.losses.transport import channel_transport, moment_distance, relaxed_transport
 
 __all__ = [
+    "MotionLoss",
+    "advection_residual",
     "autocorrelation_distance",
     "channel_transport",
     "gram_distance",
     "gram_loss",
     "gram_matrix",
     "moment_distance",
+    "motion_loss",
     "overflow_loss",
     "relaxed_transport",
     "slope_correlation",

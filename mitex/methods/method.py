@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from mitex.lazy import load
@@ -25,6 +25,8 @@ class Method:
         fit, apply: references to the dataclasses of its options, a `FitOptions` and an `ApplyOptions`.
         texture: reference to its `Texture`.
         animate: reference to the options of `mitex animate`, for textures that grow or change.
+        commands: further commands of its own: word -> reference to the dataclass of the options, and the line
+            in the overview.
         tensors: names of the tensors in weights that the authors published: such files tell nothing else of
             their method.
         baseline: whether other methods are compared with it, rather than it being one to use.
@@ -37,6 +39,7 @@ class Method:
     apply: str
     texture: str
     animate: str | None = None
+    commands: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     tensors: frozenset[str] = frozenset()
     baseline: bool = False
 

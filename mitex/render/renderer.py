@@ -76,7 +76,7 @@ class OrbitRenderer:
         if displacement and "height" not in asset.vertex_maps:
             raise ConfigError("displacement needs a height map", "leave it out or use a model with height")
         self.resolution = resolution
-        self._floating = floating
+        self._floating, self._ao = floating, ao
         _, place = (like or asset.mesh).normalised()
         if asset.atlas is None:  # a vertex for each normal, and for each UV
             split = split_at_hard_edges(asset.mesh)
@@ -116,6 +116,23 @@ class OrbitRenderer:
         """
         self._turn(azimuth, view)
         return accumulated(self._scene, self.resolution, spp, seed)
+
+    def show(self, asset: Asset) -> None:
+        """Changes the look to that of another asset of the same mesh, with the same maps, of the same sizes;
+        a new renderer for each would leak memory.
+        """
+        from mitex.runtime.jit import mi
+
+        assert asset.texture_maps is not None
+        albedo, roughness = _material(asset.texture_maps, self._ao)
+        values = {"base_color.data": albedo, "roughness.data": roughness}
+        if "normal" in asset.texture_maps:
+            values["normalmap.data"] = _unmirrored(asset)
+        for key in self._params.keys():  # noqa: SIM118
+            for name, array in values.items():
+                if key.startswith("object.") and key.endswith(name):
+                    self._params[key] = mi.TensorXf(np.ascontiguousarray(array, np.float32))
+        self._params.update()
 
     def _build(self, shape: mi.Mesh) -> tuple[mi.Scene, mi.SceneParameters]:
         from mitex.runtime.jit import mi

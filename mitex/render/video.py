@@ -33,11 +33,18 @@ def check_video(path: str | os.PathLike[str], frames: int, fps: int, resolution:
     return target
 
 
-def write_video(target: Path, pictures: Iterable[np.ndarray], frames: int, fps: int, side: int) -> Path:
+def write_video(
+    target: Path,
+    pictures: Iterable[np.ndarray],
+    frames: int,
+    fps: int,
+    side: int,
+    work: str = "rendering frames",
+) -> Path:
     """Writes `frames` pictures (side, side, 3), sRGB in [0, 1], as .mp4 (H.264) or .gif, by the suffix.
 
     Pictures are drawn from the iterable as they are written, so that a film need not fit into memory as .mp4.
-    How many are written is announced (`mitex.progress`).
+    How many are written is announced as `work` (`mitex.progress`).
 
     Raises:
         ConfigError: there are fewer or more pictures than `frames`; nothing is left then.
@@ -46,7 +53,7 @@ def write_video(target: Path, pictures: Iterable[np.ndarray], frames: int, fps: 
 
     def bytes_of() -> Iterator[np.ndarray]:
         done = 0
-        for done, picture in enumerate(counted("rendering frames", pictures, frames), 1):
+        for done, picture in enumerate(counted(work, pictures, frames), 1):
             if done > frames:
                 raise ConfigError(f"more pictures than the {frames} frames of a video", "raise frames")
             yield np.round(picture * 255.0).astype(np.uint8)
@@ -86,8 +93,16 @@ def _write_gif(path: Path, pictures: Iterator[np.ndarray], fps: int, side: int) 
     # One palette for all frames, or colours would flicker.
     palette = _strip(images[:: max(1, len(images) // 8)]).quantize(256, Image.Quantize.MEDIANCUT)
     indexed = [i.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG) for i in images]
-    duration = max(20, round(1000.0 / fps))  # [ms]; viewers slow down anything faster
-    indexed[0].save(path, "GIF", save_all=True, append_images=indexed[1:], duration=duration, loop=0)
+    durations = gif_durations(len(indexed), fps)
+    indexed[0].save(path, "GIF", save_all=True, append_images=indexed[1:], duration=durations, loop=0)
+
+
+def gif_durations(frames: int, fps: int) -> list[int]:
+    """How long each frame of a GIF stands [ms]: hundredths of a second, which add up to `frames` / `fps`, but
+    at least two, as viewers slow down anything faster.
+    """
+    ends = np.round(np.arange(frames + 1) * (100.0 / fps)).astype(int)
+    return [10 * max(2, int(duration)) for duration in np.diff(ends)]
 
 
 def _strip(images: Sequence[Image.Image]) -> Image.Image:

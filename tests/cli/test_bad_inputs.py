@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mitex.cli import main
@@ -89,6 +90,9 @@ FITS = {
     "resume and init": (None, "--resume --init cobblestone", "--resume and --init contradict"),
     "resume without a run": (None, "--resume", "no checkpoint"),
     "unknown device": (None, "--device tpu", "--device"),
+    "unknown field": (None, "--motion rihgt", "did you mean right?"),
+    "a field twice": (None, "--motion up --set motion=down", "motion is set to down and to up"),
+    "field of one mesh": (None, "--motion wind.npy", "holds the vectors of one mesh"),
     "unknown init": (None, f"--init no_such_model {QUICK}", "no_such_model"),
     "damaged init": (
         lambda d: bad.text(d / "m.safetensors"),
@@ -160,6 +164,10 @@ APPLIES = {
     "vertex colours and resolution": (apply("--vertex-colors --resolution 64"), "contradict"),
     "vertex colours in obj": (apply("--vertex-colors", out="out/a.obj"), "means nothing for .obj"),
     "resolution of ply": (apply("--resolution 64", out="out/a.ply"), "means nothing for .ply"),
+    "negative speed": (apply("--speed -1"), "--speed -1"),
+    "field of a still texture": (apply("--field up"), "'pebbles' does not move"),
+    "speed of a still texture": (apply("--speed 2"), "'pebbles' does not move"),
+    "field of a still tile": ("apply pebbles --tile 64 --field up --out out/tile", "'pebbles' does not move"),
 }
 
 RENDERS = {
@@ -339,5 +347,29 @@ class TestArchitectures:
         check_refused(files, apply(model="nan.safetensors"), "not finite", capsys)
 
     def test_a_condition_that_no_option_gives(self, files, capsys):
-        bad.model(files / "graft.safetensors", condition=3)
-        check_refused(files, apply(model="graft.safetensors"), "'graft' needs a condition of 3", capsys)
+        bad.model(files / "graft.safetensors", condition=4)
+        check_refused(files, apply(model="graft.safetensors"), "'graft' needs a condition of 4", capsys)
+
+    @pytest.mark.parametrize(
+        ("words", "message"),
+        [
+            ("", "'wind' needs a condition of 3 values at each vertex, and has none here; give --field"),
+            ("--field rihgt", "did you mean right?"),
+            ("--field none.npy", "none.npy"),
+            ("--field short.npy", "shape (8, 3)"),
+            ("--field nan.npy", "NaN or infinite at 8 of 8 vertices"),
+            ("--field zero.npy", "zero everywhere"),
+        ],
+    )
+    def test_fields_of_a_moving_texture(self, files, capsys, words, message):
+        bad.model(files / "wind.safetensors", condition=3)
+        vectors = {"short": np.ones((7, 3)), "nan": np.full((8, 3), np.nan), "zero": np.zeros((8, 3))}
+        for name, values in vectors.items():
+            np.save(files / f"{name}.npy", values)
+        check_refused(files, apply(words, model="wind.safetensors"), message, capsys)
+
+    def test_a_field_is_not_overwritten(self, files, capsys):
+        bad.model(files / "wind.safetensors", condition=3)
+        bad.ply(files / "wind.ply")
+        words = apply("--field wind.ply", model="wind.safetensors", out="wind.ply")
+        check_refused(files, words, "wind.ply", capsys)

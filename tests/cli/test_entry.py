@@ -126,7 +126,8 @@ class TestHelp:
         self.check_examples(name, capsys)
 
     @pytest.mark.parametrize(
-        ("name", "model"), [("apply", "waffle"), ("apply", "spikes"), ("animate", "spikes")]
+        ("name", "model"),
+        [("apply", "waffle"), ("apply", "spikes"), ("animate", "spikes"), ("animate", "waffle")],
     )
     def test_commands_on_models_explain_the_options_of_their_method(self, name, model, capsys):
         assert main([name, model, "--help"]) == 0
@@ -198,8 +199,8 @@ class TestUsage:
             (["modles"], "there is no command 'modles'; did you mean models?"),
             (
                 ["xyzzy"],
-                "there is no command 'xyzzy'; use one of doctor, demo, fit, apply, animate, cache, models, "
-                "render, try",
+                "there is no command 'xyzzy'; use one of doctor, demo, fit, apply, animate, graft, cache, "
+                "models, render, try",
             ),
             (["fit"], "`mitex fit` needs a method; try `mitex fit geometric --help`"),
             (["fit", "nac"], "`mitex fit` knows no method 'nac'; did you mean nca?"),
@@ -225,7 +226,11 @@ class TestUsage:
                 "--orientation is no option of geometric textures in `mitex apply`; see `mitex apply spikes "
                 "--help`",
             ),
-            (["animate", "waffle"], "`mitex animate` takes no nca textures; name a run of geometric"),
+            (["animate", "waffle"], "--mesh and --out are missing; see `mitex animate --help`"),
+            (
+                ["graft", "waffle", "--mash", "x"],
+                "--mash is no option of `mitex graft`; did you mean --mesh?",
+            ),
             (
                 ["fit", "nca", "--exemplr", "x"],
                 "--exemplr is no option of `mitex fit nca`; did you mean --exemplar?",

@@ -5,7 +5,8 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
 - fits: their settings are resolved as they were asked for, which checks them; then they get 2 steps, 3 if the
   run is resumed, and the tiny settings of their method;
 - meshes that ship with Mitex are balls of 362 vertices, under their names;
-- automata grow for 2 steps on the mesh as it is, and are baked at 64 texels;
+- automata grow for 2 steps on the mesh as it is, are not healed, and are baked at 64 texels;
+- films have 4 frames of 32 pixels;
 - pictures are traced in 16 x 16 pixels with one path each, and enlarged.
 """
 
@@ -45,13 +46,17 @@ def prepare(folder: Path) -> None:
 
 def shrink(patch: pytest.MonkeyPatch) -> None:
     """Makes the work small until the patch is undone."""
-    from mitex.methods.nca import NcaTexture
+    from mitex.methods.nca import NcaTexture, film, texture
     from mitex.render import renderer, shell
     from mitex.training import fit
 
     patch.setattr(fit, "resolve", _with_few_steps(fit.resolve))
     patch.setattr("mitex.mesh.load.embedded", lambda name: replace(icosphere(6), name=embedded(name).name))
-    patch.setattr(NcaTexture, "apply", _small_growth(NcaTexture.apply))
+    patch.setattr(texture, "grown_state", _with_few_growth_steps(texture.grown_state))
+    patch.setattr(texture, "healed", lambda growth, state, generator: state)
+    for module in (film, texture):
+        patch.setattr(module, "film", _with_few_frames(film.film))
+    patch.setattr(texture.GrowingTexture, "apply", _small_growth(texture.GrowingTexture.apply))
     patch.setattr(NcaTexture, "tile", _small_tile(NcaTexture.tile))
     sketch, sensor = _with_few_paths(renderer.accumulated), renderer.sensor
     for module in (renderer, shell):
@@ -71,10 +76,26 @@ def _with_few_steps(resolve: Callable[..., Any]) -> Callable[..., Any]:
     return small
 
 
+def _with_few_growth_steps(grown_state: Callable[..., Any]) -> Callable[..., Any]:
+    def small(growth: Any, seed: int, steps: int) -> Any:
+        return grown_state(growth, seed, min(steps, GROWTH))
+
+    return small
+
+
+def _with_few_frames(film: Callable[..., Any]) -> Callable[..., Any]:
+    def small(texture: Any, mesh: Any, path: Any, shooting: Any, **options: Any) -> Any:
+        loop = None if shooting.loop is None else 1
+        short = replace(shooting, seconds=4 / shooting.fps, resolution=32, start=2, loop=loop, damage_at=0.0)
+        return film(texture, mesh, path, short, **options)
+
+    return small
+
+
 def _small_growth(apply: Callable[..., Any]) -> Callable[..., Any]:
     def small(texture: Any, mesh: Mesh, **options: Any) -> Any:
         texels = None if options.get("resolution", TEXELS) is None else TEXELS
-        return apply(texture, mesh, **options | {"resolution": texels, "steps": GROWTH, "subdivide": 0})
+        return apply(texture, mesh, **options | {"resolution": texels, "subdivide": 0})
 
     return small
 

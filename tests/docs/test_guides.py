@@ -22,6 +22,7 @@ METHODS = [
     for name, method in methods().items()
     if method.presets.startswith(PACKAGES[0]) and not method.baseline
 ]
+FURTHER = ["moving"]
 PICTURE = re.compile(r"!\[(.*?)\]\((.*?)\)")
 NAMED_TEXTURE = re.compile(r"\b[A-Z][\w-]*_\d{3}\b")  # as 3dtextures.me names them
 PAGES = [DOCS.parent / "README.md", *sorted(DOCS.rglob("*.md"))]
@@ -49,6 +50,15 @@ class TestGuide:
     def test_there_are_pages_of_its_results_and_of_its_inside(self, name):
         assert (DOCS / "results" / f"{name}.md").is_file()
         assert (DOCS / "developers" / f"{name}.md").is_file()
+
+
+@pytest.mark.parametrize("name", FURTHER)
+def test_guides_to_what_methods_can_do_are_short_and_begin_with_a_picture(name):
+    text = read(DOCS / f"{name}.md")
+    assert len(re.sub(r"<!--.*?-->", "", text).split()) <= MOST_WORDS
+    first, *_, last = re.findall(r"^## (.*)$", text, re.MULTILINE)
+    assert (first, last) == ("What it is for", "Limits")
+    assert PICTURE.search(re.split(r"^## ", text, flags=re.MULTILINE)[1])
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(DOCS.parent)))

@@ -12,15 +12,18 @@ METHOD = Method(
     fit="mitex.methods.nca.cli:Fit",
     apply="mitex.methods.nca.cli:Apply",
     texture="mitex.methods.nca.texture:NcaTexture",
+    animate="mitex.methods.nca.animation:Animate",
+    commands={"graft": ("mitex.methods.nca.grafting:Grafted", "let two textures grow into each other")},
     tensors=frozenset({"fc1.weight", "fc1.bias", "fc2.weight", "fc2.bias"}),
 )
 
-__all__ = ["METHOD", "PRESETS", "MeshNCA", "NcaConfig", "NcaTexture", "fit"]
+__all__ = ["METHOD", "PRESETS", "Graft", "MeshNCA", "NcaConfig", "NcaTexture", "fit"]
 
 __getattr__ = attributes(
     __name__,
     {
         "PRESETS": "mitex.methods.nca.config",
+        "Graft": "mitex.methods.nca.graft",
         "NcaConfig": "mitex.methods.nca.config",
         "MeshNCA": "mitex.methods.nca.model",
         "NcaTexture": "mitex.methods.nca.texture",
@@ -31,5 +34,6 @@ __getattr__ = attributes(
 if TYPE_CHECKING:
     from mitex.methods.nca.config import PRESETS, NcaConfig
     from mitex.methods.nca.fitting import fit
+    from mitex.methods.nca.graft import Graft
     from mitex.methods.nca.model import MeshNCA
     from mitex.methods.nca.texture import NcaTexture

@@ -9,11 +9,11 @@ from mitex.asset import Asset
 from mitex.atlas import Atlas
 from mitex.exemplar import MAPS
 from mitex.geometry.triangles import interpolate
-from mitex.geometry.vectors import orthonormal, rotate_about, unit
-from mitex.mesh import Mesh
+from mitex.geometry.vectors import orthonormal, unit
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.surface import Points, Surface
 from mitex.methods.nca.look import Look
+from mitex.methods.nca.orientation import Turn, rightwards
 from mitex.methods.nca.palette import Palette
 from mitex.progress import announce
 
@@ -27,8 +27,9 @@ class Grown:
         look: the decoder and the maps.
         state: (V, C).
         cells: the automaton's mesh.
-        orientation: of the texture [rad].
+        orientation: of the texture.
         palette: the exemplar's colours, which all albedos are held within; None for as they are.
+        surface: of the automaton's mesh, if it has been built before.
     """
 
     def __init__(
@@ -36,11 +37,12 @@ class Grown:
         look: Look,
         state: torch.Tensor,
         cells: Cells,
-        orientation: float = 0.0,
+        orientation: Turn = 0.0,
         palette: Palette | None = None,
+        surface: Surface | None = None,
     ) -> None:
         self.look, self.cells, self.orientation, self.palette = look, cells, orientation, palette
-        self.surface = Surface(cells.mesh, look.interpolation)
+        self.surface = surface or Surface(cells.mesh, look.interpolation)
         self.table = self.surface.table(state)
 
     @torch.no_grad()
@@ -60,16 +62,13 @@ class Grown:
 
     def at_vertices(self) -> dict[str, np.ndarray]:
         """Maps (V, c) at the vertices of the given mesh."""
-        mesh = self.cells.given
-        face, corner = np.zeros(len(mesh.vertices), np.int32), np.zeros(len(mesh.vertices), np.int64)
-        for k in range(3):
-            face[mesh.faces[:, k]], corner[mesh.faces[:, k]] = np.arange(len(mesh.faces)), k
-        return self._maps(self.values(face, np.eye(3, dtype=np.float32)[corner]))
+        return self.maps(self.values(*self._vertices()))
 
     def asset(self) -> Asset:
         """The given mesh with the maps at its vertices."""
         mesh = self.cells.given
-        return Asset(mesh, self.at_vertices(), tangents(mesh, self.orientation), name=mesh.name)
+        right = self._right(mesh.normals, *self._vertices())
+        return Asset(mesh, self.at_vertices(), right, name=mesh.name)
 
     def textures(self, atlas: Atlas) -> dict[str, np.ndarray]:
         """Maps (N, N, c) on the texels of a layout of the given mesh; the mean where there is no chart."""
@@ -80,8 +79,8 @@ class Grown:
             used = atlas.face[rows] >= 0
             face, barycentric = atlas.face[rows][used], atlas.barycentric[rows][used].clip(0)
             barycentric /= barycentric.sum(axis=1, keepdims=True)
-            for name, values in self._maps(self.values(face, barycentric)).items():
-                detail = self._detail(values, face, barycentric) if name == "normal" else values
+            for name, values in self.maps(self.values(face, barycentric)).items():
+                detail = self.object_normals(values, face, barycentric) if name == "normal" else values
                 images[name][rows][used] = detail
         empty = atlas.face < 0
         for name, image in images.items():
@@ -91,26 +90,34 @@ class Grown:
                 image[empty] = image[~empty].mean(axis=0)
         return images
 
-    def _maps(self, values: np.ndarray) -> dict[str, np.ndarray]:
+    def maps(self, values: np.ndarray) -> dict[str, np.ndarray]:
+        """The columns (P, c) of values (P, K), by map."""
         return {name: values[:, list(columns)] for name, columns in self.look.layout.items()}
 
-    def _detail(self, encoded: np.ndarray, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+    def object_normals(self, encoded: np.ndarray, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """Normals in object space (P, 3) of a normal map's values at points of the given mesh."""
         mesh = self.cells.given
         normals = unit(interpolate(barycentric, mesh.shading_normals[face]))
-        right = _right(normals, self.orientation)
+        right = self._right(normals, face, barycentric)
         x, y, z = (encoded * 2 - 1).T[..., None]
         return x * right + y * np.cross(normals, right) + z * normals
 
+    def _vertices(self) -> tuple[np.ndarray, np.ndarray]:
+        """A face (V,) and barycentrics (V, 3) of each vertex of the given mesh."""
+        mesh = self.cells.given
+        face, corner = np.zeros(len(mesh.vertices), np.int32), np.zeros(len(mesh.vertices), np.int64)
+        for k in range(3):
+            face[mesh.faces[:, k]], corner[mesh.faces[:, k]] = np.arange(len(mesh.faces)), k
+        return face, np.eye(3, dtype=np.float32)[corner]
 
-def tangents(mesh: Mesh, orientation: float = 0.0) -> np.ndarray:
-    """Where the exemplar's right points on the surface, (V, 3) unit.
+    def _right(self, normals: np.ndarray, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """Where the exemplar's right points, (P, 3) unit, at points of the given mesh with these normals.
 
-    Training views have +y up, so right is y x normal; `orientation` turns it about the normal [rad].
-    """
-    return _right(mesh.normals, orientation)
-
-
-def _right(normals: np.ndarray, orientation: float) -> np.ndarray:
-    right = orthonormal(np.cross(np.array([0, 1, 0], normals.dtype), normals), normals)
-    return unit(rotate_about(right, normals, orientation)).astype(np.float32)
+        Training views have +y up, so without a turn right is y x normal.
+        """
+        if not isinstance(self.orientation, np.ndarray):
+            return rightwards(normals, self.orientation).astype(np.float32)
+        mesh = self.cells.mesh
+        right = rightwards(mesh.normals, self.orientation).astype(np.float32)
+        located, weights = self.cells.locate(face, barycentric)
+        return orthonormal(interpolate(weights, right[mesh.faces[located]]), normals).astype(np.float32)

@@ -9,17 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from mitex.errors import ConfigError
-from mitex.geometry.triangles import nearest_on_triangles
+from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh, remesh, subdivide_loop, subdivide_midpoint
+from mitex.mesh.nearest import nearest_points
 from mitex.mesh.subdivide import child_points
 
 ENOUGH_VERTICES = 8_000  # "auto" subdivides until a mesh has them: the training has 10,242
 MOST_LEVELS = 6
 MOST_VERTICES = 4_000_000  # a gigabyte of states
-CANDIDATES = 8  # faces whose distance is computed
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +58,7 @@ class Cells:
         if self.levels is not None:
             return child_points(face, barycentric, self.levels)
         corners = self.given.vertices[self.given.faces[face]]
-        return _nearest(self.mesh, np.einsum("pk,pkd->pd", barycentric, corners))
+        return nearest_points(self.mesh, interpolate(barycentric, corners))
 
 
 def check(mesh: Mesh, subdivide: int | str, scale: float) -> int:
@@ -81,17 +80,3 @@ def check(mesh: Mesh, subdivide: int | str, scale: float) -> int:
     if len(mesh.vertices) * 4**levels * max(1 / scale**2, 1) > MOST_VERTICES:
         raise ConfigError(f"a mesh of more than {MOST_VERTICES:,} vertices", "subdivide less")
     return levels
-
-
-def _nearest(mesh: Mesh, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The points of a mesh that are nearest to points (P, 3), among the faces with the nearest centres."""
-    corners = mesh.vertices[mesh.faces].astype(np.float64)
-    count = min(CANDIDATES, len(corners))
-    _, faces = KDTree(corners.mean(axis=1)).query(points, k=count, workers=-1)
-    faces = np.asarray(faces).reshape(len(points), count)
-    best, face, barycentric = np.full(len(points), np.inf), faces[:, 0].copy(), np.zeros((len(points), 3))
-    for candidate in faces.T:
-        weights, distance = nearest_on_triangles(corners[candidate], points)
-        closer = distance < best
-        best[closer], face[closer], barycentric[closer] = distance[closer], candidate[closer], weights[closer]
-    return face.astype(np.int32), barycentric.astype(np.float32)

@@ -10,7 +10,7 @@ from tyro.conf import arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
-from mitex.methods.nca.ranges import MOST_STEPS, TILE_CELLS, TILE_SIDES
+from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS, TILE_CELLS, TILE_SIDES
 from mitex.methods.options import EXPORTS, PICTURES, ExemplarOptions, OptionalMeshOptions
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 RESOLUTION = 1024  # of baked textures [texels]
 MOST_VARIANTS = 32
+FIELD_FILES = (".npy", ".ply", ".json")
 
 
 @dataclass(kw_only=True)
@@ -31,15 +32,20 @@ class Fit(ExemplarOptions):
       mitex fit nca --exemplar pebbles.png --out runs/pebbles
       mitex fit nca --exemplar cobblestone --steps 300 --set hidden=96
       mitex fit nca --exemplar maps/ --preset paper --out runs/paper
+      mitex fit nca --exemplar lava --init lava --motion right --out runs/flowing
       mitex fit nca --exemplar pebbles.png --out runs/pebbles --resume
       mitex fit nca --settings --preset paper
     """
 
-    preset: Annotated[str | None, arg(metavar="patch|paper", help_behavior_hint="(default: patch)")] = None
-    """Settings to start from: `patch` is fast, `paper` follows the publication."""
+    preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: patch)")] = None
+    """Settings to start from: `patch` is fast, `paper` follows the publication; `motion` (the default with
+    --motion) and `motion-paper` likewise, for textures that move."""
 
     init: Annotated[str | None, arg(metavar="MODEL|RUN", help_behavior_hint="")] = None
-    """Start from the weights of a model or a run."""
+    """Start from the weights of a model or a run; of the still texture, for one that shall move."""
+
+    motion: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="")] = None
+    """Vector field that the texture learns to move along, by name (right, up, about-y ...) or direction."""
 
     device: Annotated[
         Literal["cpu", "cuda"] | None, arg(metavar="cpu|cuda", help_behavior_hint="(default: cpu)")
@@ -59,7 +65,7 @@ class Fit(ExemplarOptions):
         from mitex.methods import nca
 
         with self.progress() as on_step:
-            nca.fit(exemplar, out, init=self.init, on_step=on_step, **options)
+            nca.fit(exemplar, out, init=self.init, motion=self.motion, on_step=on_step, **options)
         print(out)
 
 
@@ -85,11 +91,17 @@ class Apply(OptionalMeshOptions):
     subdivide: Annotated[str, arg(metavar="auto|N")] = "auto"
     """How often to subdivide the automaton's copy of the mesh; auto: to the training's density."""
 
-    orientation: Annotated[float, arg(metavar="DEG")] = 0.0
-    """Turns the texture on the surface [degrees]."""
+    orientation: Annotated[str, arg(metavar="DEG|FIELD")] = "0"
+    """Turns the texture on the surface [degrees], or lets its up follow a vector field (as of --field)."""
 
     scale: Annotated[float, arg(metavar="X")] = 1.0
     """Size of the pattern."""
+
+    field: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="(default: the training's)")] = None
+    """Vector field that a moving texture follows: a name, a direction, or a file (.npy .ply .json)."""
+
+    speed: Annotated[float, arg(metavar="X")] = 1.0
+    """Speed of a moving texture, as a factor of the field."""
 
     resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {RESOLUTION})")] = None
     """Side of the baked textures [texels]."""
@@ -112,13 +124,14 @@ class Apply(OptionalMeshOptions):
     """Cells along a side of the tile; more make the pattern finer."""
 
     def check(self) -> None:
-        self._levels()
+        levels(self.subdivide)
         in_range("--variants", self.variants, 1, MOST_VARIANTS)
         in_range("--seed", self.seed, *SEEDS)
         in_range("--seed", self.seed + self.variants - 1, *SEEDS)
         in_range("--steps", self.steps, 1, MOST_STEPS)
-        in_range("--orientation", self.orientation, -360.0, 360.0)
+        oriented(self.orientation)
         in_range("--scale", self.scale, 0.05, 20.0)
+        in_range("--speed", self.speed, *SPEEDS)
         in_range("--resolution", self.resolution, 64, 8192)
         mutually_exclusive(
             "--resolution", "--vertex-colors", self.resolution is not None and self.vertex_colors
@@ -138,7 +151,7 @@ class Apply(OptionalMeshOptions):
         others = {
             "--mesh": self.mesh is not None,
             "--subdivide": self.subdivide != "auto",
-            "--orientation": self.orientation != 0,
+            "--orientation": oriented(self.orientation) != 0,
             "--scale": self.scale != 1,
             "--resolution": self.resolution is not None,
             "--vertex-colors": self.vertex_colors,
@@ -149,6 +162,9 @@ class Apply(OptionalMeshOptions):
             mutually_exclusive("--tile", option, used)
         place = Path(self.out)
         reject_unused("--tile", place, place.suffix.lower() in EXPORTS + PICTURES)
+
+    def inputs(self) -> list[Path | str]:
+        return [*super().inputs(), *field_files(self.field, self.orientation)]
 
     def prepared(self) -> Path:
         if self.tile is None:
@@ -175,7 +191,8 @@ class Apply(OptionalMeshOptions):
 
         if self.tile is not None:
             texture = NcaTexture.load(self.model)
-            maps = texture.tile(self.tile, cells=self.tile_cells, seed=self.seed, steps=self.steps)
+            motion = {"field": self.field, "speed": self.speed}
+            maps = texture.tile(self.tile, cells=self.tile_cells, seed=self.seed, steps=self.steps, **motion)
             write_maps(maps, out, self.maps_format)
         elif self.variants > 1:
             from mitex.mesh import Mesh
@@ -204,16 +221,43 @@ class Apply(OptionalMeshOptions):
         textures = out.suffix.lower() != ".ply" and not self.vertex_colors
         return {
             "steps": self.steps,
-            "subdivide": self._levels(),
-            "orientation": self.orientation,
+            "subdivide": levels(self.subdivide),
+            "orientation": oriented(self.orientation),
             "scale": self.scale,
             "resolution": (self.resolution or RESOLUTION) if textures else None,
             "keep_dense": self.keep_dense,
+            "field": self.field,
+            "speed": self.speed,
         }
 
-    def _levels(self) -> int | str:
-        if self.subdivide == "auto":
-            return "auto"
-        if self.subdivide not in list("0123456"):
-            raise ConfigError(f"--subdivide cannot be {self.subdivide!r}", "use auto or a number from 0 to 6")
-        return int(self.subdivide)
+
+def field_files(*fields: str | None) -> list[str]:
+    """The files that --field and --orientation name, if they do."""
+    return [field for field in fields if field and Path(field).suffix.lower() in FIELD_FILES]
+
+
+def oriented(orientation: str) -> float | str:
+    """What --orientation means: an angle [degrees], or a vector field.
+
+    Raises:
+        ConfigError: an angle out of range.
+    """
+    try:
+        angle = float(orientation)
+    except ValueError:
+        return orientation
+    in_range("--orientation", angle, -360.0, 360.0)
+    return angle
+
+
+def levels(subdivide: str) -> int | str:
+    """What --subdivide means.
+
+    Raises:
+        ConfigError: neither auto nor a number of levels.
+    """
+    if subdivide == "auto":
+        return "auto"
+    if subdivide not in list("0123456"):
+        raise ConfigError(f"--subdivide cannot be {subdivide!r}", "use auto or a number from 0 to 6")
+    return int(subdivide)

@@ -90,6 +90,18 @@ class NcaConfig(TrainingConfig):
     milestones: tuple[int, ...] = key((500, 750), "steps at which the learning rate falls", 0)
     decay: float = key(0.3, "factor of the learning rate at a milestone", 0)
     normalise_gradients: bool = key(True, "divide each parameter tensor's gradient by its norm")
+    motion: str = key("", "vector field that the texture moves along, by name or direction; empty for none")
+    motion_encoding: bool = key(True, "whether cells know the field at their place (MPE)")
+    motion_estimator: Literal["advection", "flow", "lucas-kanade"] = key(
+        "advection", "what tells how it moves: the states themselves, or pictures of the albedo"
+    )
+    motion_gamma: float = key(1.5, "of the direction in the loss of pictures", 0)
+    motion_weight: float = key(2.0, "of the motion loss (lambda)", 0)
+    motion_period: float = key(8.0, "automaton steps in which a vector of length 1 is one edge (T)", 1)
+    motion_steps: int = key(8, "automaton steps between the states that are compared", 1, 4096)
+    motion_start: int = key(0, "training step from which on motion counts", 0)
+    motion_turns: bool = key(True, "another rotation of the field in each step")
+    motion_speeds: tuple[float, ...] = key((0.5, 1.5), "least and most factor of the field in a step", 0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -112,6 +124,8 @@ class NcaConfig(TrainingConfig):
         unknown = [name for name in self.coordinates if name not in COORDINATES]
         if unknown:
             raise ConfigError(f"coordinates holds {unknown}", f"use some of {', '.join(COORDINATES)}")
+        if len(self.motion_speeds) != 2 or self.motion_speeds[0] > self.motion_speeds[1]:
+            raise ConfigError(f"motion_speeds holds {self.motion_speeds}", "give the least and the most")
         if not self.wave_frequencies:
             raise ConfigError("wave_frequencies holds nothing", "give one or more [cycles per edge]")
 
@@ -157,3 +171,27 @@ PRESETS = {
         milestones=(1000, 2000),
     ),
 }
+PRESETS["motion"] = replace(
+    DEFAULT,
+    preset="motion",
+    steps=600,
+    pool=32,
+    milestones=(350, 500),
+    motion="right",
+)
+PRESETS["motion-paper"] = replace(
+    PRESETS["paper"],
+    preset="motion-paper",
+    channels=32,
+    min_steps=32,
+    max_steps=64,
+    resolution=128,
+    distance=2.0,
+    motion="right",
+    motion_estimator="flow",
+    motion_weight=0.67,
+    motion_period=24.0,
+    motion_steps=64,
+    motion_turns=False,
+    motion_speeds=(1.0, 1.0),
+)

@@ -21,7 +21,7 @@ from mitex.methods.nca import METHOD
 from mitex.methods.nca.config import DECODER_KEYS, NcaConfig
 from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.decoder.shape import DecoderShape
-from mitex.methods.nca.look import STATE_CHANNELS, Look
+from mitex.methods.nca.look import STATE_CHANNELS, Look, weights_key
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import HARMONICS
@@ -49,7 +49,8 @@ def load(source: str | Path) -> tuple[Look, dict[str, Any]]:
     """Reads a look by file, run folder or bundled name.
 
     Returns:
-        The look, and what is known about it; `maps` and `name` are always there.
+        The look, and what is known about it; `maps`, `name` and `family` are always there. The family of a
+        look that was trained from nothing is its own weights' hash, which those trained from it inherit.
 
     Raises:
         CheckpointError: nothing there, not a model, or weights of an impossible shape.
@@ -70,7 +71,7 @@ def load(source: str | Path) -> tuple[Look, dict[str, Any]]:
     own = {RULE + name if name in METHOD.tensors else name: value for name, value in tensors.items()}
     bounds = {name: getattr(look, name) for name in ("low", "high")}  # which the authors' weights lack
     _fill(look, bounds | own, path)
-    return look, about
+    return look, {"family": weights_key(look)} | about
 
 
 def _from_checkpoint(state: checkpoint.Checkpoint, path: Path) -> tuple[Look, dict[str, Any]]:
@@ -84,7 +85,7 @@ def _from_checkpoint(state: checkpoint.Checkpoint, path: Path) -> tuple[Look, di
             f"'{path}' does not hold a MeshNCA model ({e})", "give a run of mitex fit nca"
         ) from e
     _fill(look, {k[6:]: v for k, v in state.task.items() if k.startswith("model.")}, path)
-    return look, about
+    return look, {"family": state.metadata.get("family", weights_key(look))} | about
 
 
 def _shape(text: str, path: Path) -> DecoderShape:

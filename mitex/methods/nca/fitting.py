@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -10,13 +9,15 @@ from mitex.errors import CheckpointError
 from mitex.exemplar import Exemplar
 from mitex.methods.nca import files
 from mitex.methods.nca.config import PRESETS, NcaConfig
-from mitex.methods.nca.decoder.decoder import Decoder
-from mitex.methods.nca.look import Look
+from mitex.methods.nca.look import Look, traits
+from mitex.methods.nca.motion.start import check_field, moving, with_condition
+from mitex.methods.nca.motion.task import MotionTask
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.settling import settling_steps
 from mitex.methods.nca.task import NcaTask
 from mitex.methods.nca.texture import NcaTexture
 from mitex.training.fit import Run
+from mitex.training.locate import CHECKPOINT, PREVIOUS, header
 from mitex.training.settings import RunOptions
 
 
@@ -25,6 +26,7 @@ def fit(
     out: str | Path | None = None,
     *,
     init: str | Path | None = None,
+    motion: str | None = None,
     **options: Unpack[RunOptions],
 ) -> NcaTexture:
     """Trains a MeshNCA on an exemplar; writes a run folder with the texture in it.
@@ -32,8 +34,11 @@ def fit(
     Args:
         exemplar: maps, or what `Exemplar.load` takes.
         out: run folder; must be new or empty, or hold a run to resume; None writes no file.
-        init: model to start from: the parent, if the two shall be graftable (section 4.4).
-        options: preset ("patch" or "paper"), and those of `RunOptions`.
+        init: model to start from: the parent, if the two shall be graftable (section 4.4), or the still look
+            of a moving one.
+        motion: the vector field that the texture learns to move along, by name or direction (see
+            `mitex.mesh.fields`); the preset is then "motion" unless another is named.
+        options: preset ("patch", "paper", "motion" or "motion-paper"), and those of `RunOptions`.
 
     Returns:
         The texture, also saved as `texture.safetensors` in `out` if that is given.
@@ -43,22 +48,26 @@ def fit(
         Cancelled: by `cancel`; a checkpoint has been saved if there is a folder.
         Interrupted: by Ctrl-C, likewise.
     """
-    run = Run.of(PRESETS, out, **options)
+    run = Run.of(PRESETS, out, **(options if motion is None else moving(options, motion)))
     config = run.config
+    if config.motion:
+        check_field(config.motion)
     maps = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
     origin: dict[str, Any] = {"exemplar": maps.name, "density": config.density}
     if "albedo" in maps.maps:
         origin["palette"] = Palette.of(maps.maps["albedo"]).record()
-    parent = None
+    parent, lineage = None, _lineage(run)
     if init is not None:
         parent, about = _parent(init, config, sorted(maps.maps))
-        origin["parent"] = str(about["name"])
-    task = NcaTask(config, maps, parent)
+        lineage = {"parent": str(about["name"]), "family": about["family"]}
+    if config.motion:
+        origin |= {"motion": config.motion, "motion_period": config.motion_period}
+    task = (MotionTask if config.motion else NcaTask)(config, maps, parent, lineage)
 
     def texture(about: dict[str, Any]) -> NcaTexture:
         look = task.look.to("cpu")
         steps = settling_steps(look, task.exemplar, config.density)
-        return NcaTexture(look, about | origin | {"growth_steps": steps})
+        return NcaTexture(look, about | origin | lineage | {"growth_steps": steps})
 
     return run.train(
         task,
@@ -73,7 +82,9 @@ def fit(
 
 def _parent(init: str | Path, config: NcaConfig, maps: list[str]) -> tuple[Look, dict[str, Any]]:
     parent, about = files.load(init)
-    theirs, ours = (_traits(look) for look in (parent, Look.of(config, maps)))
+    if config.motion and config.motion_encoding and not parent.rule.condition:
+        parent = with_condition(parent)
+    theirs, ours = (traits(look) for look in (parent, Look.of(config, maps)))
     differing = sorted(name for name in theirs | ours if theirs.get(name) != ours.get(name))
     if differing:
         raise CheckpointError(
@@ -83,8 +94,10 @@ def _parent(init: str | Path, config: NcaConfig, maps: list[str]) -> tuple[Look,
     return parent, about
 
 
-def _traits(look: Look) -> dict[str, Any]:
-    """What two looks must have in common for the weights of one to mean the same in the other."""
-    traits: dict[str, Any] = {"maps": look.maps, "aggregation": look.mean}
-    traits |= {name: tuple(value.shape) for name, value in look.state_dict().items()}
-    return traits | (asdict(look.decoder.shape) if isinstance(look.decoder, Decoder) else {})
+def _lineage(run: Run[NcaConfig]) -> dict[str, str]:
+    """What a run that is resumed has begun from."""
+    if not run.resume or run.folder is None:
+        return {}
+    heads = [head for name in (CHECKPOINT, PREVIOUS) if (head := header(run.folder / name))]
+    texts = heads[0][1] if heads else {}
+    return {key: texts[f"task.{key}"] for key in ("parent", "family") if f"task.{key}" in texts}

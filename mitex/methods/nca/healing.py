@@ -9,43 +9,29 @@ import torch
 
 from mitex.errors import TextureWarning
 from mitex.mesh import Mesh
-from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
-from mitex.methods.nca.look import Look
-from mitex.methods.nca.palette import Palette
-from mitex.methods.nca.perception import Perception
+from mitex.methods.nca.growth import Growth
 
 ROUNDS, STEPS = 3, 60  # of growing anew, and the automaton's steps in each
 RINGS = 3  # of neighbours that start anew too
 
 
 @torch.no_grad()
-def healed(
-    look: Look,
-    state: torch.Tensor,
-    cells: Cells,
-    operator: Perception,
-    palette: Palette,
-    generator: torch.Generator,
-) -> torch.Tensor:
+def healed(growth: Growth, state: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
     """A state (V, C) in which places of foreign colours were set back to the seed and have grown again.
 
     A rule that was trained to grow from the seed and to keep its pattern repairs what is taken away. Where
     foreign colours stay after all rounds, a `TextureWarning` says how much of the mesh has them. Only regions
     count, see `inner`.
     """
-    own = Cells(cells.mesh, 0, cells.mesh)
-
-    def foreign() -> np.ndarray:
-        return palette.unlike(Grown(look, state, own).at_vertices()["albedo"])
-
+    cells = growth.cells
     for _ in range(ROUNDS):
-        places = foreign()
+        places = growth.foreign(state)
         if not inner(cells.mesh, places).any():
             return state
         state = torch.where(torch.from_numpy(_around(cells, places))[:, None], 0.0, state)
-        state = look.evolve(state[None], operator, STEPS, generator)[0]
-    places = foreign()
+        state = growth.evolve(state, STEPS, generator)
+    places = growth.foreign(state)
     if inner(cells.mesh, places).any():
         warnings.warn(
             f"{places.mean():.1%} of '{cells.given.name}' has colours that the exemplar does not have; "

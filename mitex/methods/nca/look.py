@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import deepcopy
+from dataclasses import asdict
+from typing import Any
 
 import torch
 from torch import nn
 
+from mitex.cache import content_key
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.decoder.decoder import Decoder, Readout
 from mitex.methods.nca.decoder.shape import DecoderShape
@@ -62,7 +65,8 @@ class Look(nn.Module):
     @staticmethod
     def of(config: NcaConfig, maps: Sequence[str]) -> Look:
         """With the shapes of a config, and no weights yet."""
-        rule = MeshNCA(config.channels, config.hidden, degree=config.degree)
+        condition = 3 if config.motion and config.motion_encoding else 0
+        rule = MeshNCA(config.channels, config.hidden, condition, config.degree)
         shape = config.decoder_shape if config.decoder else None
         return Look(rule, maps, shape, config.aggregation == "mean")
 
@@ -96,17 +100,42 @@ class Look(nn.Module):
         self.high.lerp_(state.amax(0), RATE)
 
     def evolve(
-        self, state: torch.Tensor, operator: Perception, steps: int, generator: torch.Generator
+        self,
+        state: torch.Tensor,
+        operator: Perception,
+        steps: int,
+        generator: torch.Generator,
+        condition: torch.Tensor | None = None,
     ) -> torch.Tensor:
-        """`steps` steps of the rule from a state (B, V, C), held within the bounds after each."""
+        """`steps` steps of the rule from a state (B, V, C), held within the bounds after each; `condition` as
+        of `MeshNCA.step`.
+        """
         for step in range(steps):
             announce("growing the texture", step, steps)
-            state = self.bounded(self.rule.evolve(state, operator, 1, generator))
+            state = self.bounded(self.rule.evolve(state, operator, 1, generator, condition))
         return state
 
     def bounded(self, state: torch.Tensor) -> torch.Tensor:
         """The state (..., C) held where the training's states were: on meshes unlike the sphere it may grow
         without an end, as nothing has taught the rule to come back.
         """
-        margin = MARGIN * (self.high - self.low)
-        return torch.minimum(torch.maximum(state, self.low - margin), self.high + margin)
+        return held(state, self.low, self.high)
+
+
+def held(state: torch.Tensor, low: torch.Tensor, high: torch.Tensor) -> torch.Tensor:
+    """States (..., C) within bounds (..., C) and a margin beyond them."""
+    margin = MARGIN * (high - low)
+    return torch.minimum(torch.maximum(state, low - margin), high + margin)
+
+
+def traits(look: Look) -> dict[str, Any]:
+    """What two looks must have in common for the weights of one to mean the same in the other."""
+    traits: dict[str, Any] = {"maps": look.maps, "aggregation": look.mean}
+    traits |= {name: tuple(value.shape) for name, value in look.state_dict().items()}
+    return traits | (asdict(look.decoder.shape) if isinstance(look.decoder, Decoder) else {})
+
+
+def weights_key(look: Look) -> str:
+    """A hash of all weights of a look."""
+    parts = ((name, value.numpy(force=True)) for name, value in sorted(look.state_dict().items()))
+    return content_key(*(part for pair in parts for part in pair))[:12]

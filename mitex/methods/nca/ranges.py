@@ -4,6 +4,7 @@ TILE_CELLS = (8, 1024)  # along a side of a tile
 TILE_SIDES = (16, 8192)  # of its maps [px]
 REPEATS = 2  # of the exemplar along a flat square, unless something else is said
 MOST_STEPS = 10_000  # of the automaton
+SPEEDS = (0.0, 10.0)  # of a moving texture
 
 
 def square_cells(density: float) -> int:

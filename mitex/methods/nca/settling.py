@@ -26,7 +26,7 @@ def settling_steps(look: Look, exemplar: Exemplar, density: float) -> int:
     average; the most if they never are (`mitex.evaluation.regularity`).
 
     Args:
-        look: a trained rule and decoder, without a condition.
+        look: a trained rule and decoder; one that moves is looked at while it moves to the right.
         exemplar: its maps.
         density: cells along the exemplar's width.
     """
@@ -34,9 +34,12 @@ def settling_steps(look: Look, exemplar: Exemplar, density: float) -> int:
     goal = np.mean([regularity(maps[name]) for name in look.layout])
     plane = TrainingPlane.of(square_cells(density), look)
     generator = torch.Generator().manual_seed(0)
+    right = None
+    if look.rule.condition:
+        right = torch.from_numpy(plane.axes[:1].astype(np.float32)).expand(plane.perception.vertices, -1)
     state, age = look.rule.seed(plane.perception), 0
     for steps in STEPS:
-        state = look.evolve(state, plane.perception, steps - age, generator)
+        state = look.evolve(state, plane.perception, steps - age, generator, right)
         age = steps
         if _regularity(plane.whole(look, state[0], REPEATS * SIDE), look) >= goal:
             break

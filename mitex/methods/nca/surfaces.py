@@ -97,6 +97,23 @@ class TrainingSphere:
 
 
 @dataclass(frozen=True, eq=False)
+class Windows:
+    """Squares of a flat square.
+
+    Attributes:
+        corners: (K, 2) float64, lower left ones, x and y [periods].
+        width: of each [periods].
+        pixels: height and width of each [px].
+        antialias: n for n x n samples in each pixel.
+    """
+
+    corners: np.ndarray
+    width: float
+    pixels: int
+    antialias: int = 1
+
+
+@dataclass(frozen=True, eq=False)
 class TrainingPlane:
     """A flat square on which states grow, its opposite sides joined.
 
@@ -120,40 +137,41 @@ class TrainingPlane:
         operator = lattice_perception(lattice, look.rule.degree, look.mean, look.device)
         return TrainingPlane(lattice, operator, Surface(lattice.mesh, look.interpolation, look.device))
 
+    @property
+    def axes(self) -> np.ndarray:
+        """(2, 3) float64 unit vectors to the right and up in the square, in the space of the mesh."""
+        origin, right = self.lattice.mesh.vertices[:2].astype(np.float64)
+        return np.stack([right - origin, [0.0, 1.0, 0.0]])
+
     def patches(
         self, look: Look, state: torch.Tensor, closeups: CloseUps, generator: torch.Generator
     ) -> torch.Tensor:
         """As of `TrainingSphere`; within the square, as the decoder's waves do not repeat."""
+        return self.windows(look, state, self.places(closeups, generator))
+
+    def places(self, closeups: CloseUps, generator: torch.Generator) -> Windows:
+        """The windows of `patches`."""
         periods = closeups.width / self.lattice.columns
         share = min(1 / periods, 1.0)
         width = share * periods
-        corners = torch.rand(closeups.count, 2, generator=generator, dtype=torch.float64).numpy() * (
-            1 - width
-        )
-        return self._windows(look, state, corners, width, closeups.pixels(share), closeups.antialias)
+        corners = torch.rand(closeups.count, 2, generator=generator, dtype=torch.float64).numpy()
+        return Windows(corners * (1 - width), width, closeups.pixels(share), closeups.antialias)
 
     def whole(self, look: Look, state: torch.Tensor, resolution: int) -> torch.Tensor:
         """All of the square, (H, W, C)."""
-        return self._windows(look, state, np.zeros((1, 2)), 1.0, resolution, 2)[0]
+        return self.windows(look, state, Windows(np.zeros((1, 2)), 1.0, resolution, 2))[0]
 
-    def _windows(
-        self,
-        look: Look,
-        state: torch.Tensor,
-        corners: np.ndarray,
-        width: float,
-        resolution: int,
-        antialias: int,
-    ) -> torch.Tensor:
-        """Images (K, H, W, C) of squares with lower left corners (K, 2) and a width, in periods."""
+    def windows(self, look: Look, state: torch.Tensor, windows: Windows) -> torch.Tensor:
+        """Images (K, H, W, C) of a state (V, C) in windows."""
+        resolution, antialias = windows.pixels, windows.antialias
         samples = resolution * antialias
-        steps = (np.arange(samples) + 0.5) * (width / samples)
+        steps = (np.arange(samples) + 0.5) * (windows.width / samples)
         grid = np.stack(np.meshgrid(steps, steps[::-1]), axis=2)
-        face, barycentric = self.lattice.locate((corners[:, None, None] + grid).reshape(-1, 2))
+        face, barycentric = self.lattice.locate((windows.corners[:, None, None] + grid).reshape(-1, 2))
         points = Points(torch.from_numpy(face), torch.from_numpy(barycentric))
         table = self.surface.table(state[torch.from_numpy(self.lattice.source)])
         values = look.decoder(self.surface, table, points)
-        sides = (len(corners), resolution, antialias, resolution, antialias, -1)
+        sides = (len(windows.corners), resolution, antialias, resolution, antialias, -1)
         return values.view(sides).mean((2, 4))
 
 

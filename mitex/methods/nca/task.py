@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -33,6 +35,13 @@ SMALLEST = 128  # side of the exemplar at the coarsest zoom [px], at least: a qu
 PREVIEW = 256  # side of a preview's pictures [px]
 
 
+class Rollout(NamedTuple):
+    """A state that has evolved, (1, V, C), and what its way adds to the loss, by name."""
+
+    state: torch.Tensor
+    terms: dict[str, torch.Tensor]
+
+
 class NcaTask:
     """Trains a look: states from a pool evolve on surfaces, and their views are compared at several zooms.
 
@@ -40,13 +49,20 @@ class NcaTask:
         config: settings.
         exemplar: maps to learn.
         init: what to start from; None draws new weights from the seed.
+        lineage: name of the model to start from, and its family, for the checkpoint.
     """
 
-    def __init__(self, config: NcaConfig, exemplar: Exemplar, init: Look | None = None) -> None:
+    def __init__(
+        self,
+        config: NcaConfig,
+        exemplar: Exemplar,
+        init: Look | None = None,
+        lineage: Mapping[str, str] | None = None,
+    ) -> None:
         device = available_device(config.device)
         keep_freed_memory()
         announce("preparing spheres and the exemplar")
-        self.config = config
+        self.config, self.lineage = config, dict(lineage or {})
         self.exemplar = exemplar.resized(min(config.exemplar_size, *exemplar.size))
         self.maps = sorted(exemplar.maps)
         self.look = Look.of(config, self.maps)
@@ -96,7 +112,7 @@ class NcaTask:
         if step % config.inject_every == 0:
             state = torch.zeros_like(state)
         steps = int(torch.randint(config.min_steps, config.max_steps + 1, (), generator=generator))
-        state = self.look.rule.evolve(state, surface.perception, steps, generator)
+        state, further = self.rollout(surface, state, step, steps, generator)
         terms: dict[str, list[torch.Tensor]] = {"appearance": [], "relief": []}
         for size, appearance in self.zooms.items():
             views = self.views(surface, state[0], size, generator)
@@ -104,13 +120,24 @@ class NcaTask:
             if self.relief and isinstance(surface, TrainingPlane):  # on spheres, "right" turns in a view
                 terms["relief"].append(config.relief_weight * self.relief(views, size))
         means = {name: torch.stack(values).mean() for name, values in terms.items() if values}
-        means["overflow"] = overflow_loss(state)
+        means |= {"overflow": overflow_loss(state)} | further
         weights = {"overflow": config.overflow_weight}
         return Step(
             torch.stack([weights.get(name, 1.0) * mean for name, mean in means.items()]).sum(),
             {name: mean.item() for name, mean in means.items()},
             partial(self._put_back, index, state.detach()[0]),
         )
+
+    def rollout(
+        self,
+        surface: TrainingSurface,
+        state: torch.Tensor,
+        step: int,
+        steps: int,
+        generator: torch.Generator,
+    ) -> Rollout:
+        """A state (1, V, C) of the pool after some steps of the rule, in a training step."""
+        return Rollout(self.look.rule.evolve(state, surface.perception, steps, generator), {})
 
     def _put_back(self, index: int, state: torch.Tensor) -> None:
         self.pool[index, : len(state)], self._touched[index] = state, True
@@ -130,16 +157,16 @@ class NcaTask:
         """The views (K, H, W, C) of one step in which the exemplar is `size` [px] wide."""
         if isinstance(surface, TrainingSphere):
             return surface.views(self.look, state, self.cameras(surface, size, generator))
-        return surface.patches(self.look, state, self._closeups(size), generator)
+        return surface.patches(self.look, state, self.closeups(size), generator)
 
     def cameras(self, sphere: TrainingSphere, size: int, generator: torch.Generator) -> Cameras:
         """The cameras of `views`."""
         config = self.config
         if config.views == "full":
             return random_views(generator, config.view_count, config.distance, config.fov, config.resolution)
-        return sphere.cameras(self._closeups(size), generator)
+        return sphere.cameras(self.closeups(size), generator)
 
-    def _closeups(self, size: int) -> CloseUps:
+    def closeups(self, size: int) -> CloseUps:
         """Those of one step in which the exemplar is `size` [px] wide."""
         config = self.config
         return CloseUps(config.density * config.resolution / size, config.view_count, config.resolution)
@@ -180,7 +207,7 @@ class NcaTask:
 
     def metadata(self) -> dict[str, str]:
         exemplar = {"exemplar": self.exemplar.name, "exemplar_key": self.exemplar.key}
-        return {"method": "nca", "maps": ",".join(self.maps)} | exemplar
+        return {"method": "nca", "maps": ",".join(self.maps)} | exemplar | self.lineage
 
 
 def _padded(view: torch.Tensor, side: int) -> np.ndarray:

@@ -1,8 +1,9 @@
-"""A learned texture: the cell rule, and putting what it grows on any mesh."""
+"""Learned textures: the cell rule, and putting what it grows on any mesh."""
 
 from __future__ import annotations
 
-import math
+import os
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,13 +17,16 @@ from mitex.atlas import Atlas, laid_out
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh
 from mitex.methods.nca import files
-from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.field import fields
+from mitex.methods.nca.film import Shooting, film
+from mitex.methods.nca.growth import Growth, LookGrowth
 from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look
+from mitex.methods.nca.motion.condition import Field, cell_vectors, flat_vectors, followed_field
+from mitex.methods.nca.orientation import Orientation, Turn, cell_turns
 from mitex.methods.nca.palette import Palette
-from mitex.methods.nca.perception import Perception, lattice_perception, perception
+from mitex.methods.nca.perception import lattice_perception
 from mitex.methods.nca.ranges import MOST_STEPS, square_cells
 from mitex.methods.nca.tile import flat_cells, tile_maps
 from mitex.progress import announce
@@ -32,8 +36,150 @@ STEPS = 200  # of models that do not say it; enough to cover a surface
 DENSITY = 32.0  # cells along the exemplar's width, of models that do not say it
 
 
+class GrowingTexture(ABC):
+    """What automata grow on any mesh: a texture that was learned, or two of them grafted.
+
+    Attributes:
+        about: how it was made, as JSON values; name at least.
+    """
+
+    about: Mapping[str, Any]
+
+    @property
+    @abstractmethod
+    def steps(self) -> int:
+        """Of the automaton, until the pattern is in order."""
+
+    @abstractmethod
+    def condition(
+        self,
+        cells: Cells,
+        field: Field | None = None,
+        speed: float = 1.0,
+        orientation: Turn = 0.0,
+        given: Mesh | None = None,
+    ) -> torch.Tensor | None:
+        """What the cells are told of a vector field, (V, 3); None for a texture that does not move.
+
+        Args:
+            cells: the automaton's mesh.
+            field: see `mitex.mesh.fields`; None for the one that the texture was trained with.
+            speed: factor of the field, whose mean length is 1.
+            orientation: of the texture.
+            given: whose vertices the vectors of a file or an array belong to; None for `cells.given`.
+
+        Raises:
+            ConfigError: a field of a texture that does not move, or one that cannot be used on the mesh.
+        """
+
+    @abstractmethod
+    def growth(self, cells: Cells, orientation: Turn = 0.0, condition: torch.Tensor | None = None) -> Growth:
+        """The automaton on a mesh, its texture turned; with the cells' `condition`."""
+
+    def apply(
+        self,
+        mesh: Mesh,
+        *,
+        seed: int = 0,
+        steps: int | None = None,
+        subdivide: int | str = "auto",
+        orientation: Orientation = 0.0,
+        scale: float = 1.0,
+        resolution: int | None = 1024,
+        keep_dense: bool = False,
+        field: Field | None = None,
+        speed: float = 1.0,
+    ) -> Asset:
+        """Grows the texture on a mesh.
+
+        The automaton runs on a subdivided copy of the mesh; the size of the pattern follows the density of
+        its vertices: each level of subdivision halves it.
+
+        Args:
+            mesh: any mesh; near-uniform edges and valence 6 give the best texture (`mitex.mesh.quality`).
+            seed: of the random updates.
+            steps: of the automaton; None for as many as the model's pattern needs to be in order.
+            subdivide: levels of subdivision, or "auto": as many as bring the copy to 8,000 vertices.
+            orientation: turns the texture about the normals, counter-clockwise [degrees]; or a vector field
+                that its up follows, see `mitex.mesh.fields`.
+            scale: size of the pattern, 1 for what the density gives; others need a remeshing of the copy to
+                the fitting density (extra `remesh`).
+            resolution: of the baked textures [texels], on the mesh's own UVs if nothing in them overlaps,
+                else on new ones. None leaves the maps at the vertices.
+            keep_dense: returns the finer mesh itself, rounded by Loop subdivision, instead of the given one.
+            field: vector field that a moving texture follows, see `mitex.mesh.fields`; None for the one that
+                it was trained with.
+            speed: factor of the field, whose mean length is 1.
+
+        Returns:
+            An asset on the given mesh, with one map per learned map.
+
+        Raises:
+            ConfigError: options out of range, a field of a texture that does not move, or one that cannot be
+                used on the mesh.
+            MeshError: the mesh cannot be remeshed.
+        """
+        laid = mesh if resolution is None or (keep_dense and scale != 1.0) else laid_out(mesh, resolution)
+        announce("preparing the mesh")
+        cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
+        turn = cell_turns(orientation, cells.mesh, mesh)
+        growth = self.growth(cells, turn, self.condition(cells, field, speed, turn, mesh))
+        grown = growth.shown(_healthy(growth, seed, self.steps if steps is None else steps))
+        asset = grown.asset()
+        if resolution is None:
+            return asset
+        atlas = Atlas.build(cells.given, resolution, max(min(8, resolution // 8), 1), cells.given.uv)
+        return replace(asset, atlas=atlas, texture_maps=grown.textures(atlas))
+
+    def animate(
+        self,
+        mesh: Mesh,
+        path: str | os.PathLike[str],
+        *,
+        seed: int = 0,
+        subdivide: int | str = "auto",
+        orientation: Orientation = 0.0,
+        scale: float = 1.0,
+        field: Field | None = None,
+        speed: float = 1.0,
+        resume: bool = False,
+        **shooting: Any,
+    ) -> Path:
+        """Films the texture as it grows, changes, or heals, before a camera that stays.
+
+        Args:
+            mesh: any mesh.
+            path: of the film: .mp4, .gif, or a new folder for its frames as PNG.
+            seed, subdivide, orientation, scale, field, speed: as of `apply`.
+            resume: goes on with a film that was interrupted, whose frames are in a hidden folder beside it.
+            shooting: as of `mitex.methods.nca.film.Shooting`: seconds, fps, loop, damage, and others.
+
+        Returns:
+            The path written.
+
+        Raises:
+            ConfigError: an option out of range, or a field as of `apply`.
+            OutputError: another kind of file, an unwritable place, or nothing there to resume.
+            KeyboardInterrupt: stopped after a whole frame.
+        """
+        options = {"seed": seed, "subdivide": subdivide, "orientation": orientation, "scale": scale}
+        options |= {"field": field, "speed": speed}
+        return film(self, mesh, path, Shooting(**shooting), resume=resume, **options)
+
+    def variants(
+        self, mesh: Mesh, seeds: Iterable[int], *, resolution: int | None = 1024, **options: Any
+    ) -> Iterator[Asset]:
+        """One asset for each seed, all on one mesh and one UV layout, with the seed in its name; options as
+        of `apply`.
+        """
+        laid = mesh if resolution is None else laid_out(mesh, resolution)
+        for seed in seeds:
+            asset = self.apply(laid, seed=seed, resolution=resolution, **options)
+            yield replace(asset, name=f"seed {seed}")
+
+
 @dataclass(frozen=True, eq=False)
-class NcaTexture:
+class NcaTexture(GrowingTexture):
     """A trained MeshNCA.
 
     Attributes:
@@ -57,57 +203,15 @@ class NcaTexture:
         """Writes the model file (safetensors, about 50 KB)."""
         return files.save(Path(path), self.look, self.about)
 
-    def apply(
+    def fields(
         self,
         mesh: Mesh,
         *,
         seed: int = 0,
         steps: int | None = None,
-        subdivide: int | str = "auto",
-        orientation: float = 0.0,
-        scale: float = 1.0,
-        resolution: int | None = 1024,
-        keep_dense: bool = False,
-    ) -> Asset:
-        """Grows the texture on a mesh.
-
-        The automaton runs on a subdivided copy of the mesh; the size of the pattern follows the density of
-        its vertices: each level of subdivision halves it.
-
-        Args:
-            mesh: any mesh; near-uniform edges and valence 6 give the best texture (`mitex.mesh.quality`).
-            seed: of the random updates.
-            steps: of the automaton; None for as many as the model's pattern needs to be in order.
-            subdivide: levels of subdivision, or "auto": as many as bring the copy to 8,000 vertices.
-            orientation: turns the texture about the normals, counter-clockwise [degrees].
-            scale: size of the pattern, 1 for what the density gives; others need a remeshing of the copy to
-                the fitting density (extra `remesh`).
-            resolution: of the baked textures [texels], on the mesh's own UVs if nothing in them overlaps,
-                else on new ones. None leaves the maps at the vertices.
-            keep_dense: returns the finer mesh itself, rounded by Loop subdivision, instead of the given one.
-
-        Returns:
-            An asset on the given mesh, with one map per learned map.
-
-        Raises:
-            ConfigError: options out of range, or the model needs a condition.
-            MeshError: the mesh cannot be remeshed.
-        """
-        self._check_unconditioned()
-        laid = mesh if resolution is None or (keep_dense and scale != 1.0) else laid_out(mesh, resolution)
-        announce("preparing the mesh")
-        cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
-        turn = math.radians(orientation)
-        state = self._healthy(cells, seed, self.steps if steps is None else steps, turn)
-        grown = Grown(self.look, state, cells, turn, self._palette)
-        asset = grown.asset()
-        if resolution is None:
-            return asset
-        atlas = Atlas.build(cells.given, resolution, max(min(8, resolution // 8), 1), cells.given.uv)
-        return replace(asset, atlas=atlas, texture_maps=grown.textures(atlas))
-
-    def fields(
-        self, mesh: Mesh, *, seed: int = 0, steps: int | None = None, orientation: float = 0.0
+        orientation: Orientation = 0.0,
+        field: Field | None = None,
+        speed: float = 1.0,
     ) -> dict[str, dict[str, Any]]:
         """Grows the texture on a mesh and returns it as textures of a Mitsuba scene, by map, which are
         decoded where rays meet the surface: `{"type": "principled", "base_color": fields["albedo"], ...}`.
@@ -115,71 +219,94 @@ class NcaTexture:
         A cell sits at each vertex of the mesh, and the shape in the scene must have these vertices; see
         `mitex.mesh.subdivide_midpoint`. Other arguments and errors as of `apply`.
         """
-        cells, steps = Cells(mesh, 0, mesh), self.steps if steps is None else steps
-        return fields(self.look, self._healthy(cells, seed, steps, math.radians(orientation)), mesh)
-
-    def variants(
-        self, mesh: Mesh, seeds: Iterable[int], *, resolution: int | None = 1024, **options: Any
-    ) -> Iterator[Asset]:
-        """One asset for each seed, all on one mesh and one UV layout, with the seed in its name; options as
-        of `apply`.
-        """
-        laid = mesh if resolution is None else laid_out(mesh, resolution)
-        for seed in seeds:
-            asset = self.apply(laid, seed=seed, resolution=resolution, **options)
-            yield replace(asset, name=f"seed {seed}")
+        growth = self._on(mesh, orientation, field, speed)
+        return fields(self.look, _healthy(growth, seed, self.steps if steps is None else steps), mesh)
 
     def tile(
-        self, resolution: int = 1024, *, cells: int | None = None, seed: int = 0, steps: int | None = None
+        self,
+        resolution: int = 1024,
+        *,
+        cells: int | None = None,
+        seed: int = 0,
+        steps: int | None = None,
+        field: Field | None = None,
+        speed: float = 1.0,
     ) -> dict[str, np.ndarray]:
         """Grows the texture on a flat square whose opposite sides are joined.
 
         Args:
             resolution: side of the maps [px], 16 to 8192.
             cells: along a side, 8 to 1024; if None, the exemplar appears about `REPEATS` times along it.
-            seed, steps: as of `apply`.
+            seed, steps, speed: as of `apply`.
+            field: as of `apply`, but the same everywhere, as any other has a seam; None for "right".
 
         Returns:
             Maps (N, N, c) float32 in [0, 1], row 0 on top, the exemplar's up upwards; they go on at their
             opposite sides.
 
         Raises:
-            ConfigError: options out of range, or the model needs a condition.
+            ConfigError: options out of range, or a field as of `apply`.
         """
         lattice = flat_cells(self._tile_cells() if cells is None else cells, resolution)
         operator = lattice_perception(lattice, self.look.rule.degree, self.look.mean)
-        state = self.grow(operator, seed=seed, steps=steps)
-        state = self._healed(state, Cells(lattice.joined, 0, lattice.joined), operator, seed)
+        cells_of_square = Cells(lattice.joined, 0, lattice.joined)
+        direction, condition = followed_field(self.look, self.about, field, speed, "right"), None
+        if direction is not None:
+            condition = torch.from_numpy(flat_vectors(lattice, direction, speed))
+        growth = LookGrowth(self.look, cells_of_square, 0.0, self._palette, operator, condition)
+        state = _healthy(growth, seed, self.steps if steps is None else steps)
         return tile_maps(self.look, state, lattice, resolution, self._palette)
 
-    @torch.no_grad()
     def grow(
-        self, mesh: Mesh | Perception, *, seed: int = 0, steps: int | None = None, orientation: float = 0.0
+        self,
+        mesh: Mesh,
+        *,
+        seed: int = 0,
+        steps: int | None = None,
+        orientation: Orientation = 0.0,
+        field: Field | None = None,
+        speed: float = 1.0,
     ) -> torch.Tensor:
         """The state of the automaton after some steps, held within the bounds of the training's.
 
         Args:
-            mesh: any mesh, or its perception operator, which has an orientation of its own.
+            mesh: any mesh.
             seed: of the random updates.
             steps: from the initial state, which is zero; None as of `apply`.
-            orientation: as in `apply`.
+            orientation, field, speed: as in `apply`.
 
         Returns:
             (V, C) float32.
 
         Raises:
-            ConfigError: steps below 0, or the model needs a condition.
+            ConfigError: steps below 0, or a field as of `apply`.
         """
-        self._check_unconditioned()
-        steps = self.steps if steps is None else steps
-        if steps < 0:
-            raise ConfigError(f"{steps} steps", "give 0 or more")
-        keep_freed_memory()
-        rule, operator = self.look.rule, mesh
-        if isinstance(operator, Mesh):
-            operator = perception(operator, rule.degree, math.radians(orientation), mean=self.look.mean)
-        generator = torch.Generator().manual_seed(seed)
-        return self.look.evolve(rule.seed(operator), operator, steps, generator)[0]
+        growth = self._on(mesh, orientation, field, speed)
+        return grown_state(growth, seed, self.steps if steps is None else steps)
+
+    def condition(
+        self,
+        cells: Cells,
+        field: Field | None = None,
+        speed: float = 1.0,
+        orientation: Turn = 0.0,
+        given: Mesh | None = None,
+    ) -> torch.Tensor | None:
+        field = followed_field(self.look, self.about, field, speed, self.about.get("motion"))
+        if field is None:
+            return None
+        vectors = cell_vectors(given or cells.given, cells.mesh, field, speed, orientation)
+        return torch.from_numpy(vectors)
+
+    def growth(
+        self, cells: Cells, orientation: Turn = 0.0, condition: torch.Tensor | None = None
+    ) -> LookGrowth:
+        return LookGrowth(self.look, cells, orientation, self._palette, condition=condition)
+
+    def _on(self, mesh: Mesh, orientation: Orientation, field: Field | None, speed: float) -> LookGrowth:
+        """What grows on the vertices of a mesh, turned by an angle [degrees]."""
+        cells, turn = Cells(mesh, 0, mesh), cell_turns(orientation, mesh, mesh)
+        return self.growth(cells, turn, self.condition(cells, field, speed, turn))
 
     @property
     def steps(self) -> int:
@@ -193,27 +320,24 @@ class NcaTexture:
             density = DENSITY
         return square_cells(density)
 
-    def _healthy(self, cells: Cells, seed: int, steps: int, turn: float) -> torch.Tensor:
-        """What grows on an automaton's mesh, turned by an angle [rad], with the exemplar's colours."""
-        operator = perception(cells.mesh, self.look.rule.degree, turn, mean=self.look.mean)
-        return self._healed(self.grow(operator, seed=seed, steps=steps), cells, operator, seed)
-
-    def _healed(self, state: torch.Tensor, cells: Cells, operator: Perception, seed: int) -> torch.Tensor:
-        palette = self._palette
-        if palette is None:
-            return state
-        generator = torch.Generator().manual_seed(seed)
-        return healed(self.look, state, cells, operator, palette, generator)
-
     @property
     def _palette(self) -> Palette | None:
         record = self.about.get("palette")
         return None if record is None else Palette.from_record(record)
 
-    def _check_unconditioned(self) -> None:
-        if self.look.rule.condition:
-            name, width = self.about.get("name", "the model"), self.look.rule.condition
-            raise ConfigError(
-                f"'{name}' needs a condition of {width} values at each vertex, and has none here",
-                "use a model that was trained without, or give the condition to MeshNCA.evolve in Python",
-            )
+
+def grown_state(growth: Growth, seed: int, steps: int) -> torch.Tensor:
+    """The state (V, C) after some steps from the initial one, with random updates from a seed.
+
+    Raises:
+        ConfigError: steps below 0.
+    """
+    if steps < 0:
+        raise ConfigError(f"{steps} steps", "give 0 or more")
+    keep_freed_memory()
+    return growth.evolve(growth.seed(), steps, torch.Generator().manual_seed(seed))
+
+
+def _healthy(growth: Growth, seed: int, steps: int) -> torch.Tensor:
+    """The same, with the exemplar's colours."""
+    return healed(growth, grown_state(growth, seed, steps), torch.Generator().manual_seed(seed))

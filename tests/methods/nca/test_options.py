@@ -2,6 +2,7 @@
 
 from dataclasses import fields
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -11,6 +12,10 @@ from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.methods import nca
 from mitex.methods.nca import NcaConfig
+from mitex.methods.nca.motion import task as motion_task
+from mitex.methods.nca.motion.drift import Drift, draw_drift
+from mitex.methods.nca.motion.pairs import sphere_pairs
+from mitex.methods.nca.motion.task import MotionTask
 from mitex.methods.nca.task import NcaTask
 from mitex.runtime import threads
 from tests.methods.nca.tiny import SETTINGS, config
@@ -34,7 +39,8 @@ def build(exemplar):
 
     def build(*settings: str) -> NcaTask:
         if settings not in tasks:
-            tasks[settings] = NcaTask(config(*settings), exemplar)
+            resolved = config(*settings)
+            tasks[settings] = (MotionTask if resolved.motion else NcaTask)(resolved, exemplar)
         return tasks[settings]
 
     return build
@@ -325,6 +331,85 @@ def weights_of_parts(build):
     assert parts["overflow"] > 0.5
     assert total.item() == pytest.approx(parts["appearance"] + 10 * parts["overflow"], rel=1e-4)
     assert total_3.item() == pytest.approx(parts_3["appearance"] + 30 * parts_3["overflow"], rel=1e-4)
+
+
+MOVING = ("motion=up", "motion_steps=1", "view_count=1")
+
+
+def _motion(task, step=1, seed=0):
+    """The motion term of one step from a pool of noise; None if there is none."""
+    task.pool.copy_(torch.randn(task.pool.shape, generator=torch.Generator().manual_seed(1)))
+    return _loss(task, step, seed)[1].get("motion")
+
+
+@check("motion")
+def textures_that_move(build):
+    assert [build(f"motion={field}").look.rule.condition for field in ("", "up")] == [0, 3]
+
+
+@check("motion_encoding")
+def what_cells_know(build):
+    told, untold = (build("motion=up", f"motion_encoding={on}").look.rule for on in ("true", "false"))
+    assert (told.condition, untold.condition) == (3, 0)
+
+
+@check("motion_weight")
+def weight_of_motion(build):
+    one, three = (_motion(build(*MOVING, f"motion_weight={weight}")) for weight in (1, 3))
+    assert three == pytest.approx(3 * one, rel=1e-4) and one > 0
+
+
+@check("motion_start")
+def motion_begins_later(build):
+    task = build(*MOVING, "motion_start=2")
+    assert _motion(task, step=1) is None and _motion(task, step=2) > 0
+
+
+@check("motion_period", "motion_steps")
+def speed_of_motion(build):
+    """Ways between two states are as many edges as there are steps in a part of the period."""
+    for steps, period, expected in ((2, 4, 0.5), (3, 4, 0.75), (2, 16, 0.125)):
+        task = build("motion=up", f"motion_steps={steps}", f"motion_period={period}", "min_steps=3")
+        shares = []
+        with patch.object(
+            Drift, "transport", lambda self, share, to=shares: to.append(share) or (lambda s: s + 1)
+        ):
+            _motion(task)
+        assert shares == [expected]
+
+
+@check("motion_turns", "motion_speeds")
+def drifts(build):
+    sphere = build().surfaces[0]
+    for turns, speeds in (("false", "1,1"), ("true", "2,3")):
+        settings = build("motion=up", f"motion_turns={turns}", f"motion_speeds={speeds}").config
+        field = draw_drift(settings, sphere, torch.Generator().manual_seed(0)).field
+        unturned = np.abs(field[:, [0, 2]].mean(axis=0)).max() < 0.01
+        assert unturned == (turns == "false")
+        low, high = map(float, speeds.split(","))
+        assert low - 1e-5 <= np.linalg.norm(field, axis=1).mean() <= high + 1e-5
+
+
+@check("motion_estimator", "motion_gamma")
+def motion_in_pictures(build):
+    """Of an estimator that is nearly right: what the direction costs counts gamma times."""
+    names, targets = [], []
+
+    def load(name):
+        names.append(name)
+        return lambda first, second: 0.1 * targets[-1] + (second - first)
+
+    def pairs(look, states, drift, cameras):
+        result = sphere_pairs(look, states, drift, cameras)
+        targets.append(result.target)
+        return result
+
+    with patch.multiple(motion_task, load_estimator=load, sphere_pairs=pairs):
+        settings = (*MOVING, "motion_estimator=lucas-kanade")
+        tasks = [build(*settings, f"motion_gamma={gamma}") for gamma in (0.5, 4, 7.5)]
+        losses = [_motion(MotionTask(task.config, task.exemplar)) for task in tasks]
+    assert set(names) == {"lucas-kanade"}
+    assert losses[2] - losses[1] == pytest.approx(losses[1] - losses[0], rel=1e-3) and losses[1] > losses[0]
 
 
 @pytest.mark.parametrize("key", sorted(CHECKS))

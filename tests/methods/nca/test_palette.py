@@ -9,6 +9,7 @@ from mitex.exemplar import Exemplar
 from mitex.mesh import icosphere
 from mitex.methods.nca import NcaTexture, healing
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.growth import LookGrowth
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.palette import Palette
@@ -61,16 +62,22 @@ def grown():
     return look, Cells(mesh, 0, mesh), perception(mesh, 1)
 
 
+def _heal(grown, state, palette):
+    look, cells, operator = grown
+    growth = LookGrowth(look, cells, palette=palette, operator=operator)
+    return healing.healed(growth, state, torch.Generator().manual_seed(0))
+
+
 def test_a_foreign_place_is_set_back_and_grows_again(grown, monkeypatch):
     """With no steps to grow in, what was set back is the seed: the place, three rings, and nothing else."""
-    look, cells, operator = grown
+    cells = grown[1]
     monkeypatch.setattr(healing, "STEPS", 0)
     state = torch.full((len(cells.mesh.vertices), 16), 0.1)
     graph = cells.mesh.edges
     place = np.zeros(len(state), bool)
     place[[7, *graph.indices[graph.indptr[7] : graph.indptr[8]]]] = True
     state[torch.from_numpy(place), :3] = torch.tensor([0.5, -0.5, -0.5])
-    result = healing.healed(look, state, cells, operator, Grey(), torch.Generator().manual_seed(0))
+    result = _heal(grown, state, Grey())
     for _ in range(healing.RINGS):
         place |= np.bincount(graph.rows, place[graph.indices], len(place)) > 0
     assert (result[torch.from_numpy(place)] == 0).all()
@@ -78,19 +85,19 @@ def test_a_foreign_place_is_set_back_and_grows_again(grown, monkeypatch):
 
 
 def test_a_good_state_stays(grown):
-    look, cells, operator = grown
+    cells = grown[1]
     state = torch.full((len(cells.mesh.vertices), 16), 0.1)
-    result = healing.healed(look, state, cells, operator, Grey(), torch.Generator().manual_seed(0))
+    result = _heal(grown, state, Grey())
     assert torch.equal(result, state)
 
 
 def test_what_does_not_heal_is_said(grown, monkeypatch):
-    look, cells, operator = grown
+    cells = grown[1]
     monkeypatch.setattr(healing, "STEPS", 1)
     nowhere = Palette(np.full((1, 3), 9.0), 0.1)
     state = torch.zeros(len(cells.mesh.vertices), 16)
     with pytest.warns(TextureWarning, match="100.0% of 'icosphere6' has colours that the exemplar"):
-        healing.healed(look, state, cells, operator, nowhere, torch.Generator().manual_seed(0))
+        _heal(grown, state, nowhere)
 
 
 def test_dots_and_lines_are_no_regions(grown):

@@ -42,9 +42,21 @@ def test_growing_stops_when_the_pattern_is_regular_enough(exemplar, monkeypatch,
     ages = []
     look = texture().look
     evolve = look.evolve
-    monkeypatch.setattr(look, "evolve", lambda s, o, n, g: ages.append(n) or evolve(s, o, n, g))
+    monkeypatch.setattr(look, "evolve", lambda s, o, n, g, c: ages.append(n) or evolve(s, o, n, g, c))
     assert settling_steps(look, exemplar, 8) == steps / 100
     assert sum(ages) == steps / 100
+
+
+def test_a_moving_pattern_is_looked_at_while_it_moves(exemplar, monkeypatch):
+    """To the right, by the length of the field that it was trained with."""
+    monkeypatch.setattr(settling, "STEPS", (1,))
+    look = texture(condition=3).look
+    evolve, conditions = look.evolve, []
+    monkeypatch.setattr(
+        look, "evolve", lambda *arguments: conditions.append(arguments[4]) or evolve(*arguments)
+    )
+    assert settling_steps(look, exemplar, 8) == 1
+    assert (conditions[0] == torch.tensor([1.0, 0.0, 0.0])).all() and conditions[0].shape[1] == 3
 
 
 def test_noise_never_is_as_regular_as_stripes(exemplar, monkeypatch):

@@ -12,8 +12,8 @@ from mitex.atlas import laid_out
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, grid, icosphere, subdivide_loop, subdivide_midpoint
 from mitex.methods.nca import NcaTexture, cells
-from mitex.methods.nca.bake import tangents
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.orientation import rightwards
 from mitex.methods.nca.perception import perception
 from tests.methods.nca import tiny
 from tests.methods.nca.brute_force import patchwork
@@ -123,13 +123,13 @@ def test_orientation_turns_the_growth_and_the_tangents(texture):
 def test_tangents_point_to_the_right_of_an_upright_view():
     """Seen from outside with +y up; unit and across the normals, also at the poles."""
     sphere = icosphere(4)
-    right = tangents(sphere)
+    right = rightwards(sphere.normals)
     assert np.allclose(np.linalg.norm(right, axis=1), 1, atol=1e-6)
     assert np.abs((right * sphere.normals).sum(1)).max() < 1e-5
     front = np.argmax(sphere.normals[:, 2])
     assert np.dot(right[front], [1, 0, 0]) > 0.95
     assert np.abs(right[np.abs(sphere.normals[:, 1]) < 0.99, 1]).max() < 1e-5
-    quarter = tangents(sphere, math.pi / 2)
+    quarter = rightwards(sphere.normals, math.pi / 2)
     assert np.allclose(quarter, np.cross(sphere.normals, right), atol=1e-5)
 
 
@@ -302,7 +302,7 @@ def test_too_many_vertices_are_refused_before_they_are_made(texture, options):
 
 def test_a_model_with_a_condition_says_what_it_needs(sphere):
     """Before any work: 200 million steps would not end."""
-    conditioned = tiny.texture(condition=3)
+    conditioned = tiny.texture(condition=4)
     for use in (conditioned.apply, conditioned.grow):
-        with pytest.raises(ConfigError, match=r"'tiny' needs a condition of 3 values .*; .*MeshNCA\.evolve"):
+        with pytest.raises(ConfigError, match=r"'tiny' needs a condition of 4 values .*; .*MeshNCA\.evolve"):
             use(sphere, steps=200_000_000)

@@ -1,0 +1,29 @@
+"""Whether values on a surface move along a vector field: no camera and no network is needed to tell."""
+
+from __future__ import annotations
+
+import torch
+
+
+def advection_residual(before: torch.Tensor, after: torch.Tensor, upstream: torch.Tensor) -> torch.Tensor:
+    """What a transport leaves undone: |S(t + n)(x) - S(t)(x - d)|^2 / |S(t)(x - d) - S(t)(x)|^2.
+
+    d = (n / T) U is the way of the field U in n steps, if its unit is a unit of length in T steps. To the
+    first order of d, S(t)(x - d) is S(t) - (n / T) U . grad S(t). Values from upstream are right for ways of
+    any length, while the gradient is wrong as soon as d is a fair part of what repeats in S.
+
+    The denominator is what a state leaves undone that stays as it is. So 0 is a perfect transport, 1 none at
+    all, and neither the scale of the values nor how smooth they are matters: a state that fades to grey gains
+    nothing. It has no gradient, nor has `before`: only what happens afterwards can be better or worse.
+
+    Args:
+        before: S(t), (V, C).
+        after: S(t + n), (V, C).
+        upstream: S(t)(x - d), (V, C).
+
+    Returns:
+        Sums over vertices and channels, divided; a scalar, differentiable in `after`.
+    """
+    before, upstream = before.detach(), upstream.detach()
+    way = (upstream - before).square().sum()
+    return (after - upstream).square().sum() / way.clamp(min=torch.finfo(way.dtype).tiny)

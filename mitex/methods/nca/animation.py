@@ -1,0 +1,184 @@
+"""`mitex animate` for automata's textures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from tyro.conf import Positional, arg
+
+from mitex.errors import ConfigError
+from mitex.methods.checks import SEEDS, in_range
+from mitex.methods.nca.cli import field_files, levels, oriented
+from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS
+
+FADE = 12  # frames over which a loop fades
+SPP = 32  # of the path tracer
+VIDEOS = (".mp4", ".gif")
+
+
+@dataclass(kw_only=True)
+class Animate:
+    """Film a texture as it grows on a mesh, goes on changing (--start), or heals (--damage).
+
+    Frames are kept in a hidden folder beside the film until it is whole: Ctrl-C keeps them, --resume goes on.
+
+    examples:
+      mitex animate pebbles --mesh bunny.obj --out growth.mp4
+      mitex animate pebbles --mesh bunny.obj --out loop.gif --loop --seconds 3 --resolution 256
+      mitex animate pebbles --mesh bunny.obj --out healing.mp4 --damage 0,0.5,0,0.3
+      mitex animate pebbles --mesh bunny.obj --out frames/ --renderer path --spp 64
+      mitex animate runs/flowing --mesh bunny.obj --out flow.mp4 --start 200 --field about-y --speed 1.5
+      mitex animate pebbles --mesh bunny.obj --out growth.mp4 --resume
+    """
+
+    model: Annotated[Positional[str], arg(metavar="RUN|MODEL")]
+    """Run folder, model file, or name of a bundled model (see `mitex models`)."""
+
+    mesh: Annotated[str, arg(metavar="MESH|NAME")]
+    """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
+
+    out: Annotated[str, arg(metavar="FILE|DIR/")]
+    """Film to write (.mp4 .gif), or a new folder for its frames as PNG."""
+
+    seconds: Annotated[float, arg(metavar="S")] = 4.0
+    """Length; a loop may be shorter."""
+
+    fps: Annotated[int, arg(metavar="N")] = 24
+    """Frames a second."""
+
+    steps_per_frame: Annotated[int, arg(metavar="N")] = 2
+    """Steps of the automaton from frame to frame."""
+
+    start: Annotated[
+        int | None,
+        arg(metavar="N", help_behavior_hint="(default: 0; the model's steps for --loop and --damage)"),
+    ] = None
+    """Steps of the automaton before the first frame."""
+
+    renderer: Literal["preview", "path"] = "preview"
+    """`preview`: direct light, a fraction of a second a frame; `path`: path-traced, seconds a frame."""
+
+    resolution: Annotated[int, arg(metavar="N")] = 384
+    """Width and height [pixels]."""
+
+    spp: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {SPP})")] = None
+    """Samples a pixel, with --renderer path."""
+
+    azimuth: Annotated[float, arg(metavar="DEG")] = 25.0
+    """Side from which the mesh is seen [degrees]; 0 is +z, 90 is +x."""
+
+    elevation: Annotated[float, arg(metavar="DEG")] = 18.0
+    """How high the camera stands [degrees]."""
+
+    loop: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Cut the film where its end resembles its beginning, and fade from one into the other."""
+
+    fade: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {FADE})")] = None
+    """Frames over which a loop fades."""
+
+    damage: Annotated[str | None, arg(metavar="X,Y,Z,R|AXIS:LOW:HIGH", help_behavior_hint="")] = None
+    """Set a region back to the seed, to see it grow again: a ball, or what is between two heights along an
+    axis [mesh units]; y:0: is the half above 0."""
+
+    damage_at: Annotated[float | None, arg(metavar="S", help_behavior_hint="(default: 0.5)")] = None
+    """When [seconds]."""
+
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Random seed."""
+
+    subdivide: Annotated[str, arg(metavar="auto|N")] = "auto"
+    """How often to subdivide the automaton's copy of the mesh; auto: to the training's density."""
+
+    orientation: Annotated[str, arg(metavar="DEG|FIELD")] = "0"
+    """Turns the texture on the surface [degrees], or lets its up follow a vector field (as of --field)."""
+
+    scale: Annotated[float, arg(metavar="X")] = 1.0
+    """Size of the pattern."""
+
+    field: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="(default: the training's)")] = None
+    """Vector field that a moving texture follows: a name, a direction, or a file (.npy .ply .json)."""
+
+    speed: Annotated[float, arg(metavar="X")] = 1.0
+    """Speed of a moving texture, as a factor of the field."""
+
+    resume: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Go on with a film that was interrupted."""
+
+    quiet: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Show no progress."""
+
+    def run(self) -> None:
+        self._check()
+        from mitex.mesh.files import mesh_files
+        from mitex.paths import prepare_output
+        from mitex.runtime import let_idle_threads_sleep
+
+        let_idle_threads_sleep()
+        from mitex.methods.nca.film import Shooting
+
+        shooting = Shooting(**self._shooting())
+        target = shooting.recording(self.out, {}).target
+        if target.suffix.lower() in VIDEOS:
+            prepare_output(
+                target,
+                inputs=[self.model, *mesh_files(self.mesh), *field_files(self.field, self.orientation)],
+            )
+        from mitex.mesh import Mesh
+        from mitex.methods.nca import NcaTexture
+        from mitex.methods.nca.film import film
+
+        film(
+            NcaTexture.load(self.model),
+            Mesh.load(self.mesh),
+            self.out,
+            shooting,
+            resume=self.resume,
+            seed=self.seed,
+            subdivide=levels(self.subdivide),
+            orientation=oriented(self.orientation),
+            scale=self.scale,
+            field=self.field,
+            speed=self.speed,
+        )
+        print(self.out)
+
+    def _check(self) -> None:
+        levels(self.subdivide)
+        in_range("--seconds", self.seconds, 0.0, 3600.0)
+        in_range("--fps", self.fps, 1, 60)
+        in_range("--steps-per-frame", self.steps_per_frame, 1, MOST_STEPS)
+        in_range("--start", self.start, 0, MOST_STEPS)
+        in_range("--resolution", self.resolution, 16, 4096)
+        in_range("--spp", self.spp, 1, 65536)
+        in_range("--azimuth", self.azimuth, -360.0, 360.0)
+        in_range("--elevation", self.elevation, -85.0 if self.renderer == "preview" else 0.0, 85.0)
+        in_range("--damage-at", self.damage_at, 0.0, 3600.0)
+        in_range("--seed", self.seed, *SEEDS)
+        oriented(self.orientation)
+        in_range("--scale", self.scale, 0.05, 20.0)
+        in_range("--speed", self.speed, *SPEEDS)
+        for option, needed, given in (
+            ("--spp", "--renderer path", self.spp is not None and self.renderer != "path"),
+            ("--fade", "--loop", self.fade is not None and not self.loop),
+            ("--damage-at", "--damage", self.damage_at is not None and self.damage is None),
+        ):
+            if given:
+                raise ConfigError(f"{option} means nothing without {needed}", "give both or neither")
+
+    def _shooting(self) -> dict[str, Any]:
+        """Arguments of `Shooting`."""
+        same = (
+            "seconds",
+            "fps",
+            "steps_per_frame",
+            "start",
+            "renderer",
+            "resolution",
+            "azimuth",
+            "elevation",
+        )
+        options = {name: getattr(self, name) for name in (*same, "damage")}
+        options |= {"loop": (FADE if self.fade is None else self.fade) if self.loop else None}
+        further = {"spp": self.spp, "damage_at": self.damage_at}
+        return options | {name: value for name, value in further.items() if value is not None}

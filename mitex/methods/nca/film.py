@@ -1,0 +1,249 @@
+"""Films of a texture that grows, moves, or heals."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+import numpy as np
+import torch
+
+from mitex.atlas import Atlas, laid_out
+from mitex.cache import content_key
+from mitex.colour import linear_to_srgb
+from mitex.errors import ConfigError
+from mitex.export.common import DEFAULT_ALBEDO
+from mitex.geometry.triangles import interpolate
+from mitex.geometry.vectors import unit
+from mitex.mesh import Mesh
+from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.growth import Growth
+from mitex.methods.nca.motion.condition import Field
+from mitex.methods.nca.orientation import Orientation, cell_turns
+from mitex.methods.nca.ranges import MOST_STEPS
+from mitex.methods.nca.region import region
+from mitex.progress import announce
+from mitex.render import OrbitRenderer, tone
+from mitex.render.preview import PreviewRenderer
+from mitex.render.recording import Recording
+from mitex.runtime import keep_freed_memory
+
+if TYPE_CHECKING:
+    from mitex.methods.nca.texture import GrowingTexture
+
+PADDING = 8  # of the charts of a baked frame [texels]
+OF_THE_FILM = ("seconds", "loop")  # what no single picture follows from
+
+
+@dataclass(frozen=True)
+class Shooting:
+    """How a texture is filmed.
+
+    Attributes:
+        seconds: of the film; of a loop, at most.
+        fps: frames a second.
+        steps_per_frame: of the automaton.
+        start: steps before the first frame; None for 0, or as many as the model needs to be in order if the
+            film is a loop or shows damage.
+        renderer: "preview" for direct light, in a fraction of a second a frame; "path" for the path tracer.
+        resolution: width and height [px].
+        spp: samples a pixel of the path tracer.
+        azimuth, elevation: from where the mesh is seen [degrees].
+        loop: frames over which the film fades into its beginning; None for one that just ends.
+        damage: a region that is set back to the seed, see `mitex.methods.nca.region`; None for none.
+        damage_at: when [s].
+    """
+
+    seconds: float = 4.0
+    fps: int = 24
+    steps_per_frame: int = 2
+    start: int | None = None
+    renderer: Literal["preview", "path"] = "preview"
+    resolution: int = 384
+    spp: int = 32
+    azimuth: float = 25.0
+    elevation: float = 18.0
+    loop: int | None = None
+    damage: str | None = None
+    damage_at: float = 0.5
+
+    @property
+    def frames(self) -> int:
+        """How many there are."""
+        return round(self.seconds * self.fps)
+
+    @property
+    def damaged_frame(self) -> int:
+        """The first frame that shows the damage."""
+        return round(self.damage_at * self.fps)
+
+    @property
+    def texels(self) -> int:
+        """Side of the textures that are baked for the path tracer: two across a pixel."""
+        return min(max(2 * self.resolution, 256), 2048)
+
+    def check(self) -> None:
+        """Raises a ConfigError if a number is out of range that nothing else checks before work begins."""
+        if self.renderer not in ("preview", "path"):
+            raise ConfigError(f"there is no renderer '{self.renderer}'", "use preview or path")
+        if not 1 <= self.steps_per_frame <= MOST_STEPS:
+            raise ConfigError(f"{self.steps_per_frame} steps a frame", f"use 1 to {MOST_STEPS}")
+        if self.start is not None and not 0 <= self.start <= MOST_STEPS:
+            raise ConfigError(f"a start after {self.start} steps", f"use 0 to {MOST_STEPS}")
+        if self.damage is not None and not 0 <= self.damaged_frame < self.frames:
+            raise ConfigError(
+                f"damage at {self.damage_at:g} s in a film of {self.seconds:g} s", "choose a time within it"
+            )
+
+    def recording(self, path: str | os.PathLike[str], settings: Mapping[str, Any]) -> Recording:
+        """The film's place and frames, checked; `settings` are what its pictures follow from."""
+        self.check()
+        return Recording.of(path, self.frames, self.fps, self.resolution, settings, self.loop)
+
+
+def film(
+    texture: GrowingTexture,
+    mesh: Mesh,
+    path: str | os.PathLike[str],
+    shooting: Shooting,
+    *,
+    resume: bool = False,
+    seed: int = 0,
+    subdivide: int | str = "auto",
+    orientation: Orientation = 0.0,
+    scale: float = 1.0,
+    field: Field | None = None,
+    speed: float = 1.0,
+) -> Path:
+    """Films a texture on a mesh; arguments and errors as of `GrowingTexture.animate`."""
+    shooting.recording(path, {})
+    laid = mesh if shooting.renderer == "preview" else laid_out(mesh, shooting.texels)
+    announce("preparing the mesh")
+    cells = Cells.of(laid, subdivide, scale)
+    turn = cell_turns(orientation, cells.mesh, mesh)
+    condition = texture.condition(cells, field, speed, turn, mesh)
+    growth = texture.growth(cells, turn, condition)
+    start = shooting.start
+    if start is None:
+        start = 0 if shooting.loop is None and shooting.damage is None else texture.steps
+    damage = None
+    if shooting.damage is not None:
+        damage = torch.from_numpy(region(shooting.damage)(growth.cells.mesh.vertices))
+        if not damage.any():
+            raise ConfigError(f"nothing of '{mesh.name}' is in '{shooting.damage}'", "choose another region")
+    scene = {"mesh": content_key(laid.vertices, laid.faces), "model": growth.key, "seed": seed}
+    scene |= {
+        "subdivide": subdivide,
+        "orientation": content_key(np.asarray(turn)),
+        "scale": scale,
+        "start": start,
+    }
+    scene |= {} if condition is None else {"condition": content_key(condition.numpy())}
+    settings = {name: value for name, value in asdict(shooting).items() if name not in OF_THE_FILM}
+    recording = shooting.recording(path, scene | settings)
+    keep_freed_memory()
+    camera: Camera = (PreviewCamera if shooting.renderer == "preview" else TracedCamera)(laid, shooting)
+    states = States(growth, shooting, start, seed, damage)
+
+    def pictures(done: int) -> Iterator[np.ndarray]:
+        return map(camera.picture, map(growth.shown, states.frames(done, recording.pictures)))
+
+    return recording.record(pictures, resume)
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """The states of a film's frames.
+
+    Attributes:
+        growth, shooting, start, seed: as of `film`.
+        damage: (V,) bool, the cells that are set back; None for none.
+    """
+
+    growth: Growth
+    shooting: Shooting
+    start: int
+    seed: int
+    damage: torch.Tensor | None
+
+    def frames(self, done: int, frames: int) -> Iterator[torch.Tensor]:
+        """Those of all frames but the first `done`, whose steps are taken at once, so that a film goes on
+        exactly as if it had not been interrupted.
+        """
+        generator = torch.Generator().manual_seed(self.seed)
+        state = self.growth.evolve(self.growth.seed(), self.start, generator)
+        for frame in range(done):
+            announce("growing what has been filmed", frame, done)
+            state = self._next(self._damaged(state, frame), generator)
+        return self._following(state, generator, range(done, frames))
+
+    def _following(
+        self, state: torch.Tensor, generator: torch.Generator, frames: range
+    ) -> Iterator[torch.Tensor]:
+        for frame in frames:
+            state = self._damaged(state, frame)
+            yield state
+            state = self._next(state, generator)
+
+    def _damaged(self, state: torch.Tensor, frame: int) -> torch.Tensor:
+        if self.damage is None or frame != self.shooting.damaged_frame:
+            return state
+        return torch.where(self.damage[:, None], 0.0, state)
+
+    def _next(self, state: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
+        return self.growth.evolve(state, self.shooting.steps_per_frame, generator)
+
+
+class Camera(Protocol):
+    """Takes pictures of states on one mesh."""
+
+    def picture(self, grown: Grown) -> np.ndarray:
+        """(H, W, 3) sRGB in [0, 1] of what a state shows."""
+        ...
+
+
+class PreviewCamera:
+    """Direct light, in a fraction of a second a picture."""
+
+    def __init__(self, mesh: Mesh, shooting: Shooting) -> None:
+        self._renderer = PreviewRenderer(
+            mesh,
+            resolution=shooting.resolution,
+            azimuth=shooting.azimuth,
+            elevation=shooting.elevation,
+        )
+        self._normals = unit(
+            interpolate(self._renderer.barycentric, mesh.shading_normals[self._renderer.face])
+        )
+
+    def picture(self, grown: Grown) -> np.ndarray:
+        points = self._renderer.face, self._renderer.barycentric
+        maps = grown.maps(grown.values(*points))
+        albedo = maps.get("albedo", np.full((len(self._normals), 3), linear_to_srgb(DEFAULT_ALBEDO)))
+        normals = self._normals
+        if "normal" in maps:
+            normals = unit(grown.object_normals(maps["normal"], *points))
+        return self._renderer.render(albedo, normals, maps.get("ambient_occlusion", 1.0))
+
+
+class TracedCamera:
+    """The path tracer, with textures baked for each picture."""
+
+    def __init__(self, mesh: Mesh, shooting: Shooting) -> None:
+        self._shooting = shooting
+        self._atlas = Atlas.build(mesh, shooting.texels, PADDING, mesh.uv)
+        self._renderer: OrbitRenderer | None = None
+
+    def picture(self, grown: Grown) -> np.ndarray:
+        asset = replace(grown.asset(), atlas=self._atlas, texture_maps=grown.textures(self._atlas))
+        shooting = self._shooting
+        if self._renderer is None:
+            self._renderer = OrbitRenderer(asset, resolution=shooting.resolution)
+            self._view = self._renderer.fit_view(shooting.azimuth, shooting.elevation)
+        else:
+            self._renderer.show(asset)
+        return tone(self._renderer.render(shooting.azimuth, self._view, shooting.spp))

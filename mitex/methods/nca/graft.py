@@ -1,0 +1,174 @@
+"""Two textures that grow into each other on one mesh (MeshNCA, section 3.3.2).
+
+Both rules see the one state, and each cell's update is theirs mixed: u = (1 - a) u_S + a u_T, with the weight
+a of its vertex. The paper's maps are channels of the state. Ours have decoders, and what these show of the
+one state is mixed by the same weight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+
+from mitex.cache import content_key
+from mitex.errors import ConfigError
+from mitex.mesh import Mesh
+from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.growth import Growth, LookGrowth
+from mitex.methods.nca.look import held, traits
+from mitex.methods.nca.model import FIRE_RATE
+from mitex.methods.nca.motion.condition import Field
+from mitex.methods.nca.orientation import Turn
+from mitex.methods.nca.texture import GrowingTexture, NcaTexture
+from mitex.methods.nca.weights import Weights
+from mitex.progress import announce
+
+
+@dataclass(frozen=True, eq=False)
+class Graft(GrowingTexture):
+    """Two textures of one family that grow into each other.
+
+    Where a weight is 0 or 1, cells are those of the single texture, bit for bit; in between, no place is
+    healed, as no exemplar says which colours belong there.
+
+    Attributes:
+        first: where the weight is 0.
+        second: where the weight is 1.
+        weights: over the mesh, see `mitex.methods.nca.weights`.
+
+    Raises:
+        ConfigError: the two are not of one family.
+    """
+
+    first: NcaTexture
+    second: NcaTexture
+    weights: Weights
+
+    def __post_init__(self) -> None:
+        check_related(self.first, self.second)
+
+    @property
+    def about(self) -> Mapping[str, Any]:
+        first, second = (texture.about for texture in (self.first, self.second))
+        return {"name": f"{first['name']} and {second['name']}", "family": first["family"]}
+
+    @property
+    def steps(self) -> int:
+        """As many as the slower of the two needs."""
+        return max(self.first.steps, self.second.steps)
+
+    def condition(
+        self,
+        cells: Cells,
+        field: Field | None,
+        speed: float,
+        orientation: Turn = 0.0,
+        given: Mesh | None = None,
+    ) -> torch.Tensor | None:
+        return self.first.condition(cells, field, speed, orientation, given)
+
+    def growth(self, cells: Cells, orientation: Turn = 0.0, condition: torch.Tensor | None = None) -> Growth:
+        first, second = (
+            texture.growth(cells, orientation, condition) for texture in (self.first, self.second)
+        )
+        return GraftedGrowth(first, second, self.weights(cells.mesh.vertices.astype(np.float64)))
+
+
+def check_related(first: NcaTexture, second: NcaTexture) -> None:
+    """Raises a ConfigError unless two textures are of one family, of rules and decoders of one shape."""
+    names = f"'{first.about.get('name')}' and '{second.about.get('name')}'"
+    if first.about.get("family") != second.about.get("family"):
+        raise ConfigError(
+            f"{names} are not of one family: their states do not mean the same",
+            "train one from the other, or both from one model (fit nca with init=...)",
+        )
+    theirs, ours = (traits(texture.look) for texture in (first, second))
+    differing = sorted(name for name in theirs | ours if theirs.get(name) != ours.get(name))
+    if differing:
+        raise ConfigError(f"{names} differ in {', '.join(differing)}", "graft textures that are alike in it")
+
+
+class GraftedGrowth(Growth):
+    """Two looks on one mesh.
+
+    Args:
+        first, second: the looks on the mesh.
+        weights: (V,) float32 in [0, 1], the second's share at each vertex of the automaton's mesh.
+    """
+
+    def __init__(self, first: LookGrowth, second: LookGrowth, weights: np.ndarray) -> None:
+        self.first, self.second, self.cells, self.weights = first, second, first.cells, weights
+        self._share = torch.from_numpy(weights)
+        self._low = torch.lerp(first.look.low, second.look.low, self._share[:, None])
+        self._high = torch.lerp(first.look.high, second.look.high, self._share[:, None])
+        self._of_first, self._of_second = self._share < 1, self._share > 0
+
+    @property
+    def key(self) -> str:
+        return content_key(self.first.key, self.second.key, self.weights)
+
+    def seed(self) -> torch.Tensor:
+        return self.first.seed()
+
+    @torch.no_grad()
+    def evolve(self, state: torch.Tensor, steps: int, generator: torch.Generator) -> torch.Tensor:
+        for step in range(steps):
+            announce("growing the texture", step, steps)
+            state = self._step(state[None], generator)[0]
+        return state
+
+    def shown(self, state: torch.Tensor) -> Grown:
+        return GraftedGrown(self.first.shown(state), self.second.shown(state), self.weights)
+
+    def foreign(self, state: torch.Tensor) -> np.ndarray:
+        foreign = np.zeros(len(state), bool)
+        for growth, own in ((self.first, self.weights == 0), (self.second, self.weights == 1)):
+            if own.any():
+                foreign |= growth.foreign(state) & own
+        return foreign
+
+    def _step(self, state: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
+        """A step of both rules with one mask, each of the cells that have a share of it.
+
+        The next states are mixed rather than the updates, which is the same but for rounding: with a weight
+        of 0 or 1, the state is exactly that of the single rule.
+        """
+        mask = torch.rand(state.shape[:2], generator=generator) < FIRE_RATE
+        parts = ((self.first, self._of_first), (self.second, self._of_second))
+        first, second = (
+            growth.look.rule.step(state, growth.operator, mask & own, growth.condition)
+            if own.any()
+            else state
+            for growth, own in parts
+        )
+        return held(torch.lerp(first, second, self._share[:, None]), self._low, self._high)
+
+
+class GraftedGrown(Grown):
+    """A state on an automaton's mesh, as two looks show it, mixed.
+
+    Args:
+        first, second: the two looks' own.
+        weights: (V,) float32, the second's share at each vertex of the automaton's mesh.
+    """
+
+    def __init__(self, first: Grown, second: Grown, weights: np.ndarray) -> None:
+        self.look, self.cells, self.orientation = first.look, first.cells, first.orientation
+        self.first, self.second, self.weights = first, second, weights
+
+    def values(self, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        share = self._share(*self.cells.locate(face, barycentric))[:, None]
+        first, second = (
+            torch.from_numpy(grown.values(face, barycentric)) for grown in (self.first, self.second)
+        )
+        return torch.lerp(first, second, torch.from_numpy(share)).numpy()
+
+    def _share(self, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """(P,) of points of the automaton's mesh; exactly that of the corners where they are equal."""
+        a, b, c = self.weights[self.cells.mesh.faces[face]].T
+        return np.clip(a + barycentric[:, 1] * (b - a) + barycentric[:, 2] * (c - a), 0, 1)

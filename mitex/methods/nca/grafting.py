@@ -1,0 +1,109 @@
+"""`mitex graft`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, arg
+
+from mitex.errors import ConfigError
+from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
+from mitex.methods.nca import METHOD
+from mitex.methods.nca.cli import RESOLUTION, field_files, levels, oriented
+from mitex.methods.nca.ranges import MOST_STEPS
+from mitex.methods.options import PICTURES, MeshOptions
+from mitex.methods.registry import method_of
+
+if TYPE_CHECKING:
+    from mitex.asset import Asset
+
+
+@dataclass(kw_only=True)
+class Grafted(MeshOptions):
+    """Grow two textures of one family on a mesh, and let one become the other where the weights say so.
+
+    `mitex models` tells which are of one family; models that were trained from them (--init) are, too.
+
+    examples:
+      mitex graft ceramic bricks --mesh bunny.obj --weights y --out bunny.glb
+      mitex graft ceramic bricks --mesh bunny.obj --weights x:-0.2:0.2 --out bunny.png
+      mitex graft lava shells --mesh bunny.obj --weights 0,0.5,0.3,0.4 --out bunny.glb
+      mitex graft lava shells --mesh bunny.obj --weights painted.png --out maps/
+      mitex graft lava shells --mesh bunny.obj --weights weights.npy --out bunny.ply
+    """
+
+    second: Annotated[Positional[str], arg(metavar="RUN|MODEL")]
+    """The texture where the weight is 1; the first one is where it is 0."""
+
+    weights: Annotated[str, arg(metavar="W")]
+    """x, y or z for a gradient along that axis from end to end, or y:LOW:HIGH; X,Y,Z,RADIUS for a place
+    around a point [mesh units]; a .npy or .ply with a value from 0 to 1 at each vertex; a .png painted over
+    the UVs; or one number."""
+
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Random seed."""
+
+    steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the slower model's)")] = None
+    """Steps of the automaton."""
+
+    subdivide: Annotated[str, arg(metavar="auto|N")] = "auto"
+    """How often to subdivide the automaton's copy of the mesh; auto: to the training's density."""
+
+    orientation: Annotated[str, arg(metavar="DEG|FIELD")] = "0"
+    """Turns the textures on the surface [degrees], or lets their up follow a vector field: a name (up, right,
+    about-y, ...), a direction, or a file (.npy .ply .json)."""
+
+    scale: Annotated[float, arg(metavar="X")] = 1.0
+    """Size of the patterns."""
+
+    resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {RESOLUTION})")] = None
+    """Side of the baked textures [texels]."""
+
+    vertex_colors: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Write colours at the vertices instead of textures."""
+
+    def check(self) -> None:
+        levels(self.subdivide)
+        in_range("--seed", self.seed, *SEEDS)
+        in_range("--steps", self.steps, 1, MOST_STEPS)
+        oriented(self.orientation)
+        in_range("--scale", self.scale, 0.05, 20.0)
+        in_range("--resolution", self.resolution, 64, 8192)
+        mutually_exclusive(
+            "--resolution", "--vertex-colors", self.resolution is not None and self.vertex_colors
+        )
+
+    def inputs(self) -> list:
+        return [*super().inputs(), self.second, self.weights, *field_files(self.orientation)]
+
+    def check_output(self, out) -> None:
+        suffix = out.suffix.lower()
+        reject_unused(
+            "--vertex-colors", out, self.vertex_colors and suffix not in (".glb", ".ply", *PICTURES)
+        )
+        reject_unused("--resolution", out, self.resolution is not None and suffix == ".ply")
+
+    def applied(self, out) -> Asset:
+        from mitex.runtime import let_idle_threads_sleep
+
+        let_idle_threads_sleep()
+        from mitex.mesh import Mesh
+        from mitex.methods.nca import Graft, NcaTexture
+        from mitex.methods.nca.weights import graft_weights
+
+        for model in (self.model, self.second):
+            if (method := method_of(model)) is not METHOD:
+                raise ConfigError(f"'{model}' is a {method.name} texture", f"graft {METHOD.name} textures")
+        mesh = Mesh.load(self.mesh)
+        first, second = NcaTexture.load(self.model), NcaTexture.load(self.second)
+        textures = out.suffix.lower() != ".ply" and not self.vertex_colors
+        return Graft(first, second, graft_weights(mesh, self.weights)).apply(
+            mesh,
+            seed=self.seed,
+            steps=self.steps,
+            subdivide=levels(self.subdivide),
+            orientation=oriented(self.orientation),
+            scale=self.scale,
+            resolution=(self.resolution or RESOLUTION) if textures else None,
+        )

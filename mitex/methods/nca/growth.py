@@ -1,0 +1,99 @@
+"""An automaton at work on a mesh: how its states evolve, and what they show."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from functools import cached_property
+
+import numpy as np
+import torch
+
+from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.decoder.surface import Surface
+from mitex.methods.nca.look import Look, weights_key
+from mitex.methods.nca.orientation import Turn
+from mitex.methods.nca.palette import Palette
+from mitex.methods.nca.perception import Perception, perception
+
+
+class Growth(ABC):
+    """What grows on the mesh of an automaton.
+
+    Attributes:
+        cells: the mesh.
+    """
+
+    cells: Cells
+
+    @property
+    @abstractmethod
+    def key(self) -> str:
+        """A hash of the weights that it follows from."""
+
+    @abstractmethod
+    def seed(self) -> torch.Tensor:
+        """The initial state, zeros (V, C)."""
+
+    @abstractmethod
+    def evolve(self, state: torch.Tensor, steps: int, generator: torch.Generator) -> torch.Tensor:
+        """The state (V, C) after some steps, held within the bounds of the training."""
+
+    @abstractmethod
+    def shown(self, state: torch.Tensor) -> Grown:
+        """What a state (V, C) looks like on the mesh that the texture is for."""
+
+    @abstractmethod
+    def foreign(self, state: torch.Tensor) -> np.ndarray:
+        """The vertices (V,) bool at which a state shows colours that the exemplar does not have."""
+
+
+class LookGrowth(Growth):
+    """A single look on a mesh.
+
+    Args:
+        look: the cell rule and its decoder.
+        cells: the mesh.
+        orientation: of the texture.
+        palette: the exemplar's colours; None if they are not known.
+        operator: perception of the cells, if it is not simply that of their mesh.
+        condition: of the cells, (V, 3), of a look that moves.
+    """
+
+    def __init__(
+        self,
+        look: Look,
+        cells: Cells,
+        orientation: Turn = 0.0,
+        palette: Palette | None = None,
+        operator: Perception | None = None,
+        condition: torch.Tensor | None = None,
+    ) -> None:
+        self.condition = condition
+        self.look, self.cells, self.orientation, self.palette = look, cells, orientation, palette
+        self.operator = operator or perception(cells.mesh, look.rule.degree, orientation, mean=look.mean)
+
+    @property
+    def key(self) -> str:
+        return weights_key(self.look)
+
+    def seed(self) -> torch.Tensor:
+        return self.look.rule.seed(self.operator)[0]
+
+    @torch.no_grad()
+    def evolve(self, state: torch.Tensor, steps: int, generator: torch.Generator) -> torch.Tensor:
+        return self.look.evolve(state[None], self.operator, steps, generator, self.condition)[0]
+
+    def shown(self, state: torch.Tensor) -> Grown:
+        return Grown(self.look, state, self.cells, self.orientation, self.palette, self._surface)
+
+    def foreign(self, state: torch.Tensor) -> np.ndarray:
+        if self.palette is None:
+            return np.zeros(len(state), bool)
+        own = Cells(self.cells.mesh, 0, self.cells.mesh)
+        grown = Grown(self.look, state, own, surface=self._surface)
+        return self.palette.unlike(grown.at_vertices()["albedo"])
+
+    @cached_property
+    def _surface(self) -> Surface:
+        return Surface(self.cells.mesh, self.look.interpolation)

@@ -1,0 +1,91 @@
+"""What the cells of a moving texture are told of a vector field on a mesh (MeshNCA, equation 10)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mitex.errors import ConfigError
+from mitex.geometry.triangles import interpolate
+from mitex.geometry.vectors import rotate_about
+from mitex.mesh import Lattice, Mesh
+from mitex.mesh.fields import vector_field
+from mitex.mesh.nearest import surface_points
+from mitex.methods.nca.look import Look
+from mitex.methods.nca.ranges import SPEEDS
+
+OF_VERTICES = (".npy", ".ply")  # files of vectors that belong to the vertices of one mesh
+WIDTH = 3  # of a vector, which is a cell's condition
+
+Field = str | Path | np.ndarray
+"""A vector field, as `mitex.mesh.fields.vector_field` takes it."""
+
+
+def cell_vectors(
+    given: Mesh, cells: Mesh, field: Field, speed: float, orientation: float | np.ndarray = 0.0
+) -> np.ndarray:
+    """(V, 3) float32 vectors of the cells.
+
+    Args:
+        given: the mesh whose vertices the vectors of a file or an array belong to.
+        cells: V vertices; the same mesh, or one of nearly the same surface.
+        field: see `Field`.
+        speed: factor of the field, whose mean length is 1.
+        orientation: of the texture [rad], one or (V,). Cells take what is turned by it for upright, so their
+            vectors are turned back.
+
+    Raises:
+        ConfigError: as of `vector_field`.
+    """
+    own = isinstance(field, np.ndarray) or Path(field).suffix.lower() in OF_VERTICES
+    if own and cells is not given:
+        vectors = vector_field(given, field).astype(np.float64)
+        face, weights = surface_points(given, cells.vertices.astype(np.float64))
+        field = interpolate(weights, vectors[given.faces[face]])
+    vectors = speed * vector_field(cells, field).astype(np.float64)
+    return rotate_about(vectors, cells.normals.astype(np.float64), -orientation).astype(np.float32)
+
+
+def flat_vectors(lattice: Lattice, field: Field, speed: float) -> np.ndarray:
+    """(V, 3) float32 vectors of the cells in a lattice's square, all the same.
+
+    Raises:
+        ConfigError: a field that differs from place to place; or as of `vector_field`.
+    """
+    vectors = speed * vector_field(lattice.mesh, field)[: lattice.count]
+    if np.ptp(vectors, axis=0).max() > 1e-4 * speed:
+        raise ConfigError(
+            f"the vector field '{field}' is not the same everywhere, so that a tile would have a seam",
+            "give a direction such as right or 1,1,0",
+        )
+    return vectors
+
+
+def followed_field(
+    look: Look, about: Mapping[str, Any], field: Field | None, speed: float, default: Field | None
+) -> Field | None:
+    """The vector field that a look follows: the given one or the default; None if the look does not move.
+
+    Raises:
+        ConfigError: it does not move but shall; no field is known; or a speed out of range.
+    """
+    name, width = about.get("name", "the model"), look.rule.condition
+    if not SPEEDS[0] <= speed <= SPEEDS[1]:
+        raise ConfigError(f"a speed of {speed:g}", f"use {SPEEDS[0]:g} to {SPEEDS[1]:g}")
+    if not width:
+        if field is not None or speed != 1.0:
+            raise ConfigError(
+                f"'{name}' does not move: it was trained without a vector field",
+                "train one from it: fit nca with `motion` and `init`",
+            )
+        return None
+    field = default if field is None else field
+    if width != WIDTH or field is None:
+        raise ConfigError(
+            f"'{name}' needs a condition of {width} values at each vertex, and has none here",
+            "give `field`" if width == WIDTH else "give it to MeshNCA.evolve in Python",
+        )
+    return field

@@ -1,0 +1,61 @@
+"""How a training of motion begins: its field, its settings, and a still look that learns to move."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+
+import torch
+
+from mitex.errors import ConfigError
+from mitex.mesh import icosphere
+from mitex.mesh.fields import vector_field
+from mitex.methods.nca.look import Look
+from mitex.methods.nca.model import MeshNCA
+from mitex.methods.nca.motion.condition import WIDTH
+from mitex.training.config import by_key
+from mitex.training.settings import RunOptions
+
+PRESET = "motion"
+
+
+def moving(options: RunOptions, field: str) -> RunOptions:
+    """Options of a fit whose texture moves along a field; the preset is `PRESET` where nothing else tells.
+
+    Raises:
+        ConfigError: the settings name another field.
+    """
+    settings = by_key(options.get("set", ()))
+    if settings.setdefault("motion", field) != field:
+        raise ConfigError(f"motion is set to {settings['motion']} and to {field}", "give it once")
+    elsewhere = options.get("config") or options.get("resume") or "preset" in settings
+    preset = options.get("preset") or (None if elsewhere else PRESET)
+    return {**options, "set": settings, "preset": preset}
+
+
+def check_field(field: str) -> None:
+    """Refuses what is no field of a training's spheres.
+
+    Raises:
+        ConfigError: it is unknown, or of one mesh alone.
+    """
+    if any(field.lower().endswith(suffix) for suffix in (".npy", ".ply")):
+        raise ConfigError(
+            f"'{field}' holds the vectors of one mesh, and the training has spheres of its own",
+            "train with a name or a direction, and give the file as `field` when it is applied",
+        )
+    vector_field(icosphere(2), field)
+
+
+def with_condition(look: Look) -> Look:
+    """A copy of a look whose cells are told a vector, which does not matter to them yet.
+
+    The weights of the new inputs are zero, so that it grows bit for bit what the look grows.
+    """
+    look, still = deepcopy(look), look.rule
+    rule = MeshNCA(still.channels, still.hidden, WIDTH, still.degree)
+    weights = still.state_dict()
+    first = weights["fc1.weight"]
+    weights["fc1.weight"] = torch.cat([first, first.new_zeros(len(first), WIDTH)], 1)
+    rule.load_state_dict(weights)
+    look.rule = rule
+    return look

@@ -1,0 +1,75 @@
+"""The training of a look that moves: the still one, along a field that differs from step to step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import torch
+
+from mitex.exemplar import Exemplar
+from mitex.losses.advection import advection_residual
+from mitex.losses.motion import motion_loss
+from mitex.methods.nca.config import NcaConfig
+from mitex.methods.nca.look import Look
+from mitex.methods.nca.motion.drift import Drift, draw_drift
+from mitex.methods.nca.motion.estimator import load_estimator
+from mitex.methods.nca.motion.pairs import Pairs, plane_pairs, sphere_pairs
+from mitex.methods.nca.surfaces import TrainingSphere, TrainingSurface
+from mitex.methods.nca.task import NcaTask, Rollout
+
+
+class MotionTask(NcaTask):
+    """Trains a look that moves along a vector field (MeshNCA, section 4.3); arguments as of `NcaTask`."""
+
+    def __init__(
+        self,
+        config: NcaConfig,
+        exemplar: Exemplar,
+        init: Look | None = None,
+        lineage: Mapping[str, str] | None = None,
+    ) -> None:
+        super().__init__(config, exemplar, init, lineage)
+        self.estimator = load_estimator(config.motion_estimator)
+
+    def rollout(
+        self,
+        surface: TrainingSurface,
+        state: torch.Tensor,
+        step: int,
+        steps: int,
+        generator: torch.Generator,
+    ) -> Rollout:
+        config, rule = self.config, self.look.rule
+        drift = draw_drift(config, surface, generator)
+        condition = drift.condition if rule.condition else None
+        apart = min(config.motion_steps, steps)
+        pattern = bool(state.any()) and step >= config.motion_start
+        states = [rule.evolve(state, surface.perception, steps % apart, generator, condition)]
+        for _ in range(steps // apart):
+            states.append(rule.evolve(states[-1], surface.perception, apart, generator, condition))
+        if not pattern:  # nothing can move yet
+            return Rollout(states[-1], {})
+        loss = self.motion([state[0] for state in states], drift, apart, generator)
+        return Rollout(states[-1], {"motion": config.motion_weight * loss})
+
+    def motion(
+        self, states: Sequence[torch.Tensor], drift: Drift, apart: int, generator: torch.Generator
+    ) -> torch.Tensor:
+        """How far states (V, C), each `apart` automaton steps from the next, are from moving with a drift."""
+        period, gamma = self.config.motion_period, self.config.motion_gamma
+        if self.estimator is None:
+            transport = drift.transport(apart / period)
+            residuals = [advection_residual(a, b, transport(a)) for a, b in pairwise(states)]
+            return torch.stack(residuals).mean()
+        pairs = self.pairs((states[-2].detach(), states[-1]), drift, generator)
+        flow = self.estimator(pairs.first, pairs.second)
+        return motion_loss(flow, pairs.target, pairs.mask, steps=apart, period=period, gamma=gamma).total
+
+    def pairs(self, states: Sequence[torch.Tensor], drift: Drift, generator: torch.Generator) -> Pairs:
+        """What the estimator looks at: the widest views, in which motions are the fewest pixels."""
+        surface, size = drift.surface, next(iter(self.zooms))
+        if isinstance(surface, TrainingSphere):
+            return sphere_pairs(self.look, states, drift, self.cameras(surface, size, generator))
+        windows = surface.places(self.closeups(size), generator)
+        return plane_pairs(self.look, states, drift, windows)

@@ -1,0 +1,121 @@
+"""`mitex animate` and `mitex graft` for automata's textures."""
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+
+from mitex.asset import Asset
+from mitex.cli import main
+from tests.cli.refusals import check_refused
+
+pytestmark = pytest.mark.usefixtures("own_cache")
+
+
+def animate(words="", out="out/film/", mesh="good.obj", model="waffle"):
+    small = "--seconds 0.5 --fps 4 --resolution 16 --subdivide 0"
+    return f"animate {model} --mesh {mesh} --out {out} {small} {words}".split()
+
+
+def graft(words="--weights y", out="out/a.ply", mesh="good.obj", models="waffle lava"):
+    return f"graft {models} --mesh {mesh} --out {out} {words}".split()
+
+
+def pictures(files):
+    return np.stack([iio.imread(path) for path in sorted((files / "out" / "film").iterdir())]).astype(int)
+
+
+def test_a_film_of_each_kind(files, capsys):
+    for out in ("out/a.mp4", "out/a.gif", "out/film/"):
+        assert main(animate(out=out)) == 0 and capsys.readouterr().out.strip() == out
+    assert len(iio.imread("out/a.mp4")) == len(iio.imread("out/a.gif")) == len(pictures(files)) == 2
+    assert not [path for path in (files / "out").iterdir() if path.name.startswith(".")]
+
+
+def test_options_reach_the_film(files, monkeypatch):
+    calls = []
+    monkeypatch.setattr(
+        "mitex.methods.nca.film.film", lambda *given, **options: calls.append((given[3], options))
+    )
+    words = "--steps-per-frame 5 --start 7 --renderer path --spp 3 --azimuth 1 --elevation 2 --loop --fade 1 "
+    words += "--damage y:0: --damage-at 0.25 --seed 4 --orientation 6 --scale 2 --field up --speed 2 --resume"
+    assert main(animate(words)) == main(animate("--loop --fade 0")) == main(animate()) == 0
+    (shooting, options), (loop, _), (still, _) = calls
+    assert (shooting.seconds, shooting.fps, shooting.resolution) == (0.5, 4, 16)
+    assert (shooting.steps_per_frame, shooting.start, shooting.renderer, shooting.spp) == (5, 7, "path", 3)
+    assert (shooting.azimuth, shooting.elevation, shooting.loop) == (1, 2, 1)
+    assert (shooting.damage, shooting.damage_at) == ("y:0:", 0.25)
+    follows = {"field": "up", "speed": 2, "resume": True}
+    assert options == {"seed": 4, "orientation": 6, "scale": 2, "subdivide": 0, **follows}
+    assert loop.loop == 0 and still.loop is None and still.renderer == "preview"
+
+
+BAD_FILMS = {
+    "no frames": (animate("--seconds 0"), "a video of 0 frames"),
+    "another format": (animate(out="out/a.avi"), "use one of .mp4, .gif"),
+    "a model": (animate(out="out/a.glb"), "not a sequence in time"),
+    "a locked place": (animate(out="good.obj/film/"), "is a file"),
+    "a full folder": (animate(out="out/.."), "is not empty"),
+    "an odd side": (animate("--resolution 17", out="out/a.mp4"), "MP4 needs an even size"),
+    "samples of a preview": (animate("--spp 4"), "--spp means nothing without --renderer path"),
+    "a fade of no loop": (animate("--fade 4"), "--fade means nothing without --loop"),
+    "a long fade": (animate("--loop"), "a cross-fade of 12 frames"),
+    "a time of no damage": (animate("--damage-at 1"), "--damage-at means nothing without --damage"),
+    "damage after the end": (animate("--damage y:0: --damage-at 1"), "choose a time within it"),
+    "nothing to resume": (animate("--resume"), "start without --resume"),
+    "many steps": (animate("--steps-per-frame 0"), "--steps-per-frame 0 is out of range"),
+    "no mesh": (animate(mesh="none.obj"), "none.obj"),
+    "no model": (animate(model="none"), "no model 'none'"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILMS)
+def test_bad_films(files, name, capsys):
+    words, message = BAD_FILMS[name]
+    check_refused(files, words, message, capsys)
+
+
+def test_a_graft_is_written(files, capsys):
+    """Its colours at the bottom are the first model's, at the top the second's."""
+    few = "--steps 20 --subdivide 2"
+    albedo = {}
+    for weights in ("y", "0", "1"):
+        assert main(graft(f"--weights {weights} {few}")) == 0
+        albedo[weights] = Asset.load(files / "out" / "a.ply").vertex_maps["albedo"]
+    mesh = Asset.load(files / "out" / "a.ply").mesh
+    low = mesh.vertices[:, 1] == mesh.vertices[:, 1].min()
+    assert np.abs(albedo["y"] - albedo["0"])[low].max() < 0.35
+    assert np.abs(albedo["0"] - albedo["1"]).max() > 0.05
+    assert main(["models"]) == 0
+    assert "which can be grafted with each other: bricks, ceramic, " in capsys.readouterr().out
+
+
+BAD_GRAFTS = {
+    "another method": (graft(models="waffle spikes"), "'spikes' is a geometric texture; graft nca textures"),
+    "no second model": (graft(models="waffle"), "RUN|MODEL is missing"),
+    "no weights": (graft(""), "--weights is missing"),
+    "bad weights": (graft("--weights w"), "says nothing about weights"),
+    "short weights": (graft("--weights short.npy"), "one number for each of 8 vertices"),
+    "no UVs": (graft("--weights paint.png"), "has no UVs"),
+    "a film": (graft(out="out/a.mp4"), "use one of .glb"),
+    "colours in a folder": (graft("--weights y --vertex-colors", out="out/maps/"), "--vertex-colors means"),
+    "its own weights": (graft("--weights short.ply", out="short.ply"), "is an input"),
+    "steps": (graft("--weights y --steps 0"), "--steps 0 is out of range"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_GRAFTS)
+def test_bad_grafts(files, name, capsys):
+    np.save(files / "short.npy", np.zeros(3))
+    iio.imwrite(files / "paint.png", np.zeros((16, 16, 3), np.uint8))
+    (files / "short.ply").write_text("ply\n")
+    words, message = BAD_GRAFTS[name]
+    check_refused(files, words, message, capsys)
+
+
+def test_models_of_other_families_are_not_grafted(files, capsys):
+    from mitex.methods.nca import NcaTexture
+
+    texture = NcaTexture.load("lava")
+    NcaTexture(texture.look, {**texture.about, "family": "another"}).save(files / "lava.safetensors")
+    message = "'waffle' and 'lava' are not of one family"
+    check_refused(files, graft(models="waffle lava.safetensors"), message, capsys)

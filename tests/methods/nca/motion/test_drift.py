@@ -1,0 +1,84 @@
+"""The field of one training step, and states that are carried along it."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from scipy.spatial.transform import Rotation
+
+from mitex.mesh import icosphere, scattered_sphere
+from mitex.mesh.fields import vector_field
+from mitex.methods.nca.motion.drift import Drift, draw_drift, random_rotation, turned_field
+from mitex.methods.nca.surfaces import TrainingPlane, TrainingSphere
+from tests.methods.nca.tiny import config, texture
+
+
+@pytest.fixture(scope="module")
+def look():
+    return texture().look
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 0.5 * math.pi])
+def test_a_square_carries_waves_along(look, azimuth):
+    """By any vector in its plane, also over its sides; better than the gradient would by far."""
+    plane = TrainingPlane.of(32, look, azimuth)
+    places = plane.lattice.mesh.vertices[: plane.lattice.count] @ plane.axes.T
+    way = np.array([1.7, -0.9])
+
+    def waves(shift):
+        x, y = (2 * math.pi / 32) * (places - shift).T
+        return torch.from_numpy(np.stack([np.sin(3 * x), np.cos(2 * x - 3 * y)], 1)).float()
+
+    field = np.tile(2 * way @ plane.axes, (len(places), 1))
+    carried = Drift(plane, field).transport(0.5)(waves(0 * way))
+    assert (carried - waves(way)).abs().max() < 0.01
+    assert (waves(0 * way) - waves(way)).abs().max() > 0.5
+
+
+@pytest.mark.parametrize("mesh", [icosphere(16), scattered_sphere(2562)], ids=["even", "uneven"])
+def test_a_sphere_carries_a_pattern_about_an_axis(look, mesh):
+    """A turn by the angle that the field says, in edges."""
+    sphere = TrainingSphere.of(mesh, look)
+    angle = 1.5 * sphere.edge
+    points = mesh.vertices.astype(np.float64)
+
+    def pattern(turn):
+        x, y, z = Rotation.from_rotvec([0, turn, 0]).inv().apply(points).T
+        return torch.from_numpy(np.stack([np.sin(5 * x), z * y, x * x], 1)).float()
+
+    field = np.cross([0.0, 1.5, 0.0], points)  # [edges] at the equator
+    carried = Drift(sphere, field).transport(1.0)(pattern(0.0))
+    error = (carried - pattern(angle)).abs().max()
+    assert error < 0.1 * (pattern(0.0) - pattern(angle)).abs().max()
+
+
+def test_turned_fields_are_those_of_the_turned_mesh():
+    """The field of +x turned to another direction is that of the other direction."""
+    mesh, rotation = icosphere(4), random_rotation(torch.Generator().manual_seed(3))
+    assert np.allclose(rotation @ rotation.T, np.eye(3)) and np.linalg.det(rotation) == pytest.approx(1)
+    direction = ",".join(f"{number:.9f}" for number in rotation @ [1, 0, 0])
+    turned = turned_field(mesh, "right", rotation)
+    assert np.allclose(turned, vector_field(mesh, direction), atol=1e-4)
+    assert np.abs((turned * mesh.normals).sum(1)).max() < 1e-4
+
+
+@pytest.mark.parametrize("kind", ["plane", "sphere"])
+def test_each_step_draws_a_direction_and_a_speed(look, kind):
+    surface = TrainingPlane.of(8, look) if kind == "plane" else TrainingSphere.of(icosphere(3), look)
+    settings, generator = config("motion=up", "motion_speeds=0.5,2"), torch.Generator().manual_seed(0)
+    fields = [draw_drift(settings, surface, generator).field for _ in range(40)]
+    speeds = [np.linalg.norm(field, axis=1).mean() for field in fields]
+    assert 0.5 <= min(speeds) < 0.7 and 1.7 < max(speeds) <= 2 + 1e-6
+    pull = np.array([field.mean(axis=0) for field in fields])
+    assert (pull.min(axis=0) < -0.3).sum() >= 2 and (pull.max(axis=0) > 0.3).sum() >= 2
+    drift = draw_drift(settings, surface, generator)
+    assert drift.condition.shape == (surface.perception.vertices, 3)
+    assert np.allclose(drift.condition.numpy(), drift.field)
+
+
+def test_without_turns_a_sphere_has_the_very_field(look):
+    sphere = TrainingSphere.of(icosphere(3), look)
+    settings = config("motion=about-y", "motion_turns=false", "motion_speeds=2,2")
+    drift = draw_drift(settings, sphere, torch.Generator())
+    assert np.allclose(drift.field, 2 * vector_field(sphere.mesh, "about-y"))

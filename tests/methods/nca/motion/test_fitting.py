@@ -1,0 +1,96 @@
+"""From a field's name to a model that moves."""
+
+import json
+
+import pytest
+import torch
+
+from mitex.errors import CheckpointError, ConfigError
+from mitex.exemplar import Exemplar
+from mitex.mesh import icosphere
+from mitex.methods import nca
+from mitex.methods.nca import NcaTexture, settling
+from mitex.runtime import threads
+from tests.methods.nca.tiny import SETTINGS, config, texture
+from tests.training.contract import assert_same_checkpoint
+
+TINY = [*SETTINGS, "surfaces=even,flat", "motion_steps=2", "pool=2"]
+
+
+@pytest.fixture(autouse=True)
+def soon_in_order(monkeypatch):
+    """How long patterns take to settle is tested elsewhere."""
+    monkeypatch.setattr(settling, "STEPS", (1,))
+
+
+@pytest.fixture(scope="module")
+def lava():
+    return Exemplar({"albedo": Exemplar.load("lava").maps["albedo"]}, "lava")
+
+
+def _parent(tmp_path, **options):
+    options = {"hidden": 16, "shape": config().decoder_shape} | options
+    return texture(seed=3, **options).save(tmp_path / "parent.safetensors")
+
+
+def test_a_still_look_learns_to_move(tmp_path, lava):
+    """It starts as what it was, with weights for the field, which change then."""
+    path = _parent(tmp_path)
+    first = nca.fit(lava, init=path, motion="about-y", set=[*TINY, "steps=0"])
+    assert (first.about["preset"], first.about["motion"]) == ("motion", "about-y")
+    assert first.about["motion_period"] == 8.0 and first.about["parent"] == "tiny"
+    still = NcaTexture.load(path)
+    sphere = icosphere(4)
+    assert torch.equal(first.grow(sphere, steps=6, speed=3), still.grow(sphere, steps=6))
+    out = tmp_path / "run"
+    moving = nca.fit(lava, out, init=path, motion="about-y", set=[*TINY, "steps=8"])
+    again = NcaTexture.load(out)
+    for look in (moving, again):
+        here, there = (look.grow(sphere, steps=6, field=field) for field in ("about-y", "up"))
+        assert (here - there).abs().max() > 1e-5
+    metrics = [json.loads(line) for line in (out / "metrics.jsonl").read_text().splitlines()]
+    assert any(line.get("motion", 0) > 0 for line in metrics)
+
+
+def test_a_run_is_resumed_with_its_field(tmp_path, lava):
+    """And is the run that was not interrupted."""
+    threads(1)
+    settings = [*TINY, "checkpoint_every=2"]
+    nca.fit(lava, tmp_path / "whole", motion="up", set=[*settings, "steps=5"])
+    nca.fit(lava, tmp_path / "parts", motion="up", set=[*settings, "steps=3"])
+    nca.fit(lava, tmp_path / "parts", set=["steps=5"], resume=True)
+    assert_same_checkpoint(tmp_path / "whole", tmp_path / "parts")
+    with pytest.raises(CheckpointError, match="motion"):
+        nca.fit(lava, tmp_path / "parts", motion="down", set=["steps=6"], resume=True)
+
+
+def test_another_preset_may_move_too(lava):
+    for options in ({"preset": "patch"}, {"set": ["preset=patch"]}):
+        words = [*TINY, "steps=0", *options.get("set", ())]
+        learned = nca.fit(lava, motion="up", **{**options, "set": words})
+        assert (learned.about["preset"], learned.look.rule.condition) == ("patch", 3)
+
+
+@pytest.mark.parametrize(
+    ("motion", "problem"),
+    [
+        ("rihgt", "did you mean right"),
+        ("1,0", "no direction"),
+        ("0,0,0", "zero everywhere"),
+        ("wind.npy", "one mesh"),
+        ("wind.PLY", "one mesh"),
+    ],
+)
+def test_fields_that_nothing_can_be_trained_with(tmp_path, lava, motion, problem):
+    with pytest.raises(ConfigError, match=problem):
+        nca.fit(lava, tmp_path / "run", motion=motion, set=TINY)
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_parent_must_fit_but_for_the_condition(tmp_path, lava):
+    with pytest.raises(CheckpointError, match="differs from the config in rule.fc1"):
+        nca.fit(lava, init=_parent(tmp_path, hidden=8), motion="up", set=TINY)
+    with pytest.raises(CheckpointError, match="differs from the config in rule.fc1.weight"):
+        nca.fit(lava, init=_parent(tmp_path, condition=3), set=TINY)
+    moving = nca.fit(lava, init=_parent(tmp_path, condition=3), motion="up", set=[*TINY, "steps=0"])
+    assert moving.about["parent"] == "tiny"

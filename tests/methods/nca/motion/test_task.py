@@ -1,0 +1,135 @@
+"""The training of motion: what it adds to the still one, and the contract of tasks."""
+
+import pytest
+import torch
+
+from mitex.exemplar import Exemplar
+from mitex.methods.nca.look import Look
+from mitex.methods.nca.motion import task as training
+from mitex.methods.nca.motion.start import with_condition
+from mitex.methods.nca.motion.task import MotionTask
+from mitex.methods.nca.task import NcaTask
+from mitex.runtime import threads
+from tests.methods.nca.tiny import config
+from tests.training.contract import (
+    FAULTS,
+    assert_loss_is_pure,
+    assert_third_step_leaves_no_trace,
+)
+
+MOVING = ("motion=right", "motion_steps=2", "surfaces=even,flat")
+
+
+@pytest.fixture(scope="module")
+def exemplar():
+    return Exemplar({"albedo": Exemplar.load("lava").maps["albedo"]}, "lava")
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    threads(1)
+
+
+def _grown(task):
+    generator = torch.Generator().manual_seed(3)
+    task.pool.copy_(0.3 * torch.randn(task.pool.shape, generator=generator))
+    for index in range(len(task.pool)):  # rows beyond the cells stay zero
+        task.pool[index, task.surface(index).perception.vertices :] = 0
+    return task
+
+
+def _metrics(task, step=1, seed=0):
+    return task.loss(step, torch.Generator().manual_seed(seed)).metrics
+
+
+@pytest.mark.parametrize("step", [0, 1])
+@pytest.mark.parametrize("surface", ["even", "flat"])
+def test_the_loss_changes_nothing(exemplar, step, surface):
+    task = _grown(MotionTask(config(*MOVING, f"surfaces={surface}"), exemplar))
+    assert_loss_is_pure(task, step)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_skipped_step_leaves_every_byte(exemplar, fault):
+    settings = config(*MOVING)
+    assert_third_step_leaves_no_trace(lambda: _grown(MotionTask(settings, exemplar)), settings, fault)
+
+
+def test_motion_is_one_more_term(exemplar):
+    """Weighted, of states that show something, from some step on."""
+    one, three, late = (
+        _grown(MotionTask(config(*MOVING, "inject_every=3", *more), exemplar))
+        for more in (("motion_weight=1",), ("motion_weight=3",), ("motion_start=5",))
+    )
+    metrics = _metrics(one)
+    assert metrics["motion"] > 0
+    assert _metrics(three)["motion"] == pytest.approx(3 * metrics["motion"], rel=1e-5)
+    assert "motion" not in _metrics(one, step=3)  # the seed
+    assert "motion" not in _metrics(late, step=4) and "motion" in _metrics(late, step=5)
+    total = one.loss(1, torch.Generator().manual_seed(0)).value
+    terms = metrics["appearance"] + 100 * metrics["overflow"] + metrics["motion"]
+    assert total.item() == pytest.approx(terms, rel=1e-5)
+
+
+def test_a_perfect_transport_would_cost_nothing(exemplar, monkeypatch):
+    """Where each of the states is the one before, carried along; also the drift that the cells were told."""
+    task = _grown(MotionTask(config(*MOVING, "min_steps=7", "max_steps=7", "motion_period=4"), exemplar))
+    drifts = []
+
+    def draw(*arguments):
+        drifts.append(training.Drift(*drawn(*arguments)))
+        return drifts[-1]
+
+    drawn = lambda *arguments: vars(original(*arguments)).values()  # noqa: E731
+    original = training.draw_drift
+    monkeypatch.setattr(training, "draw_drift", draw)
+
+    def evolve(state, operator, steps, generator, condition):
+        assert torch.equal(condition, drifts[-1].condition)
+        return drifts[-1].transport(steps / 4)(state[0])[None]
+
+    monkeypatch.setattr(task.look.rule, "evolve", evolve)
+    assert _metrics(task)["motion"] == pytest.approx(0, abs=1e-6)
+    monkeypatch.setattr(task.look.rule, "evolve", lambda state, *_: state)
+    assert _metrics(task)["motion"] == pytest.approx(task.config.motion_weight)
+
+
+def test_estimators_of_pictures_see_the_last_states(exemplar, monkeypatch):
+    """And are compared with what the drift would show; their loss is that of motions in pictures."""
+
+    def estimator(first, second):
+        assert first.shape == second.shape == (4, 1, 32, 32) and second.requires_grad
+        return (second - first).expand(-1, 2, -1, -1)
+
+    monkeypatch.setattr(training, "load_estimator", {"lucas-kanade": estimator}.__getitem__)
+    for surface in ("even", "flat"):
+        settings = (*MOVING, f"surfaces={surface}", "motion_estimator=lucas-kanade", "density=8")
+        values = []
+        for gamma in (0, 2):
+            task = _grown(MotionTask(config(*settings, f"motion_gamma={gamma}"), exemplar))
+            result = task.loss(1, torch.Generator().manual_seed(0))
+            result.value.backward()
+            assert task.look.rule.fc1.weight.grad[:, -3:].any()
+            values.append(result.metrics["motion"])
+        assert values[0] != values[1]
+
+
+def test_cells_may_know_nothing_of_the_field(exemplar):
+    """The paper's ablation: the same loss, but no condition."""
+    task = _grown(MotionTask(config(*MOVING, "motion_encoding=false"), exemplar))
+    assert task.look.rule.condition == 0 and _metrics(task)["motion"] > 0
+
+
+def test_a_still_look_begins_as_it_was(exemplar):
+    """Bit for bit, whatever the cells are told; the weights of that have gradients."""
+    still = NcaTask(config(), exemplar).look
+    look = with_condition(still)
+    assert isinstance(look, Look) and look.rule.condition == 3 and still.rule.condition == 0
+    sphere = MotionTask(config(*MOVING), exemplar, look).surfaces[0]
+    state = 0.3 * torch.randn(1, sphere.perception.vertices, 16, generator=torch.Generator().manual_seed(0))
+    told = torch.randn(sphere.perception.vertices, 3, generator=torch.Generator().manual_seed(1))
+    ours = look.rule.evolve(state, sphere.perception, 6, torch.Generator().manual_seed(2), told)
+    theirs = still.rule.evolve(state, sphere.perception, 6, torch.Generator().manual_seed(2))
+    assert torch.equal(ours, theirs)
+    ours.square().sum().backward()
+    assert look.rule.fc1.weight.grad is not None and look.rule.fc1.weight.grad[:, -3:].any()

@@ -1,0 +1,127 @@
+"""Films show the automaton's states in turn; every option changes what they show."""
+
+import signal
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+import torch
+
+from mitex.errors import ConfigError
+from mitex.mesh import icosphere
+from mitex.methods.nca import Graft, NcaTexture, film
+from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.weights import graft_weights
+from tests.methods.nca import tiny
+
+SPHERE, MAPS = icosphere(6), ("albedo", "ambient_occlusion", "normal")
+SHORT = {"seconds": 1.0, "fps": 4, "resolution": 24, "subdivide": 0, "steps_per_frame": 3}
+
+
+@pytest.fixture(scope="module")
+def texture():
+    return tiny.texture(MAPS, shape=None)
+
+
+def frames(folder):
+    return np.stack([iio.imread(path) for path in sorted(folder.iterdir())]).astype(int)
+
+
+def shoot(texture, folder, **options):
+    return frames(texture.animate(SPHERE, folder, **{**SHORT, **options}))
+
+
+@pytest.fixture(scope="module")
+def plain(texture, tmp_path_factory):
+    return shoot(texture, tmp_path_factory.mktemp("films") / "plain")
+
+
+def test_frames_are_states_some_steps_apart(texture, plain, tmp_path):
+    """What a film from a later start shows at first is what the other one shows then."""
+    assert plain.shape == (4, 24, 24, 3) and np.ptp(plain[3]) > 30
+    assert all(np.abs(a - b).max() > 3 for a, b in zip(plain, plain[1:], strict=False))
+    assert np.array_equal(shoot(texture, tmp_path / "later", start=6, seconds=0.5), plain[2:])
+    assert np.array_equal(shoot(texture, tmp_path / "slow", steps_per_frame=6, seconds=0.5), plain[::2])
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        *({"seed": 1}, {"orientation": 90.0}, {"azimuth": 120.0}, {"elevation": 70.0}, {"subdivide": 1}),
+        {"damage": "0,0,1,0.9", "start": 0},
+    ],
+    ids=str,
+)
+def test_no_option_is_ignored(texture, plain, tmp_path, options):
+    assert np.abs(shoot(texture, tmp_path / "other", **options) - plain).max() > 3
+
+
+def test_a_damaged_region_is_set_back_at_its_time_and_grows_again(texture):
+    states, cells = {}, Cells(SPHERE, 0, SPHERE)
+    inside = torch.from_numpy(SPHERE.vertices[:, 1] > 0)
+    for damage in (None, inside):
+        shooting = film.Shooting(seconds=1, fps=4, steps_per_frame=3, damage_at=0.5)
+        shot = film.States(texture.growth(cells), shooting, 6, 0, damage)
+        states[damage is not None] = list(shot.frames(0, 4))
+    whole, damaged = states[False], states[True]
+    assert all(torch.equal(a, b) for a, b in zip(whole[:2], damaged[:2], strict=True))
+    assert not damaged[2][inside].any() and torch.equal(damaged[2][~inside], whole[2][~inside])
+    assert damaged[3][inside].any()
+
+
+def test_films_of_damage_start_when_the_pattern_is_in_order(texture, tmp_path):
+    slow = type(texture)(texture.look, {"name": "slow", "growth_steps": 9})
+    first = shoot(slow, tmp_path / "a", damage="y:0:", seconds=0.5, damage_at=0.3)[0]
+    assert np.array_equal(first, shoot(slow, tmp_path / "b", start=9, seconds=0.5)[0])
+
+
+def test_it_is_resumed_with_the_same_frames(texture, plain, tmp_path, monkeypatch):
+    picture, count = film.PreviewCamera.picture, 0
+
+    def stopped(camera, grown):
+        nonlocal count
+        count += 1
+        if count == 2:
+            signal.raise_signal(signal.SIGINT)
+        return picture(camera, grown)
+
+    monkeypatch.setattr(film.PreviewCamera, "picture", stopped)
+    with pytest.raises(KeyboardInterrupt, match="after 2 of 4 frames"):
+        shoot(texture, tmp_path / "film")
+    with pytest.raises(ConfigError, match="had another model and seed"):
+        shoot(tiny.texture(MAPS, seed=1), tmp_path / "film", seed=1, resume=True)
+    assert np.array_equal(shoot(texture, tmp_path / "film", resume=True), plain) and count == 4
+
+
+def test_path_traced_frames_show_the_same_states(texture, plain, tmp_path):
+    """Those of one renderer that changes its look are those of renderers of their own."""
+    options = {"renderer": "path", "spp": 4, "resolution": 32}
+    both = shoot(texture, tmp_path / "both", seconds=0.5, **options)
+    second = shoot(texture, tmp_path / "second", seconds=0.5, start=3, **options)
+    assert np.abs(both[1] - second[0]).mean() < 0.5 < np.abs(both[0] - both[1]).mean()
+
+
+def test_a_graft_is_filmed_too(texture, plain, tmp_path):
+    other = tiny.texture(MAPS, seed=1, shape=None)
+    pair = (NcaTexture(one.look, {"name": "a relative", "family": "one"}) for one in (texture, other))
+    first, second = pair
+    grafted = Graft(first, second, graft_weights(SPHERE, 0))
+    assert np.array_equal(shoot(grafted, tmp_path / "film"), plain)
+
+
+BAD = {
+    "another renderer": ({"renderer": "raster"}, "no renderer 'raster'"),
+    "no steps": ({"steps_per_frame": 0}, "0 steps a frame"),
+    "a negative start": ({"start": -1}, "a start after -1 steps"),
+    "damage after the end": ({"damage": "y:0:", "damage_at": 2.0}, "choose a time within it"),
+    "damage of nothing": ({"damage": "9,9,9,1"}, "nothing of 'icosphere6' is in '9,9,9,1'"),
+    "damage in other words": ({"damage": "all"}, "'all' is no region"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_films_are_refused(texture, tmp_path, name):
+    options, message = BAD[name]
+    with pytest.raises(ConfigError, match=message):
+        shoot(texture, tmp_path / "film", **options)
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,103 @@
+"""Two textures on one mesh: each alone where the weight says so, and the published mixture in between."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from mitex.errors import ConfigError
+from mitex.mesh import icosphere
+from mitex.methods.nca import Graft, NcaTexture
+from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.perception import perception
+from mitex.methods.nca.texture import grown_state
+from mitex.methods.nca.weights import graft_weights
+from tests.methods.nca import tiny
+
+SPHERE = icosphere(4)
+CELLS = Cells(SPHERE, 0, SPHERE)
+ALL = ("albedo", "normal", "roughness")
+OPTIONS: dict[str, Any] = {"seed": 3, "steps": 12, "subdivide": 1, "resolution": 64}
+
+
+def relative(seed, family="one", maps=ALL, reach=0.3, **options):
+    texture = tiny.texture(maps, seed=seed, **options)
+    texture.look.low.fill_(-reach)
+    texture.look.high.fill_(reach)
+    palette = {"colours": [[0.2 * seed, 0.5, 0.5]], "radius": 0.2}
+    return NcaTexture(texture.look, {"name": f"tiny {seed}", "family": family, "palette": palette})
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return relative(0), relative(1, reach=0.5)
+
+
+def graft(pair, source):
+    first, second = pair
+    return Graft(first, second, graft_weights(SPHERE, source))
+
+
+@pytest.mark.filterwarnings("ignore::mitex.errors.TextureWarning")
+@pytest.mark.parametrize("weight", [0, 1])
+def test_at_either_end_it_is_the_single_texture_bit_for_bit(pair, weight):
+    """With the places that are healed, the palette, and the normals of the baked textures."""
+    single, grafted = pair[weight].apply(SPHERE, **OPTIONS), graft(pair, weight).apply(SPHERE, **OPTIONS)
+    assert single.texture_maps and grafted.texture_maps
+    for maps, others in (
+        (single.texture_maps, grafted.texture_maps),
+        (single.vertex_maps, grafted.vertex_maps),
+    ):
+        assert maps.keys() == others.keys() and all(np.array_equal(maps[k], others[k]) for k in maps)
+
+
+def test_updates_are_mixed_by_the_weights_of_the_vertices(pair):
+    """Equation of section 3.3.2, with one mask for both, and within bounds that are mixed too."""
+    growth = graft(pair, "x").growth(CELLS)
+    share = torch.from_numpy(graft_weights(SPHERE, "x")(SPHERE.vertices.astype(np.float64)))[:, None]
+    operator, generator = perception(SPHERE, 1, mean=True), torch.Generator().manual_seed(5)
+    state = growth.seed()
+    reach = 1.1 * (0.3 + share * 0.2)
+    with torch.no_grad():
+        for _ in range(6):
+            mask = torch.rand(1, len(state), generator=generator)[0] < 0.5
+            first, second = (texture.look.rule.update(state[None], operator)[0] for texture in pair)
+            update = (1 - share) * first + share * second
+            state = torch.where(mask[:, None], state + update, state)
+            state = torch.minimum(torch.maximum(state, -reach), reach)
+    grown = grown_state(growth, 5, 6)
+    assert torch.allclose(grown, state, atol=1e-5) and state.abs().max() > 0.1
+
+
+def test_maps_are_mixed_by_the_weight_at_the_point(pair):
+    growth = graft(pair, "x").growth(CELLS)
+    state = grown_state(growth, 0, 5)
+    face = np.arange(len(SPHERE.faces), dtype=np.int32)
+    barycentric = np.full((len(face), 3), 1 / 3, np.float32)
+    first, second = (t.growth(CELLS).shown(state).values(face, barycentric) for t in pair)
+    places = SPHERE.vertices[SPHERE.faces].mean(axis=1, dtype=np.float64)
+    share = graft_weights(SPHERE, "x")(places)[:, None]
+    mixed = growth.shown(state).values(face, barycentric)
+    assert np.allclose(mixed, (1 - share) * first + share * second, atol=1e-5)
+
+
+def test_it_needs_as_many_steps_as_the_slower_one(pair):
+    slow = NcaTexture(pair[1].look, {**pair[1].about, "growth_steps": 500})
+    assert Graft(pair[0], slow, graft_weights(SPHERE, 0)).steps == 500
+
+
+def test_only_one_family_can_be_grafted(pair):
+    with pytest.raises(ConfigError, match="'tiny 0' and 'tiny 2' are not of one family"):
+        graft((pair[0], relative(2, family="another")), "x")
+    with pytest.raises(ConfigError, match="differ in fc1, .*hidden|differ in .*rule.fc1"):
+        graft((pair[0], relative(2, hidden=64)), "x")
+    with pytest.raises(ConfigError, match="differ in .*maps"):
+        graft((pair[0], relative(2, maps=("albedo",))), "x")
+
+
+def test_bundled_models_are_one_family():
+    from mitex.methods.registry import bundled, methods
+
+    families = {NcaTexture.load(path).about["family"] for path in bundled(methods()["nca"]).values()}
+    assert families == {NcaTexture.load("ceramic").about["family"]}
