@@ -21,14 +21,20 @@ from mitex.training.progress import ProgressDisplay
 QUICK = ("resolution=320", "exemplar_size=160", "steps=100", "milestones=75,90")
 
 
-def main(out: str = "octopus.png", large: bool = False, settings: Sequence[str] = (), spp: int = 32) -> None:
+def main(
+    out: str = "octopus.png",
+    large: bool = False,
+    settings: Sequence[str] = (),
+    resolution: int = 512,
+    spp: int = 32,
+) -> None:
     exemplar = Exemplar.load("scales")
     if not large:
         exemplar, settings = Exemplar({"albedo": exemplar.maps["albedo"]}, "scales"), [*QUICK, *settings]
     with ProgressDisplay() as on_step:
         asset = surface.fit(exemplar, embedded("octopus"), set=settings, on_step=on_step).apply()
     print(asset.export(Path(out).with_suffix(".glb")))
-    sides = [still(asset, resolution=512, spp=spp, azimuth=azimuth) for azimuth in (20, 200)]
+    sides = [still(asset, resolution=resolution, spp=spp, azimuth=azimuth) for azimuth in (20, 200)]
     print(write_image(out, np.hstack([tone(side) for side in sides])))
 
 
