@@ -4,7 +4,7 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
 
 - fits: their settings are resolved as they were asked for, which checks them; then they get 2 steps, 3 if the
   run is resumed, and the tiny settings of their method;
-- meshes that ship with Mitex are balls of 362 vertices, under their names;
+- meshes that ship with Mitex are balls of 362 vertices, as large as they and under their names;
 - automata grow for 2 steps on the mesh as it is, are not healed, and are baked at 64 texels;
 - films have 4 frames of 32 pixels;
 - pictures are traced in 16 x 16 pixels with one path each, and enlarged.
@@ -51,7 +51,7 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     from mitex.training import fit
 
     patch.setattr(fit, "resolve", _with_few_steps(fit.resolve))
-    patch.setattr("mitex.mesh.load.embedded", lambda name: replace(icosphere(6), name=embedded(name).name))
+    patch.setattr("mitex.mesh.load.embedded", lambda name: _ball_in_place_of(embedded(name)))
     patch.setattr(texture, "grown_state", _with_few_growth_steps(texture.grown_state))
     patch.setattr(texture, "healed", lambda growth, state, generator: state)
     for module in (film, texture):
@@ -62,6 +62,14 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     for module in (renderer, shell):
         patch.setattr(module, "accumulated", sketch)
         patch.setattr(module, "sensor", lambda resolution: sensor(SIDE))
+
+
+def _ball_in_place_of(mesh: Mesh) -> Mesh:
+    low, high = mesh.vertices.min(0), mesh.vertices.max(0)
+    ball = icosphere(6)
+    return replace(
+        ball.with_vertices(0.5 * (low + high) + 0.5 * (high - low) * ball.vertices), name=mesh.name
+    )
 
 
 def _with_few_steps(resolve: Callable[..., Any]) -> Callable[..., Any]:
