@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -93,6 +93,10 @@ class Weights:
     index: torch.Tensor
     weight: torch.Tensor
     columns: int
+
+    def to(self, device: torch.device | str) -> Weights:
+        """The same on another device."""
+        return replace(self, index=self.index.to(device), weight=self.weight.to(device))
 
     @cached_property
     def matrix(self) -> torch.Tensor:

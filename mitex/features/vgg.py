@@ -45,7 +45,7 @@ class Vgg16:
             raise ConfigError(f"unknown pooling {pool!r}", "use 'average' or 'max'")
         if precision not in ("auto", "bfloat16", "float32"):
             raise ConfigError(f"unknown precision {precision!r}", "use 'auto', 'bfloat16' or 'float32'")
-        fast = precision == "bfloat16" or (precision == "auto" and bfloat16_is_fast())
+        fast = precision == "bfloat16" or (precision == "auto" and bfloat16_is_fast(device))
         self.pool, self.normalised, self.device = pool, normalised, device
         self.dtype = torch.bfloat16 if fast else torch.float32
         self.operations: list[FrozenConv | Pool] = []

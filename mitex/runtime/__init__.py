@@ -1,6 +1,7 @@
 """What Mitex runs on: LLVM, Mitsuba and its variant, threads, seeds, number formats, and their report."""
 
 from mitex.runtime.causes import raise_causes
+from mitex.runtime.devices import available_device
 from mitex.runtime.health import Check, doctor
 from mitex.runtime.memory import available_memory, keep_freed_memory
 from mitex.runtime.precision import bfloat16_is_fast
@@ -10,6 +11,7 @@ from mitex.runtime.workers import let_idle_threads_sleep, lower_worker_priority,
 
 __all__ = [
     "Check",
+    "available_device",
     "available_memory",
     "bfloat16_is_fast",
     "doctor",

@@ -9,10 +9,11 @@ from mitex.errors import ConfigError
 VARIABLE = "MITEX_BF16"
 
 
-def bfloat16_is_fast() -> bool:
-    """Whether frozen networks, and gradients of small ones, should be multiplied in bfloat16.
+def bfloat16_is_fast(device: str = "cpu") -> bool:
+    """Whether frozen networks, and gradients of small ones, should be multiplied in bfloat16 on a device.
 
-    They should where the CPU has AMX or AVX-512 instructions for it. `MITEX_BF16=0` or `1` decides instead.
+    They should where the CPU has AMX or AVX-512 instructions for it, or the graphics card tensor cores.
+    `MITEX_BF16=0` or `1` decides instead.
 
     Raises:
         ConfigError: The variable has another value.
@@ -20,7 +21,13 @@ def bfloat16_is_fast() -> bool:
     setting = os.environ.get(VARIABLE, "")
     if setting not in ("", "0", "1"):
         raise ConfigError(f"{VARIABLE} is '{setting}'", "set it to 0 or 1, or unset it")
-    return setting == "1" if setting else bool(bfloat16_flags())
+    if setting:
+        return setting == "1"
+    if device == "cpu":
+        return bool(bfloat16_flags())
+    import torch
+
+    return torch.cuda.is_bf16_supported(including_emulation=False)
 
 
 @cache

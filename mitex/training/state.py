@@ -15,7 +15,7 @@ from mitex.training.run import as_json
 from mitex.training.task import Step, Task
 
 SMOOTHING = 50  # steps over which the reported loss is averaged
-FREE_KEYS = frozenset({"steps", "lr", "milestones", "decay", "checkpoint_every", "preview_every"})
+FREE_KEYS = frozenset({"steps", "lr", "milestones", "decay", "checkpoint_every", "preview_every", "device"})
 
 
 class TrainState:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import arg
 
@@ -47,9 +47,14 @@ class Fit(ExemplarOptions):
     motion: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="")] = None
     """Vector field that the texture learns to move along, by name (right, up, about-y ...) or direction."""
 
+    device: Annotated[
+        Literal["cpu", "cuda"] | None, arg(metavar="cpu|cuda", help_behavior_hint="(default: cpu)")
+    ] = None
+    """Train on the processor, or on the first CUDA graphics card."""
+
     def run(self) -> None:
         mutually_exclusive("--resume", "--init", self.resume and self.init is not None)
-        options = self.run_options()
+        options = self.run_options(device=self.device)
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()

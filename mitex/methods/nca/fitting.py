@@ -62,12 +62,14 @@ def fit(
         lineage = {"parent": str(about["name"]), "family": about["family"]}
     if config.motion:
         origin |= {"motion": config.motion, "motion_period": config.motion_period}
+        origin["motion_speed"] = config.motion_speeds[1]
     task = (MotionTask if config.motion else NcaTask)(config, maps, parent, lineage)
 
     def texture(about: dict[str, Any]) -> NcaTexture:
-        steps = settling_steps(task.look, task.exemplar, config.density)
-        family = {"family": weights_key(task.look)}
-        return NcaTexture(task.look, about | origin | family | lineage | {"growth_steps": steps})
+        look = task.look.to("cpu")
+        steps = settling_steps(look, task.exemplar, config.density)
+        family = {"family": weights_key(look)}
+        return NcaTexture(look, about | origin | family | lineage | {"growth_steps": steps})
 
     return run.train(
         task,

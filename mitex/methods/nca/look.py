@@ -75,6 +75,11 @@ class Look(nn.Module):
         """Of the states between the vertices."""
         return self.decoder.shape.interpolation if isinstance(self.decoder, Decoder) else "linear"
 
+    @property
+    def device(self) -> torch.device:
+        """Where its weights are."""
+        return self.low.device
+
     def repeating(self, period: float, edge: float) -> Look:
         """A copy whose local coordinates repeat after `period` in x and y, where edges are `edge` long."""
         look = deepcopy(self)

@@ -104,7 +104,9 @@ def perception(
     return operators[key]
 
 
-def lattice_perception(lattice: Lattice, degree: int = 1, mean: bool = False) -> Perception:
+def lattice_perception(
+    lattice: Lattice, degree: int = 1, mean: bool = False, device: torch.device | str = "cpu"
+) -> Perception:
     """The perception operator of the vertices in the square of a lattice: those at its sides have the ones at
     the opposite sides as neighbours. Arguments as of `perception`.
     """
@@ -113,7 +115,7 @@ def lattice_perception(lattice: Lattice, degree: int = 1, mean: bool = False) ->
     count, blocks = lattice.count, HARMONICS[degree] + 1
     matrix = _matrix(lattice.mesh, degree, 0.0, mean)[: count * blocks]
     entries = matrix.data, lattice.source[matrix.indices], matrix.indptr
-    return _operator(scipy.sparse.csr_array(entries, shape=(count * blocks, count)), count)
+    return _operator(scipy.sparse.csr_array(entries, shape=(count * blocks, count)), count, device)
 
 
 def _operator(matrix: Any, vertices: int, device: torch.device | str = "cpu") -> Perception:

@@ -67,8 +67,8 @@ class TrainingSphere:
     @staticmethod
     def of(mesh: Mesh, look: Look) -> TrainingSphere:
         """For a look's rule and decoder."""
-        operator = perception(mesh, look.rule.degree, mean=look.mean)
-        return TrainingSphere(mesh, operator, Surface(mesh, look.interpolation), Stage(mesh))
+        operator = perception(mesh, look.rule.degree, device=look.device, mean=look.mean)
+        return TrainingSphere(mesh, operator, Surface(mesh, look.interpolation, look.device), Stage(mesh))
 
     @property
     def edge(self) -> float:
@@ -134,8 +134,8 @@ class TrainingPlane:
         axes = np.broadcast_to(np.array([0.0, 1.0, 0.0]), lattice.mesh.vertices.shape)
         vertices = rotate_about(lattice.mesh.vertices.astype(np.float64), axes, azimuth)
         lattice = replace(lattice, mesh=lattice.mesh.with_vertices(vertices))
-        operator = lattice_perception(lattice, look.rule.degree, look.mean)
-        return TrainingPlane(lattice, operator, Surface(lattice.mesh, look.interpolation))
+        operator = lattice_perception(lattice, look.rule.degree, look.mean, look.device)
+        return TrainingPlane(lattice, operator, Surface(lattice.mesh, look.interpolation, look.device))
 
     @property
     def axes(self) -> np.ndarray:

@@ -64,7 +64,7 @@ class Targets:
 
     def sample(self, layer: str, which: torch.Tensor, positions: torch.Tensor) -> torch.Tensor:
         """Vectors (K, n, C) float32 of pictures `which` (K,) at `positions` (K, n)."""
-        return self._vectors[layer][which[:, None], positions].float()
+        return self._vectors[layer][which[:, None].to(positions.device), positions].float()
 
 
 def _some(vectors: torch.Tensor, generator: torch.Generator) -> torch.Tensor:

@@ -26,7 +26,7 @@ from mitex.methods.nca.surfaces import (
 )
 from mitex.methods.nca.targets import Targets, enlarged
 from mitex.progress import announce
-from mitex.runtime import keep_freed_memory
+from mitex.runtime import available_device, keep_freed_memory
 from mitex.scenes.cameras import Cameras, random_views
 from mitex.training import Step
 from mitex.triples import channel_triples, triple_images
@@ -59,6 +59,7 @@ class NcaTask:
         init: Look | None = None,
         lineage: Mapping[str, str] | None = None,
     ) -> None:
+        device = available_device(config.device)
         keep_freed_memory()
         announce("preparing spheres and the exemplar")
         self.config, self.lineage = config, dict(lineage or {})
@@ -69,6 +70,7 @@ class NcaTask:
             self.look.initialise(torch.Generator().manual_seed(config.seed), config.gain)
         else:
             self.look.load_state_dict(init.state_dict())
+        self.look.to(device)
         self.surfaces = training_surfaces(config, self.look)
         self.zooms = self._appearances()
         self.relief = None
@@ -76,12 +78,12 @@ class NcaTask:
             self.relief = Relief(self.exemplar, self.look.layout, self.zooms)
         # Rows beyond the cells of a state's surface stay zero.
         most = max(surface.perception.vertices for surface in self.surfaces)
-        self.pool = torch.zeros(config.pool, most, config.channels)
+        self.pool = torch.zeros(config.pool, most, config.channels, device=self.look.device)
         self._touched = torch.zeros(config.pool, dtype=torch.bool)
 
     def _appearances(self) -> dict[int, Appearance]:
         """Size of the exemplar [px] -> comparison with it at that size; from the coarsest on."""
-        config, network = self.config, Vgg16(self.config.pooling)
+        config, network = self.config, Vgg16(self.config.pooling, device=str(self.look.device))
         layout = self.look.layout
         pictures = channel_triples(layout, config.blend, config.seed)
         finest = self.exemplar.size[0]
@@ -135,7 +137,13 @@ class NcaTask:
         generator: torch.Generator,
     ) -> Rollout:
         """A state (1, V, C) of the pool after some steps of the rule, in a training step."""
-        return Rollout(self.look.rule.evolve(state, surface.perception, steps, generator), {})
+        return Rollout(self.evolved(surface, state, steps, generator), {})
+
+    def evolved(
+        self, surface: TrainingSurface, state: torch.Tensor, steps: int, generator: torch.Generator
+    ) -> torch.Tensor:
+        """A state (1, V, C) after some steps of the rule."""
+        return self.look.rule.evolve(state, surface.perception, steps, generator)
 
     def _put_back(self, index: int, state: torch.Tensor) -> None:
         self.pool[index, : len(state)], self._touched[index] = state, True
@@ -179,7 +187,7 @@ class NcaTask:
         self.look.load_state_dict(weights)
         self._touched = state["pool.touched"]
         self.pool.zero_()
-        self.pool[self._touched] = state["pool.states"]
+        self.pool[self._touched] = state["pool.states"].to(self.pool.device)
 
     @torch.no_grad()
     def preview(self, step: int) -> np.ndarray:
@@ -189,7 +197,7 @@ class NcaTask:
         generator = torch.Generator().manual_seed(step)
         index = int(torch.randint(self.config.pool, (), generator=generator))
         surface, look = self.surface(index), self.look
-        state = look.rule.evolve(self.grown(index), surface.perception, self.config.max_steps, generator)[0]
+        state = self.evolved(surface, self.grown(index), self.config.max_steps, generator)[0]
         views = [
             surface.patches(look, state, CloseUps(width, 1, PREVIEW, antialias=2), generator)[0]
             for width in (self.config.density, self.config.density / 4)
@@ -212,4 +220,4 @@ def _padded(view: torch.Tensor, side: int) -> np.ndarray:
     """A square view (h, h, C) in the middle of (side, side, C) zeros."""
     before = (side - len(view)) // 2
     after = side - len(view) - before
-    return F.pad(view, (0, 0, before, after, before, after)).numpy()
+    return F.pad(view, (0, 0, before, after, before, after)).cpu().numpy()

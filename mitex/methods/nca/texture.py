@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
@@ -252,7 +253,7 @@ class NcaTexture(GrowingTexture):
         cells_of_square = Cells(lattice.joined, 0, lattice.joined)
         direction, condition = followed_field(self.look, self.about, field, speed, "right"), None
         if direction is not None:
-            condition = torch.from_numpy(flat_vectors(lattice, direction, speed))
+            condition = torch.from_numpy(flat_vectors(lattice, direction, speed, self._fastest))
         growth = LookGrowth(self.look, cells_of_square, 0.0, self._palette, operator, condition)
         state = _healthy(growth, seed, self.steps if steps is None else steps)
         return tile_maps(self.look, state, lattice, resolution, self._palette)
@@ -295,7 +296,7 @@ class NcaTexture(GrowingTexture):
         field = followed_field(self.look, self.about, field, speed, self.about.get("motion"))
         if field is None:
             return None
-        vectors = cell_vectors(given or cells.given, cells.mesh, field, speed, orientation)
+        vectors = cell_vectors(given or cells.given, cells.mesh, field, speed, orientation, self._fastest)
         return torch.from_numpy(vectors)
 
     def growth(
@@ -324,6 +325,12 @@ class NcaTexture(GrowingTexture):
         if not isinstance(density, int | float) or not density > 0:
             density = DENSITY
         return square_cells(density)
+
+    @property
+    def _fastest(self) -> float:
+        """Length of the longest vectors that the training had."""
+        fastest = self.about.get("motion_speed")
+        return fastest if isinstance(fastest, int | float) and fastest > 0 else math.inf
 
     @property
     def _palette(self) -> Palette | None:

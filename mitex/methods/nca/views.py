@@ -31,5 +31,7 @@ def render_views(
     points = Points(hits.face, hits.barycentric)
     values = decoder(surface, surface.table(state), points)
     if len(values) < len(hits.hit):
-        values = values.new_zeros(len(hits.hit), values.shape[1]).index_put((hits.hit,), values)
+        values = values.new_zeros(len(hits.hit), values.shape[1]).index_put(
+            (hits.hit.to(values.device),), values
+        )
     return values.view(-1, antialias * antialias, values.shape[1]).mean(1).view(*cameras.shape, -1)

@@ -393,7 +393,7 @@ def motion_in_pictures(build):
     """Of an estimator that is nearly right: what the direction costs counts gamma times."""
     names, targets = [], []
 
-    def load(name):
+    def load(name, device):
         names.append(name)
         return lambda first, second: 0.1 * targets[-1] + (second - first)
 
@@ -429,10 +429,13 @@ def test_the_check_of_a_key_fails_where_it_is_ignored(build, key):
 
 OF_THE_FIT = {"lr", "milestones", "decay", "normalise_gradients"}
 OF_THE_LOOP = {"preset", "steps", "checkpoint_every", "preview_every"}  # tests/training
+OF_THE_DEVICE = {"device"}  # test_device
 
 
 def test_no_key_is_left_out():
-    assert {field.name for field in fields(NcaConfig)} == set(CHECKS) | OF_THE_FIT | OF_THE_LOOP
+    assert {field.name for field in fields(NcaConfig)} == set(
+        CHECKS
+    ) | OF_THE_FIT | OF_THE_LOOP | OF_THE_DEVICE
 
 
 @pytest.fixture

@@ -53,12 +53,13 @@ class Waves:
         Between edges of different lengths, the waves of the two nearest powers of two are mixed: their
         phases could not follow a length that changes. Weights are such that the variance stays.
         """
+        vectors, phases = self.vectors.to(position.device), self.phases.to(position.device)
         octave = torch.log2(edge)
         below = octave.floor()
         share = (octave - below)[:, None]
-        mixed = position.new_zeros(len(position), len(self.vectors))
+        mixed = position.new_zeros(len(position), len(vectors))
         for level, weight in ((below, 1 - share), (below + 1, share)):
-            cycles = (position * torch.exp2(-level)[:, None]) @ self.vectors.T + self.phases
+            cycles = (position * torch.exp2(-level)[:, None]) @ vectors.T + phases
             mixed = mixed + weight.sqrt() * torch.cos(2 * math.pi * cycles)
         return self.amplitude * mixed
 

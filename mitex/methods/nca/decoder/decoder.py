@@ -48,11 +48,12 @@ class Decoder(nn.Module):
     def forward(self, surface: Surface, table: torch.Tensor, points: Points) -> torch.Tensor:
         """Values (P, K), about in [0, 1], at points of a surface; `table` is its table of the state."""
         inputs = [surface.read(table, points)]
+        barycentric = points.barycentric.to(table.device)
         for name in self.shape.coordinates:
             if name == "waves":
                 inputs.append(self.waves(*surface.place(points)))
             elif name == "barycentrics":
-                inputs.append(sorted_barycentrics(points.barycentric))
+                inputs.append(sorted_barycentrics(barycentric))
             else:
-                inputs.append(symmetric_polynomials(points.barycentric))
+                inputs.append(symmetric_polynomials(barycentric))
         return self.network(torch.cat(inputs, 1)) + OFFSET

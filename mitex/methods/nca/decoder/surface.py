@@ -37,14 +37,17 @@ class Surface:
     Args:
         mesh: the mesh; texture depends neither on its place nor on its size.
         interpolation: of the states, "smooth" or "linear".
+        device: of the states; points are on the CPU.
     """
 
-    def __init__(self, mesh: Mesh, interpolation: Kind = "smooth") -> None:
+    def __init__(
+        self, mesh: Mesh, interpolation: Kind = "smooth", device: torch.device | str = "cpu"
+    ) -> None:
         init(needs="ad")
         mesh = mesh.with_vertices(decoder_units(mesh).apply(mesh.vertices))
-        self.mesh = mesh
+        self.mesh, self.device = mesh, device
         self._lookup = SurfaceLookup(mesh, interpolation)
-        self._table = LinearMap(values_and_gradients(mesh)) if interpolation == "smooth" else None
+        self._table = LinearMap(values_and_gradients(mesh), device) if interpolation == "smooth" else None
         corners = np.column_stack([mesh.vertices, mesh.edge_lengths]).astype(np.float32)
         self._corners = torch.from_numpy(corners)
         self._faces = torch.from_numpy(mesh.faces.astype(np.int64))
@@ -55,12 +58,13 @@ class Surface:
 
     def read(self, table: torch.Tensor, points: Points) -> torch.Tensor:
         """The interpolated state at the points: (P, C)."""
-        return self._lookup.weights(points.face, points.barycentric)(table)
+        return self._lookup.weights(points.face, points.barycentric).to(self.device)(table)
 
     def place(self, points: Points) -> tuple[torch.Tensor, torch.Tensor]:
         """Positions (P, 3) and lengths of the edges around (P,) of the points [decoder units]."""
         corners = self._corners[self._faces[points.face.long()]]
         values = (points.barycentric[:, :, None] * corners).sum(1)
+        values = values.to(self.device)
         return values[:, :3], values[:, 3]
 
 
