@@ -38,8 +38,10 @@ docs: $(STAMP)
 bench: $(STAMP)
 	$(VENV)/bin/python -m benchmarks.nca
 	OMP_WAIT_POLICY=PASSIVE $(VENV)/bin/python -m benchmarks.nca_decoder
+	OMP_WAIT_POLICY=PASSIVE $(VENV)/bin/python -m benchmarks.nca_motion
 	$(VENV)/bin/python -m benchmarks.surface
 	$(VENV)/bin/python -m benchmarks.geometric
+	$(VENV)/bin/python -m benchmarks.flow
 	OMP_WAIT_POLICY=PASSIVE $(VENV)/bin/python -m benchmarks.nerf
 
 clean:

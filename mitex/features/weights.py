@@ -11,6 +11,9 @@ from mitex.errors import WeightsError
 
 VGG16_FILE = "vgg16_conv_fp16.safetensors"
 VGG16_SHA256 = "bb5788b61d3a34c37ba2a93772a503da31be4676f46e9bc45243f09542557316"
+FLOW_FILE = "flow.safetensors"
+FLOW_SHA256 = "966770fb186902da48cba30f9b09087250f566a9ba6a86b6f43ed83cd1d67aad"
+FOLDER = Path(__file__).parents[1] / "data" / "weights"
 
 
 def vgg16_path() -> Path:
@@ -19,9 +22,21 @@ def vgg16_path() -> Path:
     Raises:
         WeightsError: the file is missing.
     """
-    path = Path(os.environ.get("MITEX_VGG16") or Path(__file__).parents[1] / "data" / "weights" / VGG16_FILE)
+    path = Path(os.environ.get("MITEX_VGG16") or FOLDER / VGG16_FILE)
     if not path.is_file():
         raise WeightsError(f"the VGG-16 weights are not at {path}", "reinstall mitex or unset MITEX_VGG16")
+    return path
+
+
+def flow_path() -> Path:
+    """The weights of the flow network that ship with the package.
+
+    Raises:
+        WeightsError: the file is missing.
+    """
+    path = FOLDER / FLOW_FILE
+    if not path.is_file():
+        raise WeightsError(f"the weights of the flow network are not at {path}", "reinstall mitex")
     return path
 
 

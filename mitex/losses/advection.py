@@ -5,7 +5,9 @@ from __future__ import annotations
 import torch
 
 
-def advection_residual(before: torch.Tensor, after: torch.Tensor, upstream: torch.Tensor) -> torch.Tensor:
+def advection_residual(
+    before: torch.Tensor, after: torch.Tensor, upstream: torch.Tensor, floor: float = 0.0
+) -> torch.Tensor:
     """What a transport leaves undone: |S(t + n)(x) - S(t)(x - d)|^2 / |S(t)(x - d) - S(t)(x)|^2.
 
     d = (n / T) U is the way of the field U in n steps, if its unit is a unit of length in T steps. To the
@@ -16,14 +18,19 @@ def advection_residual(before: torch.Tensor, after: torch.Tensor, upstream: torc
     all, and neither the scale of the values nor how smooth they are matters: a state that fades to grey gains
     nothing. It has no gradient, nor has `before`: only what happens afterwards can be better or worse.
 
+    Any change is large beside a very short way. With a floor, the denominator is larger by that share of the
+    variance of S(t), so that ways need not be long for the residual to be a measure of them; without a way,
+    it tells how still S stands.
+
     Args:
         before: S(t), (V, C).
         after: S(t + n), (V, C).
         upstream: S(t)(x - d), (V, C).
+        floor: share of the variance over the vertices, 0 or more.
 
     Returns:
         Sums over vertices and channels, divided; a scalar, differentiable in `after`.
     """
     before, upstream = before.detach(), upstream.detach()
-    way = (upstream - before).square().sum()
+    way = (upstream - before).square().sum() + floor * (before - before.mean(0)).square().sum()
     return (after - upstream).square().sum() / way.clamp(min=torch.finfo(way.dtype).tiny)

@@ -67,6 +67,19 @@ def test_only_what_happens_afterwards_has_a_gradient():
     assert before.grad is None and upstream.grad is None
 
 
+def test_a_floor_counts_as_a_longer_way():
+    """So that a state without a way has a residual by how still it stands."""
+    before, after = _waves(), _waves(0.001)
+    variance = (before - before.mean(0)).square().sum().item()
+    left, way = ((_waves(0.002) - other).square().sum().item() for other in (after, before))
+    residual = advection_residual(before, after, _waves(0.002), floor=0.3).item()
+    assert residual == pytest.approx(left / (way + 0.3 * variance))
+    moved = (after - before).square().sum().item()
+    assert advection_residual(before, after, before, floor=0.3).item() == pytest.approx(
+        moved / (0.3 * variance)
+    )
+
+
 def test_a_state_without_a_pattern_has_a_finite_residual():
     grey = torch.full((9, 2), 0.5)
     assert advection_residual(grey, grey, grey) == 0

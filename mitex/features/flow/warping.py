@@ -17,8 +17,8 @@ LEAST_CONTRAST = 0.02  # standard deviation below which contrast counts as noise
 def warp(image: torch.Tensor, motion: torch.Tensor) -> torch.Tensor:
     """The image as seen from where it came: the value at x is that of the image at x + motion(x).
 
-    The image is interpolated to twice its size by Catmull-Rom splines, and linearly from there on: torch's own
-    bicubic interpolation bends a linear ramp, by up to a twentieth of a pixel. The border's value is used
+    The image is interpolated to twice its size by Catmull-Rom splines, and linearly from there on: torch's
+    own bicubic interpolation bends a linear ramp, by up to a twentieth of a pixel. The border's value is used
     outside. Differentiable in both.
 
     Args:

@@ -9,7 +9,7 @@ from mitex.errors import CheckpointError
 from mitex.exemplar import Exemplar
 from mitex.methods.nca import files
 from mitex.methods.nca.config import PRESETS, NcaConfig
-from mitex.methods.nca.look import Look, traits
+from mitex.methods.nca.look import Look, traits, weights_key
 from mitex.methods.nca.motion.start import check_field, moving, with_condition
 from mitex.methods.nca.motion.task import MotionTask
 from mitex.methods.nca.palette import Palette
@@ -62,12 +62,14 @@ def fit(
         lineage = {"parent": str(about["name"]), "family": about["family"]}
     if config.motion:
         origin |= {"motion": config.motion, "motion_period": config.motion_period}
+        origin["motion_speed"] = config.motion_speeds[1]
     task = (MotionTask if config.motion else NcaTask)(config, maps, parent, lineage)
 
     def texture(about: dict[str, Any]) -> NcaTexture:
         look = task.look.to("cpu")
         steps = settling_steps(look, task.exemplar, config.density)
-        return NcaTexture(look, about | origin | lineage | {"growth_steps": steps})
+        family = {"family": weights_key(look)}
+        return NcaTexture(look, about | origin | family | lineage | {"growth_steps": steps})
 
     return run.train(
         task,

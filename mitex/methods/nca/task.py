@@ -137,7 +137,13 @@ class NcaTask:
         generator: torch.Generator,
     ) -> Rollout:
         """A state (1, V, C) of the pool after some steps of the rule, in a training step."""
-        return Rollout(self.look.rule.evolve(state, surface.perception, steps, generator), {})
+        return Rollout(self.evolved(surface, state, steps, generator), {})
+
+    def evolved(
+        self, surface: TrainingSurface, state: torch.Tensor, steps: int, generator: torch.Generator
+    ) -> torch.Tensor:
+        """A state (1, V, C) after some steps of the rule."""
+        return self.look.rule.evolve(state, surface.perception, steps, generator)
 
     def _put_back(self, index: int, state: torch.Tensor) -> None:
         self.pool[index, : len(state)], self._touched[index] = state, True
@@ -191,7 +197,7 @@ class NcaTask:
         generator = torch.Generator().manual_seed(step)
         index = int(torch.randint(self.config.pool, (), generator=generator))
         surface, look = self.surface(index), self.look
-        state = look.rule.evolve(self.grown(index), surface.perception, self.config.max_steps, generator)[0]
+        state = self.evolved(surface, self.grown(index), self.config.max_steps, generator)[0]
         views = [
             surface.patches(look, state, CloseUps(width, 1, PREVIEW, antialias=2), generator)[0]
             for width in (self.config.density, self.config.density / 4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
@@ -22,7 +23,7 @@ from mitex.methods.nca.field import fields
 from mitex.methods.nca.film import Shooting, film
 from mitex.methods.nca.growth import Growth, LookGrowth
 from mitex.methods.nca.healing import healed
-from mitex.methods.nca.look import Look
+from mitex.methods.nca.look import Look, weights_key
 from mitex.methods.nca.motion.condition import Field, cell_vectors, flat_vectors, followed_field
 from mitex.methods.nca.orientation import Orientation, Turn, cell_turns
 from mitex.methods.nca.palette import Palette
@@ -252,7 +253,7 @@ class NcaTexture(GrowingTexture):
         cells_of_square = Cells(lattice.joined, 0, lattice.joined)
         direction, condition = followed_field(self.look, self.about, field, speed, "right"), None
         if direction is not None:
-            condition = torch.from_numpy(flat_vectors(lattice, direction, speed))
+            condition = torch.from_numpy(flat_vectors(lattice, direction, speed, self._fastest))
         growth = LookGrowth(self.look, cells_of_square, 0.0, self._palette, operator, condition)
         state = _healthy(growth, seed, self.steps if steps is None else steps)
         return tile_maps(self.look, state, lattice, resolution, self._palette)
@@ -295,7 +296,7 @@ class NcaTexture(GrowingTexture):
         field = followed_field(self.look, self.about, field, speed, self.about.get("motion"))
         if field is None:
             return None
-        vectors = cell_vectors(given or cells.given, cells.mesh, field, speed, orientation)
+        vectors = cell_vectors(given or cells.given, cells.mesh, field, speed, orientation, self._fastest)
         return torch.from_numpy(vectors)
 
     def growth(
@@ -314,11 +315,22 @@ class NcaTexture(GrowingTexture):
         steps = self.about.get("growth_steps")
         return steps if isinstance(steps, int) and 0 < steps <= MOST_STEPS else STEPS
 
+    @property
+    def family(self) -> str:
+        """What it has in common with textures that were trained from it, or from what it was trained from."""
+        return str(self.about.get("family") or weights_key(self.look))
+
     def _tile_cells(self) -> int:
         density = self.about.get("density")
         if not isinstance(density, int | float) or not density > 0:
             density = DENSITY
         return square_cells(density)
+
+    @property
+    def _fastest(self) -> float:
+        """Length of the longest vectors that the training had."""
+        fastest = self.about.get("motion_speed")
+        return fastest if isinstance(fastest, int | float) and fastest > 0 else math.inf
 
     @property
     def _palette(self) -> Palette | None:

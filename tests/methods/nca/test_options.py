@@ -395,7 +395,7 @@ def motion_in_pictures(build):
     """Of an estimator that is nearly right: what the direction costs counts gamma times."""
     names, targets = [], []
 
-    def load(name):
+    def load(name, device):
         names.append(name)
         return lambda first, second: 0.1 * targets[-1] + (second - first)
 

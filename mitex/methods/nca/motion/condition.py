@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mitex.errors import ConfigError
+from mitex.errors import ConfigError, TextureWarning
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import rotate_about
 from mitex.mesh import Lattice, Mesh
@@ -19,13 +21,19 @@ from mitex.methods.nca.ranges import SPEEDS
 
 OF_VERTICES = (".npy", ".ply")  # files of vectors that belong to the vertices of one mesh
 WIDTH = 3  # of a vector, which is a cell's condition
+FEW = 0.1  # of the vectors, which may be too fast
 
 Field = str | Path | np.ndarray
 """A vector field, as `mitex.mesh.fields.vector_field` takes it."""
 
 
 def cell_vectors(
-    given: Mesh, cells: Mesh, field: Field, speed: float, orientation: float | np.ndarray = 0.0
+    given: Mesh,
+    cells: Mesh,
+    field: Field,
+    speed: float,
+    orientation: float | np.ndarray = 0.0,
+    fastest: float = math.inf,
 ) -> np.ndarray:
     """(V, 3) float32 vectors of the cells.
 
@@ -36,6 +44,7 @@ def cell_vectors(
         speed: factor of the field, whose mean length is 1.
         orientation: of the texture [rad], one or (V,). Cells take what is turned by it for upright, so their
             vectors are turned back.
+        fastest: length of the longest vectors, see `slowed`.
 
     Raises:
         ConfigError: as of `vector_field`.
@@ -45,11 +54,30 @@ def cell_vectors(
         vectors = vector_field(given, field).astype(np.float64)
         face, weights = surface_points(given, cells.vertices.astype(np.float64))
         field = interpolate(weights, vectors[given.faces[face]])
-    vectors = speed * vector_field(cells, field).astype(np.float64)
+    vectors = slowed(speed * vector_field(cells, field).astype(np.float64), fastest)
     return rotate_about(vectors, cells.normals.astype(np.float64), -orientation).astype(np.float32)
 
 
-def flat_vectors(lattice: Lattice, field: Field, speed: float) -> np.ndarray:
+def slowed(vectors: np.ndarray, fastest: float) -> np.ndarray:
+    """The vectors (V, 3), none longer than `fastest`: a pattern that is told to move faster than it has
+    learned stands still.
+
+    Warns:
+        TextureWarning: more than `FEW` of them were longer.
+    """
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    share = (lengths > fastest).mean()
+    if share > FEW:
+        warnings.warn(
+            f"{share:.0%} of the vector field is faster than the texture has learned to move, and was slowed "
+            "down; take a lower speed, and more steps between two frames",
+            TextureWarning,
+            stacklevel=5,
+        )
+    return vectors * np.minimum(1.0, fastest / np.maximum(lengths, 1e-12))
+
+
+def flat_vectors(lattice: Lattice, field: Field, speed: float, fastest: float = math.inf) -> np.ndarray:
     """(V, 3) float32 vectors of the cells in a lattice's square, all the same.
 
     Raises:
@@ -61,7 +89,7 @@ def flat_vectors(lattice: Lattice, field: Field, speed: float) -> np.ndarray:
             f"the vector field '{field}' is not the same everywhere, so that a tile would have a seam",
             "give a direction such as right or 1,1,0",
         )
-    return vectors
+    return slowed(vectors, fastest)
 
 
 def followed_field(
@@ -76,12 +104,14 @@ def followed_field(
     if not SPEEDS[0] <= speed <= SPEEDS[1]:
         raise ConfigError(f"a speed of {speed:g}", f"use {SPEEDS[0]:g} to {SPEEDS[1]:g}")
     if not width:
-        if field is not None or speed != 1.0:
-            raise ConfigError(
-                f"'{name}' does not move: it was trained without a vector field",
-                "train one from it: fit nca with `motion` and `init`",
-            )
-        return None
+        if field is None and speed == 1.0:
+            return None
+        if "motion" in about:
+            raise ConfigError(f"'{name}' moves in its own way alone", "train one with motion_encoding=true")
+        raise ConfigError(
+            f"'{name}' does not move: it was trained without a vector field",
+            "train one from it: fit nca with `motion` and `init`",
+        )
     field = default if field is None else field
     if width != WIDTH or field is None:
         raise ConfigError(

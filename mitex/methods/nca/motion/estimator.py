@@ -10,7 +10,7 @@ import torch
 Estimator = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
 
 
-def load_estimator(name: str) -> Estimator | None:
+def load_estimator(name: str, device: torch.device | str = "cpu") -> Estimator | None:
     """The flow network, or Lucas and Kanade's method; None for the residual of states."""
     if name == "advection":
         return None
@@ -18,5 +18,5 @@ def load_estimator(name: str) -> Estimator | None:
 
     if name == "lucas-kanade":
         return flow.lucas_kanade
-    network = flow.flow_network()
+    network = flow.flow_network().to(device)
     return lambda first, second: network(torch.cat([first, second], 1))

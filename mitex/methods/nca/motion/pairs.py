@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from mitex.evaluation.regularity import LUMINANCE
 from mitex.geometry.triangles import interpolate
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.motion.drift import Drift
 from mitex.methods.nca.surfaces import TrainingPlane, TrainingSphere, Windows
 from mitex.scenes.cameras import Cameras
 from mitex.scenes.screen import screen_motion
-
-LUMINANCE = (0.2126, 0.7152, 0.0722)  # of red, green and blue
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,15 +44,11 @@ def sphere_pairs(look: Look, states: Sequence[torch.Tensor], drift: Drift, camer
     points, field = (interpolate(weights, values[corners]) for values in (sphere.mesh.vertices, drift.field))
     hit = hits.hit.numpy()
     camera = np.flatnonzero(hit) // (cameras.width * cameras.height)
-    target = np.zeros((len(hit), 2))
-    target[hit] = screen_motion(cameras, camera, points, sphere.edge * field)
+    motion = np.zeros((len(hit), 2))
+    motion[hit] = screen_motion(cameras, camera, points, sphere.edge * field)
     size = cameras.shape
-    return Pairs(
-        first,
-        second,
-        torch.from_numpy(target.astype(np.float32)).view(*size, 2).permute(0, 3, 1, 2),
-        hits.hit.view(size),
-    )
+    target = torch.from_numpy(motion.astype(np.float32)).view(*size, 2).permute(0, 3, 1, 2)
+    return Pairs(first, second, target.to(first.device), hits.hit.view(size).to(first.device))
 
 
 def plane_pairs(look: Look, states: Sequence[torch.Tensor], drift: Drift, windows: Windows) -> Pairs:
@@ -62,9 +57,8 @@ def plane_pairs(look: Look, states: Sequence[torch.Tensor], drift: Drift, window
     assert isinstance(plane, TrainingPlane)
     first, second = (_grey(look, plane.windows(look, state, windows)) for state in states)
     right, up = plane.axes @ drift.field[0] * (windows.pixels / (windows.width * plane.lattice.columns))
-    target = torch.tensor([right, -up], dtype=torch.float32)[:, None, None]
-    shape = (len(first), 2, *first.shape[2:])
-    return Pairs(first, second, target.expand(shape), torch.ones(len(first), *shape[2:], dtype=torch.bool))
+    target = first.new_tensor([right, -up])[:, None, None].expand(len(first), -1, *first.shape[2:])
+    return Pairs(first, second, target, torch.ones_like(first[:, 0], dtype=torch.bool))
 
 
 def _grey(look: Look, views: torch.Tensor) -> torch.Tensor:

@@ -18,6 +18,8 @@ from mitex.methods.nca.motion.pairs import Pairs, plane_pairs, sphere_pairs
 from mitex.methods.nca.surfaces import TrainingSphere, TrainingSurface
 from mitex.methods.nca.task import NcaTask, Rollout
 
+FLOOR = 0.1  # of residuals: as much as a way of a third of a cell, in usual patterns
+
 
 class MotionTask(NcaTask):
     """Trains a look that moves along a vector field (MeshNCA, section 4.3); arguments as of `NcaTask`."""
@@ -30,7 +32,7 @@ class MotionTask(NcaTask):
         lineage: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__(config, exemplar, init, lineage)
-        self.estimator = load_estimator(config.motion_estimator)
+        self.estimator = load_estimator(config.motion_estimator, self.look.device)
 
     def rollout(
         self,
@@ -42,7 +44,7 @@ class MotionTask(NcaTask):
     ) -> Rollout:
         config, rule = self.config, self.look.rule
         drift = draw_drift(config, surface, generator)
-        condition = drift.condition if rule.condition else None
+        condition = self._told(drift)
         apart = min(config.motion_steps, steps)
         pattern = bool(state.any()) and step >= config.motion_start
         states = [rule.evolve(state, surface.perception, steps % apart, generator, condition)]
@@ -53,6 +55,16 @@ class MotionTask(NcaTask):
         loss = self.motion([state[0] for state in states], drift, apart, generator)
         return Rollout(states[-1], {"motion": config.motion_weight * loss})
 
+    def evolved(
+        self, surface: TrainingSurface, state: torch.Tensor, steps: int, generator: torch.Generator
+    ) -> torch.Tensor:
+        condition = self._told(draw_drift(self.config, surface, generator))
+        return self.look.rule.evolve(state, surface.perception, steps, generator, condition)
+
+    def _told(self, drift: Drift) -> torch.Tensor | None:
+        """The condition of the cells."""
+        return drift.condition.to(self.look.device) if self.look.rule.condition else None
+
     def motion(
         self, states: Sequence[torch.Tensor], drift: Drift, apart: int, generator: torch.Generator
     ) -> torch.Tensor:
@@ -60,7 +72,7 @@ class MotionTask(NcaTask):
         period, gamma = self.config.motion_period, self.config.motion_gamma
         if self.estimator is None:
             transport = drift.transport(apart / period)
-            residuals = [advection_residual(a, b, transport(a)) for a, b in pairwise(states)]
+            residuals = [advection_residual(a, b, transport(a), FLOOR) for a, b in pairwise(states)]
             return torch.stack(residuals).mean()
         pairs = self.pairs((states[-2].detach(), states[-1]), drift, generator)
         flow = self.estimator(pairs.first, pairs.second)

@@ -1,12 +1,13 @@
 """What cells are told of a field, through the texture's own methods."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
 import torch
 
-from mitex.errors import ConfigError
+from mitex.errors import ConfigError, TextureWarning
 from mitex.mesh import Lattice, grid, icosphere, subdivide_midpoint
 from mitex.mesh.fields import vector_field
 from mitex.methods.nca import NcaTexture
@@ -94,6 +95,14 @@ def test_a_texture_that_does_not_move_says_so(still, sphere, use, option):
         getattr(still, use)(*arguments, steps=200_000_000, **option)
 
 
+def test_a_texture_whose_cells_know_no_field(still, sphere):
+    """The paper's ablation moves, but cannot be told where."""
+    fixed = NcaTexture(still.look, {"name": "fixed", "motion": "up"})
+    assert fixed.grow(sphere, steps=2).any()
+    with pytest.raises(ConfigError, match="'fixed' moves in its own way alone"):
+        fixed.grow(sphere, steps=2, field="down")
+
+
 @pytest.mark.parametrize(
     ("option", "problem"),
     [
@@ -136,3 +145,20 @@ def test_files_keep_condition_and_field(moving, sphere, tmp_path):
     again = NcaTexture.load(moving.save(tmp_path / "flow.safetensors"))
     assert (again.look.rule.condition, again.about["motion"]) == (3, "right")
     assert torch.equal(again.grow(sphere, steps=5), moving.grow(sphere, steps=5, field="right"))
+
+
+@pytest.mark.parametrize("speed", [1.0, 5.0])
+def test_no_vector_is_longer_than_those_of_the_training(moving, sphere, speed):
+    """Where it is, it keeps its direction; if many are, the texture says so."""
+    slow = NcaTexture(moving.look, moving.about | {"motion_speed": 1.268})
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        vectors = _condition(slow, sphere, speed=speed)
+        flat = slow.tile(32, cells=16, steps=6, speed=speed)["albedo"]
+    full = speed * vector_field(sphere, "right").astype(np.float64)
+    lengths, longest = (np.linalg.norm(v, axis=1) for v in (vectors, full))
+    assert np.allclose(lengths, np.minimum(longest, 1.268), atol=1e-5) and longest.max() > 1.27
+    assert np.allclose(lengths[:, None] * full, longest[:, None] * vectors, atol=1e-4)
+    assert [issubclass(w.category, TextureWarning) for w in caught] == ([] if speed == 1 else [True, True])
+    expected = slow.tile(32, cells=16, steps=6, speed=min(speed, 1.268))["albedo"]
+    assert np.allclose(flat, expected, atol=1e-5)

@@ -38,10 +38,11 @@ def test_a_still_look_learns_to_move(tmp_path, lava):
     path = _parent(tmp_path)
     first = nca.fit(lava, init=path, motion="about-y", set=[*TINY, "steps=0"])
     assert (first.about["preset"], first.about["motion"]) == ("motion", "about-y")
-    assert first.about["motion_period"] == 8.0 and first.about["parent"] == "tiny"
+    assert first.about["motion_period"] == 12.0 and first.about["parent"] == "tiny"
+    assert first.about["motion_speed"] == 2.0
     still = NcaTexture.load(path)
     sphere = icosphere(4)
-    assert torch.equal(first.grow(sphere, steps=6, speed=3), still.grow(sphere, steps=6))
+    assert torch.equal(first.grow(sphere, steps=6, speed=1.5), still.grow(sphere, steps=6))
     out = tmp_path / "run"
     moving = nca.fit(lava, out, init=path, motion="about-y", set=[*TINY, "steps=8"])
     again = NcaTexture.load(out)

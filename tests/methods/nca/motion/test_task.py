@@ -1,9 +1,11 @@
 """The training of motion: what it adds to the still one, and the contract of tasks."""
 
+import numpy as np
 import pytest
 import torch
 
 from mitex.exemplar import Exemplar
+from mitex.methods.nca import task as still_training
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.motion import task as training
 from mitex.methods.nca.motion.start import with_condition
@@ -74,6 +76,7 @@ def test_motion_is_one_more_term(exemplar):
 def test_a_perfect_transport_would_cost_nothing(exemplar, monkeypatch):
     """Where each of the states is the one before, carried along; also the drift that the cells were told."""
     task = _grown(MotionTask(config(*MOVING, "min_steps=7", "max_steps=7", "motion_period=4"), exemplar))
+    monkeypatch.setattr(training, "FLOOR", 0.0)
     drifts = []
 
     def draw(*arguments):
@@ -101,7 +104,7 @@ def test_estimators_of_pictures_see_the_last_states(exemplar, monkeypatch):
         assert first.shape == second.shape == (4, 1, 32, 32) and second.requires_grad
         return (second - first).expand(-1, 2, -1, -1)
 
-    monkeypatch.setattr(training, "load_estimator", {"lucas-kanade": estimator}.__getitem__)
+    monkeypatch.setattr(training, "load_estimator", lambda name, device: {"lucas-kanade": estimator}[name])
     for surface in ("even", "flat"):
         settings = (*MOVING, f"surfaces={surface}", "motion_estimator=lucas-kanade", "density=8")
         values = []
@@ -133,3 +136,14 @@ def test_a_still_look_begins_as_it_was(exemplar):
     assert torch.equal(ours, theirs)
     ours.square().sum().backward()
     assert look.rule.fc1.weight.grad is not None and look.rule.fc1.weight.grad[:, -3:].any()
+
+
+@pytest.mark.parametrize("encoding", ["true", "false"])
+def test_previews_are_of_moving_states(exemplar, monkeypatch, encoding):
+    """They leave the pool alone, and are the same again."""
+    monkeypatch.setattr(still_training, "PREVIEW", 48)
+    task = _grown(MotionTask(config(*MOVING, f"motion_encoding={encoding}"), exemplar))
+    before = task.pool.clone()
+    picture = task.preview(5)
+    assert picture.shape == (48, 4 * 48, 3) and np.array_equal(task.preview(5), picture)
+    assert torch.equal(task.pool, before)

@@ -1,0 +1,99 @@
+"""What motion adds to a training step of MeshNCA, by each way to measure it.
+
+Run it as `python -m benchmarks.nca_motion`: the states of one rollout on a sphere of 10,242 cells, and what
+tells how far they are from moving along a field, forward and backward. The transport residual looks at all of
+them, the others at pictures of the last two. All runs in one process on the same threads; every number is the
+best of its repetitions.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import replace
+
+import torch
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.nca import best, cpu
+from mitex.exemplar import Exemplar
+from mitex.methods.nca import PRESETS, NcaTexture
+from mitex.methods.nca.motion.drift import Drift, draw_drift
+from mitex.methods.nca.motion.estimator import load_estimator
+from mitex.methods.nca.motion.start import with_condition
+from mitex.methods.nca.motion.task import MotionTask
+from mitex.runtime import let_idle_threads_sleep
+
+MODEL = "lava"
+ESTIMATORS = ("advection", "lucas-kanade", "flow")
+
+
+class Motion:
+    """The parts of a step, each with the same drift and states.
+
+    Args:
+        quick: at a small size.
+    """
+
+    def __init__(self, quick: bool) -> None:
+        config = replace(PRESETS["motion"], surfaces=("even",), min_steps=40, max_steps=40)
+        if quick:
+            config = replace(config, frequency=12, pool=2, resolution=32, view_count=1, exemplar_size=128)
+        self.task = MotionTask(config, Exemplar.load(MODEL), with_condition(NcaTexture.load(MODEL).look))
+        (self.surface,) = self.task.surfaces
+        self.task.pool.copy_(0.2 * torch.randn(self.task.pool.shape, generator=self._generator()))
+        self.drift = self.draw()
+        self.states = [state.requires_grad_() for state in self._states()]
+
+    @staticmethod
+    def _generator() -> torch.Generator:
+        return torch.Generator().manual_seed(0)
+
+    def _states(self) -> list[torch.Tensor]:
+        count = self.task.config.min_steps // self.task.config.motion_steps + 1
+        return [self.task.grown(0)[0] + 0.01 * k for k in range(count)]
+
+    def draw(self) -> Drift:
+        return draw_drift(self.task.config, self.surface, self._generator())
+
+    def rollout(self) -> None:
+        result = self.task.evolved(
+            self.surface, self.task.grown(0), self.task.config.min_steps, self._generator()
+        )
+        torch.autograd.grad(result.sum(), list(self.task.look.rule.parameters()))
+
+    def loss(self, name: str) -> None:
+        self.task.estimator = load_estimator(name)
+        value = self.task.motion(self.states, self.drift, self.task.config.motion_steps, self._generator())
+        torch.autograd.grad(value, self.states[-1])
+
+    def step(self) -> None:
+        self.task.estimator = None
+        torch.autograd.grad(self.task.loss(1, self._generator()).value, self.task.parameters)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="small sizes: shows that it runs, not how fast")
+    options = parser.parse_args()
+    let_idle_threads_sleep()
+    motion, repetitions = Motion(options.quick), 1 if options.quick else 3
+    steps, cells = motion.task.config.min_steps, motion.surface.perception.vertices
+    parts: dict[str, Callable[[], object]] = {
+        f"automaton, {steps} steps, {cells:,} cells": motion.rollout,
+        "a field, turned at random": motion.draw,
+    }
+    parts |= {f"motion by {name}": lambda name=name: motion.loss(name) for name in ESTIMATORS}
+    parts["whole step, by advection"] = motion.step
+    times = {name: best(part, repetitions) for name, part in parts.items()}
+    table = Table("preset `motion`, forward + backward", "ms", "share, %")
+    for name, milliseconds in times.items():
+        table.add_row(name, f"{milliseconds:.0f}", f"{100 * milliseconds / list(times.values())[-1]:.0f}")
+    Console().print(cpu(), table)
+
+
+if __name__ == "__main__":
+    main()
