@@ -344,7 +344,7 @@ def _motion(task, step=1, seed=0):
 
 @check("motion")
 def textures_that_move(build):
-    assert [build(f"motion={field}").look.rule.condition for field in ("", "up")] == [0, 3]
+    assert [build(f"motion={field}").look.rule.condition for field in ("none", "up")] == [0, 3]
 
 
 @check("motion_encoding")
