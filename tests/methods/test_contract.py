@@ -5,7 +5,7 @@ import subprocess
 import sys
 import threading
 import tomllib
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import partial
 from importlib import import_module
 from inspect import signature
@@ -16,7 +16,7 @@ import pytest
 import torch
 
 import mitex
-from mitex.cli import main
+from mitex.cli import commands, main
 from mitex.cli.usage import parse
 from mitex.errors import CheckpointError
 from mitex.images import read_image
@@ -26,12 +26,12 @@ from mitex.methods.registry import load, method_of, methods
 from mitex.training import checkpoint, model_file
 from mitex.training.locate import NAME
 from mitex.training.settings import FitConfig, meaning
-from tests.methods.fits import FITS, prepare
+from tests.methods.fits import FITS, few_patches, prepare
 from tests.state import in_thread, program_state
 
 SIDE = 48  # of pictures [pixels]
 TOY = Path(__file__).parents[1] / "toy"
-pytestmark = pytest.mark.usefixtures("own_cache", "toy")
+pytestmark = pytest.mark.usefixtures("own_cache", "toy", "quick_settling")
 
 
 @pytest.fixture(scope="module")
@@ -93,14 +93,20 @@ def test_baselines_come_last_and_say_so(toy):
 
 
 def test_an_installed_method_cannot_take_a_built_in_one_s_name(monkeypatch, toy):
-    from dataclasses import replace
-
     from mitex.methods import registry
 
     monkeypatch.setattr(registry, "_installed", lambda: iter([replace(toy, name="nca")]))
     methods.cache_clear()
     assert methods()["nca"].title != toy.title
     methods.cache_clear()
+
+
+def test_a_method_brings_commands_but_takes_no_shared_one(toy, monkeypatch):
+    own = ("mitex.cli.doctor:Doctor", "a line")
+    checkers = replace(toy, commands={"checkers": own, "render": own, "apply": own})
+    monkeypatch.setattr(commands, "methods", lambda: {"checkerboard": checkers})
+    assert commands.of_methods() == {"checkers": own} and commands.lines()["checkers"] == "a line"
+    assert commands.find(["checkers"]).command.__name__ == "Doctor"
 
 
 def python_fit(name, **options):
@@ -174,6 +180,8 @@ class TestDescription:
         texture = method.load_texture()
         assert all(hasattr(texture, attribute) for attribute in ("load", "save", "apply"))
         assert method.animate is None or callable(resolve_reference(method.animate).run)
+        for reference, line in method.commands.values():
+            assert callable(resolve_reference(reference).run) and line
 
     def test_the_default_config_is_the_first_preset_and_every_key_is_explained(self, name):
         presets = methods()[name].load_presets()
@@ -216,6 +224,7 @@ class TestRun:
 
     def test_it_is_applied_exported_and_rendered(self, name, runs, workplace, monkeypatch, capsys):
         monkeypatch.chdir(workplace)
+        few_patches(monkeypatch)
         quick = {"resolution": SIDE, "spp": 4}
         monkeypatch.setattr(methods()[name].load_apply(), "picture_options", lambda options: quick)
         for suffix in ("glb", "png"):

@@ -5,7 +5,7 @@ import pytest
 from mitex.methods.nca import NcaTexture
 from tools.make_models import MODELS, PARENT, RECIPES, record
 
-OF_A_RUN = {"seconds", "loss", "maps", "palette", "growth_steps"}
+OF_A_RUN = {"seconds", "family", "loss", "maps", "palette", "growth_steps"}
 
 
 def test_every_bundled_rule_is_in_the_table():

@@ -9,7 +9,7 @@ from mitex.errors import CheckpointError
 from mitex.exemplar import Exemplar
 from mitex.methods.nca import files
 from mitex.methods.nca.config import PRESETS, NcaConfig
-from mitex.methods.nca.look import Look, traits
+from mitex.methods.nca.look import Look, traits, weights_key
 from mitex.methods.nca.motion.start import check_field, moving, with_condition
 from mitex.methods.nca.motion.task import MotionTask
 from mitex.methods.nca.palette import Palette
@@ -68,7 +68,8 @@ def fit(
     def texture(about: dict[str, Any]) -> NcaTexture:
         look = task.look.to("cpu")
         steps = settling_steps(look, task.exemplar, config.density)
-        return NcaTexture(look, about | origin | lineage | {"growth_steps": steps})
+        family = {"family": weights_key(look)}
+        return NcaTexture(look, about | origin | family | lineage | {"growth_steps": steps})
 
     return run.train(
         task,

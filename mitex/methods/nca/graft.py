@@ -54,8 +54,8 @@ class Graft(GrowingTexture):
 
     @property
     def about(self) -> Mapping[str, Any]:
-        first, second = (texture.about for texture in (self.first, self.second))
-        return {"name": f"{first['name']} and {second['name']}", "family": first["family"]}
+        first, second = (texture.about.get("name") for texture in (self.first, self.second))
+        return {"name": f"{first} and {second}", "family": self.first.family}
 
     @property
     def steps(self) -> int:
@@ -82,7 +82,7 @@ class Graft(GrowingTexture):
 def check_related(first: NcaTexture, second: NcaTexture) -> None:
     """Raises a ConfigError unless two textures are of one family, of rules and decoders of one shape."""
     names = f"'{first.about.get('name')}' and '{second.about.get('name')}'"
-    if first.about.get("family") != second.about.get("family"):
+    if first.family != second.family:
         raise ConfigError(
             f"{names} are not of one family: their states do not mean the same",
             "train one from the other, or both from one model (fit nca with init=...)",

@@ -23,7 +23,7 @@ from mitex.methods.nca.field import fields
 from mitex.methods.nca.film import Shooting, film
 from mitex.methods.nca.growth import Growth, LookGrowth
 from mitex.methods.nca.healing import healed
-from mitex.methods.nca.look import Look
+from mitex.methods.nca.look import Look, weights_key
 from mitex.methods.nca.motion.condition import Field, cell_vectors, flat_vectors, followed_field
 from mitex.methods.nca.orientation import Orientation, Turn, cell_turns
 from mitex.methods.nca.palette import Palette
@@ -314,6 +314,11 @@ class NcaTexture(GrowingTexture):
         """Of the automaton, until the pattern is in order (`settling_steps`)."""
         steps = self.about.get("growth_steps")
         return steps if isinstance(steps, int) and 0 < steps <= MOST_STEPS else STEPS
+
+    @property
+    def family(self) -> str:
+        """What it has in common with textures that were trained from it, or from what it was trained from."""
+        return str(self.about.get("family") or weights_key(self.look))
 
     def _tile_cells(self) -> int:
         density = self.about.get("density")

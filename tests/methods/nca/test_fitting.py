@@ -13,8 +13,11 @@ from mitex.mesh import icosphere
 from mitex.methods import nca
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.decoder.shape import DecoderShape
+from mitex.methods.nca.look import weights_key
 from mitex.runtime import threads
 from tests.methods.nca.tiny import SETTINGS, config, texture
+
+pytestmark = pytest.mark.usefixtures("quick_settling")
 
 
 def _losses(folder):
@@ -81,6 +84,19 @@ def test_starting_from_a_parent(tmp_path, lava):
     assert "loss" not in child.about  # there was no step
     own, others = (t.look.state_dict() for t in (child, parent))
     assert own.keys() == others.keys() and all(torch.equal(own[name], others[name]) for name in own)
+
+
+def test_a_family_goes_on_in_runs_that_are_resumed_and_in_grandchildren(tmp_path, lava):
+    """It is that of the first ancestor, as its weights were when others were trained from it."""
+    parent = texture(seed=3, hidden=16, shape=config().decoder_shape)
+    path, run = parent.save(tmp_path / "parent.safetensors"), tmp_path / "run"
+    family = weights_key(parent.look)
+    nca.fit(lava, run, init=path, set=[*SETTINGS, "steps=1"])
+    resumed = nca.fit(lava, run, set=["steps=2"], resume=True)
+    assert (resumed.about["parent"], resumed.about["family"]) == ("tiny", family)
+    grandchild = nca.fit(lava, tmp_path / "another", init=run, set=[*SETTINGS, "steps=0"])
+    assert grandchild.about["family"] == family != weights_key(resumed.look)
+    assert NcaTexture.load(path).about["family"] == family
 
 
 @pytest.mark.parametrize(

@@ -96,6 +96,13 @@ def test_only_one_family_can_be_grafted(pair):
         graft((pair[0], relative(2, maps=("albedo",))), "x")
 
 
+def test_a_texture_of_no_known_family_is_its_own(pair):
+    alone = NcaTexture(pair[0].look, {"name": "alone"})
+    assert Graft(alone, NcaTexture(pair[0].look), graft_weights(SPHERE, 0)).steps == alone.steps
+    with pytest.raises(ConfigError, match="not of one family"):
+        graft((alone, NcaTexture(pair[1].look)), 0)
+
+
 def test_bundled_models_are_one_family():
     from mitex.methods.registry import bundled, methods
 

@@ -20,6 +20,8 @@ from mitex.methods.nca.task import NcaTask
 from mitex.runtime import threads
 from tests.methods.nca.tiny import SETTINGS, config
 
+pytestmark = pytest.mark.usefixtures("quick_settling")
+
 # As many samples as there are places: the loss depends on no choice of them.
 ALL_PLACES = ("samples=4096", "view_count=2", "pool=1", "blend=false", "min_steps=3", "max_steps=3")
 
