@@ -10,8 +10,8 @@ from mitex.errors import ConfigError
 from mitex.mesh import icosphere
 from mitex.methods.nca import Graft, NcaTexture
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.growth import grown_state
 from mitex.methods.nca.perception import perception
-from mitex.methods.nca.texture import grown_state
 from mitex.methods.nca.weights import graft_weights
 from tests.methods.nca import tiny
 
