@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import time
-from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
     from mitex.asset import Asset
     from mitex.methods.surface import SurfaceTexture
+
+log = logging.getLogger(__name__)
 
 # Synthesized here and now: exemplar, mesh, settings.
 EXEMPLAR, MESH = "hexagons", "vase"
@@ -45,24 +48,27 @@ class Demo:
     seed: Annotated[int, arg(metavar="N")] = 0
     """Random seed."""
 
+    quiet: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Show no progress."""
+
     def run(self) -> None:
         in_range("--seed", self.seed, *SEEDS)
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()
         start = time.monotonic()
-        for path in demo(self.out, self.seed, lambda line: print(line, flush=True)):
+        for path in demo(self.out, self.seed, self.quiet):
             print(path)
-        print(f"done in {time.monotonic() - start:.0f} s")
+        log.info("done in %.0f s", time.monotonic() - start)
 
 
-def demo(out: Path, seed: int, say: Callable[[str], None] = lambda line: None) -> list[Path]:
+def demo(out: Path, seed: int, quiet: bool = False) -> list[Path]:
     """Synthesizes, grows, renders and exports into `out`.
 
     Args:
         out: folder; a synthesis that was stopped in it goes on.
         seed: of the synthesis and the models.
-        say: told what happens.
+        quiet: show no progress of the synthesis.
 
     Returns:
         The files made: a .glb and a .png for each mesh, and the sheet of all pictures.
@@ -77,10 +83,10 @@ def demo(out: Path, seed: int, say: Callable[[str], None] = lambda line: None) -
         for suffix in (".glb", ".png"):
             prepare_output(out / f"{mesh}{suffix}")
     out = prepare_output(out / "demo.png").parent
-    say(f"synthesizing '{EXEMPLAR}' on {MESH}")
-    pieces = [_put(_synthesized(out / "run", seed).apply(), EXEMPLAR, MESH, out)]
+    log.info("synthesizing '%s' on %s", EXEMPLAR, MESH)
+    pieces = [_put(_synthesized(out / "run", seed, quiet).apply(), EXEMPLAR, MESH, out)]
     for model, mesh in MODELS.items():
-        say(f"growing '{model}' on {mesh}")
+        log.info("growing '%s' on %s", model, mesh)
         pieces.append(_put(*_grown(model, mesh, seed), mesh, out))
     cells = [picture for piece in pieces for picture in (piece.exemplar, piece.picture)]
     labels = [label for piece in pieces for label in (f"image: {piece.source}", f"on {piece.mesh}")]
@@ -106,7 +112,7 @@ class Piece:
     files: list[Path]
 
 
-def _synthesized(run: Path, seed: int) -> SurfaceTexture:
+def _synthesized(run: Path, seed: int, quiet: bool) -> SurfaceTexture:
     from mitex.exemplar import Exemplar
     from mitex.methods import surface
     from mitex.training.locate import CHECKPOINT, PREVIOUS
@@ -115,7 +121,7 @@ def _synthesized(run: Path, seed: int) -> SurfaceTexture:
     maps = Exemplar.load(EXEMPLAR).maps
     exemplar = Exemplar({name: maps[name] for name in MAPS}, EXEMPLAR)
     resume = any((run / name).is_file() for name in (CHECKPOINT, PREVIOUS))
-    with ProgressDisplay() as on_step:
+    with nullcontext() if quiet else ProgressDisplay() as on_step:
         return surface.fit(exemplar, MESH, run, seed=seed, set=SETTINGS, resume=resume, on_step=on_step)
 
 

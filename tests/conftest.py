@@ -59,6 +59,14 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="module")
+def quick_settling() -> Iterator[None]:
+    """How long a pattern takes to be in order is looked for in 10 steps at most, not in 1000."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mitex.methods.nca.settling.STEPS", (2, 5, 10))
+        yield
+
+
 @pytest.fixture
 def mi() -> Any:
     """Mitsuba with the plugins of Mitex."""

@@ -25,7 +25,7 @@ def test_what_it_shows_is_there():
     assert resolve(surface.PRESETS, overrides=demo.SETTINGS).preset == "fast"
 
 
-def test_it_leaves_assets_pictures_and_a_sheet(tmp_path, monkeypatch, capsys):
+def test_it_leaves_assets_pictures_and_a_sheet(tmp_path, monkeypatch, capfd):
     """The second call goes on from the first, and gives the same pictures."""
     grow = NcaTexture.apply
     monkeypatch.chdir(tmp_path)
@@ -37,10 +37,11 @@ def test_it_leaves_assets_pictures_and_a_sheet(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(demo, "SAMPLES", 1)
     monkeypatch.setattr(NcaTexture, "apply", lambda *a, **o: grow(*a, **o, subdivide=0, steps=2))
     sheets = []
-    for _ in range(2):
-        assert main(["demo", "--out", "shown"]) == 0
-        said = capsys.readouterr().out
-        assert "growing 'lava' on knot" in said and "shown/mushrooms.glb" in said
+    for quiet in ([], ["--quiet"]):
+        assert main(["demo", "--out", "shown", *quiet]) == 0
+        files, said = capfd.readouterr()
+        assert files.splitlines()[0].endswith("shown/mushrooms.glb")
+        assert bool(said) != bool(quiet) and ("growing 'lava' on knot" in said) != bool(quiet)
         sheets.append((tmp_path / "shown" / "demo.png").read_bytes())
     assert sheets[0] == sheets[1]
     names = {path.name for path in (tmp_path / "shown").iterdir()}

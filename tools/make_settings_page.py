@@ -70,8 +70,8 @@ def line(cells: Iterable[str]) -> str:
 
 
 def code(text: str) -> str:
-    """A value in the type of code."""
-    return f"`{text}`" if text else "an empty list"
+    """A value in the type of code, the items of a list one by one, so that a long list breaks."""
+    return ", ".join(f"`{item}`" for item in text.split(",")) if text else "an empty list"
 
 
 if __name__ == "__main__":

@@ -23,19 +23,23 @@ from mitex.lazy import load
 HEADER = ["Parameter", "Type", "Description", "Flags"]
 
 
+def parameters(text: str) -> list[list[str]]:
+    """The rows of a list of parameters, each of name, type, description, and flags ("" where it has none)."""
+    rows = re.split(r"^ *\* ", text, flags=re.MULTILINE)[1:]
+    cells = [re.split(r"^ *- ", row, flags=re.MULTILINE)[1:] for row in rows]
+    return [[" ".join(cell.split()) for cell in row] + [""] * (len(HEADER) - len(row)) for row in cells]
+
+
 class PluginParameters(ListTable):
     """A list of parameters as a table; their flags, the last column, may be left out."""
 
     def run(self) -> list[Any]:
         """Called by docutils."""
-        rows = re.split(r"^ *\* ", "\n".join(self.content), flags=re.MULTILINE)[1:]
-        cells = [re.split(r"^ *- ", row, flags=re.MULTILINE)[1:] for row in rows]
         lines = []
-        for row in [HEADER, *cells]:
-            padded = row + [""] * (len(HEADER) - len(row))
-            lines += ["*"] + [f"  - {' '.join(cell.split())}" for cell in padded]
+        for row in [HEADER, *parameters("\n".join(self.content))]:
+            lines += ["*"] + [f"  - {cell}" for cell in row]
         self.content = StringList(lines, self.name)
-        self.options |= {"header-rows": 1, "widths": [16, 12, 54, 18]}
+        self.options |= {"header-rows": 1, "widths": [16, 12, 54, 18], "class": ["parameters"]}
         return list(super().run())
 
 

@@ -103,7 +103,9 @@ def measured_motion(
     first, second = grey[:-1], grey[1:]
     expected = torch.tensor(target).movedim(2, 0)[None] * (steps / period)
     with torch.no_grad():
-        motion, detail = lucas_kanade(first, second), smaller_eigenvalue(first).clamp_min(0)
+        pairs = zip(first.split(1), second.split(1), strict=True)  # a film at once may not fit in memory
+        motion = torch.cat([lucas_kanade(*pair) for pair in pairs])
+        detail = torch.cat([smaller_eigenvalue(frame) for frame in first.split(1)]).clamp_min(0)
     weight = _counting(expected, torch.tensor(mask)) * detail / (detail + DETAIL)
     return motion_errors(motion, expected.expand_as(motion), weight)
 

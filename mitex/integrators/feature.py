@@ -26,15 +26,15 @@ class FeatureIntegrator(GridIntegrator):
        - |texture|
        - The texture to image, on every shape: all channels of a `vertex_field`, `texel_field` or
          `decoded_field`; of any other the colour that `eval` gives (3 channels in rgb variants, 1 in mono,
-         none in spectral ones).
+         none in spectral ones). Give this or `name`.
        - exposed, differentiable
      * - name
        - |string|
-       - Instead of `field`: the name under which each shape, its BSDF or a BSDF inside that holds its
+       - Instead of `field`: the name under which each shape, its BSDF or a BSDF inside that holds its own
          texture, for instance `reflectance`. Shapes without one show the background. (Default: none)
      * - background
        - |float| or |tensor|
-       - Value of rays that see nothing, one for all channels or C. (Default: 0)
+       - Value of rays that see nothing: a number for all channels, or a tensor (C,). (Default: 0)
        - exposed, differentiable
      * - antialias
        - |int|
@@ -42,7 +42,7 @@ class FeatureIntegrator(GridIntegrator):
          sample at the pixel's centre. An `spp` given to `mi.render` replaces it and must be a square number.
          (Default: 1)
 
-    Variants: llvm and cuda ones; in spectral ones only the fields of Mitex.
+    Variants: llvm and cuda ones; in spectral ones only the fields of Mitex. Others are a ConfigError.
 
     The sensor's sampler and reconstruction filter are not used: the image is deterministic, the seed has no
     effect. The result is returned and not stored in the film, which has no room for C channels.

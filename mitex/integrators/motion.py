@@ -48,7 +48,7 @@ class MotionIntegrator(GridIntegrator):
        - n for n x n samples per pixel at the centres of a regular grid. An `spp` given to `mi.render`
          replaces it and must be a square number. (Default: 1)
 
-    Variants: llvm and cuda ones.
+    Variants: llvm and cuda ones. Others are a ConfigError.
 
     A thin lens is taken for a pinhole. An `instance` does not turn the vectors. The sensor's sampler and
     reconstruction filter are not used, and the result is not stored in the film, as in `feature`.

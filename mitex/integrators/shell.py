@@ -23,15 +23,16 @@ class ShellIntegrator:
 
      * - field
        - |volume|
-       - A `shell_field`.
+       - The radiance field, an object that `mitex.textures.shell_field.shell_field` makes.
+       - exposed, differentiable
      * - max_depth
        - |int|
-       - Longest path in the scene [segments]. (Default: 6)
+       - Longest path in the scene, at least 1 [segments]. (Default: 6)
      * - hide_emitters
        - |bool|
-       - Show nothing where the camera sees light sources directly. (Default: no)
+       - Show nothing where the camera sees light sources directly. (Default: false)
 
-    Variants: llvm_ad_rgb and cuda_ad_rgb.
+    Variants: llvm_ad_rgb and cuda_ad_rgb. Others are a ConfigError.
 
     Images are differentiable in the field's parameters.
     """

@@ -6,6 +6,7 @@ fields" (2013), with the smallest rotation between the normals of two vertices i
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -56,10 +57,9 @@ def connection_laplacian(edges: np.ndarray, carried: np.ndarray, weights: np.nda
     return coo_array((np.concatenate(values), places), (count, count)).tocsc()
 
 
-def solve(matrix: Any, right: np.ndarray) -> np.ndarray:
-    """The solution (V,) of a Hermitian and positive definite system, `matrix` in scipy's CSC form."""
+def solver(matrix: Any) -> Callable[[np.ndarray], np.ndarray]:
+    """Solves systems of a Hermitian and positive definite matrix, scipy's CSC, for right sides (V,)."""
     from scipy.sparse.linalg import splu
 
     # No pivoting, and an ordering for symmetric patterns.
-    factors = splu(matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    return factors.solve(right)
+    return splu(matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve

@@ -8,7 +8,7 @@ from mitex.geometry.vectors import dot
 from mitex.mesh.mesh import Mesh
 from mitex.mesh.topology import face_edges
 
-LEAST = 1e-12  # twice the area of a face, at least [mesh units^2]
+LEAST = 1e-12  # area of a face, at least, relative to the largest
 
 
 def cotangent_weights(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
@@ -22,7 +22,8 @@ def cotangent_weights(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     """
     pairs, sides = face_edges(mesh.faces, len(mesh.vertices))
     corners = mesh.vertices[mesh.faces].astype(np.float64)
-    twice = np.maximum(np.linalg.norm(mesh.face_crosses, axis=1), LEAST)
+    twice = np.linalg.norm(mesh.face_crosses, axis=1)
+    twice = np.maximum(twice, LEAST * max(float(twice.max(initial=0.0)), 1e-300))
     # The side from corner k to k + 1 lies opposite to corner k - 1.
     opposite = np.roll(corners, 1, axis=1)
     cotangents = dot(corners - opposite, np.roll(corners, -1, axis=1) - opposite) / twice[:, None]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -26,13 +26,12 @@ def film(
     spp: int = 32,
     azimuth: float = AZIMUTH,
     elevation: float = ELEVATION,
-    progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Renders assets in turn as a video; returns and raises what `turntable` does.
 
     Args:
         assets: one for each frame; they are made as they are rendered.
-        path, fps, resolution, progress: as in `turntable`.
+        path, fps, resolution: as in `turntable`.
         frames: how many assets there are.
         like: the mesh whose place and size the camera is set for.
         spp, azimuth, elevation: as in `still`.
@@ -46,4 +45,4 @@ def film(
             view = view or renderer.fit_view(azimuth, elevation)
             yield tone(renderer.render(azimuth, view, spp))
 
-    return write_video(target, pictures(), frames, fps, resolution, progress)
+    return write_video(target, pictures(), frames, fps, resolution)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -103,16 +102,16 @@ def turntable(
     displacement: float = 0.0,
     ao: bool = True,
     floating: bool = False,
-    progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Renders one full turn of the asset as a video, .mp4 (H.264) or .gif, that loops without a jump.
+
+    How many frames are written is announced: `mitex.progress.listening` calls a function with it.
 
     Args:
         path: target.
         frames: of one turn, 2 to 3600.
         fps: frames per second, 1 to 60.
         resolution: side [px]; even for .mp4.
-        progress: called with (frames done, frames) after each one.
         spp, elevation, exposure, displacement, ao, floating: as in `still` and `tone`.
 
     Returns:
@@ -131,4 +130,4 @@ def turntable(
     view = renderer.fit_view(angles.tolist(), elevation)
     # The same seed: noise that stands still compresses better and disturbs less.
     pictures = (tone(renderer.render(float(angle), view, spp), exposure) for angle in angles)
-    return write_video(target, pictures, frames, fps, resolution, progress)
+    return write_video(target, pictures, frames, fps, resolution)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -39,13 +39,12 @@ def write_video(
     frames: int,
     fps: int,
     side: int,
-    progress: Callable[[int, int], None] | None = None,
     work: str = "rendering frames",
 ) -> Path:
     """Writes `frames` pictures (side, side, 3), sRGB in [0, 1], as .mp4 (H.264) or .gif, by the suffix.
 
     Pictures are drawn from the iterable as they are written, so that a film need not fit into memory as .mp4.
-    `progress` is called with (frames done, frames) after each one; `work` is what is announced.
+    How many are written is announced as `work` (`mitex.progress`).
 
     Raises:
         ConfigError: there are fewer or more pictures than `frames`; nothing is left then.
@@ -58,8 +57,6 @@ def write_video(
             if done > frames:
                 raise ConfigError(f"more pictures than the {frames} frames of a video", "raise frames")
             yield np.round(picture * 255.0).astype(np.uint8)
-            if progress:
-                progress(done, frames)
         if done < frames:
             raise ConfigError(f"{done} pictures for a video of {frames} frames", "give one for each frame")
 

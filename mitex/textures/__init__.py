@@ -7,8 +7,8 @@
 | `decoded_field` | `DecodedField` | a state for each vertex, decoded by a small network |
 | `shell_field` | `ShellField` | none: a radiance field, an object that `shell_field(...)` makes |
 
-The docstrings of the classes are the reference: each parameter of the scene's dictionary with its type,
-meaning and default, and whether `mi.traverse` lists it (exposed) and images have
+The docstrings of the classes are the reference: each parameter of the scene's dictionary with its type and
+meaning, its default where it may be left out, and whether `mi.traverse` lists it (exposed) and images have
 derivatives to it (differentiable).
 """
 

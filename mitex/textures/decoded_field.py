@@ -33,38 +33,60 @@ class DecodedField(VertexRows):
        - |tensor|
        - The states, `mi.TensorXf` of shape (V, C); row i belongs to vertex i of the mesh.
        - exposed, differentiable
-     * - vertices, faces
+     * - vertices
        - |tensor|
-       - The mesh at rest: positions (V, 3) and vertex indices (F, 3). Distances and directions on the
-         surface are measured on it, so the texture stays when the shape in the scene is moved, scaled or
-         bent. The shape has the same vertices in the same order; its faces may be in any order.
+       - Positions of the mesh at rest, (V, 3). Distances and directions on the surface are measured on it,
+         so the texture stays when the shape in the scene is moved, scaled or bent. The shape has the same
+         vertices in the same order.
+     * - faces
+       - |tensor|
+       - Vertex indices of its triangles, (F, 3), in any order.
      * - interpolation
        - |string|
-       - `smooth`: continuously differentiable across edges; or `linear`. (Default: smooth)
+       - How states are interpolated between vertices: `smooth`, which is continuously differentiable across
+         edges, or `linear`. (Default: smooth)
      * - coordinates
        - |string|
-       - Local coordinates in the order in which the network reads them, after the state: some of `waves`,
-         `barycentrics` (sorted, 3 numbers) and `polynomials` (2), with spaces between. (Default: none)
+       - Local coordinates in the order in which the network reads them, after the state: some of `waves`
+         (N numbers), `barycentrics` (sorted, 3 numbers) and `polynomials` (2), with spaces between.
+         (Default: none)
      * - waves
        - |tensor|
-       - (N, 4): directions of N cosines times their frequencies [cycles per edge], and phases [cycles].
+       - (N, 4): for each of N cosines of the position its vector [cycles per edge] and its phase [cycles].
+         Needed if `coordinates` names them.
      * - amplitude
        - |float|
-       - Of the waves. (Default: 1)
-     * - weight_0, bias_0, weight_1, ...
+       - Amplitude of the waves. (Default: 1)
+     * - weight_k
        - |tensor|
-       - Layers of the network, (outputs, inputs) and (outputs,). The last one's outputs are the channels.
+       - Matrix of the network's layer k = 0, 1, ..., (outputs, inputs). The outputs of the last layer are the
+         channels.
+       - exposed, differentiable
+     * - bias_k
+       - |tensor|
+       - What layer k adds, (outputs,). It computes sin(omega (weight x + bias)); the last one has no sine.
        - exposed, differentiable
      * - omega
        - |float|
-       - Factor in the sines of all layers but the last. (Default: 10)
-     * - channel, raw
-       - |int|, |bool|
-       - As of `vertex_field`.
-     * - scale, offset
+       - Factor in the sines. (Default: 10)
+     * - channel
+       - |int|
+       - First channel that the texture shows to a BSDF: `eval` and `eval_3` read three channels from here on
+         (or repeat this one when fewer than three are left), `eval_1` and `eval_1_grad` read this one.
+         (Default: 0)
+     * - scale
        - |float|
-       - Every value is `scale * decoded + offset`. (Default: 1 and 0)
+       - Factor of every value. (Default: 1)
        - exposed, differentiable
+     * - offset
+       - |float|
+       - Added to every value, after `scale`. (Default: 0)
+       - exposed, differentiable
+     * - raw
+       - |bool|
+       - If false, `eval`, which BSDFs call for colours, takes values as sRGB in [0, 1], clips them and
+         converts them to linear after decoding. If true, it returns them as they are. Nothing else ever
+         converts. (Default: false)
 
     Variants: llvm ones; colours (`eval`) in rgb and mono, the rest in spectral ones, too. Others are a
     ConfigError, and so is rendering a mesh with another number of vertices than `data` has rows. Other shapes

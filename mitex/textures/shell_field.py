@@ -20,12 +20,25 @@ CHUNK = 1 << 16  # rays that are marched at a time
 
 
 class ShellField:
-    """A radiance field somewhere in the world.
+    """A radiance field somewhere in the world, for the integrator `shell`.
 
-    Args:
-        field: in its own cube [-1, 1]^3.
-        similarity: world -> cube.
-        turn: (3, 3) rotation of the field in the world, about the origin; None for none.
+    `shell_field(field, similarity, turn)` makes one; a scene's dictionary cannot.
+
+    .. pluginparameters::
+
+     * - field
+       - |object|
+       - A `mitex.textures.march.RadianceField`, in its own cube [-1, 1]^3. The parameters of a
+         `DifferentiableField` become parameters of the scene, under the names that it gives them.
+       - exposed, differentiable
+     * - similarity
+       - |object|
+       - Where it is: a `mitex.mesh.Similarity`, world -> cube.
+     * - turn
+       - |array|
+       - Rotation of the field in the world about the origin, (3, 3). (Default: none)
+
+    Variants: llvm_ad_rgb and cuda_ad_rgb. Others are a ConfigError.
     """
 
     def __init__(self, field: RadianceField, similarity: Similarity, turn: np.ndarray | None = None) -> None:

@@ -22,7 +22,7 @@ class TexelField(FieldMethods):
 
      * - data
        - |tensor|
-       - `mi.TensorXf` of shape (H, W, C), finite. Row 0 is the top of the map, see below.
+       - The values, `mi.TensorXf` of shape (H, W, C), finite. Row 0 is the top of the map, see below.
        - exposed, differentiable
      * - charts
        - |tensor|
@@ -31,10 +31,25 @@ class TexelField(FieldMethods):
        - exposed
      * - filter
        - |string|
-       - `bilinear` or `nearest`. (Default: `bilinear`)
-     * - channel, scale, offset, raw
-       - |int|, |float|, |float|, |bool|
-       - As those of a `vertex_field`.
+       - How texels are interpolated: `bilinear` or `nearest`. (Default: bilinear)
+     * - channel
+       - |int|
+       - First channel that the texture shows to a BSDF: `eval` and `eval_3` read three channels from here on
+         (or repeat this one when fewer than three are left), `eval_1` and `eval_1_grad` read this one.
+         (Default: 0)
+     * - scale
+       - |float|
+       - Factor of every value. (Default: 1)
+       - exposed, differentiable
+     * - offset
+       - |float|
+       - Added to every value, after `scale`. (Default: 0)
+       - exposed, differentiable
+     * - raw
+       - |bool|
+       - If false, `eval`, which BSDFs call for colours, takes values as sRGB in [0, 1], clips them and
+         converts them to linear after interpolation. If true, it returns them as they are. Nothing else ever
+         converts. (Default: false)
 
     Texel (r, c) shows u = (c + 0.5) / W, v = 1 - (r + 0.5) / H, with v upwards as in `mitex.atlas.Atlas` and
     in OBJ files. Mitsuba's own `bitmap` shows its row 0 at v = 0 instead, and to make up for it the `obj`

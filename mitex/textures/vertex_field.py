@@ -17,16 +17,21 @@ class VertexField(VertexRows):
 
      * - data
        - |tensor|
-       - `mi.TensorXf` of shape (V, C), or (V,) for one channel; row i belongs to vertex i of the mesh.
+       - The values, `mi.TensorXf` of shape (V, C), or (V,) for one channel; row i belongs to vertex i of the
+         mesh.
        - exposed, differentiable
      * - channel
        - |int|
        - First channel that the texture shows to a BSDF: `eval` and `eval_3` read three channels from here on
          (or repeat this one when fewer than three are left), `eval_1` and `eval_1_grad` read this one.
          (Default: 0)
-     * - scale, offset
+     * - scale
        - |float|
-       - Every value is `scale * data + offset`. (Default: 1 and 0)
+       - Factor of every value. (Default: 1)
+       - exposed, differentiable
+     * - offset
+       - |float|
+       - Added to every value, after `scale`. (Default: 0)
        - exposed, differentiable
      * - raw
        - |bool|

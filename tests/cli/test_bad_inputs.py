@@ -89,10 +89,10 @@ FITS = {
     "presets of --preset and --set": (None, "--preset patch --set preset=paper", "contradicts"),
     "resume and init": (None, "--resume --init cobblestone", "--resume and --init contradict"),
     "resume without a run": (None, "--resume", "no checkpoint"),
+    "unknown device": (None, "--device tpu", "--device"),
     "unknown field": (None, "--motion rihgt", "did you mean right?"),
     "a field twice": (None, "--motion up --set motion=down", "motion is set to down and to up"),
     "field of one mesh": (None, "--motion wind.npy", "holds the vectors of one mesh"),
-    "unknown device": (None, "--device tpu", "--device"),
     "unknown init": (None, f"--init no_such_model {QUICK}", "no_such_model"),
     "damaged init": (
         lambda d: bad.text(d / "m.safetensors"),

@@ -164,6 +164,32 @@ class TestHelp:
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
         assert done.stdout.splitlines()[-1] == "set()"
 
+    def test_long_commands_speak_before_heavy_imports(self):
+        """So that the first line comes at once, whatever the command loads then."""
+        commands = [
+            *("fit nca --exemplar lava", "fit surface --exemplar lava --mesh knot"),
+            *("fit geometric --reference craters", "fit nerf --capture photos", "demo"),
+            *("apply spikes --mesh vase --out a.glb", "animate spikes --mesh vase --out a.mp4"),
+            *("render a.glb --out a.png", "render a.glb --out a.mp4"),
+        ]
+        code = f"""
+import sys
+from mitex.cli import display, main
+
+def announce(work):
+    print(work, {{'torch', 'mitsuba', 'drjit', 'trimesh', 'scipy', 'PIL'}} & set(sys.modules))
+    sys.exit()
+
+display.announce = announce
+for command in {commands}:
+    try:
+        main(command.split())
+    except SystemExit:
+        pass
+"""
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        assert done.stdout.splitlines() == ["starting set()"] * len(commands)
+
 
 class TestUsage:
     @pytest.mark.parametrize(

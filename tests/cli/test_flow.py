@@ -20,6 +20,8 @@ from mitex.exemplar import MAPS
 from mitex.images import read_image
 from tests.cli import bad_files
 
+pytestmark = pytest.mark.usefixtures("quick_settling")
+
 TINY = [
     *(
         "frequency=4",

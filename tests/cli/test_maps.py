@@ -11,7 +11,7 @@ from tests.cli import bad_files as bad
 from tests.cli.refusals import apply, check_refused
 from tests.export.common import Glb
 
-pytestmark = pytest.mark.usefixtures("own_cache")
+pytestmark = pytest.mark.usefixtures("own_cache", "quick_settling")
 GROWN = "--subdivide 0 --steps 1 --resolution 64"
 SURFACE = "--quiet --set exemplar_size=32 steps=2 preview_every=0 scales=0 layers=relu1_1"
 

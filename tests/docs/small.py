@@ -4,9 +4,10 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
 
 - fits: their settings are resolved as they were asked for, which checks them; then they get 2 steps, 3 if the
   run is resumed, and the tiny settings of their method;
-- automata take 10 steps at most, and what they grow is not healed; textures are baked at 64 texels;
+- meshes that ship with Mitex are balls of 362 vertices, as large as they and under their names;
+- automata grow for 2 steps on the mesh as it is, are not healed, and are baked at 64 texels;
 - films have 4 frames of 32 pixels;
-- pictures are traced with one path a pixel.
+- pictures are traced in 16 x 16 pixels with one path each, and enlarged.
 """
 
 from __future__ import annotations
@@ -19,13 +20,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods.registry import methods
 from mitex.training.run import CONFIG
-from tests.cli.test_nerf import icosphere, save
+from tests.cli.test_nerf import save
 
 STEPS, RESUMED_STEPS = 2, 3
+GROWTH = 2  # steps of an automaton
 TEXELS = 64
-GROWTH_STEPS = 10
+SIDE = 16  # of a picture [pixels]
 EVERY_FIT = {"checkpoint_every": 1, "preview_every": 0}
 TINY: dict[str, dict[str, Any]] = {
     # Nothing of the architecture, which must be that of the model after `--init`.
@@ -48,15 +51,25 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     from mitex.training import fit
 
     patch.setattr(fit, "resolve", _with_few_steps(fit.resolve))
+    patch.setattr("mitex.mesh.load.embedded", lambda name: _ball_in_place_of(embedded(name)))
     patch.setattr(texture, "grown_state", _with_few_growth_steps(texture.grown_state))
     patch.setattr(texture, "healed", lambda growth, state, generator: state)
     for module in (film, texture):
         patch.setattr(module, "film", _with_few_frames(film.film))
-    patch.setattr(texture.GrowingTexture, "apply", _with_few_texels(texture.GrowingTexture.apply))
-    patch.setattr(NcaTexture, "tile", _with_few_texels(NcaTexture.tile))
-    sketch = _with_one_path(renderer.accumulated)
-    patch.setattr(renderer, "accumulated", sketch)
-    patch.setattr(shell, "accumulated", sketch)
+    patch.setattr(texture.GrowingTexture, "apply", _small_growth(texture.GrowingTexture.apply))
+    patch.setattr(NcaTexture, "tile", _small_tile(NcaTexture.tile))
+    sketch, sensor = _with_few_paths(renderer.accumulated), renderer.sensor
+    for module in (renderer, shell):
+        patch.setattr(module, "accumulated", sketch)
+        patch.setattr(module, "sensor", lambda resolution: sensor(SIDE))
+
+
+def _ball_in_place_of(mesh: Mesh) -> Mesh:
+    low, high = mesh.vertices.min(0), mesh.vertices.max(0)
+    ball = icosphere(6)
+    return replace(
+        ball.with_vertices(0.5 * (low + high) + 0.5 * (high - low) * ball.vertices), name=mesh.name
+    )
 
 
 def _with_few_steps(resolve: Callable[..., Any]) -> Callable[..., Any]:
@@ -73,7 +86,7 @@ def _with_few_steps(resolve: Callable[..., Any]) -> Callable[..., Any]:
 
 def _with_few_growth_steps(grown_state: Callable[..., Any]) -> Callable[..., Any]:
     def small(growth: Any, seed: int, steps: int) -> Any:
-        return grown_state(growth, seed, min(steps, GROWTH_STEPS))
+        return grown_state(growth, seed, min(steps, GROWTH))
 
     return small
 
@@ -87,17 +100,24 @@ def _with_few_frames(film: Callable[..., Any]) -> Callable[..., Any]:
     return small
 
 
-def _with_few_texels(make: Callable[..., Any]) -> Callable[..., Any]:
-    def small(*arguments: Any, **options: Any) -> Any:
-        if options.get("resolution", TEXELS) is not None:
-            options["resolution"] = TEXELS
-        return make(arguments[0], **options) if make.__name__ == "tile" else make(*arguments, **options)
+def _small_growth(apply: Callable[..., Any]) -> Callable[..., Any]:
+    def small(texture: Any, mesh: Mesh, **options: Any) -> Any:
+        texels = None if options.get("resolution", TEXELS) is None else TEXELS
+        return apply(texture, mesh, **options | {"resolution": texels, "subdivide": 0})
 
     return small
 
 
-def _with_one_path(accumulated: Callable[..., np.ndarray]) -> Callable[..., np.ndarray]:
+def _small_tile(tile: Callable[..., Any]) -> Callable[..., Any]:
+    def small(texture: Any, resolution: int = TEXELS, **options: Any) -> Any:
+        return tile(texture, TEXELS, **options | {"steps": GROWTH})
+
+    return small
+
+
+def _with_few_paths(accumulated: Callable[..., np.ndarray]) -> Callable[..., np.ndarray]:
     def small(scene: Any, resolution: int, spp: int, seed: int) -> np.ndarray:
-        return accumulated(scene, resolution, 1, seed)
+        nearest = np.arange(resolution) * SIDE // resolution
+        return accumulated(scene, SIDE, 1, seed)[nearest][:, nearest]
 
     return small

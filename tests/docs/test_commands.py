@@ -4,7 +4,8 @@ The blocks of a page are run in their order in one folder, Python in one namespa
 is run by its own command line; `make`, `pip` and `python` are looked up: the target, the extra, the script.
 `small.py` says what is made small meanwhile. A comment before a block marks one that cannot be run:
 
-    <!-- not run: why -->       commands are parsed by the real command line, Python is compiled
+    <!-- not run: why -->       commands are parsed by the real command line, also those for a texture that
+                                the block would learn, Python is compiled
     <!-- part of: file -->      each line stands in that file of the repository
 """
 
@@ -18,9 +19,9 @@ import pytest
 from mitex.cli import commands, main
 from mitex.cli.usage import parse
 from mitex.methods.registry import methods
-from mitex.training.locate import bundled_files
 from tests.docs import small
 from tests.docs.blocks import PAGES, PROGRAMS, ROOT, Block, blocks
+from tests.methods.nerf.small import small_texture
 
 LANGUAGES = {"python", "sh", "toml", "json", "text", ""}
 EXTRAS = set(tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"])
@@ -38,7 +39,7 @@ def toy():
 
 
 @pytest.fixture
-def place(tmp_path, monkeypatch, own_cache, toy):
+def place(tmp_path, monkeypatch, own_cache, quick_settling, toy):
     """A folder with the files that the pages name; work in it is small."""
     small.prepare(tmp_path)
     small.shrink(monkeypatch)
@@ -46,12 +47,18 @@ def place(tmp_path, monkeypatch, own_cache, toy):
     return tmp_path
 
 
+@pytest.fixture(scope="module")
+def learned(tmp_path_factory):
+    """Model files by the method that a marked block learns with."""
+    return {"nerf": small_texture().save(tmp_path_factory.mktemp("learned") / "texture.safetensors")}
+
+
 @pytest.mark.parametrize("page", RUN, ids=lambda page: str(page.relative_to(ROOT)))
-def test_a_page_runs_as_it_stands(page, place, capsys):
+def test_a_page_runs_as_it_stands(page, place, learned, capsys):
     names = {"__name__": "__main__"}
     for block in blocks(page):
         if block.mark:
-            check_marked(block)
+            check_marked(block, learned)
         elif block.language == "python":
             exec(compile(block.text, block.place, "exec"), names)
         elif block.language == "sh":
@@ -78,7 +85,7 @@ def run(words, place, capsys):
             pytest.fail(f"{place}: {program} is none of {', '.join(PROGRAMS)}")
 
 
-def check_marked(block: Block):
+def check_marked(block: Block, learned):
     """As far as a block is checked that is not run."""
     kind, text = block.mark or ("", "")
     if kind == "part of":
@@ -88,10 +95,13 @@ def check_marked(block: Block):
     elif block.language == "python":
         ast.parse(block.text, block.place)
     elif block.language == "sh":
+        runs = {}
         for program, *words in block.commands():
-            bundled = words[0] not in commands.OF_MODELS or words[1] in bundled_files()
-            if program == "mitex" and bundled:  # the options of another model are known once it is there
-                call = commands.find(words)
+            if program == "mitex":
+                if words[0] == "fit" and words[1] in learned:
+                    runs[words[words.index("--out") + 1]] = str(learned[words[1]])
+                # A model has the options of its method, so there has to be one.
+                call = commands.find([runs.get(word, word) for word in words])
                 parse(call.command, call.words, call.program)
 
 

@@ -1,4 +1,4 @@
-"""An asset with every map, and a reader of GLB files that shares no code with Mitex."""
+"""An asset with every map, files of others, and a reader of GLB files that shares no code with Mitex."""
 
 import io
 import json
@@ -29,6 +29,16 @@ def wavy(mesh: Mesh | None = None, name: str = "wavy", without: tuple[str, ...] 
     }
     tangents = orthonormal(np.tile(np.array([0.3, 0.1, 1.0]), (len(p), 1)), mesh.normals)
     return Asset(mesh, {k: v for k, v in maps.items() if k not in without}, tangents, name=name)
+
+
+def write_foreign(file: Path, content: str, text: str) -> None:
+    """A file that Mitex did not write: an "image", a "link" to nowhere, or else the text."""
+    if content == "image":
+        Image.new("RGB", (4, 4)).save(file, "PNG")
+    elif content == "link":
+        file.symlink_to("nowhere")
+    else:
+        file.write_text(text)
 
 
 class Glb:

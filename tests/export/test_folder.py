@@ -12,7 +12,7 @@ from mitex.errors import OutputError
 from mitex.exemplar import MAPS, Exemplar
 from mitex.export import prepare_export, read_exr, write_maps
 from mitex.mesh import icosphere
-from tests.export.common import wavy
+from tests.export.common import wavy, write_foreign
 
 
 @pytest.fixture(scope="module")
@@ -88,13 +88,7 @@ def test_only_maps_that_there_are(tmp_path):
 @pytest.mark.parametrize("name", ["albedo.png", "height.exr", "mesh.obj", "mesh.mtl"])
 @pytest.mark.parametrize("content", ["text", "image", "link"])
 def test_files_of_others_are_kept(baked, tmp_path, name, content):
-    file = tmp_path / name
-    if content == "image":
-        Image.new("RGB", (4, 4)).save(file, "PNG")
-    elif content == "link":
-        file.symlink_to("nowhere")
-    else:
-        file.write_text("v 0 0 0\n")
+    write_foreign(tmp_path / name, content, "v 0 0 0\n")
     before = _contents(tmp_path)
     kind: Any = "exr" if name.endswith(".exr") else "png"
     for write in (baked.export, prepare_export):

@@ -11,7 +11,7 @@ from mitex.asset import Asset
 from mitex.errors import MeshError, OutputError
 from mitex.export import prepare_export
 from mitex.mesh import icosphere
-from tests.export.common import wavy
+from tests.export.common import wavy, write_foreign
 
 
 @pytest.fixture(scope="module")
@@ -92,13 +92,7 @@ def _contents(folder):
 @pytest.mark.parametrize("name", ["a.mtl", "a_albedo.png", "a_normal.png"])
 @pytest.mark.parametrize("content", ["text", "image", "empty", "link"])
 def test_files_beside_it_that_others_wrote_are_kept(baked, tmp_path, name, content):
-    file = tmp_path / name
-    if content == "image":
-        Image.new("RGB", (4, 4)).save(file, "PNG")
-    elif content == "link":
-        file.symlink_to("nowhere")
-    else:
-        file.write_text("newmtl Mitex\n" if content == "text" else "")
+    write_foreign(tmp_path / name, content, "newmtl Mitex\n" if content == "text" else "")
     before = {} if content == "link" else _contents(tmp_path)
     for write in (baked.export, prepare_export):
         with pytest.raises(OutputError, match=rf"'a.obj' comes with '.*{name}'.*; name another place"):

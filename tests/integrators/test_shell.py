@@ -19,6 +19,7 @@ init()
 from mitex.render.framing import rotation  # noqa: E402
 from mitex.textures import shell_field as module  # noqa: E402
 from mitex.textures.shell_field import shell_field  # noqa: E402
+from tests.scenes.helpers import shell_scene  # noqa: E402
 
 COLOUR = (0.2, 0.6, 0.4)
 
@@ -49,18 +50,8 @@ class Ball:
 
 
 def picture(field, *, spp=16, turn=None, place=None, side=33, seed=0, **entries: Any):
-    place = place or Similarity(np.zeros(3), 1.0)
-    scene = {
-        "type": "scene",
-        "integrator": {"type": "shell", "field": shell_field(field, place, turn)},
-        "sensor": {
-            "type": "perspective",
-            "fov": 40,
-            "to_world": mi.ScalarTransform4f().look_at([0, 0, 4], [0, 0, 0], [0, 1, 0]),
-            "film": {"type": "hdrfilm", "width": side, "height": side, "rfilter": {"type": "box"}},
-        },
-    }
-    return np.array(mi.render(mi.load_dict(scene | entries), spp=spp, seed=seed))
+    scene = shell_scene(field, fov=40, side=side, place=place, turn=turn, **entries)
+    return np.array(mi.render(scene, spp=spp, seed=seed))
 
 
 def wall(z: float, **more):
@@ -168,23 +159,7 @@ def test_it_is_seen_through_glass():
 
 def test_gradients_reach_the_fields_parameters():
     def image(density):
-        scene = mi.load_dict(
-            {
-                "type": "scene",
-                "integrator": {
-                    "type": "shell",
-                    "field": shell_field(Ball(density), Similarity(np.zeros(3), 1.0)),
-                },
-                "sensor": {
-                    "type": "perspective",
-                    "fov": 10,
-                    "to_world": mi.ScalarTransform4f().look_at([0, 0, 4], [0, 0, 0], [0, 1, 0]),
-                    "film": {"type": "hdrfilm", "width": 4, "height": 4, "rfilter": {"type": "box"}},
-                },
-                "sky": {"type": "constant", "radiance": 0.5},
-            }
-        )
-        return scene
+        return shell_scene(Ball(density), fov=10, side=4, sky={"type": "constant", "radiance": 0.5})
 
     scene = image(1.5)
     params = mi.traverse(scene)

@@ -18,3 +18,9 @@ def test_energy_is_that_of_the_linear_interpolants(rng):
     pairs, weights = cotangent_weights(mesh)
     steps = values[pairs[:, 0]] - values[pairs[:, 1]]
     np.testing.assert_allclose((weights * steps**2).sum(), energy, rtol=1e-9)
+
+
+def test_weights_do_not_depend_on_size():
+    mesh = scattered_sphere(40)
+    small = mesh.with_vertices(1e-9 * mesh.vertices)
+    np.testing.assert_allclose(cotangent_weights(small)[1], cotangent_weights(mesh)[1], rtol=1e-4)

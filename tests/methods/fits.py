@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 from tests.cli import bad_files as bad
 
@@ -70,6 +73,18 @@ def prepare(folder: Path) -> None:
 
     bad.text(folder / "cube.obj", bad.CUBE)
     bad.image(folder / "photo.png")
-    save(holed(), folder / "base.obj")
+    save(holed(54), folder / "base.obj")  # even enough not to be remeshed
     save(icosphere(6), folder / "ball.obj")
     write(folder / "photos", 16)
+
+
+def few_patches(patch: pytest.MonkeyPatch) -> None:
+    """Captured textures are synthesized from patches of 40 places, in place of 2000."""
+    from mitex.methods.nerf import texture
+
+    extract = texture.extract_patches
+
+    def few(*arguments: Any, **options: Any) -> Any:
+        return extract(*arguments, **options | {"count": 40})
+
+    patch.setattr(texture, "extract_patches", few)

@@ -14,6 +14,7 @@ from mitex.colour import linear_to_srgb
 from mitex.errors import ConfigError, OutputError
 from mitex.export import read_exr
 from mitex.mesh import icosphere
+from mitex.progress import listening
 from mitex.render import film, render_still, tone, turntable
 
 ASSET = Asset(icosphere(3), {"albedo": np.full((92, 3), 0.6), "height": np.zeros((92, 1))})
@@ -40,19 +41,12 @@ def test_stills_of_all_formats_agree(tmp_path):
 @pytest.mark.parametrize("name", ["a.mp4", "a.gif"])
 def test_turntables_have_all_frames_and_turn(name, tmp_path):
     albedo = np.where(ASSET.mesh.vertices[:, :1] > 0, [[0.9, 0.1, 0.1]], [[0.1, 0.1, 0.9]])
-    calls = []
-    path = turntable(
-        Asset(ASSET.mesh, {"albedo": albedo}),
-        tmp_path / name,
-        frames=4,
-        fps=10,
-        resolution=32,
-        spp=4,
-        progress=lambda done, of: calls.append((done, of)),
-    )
+    asset, calls = Asset(ASSET.mesh, {"albedo": albedo}), []
+    with listening(lambda *call: calls.append(call)):
+        path = turntable(asset, tmp_path / name, frames=4, fps=10, resolution=32, spp=4)
     frames = iio.imread(path)
     assert frames.shape == (4, 32, 32, 3)
-    assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert calls[-5:] == [("rendering frames", k, 4) for k in range(5)]
     red = frames[:, 12:20, 12:20].mean(axis=(1, 2))
     assert red[1, 0] > 2 * red[1, 2] and red[3, 2] > 2 * red[3, 0]  # from +x, then from -x
     assert [p.name for p in tmp_path.iterdir()] == [name]

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from mitex.errors import ConfigError
+from mitex.progress import listening
 from mitex.render.video import write_video
 
 
@@ -15,10 +16,9 @@ def pictures(count):
 @pytest.mark.parametrize("suffix", [".gif", ".mp4"])
 def test_a_picture_for_each_frame(tmp_path, suffix):
     calls = []
-    path = write_video(
-        tmp_path / f"a{suffix}", pictures(3), 3, 24, 16, lambda done, total: calls.append((done, total))
-    )
-    assert len(iio.imread(path)) == 3 and calls == [(1, 3), (2, 3), (3, 3)]
+    with listening(lambda *call: calls.append(call)):
+        path = write_video(tmp_path / f"a{suffix}", pictures(3), 3, 24, 16)
+    assert len(iio.imread(path)) == 3 and calls == [("rendering frames", k, 3) for k in range(4)]
 
 
 @pytest.mark.parametrize("suffix", [".gif", ".mp4"])

@@ -5,6 +5,7 @@ from typing import Any, Literal
 import numpy as np
 import torch
 
+from mitex.mesh import Similarity
 from mitex.scenes import Cameras
 
 
@@ -14,6 +15,33 @@ def front_camera(
     """One camera on the +z axis that looks at the origin, up +y."""
     origin, target, up = (np.array([v], np.float32) for v in ((0, 0, distance), (0, 0, 0), (0, 1, 0)))
     return Cameras(kind, origin, target, up, **options)
+
+
+def shell_scene(
+    field: Any,
+    *,
+    fov: float,
+    side: int,
+    place: Similarity | None = None,
+    turn: np.ndarray | None = None,
+    **entries: Any,
+) -> Any:
+    """A scene with a field, which a camera on the +z axis sees from a distance of 4 in side x side pixels."""
+    from mitex.runtime.jit import mi
+    from mitex.textures.shell_field import shell_field
+
+    carried = shell_field(field, place or Similarity(np.zeros(3), 1.0), turn)
+    scene = {
+        "type": "scene",
+        "integrator": {"type": "shell", "field": carried},
+        "sensor": {
+            "type": "perspective",
+            "fov": fov,
+            "to_world": mi.ScalarTransform4f().look_at([0, 0, 4], [0, 0, 0], [0, 1, 0]),
+            "film": {"type": "hdrfilm", "width": side, "height": side, "rfilter": {"type": "box"}},
+        },
+    }
+    return mi.load_dict(scene | entries)
 
 
 def gradient(tensor: torch.Tensor) -> np.ndarray:

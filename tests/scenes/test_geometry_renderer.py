@@ -29,14 +29,19 @@ MOVES = {
 }
 
 
-@pytest.mark.parametrize("name", MOVES)
-def test_derivatives_by_finite_differences(renderer, name):
-    start = torch.from_numpy(icosphere(8).vertices)
-    way, step = MOVES[name](start), 0.03
-    vertices = start.clone().requires_grad_()
+@pytest.fixture(scope="module")
+def gradient(renderer) -> torch.Tensor:
+    vertices = torch.tensor(icosphere(8).vertices, requires_grad=True)
     weighted(renderer.render(vertices, seed=3)).backward()
     assert vertices.grad is not None
-    derivative = float((vertices.grad * way).sum())
+    return vertices.grad
+
+
+@pytest.mark.parametrize("name", MOVES)
+def test_derivatives_by_finite_differences(renderer, gradient, name):
+    start = torch.tensor(icosphere(8).vertices)
+    way, step = MOVES[name](start), 0.03
+    derivative = float((gradient * way).sum())
     values = [float(weighted(renderer.render(start + sign * step * way, seed=3))) for sign in (1, -1)]
     expected = (values[0] - values[1]) / (2 * step)
     assert abs(expected) > 5e-3
@@ -44,7 +49,7 @@ def test_derivatives_by_finite_differences(renderer, name):
 
 
 def test_images_come_without_a_graph_too(renderer):
-    images = renderer.render(torch.from_numpy(icosphere(8).vertices))
+    images = renderer.render(torch.tensor(icosphere(8).vertices))
     assert images.shape == (2, 32, 32, 3) and not images.requires_grad
     assert float(images.min()) >= 0 and np.ptp(images.numpy()) > 0.1
 

@@ -15,15 +15,16 @@ Other sources are in the space of the mesh as it is given:
 
 - a direction, such as `1,0,0`. At the command line, one that begins with a minus needs an equals sign:
   `--field=-1,0,0`;
-- a `.npy` file of (V, 3) numbers: row i is the vector of vertex i;
-- a `.ply` file with V vertices that have the properties `vx vy vz`, `fx fy fz` or `u v w`;
-- a `.json` file of strokes drawn on the surface, `{"strokes": [[[x, y, z], ...], ...]}`, which the field
+- a .npy file of (V, 3) numbers: row i is the vector of vertex i;
+- a .ply file with V vertices that have the properties `vx vy vz`, `fx fy fz` or `u v w`;
+- a .json file of strokes drawn on the surface, `{"strokes": [[[x, y, z], ...], ...]}`, which the field
   follows as `stroke_vectors` says;
 - an array (V, 3).
 """
 
 from mitex.mesh.fields.field import vector_field
+from mitex.mesh.fields.files import read_vectors
 from mitex.mesh.fields.named import NAMES
 from mitex.mesh.fields.strokes import stroke_vectors
 
-__all__ = ["NAMES", "stroke_vectors", "vector_field"]
+__all__ = ["NAMES", "read_vectors", "stroke_vectors", "vector_field"]

@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from mitex.errors import ConfigError
 from mitex.geometry.vectors import across, unit
-from mitex.mesh.fields.files import read_npy, read_ply
+from mitex.mesh.fields.files import SUFFIXES, checked_vectors, read_vectors
 from mitex.mesh.fields.named import NAMES, named_vectors
-from mitex.mesh.fields.strokes import read_strokes, stroke_vectors
 from mitex.mesh.mesh import Mesh
-from mitex.paths import expanded
 from mitex.suggestions import suggestion
 
-READERS = {".npy": read_npy, ".ply": read_ply, ".json": read_strokes}
 FAINT = 1e-5  # parts of a vector along the surface that are shorter, relative to it, are rounding errors
 
 
 def vector_field(mesh: Mesh, source: str | Path | np.ndarray) -> np.ndarray:
     """A tangent vector at each vertex, of mean length 1.
 
-    MeshNCA's equations 10 and 18: U_t = U - (U . n) n with the unit vertex normal n, divided by the mean of
-    |U_t| over the vertices.
+    MeshNCA's equations 10 and 18: U - (U . n) n with the unit vertex normal n, divided by the mean of the
+    lengths over the vertices.
 
     Args:
         mesh: V vertices.
@@ -41,7 +35,7 @@ def vector_field(mesh: Mesh, source: str | Path | np.ndarray) -> np.ndarray:
         MeshError: all vertices are at one point.
     """
     label = "the vector field" if isinstance(source, np.ndarray) else f"the vector field '{source}'"
-    vectors = _checked(label, _vectors(mesh, source), mesh)
+    vectors = checked_vectors(label, _vectors(mesh, source), mesh)
     largest = np.abs(vectors).max(initial=0.0)
     if largest == 0.0:
         raise ConfigError(f"{label} is zero everywhere", "give one that moves something")
@@ -58,31 +52,20 @@ def vector_field(mesh: Mesh, source: str | Path | np.ndarray) -> np.ndarray:
     return (tangent / lengths.mean()).astype(np.float32)
 
 
-def _vectors(mesh: Mesh, source: Any) -> np.ndarray:
-    """The vectors that a source gives, not yet checked."""
+def _vectors(mesh: Mesh, source: str | Path | np.ndarray) -> np.ndarray:
+    """The vectors that a source gives."""
     if not isinstance(source, str | Path):
         return np.asarray(source)
-    name, suffix = str(source), Path(source).suffix.lower()
+    name = str(source)
     if name in NAMES:
         return named_vectors(mesh, name)
-    if suffix in READERS:
-        return _of_file(mesh, expanded(source), READERS[suffix])
+    if Path(source).suffix.lower() in SUFFIXES:
+        return read_vectors(mesh, source)
     if "," in name:
         return np.tile(_direction(name), (len(mesh.vertices), 1))
-    files = ", ".join(READERS)
+    files = ", ".join(SUFFIXES)
     everything = f"use one of {', '.join(NAMES)}, a direction such as 1,0,0, or a file ({files})"
     raise ConfigError(f"there is no vector field '{name}'", suggestion(name, NAMES, everything))
-
-
-def _of_file(mesh: Mesh, place: Path, reader: Callable[[Path], Any]) -> np.ndarray:
-    if not os.path.isfile(place):  # unlike Path.is_file, also answers for impossible names
-        raise ConfigError(f"there is no vector field at '{place}'", "check the path")
-    try:
-        content = reader(place)
-    except OSError as e:
-        reason = e.strerror or str(e)
-        raise ConfigError(f"'{place}' cannot be read ({reason})", "check its permissions") from e
-    return stroke_vectors(mesh, content) if reader is read_strokes else content
 
 
 def _direction(text: str) -> np.ndarray:
@@ -93,22 +76,3 @@ def _direction(text: str) -> np.ndarray:
     if numbers.shape != (3,):
         raise ConfigError(f"'{text}' is no direction", "give three numbers, such as 1,0,0")
     return numbers
-
-
-def _checked(label: str, vectors: np.ndarray, mesh: Mesh) -> np.ndarray:
-    """The vectors as float64, if they are finite numbers of the mesh."""
-    shape = (len(mesh.vertices), 3)
-    if vectors.dtype.kind not in "fiu" or vectors.shape != shape:
-        raise ConfigError(
-            f"{label} is {vectors.dtype} {vectors.shape}",
-            f"give numbers of shape {shape}, a vector for each vertex of '{mesh.name}'",
-        )
-    vectors = np.array(vectors, np.float64)
-    bad = ~np.isfinite(vectors).all(axis=1)
-    if bad.any():
-        raise ConfigError(
-            f"{label} is NaN or infinite at {bad.sum():,} of {shape[0]:,} vertices (first: "
-            f"{int(bad.argmax())})",
-            "use zeros where it is unknown",
-        )
-    return vectors

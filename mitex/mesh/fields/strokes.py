@@ -1,31 +1,36 @@
 """A smooth field that follows a few drawn strokes, and is as parallel as possible between them.
 
 "Design of tangent vector fields" (Fisher, Schroder, Desbrun and Hoppe 2007) with the connection Laplacian:
-the field u minimises sum_ij w_ij |u_i - r_ij u_j|^2, where r_ij carries a vector from vertex j to i and w_ij
-are the cotangent weights. At the vertices nearest to a stroke it is the stroke's direction, of length 1, and
-nowhere is it longer. On a plane each component is the harmonic interpolant. It slows down to zero where
-strokes contradict each other, and where the surface leaves no choice: on a sphere every field is zero
-somewhere.
+for each stroke k, u_k minimises sum_ij w_ij |u_i - r_ij u_j|^2, where r_ij carries a vector from vertex j
+to i and w_ij are the cotangent weights. At the vertices nearest to the stroke it is the stroke's direction,
+and at those nearest to other strokes zero. On a curved surface vectors fade with the distance, since what
+is parallel depends on the way there. So the field is
+
+    u = sum_k u_k / sum_k |u_k|,
+
+of length 1 where strokes agree and where there is only one, and slower between strokes that contradict each
+other. On a plane, for straight strokes, its components are the harmonic interpolants.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mitex.errors import ConfigError
-from mitex.geometry.vectors import across, dot, unit
-from mitex.mesh.connection import connection_laplacian, solve, tangent_axes, transport
+from mitex.geometry.vectors import dot, unit
+from mitex.mesh.connection import connection_laplacian, solver, tangent_axes, transport
 from mitex.mesh.cotangents import cotangent_weights
 from mitex.mesh.mesh import Mesh
 from mitex.progress import announce
 
 NEAR = 0.1  # how far off the surface a stroke may be, relative to the diagonal of the mesh's box
 FAINT = 1e-3  # of the strokes' directions at a vertex: less than that along the surface is none
+LOST = 1e-12  # nothing of the strokes arrives where less than that does
 WEIGHTS = 1e-6, 1e4  # of edges: positive for the solver, and no slivers beyond its digits
 
 
@@ -64,33 +69,42 @@ def stroke_vectors(mesh: Mesh, strokes: Sequence[np.ndarray]) -> np.ndarray:
     tree = KDTree(mesh.vertices)
     _check(mesh, tree, strokes)
     normals = unit(mesh.normals.astype(np.float64))
-    directions = across(_directions(mesh, tree, strokes), normals)
-    fixed = np.linalg.norm(directions, axis=1) > FAINT
+    x, y = tangent_axes(normals)
+    directions = [_direction(mesh, tree, stroke) for stroke in strokes]
+    drawn = [dot(direction, x) + 1j * dot(direction, y) for direction in directions]
+    fixed = np.abs(drawn).sum(axis=0) > FAINT
     if not fixed.any():
         raise ConfigError(
             f"the strokes have no direction along the surface of '{mesh.name}'", "draw them on the surface"
         )
-    x, y = tangent_axes(normals)
-    directions = unit(directions)
-    u = np.where(fixed, dot(directions, x) + 1j * dot(directions, y), 0.0)
     announce("spreading the strokes over the mesh")
     pairs, weights = cotangent_weights(mesh)
     carried = transport(normals, x, y, pairs)
-    u = _spread(connection_laplacian(pairs, carried, np.clip(weights, *WEIGHTS), len(u)), fixed, u)
+    laplacian = connection_laplacian(pairs, carried, np.clip(weights, *WEIGHTS), len(normals))
+    u, reach = np.zeros(len(normals), complex), np.zeros(len(normals))
+    for part in _extended(laplacian, fixed, drawn):
+        u += part
+        reach += np.abs(part)
+    u = np.where(reach > LOST, u / np.maximum(reach, LOST), 0.0)
     return np.real(u)[:, None] * x + np.imag(u)[:, None] * y
 
 
-def _spread(laplacian: Any, fixed: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """(V,) complex: u where it is fixed, L u = 0 elsewhere, zero where nothing fixed is connected."""
+def _extended(laplacian: Any, fixed: np.ndarray, drawn: list[np.ndarray]) -> Iterator[np.ndarray]:
+    """(V,) complex for each stroke: its values where any is fixed, L u = 0 elsewhere.
+
+    Zero where nothing fixed is connected.
+    """
     from scipy.sparse.csgraph import connected_components
 
     count, component = connected_components(abs(laplacian), directed=False)
     free = ~fixed & (np.bincount(component, fixed, count) > 0)[component]
-    if free.any():
-        rows = laplacian.tocsr()[free]
-        u = u.copy()
-        u[free] = solve(rows[:, free].tocsc(), -rows[:, fixed] @ u[fixed])
-    return u
+    rows = laplacian.tocsr()[free]
+    solve = solver(rows[:, free].tocsc()) if free.any() else None
+    for values in drawn:
+        u = np.where(fixed, values, 0.0)
+        if solve is not None:
+            u[free] = solve(-rows[:, fixed] @ u[fixed])
+        yield u
 
 
 def _check(mesh: Mesh, tree: Any, strokes: Sequence[np.ndarray]) -> None:
@@ -111,15 +125,14 @@ def _check(mesh: Mesh, tree: Any, strokes: Sequence[np.ndarray]) -> None:
             )
 
 
-def _directions(mesh: Mesh, tree: Any, strokes: Sequence[np.ndarray]) -> np.ndarray:
-    """(V, 3) mean unit vectors along the strokes at the vertices nearest to them, zero elsewhere."""
+def _direction(mesh: Mesh, tree: Any, stroke: np.ndarray) -> np.ndarray:
+    """(V, 3) mean unit vectors along a stroke at the vertices nearest to it, zero elsewhere."""
     spacing = 0.5 * float(mesh.edge_lengths.mean())
     total, passes = np.zeros(mesh.vertices.shape), np.zeros((len(mesh.vertices), 1))
-    for stroke in strokes:
-        for start, step in zip(stroke[:-1], np.diff(stroke, axis=0), strict=True):
-            samples = 1 + int(np.linalg.norm(step) / spacing)
-            along = (np.arange(samples) + 0.5) / samples
-            nearest = tree.query(start + along[:, None] * step)[1]
-            np.add.at(total, nearest, unit(step))
-            np.add.at(passes, nearest, float(step.any()))
+    for start, step in zip(stroke[:-1], np.diff(stroke, axis=0), strict=True):
+        samples = 1 + int(np.linalg.norm(step) / spacing)
+        along = (np.arange(samples) + 0.5) / samples
+        nearest = tree.query(start + along[:, None] * step)[1]
+        np.add.at(total, nearest, unit(step))
+        np.add.at(passes, nearest, float(step.any()))
     return total / np.maximum(passes, 1)

@@ -90,7 +90,7 @@ class NcaConfig(TrainingConfig):
     milestones: tuple[int, ...] = key((500, 750), "steps at which the learning rate falls", 0)
     decay: float = key(0.3, "factor of the learning rate at a milestone", 0)
     normalise_gradients: bool = key(True, "divide each parameter tensor's gradient by its norm")
-    motion: str = key("", "vector field that the texture moves along, by name or direction; empty for none")
+    motion: str | None = key(None, "vector field that the texture moves along, by name or direction")
     motion_encoding: bool = key(True, "whether cells know the field at their place (MPE)")
     motion_estimator: Literal["advection", "flow", "lucas-kanade"] = key(
         "advection", "what tells how it moves: the states themselves, or pictures of the albedo"
@@ -175,7 +175,8 @@ PRESETS["motion"] = replace(
     DEFAULT,
     preset="motion",
     steps=600,
-    pool=32,
+    pool=24,
+    view_count=2,
     milestones=(350, 500),
     motion="right",
 )

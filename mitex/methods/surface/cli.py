@@ -54,8 +54,9 @@ class Fit(ExemplarOptions):
     content: Annotated[str | None, arg(metavar="IMAGE|ao", help_behavior_hint="")] = None
     """Style transfer: keep the structure of this texture (on the mesh's own UVs), or of ambient occlusion."""
 
-    orientation: Annotated[Path | None, arg(metavar="FIELD.npy", help_behavior_hint="")] = None
-    """Where the exemplar's right shall point: a NumPy array (V, 3), a vector for each vertex of the mesh."""
+    orientation: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None
+    """Where the exemplar's right shall point: a vector for each vertex of the mesh (.npy, .ply), or strokes
+    drawn on it (.json)."""
 
     keep_uvs: Annotated[bool, arg(help_behavior_hint="")] = False
     """Use the mesh's own UVs, which must not overlap."""

@@ -16,10 +16,10 @@ from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh
+from mitex.mesh.fields import read_vectors
 from mitex.methods.surface.config import PRESETS, SurfaceConfig
 from mitex.methods.surface.content import AO, content_colours
 from mitex.methods.surface.domain import SurfaceDomain
-from mitex.methods.surface.orientation import read_orientation
 from mitex.methods.surface.task import SurfaceTask
 from mitex.methods.surface.texture import SurfaceTexture
 from mitex.methods.surface.tile import TileDomain
@@ -53,8 +53,8 @@ def fit(
         keep_uvs: use the mesh's own UVs.
         content: style transfer: a texture on the mesh's own UVs (an image file), which are kept then, or "ao"
             for the mesh's ambient occlusion.
-        orientation: (V, 3) where the exemplar's right shall point, or what `read_orientation` takes; else the
-            frames follow the config.
+        orientation: (V, 3) where the exemplar's right shall point, or a file of it, see
+            `mitex.mesh.fields.read_vectors`; else the frames follow the config.
         options: preset ("fast", "paper", or "style", the default with `content`), and those of `RunOptions`.
 
     Returns:
@@ -79,7 +79,10 @@ def fit(
         surface = with_layout(
             mesh if isinstance(mesh, Mesh) else Mesh.load(mesh), settings, keep_uvs or image
         )
-        field = read_orientation(orientation, surface) if isinstance(orientation, str | Path) else orientation
+        if isinstance(orientation, str | Path):
+            field = read_vectors(surface, orientation).astype(np.float32)
+        else:
+            field = orientation
         domain = SurfaceDomain.of(surface, settings, field, keep=run.folder is not None)
     run.control.check()
     check_memory(domain.mesh, settings, len(target.maps))

@@ -16,7 +16,7 @@ from mitex.errors import ConfigError
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import across, dot, orthonormal, rotate_about, scatter_add, unit, unit_normals
 from mitex.mesh import Mesh
-from mitex.mesh.connection import connection_laplacian, solve, tangent_axes, transport
+from mitex.mesh.connection import connection_laplacian, solver, tangent_axes, transport
 from mitex.mesh.topology import mesh_edges, welded
 
 KINDS = ("fixed", "smooth")
@@ -126,7 +126,7 @@ def _smooth(normals: np.ndarray, areas: np.ndarray, edges: np.ndarray, spare: np
     target = upright + LEVEL_PULL * np.maximum(1.0 - 2.0 * tilt, 0.0) * np.cross(SPARE_UP, normals)
     q = dot(target, x) + 1j * dot(target, y)
     laplacian = connection_laplacian(edges, transport(normals, x, y, edges), np.ones(len(edges)), count)
-    u = solve((laplacian + diags_array(pull)).tocsc(), pull * q)
+    u = solver((laplacian + diags_array(pull)).tocsc())(pull * q)
     solution = _without_faint(np.real(u)[:, None] * x + np.imag(u)[:, None] * y)
     return np.where(solution.any(axis=1, keepdims=True), orthonormal(solution, normals), spare)
 

@@ -7,7 +7,7 @@ import pytest
 
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, grid, icosphere, scattered_sphere, torus
-from mitex.mesh.fields import NAMES, vector_field
+from mitex.mesh.fields import NAMES, read_vectors, vector_field
 
 BALL = scattered_sphere(200)  # its vertex mean is not the origin
 WHEEL = torus(24, 12)
@@ -137,6 +137,21 @@ def test_refuses_files_that_are_none(tmp_path):
         assert remedy in refusal(tmp_path / f"b{suffix}")
     np.save(tmp_path / "c.npy", np.array([{}]), allow_pickle=True)
     assert "not a NumPy array" in refusal(tmp_path / "c.npy")
+    np.save(tmp_path / "c.npy", BALL.vertices)
+    (tmp_path / "c.npy").write_bytes((tmp_path / "c.npy").read_bytes()[:-100])
+    assert "not a NumPy array" in refusal(tmp_path / "c.npy")
+    np.save(tmp_path / "c.npy", BALL.vertices.astype(str))
+    assert "give numbers of shape" in refusal(tmp_path / "c.npy")
+    with (tmp_path / "c.npy").open("wb") as file:
+        np.savez(file, BALL.vertices)
+    assert "not a NumPy array" in refusal(tmp_path / "c.npy")
     bare = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n"
     (tmp_path / "d.ply").write_text(bare)
     assert "give them properties vx vy vz, fx fy fz, u v w" in refusal(tmp_path / "d.ply")
+
+
+def test_vectors_of_a_file_are_those_written(tmp_path):
+    np.save(tmp_path / "field.npy", 3 * BALL.vertices)
+    np.testing.assert_array_equal(read_vectors(BALL, tmp_path / "field.npy"), 3 * BALL.vertices)
+    with pytest.raises(ConfigError, match="is no file of vectors; give one that ends in .npy, .ply, .json"):
+        read_vectors(BALL, tmp_path / "field.txt")

@@ -35,7 +35,7 @@ def test_a_step_on_the_card_is_that_of_the_processor(exemplar, surfaces):
         step.value.backward()
         step.commit()
         losses.append(step.value.item())
-        gradients.append(torch.cat([p.grad.flatten().cpu() for p in task.parameters]))
+        gradients.append(torch.cat([p.grad.flatten().cpu() for p in task.parameters if p.grad is not None]))
         assert task.pool.device.type == task.config.device
     assert losses[1] == pytest.approx(losses[0], rel=1e-2)
     assert torch.cosine_similarity(*gradients, dim=0) > 0.99

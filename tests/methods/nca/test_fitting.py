@@ -17,6 +17,8 @@ from mitex.methods.nca.look import weights_key
 from mitex.runtime import threads
 from tests.methods.nca.tiny import SETTINGS, config, texture
 
+pytestmark = pytest.mark.usefixtures("quick_settling")
+
 
 def _losses(folder):
     return [json.loads(line)["appearance"] for line in (folder / "metrics.jsonl").read_text().splitlines()]

@@ -149,11 +149,21 @@ def test_bad_requests_are_refused(texture, maps):
         texture.apply(mesh, maps).extract(cells=50)
 
 
+@pytest.fixture(scope="module")
+def small_base() -> Mesh:
+    """Of few faces, for tests of single steps."""
+    ball = icosphere(12)
+    return Mesh(0.55 * ball.vertices, ball.faces, name="ball")
+
+
+CONFIG = replace(PRESETS["fast"], rays=512, table=12, coarsest=8, finest=16, occupancy=32, ray_steps=128)
+
+
 def small_task(base: Mesh, **more) -> TextureTask:
-    small = dict(rays=512, table=12, coarsest=8, finest=16, occupancy=32, ray_steps=128)
-    settings = replace(PRESETS["fast"], **small, **more)
     capture = tiny_capture()
-    return TextureTask(settings, capture, (capture, 0), Projection(base, reach=0.12), face_frames(base), 0.12)
+    return TextureTask(
+        replace(CONFIG, **more), capture, (capture, 0), Projection(base, reach=0.12), face_frames(base), 0.12
+    )
 
 
 def run_step(task: TextureTask, step: int, generator: torch.Generator | None = None) -> Step:
@@ -169,36 +179,34 @@ def refresh_each_step(monkeypatch) -> None:
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_skipped_step_leaves_every_byte(base, fault, monkeypatch):
+def test_a_skipped_step_leaves_every_byte(small_base, fault, monkeypatch):
     refresh_each_step(monkeypatch)
     threads(1)
-    task = small_task(base)
-    assert_third_step_leaves_no_trace(lambda: small_task(base), task.config, fault)
+    assert_third_step_leaves_no_trace(lambda: small_task(small_base), CONFIG, fault)
 
 
-def test_a_refresh_that_finds_no_number_is_taken_back(base, monkeypatch):
+def test_a_refresh_that_finds_no_number_is_taken_back(small_base, monkeypatch):
     refresh_each_step(monkeypatch)
     threads(1)
-    task = small_task(base)
 
     @contextmanager
     def spoiled(task, fault):
         with patch.object(task, "density", lambda points: np.full(len(points), np.nan, np.float32)):
             yield
 
-    assert_third_step_leaves_no_trace(lambda: small_task(base), task.config, "density", spoiled)
+    assert_third_step_leaves_no_trace(lambda: small_task(small_base), CONFIG, "density", spoiled)
 
 
 @pytest.mark.parametrize("step", [0, 1])
-def test_the_loss_changes_nothing(base, step):
+def test_the_loss_changes_nothing(small_base, step):
     threads(1)
-    assert_loss_is_pure(small_task(base), step)
+    assert_loss_is_pure(small_task(small_base), step)
 
 
-def test_a_run_does_not_go_on_on_another_base_shape(base):
+def test_a_run_does_not_go_on_on_another_base_shape(small_base):
     """Checkpoints tell it, so that the loop refuses them."""
-    moved = base.with_vertices(1.001 * base.vertices)
-    tasks = [small_task(mesh) for mesh in (base, base.with_vertices(base.vertices), moved)]
+    moved = small_base.with_vertices(1.001 * small_base.vertices)
+    tasks = [small_task(mesh) for mesh in (small_base, small_base.with_vertices(small_base.vertices), moved)]
     first, same, other = [task.metadata()["base_key"] for task in tasks]
     assert first == same != other
 
@@ -214,10 +222,10 @@ def test_fine_normals_start_near_those_of_the_faces(base):
     assert cosine.min() > np.cos(np.radians(3.0))
 
 
-def test_the_light_is_that_of_the_photos_unless_it_is_learned(base):
+def test_the_light_is_that_of_the_photos_unless_it_is_learned(small_base):
     for learned in (False, True):
-        task = small_task(base, learn_light=learned)
-        estimate = estimated_light(base, task.pixels.capture)
+        task = small_task(small_base, learn_light=learned)
+        estimate = estimated_light(small_base, task.pixels.capture)
         np.testing.assert_allclose(task.named["light"].detach(), estimate, rtol=1e-5, atol=1e-6)
         loss = run_step(task, 0).value
         loss.backward()
@@ -225,8 +233,8 @@ def test_the_light_is_that_of_the_photos_unless_it_is_learned(base):
         assert (gradient is not None and gradient.abs().max() > 0) == learned
 
 
-def test_refined_cameras_get_the_gradient_of_the_loss(base):
-    task = small_task(base, refine_cameras=True)
+def test_refined_cameras_get_the_gradient_of_the_loss(small_base):
+    task = small_task(small_base, refine_cameras=True)
     capture = task.pixels.capture
     loss = run_step(task, 0).value
     loss.backward()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mitex.exemplar import Exemplar
-from mitex.mesh import embedded
+from mitex.mesh import icosphere
 from mitex.methods import surface
 from mitex.runtime import threads
 
@@ -61,8 +61,7 @@ def synthesize(folder, settings: dict[str, str]) -> np.ndarray:
     maps = maps if settings.pop("maps", "") else {"albedo": maps["albedo"]}
     content = settings.pop("content", None)
     overrides = [f"{key}={value}" for key, value in settings.items()]
-    mesh = embedded("octopus")
-    return surface.fit(Exemplar(maps), mesh, folder, set=overrides, content=content).values
+    return surface.fit(Exemplar(maps), icosphere(6), folder, set=overrides, content=content).values
 
 
 @pytest.fixture(scope="module")

@@ -1,12 +1,14 @@
 """Regions are compact on real surfaces, whatever the settings."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 import torch
 from scipy.spatial.distance import pdist
 
 from mitex.features import Vgg16
-from mitex.mesh import embedded, icosphere
+from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods.surface.comparison import GramComparison
 from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.domain import SurfaceDomain
@@ -35,7 +37,17 @@ def test_parts_do_not_depend_on_the_units_or_the_order(rng):
     assert {frozenset(order[part]) for part in bisect(1e-6 * points[order], 6)} == parts
 
 
-@pytest.mark.parametrize("mesh", [icosphere(12), embedded("octopus")], ids=["sphere", "octopus"])
+MESHES = {"sphere": icosphere(12), "octopus": embedded("octopus")}
+
+
+@cache
+def laid_out(name: str, resolution: int) -> Mesh:
+    """The mesh with the UVs of a fit, which take seconds."""
+    config = resolve(PRESETS, overrides=[f"resolution={resolution}"])
+    return with_layout(MESHES[name], config, False)
+
+
+@pytest.mark.parametrize("mesh", MESHES)
 @pytest.mark.parametrize(
     "settings",
     [
@@ -49,7 +61,7 @@ def test_parts_do_not_depend_on_the_units_or_the_order(rng):
 def test_a_region_is_no_wider_than_two_squares_of_its_area(mesh, settings):
     """Ranges of elements in the order of the levels are up to 5.3 times as wide."""
     config = resolve(PRESETS, settings[0], None, settings[1:])
-    domain = SurfaceDomain.of(with_layout(mesh, config, False), config)
+    domain = SurfaceDomain.of(laid_out(mesh, config.resolution), config)
     network = SurfaceVgg(domain.levels)
     area = round((config.region * config.exemplar_size) ** 2)
     images = torch.zeros(1, 32, 32, 3)

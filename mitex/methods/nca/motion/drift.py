@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from mitex.geometry.triangles import interpolate
 from mitex.mesh.fields import vector_field
 from mitex.mesh.mesh import Mesh
 from mitex.mesh.nearest import nearest_points
@@ -36,16 +37,52 @@ class Drift:
 
     def transport(self, share: float) -> Callable[[torch.Tensor], torch.Tensor]:
         """What a share of the period makes of a state (V, C): each cell gets that of the place upstream."""
+        where = self._upstream(self._cells, self.field, share)
+        return lambda state: self.surface.surface.read(self.table(state), where)
+
+    def table(self, state: torch.Tensor) -> torch.Tensor:
+        """What the decoder reads of a state (V, C)."""
+        surface = self.surface
+        if isinstance(surface, TrainingPlane):
+            state = state[torch.from_numpy(surface.lattice.source)]
+        return surface.surface.table(state)
+
+    def random_places(self, count: int, share: float, generator: torch.Generator) -> tuple[Points, Points]:
+        """Random points of the surface, and where what is there was a share of the period before."""
+        mesh = self._mesh
+        area = np.cumsum(mesh.face_areas, dtype=np.float64)
+        at = torch.rand(count, 3, generator=generator, dtype=torch.float64).numpy()
+        face = np.searchsorted(area, at[:, 0] * area[-1], side="right").clip(max=len(area) - 1)
+        root = np.sqrt(at[:, 1])
+        weights = np.stack([1 - root, root * (1 - at[:, 2]), root * at[:, 2]], axis=1)
+        corners = mesh.faces[face]
+        field = self.field
+        if isinstance(self.surface, TrainingPlane):
+            field = field[self.surface.lattice.source]
+        places = interpolate(weights, mesh.vertices[corners].astype(np.float64))
+        before = self._upstream(places, interpolate(weights, field[corners]), share)
+        return _points(face.astype(np.int32), weights.astype(np.float32)), before
+
+    @property
+    def _mesh(self) -> Mesh:
+        surface = self.surface
+        return surface.mesh if isinstance(surface, TrainingSphere) else surface.lattice.mesh
+
+    @property
+    def _cells(self) -> np.ndarray:
+        return self._mesh.vertices[: len(self.field)].astype(np.float64)
+
+    def _upstream(self, places: np.ndarray, field: np.ndarray, share: float) -> Points:
+        """Where what is at places (P, 3) was before, given the field there (P, 3)."""
         surface = self.surface
         if isinstance(surface, TrainingSphere):
-            away = surface.mesh.vertices - share * surface.edge * self.field
-            points, source = nearest_points(surface.mesh, away), np.arange(len(away))
-        else:
-            lattice = surface.lattice
-            away = (lattice.mesh.vertices[: lattice.count] - share * self.field) @ surface.axes.T
-            points, source = lattice.locate(away / lattice.columns), lattice.source
-        where, spread = Points(*map(torch.from_numpy, points)), torch.from_numpy(source)
-        return lambda state: surface.surface.read(surface.surface.table(state[spread]), where)
+            return _points(*nearest_points(surface.mesh, places - share * surface.edge * field))
+        columns = surface.lattice.columns
+        return _points(*surface.lattice.locate((places - share * field) @ surface.axes.T / columns))
+
+
+def _points(face: np.ndarray, barycentric: np.ndarray) -> Points:
+    return Points(torch.from_numpy(face), torch.from_numpy(barycentric))
 
 
 def draw_drift(config: NcaConfig, surface: TrainingSurface, generator: torch.Generator) -> Drift:
@@ -61,6 +98,7 @@ def draw_drift(config: NcaConfig, surface: TrainingSurface, generator: torch.Gen
         direction = np.array([math.cos(angle), math.sin(angle)]) @ surface.axes
         return Drift(surface, np.tile(speed * direction, (surface.perception.vertices, 1)))
     rotation = random_rotation(generator) if config.motion_turns else np.eye(3)
+    assert config.motion is not None
     return Drift(surface, speed * turned_field(surface.mesh, config.motion, rotation))
 
 

@@ -18,6 +18,7 @@ from mitex.methods.nca.motion.pairs import Pairs, plane_pairs, sphere_pairs
 from mitex.methods.nca.surfaces import TrainingSphere, TrainingSurface
 from mitex.methods.nca.task import NcaTask, Rollout
 
+POINTS = 8192  # at which the decoder's values are compared
 FLOOR = 0.1  # of residuals: as much as a way of a third of a cell, in usual patterns
 
 
@@ -73,10 +74,27 @@ class MotionTask(NcaTask):
         if self.estimator is None:
             transport = drift.transport(apart / period)
             residuals = [advection_residual(a, b, transport(a), FLOOR) for a, b in pairwise(states)]
-            return torch.stack(residuals).mean()
+            shown = self._shown(states[-2].detach(), states[-1], drift, apart / period, generator)
+            return torch.stack(residuals).mean() + shown
         pairs = self.pairs((states[-2].detach(), states[-1]), drift, generator)
         flow = self.estimator(pairs.first, pairs.second)
         return motion_loss(flow, pairs.target, pairs.mask, steps=apart, period=period, gamma=gamma).total
+
+    def _shown(
+        self,
+        before: torch.Tensor,
+        after: torch.Tensor,
+        drift: Drift,
+        share: float,
+        generator: torch.Generator,
+    ) -> torch.Tensor:
+        """The residual of what two states (V, C) show at random points: grain that stays in place costs."""
+        points, upstream = drift.random_places(POINTS, share, generator)
+        surface, decoder = drift.surface.surface, self.look.decoder
+        table = drift.table(before)
+        with torch.no_grad():
+            there, here = (decoder(surface, table, where) for where in (upstream, points))
+        return advection_residual(here, decoder(surface, drift.table(after), points), there, FLOOR)
 
     def pairs(self, states: Sequence[torch.Tensor], drift: Drift, generator: torch.Generator) -> Pairs:
         """What the estimator looks at: the widest views, in which motions are the fewest pixels."""

@@ -82,3 +82,25 @@ def test_without_turns_a_sphere_has_the_very_field(look):
     settings = config("motion=about-y", "motion_turns=false", "motion_speeds=2,2")
     drift = draw_drift(settings, sphere, torch.Generator())
     assert np.allclose(drift.field, 2 * vector_field(sphere.mesh, "about-y"))
+
+
+@pytest.mark.parametrize("kind", ["plane", "sphere"])
+def test_places_upstream_show_what_is_carried_here(look, kind):
+    """A smooth state there is the transported state here; points are where there is area."""
+    surface = TrainingPlane.of(32, look) if kind == "plane" else TrainingSphere.of(icosphere(16), look)
+    drift = draw_drift(config("motion=up"), surface, torch.Generator().manual_seed(1))
+    mesh = surface.lattice.mesh if isinstance(surface, TrainingPlane) else surface.mesh
+    places = mesh.vertices[: len(drift.field)].astype(np.float64)
+    scale = 2 * math.pi / 32 if kind == "plane" else 3.0
+    state = torch.from_numpy(np.sin(scale * places).round(9)).float()
+    points, before = drift.random_places(4000, 0.5, torch.Generator().manual_seed(0))
+    carried = drift.table(drift.transport(0.5)(state))
+    here, there = surface.surface.read(carried, points), surface.surface.read(drift.table(state), before)
+    still = surface.surface.read(drift.table(state), points)
+    assert (here - there).abs().mean() < 0.05 * (here - still).abs().mean()
+    middle = np.einsum(
+        "pk,pkd->pd", points.barycentric.numpy(), mesh.vertices[mesh.faces[points.face.numpy()]]
+    )
+    extent = np.ptp(mesh.vertices, axis=0).max()
+    assert np.abs(middle.mean(axis=0) - mesh.vertices.mean(axis=0)).max() < 0.03 * extent
+    assert len(np.unique(points.face)) > 0.3 * len(mesh.faces)

@@ -17,7 +17,7 @@ from mitex.errors import MeshError
 from mitex.mesh import Mesh, icosphere, quality
 from mitex.methods.nerf import PRESETS
 from mitex.methods.nerf.base import coarse
-from mitex.methods.nerf.base.base_shape import base_shape
+from mitex.methods.nerf.base.base_shape import base_shape, given_base
 from mitex.methods.nerf.base.coarse import find_base
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.training.plain import PlainTask
@@ -107,6 +107,13 @@ def test_a_base_mesh_is_refused_before_the_training(capture, ball, steps):
     with pytest.raises(MeshError, match="scene cube"):
         find_base(capture, FEW, ball.with_vertices(3 * ball.vertices))
     assert not steps and not trainings()
+
+
+def test_a_coarse_base_mesh_is_meshed_evenly(capture, ball, monkeypatch):
+    monkeypatch.setattr(coarse, "given_base", partial(given_base, edge=0.05))
+    rough = icosphere(3)
+    base = find_base(capture, replace(FEW, base_steps=1), rough.with_vertices(0.55 * rough.vertices))
+    assert quality(base.mesh).edge_length < 0.06 * 0.55 * 2 * 3**0.5
 
 
 def test_the_same_photos_under_another_name_can_be_used(capture, ball, steps):

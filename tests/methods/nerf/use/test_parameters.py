@@ -10,13 +10,13 @@ import pytest
 import torch
 
 from mitex.errors import ConfigError
-from mitex.mesh import Similarity, icosphere
+from mitex.mesh import icosphere
 from mitex.methods.nerf import NerfTexture
 from mitex.methods.nerf.field.networks import LAYERS
 from mitex.runtime import init
 from mitex.runtime.jit import dr, mi
-from mitex.textures.shell_field import shell_field
 from tests.methods.nerf.small import small_maps, small_texture
+from tests.scenes.helpers import shell_scene
 
 init()
 
@@ -39,19 +39,7 @@ FIELDS = {
 
 
 def scene_of(field):
-    return mi.load_dict(
-        {
-            "type": "scene",
-            "integrator": {"type": "shell", "field": shell_field(field, Similarity(np.zeros(3), 1.0))},
-            "sensor": {
-                "type": "perspective",
-                "fov": 32,
-                "to_world": mi.ScalarTransform4f().look_at([0, 0, 4], [0, 0, 0], [0, 1, 0]),
-                "film": {"type": "hdrfilm", "width": 6, "height": 6, "rfilter": {"type": "box"}},
-            },
-            "sky": {"type": "constant", "radiance": 0.5},
-        }
-    )
+    return shell_scene(field, fov=32, side=6, sky={"type": "constant", "radiance": 0.5})
 
 
 def parameter(scene, name):
