@@ -25,10 +25,11 @@ from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods.nca import Graft, NcaTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.film import PreviewCamera, Shooting, States
+from mitex.methods.nca.growth import grown_state
 from mitex.methods.nca.orientation import Orientation, cell_turns
 from mitex.methods.nca.region import region
 from mitex.methods.nca.surfaces import TrainingSphere
-from mitex.methods.nca.texture import GrowingTexture, grown_state
+from mitex.methods.nca.texture import GrowingTexture
 from mitex.methods.nca.weights import graft_weights
 from mitex.render import sheet, still, tone
 from mitex.scenes.cameras import orbit

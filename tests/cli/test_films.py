@@ -34,7 +34,7 @@ def test_a_film_of_each_kind(files, capsys):
 def test_options_reach_the_film(files, monkeypatch):
     calls = []
     monkeypatch.setattr(
-        "mitex.methods.nca.film.film", lambda *given, **options: calls.append((given[3], options))
+        "mitex.methods.nca.film.film", lambda *words, **options: calls.append((words[3], options))
     )
     words = "--steps-per-frame 5 --start 7 --renderer path --spp 3 --azimuth 1 --elevation 2 --loop --fade 1 "
     words += "--damage y:0: --damage-at 0.25 --seed 4 --orientation 6 --scale 2 --field up --speed 2 --resume"

@@ -39,8 +39,8 @@ def recording(path, frames=8, settings=None, **options):
 
 
 def film(path, frames=8, resume=False, stop=None, calls=None, **options):
-    made = recording(path, frames, **options)
-    return made.record(partial(pictures, count=made.pictures, stop=stop, calls=calls), resume)
+    planned = recording(path, frames, **options)
+    return planned.record(partial(pictures, count=planned.pictures, stop=stop, calls=calls), resume)
 
 
 def test_frames_size_and_speed_are_read_back(tmp_path):

@@ -17,7 +17,18 @@ METHOD = Method(
     tensors=frozenset({"fc1.weight", "fc1.bias", "fc2.weight", "fc2.bias"}),
 )
 
-__all__ = ["METHOD", "PRESETS", "Graft", "MeshNCA", "NcaConfig", "NcaTexture", "fit"]
+__all__ = [
+    "METHOD",
+    "PRESETS",
+    "Graft",
+    "GrowingTexture",
+    "MeshNCA",
+    "NcaConfig",
+    "NcaTexture",
+    "Shooting",
+    "fit",
+    "graft_weights",
+]
 
 __getattr__ = attributes(
     __name__,
@@ -26,14 +37,19 @@ __getattr__ = attributes(
         "Graft": "mitex.methods.nca.graft",
         "NcaConfig": "mitex.methods.nca.config",
         "MeshNCA": "mitex.methods.nca.model",
+        "GrowingTexture": "mitex.methods.nca.texture",
         "NcaTexture": "mitex.methods.nca.texture",
+        "Shooting": "mitex.methods.nca.film",
+        "graft_weights": "mitex.methods.nca.weights",
         "fit": "mitex.methods.nca.fitting",
     },
 )
 
 if TYPE_CHECKING:
     from mitex.methods.nca.config import PRESETS, NcaConfig
+    from mitex.methods.nca.film import Shooting
     from mitex.methods.nca.fitting import fit
     from mitex.methods.nca.graft import Graft
     from mitex.methods.nca.model import MeshNCA
-    from mitex.methods.nca.texture import NcaTexture
+    from mitex.methods.nca.texture import GrowingTexture, NcaTexture
+    from mitex.methods.nca.weights import graft_weights

@@ -158,12 +158,12 @@ class Animate:
         oriented(self.orientation)
         in_range("--scale", self.scale, 0.05, 20.0)
         in_range("--speed", self.speed, *SPEEDS)
-        for option, needed, given in (
+        for option, needed, alone in (
             ("--spp", "--renderer path", self.spp is not None and self.renderer != "path"),
             ("--fade", "--loop", self.fade is not None and not self.loop),
             ("--damage-at", "--damage", self.damage_at is not None and self.damage is None),
         ):
-            if given:
+            if alone:
                 raise ConfigError(f"{option} means nothing without {needed}", "give both or neither")
 
     def _shooting(self) -> dict[str, Any]:

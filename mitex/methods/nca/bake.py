@@ -53,12 +53,20 @@ class Grown:
             chunk = slice(start, start + CHUNK)
             arrays = self.cells.locate(face[chunk], barycentric[chunk])
             points = Points(*(torch.from_numpy(np.ascontiguousarray(a)) for a in arrays))
-            values = self.look.decoder(self.surface, self.table, points).clamp_(0, 1).numpy()
-            if self.palette is not None:
-                columns = list(self.look.layout["albedo"])
-                values[:, columns] = self.palette.held(values[:, columns])
-            parts.append(values)
+            parts.append(self._decoded(points))
         return np.concatenate(parts)
+
+    def held(self, values: np.ndarray) -> np.ndarray:
+        """Values (P, K) whose albedos are within the exemplar's colours, if these are known."""
+        if self.palette is None:
+            return values
+        values, columns = values.copy(), list(self.look.layout["albedo"])
+        values[:, columns] = self.palette.held(values[:, columns])
+        return values
+
+    def _decoded(self, points: Points) -> np.ndarray:
+        """Values (P, K) at points of the automaton's mesh."""
+        return self.held(self.look.decoder(self.surface, self.table, points).clamp_(0, 1).numpy())
 
     def at_vertices(self) -> dict[str, np.ndarray]:
         """Maps (V, c) at the vertices of the given mesh."""

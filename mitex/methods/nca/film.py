@@ -86,6 +86,25 @@ class Shooting:
         """Side of the textures that are baked for the path tracer: two across a pixel."""
         return min(max(2 * self.resolution, 256), 2048)
 
+    def first_step(self, steps: int) -> int:
+        """After how many steps the film starts, of a texture that is in order after `steps`."""
+        if self.start is not None:
+            return self.start
+        return 0 if self.loop is None and self.damage is None else steps
+
+    def damaged(self, mesh: Mesh) -> torch.Tensor | None:
+        """Which vertices are damaged, (V,) bool; None for no damage.
+
+        Raises:
+            ConfigError: there are none in the region, or it is none.
+        """
+        if self.damage is None:
+            return None
+        inside = region(self.damage)(mesh.vertices)
+        if not inside.any():
+            raise ConfigError(f"nothing of '{mesh.name}' is in '{self.damage}'", "choose another region")
+        return torch.from_numpy(inside)
+
     def check(self) -> None:
         """Raises a ConfigError if a number is out of range that nothing else checks before work begins."""
         if self.renderer not in ("preview", "path"):
@@ -127,27 +146,20 @@ def film(
     turn = cell_turns(orientation, cells.mesh, mesh)
     condition = texture.condition(cells, field, speed, turn, mesh)
     growth = texture.growth(cells, turn, condition)
-    start = shooting.start
-    if start is None:
-        start = 0 if shooting.loop is None and shooting.damage is None else texture.steps
-    damage = None
-    if shooting.damage is not None:
-        damage = torch.from_numpy(region(shooting.damage)(growth.cells.mesh.vertices))
-        if not damage.any():
-            raise ConfigError(f"nothing of '{mesh.name}' is in '{shooting.damage}'", "choose another region")
-    scene = {"mesh": content_key(laid.vertices, laid.faces), "model": growth.key, "seed": seed}
-    scene |= {
+    states = States(growth, shooting, shooting.first_step(texture.steps), seed, shooting.damaged(cells.mesh))
+    scene = {
+        "mesh": content_key(laid.vertices, laid.faces),
+        "model": growth.key,
+        "seed": seed,
         "subdivide": subdivide,
         "orientation": content_key(np.asarray(turn)),
         "scale": scale,
-        "start": start,
+        "condition": None if condition is None else content_key(condition.numpy()),
+        **asdict(replace(shooting, start=states.start)),
     }
-    scene |= {} if condition is None else {"condition": content_key(condition.numpy())}
-    settings = {name: value for name, value in asdict(shooting).items() if name not in OF_THE_FILM}
-    recording = shooting.recording(path, scene | settings)
+    recording = shooting.recording(path, {k: v for k, v in scene.items() if k not in OF_THE_FILM})
     keep_freed_memory()
     camera: Camera = (PreviewCamera if shooting.renderer == "preview" else TracedCamera)(laid, shooting)
-    states = States(growth, shooting, start, seed, damage)
 
     def pictures(done: int) -> Iterator[np.ndarray]:
         return map(camera.picture, map(growth.shown, states.frames(done, recording.pictures)))

@@ -1,8 +1,8 @@
 """Two textures that grow into each other on one mesh (MeshNCA, section 3.3.2).
 
 Both rules see the one state, and each cell's update is theirs mixed: u = (1 - a) u_S + a u_T, with the weight
-a of its vertex. The paper's maps are channels of the state. Ours have decoders, and what these show of the
-one state is mixed by the same weight.
+a of its vertex. The paper's maps are channels of the state. Ours have decoders, whose weights are mixed
+likewise: textures of one family are near enough for a decoder between two of them to be one.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from mitex.errors import ConfigError
 from mitex.mesh import Mesh
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.decoder.decoder import Decoder
+from mitex.methods.nca.decoder.surface import Points
 from mitex.methods.nca.growth import Growth, LookGrowth
 from mitex.methods.nca.look import held, traits
 from mitex.methods.nca.model import FIRE_RATE
@@ -159,14 +161,21 @@ class GraftedGrown(Grown):
 
     def __init__(self, first: Grown, second: Grown, weights: np.ndarray) -> None:
         self.look, self.cells, self.orientation = first.look, first.cells, first.orientation
+        self.surface, self.table = first.surface, first.table
         self.first, self.second, self.weights = first, second, weights
 
-    def values(self, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
-        share = self._share(*self.cells.locate(face, barycentric))[:, None]
-        first, second = (
-            torch.from_numpy(grown.values(face, barycentric)) for grown in (self.first, self.second)
-        )
-        return torch.lerp(first, second, torch.from_numpy(share)).numpy()
+    def _decoded(self, points: Points) -> np.ndarray:
+        """Albedos are held within the colours of either exemplar, and what that gives is mixed."""
+        share = torch.from_numpy(self._share(points.face.numpy(), points.barycentric.numpy())[:, None])
+        place = self.surface, self.table, points
+        own, others = self.first.look.decoder, self.second.look.decoder
+        if isinstance(own, Decoder) and isinstance(others, Decoder):
+            values = own.mixed(others, *place, share)
+        else:  # the maps are channels of the state, for both
+            values = own(*place)
+        values = values.clamp_(0, 1).numpy()
+        first, second = (torch.from_numpy(grown.held(values)) for grown in (self.first, self.second))
+        return torch.lerp(first, second, share).numpy()
 
     def _share(self, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """(P,) of points of the automaton's mesh; exactly that of the corners where they are equal."""

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 import torch
 
+from mitex.errors import ConfigError
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.surface import Surface
@@ -15,6 +16,7 @@ from mitex.methods.nca.look import Look, weights_key
 from mitex.methods.nca.orientation import Turn
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import Perception, perception
+from mitex.runtime import keep_freed_memory
 
 
 class Growth(ABC):
@@ -97,3 +99,15 @@ class LookGrowth(Growth):
     @cached_property
     def _surface(self) -> Surface:
         return Surface(self.cells.mesh, self.look.interpolation)
+
+
+def grown_state(growth: Growth, seed: int, steps: int) -> torch.Tensor:
+    """The state (V, C) after some steps from the initial one, with random updates from a seed.
+
+    Raises:
+        ConfigError: steps below 0.
+    """
+    if steps < 0:
+        raise ConfigError(f"{steps} steps", "give 0 or more")
+    keep_freed_memory()
+    return growth.evolve(growth.seed(), steps, torch.Generator().manual_seed(seed))

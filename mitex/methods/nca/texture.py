@@ -14,13 +14,12 @@ import torch
 
 from mitex.asset import Asset
 from mitex.atlas import Atlas, laid_out
-from mitex.errors import ConfigError
 from mitex.mesh import Mesh
 from mitex.methods.nca import files
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.field import fields
 from mitex.methods.nca.film import Shooting, film
-from mitex.methods.nca.growth import Growth, LookGrowth
+from mitex.methods.nca.growth import Growth, LookGrowth, grown_state
 from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look, weights_key
 from mitex.methods.nca.motion.condition import Field, Motion, look_condition, tile_condition
@@ -30,7 +29,6 @@ from mitex.methods.nca.perception import lattice_perception
 from mitex.methods.nca.ranges import MOST_STEPS, square_cells
 from mitex.methods.nca.tile import flat_cells, tile_maps
 from mitex.progress import announce
-from mitex.runtime import keep_freed_memory
 
 STEPS = 200  # of models that do not say it; enough to cover a surface
 DENSITY = 32.0  # cells along the exemplar's width, of models that do not say it
@@ -323,18 +321,6 @@ class NcaTexture(GrowingTexture):
     def _palette(self) -> Palette | None:
         record = self.about.get("palette")
         return None if record is None else Palette.from_record(record)
-
-
-def grown_state(growth: Growth, seed: int, steps: int) -> torch.Tensor:
-    """The state (V, C) after some steps from the initial one, with random updates from a seed.
-
-    Raises:
-        ConfigError: steps below 0.
-    """
-    if steps < 0:
-        raise ConfigError(f"{steps} steps", "give 0 or more")
-    keep_freed_memory()
-    return growth.evolve(growth.seed(), steps, torch.Generator().manual_seed(seed))
 
 
 def _healthy(growth: Growth, seed: int, steps: int) -> torch.Tensor:

@@ -1,5 +1,6 @@
 """Two textures on one mesh: each alone where the weight says so, and the published mixture in between."""
 
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -9,9 +10,10 @@ import torch
 from mitex.errors import ConfigError
 from mitex.mesh import icosphere
 from mitex.methods.nca import Graft, NcaTexture
+from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.growth import grown_state
 from mitex.methods.nca.perception import perception
-from mitex.methods.nca.texture import grown_state
 from mitex.methods.nca.weights import graft_weights
 from tests.methods.nca import tiny
 
@@ -70,16 +72,30 @@ def test_updates_are_mixed_by_the_weights_of_the_vertices(pair):
     assert torch.allclose(grown, state, atol=1e-5) and state.abs().max() > 0.1
 
 
-def test_maps_are_mixed_by_the_weight_at_the_point(pair):
+def test_maps_are_those_of_a_decoder_mixed_by_the_weight_at_the_point():
+    """Point by point, against a look whose weights are mixed by the weight there."""
+    pair = [NcaTexture(texture.look, {"family": "one"}) for texture in (relative(0), relative(1))]
     growth = graft(pair, "x").growth(CELLS)
     state = grown_state(growth, 0, 5)
-    face = np.arange(len(SPHERE.faces), dtype=np.int32)
+    face = np.arange(0, len(SPHERE.faces), 16, dtype=np.int32)
     barycentric = np.full((len(face), 3), 1 / 3, np.float32)
-    first, second = (t.growth(CELLS).shown(state).values(face, barycentric) for t in pair)
-    places = SPHERE.vertices[SPHERE.faces].mean(axis=1, dtype=np.float64)
-    share = graft_weights(SPHERE, "x")(places)[:, None]
     mixed = growth.shown(state).values(face, barycentric)
-    assert np.allclose(mixed, (1 - share) * first + share * second, atol=1e-5)
+    places = SPHERE.vertices[SPHERE.faces[face]].mean(axis=1, dtype=np.float64)
+    own, others = (texture.look.state_dict() for texture in pair)
+    for k, share in enumerate(graft_weights(SPHERE, "x")(places)):
+        look = deepcopy(pair[0].look)
+        look.load_state_dict({name: torch.lerp(own[name], others[name], float(share)) for name in own})
+        expected = Grown(look, state, CELLS).values(face[k : k + 1], barycentric[k : k + 1])
+        assert np.allclose(mixed[k], expected[0], atol=1e-4)
+    assert np.abs(mixed - pair[0].growth(CELLS).shown(state).values(face, barycentric)).max() > 0.05
+
+
+def test_maps_that_are_channels_are_the_state(pair):
+    plain = [NcaTexture(relative(seed, shape=None).look, {"family": "one"}) for seed in (0, 1)]
+    growth = graft(plain, "x").growth(CELLS)
+    state = grown_state(growth, 0, 5)
+    albedo = growth.shown(state).at_vertices()["albedo"]
+    assert np.allclose(albedo, np.clip(state[:, :3].numpy() + 0.5, 0, 1), atol=1e-6)
 
 
 def test_it_needs_as_many_steps_as_the_slower_one(pair):

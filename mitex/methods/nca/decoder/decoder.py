@@ -47,6 +47,21 @@ class Decoder(nn.Module):
 
     def forward(self, surface: Surface, table: torch.Tensor, points: Points) -> torch.Tensor:
         """Values (P, K), about in [0, 1], at points of a surface; `table` is its table of the state."""
+        return self.network(self._inputs(surface, table, points)) + OFFSET
+
+    def mixed(
+        self, other: Decoder, surface: Surface, table: torch.Tensor, points: Points, share: torch.Tensor
+    ) -> torch.Tensor:
+        """Values (P, K) as of a decoder whose weights at each point are those of this one and of another, of
+        the same shape, mixed; exactly those of either where its share is all.
+
+        Args:
+            share: (P, 1) in [0, 1], of the other.
+        """
+        own, others = (decoder._inputs(surface, table, points) for decoder in (self, other))
+        return self.network.mixed(other.network, torch.lerp(own, others, share), share) + OFFSET
+
+    def _inputs(self, surface: Surface, table: torch.Tensor, points: Points) -> torch.Tensor:
         inputs = [surface.read(table, points)]
         barycentric = points.barycentric.to(table.device)
         for name in self.shape.coordinates:
@@ -56,4 +71,4 @@ class Decoder(nn.Module):
                 inputs.append(sorted_barycentrics(barycentric))
             else:
                 inputs.append(symmetric_polynomials(barycentric))
-        return self.network(torch.cat(inputs, 1)) + OFFSET
+        return torch.cat(inputs, 1)

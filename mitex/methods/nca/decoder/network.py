@@ -45,6 +45,18 @@ class SineNetwork(nn.Module):
             x = torch.sin(dense.product(x, self.omega * layer.weight, self.omega * layer.bias))
         return dense.product(x, last.weight, last.bias)
 
+    def mixed(self, other: SineNetwork, x: torch.Tensor, share: torch.Tensor) -> torch.Tensor:
+        """As `forward`, with weights and biases that are mixed at each point by the other's `share` (P, 1).
+
+        A layer is linear in its weights, so that the two networks' products are mixed instead.
+        """
+        *hidden, last = zip(self.linear, other.linear, strict=True)
+        for layers in hidden:
+            own, others = (dense.product(x, self.omega * n.weight, self.omega * n.bias) for n in layers)
+            x = torch.sin(torch.lerp(own, others, share))
+        own, others = (dense.product(x, n.weight, n.bias) for n in last)
+        return torch.lerp(own, others, share)
+
     @property
     def linear(self) -> list[nn.Linear]:
         """The layers."""
