@@ -16,8 +16,16 @@ CELLS, PIXELS, STEPS = 32, 128, 4  # of a window, and between two pictures
 # Fast motion is learned in fewer steps than that of the preset.
 SETTINGS = (
     *("motion_period=8", "motion_steps=8", "motion_speeds=0.5,1.5"),
-    *("steps=170", "pool=8", "surfaces=flat", "view_count=2", "exemplar_size=128", "zooms=1"),
-    *("milestones=120,150", "preview_every=0"),
+    *(
+        "steps=260",
+        "pool=16",
+        "inject_every=6",
+        "surfaces=flat",
+        "view_count=2",
+        "exemplar_size=128",
+        "zooms=1",
+    ),
+    *("milestones=180,230", "preview_every=0"),
 )
 
 
