@@ -58,9 +58,7 @@ class Motion:
         return draw_drift(self.task.config, self.surface, self._generator())
 
     def rollout(self) -> None:
-        result = self.task.evolved(
-            self.surface, self.task.grown(0), self.task.config.min_steps, self._generator()
-        )
+        result = self.task.evolved(0, self.task.grown(0), self.task.config.min_steps, self._generator())
         torch.autograd.grad(result.sum(), list(self.task.look.rule.parameters()))
 
     def loss(self, name: str) -> None:

@@ -98,7 +98,7 @@ class NcaConfig(TrainingConfig):
     motion_gamma: float = key(1.5, "of the direction in the loss of pictures", 0)
     motion_weight: float = key(2.0, "of the motion loss (lambda)", 0)
     motion_period: float = key(12.0, "automaton steps in which a vector of length 1 is one edge (T)", 1)
-    motion_steps: int = key(8, "automaton steps between the states that are compared", 1, 4096)
+    motion_steps: int = key(12, "automaton steps between the states that are compared", 1, 4096)
     motion_start: int = key(0, "training step from which on motion counts", 0)
     motion_turns: bool = key(True, "another rotation of the field in each step")
     motion_speeds: tuple[float, ...] = key((0.0, 2.0), "least and most factor of the field in a step", 0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import NamedTuple
 
@@ -36,10 +36,11 @@ PREVIEW = 256  # side of a preview's pictures [px]
 
 
 class Rollout(NamedTuple):
-    """A state that has evolved, (1, V, C), and what its way adds to the loss, by name."""
+    """A state that has evolved, (1, V, C); what that adds to the loss, by name; and to a step's `commit`."""
 
     state: torch.Tensor
     terms: dict[str, torch.Tensor]
+    commit: Callable[[], None] = lambda: None
 
 
 class NcaTask:
@@ -112,7 +113,8 @@ class NcaTask:
         if step % config.inject_every == 0:
             state = torch.zeros_like(state)
         steps = int(torch.randint(config.min_steps, config.max_steps + 1, (), generator=generator))
-        state, further = self.rollout(surface, state, step, steps, generator)
+        rollout = self.rollout(index, state, step, steps, generator)
+        state = rollout.state
         terms: dict[str, list[torch.Tensor]] = {"appearance": [], "relief": []}
         for size, appearance in self.zooms.items():
             views = self.views(surface, state[0], size, generator)
@@ -120,34 +122,30 @@ class NcaTask:
             if self.relief and isinstance(surface, TrainingPlane):  # on spheres, "right" turns in a view
                 terms["relief"].append(config.relief_weight * self.relief(views, size))
         means = {name: torch.stack(values).mean() for name, values in terms.items() if values}
-        means |= {"overflow": overflow_loss(state)} | further
+        means |= {"overflow": overflow_loss(state)} | rollout.terms
         weights = {"overflow": config.overflow_weight}
         return Step(
             torch.stack([weights.get(name, 1.0) * mean for name, mean in means.items()]).sum(),
             {name: mean.item() for name, mean in means.items()},
-            partial(self._put_back, index, state.detach()[0]),
+            partial(self._commit, index, state.detach()[0], rollout.commit),
         )
 
     def rollout(
-        self,
-        surface: TrainingSurface,
-        state: torch.Tensor,
-        step: int,
-        steps: int,
-        generator: torch.Generator,
+        self, index: int, state: torch.Tensor, step: int, steps: int, generator: torch.Generator
     ) -> Rollout:
-        """A state (1, V, C) of the pool after some steps of the rule, in a training step."""
-        return Rollout(self.evolved(surface, state, steps, generator), {})
+        """What becomes of a state (1, V, C) of the pool, or the seed in its place, in a training step."""
+        return Rollout(self.evolved(index, state, steps, generator), {})
 
     def evolved(
-        self, surface: TrainingSurface, state: torch.Tensor, steps: int, generator: torch.Generator
+        self, index: int, state: torch.Tensor, steps: int, generator: torch.Generator
     ) -> torch.Tensor:
-        """A state (1, V, C) after some steps of the rule."""
-        return self.look.rule.evolve(state, surface.perception, steps, generator)
+        """A state (1, V, C) after some steps of the rule, on the surface of the pool's state `index`."""
+        return self.look.rule.evolve(state, self.surface(index).perception, steps, generator)
 
-    def _put_back(self, index: int, state: torch.Tensor) -> None:
+    def _commit(self, index: int, state: torch.Tensor, further: Callable[[], None]) -> None:
         self.pool[index, : len(state)], self._touched[index] = state, True
         self.look.track(state)
+        further()
 
     def surface(self, index: int) -> TrainingSurface:
         """Where a state of the pool grows."""
@@ -197,7 +195,7 @@ class NcaTask:
         generator = torch.Generator().manual_seed(step)
         index = int(torch.randint(self.config.pool, (), generator=generator))
         surface, look = self.surface(index), self.look
-        state = self.evolved(surface, self.grown(index), self.config.max_steps, generator)[0]
+        state = self.evolved(index, self.grown(index), self.config.max_steps, generator)[0]
         views = [
             surface.patches(look, state, CloseUps(width, 1, PREVIEW, antialias=2), generator)[0]
             for width in (self.config.density, self.config.density / 4)

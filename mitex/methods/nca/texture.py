@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import torch
@@ -23,7 +22,7 @@ from mitex.methods.nca.film import Shooting, film
 from mitex.methods.nca.growth import Growth, LookGrowth, grown_state
 from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look, weights_key
-from mitex.methods.nca.motion.condition import Field, cell_vectors, flat_vectors, followed_field
+from mitex.methods.nca.motion.condition import Field, Motion, look_condition, tile_condition
 from mitex.methods.nca.orientation import Orientation, Turn, cell_turns
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import lattice_perception
@@ -209,8 +208,7 @@ class NcaTexture(GrowingTexture):
         seed: int = 0,
         steps: int | None = None,
         orientation: Orientation = 0.0,
-        field: Field | None = None,
-        speed: float = 1.0,
+        **motion: Unpack[Motion],
     ) -> dict[str, dict[str, Any]]:
         """Grows the texture on a mesh and returns it as textures of a Mitsuba scene, by map, which are
         decoded where rays meet the surface: `{"type": "principled", "base_color": fields["albedo"], ...}`.
@@ -218,7 +216,7 @@ class NcaTexture(GrowingTexture):
         A cell sits at each vertex of the mesh, and the shape in the scene must have these vertices; see
         `mitex.mesh.subdivide_midpoint`. Other arguments and errors as of `apply`.
         """
-        growth = self._on(mesh, orientation, field, speed)
+        growth = self._on(mesh, orientation, **motion)
         return fields(self.look, _healthy(growth, seed, self.steps if steps is None else steps), mesh)
 
     def tile(
@@ -249,9 +247,7 @@ class NcaTexture(GrowingTexture):
         lattice = flat_cells(self._tile_cells() if cells is None else cells, resolution)
         operator = lattice_perception(lattice, self.look.rule.degree, self.look.mean)
         cells_of_square = Cells(lattice.joined, 0, lattice.joined)
-        direction, condition = followed_field(self.look, self.about, field, speed, "right"), None
-        if direction is not None:
-            condition = torch.from_numpy(flat_vectors(lattice, direction, speed, self._fastest))
+        condition = tile_condition(self.look, self.about, lattice, field, speed)
         growth = LookGrowth(self.look, cells_of_square, 0.0, self._palette, operator, condition)
         state = _healthy(growth, seed, self.steps if steps is None else steps)
         return tile_maps(self.look, state, lattice, resolution, self._palette)
@@ -263,8 +259,7 @@ class NcaTexture(GrowingTexture):
         seed: int = 0,
         steps: int | None = None,
         orientation: Orientation = 0.0,
-        field: Field | None = None,
-        speed: float = 1.0,
+        **motion: Unpack[Motion],
     ) -> torch.Tensor:
         """The state of the automaton after some steps, held within the bounds of the training's.
 
@@ -272,7 +267,8 @@ class NcaTexture(GrowingTexture):
             mesh: any mesh.
             seed: of the random updates.
             steps: from the initial state, which is zero; None as of `apply`.
-            orientation, field, speed: as in `apply`.
+            orientation: as in `apply`.
+            motion: field and speed, as in `apply`.
 
         Returns:
             (V, C) float32.
@@ -280,7 +276,7 @@ class NcaTexture(GrowingTexture):
         Raises:
             ConfigError: steps below 0, or a field as of `apply`.
         """
-        growth = self._on(mesh, orientation, field, speed)
+        growth = self._on(mesh, orientation, **motion)
         return grown_state(growth, seed, self.steps if steps is None else steps)
 
     def condition(
@@ -291,21 +287,18 @@ class NcaTexture(GrowingTexture):
         orientation: Turn = 0.0,
         given: Mesh | None = None,
     ) -> torch.Tensor | None:
-        field = followed_field(self.look, self.about, field, speed, self.about.get("motion"))
-        if field is None:
-            return None
-        vectors = cell_vectors(given or cells.given, cells.mesh, field, speed, orientation, self._fastest)
-        return torch.from_numpy(vectors)
+        whose = given or cells.given
+        return look_condition(self.look, self.about, whose, cells.mesh, field, speed, orientation)
 
     def growth(
         self, cells: Cells, orientation: Turn = 0.0, condition: torch.Tensor | None = None
     ) -> LookGrowth:
         return LookGrowth(self.look, cells, orientation, self._palette, condition=condition)
 
-    def _on(self, mesh: Mesh, orientation: Orientation, field: Field | None, speed: float) -> LookGrowth:
-        """What grows on the vertices of a mesh, turned by an angle [degrees]."""
+    def _on(self, mesh: Mesh, orientation: Orientation, **motion: Unpack[Motion]) -> LookGrowth:
+        """What grows on the vertices of a mesh."""
         cells, turn = Cells(mesh, 0, mesh), cell_turns(orientation, mesh, mesh)
-        return self.growth(cells, turn, self.condition(cells, field, speed, turn))
+        return self.growth(cells, turn, self.condition(cells, orientation=turn, **motion))
 
     @property
     def steps(self) -> int:
@@ -323,12 +316,6 @@ class NcaTexture(GrowingTexture):
         if not isinstance(density, int | float) or not density > 0:
             density = DENSITY
         return square_cells(density)
-
-    @property
-    def _fastest(self) -> float:
-        """Length of the longest vectors that the training had."""
-        fastest = self.about.get("motion_speed")
-        return fastest if isinstance(fastest, int | float) and fastest > 0 else math.inf
 
     @property
     def _palette(self) -> Palette | None:

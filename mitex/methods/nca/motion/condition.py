@@ -6,9 +6,10 @@ import math
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
+import torch
 
 from mitex.errors import ConfigError, TextureWarning
 from mitex.geometry.triangles import interpolate
@@ -27,13 +28,57 @@ Field = str | Path | np.ndarray
 """A vector field, as `mitex.mesh.fields.vector_field` takes it."""
 
 
+class Motion(TypedDict, total=False):
+    """How a moving texture moves.
+
+    Attributes:
+        field: the vector field that it follows; None for the one that it was trained with.
+        speed: factor of the field, whose mean length is 1.
+    """
+
+    field: Field | None
+    speed: float
+
+
+def look_condition(
+    look: Look,
+    about: Mapping[str, Any],
+    given: Mesh,
+    cells: Mesh,
+    field: Field | None,
+    speed: float,
+    orientation: float | np.ndarray = 0.0,
+) -> torch.Tensor | None:
+    """The condition (V, 3) of a look's cells on a mesh, None if it does not move; as of `cell_vectors`."""
+    field = followed_field(look, about, field, speed, about.get("motion"))
+    if field is None:
+        return None
+    return torch.from_numpy(cell_vectors(given, cells, field, speed, orientation, fastest(about)))
+
+
+def tile_condition(
+    look: Look, about: Mapping[str, Any], lattice: Lattice, field: Field | None, speed: float
+) -> torch.Tensor | None:
+    """The condition (V, 3) of a look's cells in a lattice's square, None if it does not move; to the right if
+    no field is given; errors as of `flat_vectors`.
+    """
+    field = followed_field(look, about, field, speed, "right")
+    return None if field is None else torch.from_numpy(flat_vectors(lattice, field, speed, fastest(about)))
+
+
+def fastest(about: Mapping[str, Any]) -> float:
+    """Length of the longest vectors that the training of a texture had."""
+    speed = about.get("motion_speed")
+    return speed if isinstance(speed, int | float) and speed > 0 else math.inf
+
+
 def cell_vectors(
     given: Mesh,
     cells: Mesh,
     field: Field,
     speed: float,
     orientation: float | np.ndarray = 0.0,
-    fastest: float = math.inf,
+    longest: float = math.inf,
 ) -> np.ndarray:
     """(V, 3) float32 vectors of the cells.
 
@@ -44,7 +89,7 @@ def cell_vectors(
         speed: factor of the field, whose mean length is 1.
         orientation: of the texture [rad], one or (V,). Cells take what is turned by it for upright, so their
             vectors are turned back.
-        fastest: length of the longest vectors, see `slowed`.
+        longest: length of the longest vectors, see `slowed`.
 
     Raises:
         ConfigError: as of `vector_field`.
@@ -54,19 +99,19 @@ def cell_vectors(
         vectors = vector_field(given, field).astype(np.float64)
         face, weights = surface_points(given, cells.vertices.astype(np.float64))
         field = interpolate(weights, vectors[given.faces[face]])
-    vectors = slowed(speed * vector_field(cells, field).astype(np.float64), fastest)
+    vectors = slowed(speed * vector_field(cells, field).astype(np.float64), longest)
     return rotate_about(vectors, cells.normals.astype(np.float64), -orientation).astype(np.float32)
 
 
-def slowed(vectors: np.ndarray, fastest: float) -> np.ndarray:
-    """The vectors (V, 3), none longer than `fastest`: a pattern that is told to move faster than it has
+def slowed(vectors: np.ndarray, longest: float) -> np.ndarray:
+    """The vectors (V, 3), none longer than `longest`: a pattern that is told to move faster than it has
     learned stands still.
 
     Warns:
         TextureWarning: more than `FEW` of them were longer.
     """
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-    share = (lengths > fastest).mean()
+    share = (lengths > longest).mean()
     if share > FEW:
         warnings.warn(
             f"{share:.0%} of the vector field is faster than the texture has learned to move, and was slowed "
@@ -74,10 +119,10 @@ def slowed(vectors: np.ndarray, fastest: float) -> np.ndarray:
             TextureWarning,
             stacklevel=5,
         )
-    return vectors * np.minimum(1.0, fastest / np.maximum(lengths, 1e-12))
+    return vectors * np.minimum(1.0, longest / np.maximum(lengths, 1e-12))
 
 
-def flat_vectors(lattice: Lattice, field: Field, speed: float, fastest: float = math.inf) -> np.ndarray:
+def flat_vectors(lattice: Lattice, field: Field, speed: float, longest: float = math.inf) -> np.ndarray:
     """(V, 3) float32 vectors of the cells in a lattice's square, all the same.
 
     Raises:
@@ -89,7 +134,7 @@ def flat_vectors(lattice: Lattice, field: Field, speed: float, fastest: float = 
             f"the vector field '{field}' is not the same everywhere, so that a tile would have a seam",
             "give a direction such as right or 1,1,0",
         )
-    return slowed(vectors, fastest)
+    return slowed(vectors, longest)
 
 
 def followed_field(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 
 import torch
@@ -15,9 +16,10 @@ from mitex.methods.nca.look import Look
 from mitex.methods.nca.motion.drift import Drift, draw_drift
 from mitex.methods.nca.motion.estimator import load_estimator
 from mitex.methods.nca.motion.pairs import Pairs, plane_pairs, sphere_pairs
-from mitex.methods.nca.surfaces import TrainingSphere, TrainingSurface
+from mitex.methods.nca.surfaces import TrainingSphere
 from mitex.methods.nca.task import NcaTask, Rollout
 
+MOST_WAYS = 2**31
 POINTS = 8192  # at which the decoder's values are compared
 FLOOR = 0.1  # of residuals: as much as a way of a third of a cell, in usual patterns
 
@@ -33,38 +35,53 @@ class MotionTask(NcaTask):
         lineage: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__(config, exemplar, init, lineage)
+        # A state moves in one way until the seed replaces it, so that the rule learns what becomes of its
+        # pattern where the field goes on coming together, or apart. These are the random seeds of the ways.
+        self.ways = torch.zeros(config.pool, dtype=torch.int64)
         self.estimator = load_estimator(config.motion_estimator, self.look.device)
 
     def rollout(
-        self,
-        surface: TrainingSurface,
-        state: torch.Tensor,
-        step: int,
-        steps: int,
-        generator: torch.Generator,
+        self, index: int, state: torch.Tensor, step: int, steps: int, generator: torch.Generator
     ) -> Rollout:
-        config, rule = self.config, self.look.rule
-        drift = draw_drift(config, surface, generator)
-        condition = self._told(drift)
+        config, way, seed = self.config, self.ways[index], not state.any()
+        if seed:
+            way = torch.randint(MOST_WAYS, (), generator=generator)
+        drift = self.drift(index, way)
         apart = min(config.motion_steps, steps)
-        pattern = bool(state.any()) and step >= config.motion_start
-        states = [rule.evolve(state, surface.perception, steps % apart, generator, condition)]
+        states = [self._moved(state, drift, steps % apart, generator)]
         for _ in range(steps // apart):
-            states.append(rule.evolve(states[-1], surface.perception, apart, generator, condition))
-        if not pattern:  # nothing can move yet
-            return Rollout(states[-1], {})
-        loss = self.motion([state[0] for state in states], drift, apart, generator)
-        return Rollout(states[-1], {"motion": config.motion_weight * loss})
+            states.append(self._moved(states[-1], drift, apart, generator))
+        terms = {}
+        if not seed and step >= config.motion_start:  # else there is no pattern yet that could move
+            loss = self.motion([state[0] for state in states], drift, apart, generator)
+            terms = {"motion": config.motion_weight * loss}
+        return Rollout(states[-1], terms, partial(self._keep, index, way))
 
     def evolved(
-        self, surface: TrainingSurface, state: torch.Tensor, steps: int, generator: torch.Generator
+        self, index: int, state: torch.Tensor, steps: int, generator: torch.Generator
     ) -> torch.Tensor:
-        condition = self._told(draw_drift(self.config, surface, generator))
-        return self.look.rule.evolve(state, surface.perception, steps, generator, condition)
+        return self._moved(state, self.drift(index, self.ways[index]), steps, generator)
 
-    def _told(self, drift: Drift) -> torch.Tensor | None:
-        """The condition of the cells."""
-        return drift.condition.to(self.look.device) if self.look.rule.condition else None
+    def drift(self, index: int, way: torch.Tensor) -> Drift:
+        """How the pool's state `index` moves, given the random seed of its way."""
+        return draw_drift(self.config, self.surface(index), torch.Generator().manual_seed(int(way)))
+
+    def _moved(
+        self, state: torch.Tensor, drift: Drift, steps: int, generator: torch.Generator
+    ) -> torch.Tensor:
+        rule, operator = self.look.rule, drift.surface.perception
+        condition = drift.condition.to(state.device) if rule.condition else None
+        return rule.evolve(state, operator, steps, generator, condition)
+
+    def _keep(self, index: int, way: torch.Tensor) -> None:
+        self.ways[index] = way
+
+    def state(self) -> dict[str, torch.Tensor]:
+        return super().state() | {"pool.ways": self.ways}
+
+    def load_state(self, state: dict[str, torch.Tensor]) -> None:
+        super().load_state(state)
+        self.ways = state["pool.ways"]
 
     def motion(
         self, states: Sequence[torch.Tensor], drift: Drift, apart: int, generator: torch.Generator
