@@ -13,9 +13,11 @@ from mitex.methods.nca import NcaTexture, settling
 from mitex.methods.nca.surfaces import TrainingPlane, Windows
 
 CELLS, PIXELS, STEPS = 32, 128, 4  # of a window, and between two pictures
+# Fast motion is learned in fewer steps than that of the preset.
 SETTINGS = (
-    *("steps=220", "pool=8", "surfaces=flat", "view_count=2", "exemplar_size=128", "zooms=1"),
-    *("milestones=160,200", "preview_every=0"),
+    *("motion_period=8", "motion_steps=8", "motion_speeds=0.5,1.5"),
+    *("steps=170", "pool=8", "surfaces=flat", "view_count=2", "exemplar_size=128", "zooms=1"),
+    *("milestones=120,150", "preview_every=0"),
 )
 
 
