@@ -74,14 +74,22 @@ def teaser() -> np.ndarray:
     return np.concatenate(pictures, axis=1)
 
 
+Labelled = list[tuple[str, np.ndarray]]
+
+
 def controls() -> np.ndarray:
     """What can be done with trained models: grafts, healing, density, orientation, steps; a row each."""
-    rows = [*_grafts(), *_healing(), *_densities(), *_orientations(), *_growth()]
-    labels, pictures = zip(*rows, strict=True)
-    return sheet(pictures, columns=5, labels=labels, cell=CELL)
+    return _rows([*_grafts(), *_healing(), *_densities(), *_orientations(), *_growth()])
 
 
-Labelled = list[tuple[str, np.ndarray]]
+def living() -> np.ndarray:
+    """What grows instead of being painted: a row of grafts, and a film of healing."""
+    return _rows([*_grafts(), *_healing()])
+
+
+def _rows(pictures: Labelled) -> np.ndarray:
+    labels, images = zip(*pictures, strict=True)
+    return sheet(images, columns=5, labels=labels, cell=CELL)
 
 
 def _grafts() -> Labelled:
@@ -166,6 +174,7 @@ def main() -> None:
         write_image(GALLERY / "teaser.jpg", teaser())
         write_image(GALLERY / "models.jpg", thumbnails(exemplars))
         write_image(GALLERY / "nca-controls.jpg", controls())
+        write_image(GALLERY / "living.jpg", living())
     for word in sys.argv[3:] or RECIPES:
         name, source, model = word.split("=") if "=" in word else (word, RECIPES[word].exemplar, word)
         picture = one(NcaTexture.load(model), _exemplar(source, exemplars), meshes)

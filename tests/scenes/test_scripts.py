@@ -61,6 +61,17 @@ def test_texel_field_script(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert warm.mean() > 0.15 and cool.mean() > 0.1
 
 
+def test_motion_script(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """About the vertical axis to the right, which is red; up is violet."""
+    script = load("motion")
+    monkeypatch.setattr(script, "embedded", lambda _name: icosphere(8))
+    script.main(str(tmp_path / "motion.png"), side=48)
+    picture = read_image(tmp_path / "motion.png")
+    about, up = picture[20:28, 20:28].mean((0, 1)), picture[20:28, 68:76].mean((0, 1))
+    assert about[0] > about[1] + 0.3 and about[0] > about[2] + 0.3
+    assert up[2] > up[0] > up[1] + 0.1
+
+
 @pytest.mark.slow
 def test_decoded_field_script(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """A ball with heights that differ; most of the time goes into one kernel."""

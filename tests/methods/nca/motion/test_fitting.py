@@ -66,9 +66,9 @@ def test_a_run_is_resumed_with_its_field(tmp_path, lava):
 
 
 def test_another_preset_may_move_too(lava):
-    for options in ({"preset": "patch"}, {"set": ["preset=patch"]}):
-        words = [*TINY, "steps=0", *options.get("set", ())]
-        learned = nca.fit(lava, motion="up", **{**options, "set": words})
+    words = [*TINY, "steps=0"]
+    for preset, settings in (("patch", words), (None, [*words, "preset=patch"])):
+        learned = nca.fit(lava, motion="up", preset=preset, set=settings)
         assert (learned.about["preset"], learned.look.rule.condition) == ("patch", 3)
 
 

@@ -132,7 +132,9 @@ def test_estimators_of_pictures_see_the_last_states(exemplar, monkeypatch):
         task = _grown(MotionTask(config(*settings), exemplar))
         result = task.loss(1, torch.Generator().manual_seed(0))
         result.value.backward()
-        assert result.metrics["motion"] > 0 and task.look.rule.fc1.weight.grad[:, -3:].any()
+        gradient = task.look.rule.fc1.weight.grad
+        assert result.metrics["motion"] > 0
+        assert gradient is not None and gradient[:, -3:].any()
 
 
 def test_cells_may_know_nothing_of_the_field(exemplar):
