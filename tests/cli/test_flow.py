@@ -95,7 +95,15 @@ def test_options_reach_the_library(folder, monkeypatch, capsys):
         "apply m.safetensors --mesh cube.obj --out a.ply --subdivide 0 --steps 1 --orientation 90 --seed 5"
     )
     assert main(words.split()) == 0
-    expected = {"seed": 5, "steps": 1, "subdivide": 0, "orientation": 90, "scale": 1.0}
+    expected = {
+        "seed": 5,
+        "steps": 1,
+        "subdivide": 0,
+        "orientation": 90,
+        "scale": 1.0,
+        "field": None,
+        "speed": 1.0,
+    }
     assert options == expected | {"resolution": None, "keep_dense": False}
     assert main([*words.split(), "--keep-dense"]) == 0
     assert options == expected | {"resolution": None, "keep_dense": True}

@@ -113,7 +113,6 @@ BAD_FILMS = {
     "odd size": (animate("--resolution 33", out="out/a.mp4"), "even size"),
     "level beyond": (animate("--end-level 5"), "this texture has the levels 0 to 1"),
     "missing mesh": (animate(mesh="none.obj"), "none.obj"),
-    "another method": (animate(model="pebbles"), "name a run of geometric"),
     "meshes in a file": (animate("--meshes good.obj"), "good.obj"),
 }
 
@@ -122,6 +121,12 @@ BAD_FILMS = {
 def test_bad_films(files, run, name, capsys):
     words, message = BAD_FILMS[name]
     check_refused(files, words, message, capsys)
+
+
+def test_a_film_of_a_texture_that_does_not_grow(files, capsys):
+    bad.safetensors(files / "flat.safetensors", format="mitex-surface-1")
+    message = "takes no surface textures; name a run of geometric or nca"
+    check_refused(files, animate(model="flat.safetensors"), message, capsys)
 
 
 def write(path, mesh):
