@@ -80,8 +80,8 @@ def measured_motion(
         frames: (N, H, W, 3) sRGB in [0, 1], N at least 2, of one unmoving view.
         target: (H, W, 2), motion in a unit of time [px]: x to the right, y down (the `motion` integrator).
         mask: (H, W), above 0 where the surface is seen and its motion counts.
-        steps: of the automaton from frame to frame; if they do not move by more than 4 pixels.
-        period: steps in a unit of time.
+        steps: of the automaton from one frame to the next, so few that nothing moves by more than 4 pixels.
+        period: steps of the automaton in a unit of time.
 
     Raises:
         ImageError: frames of another shape, or smaller than 32 x 32 pixels.
@@ -96,7 +96,10 @@ def measured_motion(
         shapes = f"target of shape {target.shape} and mask of shape {mask.shape}"
         raise ConfigError(shapes, f"give {(*size, 2)} and {size}, as the frames")
     if not (np.isfinite(frames).all() and np.isfinite(target).all() and np.isfinite(mask).all()):
-        raise ConfigError("frames, target or mask hold NaN or infinite values", "mask out what is not known")
+        raise ConfigError(
+            "frames, target or mask hold NaN or infinite values",
+            "set to 0 what is not known, and leave it out of the mask",
+        )
     if not (steps > 0 and period > 0):
         raise ConfigError(f"{steps} steps in a period of {period}", "give numbers above 0")
     grey = torch.from_numpy(frames @ LUMINANCE)[:, None]
