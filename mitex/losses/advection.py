@@ -8,7 +8,9 @@ import torch
 def advection_residual(
     before: torch.Tensor, after: torch.Tensor, upstream: torch.Tensor, floor: float = 0.0
 ) -> torch.Tensor:
-    """What a transport leaves undone: |S(t + n)(x) - S(t)(x - d)|^2 / |S(t)(x - d) - S(t)(x)|^2.
+    """What a transport leaves undone, as a share of what it has to do::
+
+        |S(t + n)(x) - S(t)(x - d)|^2 / |S(t)(x - d) - S(t)(x)|^2
 
     d = (n / T) U is the way of the field U in n steps, if its unit is a unit of length in T steps. To the
     first order of d, S(t)(x - d) is S(t) - (n / T) U . grad S(t). Values from upstream are right for ways of

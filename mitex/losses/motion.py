@@ -35,9 +35,13 @@ def motion_loss(
 ) -> MotionLoss:
     """Compares the motion from one picture to another with the desired one.
 
-    L_dir = mean(1 - cos(U_gen, U_2D)) and L_str = mean |T |U_gen| / n - |U_2D||. Their combination is L_dir
-    while the direction is wrong (L_dir >= 1), else (1 - L_dir) L_str + gamma L_dir, so that the direction
-    comes first.
+    The direction's part and the strength's are::
+
+        L_dir = mean(1 - cos(U_gen, U_2D))
+        L_str = mean |T |U_gen| / n - |U_2D||
+
+    Their combination is L_dir while the direction is wrong (L_dir >= 1), else (1 - L_dir) L_str +
+    gamma L_dir, so that the direction comes first.
 
     Means are over all pixels of all pictures that count: those in the mask whose target is longer than
     `LEAST` times the mean there. The paper's are over all, background included.

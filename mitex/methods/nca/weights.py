@@ -29,6 +29,7 @@ def graft_weights(mesh: Mesh, source: str | Path | float | np.ndarray) -> Weight
     Args:
         mesh: the mesh.
         source: one of
+
             - a number: the same weight everywhere;
             - "x", "y" or "z": from 0 at the mesh's lowest point along the axis to 1 at its highest, linearly;
               "y:-0.2:0.3" from 0 at -0.2 to 1 at 0.3 [mesh units], and the other way if the first is larger;
