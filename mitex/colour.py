@@ -11,6 +11,9 @@ import numpy as np
 
 Array = TypeVar("Array")
 
+LUMINANCE = np.array([0.299, 0.587, 0.114], np.float32)
+"""Weights of sRGB values in a grey picture (ITU-R BT.601)."""
+
 
 def srgb_to_linear(x: Array) -> Array:
     """Decode sRGB values with the curve of IEC 61966-2-1.

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from exemplar_kit import FINE, cells, downsample, grid, noise, relaxed_points, step
 
-from mitex.evaluation.regularity import LUMINANCE
+from mitex.colour import LUMINANCE
 from mitex.exemplar import Exemplar
 
 Pattern = Callable[[np.random.Generator], np.ndarray]  # a grey periodic texture (FINE, FINE), any range

@@ -113,7 +113,7 @@ def _healing() -> Labelled:
     cells = Cells.of(mesh, 0)
     growth, camera = NcaTexture.load("lava").growth(cells), PreviewCamera(mesh, shooting)
     inside = torch.from_numpy(region("0.25,0.1,0.55,0.3")(cells.mesh.vertices))
-    states = States(growth, replace(shooting, steps_per_frame=10), 200, 0, inside)
+    states = States(growth, replace(shooting, steps_per_frame=10, start=200), 0, inside)
     frames = dict(zip(range(17), states.frames(0, 17), strict=True))
     steps = {0: "before", 1: "damaged", 2: "10 steps later", 5: "40 steps later", 16: "150 steps later"}
     return [(label, camera.picture(growth.shown(frames[k]))) for k, label in steps.items()]

@@ -8,8 +8,8 @@ import numpy as np
 import torch
 import torch.nn.functional as F
 
+from mitex.colour import LUMINANCE
 from mitex.errors import ConfigError, ImageError
-from mitex.evaluation.regularity import LUMINANCE
 from mitex.features.flow import lucas_kanade, smaller_eigenvalue
 
 LEAST_SPEED = 0.05  # of the mean speed: slower targets have no direction that counts

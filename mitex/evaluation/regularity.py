@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import torch
 
+from mitex.colour import LUMINANCE
 from mitex.losses.autocorrelation import autocorrelation
-
-LUMINANCE = np.array([0.299, 0.587, 0.114], np.float32)  # of sRGB values
 
 
 def regularity(image: np.ndarray) -> float:

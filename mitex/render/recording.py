@@ -20,7 +20,7 @@ from mitex.paths import atomic_write, check_writable, expanded, prepare_output
 from mitex.progress import announce, counted
 from mitex.render.loop import Loop, best_loop
 from mitex.render.video import VIDEO_SUFFIXES, check_video, write_video
-from mitex.training.signals import StopSignals
+from mitex.runtime.signals import StopSignals
 
 log = logging.getLogger(__name__)
 
@@ -108,6 +108,8 @@ class Recording:
         file = self.folder / SETTINGS
         settings = json.loads(json.dumps({**self.settings, "resolution": self.side}))
         if not resume:
+            if self.folder.exists() and not file.is_file():
+                raise OutputError(f"'{self.folder}' is in the way, and not of an interrupted film", "move it")
             shutil.rmtree(self.folder, ignore_errors=True)
             with atomic_write(file) as temporary:
                 temporary.write_text(json.dumps(settings), encoding="utf-8")
@@ -165,7 +167,7 @@ class Recording:
 
     def _write_folder(self, pictures: Iterable[np.ndarray], count: int) -> None:
         """All frames at once: a hidden folder gets the name of the target when it is full."""
-        whole = self.target.with_name(f".{self.target.name}.whole")
+        whole = self.folder / "whole"
         shutil.rmtree(whole, ignore_errors=True)
         whole.mkdir()
         for k, picture in enumerate(counted("writing the frames", pictures, count)):

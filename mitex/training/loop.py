@@ -12,11 +12,11 @@ import torch
 
 from mitex.errors import ConfigError
 from mitex.progress import announce
+from mitex.runtime.signals import StopSignals
 from mitex.training import keeping, optim
 from mitex.training.control import ALONE, Control, Progress
 from mitex.training.errors import Cancelled, Interrupted, TrainingDiverged
 from mitex.training.pace import Pace
-from mitex.training.signals import StopSignals
 from mitex.training.state import TrainState
 from mitex.training.task import Task, Uneven
 

@@ -6,6 +6,7 @@ import pytest
 
 from mitex.asset import Asset
 from mitex.cli import main
+from mitex.methods.nca import NcaTexture
 from tests.cli.refusals import check_refused
 
 pytestmark = pytest.mark.usefixtures("own_cache")
@@ -33,20 +34,18 @@ def test_a_film_of_each_kind(files, capsys):
 
 def test_options_reach_the_film(files, monkeypatch):
     calls = []
-    monkeypatch.setattr(
-        "mitex.methods.nca.film.film", lambda *words, **options: calls.append((words[3], options))
-    )
+    monkeypatch.setattr(NcaTexture, "animate", lambda *_, **options: calls.append(options))
     words = "--steps-per-frame 5 --start 7 --renderer path --spp 3 --azimuth 1 --elevation 2 --loop --fade 1 "
     words += "--damage y:0: --damage-at 0.25 --seed 4 --orientation 6 --scale 2 --field up --speed 2 --resume"
     assert main(animate(words)) == main(animate("--loop --fade 0")) == main(animate()) == 0
-    (shooting, options), (loop, _), (still, _) = calls
-    assert (shooting.seconds, shooting.fps, shooting.resolution) == (0.5, 4, 16)
-    assert (shooting.steps_per_frame, shooting.start, shooting.renderer, shooting.spp) == (5, 7, "path", 3)
-    assert (shooting.azimuth, shooting.elevation, shooting.loop) == (1, 2, 1)
-    assert (shooting.damage, shooting.damage_at) == ("y:0:", 0.25)
-    follows = {"field": "up", "speed": 2, "resume": True}
-    assert options == {"seed": 4, "orientation": 6, "scale": 2, "subdivide": 0, **follows}
-    assert loop.loop == 0 and still.loop is None and still.renderer == "preview"
+    options, loop, still = calls
+    assert options == {
+        **{"seconds": 0.5, "fps": 4, "resolution": 16, "steps_per_frame": 5, "start": 7},
+        **{"renderer": "path", "spp": 3, "azimuth": 1, "elevation": 2, "loop": 1},
+        **{"damage": "y:0:", "damage_at": 0.25, "seed": 4, "orientation": 6, "scale": 2, "subdivide": 0},
+        **{"field": "up", "speed": 2, "resume": True},
+    }
+    assert loop["loop"] == 0 and still["loop"] is None and still["renderer"] == "preview"
 
 
 BAD_FILMS = {

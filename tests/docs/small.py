@@ -46,7 +46,7 @@ def prepare(folder: Path) -> None:
 
 def shrink(patch: pytest.MonkeyPatch) -> None:
     """Makes the work small until the patch is undone."""
-    from mitex.methods.nca import NcaTexture, film, texture
+    from mitex.methods.nca import NcaTexture, texture
     from mitex.render import renderer, shell
     from mitex.training import fit
 
@@ -54,8 +54,7 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("mitex.mesh.load.embedded", lambda name: _ball_in_place_of(embedded(name)))
     patch.setattr(texture, "grown_state", _with_few_growth_steps(texture.grown_state))
     patch.setattr(texture, "healed", lambda growth, state, generator: state)
-    for module in (film, texture):
-        patch.setattr(module, "film", _with_few_frames(film.film))
+    patch.setattr(texture, "film", _with_few_frames(texture.film))
     patch.setattr(texture.GrowingTexture, "apply", _small_growth(texture.GrowingTexture.apply))
     patch.setattr(NcaTexture, "tile", _small_tile(NcaTexture.tile))
     sketch, sensor = _with_few_paths(renderer.accumulated), renderer.sensor
@@ -92,10 +91,10 @@ def _with_few_growth_steps(grown_state: Callable[..., Any]) -> Callable[..., Any
 
 
 def _with_few_frames(film: Callable[..., Any]) -> Callable[..., Any]:
-    def small(texture: Any, mesh: Any, path: Any, shooting: Any, **options: Any) -> Any:
+    def small(growth: Any, path: Any, shooting: Any, *others: Any) -> Any:
         loop = None if shooting.loop is None else 1
         short = replace(shooting, seconds=4 / shooting.fps, resolution=32, start=2, loop=loop, damage_at=0.0)
-        return film(texture, mesh, path, short, **options)
+        return film(growth, path, short, *others)
 
     return small
 

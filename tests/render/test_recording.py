@@ -135,3 +135,12 @@ def test_what_cannot_be_filmed_is_refused(tmp_path, name):
     with pytest.raises((ConfigError, OutputError), match=message):
         recording(tmp_path / path, **options)
     assert {p.name for p in tmp_path.rglob("*")} == {"full", "file"}
+
+
+def test_a_folder_of_others_is_left_alone(tmp_path):
+    notes = tmp_path / ".a.gif.frames" / "notes.txt"
+    notes.parent.mkdir()
+    notes.write_text("mine")
+    with pytest.raises(OutputError, match="is in the way, and not of an interrupted film; move it"):
+        film(tmp_path / "a.gif", 3)
+    assert notes.read_text() == "mine"

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 
-from mitex.errors import ConfigError, MeshError
+from mitex.errors import ConfigError
 from mitex.mesh.fields.strokes import read_strokes, stroke_vectors
 from mitex.mesh.mesh import Mesh
-from mitex.mesh.readers.ply import read_tables
+from mitex.mesh.vertex_files import read_array, read_properties
 from mitex.paths import expanded
 
 SUFFIXES = (".npy", ".ply", ".json")
 PROPERTIES = (("vx", "vy", "vz"), ("fx", "fy", "fz"), ("u", "v", "w"))  # of a PLY file's vertices
-MAX_VERTICES = 2_000_000
+MEANING = "vectors"
 
 
 def read_vectors(mesh: Mesh, path: str | Path) -> np.ndarray:
@@ -33,15 +32,16 @@ def read_vectors(mesh: Mesh, path: str | Path) -> np.ndarray:
             `stroke_vectors` refuses.
     """
     place = expanded(path)
-    if place.suffix.lower() not in SUFFIXES:
-        raise ConfigError(f"'{place}' is no file of vectors", f"give one that ends in {', '.join(SUFFIXES)}")
-    if not os.path.isfile(place):  # unlike Path.is_file, also answers for impossible names
-        raise ConfigError(f"there is no vector field at '{place}'", "check the path")
-    try:
-        values = _content(mesh, place)
-    except OSError as e:
-        reason = e.strerror or str(e)
-        raise ConfigError(f"'{place}' cannot be read ({reason})", "check its permissions") from e
+    match place.suffix.lower():
+        case ".npy":
+            values = read_array(place, MEANING)
+        case ".ply":
+            _, values = read_properties(place, PROPERTIES, MEANING)
+        case ".json":
+            values = stroke_vectors(mesh, read_strokes(place))
+        case _:
+            choices = ", ".join(SUFFIXES)
+            raise ConfigError(f"'{place}' is no file of vectors", f"give one that ends in {choices}")
     return checked_vectors(f"the vector field '{place}'", values, mesh)
 
 
@@ -65,35 +65,3 @@ def checked_vectors(label: str, vectors: np.ndarray, mesh: Mesh) -> np.ndarray:
             "use zeros where it is unknown",
         )
     return vectors
-
-
-def _content(mesh: Mesh, place: Path) -> np.ndarray:
-    """What a file says, not yet checked."""
-    match place.suffix.lower():
-        case ".npy":
-            return _read_npy(place)
-        case ".ply":
-            return _read_ply(place)
-        case _:
-            return stroke_vectors(mesh, read_strokes(place))
-
-
-def _read_npy(place: Path) -> np.ndarray:
-    try:
-        # Mapped: a header that claims more than there is fails before anything is allocated.
-        return np.lib.format.open_memmap(place, mode="r")
-    except (ValueError, EOFError) as e:
-        raise ConfigError(f"'{place}' is not a NumPy array ({e})", "write it with numpy.save") from e
-
-
-def _read_ply(place: Path) -> np.ndarray:
-    try:
-        points = read_tables(str(place), place.read_bytes(), MAX_VERTICES)[0].get("vertex", {})
-    except MeshError as e:
-        raise ConfigError(e.problem, e.remedy) from e
-    for names in PROPERTIES:
-        columns = [points[name] for name in names if isinstance(points.get(name), np.ndarray)]
-        if len(columns) == 3:
-            return np.stack(columns, axis=1).astype(np.float64)
-    choices = ", ".join(" ".join(names) for names in PROPERTIES)
-    raise ConfigError(f"the vertices of '{place}' have no vectors", f"give them properties {choices}")

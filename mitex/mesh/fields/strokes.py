@@ -26,6 +26,7 @@ from mitex.geometry.vectors import dot, unit
 from mitex.mesh.connection import connection_laplacian, solver, tangent_axes, transport
 from mitex.mesh.cotangents import cotangent_weights
 from mitex.mesh.mesh import Mesh
+from mitex.mesh.vertex_files import readable
 from mitex.progress import announce
 
 NEAR = 0.1  # how far off the surface a stroke may be, relative to the diagonal of the mesh's box
@@ -38,15 +39,15 @@ def read_strokes(place: Path) -> list[np.ndarray]:
     """The strokes in a JSON file {"strokes": [[[x, y, z], ...], ...]}: an (N, 3) float64 array each.
 
     Raises:
-        ConfigError: something else is in the file.
-        OSError: it cannot be read.
+        ConfigError: there is no such file, it cannot be read, or something else is in it.
     """
     form = 'write {"strokes": [[[x, y, z], ...], ...]}'
-    try:
-        strokes = json.loads(place.read_text("utf-8"))["strokes"]
-        return [np.array(stroke, np.float64).reshape(len(stroke), 3) for stroke in strokes]
-    except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as e:
-        raise ConfigError(f"'{place}' holds no strokes", form) from e
+    with readable(place, "strokes"):
+        try:
+            strokes = json.loads(place.read_text("utf-8"))["strokes"]
+            return [np.array(stroke, np.float64).reshape(len(stroke), 3) for stroke in strokes]
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as e:
+            raise ConfigError(f"'{place}' holds no strokes", form) from e
 
 
 def stroke_vectors(mesh: Mesh, strokes: Sequence[np.ndarray]) -> np.ndarray:

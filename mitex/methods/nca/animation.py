@@ -117,8 +117,7 @@ class Animate:
         let_idle_threads_sleep()
         from mitex.methods.nca.film import Shooting
 
-        shooting = Shooting(**self._shooting())
-        target = shooting.recording(self.out, {}).target
+        target = Shooting(**self._shooting()).recording(self.out, {}).target
         if target.suffix.lower() in VIDEOS:
             prepare_output(
                 target,
@@ -126,13 +125,10 @@ class Animate:
             )
         from mitex.mesh import Mesh
         from mitex.methods.nca import NcaTexture
-        from mitex.methods.nca.film import film
 
-        film(
-            NcaTexture.load(self.model),
+        NcaTexture.load(self.model).animate(
             Mesh.load(self.mesh),
             self.out,
-            shooting,
             resume=self.resume,
             seed=self.seed,
             subdivide=levels(self.subdivide),
@@ -140,6 +136,7 @@ class Animate:
             scale=self.scale,
             field=self.field,
             speed=self.speed,
+            **self._shooting(),
         )
         print(self.out)
 

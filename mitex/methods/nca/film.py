@@ -6,12 +6,12 @@ import os
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import torch
 
-from mitex.atlas import Atlas, laid_out
+from mitex.atlas import Atlas
 from mitex.cache import content_key
 from mitex.colour import linear_to_srgb
 from mitex.errors import ConfigError
@@ -20,10 +20,7 @@ from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh
 from mitex.methods.nca.bake import Grown
-from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.growth import Growth
-from mitex.methods.nca.motion.condition import Field
-from mitex.methods.nca.orientation import Orientation, cell_turns
 from mitex.methods.nca.ranges import MOST_STEPS
 from mitex.methods.nca.region import region
 from mitex.progress import announce
@@ -31,9 +28,6 @@ from mitex.render import OrbitRenderer, tone
 from mitex.render.preview import PreviewRenderer
 from mitex.render.recording import Recording
 from mitex.runtime import keep_freed_memory
-
-if TYPE_CHECKING:
-    from mitex.methods.nca.texture import GrowingTexture
 
 PADDING = 8  # of the charts of a baked frame [texels]
 OF_THE_FILM = ("seconds", "loop")  # what no single picture follows from
@@ -125,41 +119,23 @@ class Shooting:
 
 
 def film(
-    texture: GrowingTexture,
-    mesh: Mesh,
-    path: str | os.PathLike[str],
-    shooting: Shooting,
-    *,
-    resume: bool = False,
-    seed: int = 0,
-    subdivide: int | str = "auto",
-    orientation: Orientation = 0.0,
-    scale: float = 1.0,
-    field: Field | None = None,
-    speed: float = 1.0,
+    growth: Growth, path: str | os.PathLike[str], shooting: Shooting, seed: int, resume: bool = False
 ) -> Path:
-    """Films a texture on a mesh; arguments and errors as of `GrowingTexture.animate`."""
-    shooting.recording(path, {})
-    laid = mesh if shooting.renderer == "preview" else laid_out(mesh, shooting.texels)
-    announce("preparing the mesh")
-    cells = Cells.of(laid, subdivide, scale)
-    turn = cell_turns(orientation, cells.mesh, mesh)
-    condition = texture.condition(cells, field, speed, turn, mesh)
-    growth = texture.growth(cells, turn, condition)
-    states = States(growth, shooting, shooting.first_step(texture.steps), seed, shooting.damaged(cells.mesh))
-    scene = {
-        "mesh": content_key(laid.vertices, laid.faces),
-        "model": growth.key,
-        "seed": seed,
-        "subdivide": subdivide,
-        "orientation": content_key(np.asarray(turn)),
-        "scale": scale,
-        "condition": None if condition is None else content_key(condition.numpy()),
-        **asdict(replace(shooting, start=states.start)),
-    }
-    recording = shooting.recording(path, {k: v for k, v in scene.items() if k not in OF_THE_FILM})
+    """Films what grows, on the mesh that it is for.
+
+    Args:
+        growth: the automaton.
+        path, resume: as of `GrowingTexture.animate`; errors too.
+        shooting: how, `start` among it.
+        seed: of the random updates.
+    """
+    mesh = growth.cells.given
+    states = States(growth, shooting, seed, shooting.damaged(growth.cells.mesh))
+    scene = {"mesh": content_key(mesh.vertices, mesh.faces), "texture": growth.key, "seed": seed}
+    scene |= {name: value for name, value in asdict(shooting).items() if name not in OF_THE_FILM}
+    recording = shooting.recording(path, scene)
     keep_freed_memory()
-    camera: Camera = (PreviewCamera if shooting.renderer == "preview" else TracedCamera)(laid, shooting)
+    camera: Camera = (PreviewCamera if shooting.renderer == "preview" else TracedCamera)(mesh, shooting)
 
     def pictures(done: int) -> Iterator[np.ndarray]:
         return map(camera.picture, map(growth.shown, states.frames(done, recording.pictures)))
@@ -172,13 +148,12 @@ class States:
     """The states of a film's frames.
 
     Attributes:
-        growth, shooting, start, seed: as of `film`.
+        growth, shooting, seed: as of `film`.
         damage: (V,) bool, the cells that are set back; None for none.
     """
 
     growth: Growth
     shooting: Shooting
-    start: int
     seed: int
     damage: torch.Tensor | None
 
@@ -187,7 +162,7 @@ class States:
         exactly as if it had not been interrupted.
         """
         generator = torch.Generator().manual_seed(self.seed)
-        state = self.growth.evolve(self.growth.seed(), self.start, generator)
+        state = self.growth.evolve(self.growth.seed(), self.shooting.start or 0, generator)
         for frame in range(done):
             announce("growing what has been filmed", frame, done)
             state = self._next(self._damaged(state, frame), generator)

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 import torch
 
+from mitex.cache import content_key
 from mitex.errors import ConfigError
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
@@ -31,7 +32,7 @@ class Growth(ABC):
     @property
     @abstractmethod
     def key(self) -> str:
-        """A hash of the weights that it follows from."""
+        """A hash of all that its states follow from, beside their number and a random seed."""
 
     @abstractmethod
     def seed(self) -> torch.Tensor:
@@ -77,7 +78,9 @@ class LookGrowth(Growth):
 
     @property
     def key(self) -> str:
-        return weights_key(self.look)
+        condition = () if self.condition is None else (self.condition.numpy(),)
+        place = self.cells.mesh.vertices, self.cells.mesh.faces, np.asarray(self.orientation)
+        return content_key(weights_key(self.look), *place, *condition)
 
     def seed(self) -> torch.Tensor:
         return self.look.rule.seed(self.operator)[0]

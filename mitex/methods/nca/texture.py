@@ -74,6 +74,18 @@ class GrowingTexture(ABC):
     def growth(self, cells: Cells, orientation: Turn = 0.0, condition: torch.Tensor | None = None) -> Growth:
         """The automaton on a mesh, its texture turned; with the cells' `condition`."""
 
+    def growth_on(
+        self,
+        cells: Cells,
+        given: Mesh,
+        orientation: Orientation = 0.0,
+        field: Field | None = None,
+        speed: float = 1.0,
+    ) -> Growth:
+        """The automaton on a mesh; options and errors as of `apply`, whose vectors are those of `given`."""
+        turn = cell_turns(orientation, cells.mesh, given)
+        return self.growth(cells, turn, self.condition(cells, field, speed, turn, given))
+
     def apply(
         self,
         mesh: Mesh,
@@ -120,8 +132,7 @@ class GrowingTexture(ABC):
         laid = mesh if resolution is None or (keep_dense and scale != 1.0) else laid_out(mesh, resolution)
         announce("preparing the mesh")
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
-        turn = cell_turns(orientation, cells.mesh, mesh)
-        growth = self.growth(cells, turn, self.condition(cells, field, speed, turn, mesh))
+        growth = self.growth_on(cells, mesh, orientation, field, speed)
         grown = growth.shown(_healthy(growth, seed, self.steps if steps is None else steps))
         asset = grown.asset()
         if resolution is None:
@@ -160,9 +171,13 @@ class GrowingTexture(ABC):
             OutputError: another kind of file, an unwritable place, or nothing there to resume.
             KeyboardInterrupt: stopped after a whole frame.
         """
-        options = {"seed": seed, "subdivide": subdivide, "orientation": orientation, "scale": scale}
-        options |= {"field": field, "speed": speed}
-        return film(self, mesh, path, Shooting(**shooting), resume=resume, **options)
+        shot = Shooting(**shooting)
+        shot.recording(path, {})  # refuses what it can before the work starts
+        laid = mesh if shot.renderer == "preview" else laid_out(mesh, shot.texels)
+        announce("preparing the mesh")
+        cells = Cells.of(laid, subdivide, scale)
+        growth = self.growth_on(cells, mesh, orientation, field, speed)
+        return film(growth, path, replace(shot, start=shot.first_step(self.steps)), seed, resume)
 
     def variants(
         self, mesh: Mesh, seeds: Iterable[int], *, resolution: int | None = 1024, **options: Any
@@ -216,7 +231,7 @@ class NcaTexture(GrowingTexture):
         A cell sits at each vertex of the mesh, and the shape in the scene must have these vertices; see
         `mitex.mesh.subdivide_midpoint`. Other arguments and errors as of `apply`.
         """
-        growth = self._on(mesh, orientation, **motion)
+        growth = self.growth_on(Cells(mesh, 0, mesh), mesh, orientation, **motion)
         return fields(self.look, _healthy(growth, seed, self.steps if steps is None else steps), mesh)
 
     def tile(
@@ -276,7 +291,7 @@ class NcaTexture(GrowingTexture):
         Raises:
             ConfigError: steps below 0, or a field as of `apply`.
         """
-        growth = self._on(mesh, orientation, **motion)
+        growth = self.growth_on(Cells(mesh, 0, mesh), mesh, orientation, **motion)
         return grown_state(growth, seed, self.steps if steps is None else steps)
 
     def condition(
@@ -294,11 +309,6 @@ class NcaTexture(GrowingTexture):
         self, cells: Cells, orientation: Turn = 0.0, condition: torch.Tensor | None = None
     ) -> LookGrowth:
         return LookGrowth(self.look, cells, orientation, self._palette, condition=condition)
-
-    def _on(self, mesh: Mesh, orientation: Orientation, **motion: Unpack[Motion]) -> LookGrowth:
-        """What grows on the vertices of a mesh."""
-        cells, turn = Cells(mesh, 0, mesh), cell_turns(orientation, mesh, mesh)
-        return self.growth(cells, turn, self.condition(cells, orientation=turn, **motion))
 
     @property
     def steps(self) -> int:
@@ -324,5 +334,5 @@ class NcaTexture(GrowingTexture):
 
 
 def _healthy(growth: Growth, seed: int, steps: int) -> torch.Tensor:
-    """The same, with the exemplar's colours."""
+    """As `grown_state`, with the exemplar's colours."""
     return healed(growth, grown_state(growth, seed, steps), torch.Generator().manual_seed(seed))

@@ -12,14 +12,15 @@ from mitex.errors import ConfigError
 from mitex.images import SUFFIXES, read_image
 from mitex.mesh import Mesh
 from mitex.mesh.nearest import surface_points
-from mitex.mesh.readers.ply import read_tables
+from mitex.mesh.vertex_files import read_array, read_properties
 from mitex.methods.nca.region import AXES, NUMBER
 from mitex.paths import expanded
 
 Weights = Callable[[np.ndarray], np.ndarray]
 """From points (P, 3) [mesh units] to weights (P,) float32 in [0, 1]."""
 
-PROPERTIES = ("weight", "quality", "red")  # of a PLY file, in this order
+PROPERTIES = (("weight",), ("quality",), ("red",))  # of a PLY file, in this order
+MEANING = "weights"
 HELP = "give 0 to 1, x, y:LOW:HIGH, X,Y,Z,RADIUS, a .npy or .ply with a value at each vertex, or a .png"
 
 
@@ -40,7 +41,6 @@ def graft_weights(mesh: Mesh, source: str | Path | float | np.ndarray) -> Weight
 
     Raises:
         ConfigError: the source is none of these, or its values are not from 0 to 1, one for each vertex.
-        MeshError: a .ply file that cannot be read.
         ImageError: an image that cannot be read.
     """
     if isinstance(source, np.ndarray):
@@ -84,26 +84,17 @@ def _from_file(mesh: Mesh, path: Path, text: str) -> Weights:
     suffix = path.suffix.lower()
     if suffix not in (".npy", ".ply", *SUFFIXES):
         raise ConfigError(f"'{text}' says nothing about weights", HELP)
+    if suffix == ".npy":
+        return _interpolated(mesh, read_array(path, MEANING), f"'{text}'")
+    if suffix == ".ply":
+        (name,), values = read_properties(path, PROPERTIES, MEANING)
+        # Colours may be of 255.
+        return _interpolated(
+            mesh, values / 255 if name == "red" and values.max(initial=0) > 1 else values, f"'{text}'"
+        )
     if not path.is_file():
         raise ConfigError(f"there is no file '{text}'", HELP)
-    if suffix == ".npy":
-        try:
-            return _interpolated(mesh, np.load(path, allow_pickle=False), f"'{text}'")
-        except (ValueError, EOFError, OSError) as e:
-            raise ConfigError(f"'{text}' is not an array of numbers ({e})", "write it with numpy.save") from e
-    if suffix == ".ply":
-        return _interpolated(mesh, _property(path, text), f"'{text}'")
     return _painted(mesh, path)
-
-
-def _property(path: Path, text: str) -> np.ndarray:
-    """(V,) of a PLY file's vertices; colours may be of 255."""
-    table = read_tables(text, path.read_bytes(), max_vertices=1 << 31)[0].get("vertex", {})
-    name = next((name for name in PROPERTIES if name in table), None)
-    if name is None:
-        raise ConfigError(f"the vertices in '{text}' have no weights", f"use {' or '.join(PROPERTIES)}")
-    values = np.asarray(table[name])
-    return values / 255 if name == "red" and values.max(initial=0) > 1 else values
 
 
 def _interpolated(mesh: Mesh, values: np.ndarray, name: str) -> Weights:

@@ -130,8 +130,8 @@ def test_refuses_names_that_are_none():
 
 
 def test_refuses_files_that_are_none(tmp_path):
-    assert "there is no vector field at" in refusal(tmp_path / "a.npy")
-    assert "there is no vector field at" in refusal(str(tmp_path / "a\0.ply"))
+    assert "there is no file of vectors at" in refusal(tmp_path / "a.npy")
+    assert "there is no file of vectors at" in refusal(str(tmp_path / "a\0.ply"))
     for suffix, remedy in ((".npy", "numpy.save"), (".ply", "not a PLY file")):
         (tmp_path / f"b{suffix}").write_bytes(b"0" * 100)
         assert remedy in refusal(tmp_path / f"b{suffix}")

@@ -60,8 +60,8 @@ def test_a_damaged_region_is_set_back_at_its_time_and_grows_again(texture):
     states, cells = {}, Cells(SPHERE, 0, SPHERE)
     inside = torch.from_numpy(SPHERE.vertices[:, 1] > 0)
     for damage in (None, inside):
-        shooting = film.Shooting(seconds=1, fps=4, steps_per_frame=3, damage_at=0.5)
-        shot = film.States(texture.growth(cells), shooting, 6, 0, damage)
+        shooting = film.Shooting(seconds=1, fps=4, steps_per_frame=3, start=6, damage_at=0.5)
+        shot = film.States(texture.growth(cells), shooting, 0, damage)
         states[damage is not None] = list(shot.frames(0, 4))
     whole, damaged = states[False], states[True]
     assert all(torch.equal(a, b) for a, b in zip(whole[:2], damaged[:2], strict=True))
@@ -88,7 +88,7 @@ def test_it_is_resumed_with_the_same_frames(texture, plain, tmp_path, monkeypatc
     monkeypatch.setattr(film.PreviewCamera, "picture", stopped)
     with pytest.raises(KeyboardInterrupt, match="after 2 of 4 frames"):
         shoot(texture, tmp_path / "film")
-    with pytest.raises(ConfigError, match="had another model and seed"):
+    with pytest.raises(ConfigError, match="had another texture and seed"):
         shoot(tiny.texture(MAPS, seed=1), tmp_path / "film", seed=1, resume=True)
     assert np.array_equal(shoot(texture, tmp_path / "film", resume=True), plain) and count == 4
 

@@ -106,13 +106,13 @@ BAD = {
     "a large number": ("1.5", "not from 0 to 1"),
     "the same place twice": ("x:1:1", "give two different places"),
     "no radius": ("0,0,0,0", "give a radius above 0"),
-    "no file": ("w.npy", "there is no file"),
-    "text": ("text.npy", "not an array of numbers"),
-    "objects": ("objects.npy", "not an array of numbers"),
+    "no file": ("w.npy", "there is no file of weights"),
+    "text": ("text.npy", "not a NumPy array"),
+    "objects": ("objects.npy", "not a NumPy array"),
     "too short": (np.zeros(3), "give one number for each of"),
     "NaN": (np.full(len(MESH.vertices), np.nan), "not from 0 to 1"),
     "negative": (np.full(len(MESH.vertices), -1.0), "not from 0 to 1"),
-    "no such property": ("bare.ply", "use weight or quality or red"),
+    "no such property": ("bare.ply", "give them properties weight, quality, red"),
     "no UVs": ("paint.png", "has no UVs"),
 }
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from mitex.evaluation.regularity import LUMINANCE
+from mitex.colour import LUMINANCE
 from mitex.geometry.triangles import interpolate
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.motion.drift import Drift

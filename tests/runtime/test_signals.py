@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from mitex.training.signals import StopSignals
+from mitex.runtime.signals import StopSignals
 
 
 @pytest.fixture(autouse=True)
