@@ -113,7 +113,8 @@ class _Lines:
     def show(self, work: str, details: str) -> None:
         with self._lock:
             if work != self._work:
-                self._due = time.monotonic() + FIRST_LINE
+                # Many short works in a row get a line too, so a new one does not put off the line that is due.
+                self._due = min(self._due, time.monotonic() + FIRST_LINE)
             self._work, self._text = work, work + details
         if self._thread is None and self._due < math.inf:
             self._done.clear()
@@ -125,7 +126,7 @@ class _Lines:
         if self._thread is not None:
             self._thread.join()
             self._thread = None
-        self._work = ""
+        self._work, self._due = "", math.inf
 
     def _look(self) -> None:
         while not self._done.wait(LOOK_EVERY):

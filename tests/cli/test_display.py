@@ -54,6 +54,17 @@ def test_work_gets_lines_where_there_is_no_terminal(quick):
         wait_for(stream, "baking the maps\n")
 
 
+def test_many_short_works_in_a_row_get_a_line(monkeypatch):
+    monkeypatch.setattr(display, "FIRST_LINE", 0.3)
+    monkeypatch.setattr(display, "LOOK_EVERY", 0.01)
+    stream = io.StringIO()
+    with display.shown(stream=stream):
+        for number in range(20):  # none of them takes as long as FIRST_LINE
+            announce(f"work {number}")
+            time.sleep(0.1)
+    assert "work" in stream.getvalue()
+
+
 def test_short_work_gets_no_line(monkeypatch):
     monkeypatch.setattr(display, "FIRST_LINE", 100.0)
     monkeypatch.setattr(display, "LOOK_EVERY", 0.01)
