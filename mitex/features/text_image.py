@@ -1,0 +1,44 @@
+"""What losses and searches ask of a model of texts and images: two encoders into one space."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import torch
+
+
+class TextImageModel(Protocol):
+    """A frozen pair of encoders, trained so that a text and its picture point in the same direction."""
+
+    @property
+    def name(self) -> str:
+        """What it is, as people call it."""
+        ...
+
+    @property
+    def resolution(self) -> int:
+        """Width and height of the pictures that it sees [px]."""
+        ...
+
+    def encode_images(self, images: torch.Tensor) -> torch.Tensor:
+        """Encodes pictures, differentiable in them.
+
+        Args:
+            images: (K, R, R, 3) sRGB in [0, 1], R the `resolution`.
+
+        Returns:
+            (K, D) embeddings, not normalised.
+        """
+        ...
+
+    def encode_texts(self, texts: Sequence[str]) -> torch.Tensor:
+        """Encodes texts.
+
+        Returns:
+            (N, D) embeddings, not normalised.
+
+        Raises:
+            ConfigError: a text that is empty, too long, or says what the model does not know.
+        """
+        ...
