@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from tyro.conf import arg
 
@@ -36,6 +36,8 @@ class Fit(ExemplarOptions):
       mitex fit nca --exemplar pebbles.png --out runs/pebbles --resume
       mitex fit nca --settings --preset paper
     """
+
+    only_at_start: ClassVar[frozenset[str]] = frozenset({"init"})
 
     preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: patch)")] = None
     """Settings to start from: `patch` is fast, `paper` follows the publication; `motion` (the default with

@@ -1,0 +1,29 @@
+"""`python -m mitex.cli.job WORDS`: a command of Mitex that does not outlive the process that started it."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import sys
+
+from mitex.cli.entry import main
+
+_PARENT_DEATH_SIGNAL = 1  # prctl(2)
+
+
+def end_with_parent(parent: int) -> None:
+    """Asks Linux for a SIGTERM when the parent ends, be it killed: then a fit saves its checkpoint.
+
+    Args:
+        parent: process that started this one; if it is gone already, this one ends.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGTERM)
+    if os.getppid() != parent:
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    end_with_parent(int(sys.argv[1]))
+    sys.exit(main(sys.argv[2:]))
