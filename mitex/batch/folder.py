@@ -109,7 +109,7 @@ class BatchFolder:
         (self.of(job) / FAILED).unlink(missing_ok=True)
 
     def count_start(self, job: Job, driver: str) -> int:
-        """How often a job has been started for a driver, this time included; also if its worker died since."""
+        """How often a job has been started for a driver, this time included, whether or not it ended."""
         before = _read(self.of(job) / STARTS) or {}
         count = before.get("count", 0) + 1 if before.get("driver") == driver else 1
         self.write(job, STARTS, {"driver": driver, "count": count})

@@ -140,7 +140,7 @@ def _plain(name: str) -> str:
 
 
 def _exemplar_names(method: Method) -> list[str] | None:
-    """The exemplars that ship with Mitex; None for what a method learns from otherwise, which it knows alone."""
+    """The exemplars that ship with Mitex; None for methods that learn from something else."""
     from mitex.exemplar import names
 
     return names() if issubclass(method.load_fit(), ExemplarOptions) else None

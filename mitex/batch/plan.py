@@ -81,7 +81,7 @@ class Plan:
             folder: where relative paths begin.
 
         Raises:
-            ConfigError: An unknown key or method, a value of the wrong type or out of range, or nothing to do.
+            ConfigError: An unknown key or method, a value of a wrong type or out of range, or nothing to do.
         """
         common, tables = _split(content, "methods", {key: KEYS[key] for key in KEYS}, "the plan")
         if unknown := [key for key in content if key not in (*KEYS, "methods")]:

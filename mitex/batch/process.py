@@ -52,7 +52,7 @@ class Process:
     def __init__(
         self, words: Sequence[str], folder: Path, log: IO[bytes], environment: Mapping[str, str]
     ) -> None:
-        self._ended, self._lock = False, threading.Lock()
+        self._ended, self._lock = False, threading.RLock()
         # A group of its own: Ctrl-C reaches this process alone, which passes it on once.
         self._process = subprocess.Popen(
             [sys.executable, "-m", "mitex.cli.job", str(os.getpid()), *words],
@@ -71,13 +71,17 @@ class Process:
 
     def wait(self) -> tuple[int, int]:
         """Waits for its end; the exit code (negative: the signal) and the most memory that it had [bytes]."""
-        os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOWAIT)
+        self.await_end()
         with self._lock:  # its number is its own until here
             _, status, usage = os.wait4(self.pid, 0)
             self._ended = True
             self._process.returncode = os.waitstatus_to_exitcode(status)
         scale = 1 if sys.platform == "darwin" else 1024
         return self._process.returncode, usage.ru_maxrss * scale
+
+    def await_end(self) -> None:
+        """Waits for its end, and leaves the exit code to `wait`."""
+        os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOWAIT)
 
     def stop(self, number: int = signal.SIGTERM) -> None:
         """Sends it a signal, if it has not ended: at the first SIGTERM a fit saves its checkpoint."""

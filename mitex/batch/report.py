@@ -26,8 +26,8 @@ class Row:
     Attributes:
         job: the job.
         state: one of `STATES`; "blocked" if a job that it needs failed.
-        record: of a job that is done: time, seconds, memory [bytes], host and metrics; of one that failed: its
-            error and exit code; of one that is running: its host.
+        record: of a job that is done: time, seconds, memory [bytes], host and metrics; of one that failed:
+            its error and exit code; of one that is running: its host.
     """
 
     job: Job

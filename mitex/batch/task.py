@@ -10,7 +10,7 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -156,6 +156,14 @@ def stop_processes(number: int = signal.SIGTERM) -> None:
     """Sends a signal to the processes of all jobs that are done here and now."""
     for process in tuple(_processes):
         process.stop(number)
+
+
+def end_processes() -> None:
+    """Lets those processes save what they can, and waits for their end; may be called by a signal handler."""
+    stop_processes()
+    for process in tuple(_processes):
+        with suppress(ChildProcessError):  # it has ended
+            process.await_end()
 
 
 @contextmanager

@@ -25,5 +25,6 @@ def end_with_parent(parent: int) -> None:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGUSR2, signal.SIG_IGN)  # Slurm's warning to the parent, which sends a SIGTERM
     end_with_parent(int(sys.argv[1]))
     sys.exit(main(sys.argv[2:]))
