@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from mitex.lazy import attributes
 
-__all__ = ["Engine", "Event", "Job", "MethodPlan", "Plan", "Report", "Row", "Task", "report", "run_plan"]
+__all__ = ["Engine", "Event", "Job", "MethodPlan", "Plan", "Report", "Row", "Task", "run_plan", "status"]
 
 __getattr__ = attributes(
     __name__,
@@ -24,8 +24,8 @@ __getattr__ = attributes(
         "Report": "mitex.batch.report",
         "Row": "mitex.batch.report",
         "Task": "mitex.batch.task",
-        "report": "mitex.batch.report",
         "run_plan": "mitex.batch.driver",
+        "status": "mitex.batch.report",
     },
 )
 
@@ -34,5 +34,5 @@ if TYPE_CHECKING:
     from mitex.batch.engines import Engine
     from mitex.batch.jobs import Job
     from mitex.batch.plan import MethodPlan, Plan
-    from mitex.batch.report import Report, Row, report
+    from mitex.batch.report import Report, Row, status
     from mitex.batch.task import Task

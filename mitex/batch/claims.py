@@ -1,9 +1,8 @@
 """Who works on a job: claim files that one process alone can make, also in a folder that machines share.
 
-A claim is `claim.N` in the job's folder, made with O_EXCL. Its lines are `host:pid:time`, one for each process
-that works. It is stale when its processes are gone, or, on another host, when nobody has touched it for a
-while. Whoever finds the newest claim stale makes the next one, so that no claim that somebody could hold is
-removed.
+A claim is `claim.N` in the job's folder, made with O_EXCL. Its lines are `host:pid:time`, one for each
+process at work. It is stale when these are gone, or, on another host, when nobody has touched it for a while.
+Whoever finds the newest claim stale makes the next one, so that no claim that somebody could hold is removed.
 """
 
 from __future__ import annotations

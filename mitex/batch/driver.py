@@ -15,7 +15,7 @@ from mitex.batch.engines.local import Local
 from mitex.batch.folder import FAILED, BatchFolder
 from mitex.batch.jobs import Job, jobs_of
 from mitex.batch.plan import Plan
-from mitex.batch.report import Report, report
+from mitex.batch.report import Report, status
 from mitex.batch.task import RETRIES, Outcome, Task
 from mitex.progress import announce
 from mitex.runtime.signals import StopSignals
@@ -78,14 +78,14 @@ def run_plan(
         KeyboardInterrupt: Ctrl-C or SIGTERM; the fits that were running have saved their checkpoints.
     """
     jobs = jobs_of(plan)
-    place = BatchFolder.prepared(folder, jobs)
-    if retry:
-        for job in jobs:
-            place.forget_failure(job)
-    with StopSignals() as signals, engine or Local() as workers, place.driven() as name:
+    place = BatchFolder.checked(folder)
+    with StopSignals() as signals, engine or Local() as workers, place.driven(jobs) as name:
+        if retry:
+            for job in jobs:
+                place.forget_failure(job)
         run = _Run(jobs, place, workers, name, threads or workers.threads, on_event)
         stopped = run.loop(signals)
-    summary = report(place.path)
+    summary = status(place.path)
     summary.write_csv()
     if stopped:
         raise KeyboardInterrupt(

@@ -40,8 +40,8 @@ class BatchFolder:
     path: Path
 
     @staticmethod
-    def prepared(out: str | Path, jobs: Sequence[Job]) -> BatchFolder:
-        """A new or empty folder, or one of an earlier call; its plan is that of these jobs from now on.
+    def checked(out: str | Path) -> BatchFolder:
+        """A new or empty folder, or one of an earlier call; nothing is written.
 
         Raises:
             OutputError: It holds other files, or cannot be written to.
@@ -50,9 +50,6 @@ class BatchFolder:
         check_writable(folder.path)
         if not folder.is_ours() and folder.path.is_dir() and any(folder.path.iterdir()):
             raise OutputError(f"'{out}' holds other files", "name a new or empty folder with `out`")
-        lines = [json.dumps(job.record()) + "\n" for job in jobs]
-        with atomic_write(folder.path / PLAN) as temporary:
-            temporary.write_text("".join(lines), encoding="utf-8")
         return folder
 
     @staticmethod
@@ -125,8 +122,15 @@ class BatchFolder:
             (self.path / "drivers" / name).unlink(missing_ok=True)
 
     @contextmanager
-    def driven(self) -> Iterator[str]:
-        """The name of a command that is running within the context."""
+    def driven(self, jobs: Sequence[Job]) -> Iterator[str]:
+        """The name of a command that runs these jobs within the context; the folder's plan is of them now.
+
+        Raises:
+            OutputError: The folder cannot be written to.
+        """
+        lines = [json.dumps(job.record()) + "\n" for job in jobs]
+        with atomic_write(self.path / PLAN) as temporary:
+            temporary.write_text("".join(lines), encoding="utf-8")
         name = f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(4)}"
         try:
             (self.path / "drivers").mkdir(exist_ok=True)

@@ -11,7 +11,7 @@ from typing import Any
 
 from mitex import __version__
 from mitex.batch import options
-from mitex.batch.inputs import Input, find
+from mitex.batch.inputs import Input, digest, find
 from mitex.batch.plan import MethodPlan, Plan
 from mitex.errors import ConfigError
 from mitex.methods.method import Method
@@ -68,6 +68,7 @@ def jobs_of(plan: Plan) -> list[Job]:
     Raises:
         ConfigError: An input does not exist or cannot be read, or the same job is there twice.
     """
+    digest.cache_clear()  # files may have changed since
     jobs: dict[str, Job] = {}
     for job in (job for part in plan.methods for job in _jobs(part, plan)):
         if job.id in jobs:

@@ -83,7 +83,7 @@ class Report:
         return path
 
 
-def report(path: str | Path) -> Report:
+def status(path: str | Path) -> Report:
     """How far the jobs of a folder are; changes nothing.
 
     Raises:
@@ -103,7 +103,7 @@ def _row(job: Job, folder: BatchFolder, before: Mapping[str, Row]) -> Row:
         return Row(job, "running", {"host": host})
     if record := folder.failed(job):
         return Row(job, "failed", record)
-    if job.needs in before and before[job.needs].state in ("failed", "blocked"):
+    if job.needs is not None and job.needs in before and before[job.needs].state in ("failed", "blocked"):
         return Row(job, "blocked")
     return Row(job, "interrupted" if (folder.of(job) / STARTS).exists() else "waiting")
 

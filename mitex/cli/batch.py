@@ -118,6 +118,6 @@ class Status:
     """What was given as --out."""
 
     def run(self) -> None:
-        from mitex.batch import report
+        from mitex.batch import status
 
-        print(report(self.folder).text())
+        print(status(self.folder).text())

@@ -1,8 +1,8 @@
 """Jobs on a Dask cluster.
 
-Dask counts the death of a worker against every task that was assigned to it, and gives up after a few. Jobs are
-processes of their own, so a worker's death says nothing of them: the limit is lifted, where the cluster is ours,
-and jobs count their starts themselves.
+Dask counts the death of a worker against every task that was assigned to it, and gives up after a few. Jobs
+are processes of their own, so a worker's death says nothing of them: the limit is lifted, where the cluster
+is ours, and jobs count their starts themselves.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Dask(Engine):
 
     def __enter__(self) -> Dask:
         try:
-            import dask
+            import dask.config
             import distributed
         except ImportError as e:
             raise RuntimeUnavailable(
@@ -73,7 +73,7 @@ class Dask(Engine):
         tasks = Counter[str]()
         for worker in workers.values():
             tasks[worker["host"]] += worker["nthreads"]
-        machines = self._client.run(cores)
+        machines: Any = self._client.run(cores)
         shares = (
             count // tasks[workers[name]["host"]] for name, count in machines.items() if name in workers
         )
@@ -100,7 +100,7 @@ class _Future:
 
     def result(self) -> Outcome:
         from distributed import KilledWorker
-        from distributed.comm import CommClosedError
+        from distributed.comm.core import CommClosedError
 
         try:
             return self.future.result(timeout=PATIENCE)

@@ -1,7 +1,7 @@
 """Jobs of Slurm, through submitit.
 
-Slurm ends a job when its time is over or others go first. Shortly before, submitit gets a signal: the fit saves
-its checkpoint, and the job goes back into the queue.
+Slurm ends a job when its time is over or others go first. Shortly before, submitit gets a signal: the fit
+saves its checkpoint, and the job goes back into the queue.
 """
 
 from __future__ import annotations
