@@ -23,7 +23,7 @@ from typing import Any
 from mitex.batch import claims
 from mitex.batch.jobs import Job
 from mitex.errors import ConfigError, OutputError
-from mitex.paths import atomic_write, check_writable, expanded
+from mitex.paths import atomic_write, check_writable, expanded, is_temporary
 
 PLAN = "plan.jsonl"
 DONE, FAILED, STARTS, LOG = "done.json", "failed.json", "starts.json", "log.txt"
@@ -48,7 +48,9 @@ class BatchFolder:
         """
         folder = BatchFolder(Path(os.path.abspath(expanded(out))))
         check_writable(folder.path)
-        if not folder.is_ours() and folder.path.is_dir() and any(folder.path.iterdir()):
+        files = folder.path.iterdir() if folder.path.is_dir() else ()
+        # Another call may be about to write the plan.
+        if not all(map(is_temporary, files)) and not folder.is_ours():
             raise OutputError(f"'{out}' holds other files", "name a new or empty folder with `out`")
         return folder
 

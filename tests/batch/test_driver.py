@@ -93,7 +93,7 @@ class TestOneAfterTheOther:
         fit, apply = (BatchFolder(report.folder).of(row.job) / "done.json" for row in report.rows)
         record = json.loads(fit.read_text())
         assert record["metrics"] == {"step": 2, "loss": 0.5} and record["memory"] > 1e6
-        assert 0 < record["seconds"] and record["host"] and record["time"][:2] == "20"
+        assert record["seconds"] > 0 and record["host"] and record["time"][:2] == "20"
         assert json.loads(apply.read_text())["metrics"] == {}
         lines = (report.folder / "results.csv").read_text().splitlines()
         assert lines[0].endswith("host,result,last_loss,last_step") and lines[1].endswith(",0.5,2")
@@ -136,7 +136,7 @@ class TestFailures:
         (workshop.folder / "p.png").write_text("poison")
         (workshop.folder / "plan.toml").write_text('exemplars = ["p.png"]\n[methods.stripes]')
         monkeypatch.chdir(workshop.folder)
-        assert main("batch plan.toml --out out --quiet".split()) == 2
+        assert main(["batch", "plan.toml", "--out", "out", "--quiet"]) == 2
         printed = capsys.readouterr()
         assert printed.err.startswith("error: 1 of 1 jobs are not done; ")
         assert printed.out.splitlines()[-1] == "out" and "failed   fit-stripes-p" in printed.out
