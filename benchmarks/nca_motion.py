@@ -3,8 +3,8 @@
 Run it as `python -m benchmarks.nca_motion`. First come the states of one rollout on a sphere of 10,242 cells,
 and what tells how far they are from moving along a field, forward and backward. The transport residual looks
 at all of them, the others at pictures of the last two. Then come steps of a finished automaton on spheres of
-10,242 and of 40,962 cells, with a field and without. All runs in one process on the same threads; every number is the
-best of its repetitions.
+10,242 and of 40,962 cells, with a field and without. All runs in one process on the same threads; every
+number is the best of its repetitions.
 """
 
 from __future__ import annotations
