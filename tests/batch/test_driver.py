@@ -21,14 +21,15 @@ PLAN = """exemplars = ["a.png", "b.png"]
 meshes = ["m.obj"]
 [methods.stripes]
 steps = 6
-pace = 0.2
 """
+PACE = "0.15"  # of the steps that are interrupted [s]
 
 
 @pytest.fixture
 def driver(workshop, monkeypatch):
     """Starts `mitex batch` in a process of its own, on two slow fits and what needs them."""
     (workshop.folder / "plan.toml").write_text(PLAN)
+    monkeypatch.setenv("STRIPES_PACE", PACE)
     processes = []
 
     def start(*words):
@@ -176,14 +177,15 @@ class TestFailures:
 class TestInterruptions:
     """The other jobs' files are those of a run that nothing interrupted, and no step is done twice."""
 
-    def check_the_rest(self, workshop, start, code=0):
-        assert start("--quiet").wait(200) == code
+    def check_the_rest(self, workshop, start, patch):
+        patch.delenv("STRIPES_PACE")
+        assert start("--quiet").wait(200) == 0
         assert sorted(workshop.told("step")) == sorted(["fit-stripes-a", "fit-stripes-b"] * 6)
         assert status(workshop.folder / "out").count("done") == 4
-        workshop.run(workshop.plan(steps=6, pace=0.2), out="serial")
+        workshop.run(workshop.plan(steps=6), out="serial")
         assert workshop.files() == workshop.files("serial")
 
-    def test_sigterm(self, workshop, driver, wait_for):
+    def test_sigterm(self, workshop, driver, wait_for, monkeypatch):
         process = driver("--jobs", "2")
         wait_for(lambda: len(set(workshop.told("step"))) == 2)
         process.send_signal(signal.SIGTERM)
@@ -192,26 +194,27 @@ class TestInterruptions:
         assert not list((workshop.folder / "out").rglob("claim*"))
         states = [row.state for row in status(workshop.folder / "out").rows]
         assert states == ["interrupted", "waiting"] * 2
-        self.check_the_rest(workshop, driver)
+        self.check_the_rest(workshop, driver, monkeypatch)
 
-    def test_the_driver_is_killed(self, workshop, driver, wait_for):
+    def test_the_driver_is_killed(self, workshop, driver, wait_for, monkeypatch):
         """Its fits save their checkpoints. The next command waits until they have ended."""
         process = driver("--jobs", "2")
         wait_for(lambda: len(set(workshop.told("step"))) == 2)
         process.kill()
         process.wait(200)
-        self.check_the_rest(workshop, driver)
+        self.check_the_rest(workshop, driver, monkeypatch)
 
-    def test_a_job_that_someone_else_interrupts(self, workshop, wait_for):
-        plan = workshop.plan(("a.png",), steps=50, pace=0.2)
+    def test_a_job_that_someone_else_interrupts(self, workshop, wait_for, monkeypatch):
+        monkeypatch.setenv("STRIPES_PACE", PACE)
+        plan = workshop.plan(("a.png",), steps=50)
         with ThreadPoolExecutor(1) as pool:
             report = pool.submit(workshop.run, plan)
             wait_for(lambda: workshop.told("step"))
             os.kill(int(next(workshop.folder.rglob("claim.0")).read_text().split(":")[-2]), signal.SIGTERM)
             assert [row.state for row in report.result().rows] == ["interrupted", "waiting"]
 
-    def test_two_drivers(self, workshop, driver):
+    def test_two_drivers(self, workshop, driver, monkeypatch):
         processes = [driver("--quiet", "--jobs", "2") for _ in range(2)]
         assert [process.wait(200) for process in processes] == [0, 0]
         assert sorted(workshop.told("start")) == sorted(set(workshop.told("start")))
-        self.check_the_rest(workshop, driver)
+        self.check_the_rest(workshop, driver, monkeypatch)

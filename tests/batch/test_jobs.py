@@ -62,12 +62,12 @@ class TestCommands:
     def test_options_settings_and_outputs(self, jobs, workshop):
         (workshop.folder / "salt").mkdir()
         fit, apply = jobs(
-            {"stripes": {"steps": 3, "salt": "salt", "pace": 0.5, "apply": {"turn": -4.5}}}, output="maps"
+            {"stripes": {"steps": 3, "salt": "salt", "depth": 0.25, "apply": {"turn": -4.5}}}, output="maps"
         )
         folder = workshop.folder
         assert fit.words == (
             *("fit", "stripes", "--quiet", "--exemplar", f"{folder}/a.png", "--steps=3"),
-            *("--salt", f"{folder}/salt", "--set", "pace=0.5", "--out", fit.result),
+            *("--salt", f"{folder}/salt", "--set", "depth=0.25", "--out", fit.result),
         )
         assert fit.resumed == tuple(
             word for word in (*fit.words, "--resume") if "salt" not in word.removeprefix(str(folder))

@@ -29,7 +29,7 @@ PLANS = {
     "unknown option of apply": (GOOD + "[methods.stripes.apply]\nturm = 3.0", "did you mean turn?"),
     "what the plan says itself": (GOOD + 'out = "x"', "methods.stripes has no key 'out'"),
     "a text for a list": (GOOD.replace('["a.png"]', '"a.png"'), "exemplars of the plan cannot be 'a.png'"),
-    "a text for a number": (GOOD + 'pace = "fast"', "pace cannot be 'fast'"),
+    "a text for a number": (GOOD + 'depth = "low"', "depth cannot be 'low'"),
     "a number for an option's text": (GOOD + "salt = 3", "salt of methods.stripes cannot be 3; give a text"),
     "out of range": (GOOD + "width = 99.0", "width = 99 is out of range"),
     "a seed out of range": ("seeds = [-1]\n" + GOOD, "seed -1 is out of range"),

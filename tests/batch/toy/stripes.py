@@ -1,8 +1,8 @@
 """Two methods that take no time to import: what they learn is a hash, one more for each step.
 
 `stripes` learns from an exemplar and is put on any mesh, `inlay` learns on one mesh. An exemplar that begins
-with `poison` is refused, one that begins with `crash` ends the process. What happens is told to the file that
-the environment's `STRIPES_LOG` names, a line for each start and step.
+with `poison` is refused, one that begins with `crash` ends the process. In the environment, `STRIPES_LOG` is a
+file that gets a line for each start and step, and `STRIPES_PACE` the time of a step [s].
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ STRIPES, INLAY = described("stripes", "Fit"), described("inlay", "FitOnMesh")
 @dataclass(frozen=True)
 class Config(TrainingConfig):
     preset: str = "plain"
-    pace: float = key(0.0, "time of a step [s]", 0, 10)
+    depth: float = key(0.5, "of a stripe", 0, 10)
     width: float = key(1.0, "of a stripe", 0.1, 10)
 
 
@@ -87,7 +87,6 @@ class Fit(ExemplarOptions):
 
     def run(self) -> None:
         assert self.out is not None and not (self.resume and self.salt)
-        settings = dict(word.split("=") for group in self.set for word in group)
         tell("start", self.out.name, os.environ.get(THREADS))
         step, value = 0, hashlib.sha256(self.read() + self.salt.encode()).hexdigest()
         place = self.out / CHECKPOINT
@@ -95,7 +94,7 @@ class Fit(ExemplarOptions):
             step, value = json.loads(place.read_text())
         with StopSignals() as signals:
             while step < (self.steps or 1):
-                time.sleep(float(settings.get("pace", 0)))
+                time.sleep(float(os.environ.get("STRIPES_PACE", "0")))
                 step, value = step + 1, hashlib.sha256(value.encode()).hexdigest()
                 with atomic_write(place) as temporary:
                     temporary.write_text(json.dumps([step, value]))
