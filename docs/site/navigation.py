@@ -11,7 +11,8 @@ GROUPS = {
     "Methods": ["docs/nca", "docs/surface", "docs/geometric", "docs/nerf"],
     "Guides": [
         "docs/moving",
-        *(f"docs/{name}" for name in ("batch", "blender", "plugins", "embedding", "settings", "runs", "times")),
+        "docs/batch",
+        *(f"docs/{name}" for name in ("blender", "plugins", "embedding", "settings", "runs", "times")),
         "docs/*",
     ],
     "Reference": ["docs/reference/mitex", "docs/reference/*"],

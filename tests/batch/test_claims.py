@@ -23,6 +23,12 @@ def claimed(folder, line, number=0, age=0.0):
     return path
 
 
+def taken(folder) -> Claim:
+    claim = Claim.take(folder)
+    assert claim
+    return claim
+
+
 @pytest.fixture(scope="module")
 def dead():
     """The number of a process that has ended."""
@@ -34,7 +40,7 @@ def dead():
 class TestOneHolder:
     def test_the_second_gets_none_until_the_first_lets_go(self, tmp_path):
         assert holder(tmp_path) is None
-        with Claim.take(tmp_path) as claim:
+        with taken(tmp_path) as claim:
             assert Claim.take(tmp_path) is None and holder(tmp_path) == HOST
             host, pid, moment = claim.path.read_text().strip().split(":")
             assert (host, int(pid)) == (HOST, os.getpid()) and abs(float(moment) - time.time()) < 60
@@ -97,7 +103,7 @@ class TestStaleOnes:
 
 def test_a_holder_sees_that_it_was_taken_over(tmp_path, monkeypatch):
     """As after a night of a laptop's sleep."""
-    first = Claim.take(tmp_path)
+    first = taken(tmp_path)
     assert first.touch()
     first.path.write_text("elsewhere:1:0\n")
     os.utime(first.path, (0, 0))
@@ -105,13 +111,13 @@ def test_a_holder_sees_that_it_was_taken_over(tmp_path, monkeypatch):
 
 
 def test_a_job_s_process_is_noted(tmp_path):
-    claim = Claim.take(tmp_path)
+    claim = taken(tmp_path)
     claim.note(12)
     assert [entry[1] for entry in claims._read(claim.path)] == [os.getpid(), 12]
 
 
 def test_touching_keeps_a_claim_young(tmp_path):
-    claim = Claim.take(tmp_path)
+    claim = taken(tmp_path)
     os.utime(claim.path, (0, 0))
     claim.touch()
     assert time.time() - claim.path.stat().st_mtime < STALE_AFTER

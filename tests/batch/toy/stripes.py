@@ -1,8 +1,8 @@
 """Two methods that take no time to import: what they learn is a hash, one more for each step.
 
 `stripes` learns from an exemplar and is put on any mesh, `inlay` learns on one mesh. An exemplar that begins
-with `poison` is refused, one that begins with `crash` ends the process. In the environment, `STRIPES_LOG` is a
-file that gets a line for each start and step, and `STRIPES_PACE` the time of a step [s].
+with `poison` is refused, one that begins with `crash` ends the process. In the environment, `STRIPES_LOG` is
+a file that gets a line for each start and step, and `STRIPES_PACE` the time of a step [s].
 """
 
 from __future__ import annotations
