@@ -13,8 +13,6 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from mitex.errors import OutputError
-
 STALE_AFTER = 60.0  # without a touch, of another host's claim [s]
 SLACK = 2.0  # by which a process may seem to have started after it made its claim [s]
 
@@ -34,7 +32,7 @@ class Claim:
         """A claim on the job of a folder; None if another process has one.
 
         Raises:
-            OutputError: The folder cannot be written to.
+            OSError: The folder cannot be written to.
         """
         try:
             numbers = _numbers(folder)
@@ -45,10 +43,6 @@ class Claim:
                 file.write(_line(os.getpid()))
         except FileExistsError:
             return None
-        except OSError as e:
-            raise OutputError(
-                f"cannot write to '{folder}' ({e.strerror or e})", "check the folder and the disk"
-            ) from e
         return Claim(path)._confirmed()
 
     def _confirmed(self) -> Claim | None:

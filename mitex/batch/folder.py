@@ -23,7 +23,7 @@ from typing import Any
 from mitex.batch import claims
 from mitex.batch.jobs import Job
 from mitex.errors import ConfigError, OutputError
-from mitex.paths import atomic_write, check_writable, expanded, is_temporary
+from mitex.paths import atomic_write, check_writable, expanded, is_temporary, writing
 
 PLAN = "plan.jsonl"
 DONE, FAILED, STARTS, LOG = "done.json", "failed.json", "starts.json", "log.txt"
@@ -134,13 +134,9 @@ class BatchFolder:
         with atomic_write(self.path / PLAN) as temporary:
             temporary.write_text("".join(lines), encoding="utf-8")
         name = f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(4)}"
-        try:
-            (self.path / "drivers").mkdir(exist_ok=True)
-            (self.path / "drivers" / name).write_text(f"{time.time()}\n", encoding="utf-8")
-        except OSError as e:
-            raise OutputError(
-                f"cannot write to '{self.path}' ({e.strerror or e})", "check the folder and the disk"
-            ) from e
+        with writing(self.path / "drivers" / name) as file:
+            file.parent.mkdir(exist_ok=True)
+            file.write_text(f"{time.time()}\n", encoding="utf-8")
         try:
             yield name
         finally:

@@ -52,7 +52,7 @@ class Process:
     def __init__(
         self, words: Sequence[str], folder: Path, log: IO[bytes], environment: Mapping[str, str]
     ) -> None:
-        self._ended, self._lock = False, threading.RLock()
+        self._ended, self._sent, self._lock = False, set[int](), threading.RLock()
         # A group of its own: Ctrl-C reaches this process alone, which passes it on once.
         self._process = subprocess.Popen(
             [sys.executable, "-m", "mitex.cli.job", str(os.getpid()), *words],
@@ -84,9 +84,10 @@ class Process:
         os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOWAIT)
 
     def stop(self, number: int = signal.SIGTERM) -> None:
-        """Sends it a signal, if it has not ended: at the first SIGTERM a fit saves its checkpoint."""
+        """Sends it a signal, but none twice: at a SIGTERM a fit saves, at a second one it gives up."""
         with self._lock, suppress(ProcessLookupError):
-            if not self._ended:
+            if not self._ended and number not in self._sent:
+                self._sent.add(number)
                 os.kill(self.pid, number)
 
 

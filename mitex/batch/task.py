@@ -19,6 +19,7 @@ from mitex.batch.claims import Claim
 from mitex.batch.folder import DONE, FAILED, LOG, BatchFolder
 from mitex.batch.jobs import Job
 from mitex.batch.process import Process, environment
+from mitex.paths import writing
 from mitex.training.locate import CHECKPOINT, PREVIOUS
 
 METRICS = "metrics.jsonl"
@@ -67,11 +68,12 @@ class Task:
         place = self.folder.of(self.job)
         if record := self.folder.done(self.job):
             return Outcome("done", record)
-        place.mkdir(parents=True, exist_ok=True)
-        claim = Claim.take(place)
+        with writing(place):
+            place.mkdir(parents=True, exist_ok=True)
+            claim = Claim.take(place)
         if claim is None:
             return Outcome("elsewhere")
-        with claim:
+        with writing(place), claim:
             if record := self.folder.done(self.job):  # since the first look
                 return Outcome("done", record)
             if record := self.folder.failed(self.job):
@@ -99,8 +101,8 @@ class Task:
         words = self._words()
         with (self.folder.of(self.job) / LOG).open("wb") as log:
             process = Process(words, self.folder.path, log, environment(self.threads))
-            claim.note(process.pid)
             with _running(process), self._watched(process, claim):
+                claim.note(process.pid)
                 return process.wait()
 
     def _words(self) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """Running plans on one machine: what is done stays done, whatever ends in between."""
 
+import errno
 import json
 import os
 import signal
@@ -10,12 +11,14 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from mitex.batch import Event, status
+from mitex.batch.claims import Claim
 from mitex.batch.engines import WorkerLost
 from mitex.batch.engines.local import Local
 from mitex.batch.folder import BatchFolder
 from mitex.batch.process import cores
 from mitex.batch.task import RETRIES, Outcome
 from mitex.cli import main
+from mitex.errors import OutputError
 
 PLAN = """exemplars = ["a.png", "b.png"]
 meshes = ["m.obj"]
@@ -151,6 +154,18 @@ class TestFailures:
             "code": 1,
         }
 
+    def test_a_full_disk_stops_all(self, workshop, monkeypatch):
+        """Also the job that runs. With space again, the same call goes on."""
+
+        def refuse(claim, pid):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+        with monkeypatch.context() as patch, pytest.raises(OutputError, match="no space left"):
+            patch.setattr(Claim, "note", refuse)
+            workshop.run(workshop.plan(steps=1000))
+        assert not list(workshop.folder.rglob("claim*"))
+        assert workshop.run(workshop.plan()).count("done") == 4
+
     @pytest.mark.parametrize("losses", [RETRIES, RETRIES + 1])
     def test_lost_workers(self, losses, workshop):
         class Fragile(Local):
@@ -195,6 +210,15 @@ class TestInterruptions:
         states = [row.state for row in status(workshop.folder / "out").rows]
         assert states == ["interrupted", "waiting"] * 2
         self.check_the_rest(workshop, driver, monkeypatch)
+
+    def test_a_second_signal_does_not_wait_for_a_step(self, workshop, driver, wait_for, monkeypatch):
+        monkeypatch.setenv("STRIPES_PACE", "1000")
+        process = driver()
+        wait_for(lambda: workshop.told("start"))
+        process.send_signal(signal.SIGTERM)
+        wait_for(lambda: "stopping" in process.stderr.readline())
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(200) == 130 and not workshop.told("step")
 
     def test_the_driver_is_killed(self, workshop, driver, wait_for, monkeypatch):
         """Its fits save their checkpoints. The next command waits until they have ended."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from concurrent.futures import Future, ThreadPoolExecutor
 
 from mitex.batch.engines import Engine
@@ -26,6 +27,7 @@ class Local(Engine):
     def submit(self, task: Task) -> Future[Outcome]:
         return self._pool.submit(task)
 
-    def __exit__(self, *_: object) -> None:
-        stop_processes()
+    def __exit__(self, error: type[BaseException] | None, *_: object) -> None:
+        # A KeyboardInterrupt in here is the second Ctrl-C: nobody waits for the end of a step any more.
+        stop_processes(signal.SIGKILL if error is KeyboardInterrupt else signal.SIGTERM)
         self._pool.shutdown(cancel_futures=True)
