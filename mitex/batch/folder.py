@@ -63,7 +63,7 @@ class BatchFolder:
         """
         folder = BatchFolder(Path(os.path.abspath(expanded(path))))
         if not folder.is_ours():
-            raise ConfigError(f"'{path}' is no folder of `mitex batch`", "name what was given as --out")
+            raise ConfigError(f"'{path}' is no folder of `mitex batch`", "name what it was given as `out`")
         return folder
 
     def is_ours(self) -> bool:

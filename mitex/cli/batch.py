@@ -93,7 +93,7 @@ class Batch:
 
     def _engine(self) -> Engine:
         if self.engine == "dask":
-            from mitex.batch.engines.dask import Dask
+            from mitex.batch.engines.dask_cluster import Dask
 
             return Dask(self.address, self.jobs or 1)
         if self.engine == "slurm":

@@ -147,7 +147,7 @@ class TestPlaces:
     ],
 )
 def test_options(words, message, workshop, check, monkeypatch):
-    monkeypatch.setattr("mitex.batch.engines.dask.PATIENCE", 0.3)
+    monkeypatch.setattr("mitex.batch.engines.dask_cluster.PATIENCE", 0.3)
     write(workshop)
     check(message, words)
 

@@ -64,7 +64,9 @@ class Slurm(Engine):
                 timeout_min=MINUTES, cpus_per_task=self.threads, stderr_to_stdout=True, **self._options
             )
         except (NameError, TypeError, ValueError) as e:
-            raise ConfigError(f"submitit refuses the options of Slurm ({e})", "mend --slurm") from e
+            raise ConfigError(
+                f"submitit refuses the options of Slurm ({e})", "mend or leave out the one that it names"
+            ) from e
         return executor
 
     def __exit__(self, *_: object) -> None:
@@ -111,5 +113,5 @@ class _Queued:
 def _option(text: str) -> tuple[str, int | str]:
     key, equals, value = text.partition("=")
     if not (equals and key and value):
-        raise ConfigError(f"--slurm takes no '{text}'", "write KEY=VALUE, such as partition=cpu")
+        raise ConfigError(f"'{text}' is no option of Slurm", "write KEY=VALUE, such as partition=cpu")
     return f"slurm_{key.replace('-', '_')}", int(value) if value.isdecimal() else value

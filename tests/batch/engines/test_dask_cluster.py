@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from mitex.batch import Event, status
-from mitex.batch.engines.dask import Dask
+from mitex.batch.engines.dask_cluster import Dask
 from mitex.errors import RuntimeUnavailable
 
 CLUSTER = """
