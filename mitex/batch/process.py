@@ -84,7 +84,7 @@ class Process:
         os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOWAIT)
 
     def stop(self, number: int = signal.SIGTERM) -> None:
-        """Sends it a signal, but none twice: at a SIGTERM a fit saves, at a second one it gives up."""
+        """Sends it a signal, but none twice; at a SIGTERM a fit ends its step and saves."""
         with self._lock, suppress(ProcessLookupError):
             if not self._ended and number not in self._sent:
                 self._sent.add(number)

@@ -8,6 +8,7 @@ import signal
 import sys
 
 from mitex.cli.entry import main
+from mitex.runtime.signals import StopSignals
 
 _PARENT_DEATH_SIGNAL = 1  # prctl(2)
 
@@ -25,6 +26,7 @@ def end_with_parent(parent: int) -> None:
 
 
 if __name__ == "__main__":
+    StopSignals.second_raises = False  # who does not want to wait for a step sends a SIGKILL
     signal.signal(signal.SIGUSR2, signal.SIG_IGN)  # Slurm's warning to the parent, which sends a SIGTERM
     end_with_parent(int(sys.argv[1]))
     sys.exit(main(sys.argv[2:]))
