@@ -60,6 +60,7 @@ LAZY = {
 # What belongs to a baseline -> the method that it is compared with, and further baselines that it needs.
 COMPARED = {
     "displacement": {"geometric"},
+    "multi_view_gram": {"surface"},
     "quilted": {"nerf"},
     "plain_field": {"nerf"},
 }

@@ -62,6 +62,11 @@ FITS = {
         resume="",
         source="nerf",
     ),
+    "multi_view_gram": TinyFit(
+        "--exemplar photo.png --mesh cube.obj --steps 2 --set resolution=32 exemplar_size=32 view=32 "
+        f"layers=relu1_1 {SMALL_RUN}",
+        "--mesh cube.obj",
+    ),
     "displacement": TinyFit("--reference spikes --set resolution=16", "--mesh cube.obj", resume=""),
 }
 
