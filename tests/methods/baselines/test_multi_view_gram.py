@@ -29,7 +29,7 @@ from tests.training.contract import (
 
 CONFIG = MultiViewConfig(
     steps=4,
-    resolution=32,
+    resolution=64,
     exemplar_size=32,
     view=32,
     antialias=1,
