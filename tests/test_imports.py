@@ -38,6 +38,7 @@ ORDER = [
     "images",
     "colour",
     "runtime",
+    "cuts",
     "sparse",
     "cache",
     "cache_entries",
