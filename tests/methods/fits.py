@@ -67,6 +67,16 @@ FITS = {
         f"layers=relu1_1 {SMALL_RUN}",
         "--mesh cube.obj",
     ),
+    "gatys": TinyFit(
+        "--exemplar photo.png --steps 2 --set size=32 resolution=32 exemplar_size=32 layers=relu1_1 "
+        f"{SMALL_RUN}",
+        "--mesh cube.obj --resolution 64",
+    ),
+    "image_quilting": TinyFit(
+        "--exemplar photo.png --set size=32 resolution=32 exemplar_size=32 block=12",
+        "--mesh cube.obj --resolution 64",
+        resume="",
+    ),
     "displacement": TinyFit("--reference spikes --set resolution=16", "--mesh cube.obj", resume=""),
 }
 
