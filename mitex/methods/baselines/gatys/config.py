@@ -20,6 +20,9 @@ class GatysConfig(TrainingConfig):
     exemplar_size: int = key(
         256, "side that the exemplar's central square is resized to [px]; a pixel becomes a texel", 32, 2048
     )
+    noise: float = key(
+        0.1, "of the start, in which the exemplar's mean colour has the rest; the paper: 1", 0, 1
+    )
     periodic: bool = key(True, "the picture goes on beyond its borders; the paper: zeros are around it")
     layers: tuple[str, ...] = key(
         ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "VGG-16's that are compared"
@@ -39,4 +42,4 @@ class GatysConfig(TrainingConfig):
 
 
 DEFAULT = GatysConfig()
-PRESETS = {DEFAULT.preset: DEFAULT, "paper": replace(DEFAULT, preset="paper", periodic=False)}
+PRESETS = {DEFAULT.preset: DEFAULT, "paper": replace(DEFAULT, preset="paper", noise=1.0, periodic=False)}

@@ -17,7 +17,7 @@ AROUND = 64  # pixels by which a periodic picture is continued; deeper layers se
 
 
 class GatysTask(ParameterTask):
-    """Pixels, from noise.
+    """Pixels, that start as noise.
 
     The paper takes VGG-19 with its weights scaled to a mean activation of one; here it is VGG-16, scaled
     alike. Both pool by means.
@@ -31,9 +31,10 @@ class GatysTask(ParameterTask):
         keep_freed_memory()
         self.config, self.exemplar = config, exemplar
         generator = torch.Generator().manual_seed(config.seed)
-        super().__init__({"image": torch.rand(config.size, config.size, 3, generator=generator)})
-        self.network = Vgg16()
         picture = torch.from_numpy(exemplar.resized(config.exemplar_size).maps["albedo"])
+        noise = torch.rand(config.size, config.size, 3, generator=generator)
+        super().__init__({"image": picture.mean((0, 1)).lerp(noise, config.noise)})
+        self.network = Vgg16()
         features = self.network.features(picture[None], config.layers)
         self.targets = {layer: gram_matrix(values.flatten(1, 2)[0]) for layer, values in features.items()}
 
