@@ -110,19 +110,26 @@ class TestReaction:
         for _ in range(3):
             hidden = expected @ inner.T + bias
             active = hidden / (1 + np.exp(-5 * hidden))
-            expected = expected + reaction.rates.numpy() * (matrix @ expected) + active @ outer.T
+            expected = expected + reaction.rates.numpy() * (matrix @ expected) + 0.1 * active @ outer.T
         actual = reaction.evolve(state, LinearMap(matrix), 3)
         assert np.abs(expected).max() < 3
         np.testing.assert_allclose(actual.numpy(), expected, atol=1e-5)
 
     def test_without_a_reaction_it_only_diffuses(self):
         generator, laplacian = torch.Generator().manual_seed(0), LinearMap(grid_laplacian(16))
-        reaction = Reaction.random(3, 4, geometric_rates(0.01, 0.125, 3), generator)
+        tensors = {"inner": torch.ones(4, 3), "bias": torch.ones(4), "outer": torch.zeros(3, 4)}
+        reaction = Reaction(tensors, geometric_rates(0.01, 0.125, 3))
         start = reaction.start(256, laplacian, generator)
         later = reaction.evolve(start, laplacian, 50)
         assert torch.allclose(later.mean(0), start.mean(0), atol=1e-5)
         spread = later.std(0) / start.std(0)
         assert spread[0] > spread[1] > spread[2]
+
+    def test_chemicals_decay_at_first(self):
+        generator = torch.Generator().manual_seed(0)
+        reaction = Reaction.random(3, 9, geometric_rates(0.01, 0.125, 3), generator)
+        state = torch.randn(20, 3, generator=generator)
+        assert torch.allclose(reaction.speed(state), -0.1 * state, atol=1e-6)
 
     def test_rates_and_colours(self):
         assert torch.allclose(geometric_rates(0.01, 0.04, 3), torch.tensor([0.01, 0.02, 0.04]))
@@ -138,21 +145,29 @@ class TestTask:
         assert_third_step_leaves_no_trace(lambda: ReactionDiffusionTask(CONFIG, exemplar), CONFIG, fault)
 
     def test_the_pool_goes_on_and_starts_anew(self, exemplar):
-        task = ReactionDiffusionTask(replace(CONFIG, inject_every=2, pool=1), exemplar)
-        generator = torch.Generator().manual_seed(0)
-        task.loss(1, generator).commit()
-        once = task.pool.clone()
-        task.loss(1, generator).commit()
-        twice = task.pool.std() / once.std()
-        task.loss(2, generator).commit()
-        assert twice < 1 and not torch.equal(task.pool, once)
+        """Chemicals decay, and a new start has all that it began with."""
+        task = ReactionDiffusionTask(replace(CONFIG, inject_every=4, pool=1), exemplar)
+        generator, spreads = torch.Generator().manual_seed(0), []
+        for step in (1, 2, 3, 4):
+            task.loss(step, generator).commit()
+            spreads.append(float(task.pool.std()))
+        assert spreads[0] > spreads[1] > spreads[2] < 0.9 * spreads[3]
+
+    def test_a_state_that_explodes_does_not_go_back(self, exemplar):
+        task = ReactionDiffusionTask(CONFIG, exemplar)
+        before = task.pool.clone()
+        with torch.no_grad():
+            task.named["outer"].mul_(-100)
+        step = task.loss(1, torch.Generator().manual_seed(0))
+        step.commit()
+        assert step.metrics["overflow"] > 0.5 and torch.equal(task.pool, before)
 
     def test_training_comes_near(self, exemplar, tmp_path):
         heard = []
-        settings = [*SMALL[:-1], "preview_every=60", "lr=0.003", "inject_every=2"]
+        settings = [*SMALL[:-1], "preview_every=60", "lr=0.005", "hidden=16"]
         reaction_diffusion.fit(exemplar, tmp_path / "run", set=settings, steps=60, on_step=heard.append)
         losses = [report.metrics["gram"] for report in heard[1:]]
-        assert np.mean(losses[-10:]) < 0.5 * np.mean(losses[:10])
+        assert np.median(losses[-10:]) < 0.8 * np.median(losses[:10])
         assert (tmp_path / "run" / "previews" / "000060.png").is_file()
 
     def test_resuming_changes_nothing(self, exemplar, tmp_path):
@@ -166,7 +181,7 @@ class TestTask:
 
 
 def texture(channels: int = 4, **options) -> ReactionDiffusionTexture:
-    """Nothing reacts, so that blobs of colour fade."""
+    """Chemicals that decay, so that blobs of colour fade."""
     generator = torch.Generator().manual_seed(0)
     reaction = Reaction.random(channels, 5, geometric_rates(0.01, 0.1, channels), generator)
     return ReactionDiffusionTexture(reaction, **({"cells": 16, "width": 0.5} | options))

@@ -10,7 +10,7 @@ import torch.nn.functional as F
 
 from mitex.sparse import LinearMap
 
-BOUND = 1.5  # states that leave it are brought back after a while, in the training and on meshes
+BOUND = 2.0  # of states; those that leave it explode
 SHARE = 0.02  # of the cells, from which a state starts
 BLUR = 8  # steps of diffusion that make blobs of them
 HEIGHT = 4.0  # of the noise before

@@ -58,8 +58,13 @@ class ReactionDiffusionTask(ParameterTask):
         return Step(
             terms["gram"] + config.overflow_weight * terms["overflow"],
             {name: value.item() for name, value in terms.items()},
-            partial(self.pool[index].copy_, state.detach().clamp(-BOUND, BOUND)),
+            partial(self._keep, index, state.detach()),
         )
+
+    def _keep(self, index: int, state: torch.Tensor) -> None:
+        """Puts a state back into the pool, unless it has exploded."""
+        if state.abs().max() <= BOUND:
+            self.pool[index] = state
 
     def state(self) -> dict[str, torch.Tensor]:
         return super().state() | {"pool": self.pool}

@@ -28,7 +28,7 @@ from mitex.training import model_file
 
 STEPS = 500  # of time, after which patterns are in order
 MOST_STEPS = 10_000
-PERIOD = 32  # steps after which states are held within their bounds, as in the training
+PERIOD = 16  # steps after which states are held within their bounds
 MOST_CELLS = 500_000
 LAYOUT = 512  # texels that charts are packed for, as those of surface textures
 PADDING = 8  # texels by which charts are continued outwards
