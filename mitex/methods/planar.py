@@ -66,7 +66,7 @@ class PlanarTexture:
         return model_file.save(path, tensors, self.method, self.about)
 
     def apply(
-        self, mesh: Mesh, *, scale: float = 1.0, resolution: int = 1024, keep_uvs: bool = False
+        self, mesh: Mesh, *, scale: float = 1.0, resolution: int = 512, keep_uvs: bool = False
     ) -> Asset:
         """Lays the picture over the UVs of any mesh, beyond its borders again and again.
 

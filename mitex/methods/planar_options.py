@@ -22,7 +22,7 @@ class PlanarOptions(MeshOptions):
     scale: Annotated[float, arg(metavar="X")] = 1.0
     """Size of the pattern; 1 is that of a surface texture."""
 
-    resolution: Annotated[int, arg(metavar="N")] = 1024
+    resolution: Annotated[int, arg(metavar="N")] = 512
     """Side of the albedo texture [texels]."""
 
     keep_uvs: Annotated[bool, arg(help_behavior_hint="")] = False

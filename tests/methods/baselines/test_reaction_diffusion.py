@@ -125,11 +125,12 @@ class TestReaction:
         spread = later.std(0) / start.std(0)
         assert spread[0] > spread[1] > spread[2]
 
-    def test_chemicals_decay_at_first(self):
+    def test_much_of_a_chemical_decays_at_first(self):
         generator = torch.Generator().manual_seed(0)
         reaction = Reaction.random(3, 9, geometric_rates(0.01, 0.125, 3), generator)
-        state = torch.randn(20, 3, generator=generator)
-        assert torch.allclose(reaction.speed(state), -0.1 * state, atol=1e-6)
+        state = torch.tensor([[0.0, 0.1, -0.2], [2.0, -2.0, 3.0]])
+        expected = torch.tensor([[0.0, 0.0, 0.0], [-0.7, 0.7, -1.1]])
+        assert torch.allclose(reaction.speed(state), expected, atol=0.01)
 
     def test_rates_and_colours(self):
         assert torch.allclose(geometric_rates(0.01, 0.04, 3), torch.tensor([0.01, 0.02, 0.04]))
@@ -145,13 +146,12 @@ class TestTask:
         assert_third_step_leaves_no_trace(lambda: ReactionDiffusionTask(CONFIG, exemplar), CONFIG, fault)
 
     def test_the_pool_goes_on_and_starts_anew(self, exemplar):
-        """Chemicals decay, and a new start has all that it began with."""
         task = ReactionDiffusionTask(replace(CONFIG, inject_every=4, pool=1), exemplar)
         generator, spreads = torch.Generator().manual_seed(0), []
         for step in (1, 2, 3, 4):
             task.loss(step, generator).commit()
             spreads.append(float(task.pool.std()))
-        assert spreads[0] > spreads[1] > spreads[2] < 0.9 * spreads[3]
+        assert spreads[0] > spreads[1] > spreads[2] < 0.95 * spreads[3]
 
     def test_a_state_that_explodes_does_not_go_back(self, exemplar):
         task = ReactionDiffusionTask(CONFIG, exemplar)
@@ -164,10 +164,10 @@ class TestTask:
 
     def test_training_comes_near(self, exemplar, tmp_path):
         heard = []
-        settings = [*SMALL[:-1], "preview_every=60", "lr=0.005", "hidden=16"]
+        settings = [*SMALL[:-1], "preview_every=60", "lr=0.01", "hidden=16"]
         reaction_diffusion.fit(exemplar, tmp_path / "run", set=settings, steps=60, on_step=heard.append)
         losses = [report.metrics["gram"] for report in heard[1:]]
-        assert np.median(losses[-10:]) < 0.8 * np.median(losses[:10])
+        assert np.median(losses[-10:]) < 0.6 * np.median(losses[:10])
         assert (tmp_path / "run" / "previews" / "000060.png").is_file()
 
     def test_resuming_changes_nothing(self, exemplar, tmp_path):

@@ -33,7 +33,7 @@ class ReactionDiffusionConfig(TrainingConfig):
         ("relu1_1", "relu2_1", "relu3_1", "relu4_1"), "VGG-16's whose Gram matrices are compared"
     )
     overflow_weight: float = key(100.0, "of the overflow loss", 0)
-    lr: float = key(1.5e-3, "learning rate of Adam", 0)
+    lr: float = key(4e-3, "learning rate of Adam", 0)
     milestones: tuple[int, ...] = key((700, 900), "steps at which the learning rate falls", 0)
     decay: float = key(0.3, "factor of the learning rate at a milestone", 0)
 

@@ -14,7 +14,8 @@ BOUND = 2.0  # of states; those that leave it explode
 SHARE = 0.02  # of the cells, from which a state starts
 BLUR = 8  # steps of diffusion that make blobs of them
 HEIGHT = 4.0  # of the noise before
-DECAY = 0.1  # of the chemicals in a step, at the start of a training
+DECAY = 0.4  # of what is beyond FREE in a step, at the start of a training
+FREE = 0.25
 PACE = 0.1  # of the reaction in a step: small changes of the weights must not make states explode
 SLOPE = 5.0  # of the activation x sigmoid(5 x)
 
@@ -33,17 +34,19 @@ class Reaction:
 
     @staticmethod
     def random(channels: int, hidden: int, rates: torch.Tensor, generator: torch.Generator) -> Reaction:
-        """Chemicals decay at first, f(x) = -DECAY x, as far as there are two hidden units for each.
+        """Chemicals decay at first where there is much of them, if there are two hidden units for each.
 
-        Two opposite units give s(y) - s(-y) = y. A start without decay lets states explode in the training.
+        Two opposite units give s(x - FREE) - s(-x - FREE): next to nothing up to FREE, and x - FREE beyond.
+        A start without such a wall lets states explode in the training.
         """
         inner = torch.randn(hidden, channels, generator=generator) / channels**0.5
-        outer = torch.zeros(channels, hidden)
+        bias, outer = torch.zeros(hidden), torch.zeros(channels, hidden)
         pairs = min(channels, hidden // 2)
         one = torch.eye(channels)[:pairs]
         inner[: 2 * pairs] = torch.cat([one, -one])
+        bias[: 2 * pairs] = -FREE
         outer[:, : 2 * pairs] = DECAY / PACE * torch.cat([-one.T, one.T], dim=1)
-        return Reaction({"inner": inner, "bias": torch.zeros(hidden), "outer": outer}, rates)
+        return Reaction({"inner": inner, "bias": bias, "outer": outer}, rates)
 
     def speed(self, state: torch.Tensor) -> torch.Tensor:
         """f(x) of states (N, K)."""

@@ -85,7 +85,7 @@ class ReactionDiffusionTexture:
         seed: int = 0,
         steps: int = STEPS,
         scale: float = 1.0,
-        resolution: int = 1024,
+        resolution: int = 512,
         keep_uvs: bool = False,
     ) -> Asset:
         """Lets the chemicals react and diffuse on a mesh.
