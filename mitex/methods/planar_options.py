@@ -12,7 +12,7 @@ from mitex.methods.checks import in_range
 from mitex.methods.options import MeshOptions
 
 if TYPE_CHECKING:
-    from mitex.asset import Asset
+    from mitex.methods.interface import Applied
 
 
 @dataclass(kw_only=True)
@@ -32,7 +32,7 @@ class PlanarOptions(MeshOptions):
         in_range("--scale", self.scale, 0.05, 20.0)
         in_range("--resolution", self.resolution, 16, 8192)
 
-    def applied(self, out: Path) -> Asset:
+    def applied(self, out: Path) -> Applied:
         from mitex.mesh import Mesh
         from mitex.methods.registry import load
 

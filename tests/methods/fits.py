@@ -80,7 +80,7 @@ FITS = {
     "reaction_diffusion": TinyFit(
         "--exemplar photo.png --steps 2 --set channels=4 hidden=8 grid=32 exemplar_size=32 pool=1 "
         f"min_steps=1 max_steps=2 layers=relu1_1 {SMALL_RUN}",
-        "--mesh cube.obj --resolution 64 --steps 2",
+        "--mesh cube.obj --resolution 64 --steps 2 --scale 4",
     ),
     "displacement": TinyFit("--reference spikes --set resolution=16", "--mesh cube.obj", resume=""),
 }

@@ -108,7 +108,7 @@ class TestGramAverage:
         average, gram = GramAverage({"a": 2}, 0.95), torch.rand(2, 2, requires_grad=True)
         average.add({"a": torch.rand(2, 2)})
         average.blended({"a": gram})["a"].sum().backward()
-        assert torch.equal(gram.grad, torch.ones(2, 2))
+        assert gram.grad is not None and torch.equal(gram.grad, torch.ones(2, 2))
 
     def test_what_shows_the_background_is_left_out(self):
         features, coverage = torch.rand(4, 4, 3), torch.ones(8, 8)

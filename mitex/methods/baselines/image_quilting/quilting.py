@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.fft import irfft2, next_fast_len, rfft2
+from numpy.fft import irfft2, rfft2
 
 from mitex.cuts import feather, new_part, overlap_paths
 from mitex.progress import announce
@@ -68,7 +68,7 @@ class OverlapErrors:
     def __init__(self, exemplar: np.ndarray, block: int, overlap: int) -> None:
         self.block, self.overlap = block, overlap
         self.valid = exemplar.shape[0] - block + 1, exemplar.shape[1] - block + 1
-        self.shape = tuple(next_fast_len(side, real=True) for side in exemplar.shape[:2])
+        self.shape = exemplar.shape[0], exemplar.shape[1]
         values = exemplar.astype(np.float64)
         self._spectrum = rfft2(values, self.shape, axes=(0, 1))
         squares = rfft2(np.square(values).sum(2), self.shape)

@@ -68,5 +68,6 @@ def covered_gram(features: torch.Tensor, coverage: torch.Tensor | None) -> torch
     rows = features.reshape(-1, features.shape[2])
     if coverage is None:
         return gram_matrix(rows)
-    inside = torch.nn.functional.adaptive_avg_pool2d(coverage[None], features.shape[:2])[0] > FULL
+    size = features.shape[0], features.shape[1]
+    inside = torch.nn.functional.adaptive_avg_pool2d(coverage[None], size)[0] > FULL
     return gram_matrix(rows[inside.flatten()]) if inside.any() else gram_matrix(rows)
