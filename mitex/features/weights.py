@@ -13,6 +13,7 @@ VGG16_FILE = "vgg16_conv_fp16.safetensors"
 VGG16_SHA256 = "bb5788b61d3a34c37ba2a93772a503da31be4676f46e9bc45243f09542557316"
 FLOW_FILE = "flow.safetensors"
 FLOW_SHA256 = "cd69fffabcc5fd97d1d9f64742aa4644ce1a3666866a906cda6bbc3a1b5e9914"
+WORDS_FILE = "words.safetensors"
 FOLDER = Path(__file__).parents[1] / "data" / "weights"
 
 

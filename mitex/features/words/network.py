@@ -1,0 +1,97 @@
+"""Two small encoders into one space: pictures by convolutions, texts by attention."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+import torch.nn.functional as F
+from torch import nn
+
+from mitex.features.words.vocabulary import CONCEPTS, LONGEST
+
+RESOLUTION = 64  # of a picture [px]
+SIZE = 128  # of an embedding
+WIDTHS = (48, 96, 192)  # channels at 32, 16 and 8 pixels
+DEPTHS = (0, 2, 3)  # convolutions at these sizes, beside those that halve it
+HEADS = 4
+LAYERS = 2
+
+
+class ImageEncoder(nn.Module):
+    """Residual convolutions at three sizes; means over the picture at each size tell what it shows.
+
+    Smooth activations and means, no maxima and no normalisation, so that the gradient in the picture is
+    smooth and reaches every pixel.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        inputs = (3, *WIDTHS[:-1])
+        self.halving = nn.ModuleList(
+            nn.Conv2d(a, b, 5 if a == 3 else 3, 2, 2 if a == 3 else 1)
+            for a, b in zip(inputs, WIDTHS, strict=True)
+        )
+        self.trunks = nn.ModuleList(
+            nn.ModuleList(nn.Conv2d(width, width, 3, padding=1) for _ in range(depth))
+            for width, depth in zip(WIDTHS, DEPTHS, strict=True)
+        )
+        self.hidden = nn.Linear(sum(WIDTHS), 2 * SIZE)
+        self.out = nn.Linear(2 * SIZE, SIZE)
+        for parameter in self.parameters():
+            if parameter.ndim > 1:
+                nn.init.kaiming_normal_(parameter, nonlinearity="relu")
+            else:
+                nn.init.zeros_(parameter)
+        with torch.no_grad():
+            for parameter in self.trunks.parameters():
+                parameter *= 0.3  # the trunks begin near the identity
+
+    def forward(self, images: torch.Tensor) -> torch.Tensor:
+        """(K, 128) of (K, 3, 64, 64) sRGB in [0, 1]."""
+        x, means = 4 * images - 2, []
+        for halve, trunk in zip(self.halving, self.trunks, strict=True):
+            x = F.silu(halve(x))
+            for layer in trunk:
+                x = x + F.silu(layer(x))
+            means.append(x.mean((2, 3)))
+        return self.out(F.silu(self.hidden(torch.cat(means, 1))))
+
+
+class TextEncoder(nn.Module):
+    """Embeddings of concepts and of their places, two layers of attention, and the mean over the text."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.concepts = nn.Embedding(len(CONCEPTS) + 1, SIZE, padding_idx=0)
+        self.places = nn.Parameter(0.02 * torch.randn(LONGEST, SIZE))
+        layer = nn.TransformerEncoderLayer(
+            SIZE, HEADS, 2 * SIZE, dropout=0.0, activation=F.gelu, batch_first=True, norm_first=True
+        )
+        self.layers = nn.TransformerEncoder(layer, LAYERS, enable_nested_tensor=False)
+        self.out = nn.Linear(SIZE, SIZE)
+
+    def forward(self, numbers: torch.Tensor) -> torch.Tensor:
+        """(N, 128) of (N, L) places in `CONCEPTS` from 1 on, filled up with 0."""
+        said = numbers > 0
+        x = self.concepts(numbers) + self.places[: numbers.shape[1]]
+        x = self.layers(x, src_key_padding_mask=~said) * said[..., None]
+        return self.out(x.sum(1) / said.sum(1, keepdim=True))
+
+
+class WordsNetwork(nn.Module):
+    """Both encoders, with the temperature of their training."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.image, self.text = ImageEncoder(), TextEncoder()
+        self.log_scale = nn.Parameter(torch.tensor(2.7))
+
+
+_NUMBERS = {concept: number for number, concept in enumerate(CONCEPTS, 1)}
+
+
+def numbered(texts: Sequence[Sequence[str]]) -> torch.Tensor:
+    """(N, L) int64: the concepts of each text by number, filled up with 0 to the longest."""
+    longest = max(map(len, texts))
+    return torch.tensor([[_NUMBERS[c] for c in text] + [0] * (longest - len(text)) for text in texts])
