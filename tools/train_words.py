@@ -37,6 +37,7 @@ from mitex.training.optim import Adam
 SIDE = 80  # of the pictures, of which pieces are trained on [px]
 AVERAGED = 300  # steps over which the weights that are shipped are averaged
 WARM_UP = 200  # steps in which the learning rate rises
+MISLEADING = 1000  # steps in which the changes that mislead grow
 SHOWN = 50  # steps between lines of progress
 SEED = 1
 
@@ -45,11 +46,11 @@ SEED = 1
 class Config:
     """How the network is trained."""
 
-    steps: int = 4000
+    steps: int = 3500
     seed: int = 0
-    checkpoint_every: int = 200
+    checkpoint_every: int = 100
     preview_every: int = 0
-    batch: int = 256
+    batch: int = 128
     lr: float = 1e-3
     attack: float = 2.0  # largest norm of the changes that are made to mislead the network
 
@@ -96,7 +97,8 @@ class WordsTask(ParameterTask):
         images.requires_grad_()
         seed = int(torch.randint(2**31, (), generator=generator))
         value, found = self._contrast(images, [self.subjects[i] for i in chosen], seed)
-        size = self.config.attack * torch.rand(len(images), 1, 1, 1, generator=generator)
+        most = self.config.attack * min(1, step / MISLEADING)
+        size = most * torch.rand(len(images), 1, 1, 1, generator=generator)
 
         def commit() -> None:
             if fresh and images.grad is not None and self.config.attack:
@@ -126,8 +128,8 @@ class WordsTask(ParameterTask):
         captions += [describe(other(subject, rng), rng) for subject in shown]
         with torch.autocast("cpu", torch.bfloat16):
             pictures = self.network.image(images.contiguous(memory_format=torch.channels_last))
-        texts = self.network.text(numbered([caption.concepts for caption in captions]))
-        likeness = F.normalize(pictures.float(), dim=1) @ F.normalize(texts, dim=1).T
+            texts = self.network.text(numbered([caption.concepts for caption in captions]))
+        likeness = F.normalize(pictures.float(), dim=1) @ F.normalize(texts.float(), dim=1).T
         right = torch.eye(len(shown), len(captions), dtype=torch.bool)
         logits = likeness * self.network.log_scale.clamp(max=4).exp()
         logits = logits.masked_fill(true_of(captions, shown) & ~right, -math.inf)
@@ -165,7 +167,7 @@ def learn(pictures: Path, run: Path, config: Config, resume: bool) -> None:
 
     def show(progress: Progress) -> None:
         if progress.step % SHOWN < 2:
-            print(f"step {progress.step}, {progress.record}, {progress.seconds:.0f} s", flush=True)
+            print(f"step {progress.step}, {progress.metrics}, {progress.seconds:.0f} s", flush=True)
 
     task = WordsTask(config, np.load(pictures, allow_pickle=False))
     train(task, config, run, lr=lr, optimizer=ClippedAdam, resume=resume, control=Control(on_step=show))

@@ -12,7 +12,7 @@ from mitex.features.words.vocabulary import CONCEPTS, LONGEST
 
 RESOLUTION = 64  # of a picture [px]
 SIZE = 128  # of an embedding
-WIDTHS = (48, 96, 192)  # channels at 32, 16 and 8 pixels
+WIDTHS = (32, 64, 160)  # channels at 32, 16 and 8 pixels
 DEPTHS = (0, 2, 3)  # convolutions at these sizes, beside those that halve it
 HEADS = 4
 LAYERS = 2
