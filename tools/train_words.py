@@ -23,12 +23,13 @@ import torch
 import torch.nn.functional as F
 from safetensors.torch import save_file
 from word_augmentation import augmented
-from word_captions import describe, other, true_of
+from word_captions import VALUES, describe, other, true_of
+from word_patterns import KINDS
 from word_pictures import Subject, draw_subject, render
 from word_retrieval import retrieval
 
 from mitex.features.weights import FOLDER, WORDS_FILE
-from mitex.features.words.network import RESOLUTION, WordsNetwork, numbered
+from mitex.features.words.network import RESOLUTION, SIZE, WordsNetwork, numbered
 from mitex.paths import atomic_write
 from mitex.training import ParameterTask, Step, checkpoint, train
 from mitex.training.control import Control, Progress
@@ -37,8 +38,9 @@ from mitex.training.optim import Adam
 SIDE = 80  # of the pictures, of which pieces are trained on [px]
 AVERAGED = 300  # steps over which the weights that are shipped are averaged
 WARM_UP = 200  # steps in which the learning rate rises
-MISLEADING = 1000  # steps in which the changes that mislead grow
+MISLEADING = (1500, 2500)  # steps between which the changes that mislead grow
 SHOWN = 50  # steps between lines of progress
+ALIKE = 16  # pictures of the same two colours in a row: only their patterns tell them apart
 SEED = 1
 
 
@@ -46,12 +48,12 @@ SEED = 1
 class Config:
     """How the network is trained."""
 
-    steps: int = 3500
+    steps: int = 4500
     seed: int = 0
     checkpoint_every: int = 100
     preview_every: int = 0
     batch: int = 128
-    lr: float = 1e-3
+    lr: float = 1.5e-3
     attack: float = 2.0  # largest norm of the changes that are made to mislead the network
 
 
@@ -63,6 +65,14 @@ def subjects(count: int) -> list[Subject]:
         if not subject.held_out:
             drawn.append(subject)
     return drawn
+
+
+def _alike(subjects: list[Subject]) -> list[list[int]]:
+    """Places of the subjects that have the same two colours."""
+    places: dict[tuple[str, ...], list[int]] = {}
+    for i, subject in enumerate(subjects):
+        places.setdefault(tuple(sorted((subject.figure, subject.ground))), []).append(i)
+    return list(places.values())
 
 
 class ClippedAdam(Adam):
@@ -86,9 +96,12 @@ class WordsTask(ParameterTask):
         self.config, self.network = config, WordsNetwork()
         self.network.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
         self.pictures, self.subjects = pictures, subjects(len(pictures))
+        self.alike = _alike(self.subjects)
         self.again: tuple[torch.Tensor, list[int]] | None = None
-        super().__init__(dict(self.network.named_parameters()))
-        self.average = {name: value.detach().clone() for name, value in self.named.items()}
+        self.heads = torch.nn.ModuleDict({key: torch.nn.Linear(SIZE, len(VALUES[key])) for key in VALUES})
+        heads = {f"heads.{name}": value for name, value in self.heads.named_parameters()}
+        super().__init__(dict(self.network.named_parameters()) | heads)
+        self.average = {name: value.detach().clone() for name, value in self.network.named_parameters()}
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
         """One batch; the metric is the share of pictures whose caption is found among all."""
@@ -96,12 +109,13 @@ class WordsTask(ParameterTask):
         images, chosen = self._draw(generator) if self.again is None else self.again
         images.requires_grad_()
         seed = int(torch.randint(2**31, (), generator=generator))
-        value, found = self._contrast(images, [self.subjects[i] for i in chosen], seed)
-        most = self.config.attack * min(1, step / MISLEADING)
+        value, metrics = self._contrast(images, [self.subjects[i] for i in chosen], seed)
+        begin, end = MISLEADING
+        most = self.config.attack * min(1, max(0, step - begin) / (end - begin))
         size = most * torch.rand(len(images), 1, 1, 1, generator=generator)
 
         def commit() -> None:
-            if fresh and images.grad is not None and self.config.attack:
+            if fresh and images.grad is not None and most:
                 slope = images.grad / images.grad.flatten(1).norm(dim=1).clamp(min=1e-12)[:, None, None, None]
                 self.again = (images.detach() + size * slope).clamp(0, 1), chosen
             else:
@@ -109,16 +123,20 @@ class WordsTask(ParameterTask):
             for name, average in self.average.items():
                 average.lerp_(self.named[name].detach(), max(1 / (1 + step), 1 / AVERAGED))
 
-        return Step(value, {f"found_{'fresh' if fresh else 'misled'}": found}, commit)
+        return Step(value, {f"{name}_{'fresh' if fresh else 'misled'}": number for name, number in metrics.items()}, commit)
 
     def _draw(self, generator: torch.Generator) -> tuple[torch.Tensor, list[int]]:
-        chosen = torch.randint(len(self.pictures), (self.config.batch,), generator=generator).tolist()
+        rng = np.random.default_rng(int(torch.randint(2**31, (), generator=generator)))
+        chosen = rng.integers(len(self.pictures), size=self.config.batch).tolist()
+        for start in range(0, self.config.batch // 2, ALIKE):
+            same = self.alike[rng.integers(len(self.alike))]
+            chosen[start : start + ALIKE] = rng.choice(same, ALIKE).tolist()
         images = torch.from_numpy(self.pictures[chosen]).permute(0, 3, 1, 2) / 255
         return augmented(images, RESOLUTION, generator), chosen
 
     def _contrast(
         self, images: torch.Tensor, shown: list[Subject], seed: int
-    ) -> tuple[torch.Tensor, float]:
+    ) -> tuple[torch.Tensor, dict[str, float]]:
         """InfoNCE both ways; each picture has one more text, which is nearly right, to be told from its own.
 
         Texts that happen to be true of a picture as well do not count.
@@ -136,7 +154,22 @@ class WordsTask(ParameterTask):
         target = torch.arange(len(shown))
         own = logits[:, : len(shown)]
         loss = (F.cross_entropy(logits, target) + F.cross_entropy(own.T, target)) / 2
-        return loss, (logits.argmax(1) == target).float().mean().item()
+        attributes, kinds = self._attributes(pictures.float(), shown)
+        found = (logits.argmax(1) == target).float().mean().item()
+        return loss + attributes, {"found": found, "kinds": kinds}
+
+    def _attributes(self, pictures: torch.Tensor, shown: list[Subject]) -> tuple[torch.Tensor, float]:
+        """How well linear maps tell the attributes, which teaches the patterns faster; the share of right ones."""
+        losses, right = [], 0.0
+        for key, head in self.heads.items():
+            told = torch.tensor([VALUES[key].index(getattr(s, key)) for s in shown])
+            logits = head(pictures)
+            if key in ("figure", "ground"):  # which of them is which cannot be told in all patterns
+                told[torch.tensor([KINDS[s.kind].equal for s in shown])] = -100
+            if key == "kind":
+                right = (logits.argmax(1) == told).float().mean().item()
+            losses.append(F.cross_entropy(logits, told))
+        return torch.stack(losses).sum() / 3, right
 
     def state(self) -> dict[str, torch.Tensor]:
         return super().state() | {f"average/{name}": value for name, value in self.average.items()}

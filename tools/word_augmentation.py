@@ -26,7 +26,7 @@ def augmented(images: torch.Tensor, side: int, generator: torch.Generator) -> to
     coarse = torch.randn(len(images), 3, side // 8, side // 8, generator=generator)
     coarse = F.interpolate(coarse, size=side, mode="bilinear", align_corners=False)
     fine = torch.randn(pieces.shape, generator=generator)
-    return (pieces + _often(uniform, 0.5) * 0.08 * fine + _often(uniform, 0.3) * 0.06 * coarse).clamp(0, 1)
+    return (pieces + _often(uniform, 0.5) * 0.06 * fine + _often(uniform, 0.3) * 0.06 * coarse).clamp(0, 1)
 
 
 def _often(uniform, share: float) -> torch.Tensor:

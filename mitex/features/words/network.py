@@ -13,31 +13,36 @@ from mitex.features.words.vocabulary import CONCEPTS, LONGEST
 RESOLUTION = 64  # of a picture [px]
 SIZE = 128  # of an embedding
 WIDTHS = (32, 64, 160)  # channels at 32, 16 and 8 pixels
+KERNELS = (6, 4, 4)  # of the convolutions that halve the size
 DEPTHS = (0, 2, 3)  # convolutions at these sizes, beside those that halve it
+AROUND = 8  # pixels over which contrast is measured, and twice as many in part [px]
+NOISE = 0.06  # standard deviation below which contrast counts as noise
 HEADS = 4
 LAYERS = 2
 
 
 class ImageEncoder(nn.Module):
-    """Residual convolutions at three sizes; means over the picture at each size tell what it shows.
+    """Residual convolutions of colours and of what is left of them when brightness and contrast are normalised.
 
-    Smooth activations and means, no maxima and no normalisation, so that the gradient in the picture is
-    smooth and reaches every pixel.
+    There are three sizes; every place votes for what is there, and the mean vote counts.
+    Smooth activations and means, no maxima and no normalisation, and strides that divide the filters' widths,
+    so that the gradient in the picture is smooth and reaches every pixel. Since the vote is local, a picture
+    fits a text best when it does so everywhere.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        inputs = (3, *WIDTHS[:-1])
+        inputs = (6, *WIDTHS[:-1])
         self.halving = nn.ModuleList(
-            nn.Conv2d(a, b, 5 if a == 3 else 3, 2, 2 if a == 3 else 1)
-            for a, b in zip(inputs, WIDTHS, strict=True)
+            nn.Conv2d(a, b, kernel, 2, kernel // 2 - 1)
+            for a, b, kernel in zip(inputs, WIDTHS, KERNELS, strict=True)
         )
         self.trunks = nn.ModuleList(
             nn.ModuleList(nn.Conv2d(width, width, 3, padding=1) for _ in range(depth))
             for width, depth in zip(WIDTHS, DEPTHS, strict=True)
         )
-        self.hidden = nn.Linear(sum(WIDTHS), 2 * SIZE)
-        self.out = nn.Linear(2 * SIZE, SIZE)
+        self.hidden = nn.Conv2d(sum(WIDTHS), 2 * SIZE, 1)
+        self.out = nn.Conv2d(2 * SIZE, SIZE, 1)
         for parameter in self.parameters():
             if parameter.ndim > 1:
                 nn.init.kaiming_normal_(parameter, nonlinearity="relu")
@@ -49,13 +54,32 @@ class ImageEncoder(nn.Module):
 
     def forward(self, images: torch.Tensor) -> torch.Tensor:
         """(K, 128) of (K, 3, 64, 64) sRGB in [0, 1]."""
-        x, means = 4 * images - 2, []
+        x, levels = torch.cat([4 * images - 2, normalised_contrast(images)], 1), []
         for halve, trunk in zip(self.halving, self.trunks, strict=True):
             x = F.silu(halve(x))
             for layer in trunk:
                 x = x + F.silu(layer(x))
-            means.append(x.mean((2, 3)))
-        return self.out(F.silu(self.hidden(torch.cat(means, 1))))
+            levels.append(x)
+        coarse = [F.avg_pool2d(level, level.shape[2] // x.shape[2]) for level in levels]
+        return self.out(F.silu(self.hidden(torch.cat(coarse, 1)))).mean((2, 3))
+
+
+def normalised_contrast(images: torch.Tensor) -> torch.Tensor:
+    """(I - mean) / sqrt(variance + NOISE^2), from about 16 pixels around: patterns look alike in all colours.
+
+    Args:
+        images: (K, 3, 64, 64) in [0, 1]; the variance is that of all three channels.
+
+    Returns:
+        (K, 3, 64, 64), about -3 to 3.
+    """
+    centred = images - _around(images)
+    return centred / (_around(centred.square().mean(1, keepdim=True)) + NOISE**2).sqrt()
+
+
+def _around(images: torch.Tensor) -> torch.Tensor:
+    coarse = F.avg_pool2d(images, AROUND)
+    return F.interpolate(coarse, scale_factor=float(AROUND), mode="bilinear", align_corners=False)
 
 
 class TextEncoder(nn.Module):
@@ -64,7 +88,7 @@ class TextEncoder(nn.Module):
     def __init__(self) -> None:
         super().__init__()
         self.concepts = nn.Embedding(len(CONCEPTS) + 1, SIZE, padding_idx=0)
-        self.places = nn.Parameter(0.02 * torch.randn(LONGEST, SIZE))
+        self.places = nn.Parameter(torch.randn(LONGEST, SIZE))
         layer = nn.TransformerEncoderLayer(
             SIZE, HEADS, 2 * SIZE, dropout=0.0, activation=F.gelu, batch_first=True, norm_first=True
         )
