@@ -1,6 +1,6 @@
 """Pictures that the embedded text-image model leads to: what its gradient knows of the words.
 
-    python tools/make_words_sheet.py OUT.jpg ["red dots on white" ...]
+python tools/make_words_sheet.py OUT.jpg ["red dots on white" ...]
 """
 
 from __future__ import annotations
@@ -76,7 +76,9 @@ def _pieces(picture: torch.Tensor, side: int, generator: torch.Generator) -> tor
 
 def sheet(pictures: list[np.ndarray]) -> np.ndarray:
     """The pictures in rows, twice as large."""
-    large = [np.pad(p.repeat(2, 0).repeat(2, 1), ((4, 4), (4, 4), (0, 0)), constant_values=1) for p in pictures]
+    large = [
+        np.pad(p.repeat(2, 0).repeat(2, 1), ((4, 4), (4, 4), (0, 0)), constant_values=1) for p in pictures
+    ]
     large += [np.ones_like(large[0])] * (-len(large) % COLUMNS)
     rows = [np.concatenate(large[i : i + COLUMNS], 1) for i in range(0, len(large), COLUMNS)]
     return np.concatenate(rows)

@@ -123,7 +123,11 @@ class WordsTask(ParameterTask):
             for name, average in self.average.items():
                 average.lerp_(self.named[name].detach(), max(1 / (1 + step), 1 / AVERAGED))
 
-        return Step(value, {f"{name}_{'fresh' if fresh else 'misled'}": number for name, number in metrics.items()}, commit)
+        return Step(
+            value,
+            {f"{name}_{'fresh' if fresh else 'misled'}": number for name, number in metrics.items()},
+            commit,
+        )
 
     def _draw(self, generator: torch.Generator) -> tuple[torch.Tensor, list[int]]:
         rng = np.random.default_rng(int(torch.randint(2**31, (), generator=generator)))

@@ -218,7 +218,9 @@ def plaid(p: Place) -> Drawn:
     across, down = stripes(p).figure, stripes(p._replace(u=p.v)).figure
     lines = torch.maximum(*(p.edge(0.04 - (x.remainder(1.0) - 0.02).abs()) for x in (p.u, p.v)))
     return Drawn(
-        torch.maximum((across + down) / 2, lines), p.seed.expand_as(p.u), 0.3 * smooth_noise(p.u * 8, p.v * 8, p.seed)
+        torch.maximum((across + down) / 2, lines),
+        p.seed.expand_as(p.u),
+        0.3 * smooth_noise(p.u * 8, p.v * 8, p.seed),
     )
 
 
@@ -312,7 +314,11 @@ def speckles(p: Place) -> Drawn:
 
 
 def wood(p: Place) -> Drawn:
-    bent = p.u + 0.9 * smooth_noise(p.u * 0.4, p.v * 0.12, p.seed) + 0.5 * smooth_noise(p.u, p.v * 0.3, p.seed + 1)
+    bent = (
+        p.u
+        + 0.9 * smooth_noise(p.u * 0.4, p.v * 0.12, p.seed)
+        + 0.5 * smooth_noise(p.u, p.v * 0.3, p.seed + 1)
+    )
     ring = bent.remainder(1.0) ** 1.6
     fibre = smooth_noise(p.u * 12, p.v * 0.8, p.seed + 2) - 0.5
     return Drawn((ring + 0.35 * fibre).clamp(0, 1), p.seed.expand_as(p.u), 1 - ring)
@@ -320,7 +326,9 @@ def wood(p: Place) -> Drawn:
 
 def fur(p: Place) -> Drawn:
     bent = warped(p, 1.2, 1.5)
-    hair = (smooth_noise(bent.u * 5, bent.v * 0.8, p.seed) + smooth_noise(bent.u * 9, bent.v * 1.3, p.seed + 1)) / 2
+    hair = (
+        smooth_noise(bent.u * 5, bent.v * 0.8, p.seed) + smooth_noise(bent.u * 9, bent.v * 1.3, p.seed + 1)
+    ) / 2
     hair = ((hair - 0.5) * 2.6 + 0.5).clamp(0, 1)
     return Drawn(hair, smooth_noise(bent.u * 5, bent.v * 0.8, p.seed + 2), hair)
 
@@ -352,7 +360,9 @@ KINDS = {
     "hearts": Kind(hearts),
     "triangles": Kind(triangles),
     "crosses": Kind(crosses),
-    "leaves": Kind(leaves, usual=(("green", "brown"), ("green", "dark green"), ("light green", "dark green"))),
+    "leaves": Kind(
+        leaves, usual=(("green", "brown"), ("green", "dark green"), ("light green", "dark green"))
+    ),
     "stripes": Kind(stripes, equal=True, directed=True),
     "waves": Kind(waves, equal=True, directed=True),
     "zigzag": Kind(zigzag, equal=True, directed=True),
@@ -370,9 +380,19 @@ KINDS = {
     "cracks": Kind(cracks, elements=False),
     "blotches": Kind(blotches),
     "clouds": Kind(clouds, equal=True, elements=False, usual=(("white", "light blue"), ("white", "blue"))),
-    "marble": Kind(marble, elements=False, usual=(("grey", "white"), ("dark grey", "white"), ("white", "black"))),
+    "marble": Kind(
+        marble, elements=False, usual=(("grey", "white"), ("dark grey", "white"), ("white", "black"))
+    ),
     "speckles": Kind(speckles),
-    "wood": Kind(wood, equal=True, directed=True, elements=False, usual=(("brown", "light brown"), ("dark brown", "brown"))),
-    "fur": Kind(fur, equal=True, directed=True, elements=False, usual=(("brown", "dark brown"), ("grey", "dark grey"))),
+    "wood": Kind(
+        wood,
+        equal=True,
+        directed=True,
+        elements=False,
+        usual=(("brown", "light brown"), ("dark brown", "brown")),
+    ),
+    "fur": Kind(
+        fur, equal=True, directed=True, elements=False, usual=(("brown", "dark brown"), ("grey", "dark grey"))
+    ),
     "maze": Kind(maze, elements=False),
 }

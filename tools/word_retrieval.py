@@ -35,7 +35,9 @@ def full(subject: Subject, rng: np.random.Generator) -> list[str]:
     return phrase(said, KINDS[subject.kind].equal, rng)
 
 
-def likeness(network: WordsNetwork, subjects: list[Subject], texts: list[list[str]], seed: int) -> torch.Tensor:
+def likeness(
+    network: WordsNetwork, subjects: list[Subject], texts: list[list[str]], seed: int
+) -> torch.Tensor:
     """(pictures, texts) cosines."""
     images = torch.from_numpy(render(subjects, RESOLUTION, seed)).permute(0, 3, 1, 2) / 255
     pictures = torch.cat([network.image(part) for part in images.split(64)])

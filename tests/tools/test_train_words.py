@@ -14,7 +14,14 @@ from mitex.features.words import concepts, words_model
 from mitex.features.words.vocabulary import LONGEST, PATTERNS
 
 TOOLS = Path(__file__).parents[2] / "tools"
-MODULES = ("word_augmentation", "word_captions", "word_patterns", "word_pictures", "word_retrieval", "train_words")
+MODULES = (
+    "word_augmentation",
+    "word_captions",
+    "word_patterns",
+    "word_pictures",
+    "word_retrieval",
+    "train_words",
+)
 
 
 @pytest.fixture
