@@ -63,10 +63,10 @@ def _picture(levels: list[torch.Tensor]) -> torch.Tensor:
 
 
 def _pieces(picture: torch.Tensor, side: int, generator: torch.Generator) -> torch.Tensor:
-    """(PIECES, 3, side, side): squares of two thirds to the whole of the picture, which goes on over its borders."""
+    """(PIECES, 3, side, side): squares of half to the whole width of the picture, which repeats itself."""
     shifts = torch.randint(SIDE, (2,), generator=generator).tolist()
     picture = picture.roll(shifts, (2, 3))
-    scale = 0.67 + 0.33 * torch.rand(PIECES, generator=generator)
+    scale = 0.5 + 0.5 * torch.rand(PIECES, generator=generator)
     shift = (1 - scale) * (2 * torch.rand(2, PIECES, generator=generator) - 1)
     none = torch.zeros(PIECES)
     frames = torch.stack([scale, none, shift[0], none, scale, shift[1]], 1).view(PIECES, 2, 3)

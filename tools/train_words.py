@@ -4,10 +4,11 @@
     python tools/train_words.py train PICTURES.npy RUN [--steps N] [--resume]
     python tools/train_words.py finish RUN
 
-`draw` makes the pictures: about six minutes for 36,000 on two cores, 700 MB. `train` takes about 45 minutes
-and leaves checkpoints in the folder RUN, from which `--resume` goes on. `finish` takes the averaged weights of
-the last checkpoint, also while a training runs. It prints how often the right text is found for a picture, and
-writes the weights into the package; their SHA-256 belongs into `mitex/features/weights.py`.
+`draw` makes 36,000 pictures in about two minutes, 700 MB. `train` takes about 40 minutes beside other work
+and leaves checkpoints in the folder RUN, from which `--resume` goes on; beside other work, one thread is best
+(OMP_NUM_THREADS=1). `finish` takes the averaged weights of the last checkpoint, also while a training runs.
+It prints how often the right text is found for a picture, and writes the weights into the package; their
+SHA-256 belongs into `mitex/features/weights.py`.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ from mitex.training.optim import Adam
 
 SIDE = 80  # of the pictures, of which pieces are trained on [px]
 AVERAGED = 300  # steps over which the weights that are shipped are averaged
-WARM_UP = 200  # steps in which the learning rate rises
-MISLEADING = (1500, 2500)  # steps between which the changes that mislead grow
+WARM_UP = 100  # steps in which the learning rate rises
+MISLEADING = (1200, 2000)  # steps between which the changes that mislead grow
 SHOWN = 50  # steps between lines of progress
 ALIKE = 16  # pictures of the same two colours in a row: only their patterns tell them apart
 SEED = 1
@@ -48,12 +49,12 @@ SEED = 1
 class Config:
     """How the network is trained."""
 
-    steps: int = 4500
+    steps: int = 3400
     seed: int = 0
     checkpoint_every: int = 100
     preview_every: int = 0
     batch: int = 128
-    lr: float = 1.5e-3
+    lr: float = 3e-3
     attack: float = 2.0  # largest norm of the changes that are made to mislead the network
 
 
@@ -101,7 +102,8 @@ class WordsTask(ParameterTask):
         self.heads = torch.nn.ModuleDict({key: torch.nn.Linear(SIZE, len(VALUES[key])) for key in VALUES})
         heads = {f"heads.{name}": value for name, value in self.heads.named_parameters()}
         super().__init__(dict(self.network.named_parameters()) | heads)
-        self.average = {name: value.detach().clone() for name, value in self.network.named_parameters()}
+        self.learned = {k: v for k, v in self.network.state_dict().items() if v.is_floating_point()}
+        self.average = {name: value.detach().clone() for name, value in self.learned.items()}
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
         """One batch; the metric is the share of pictures whose caption is found among all."""
@@ -121,7 +123,7 @@ class WordsTask(ParameterTask):
             else:
                 self.again = None
             for name, average in self.average.items():
-                average.lerp_(self.named[name].detach(), max(1 / (1 + step), 1 / AVERAGED))
+                average.lerp_(self.learned[name], max(1 / (1 + step), 1 / AVERAGED))
 
         return Step(
             value,
@@ -163,7 +165,7 @@ class WordsTask(ParameterTask):
         return loss + attributes, {"found": found, "kinds": kinds}
 
     def _attributes(self, pictures: torch.Tensor, shown: list[Subject]) -> tuple[torch.Tensor, float]:
-        """How well linear maps tell the attributes, which teaches the patterns faster; the share of right ones."""
+        """How well linear maps tell the attributes, for a faster training; the share of right patterns."""
         losses, right = [], 0.0
         for key, head in self.heads.items():
             told = torch.tensor([VALUES[key].index(getattr(s, key)) for s in shown])
@@ -176,12 +178,14 @@ class WordsTask(ParameterTask):
         return torch.stack(losses).sum() / 3, right
 
     def state(self) -> dict[str, torch.Tensor]:
-        return super().state() | {f"average/{name}": value for name, value in self.average.items()}
+        averages = {f"average/{name}": value for name, value in self.average.items()}
+        return self.learned | super().state() | averages
 
     def load_state(self, state: dict[str, torch.Tensor]) -> None:
         super().load_state(state)
         for name, value in self.average.items():
             value.copy_(state[f"average/{name}"])
+            self.learned[name].copy_(state[name])
 
     def metadata(self) -> dict[str, str]:
         return {"method": "words"}
@@ -213,16 +217,17 @@ def learn(pictures: Path, run: Path, config: Config, resume: bool) -> None:
 def finish(run: Path) -> None:
     """Measures the averaged weights as they are shipped, in half precision, and writes them."""
     saved = checkpoint.load(run)
-    network = WordsNetwork().requires_grad_(False)
-    names = network.state_dict()
-    halves = {name: saved.task[f"average/{name}"].half().contiguous() for name in names}
-    network.load_state_dict({name: value.float() for name, value in halves.items()})
+    network = WordsNetwork().requires_grad_(False).eval()
+    averages = {k.removeprefix("average/"): v for k, v in saved.task.items() if k.startswith("average/")}
+    network.load_state_dict(averages, strict=False)  # all but the counts of batches
+    network.half().float()
     about = {"training_steps": str(saved.step), "training_seconds": f"{saved.seconds:.0f}"}
     for name, share in retrieval(network).items():
         print(f"{name:32} {100 * share:.1f} %")
         about[name.replace(" ", "_")] = f"{share:.3f}"
     path = FOLDER / WORDS_FILE
     with atomic_write(path) as temporary:
+        halves = {name: value.contiguous() for name, value in network.half().state_dict().items()}
         save_file(halves, temporary, about)
     print(about, path.stat().st_size, hashlib.sha256(path.read_bytes()).hexdigest())
 

@@ -69,7 +69,7 @@ def told_apart(network: WordsNetwork, key: str, values: list[str | bool], seed: 
 
 
 def order(network: WordsNetwork, seed: int) -> float:
-    """The share of held-out pictures for which the right one of "red dots on white" and the reverse is told."""
+    """The share of held-out pictures of "red dots on white" that are not taken for "white dots on red"."""
     subjects = held_out(
         CHOICES,
         seed,

@@ -12,7 +12,7 @@ from mitex.features.words.model import WordsModel, words_model
 from mitex.images import resize
 
 PIECES = ((0.0, 0.0, 1.0), (0.15, 0.0, 0.7), (0.25, 0.1, 0.5))
-"""Squares that are looked at: left, top, width, as parts of the picture's. A thumbnail's ball is above its foot."""
+"""Squares that are looked at: left, top, width, as parts of the picture's. Thumbnails show balls on feet."""
 
 
 @torch.no_grad()

@@ -69,5 +69,5 @@ def words_model() -> WordsModel:
     path = weights.words_path()
     weights.verify(path, weights.WORDS_SHA256)
     network = WordsNetwork()
-    network.load_state_dict({name: value.float() for name, value in load_file(path).items()})
+    network.load_state_dict(load_file(path))
     return WordsModel(network)

@@ -22,46 +22,43 @@ LAYERS = 2
 
 
 class ImageEncoder(nn.Module):
-    """Residual convolutions of colours and of what is left of them when brightness and contrast are normalised.
+    """Residual convolutions at three sizes; every place votes for what is there, and the mean vote counts.
 
-    There are three sizes; every place votes for what is there, and the mean vote counts.
-    Smooth activations and means, no maxima and no normalisation, and strides that divide the filters' widths,
-    so that the gradient in the picture is smooth and reaches every pixel. Since the vote is local, a picture
-    fits a text best when it does so everywhere.
+    They see the colours, and what is left of them when brightness and contrast are normalised. Smooth
+    activations and means, no maxima, and strides that divide the filters' widths, so that the gradient in the
+    picture is smooth and reaches every pixel. Since votes are local, a picture fits a text best when it does
+    so everywhere. Batch normalisation is but a scale and a shift once it is trained.
     """
 
     def __init__(self) -> None:
         super().__init__()
         inputs = (6, *WIDTHS[:-1])
         self.halving = nn.ModuleList(
-            nn.Conv2d(a, b, kernel, 2, kernel // 2 - 1)
-            for a, b, kernel in zip(inputs, WIDTHS, KERNELS, strict=True)
+            _convolution(a, b, kernel, 2) for a, b, kernel in zip(inputs, WIDTHS, KERNELS, strict=True)
         )
         self.trunks = nn.ModuleList(
-            nn.ModuleList(nn.Conv2d(width, width, 3, padding=1) for _ in range(depth))
+            nn.ModuleList(_convolution(width, width, 3, 1) for _ in range(depth))
             for width, depth in zip(WIDTHS, DEPTHS, strict=True)
         )
-        self.hidden = nn.Conv2d(sum(WIDTHS), 2 * SIZE, 1)
+        self.hidden = _convolution(sum(WIDTHS), 2 * SIZE, 1, 1)
         self.out = nn.Conv2d(2 * SIZE, SIZE, 1)
-        for parameter in self.parameters():
-            if parameter.ndim > 1:
-                nn.init.kaiming_normal_(parameter, nonlinearity="relu")
-            else:
-                nn.init.zeros_(parameter)
-        with torch.no_grad():
-            for parameter in self.trunks.parameters():
-                parameter *= 0.3  # the trunks begin near the identity
 
     def forward(self, images: torch.Tensor) -> torch.Tensor:
         """(K, 128) of (K, 3, 64, 64) sRGB in [0, 1]."""
         x, levels = torch.cat([4 * images - 2, normalised_contrast(images)], 1), []
         for halve, trunk in zip(self.halving, self.trunks, strict=True):
-            x = F.silu(halve(x))
+            x = halve(x)
             for layer in trunk:
-                x = x + F.silu(layer(x))
+                x = x + layer(x)
             levels.append(x)
         coarse = [F.avg_pool2d(level, level.shape[2] // x.shape[2]) for level in levels]
-        return self.out(F.silu(self.hidden(torch.cat(coarse, 1)))).mean((2, 3))
+        return self.out(self.hidden(torch.cat(coarse, 1))).mean((2, 3))
+
+
+def _convolution(inputs: int, outputs: int, kernel: int, stride: int) -> nn.Sequential:
+    layer = nn.Conv2d(inputs, outputs, kernel, stride, (kernel - 1) // 2, bias=False)
+    nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
+    return nn.Sequential(layer, nn.BatchNorm2d(outputs), nn.SiLU())
 
 
 def normalised_contrast(images: torch.Tensor) -> torch.Tensor:

@@ -10,16 +10,22 @@ from mitex.suggestions import suggestion
 
 LONGEST = 16  # concepts of a text
 
-COLOURS = (
+
+def _listed(words: str) -> tuple[str, ...]:
+    return tuple(words.split())
+
+
+COLOURS = _listed(
     "red orange yellow green cyan blue purple pink brown beige black grey white dark light colourful"
-).split()
-PATTERNS = (
-    "plain dots rings stars flowers hearts triangles crosses leaves stripes waves zigzag checks diamonds bricks "
-    "grid plaid weave knit scales hexagons pebbles mosaic cracks blotches clouds marble speckles wood fur maze"
-).split()
-OTHERS = (
+)
+PATTERNS = _listed(
+    "plain dots rings stars flowers hearts triangles crosses leaves stripes waves zigzag checks diamonds "
+    "bricks grid plaid weave knit scales hexagons pebbles mosaic cracks blotches clouds marble speckles wood "
+    "fur maze"
+)
+OTHERS = _listed(
     "small medium large matte shiny metallic rough relief vertical horizontal diagonal on with and in object"
-).split()
+)
 CONCEPTS = (*COLOURS, *PATTERNS, *OTHERS)
 """What the text encoder has embeddings of, in their order in the weights; position 0 is no word."""
 
@@ -83,7 +89,7 @@ _SYNONYMS = {
     "diagonal": "slanted oblique",
     "on": "over onto upon",
     "with": "having",
-    "object": "sphere ball balls bunny chair vase mug cube cylinder torus teapot egg alien shape octopus knot",
+    "object": "sphere ball bunny chair vase mug cube cylinder torus teapot egg alien shape octopus knot mesh",
 }
 _PHRASES = {
     "navy": "dark blue",
@@ -119,11 +125,11 @@ _PHRASES = {
     "fish scales": "scales",
     "brick wall": "bricks",
     "chess board": "checks",
-}  # fmt: skip
-_STOP = frozenset(
-    "a an the of made from image picture photo rendering render 3d texture textured pattern patterned surface "
-    "material background ground cover covered coloured colored colour color style skin bright fabric cloth some very "
-    "is its it to by that has".split()
+}
+_STOP = _listed(
+    "a an the of made from image picture photo rendering render 3d texture textured pattern patterned "
+    "surface material background ground cover covered coloured colored colour color style skin bright fabric cloth "
+    "some very is its it to by that has"
 )
 
 
