@@ -128,8 +128,8 @@ _PHRASES = {
 }
 _STOP = _listed(
     "a an the of made from image picture photo rendering render 3d texture textured pattern patterned "
-    "surface material background ground cover covered coloured colored colour color style skin bright fabric cloth "
-    "some very is its it to by that has"
+    "surface material background ground cover covered coloured colored colour color style skin bright "
+    "fabric cloth some very is its it to by that has"
 )
 
 
