@@ -48,7 +48,7 @@ class ImageEncoder(nn.Module):
         x, levels = torch.cat([4 * images - 2, normalised_contrast(images)], 1), []
         for halve, trunk in zip(self.halving, self.trunks, strict=True):
             x = halve(x)
-            for layer in trunk:
+            for layer in trunk.children():
                 x = x + layer(x)
             levels.append(x)
         coarse = [F.avg_pool2d(level, level.shape[2] // x.shape[2]) for level in levels]
