@@ -50,7 +50,7 @@ WEIGHTS = {"kind": 2.0}  # of what linear maps tell: patterns are the hardest
 class Config:
     """How the network is trained."""
 
-    steps: int = 3800
+    steps: int = 3300
     seed: int = 0
     checkpoint_every: int = 100
     preview_every: int = 0
