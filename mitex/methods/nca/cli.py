@@ -155,6 +155,9 @@ class Apply(OptionalMeshOptions):
     keep_dense: Annotated[bool, arg(help_behavior_hint="")] = False
     """Write the subdivided, rounded mesh instead of the given one."""
 
+    displace: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Move the vertices by the relief of a texture from words; best with --keep-dense."""
+
     variants: Annotated[int, arg(metavar="N")] = 1
     """Looks that a .glb offers on the one mesh, each with the next seed (KHR_materials_variants)."""
 
@@ -199,6 +202,7 @@ class Apply(OptionalMeshOptions):
             "--resolution": self.resolution is not None,
             "--vertex-colors": self.vertex_colors,
             "--keep-dense": self.keep_dense,
+            "--displace": self.displace,
             "--variants": self.variants > 1,
         }
         for option, used in others.items():
@@ -269,6 +273,7 @@ class Apply(OptionalMeshOptions):
             "scale": self.scale,
             "resolution": (self.resolution or RESOLUTION) if textures else None,
             "keep_dense": self.keep_dense,
+            "displace": self.displace,
             "field": self.field,
             "speed": self.speed,
         }

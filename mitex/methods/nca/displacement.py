@@ -7,6 +7,9 @@ change by a few pixels.
 
 from __future__ import annotations
 
+from collections.abc import Container, Mapping
+from typing import Any
+
 import numpy as np
 import torch
 import torch.nn.functional as F
@@ -50,3 +53,9 @@ class Relief:
         of the surface's curvature (Blinn 1978). Differentiable in the heights.
         """
         return F.normalize(self.plain - self.slopes(height), dim=1)
+
+
+def known_relief(about: Mapping[str, Any], maps: Container[str]) -> float:
+    """The bound of a texture's relief [edges], as its file tells; 0 if its height is a map and no more."""
+    bound = about.get("relief")
+    return float(bound) if isinstance(bound, int | float) and bound > 0 and "height" in maps else 0.0
