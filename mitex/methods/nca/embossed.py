@@ -57,6 +57,7 @@ class Embossed(Grown):
         return Relief(self.cells.mesh, self.bound)
 
     @cached_property
+    @torch.no_grad()
     def _height(self) -> torch.Tensor:
         """(V,) at the vertices of the automaton's mesh."""
         values = self._decoded(vertex_points(self.cells.mesh))
