@@ -35,6 +35,7 @@ def no_other_models(monkeypatch, tmp_path):
 def run(tmp_path_factory, clip):
     out = tmp_path_factory.mktemp("fit") / "run"
     settings = [*SETTINGS, "steps=4", "preview_every=4", "checkpoint_every=2"]
+    threads(1)
     return out, nca.fit_text(TEXT, out, clip=clip, set=settings)
 
 
