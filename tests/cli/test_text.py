@@ -2,7 +2,9 @@
 
 import pytest
 
+from mitex.asset import clay
 from mitex.cli import main
+from mitex.mesh import icosphere
 from tests.cli.refusals import check_refused
 from tests.features.clip.folders import write_folder
 
@@ -14,11 +16,12 @@ TINY = (
 
 @pytest.fixture
 def files(tmp_path, monkeypatch):
-    """A folder to work in, with a CLIP model and an image."""
+    """A folder to work in, with a CLIP model and a mesh."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("HF_HUB_CACHE", str(tmp_path / "hub"))
     monkeypatch.delenv("MITEX_CLIP", raising=False)
     write_folder(tmp_path / "clip")
+    clay(icosphere(3)).export("ball.ply")
     return tmp_path
 
 
@@ -27,9 +30,9 @@ def test_from_words_to_a_file(files, capsys):
     assert main(words) == 0
     assert capsys.readouterr().out == "runs/red-dots-on-red\n"
     assert main([*words[:6], "--resume", "--steps", "3", "--out", "runs/red-dots-on-red", "--quiet"]) == 0
-    apply = "apply runs/red-dots-on-red --mesh vase --out vase.glb --resolution 64 --steps 2 --quiet"
+    apply = "apply runs/red-dots-on-red --mesh ball.ply --out ball.glb --resolution 64 --steps 2 --quiet"
     assert main([*apply.split(), "--displace"]) == 0
-    assert (files / "vase.glb").stat().st_size > 10_000
+    assert (files / "ball.glb").stat().st_size > 10_000
 
 
 @pytest.mark.parametrize(
