@@ -1,4 +1,4 @@
-"""What makes the work of the pages' commands small, and the file that they name.
+"""What makes the work of the pages' commands small, and the files that they name.
 
 Nothing of a command or a snippet is changed. What takes minutes is made small below it, whoever calls it:
 
@@ -24,6 +24,7 @@ from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods.registry import methods
 from mitex.training.run import CONFIG
 from tests.cli.test_nerf import save
+from tests.features.clip.folders import write_folder
 
 STEPS, RESUMED_STEPS = 2, 3
 GROWTH = 2  # steps of an automaton
@@ -40,8 +41,9 @@ TINY: dict[str, dict[str, Any]] = {
 
 
 def prepare(folder: Path) -> None:
-    """Writes the file that pages name and that the user brings along."""
+    """Writes the files that pages name and that the user brings along."""
     save(icosphere(6), folder / "bunny.obj")
+    write_folder(folder / "models" / "clip-b32")
 
 
 def shrink(patch: pytest.MonkeyPatch) -> None:

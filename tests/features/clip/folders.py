@@ -35,7 +35,7 @@ def config(projection_dim: int, image_size: int, patch_size: int, **options: Any
         "hidden_act": options.get("hidden_act", "quick_gelu"),
     }
     ids = vocabulary()
-    text = {"vocab_size": len(ids), "max_position_embeddings": 40, "bos_token_id": ids[START]}
+    text = {"vocab_size": len(ids), "max_position_embeddings": 77, "bos_token_id": ids[START]}
     return {
         "model_type": "clip",
         "projection_dim": projection_dim,
