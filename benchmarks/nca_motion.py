@@ -1,9 +1,10 @@
-"""What motion adds to a training step of MeshNCA, by each way to measure it.
+"""What motion adds to a training step of MeshNCA, by each way to measure it, and to a growing texture.
 
-Run it as `python -m benchmarks.nca_motion`: the states of one rollout on a sphere of 10,242 cells, and what
-tells how far they are from moving along a field, forward and backward. The transport residual looks at all of
-them, the others at pictures of the last two. All runs in one process on the same threads; every number is the
-best of its repetitions.
+Run it as `python -m benchmarks.nca_motion`. First come the states of one rollout on a sphere of 10,242 cells,
+and what tells how far they are from moving along a field, forward and backward. The transport residual looks
+at all of them, the others at pictures of the last two. Then come steps of a finished automaton on spheres of
+10,242 and of 40,962 cells, with a field and without. All runs in one process on the same threads; every
+number is the best of its repetitions.
 """
 
 from __future__ import annotations
@@ -18,7 +19,11 @@ from rich.table import Table
 
 from benchmarks.nca import best, cpu
 from mitex.exemplar import Exemplar
+from mitex.mesh import icosphere
 from mitex.methods.nca import PRESETS, NcaTexture
+from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.growth import LookGrowth
+from mitex.methods.nca.motion.condition import cell_vectors
 from mitex.methods.nca.motion.drift import Drift, draw_drift
 from mitex.methods.nca.motion.estimator import load_estimator
 from mitex.methods.nca.motion.start import with_condition
@@ -27,6 +32,8 @@ from mitex.runtime import let_idle_threads_sleep
 
 MODEL = "lava"
 ESTIMATORS = ("advection", "lucas-kanade", "flow")
+FREQUENCIES = (32, 64)  # of the spheres that textures grow on
+GROWTH = 50  # steps
 
 
 class Motion:
@@ -71,6 +78,18 @@ class Motion:
         torch.autograd.grad(self.task.loss(1, self._generator()).value, self.task.parameters)
 
 
+def steps_per_second(frequency: int, moving: bool, repetitions: int) -> float:
+    """Of a finished automaton on a sphere."""
+    look = NcaTexture.load(MODEL).look
+    look = with_condition(look) if moving else look
+    mesh = icosphere(frequency)
+    cells, generator = Cells.of(mesh, 0), torch.Generator().manual_seed(0)
+    vectors = torch.from_numpy(cell_vectors(mesh, mesh, "right", 1.0)) if moving else None
+    growth = LookGrowth(look, cells, condition=vectors)
+    state = growth.evolve(growth.seed(), 1, generator)
+    return 1e3 * GROWTH / best(lambda: growth.evolve(state, GROWTH, generator), repetitions)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -90,7 +109,11 @@ def main() -> None:
     table = Table("preset `motion`, forward + backward", "ms", "share, %")
     for name, milliseconds in times.items():
         table.add_row(name, f"{milliseconds:.0f}", f"{100 * milliseconds / list(times.values())[-1]:.0f}")
-    Console().print(cpu(), table)
+    growth = Table("cells", "steps/s, still", "steps/s, moving")
+    for frequency in (8,) if options.quick else FREQUENCIES:
+        rates = [steps_per_second(frequency, moving, repetitions) for moving in (False, True)]
+        growth.add_row(f"{10 * frequency**2 + 2:,}", *(f"{rate:.0f}" for rate in rates))
+    Console().print(cpu(), table, growth)
 
 
 if __name__ == "__main__":

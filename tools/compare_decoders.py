@@ -58,6 +58,7 @@ def main() -> None:
     write_image(GALLERY / "nca-decoders.jpg", sheet(cells, columns=4, labels=labels, cell=CELL))
 
 
+@torch.no_grad()
 def views(texture: NcaTexture) -> tuple[np.ndarray, np.ndarray]:
     """The albedo on a sphere: as wide as the exemplar, and an eighth of that."""
     mesh = icosphere(FREQUENCY)

@@ -7,6 +7,8 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
 - meshes that ship with Mitex are balls of 362 vertices, as large as they and under their names;
 - automata grow for 2 steps on the mesh as it is, are not healed, and are baked at 64 texels;
 - films have 4 frames of 32 pixels;
+- the photos that pages name are 8 of a ball in 24 x 24 pixels, which is its own base shape; its texture is
+  joined from 30 patches to 128 texels;
 - pictures are traced in 16 x 16 pixels with one path each, and enlarged.
 """
 
@@ -25,6 +27,7 @@ from mitex.methods.registry import methods
 from mitex.training.run import CONFIG
 from tests.cli.test_nerf import save
 from tests.features.clip.folders import write_folder
+from tests.methods.nerf.tiny import tiny_capture, write_capture
 
 STEPS, RESUMED_STEPS = 2, 3
 GROWTH = 2  # steps of an automaton
@@ -36,19 +39,30 @@ TINY: dict[str, dict[str, Any]] = {
     "nca": {"frequency": 4, "pool": 1, "view_count": 1, "zooms": 1, "min_steps": 2, "max_steps": 2}
     | {"resolution": 32, "target_size": 32, "exemplar_size": 32, "layers": ("relu1_1",), "order_weight": 0.0},
     "surface": {"resolution": 32, "exemplar_size": 32, "scales": 0, "layers": ("relu1_1",)},
+    "nerf": {
+        "base_steps": 2,
+        "rays": 64,
+        "ray_steps": 64,
+        "table": 10,
+        "coarsest": 4,
+        "finest": 8,
+        "occupancy": 16,
+    },
     "geometric": {"level_steps": 2, "fit_steps": 10, "fit_samples": 100},
 }
 
 
 def prepare(folder: Path) -> None:
-    """Writes the files that pages name and that the user brings along."""
+    """Writes the files that pages name and that the user brings along, or has from a script."""
     save(icosphere(6), folder / "bunny.obj")
     write_folder(folder / "models" / "clip-b32")
+    write_capture(tiny_capture(views=8, side=24, spp=1), folder / "captures" / "cobbles")
 
 
 def shrink(patch: pytest.MonkeyPatch) -> None:
     """Makes the work small until the patch is undone."""
     from mitex.methods.nca import NcaTexture, texture
+    from mitex.methods.nerf import NerfTexture, fitting
     from mitex.render import renderer, shell
     from mitex.training import fit
 
@@ -59,6 +73,8 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(texture, "film", _with_few_frames(texture.film))
     patch.setattr(texture.GrowingTexture, "apply", _small_growth(texture.GrowingTexture.apply))
     patch.setattr(NcaTexture, "tile", _small_tile(NcaTexture.tile))
+    patch.setattr(fitting, "find_base", lambda *_, **__: _ball_as_base())
+    patch.setattr(NerfTexture, "synthesize", _small_quilt(NerfTexture.synthesize))
     sketch, sensor = _with_few_paths(renderer.accumulated), renderer.sensor
     for module in (renderer, shell):
         patch.setattr(module, "accumulated", sketch)
@@ -112,6 +128,20 @@ def _small_growth(apply: Callable[..., Any]) -> Callable[..., Any]:
 def _small_tile(tile: Callable[..., Any]) -> Callable[..., Any]:
     def small(texture: Any, resolution: int = TEXELS, **options: Any) -> Any:
         return tile(texture, TEXELS, **options | {"steps": GROWTH})
+
+    return small
+
+
+def _ball_as_base() -> Any:
+    from mitex.methods.nerf.base.coarse import BaseShape
+
+    ball = icosphere(30)
+    return BaseShape(Mesh(0.7 * ball.vertices, ball.faces, name="ball"), 0.68 * ball.vertices, thickness=0.1)
+
+
+def _small_quilt(synthesize: Callable[..., Any]) -> Callable[..., Any]:
+    def small(texture: Any, size: Any = 128, *others: Any, **options: Any) -> Any:
+        return synthesize(texture, 128, *others, **options | {"patches": 30})
 
     return small
 

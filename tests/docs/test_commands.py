@@ -4,8 +4,7 @@ The blocks of a page are run in their order in one folder, Python in one namespa
 is run by its own command line; `make`, `pip` and `python` are looked up: the target, the extra, the script.
 `small.py` says what is made small meanwhile. A comment before a block marks one that cannot be run:
 
-    <!-- not run: why -->       commands are parsed by the real command line, also those for a texture that
-                                the block would learn, Python is compiled
+    <!-- not run: why -->       commands are parsed by the real command line, Python is compiled
     <!-- part of: file -->      each line stands in that file of the repository
 """
 
@@ -21,7 +20,6 @@ from mitex.cli.usage import parse
 from mitex.methods.registry import methods
 from tests.docs import small
 from tests.docs.blocks import PAGES, PROGRAMS, ROOT, Block, blocks
-from tests.methods.nerf.small import small_texture
 
 LANGUAGES = {"python", "sh", "toml", "json", "text", ""}
 EXTRAS = set(tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"])
@@ -47,18 +45,12 @@ def place(tmp_path, monkeypatch, own_cache, quick_settling, toy):
     return tmp_path
 
 
-@pytest.fixture(scope="module")
-def learned(tmp_path_factory):
-    """Model files by the method that a marked block learns with."""
-    return {"nerf": small_texture().save(tmp_path_factory.mktemp("learned") / "texture.safetensors")}
-
-
 @pytest.mark.parametrize("page", RUN, ids=lambda page: str(page.relative_to(ROOT)))
-def test_a_page_runs_as_it_stands(page, place, learned, capsys):
+def test_a_page_runs_as_it_stands(page, place, capsys):
     names = {"__name__": "__main__"}
     for block in blocks(page):
         if block.mark:
-            check_marked(block, learned)
+            check_marked(block)
         elif block.language == "python":
             exec(compile(block.text, block.place, "exec"), names)
         elif block.language == "sh":
@@ -85,7 +77,7 @@ def run(words, place, capsys):
             pytest.fail(f"{place}: {program} is none of {', '.join(PROGRAMS)}")
 
 
-def check_marked(block: Block, learned):
+def check_marked(block: Block):
     """As far as a block is checked that is not run."""
     kind, text = block.mark or ("", "")
     if kind == "part of":
@@ -95,13 +87,9 @@ def check_marked(block: Block, learned):
     elif block.language == "python":
         ast.parse(block.text, block.place)
     elif block.language == "sh":
-        runs = {}
         for program, *words in block.commands():
             if program == "mitex":
-                if words[0] == "fit" and words[1] in learned:
-                    runs[words[words.index("--out") + 1]] = str(learned[words[1]])
-                # A model has the options of its method, so there has to be one.
-                call = commands.find([runs.get(word, word) for word in words])
+                call = commands.find(words)
                 parse(call.command, call.words, call.program)
 
 

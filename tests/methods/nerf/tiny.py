@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 from functools import cache
+from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from mitex.mesh import Mesh, Similarity, icosphere
 from mitex.methods.nerf.capture.capture import Capture
@@ -42,6 +45,18 @@ def bumpy(amplitude: float = 0.08, frequency: int = 24) -> Mesh:
 def tiny_capture(views: int = 16, side: int = 48, spp: int = 16, seed: int = 0) -> Capture:
     """`views` pictures of the ball from all around, side x side."""
     return captured(bumpy(), views, side, spp, seed)
+
+
+def write_capture(capture: Capture, folder: Path) -> None:
+    """Writes a capture in the layout of NeRF-synthetic; its world is the scene cube."""
+    folder.mkdir(parents=True)
+    frames = []
+    for name, image, pose in zip(capture.names, capture.images, capture.poses, strict=True):
+        Image.fromarray(image).save(folder / name)
+        frames.append({"file_path": name, "transform_matrix": [*pose.tolist(), [0, 0, 0, 1]]})
+    fx, fy, cx, cy = capture.intrinsics[0].tolist()
+    camera = {"fl_x": fx, "fl_y": fy, "cx": cx, "cy": cy}
+    (folder / "transforms.json").write_text(json.dumps({**camera, "frames": frames}))
 
 
 def captured(mesh: Mesh, views: int, side: int, spp: int, seed: int = 0) -> Capture:

@@ -1,0 +1,170 @@
+"""Measures how textures of `nca` flow on meshes: where to, how fast, and what is left of the look.
+
+usage: python tools/compare_motion.py MOVING:STILL ... [--fields F ...] [--meshes M ...]
+
+MOVING and STILL are models, run folders or bundled names; STILL is the texture that MOVING was trained from.
+Close-ups of the albedo, four pixels an edge of the cells' mesh, are taken some steps apart. Lucas and
+Kanade's method estimates the motion between them, which is compared with that of the field. The look is
+compared with the exemplar, by the Frechet distance of VGG-16's features at relu2_2, some steps after the
+pattern is in order, as a multiple of the still texture's. Prints a Markdown table.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from mitex.errors import ConfigError
+from mitex.evaluation.metrics import single_image_frechet
+from mitex.evaluation.motion import measured_motion
+from mitex.exemplar import Exemplar
+from mitex.geometry.triangles import interpolate
+from mitex.geometry.vectors import scatter_add
+from mitex.mesh import Mesh, icosphere
+from mitex.methods.nca import NcaTexture
+from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.growth import Growth
+from mitex.scenes.cameras import Cameras, patch_views
+from mitex.scenes.screen import screen_motion
+from mitex.scenes.stage import Stage
+
+SPHERE = "sphere"
+FREQUENCY = 32  # of the sphere that textures are trained on
+VIEWS, SIDE, PIXELS = 6, 128, 4  # close-ups, their side [px], and pixels an edge
+FRAMES, STEPS = 4, 4  # of a film, and steps of the automaton between two of them
+LATER = (50, 500, 1000)  # steps after which the look is compared
+
+
+@dataclass(frozen=True, eq=False)
+class CloseUps:
+    """Places of a surface that cameras look at.
+
+    Attributes:
+        cells: the automaton's mesh, which is the one that is seen.
+        edge: mean length of the edges at each vertex (V,).
+    """
+
+    cells: Cells
+    edge: np.ndarray
+    cameras: Cameras
+    hit: np.ndarray
+    face: np.ndarray
+    barycentric: np.ndarray
+
+    @staticmethod
+    def of(mesh: Mesh) -> CloseUps:
+        fine = Cells.dense(mesh).mesh
+        rows, columns = fine.edges.rows, fine.edges.indices
+        lengths = np.linalg.norm(fine.vertices[rows] - fine.vertices[columns], axis=1)
+        edge = scatter_add(rows, lengths[:, None], len(fine.vertices))[:, 0] / np.diff(fine.edges.indptr)
+        half = 0.5 * SIDE / PIXELS * float(np.median(edge))
+        cameras = patch_views(torch.Generator().manual_seed(0), fine, VIEWS, half, SIDE)
+        hits = Stage(fine).hits(cameras, 1)
+        arrays = hits.hit.numpy(), hits.face.numpy(), hits.barycentric.numpy()
+        return CloseUps(Cells(fine, 0, fine), edge, cameras, *arrays)
+
+    @property
+    def covered(self) -> np.ndarray:
+        """(K, H, W) bool."""
+        return self.hit.reshape(self.cameras.shape)
+
+    def pictures(self, growth: Growth, state: torch.Tensor) -> np.ndarray:
+        """The albedo (K, H, W, 3) of a state, black where there is no surface."""
+        grown = growth.shown(state)
+        albedo = grown.maps(grown.values(self.face, self.barycentric))["albedo"]
+        return self._image(albedo)
+
+    def target(self, field: np.ndarray) -> np.ndarray:
+        """Motion (K, H, W, 2) of the cells' vectors (V, 3), of which 1 is an edge [px]."""
+        mesh = self.cells.mesh
+        corners = mesh.faces[self.face]
+        velocities = interpolate(self.barycentric, (field * self.edge[:, None])[corners])
+        points = interpolate(self.barycentric, mesh.vertices[corners].astype(np.float64))
+        camera = np.repeat(np.arange(len(self.cameras)), SIDE * SIDE)[self.hit]
+        return self._image(screen_motion(self.cameras, camera, points, velocities))
+
+    def _image(self, values: np.ndarray) -> np.ndarray:
+        image = np.zeros((len(self.hit), values.shape[1]), np.float32)
+        image[self.hit] = values
+        return image.reshape(*self.cameras.shape, -1)
+
+
+def motion_of(texture: NcaTexture, closeups: CloseUps, field: str) -> tuple[float, float, list[float]]:
+    """Direction error [degrees], speed ratio, and distances from the exemplar after `LATER`."""
+    condition = texture.condition(closeups.cells, field)
+    if condition is None:
+        raise ConfigError(f"{texture.about['name']} does not move", "train it with `motion`")
+    growth = texture.growth(closeups.cells, 0.0, condition)
+    generator = torch.Generator().manual_seed(0)
+    state = growth.evolve(growth.seed(), texture.steps, generator)
+    period = float(texture.about["motion_period"])
+    target = closeups.target(condition.numpy().astype(np.float64))
+    films = np.stack(list(film(growth, state, closeups)), axis=1)
+    errors = [
+        measured_motion(frames, motion, covered, steps=STEPS, period=period)
+        for frames, motion, covered in zip(films, target, closeups.covered, strict=True)
+        if covered.mean() > 0.5
+    ]
+    looks = []
+    for before, after in zip((0, *LATER), LATER, strict=False):
+        state = growth.evolve(state, after - before, generator)
+        looks.append(distance(texture, closeups, growth, state))
+    direction, ratio = (
+        float(np.mean([getattr(e, key) for e in errors])) for key in ("direction", "speed_ratio")
+    )
+    return direction, ratio, looks
+
+
+def film(growth: Growth, state: torch.Tensor, closeups: CloseUps) -> Iterator[np.ndarray]:
+    """Close-ups (K, H, W, 3), `STEPS` apart."""
+    generator = torch.Generator().manual_seed(1)
+    for _ in range(FRAMES):
+        yield closeups.pictures(growth, state)
+        state = growth.evolve(state, STEPS, generator)
+
+
+def distance(texture: NcaTexture, closeups: CloseUps, growth: Growth, state: torch.Tensor) -> float:
+    """Mean Frechet distance of close-ups from the exemplar, as wide as it is there."""
+    pixels = round(PIXELS * float(texture.about["density"]))
+    exemplar = Exemplar.load(texture.about["exemplar"]).resized(pixels).maps["albedo"]
+    pictures = closeups.pictures(growth, state)
+    whole = [view for view, covered in zip(pictures, closeups.covered, strict=True) if covered.all()]
+    return float(np.mean([single_image_frechet(exemplar, view) for view in whole]))
+
+
+def still_distance(texture: NcaTexture, closeups: CloseUps) -> float:
+    """The same of a still texture, once its pattern is in order."""
+    growth = texture.growth(closeups.cells)
+    state = growth.evolve(growth.seed(), texture.steps, torch.Generator().manual_seed(0))
+    return distance(texture, closeups, growth, state)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("models", nargs="+")
+    parser.add_argument("--fields", nargs="+", default=["right", "about-x", "shear-up"])
+    parser.add_argument("--meshes", nargs="+", default=[SPHERE, "octopus", "vase"])
+    arguments = parser.parse_args()
+    later = " | ".join(f"look after {steps:,}" for steps in LATER)
+    print(f"| texture | mesh | field | direction | speed | {later} |\n" + "| --- " * (5 + len(LATER)) + "|")
+    for mesh_name in arguments.meshes:
+        mesh = icosphere(FREQUENCY) if mesh_name == SPHERE else Mesh.load(mesh_name)
+        closeups = CloseUps.of(mesh)
+        for pair in arguments.models:
+            moving, still = (NcaTexture.load(name) for name in pair.split(":"))
+            reference = still_distance(still, closeups)
+            for field in arguments.fields:
+                direction, ratio, looks = motion_of(moving, closeups, field)
+                numbers = " | ".join(f"{look / reference:.2f}" for look in looks)
+                names = f"{moving.about['name']} | {Path(mesh_name).stem} | {field}"
+                print(f"| {names} | {direction:.0f}° | {ratio:.2f} | {numbers} |", flush=True)
+
+
+if __name__ == "__main__":
+    with torch.no_grad():
+        main()
