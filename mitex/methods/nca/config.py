@@ -220,7 +220,7 @@ PRESETS["motion-paper"] = replace(
 PRESETS["text"] = replace(
     DEFAULT,
     preset="text",
-    text="",
+    text="red dots on white",
     steps=1000,
     views="full",
     surfaces=("even", "uneven"),
@@ -234,7 +234,7 @@ PRESETS["text"] = replace(
 PRESETS["text-paper"] = replace(
     PRESETS["paper"],
     preset="text-paper",
-    text="",
+    text="red dots on white",
     pool=64,
     inject_every=32,
     view_count=8,
