@@ -69,12 +69,9 @@ class TextTask(PoolTask):
         look = initial_look(config, MAPS, init, device)
         surfaces = training_surfaces(config, look) if mesh is None else [training_mesh(mesh, look)]
         super().__init__(config, look, surfaces, lineage)
-        self.figures = {
-            surface: Figure(surface, config.text_relief, device)
-            for surface in surfaces
-            if isinstance(surface, TrainingSphere)
-        }
-        self._edges = {surface: _edges(surface.mesh, device) for surface in self.figures}
+        self.spheres = [surface for surface in surfaces if isinstance(surface, TrainingSphere)]
+        self.figures = {sphere: Figure(sphere, config.text_relief, device) for sphere in self.spheres}
+        self._edges = {sphere: _edges(sphere.mesh, device) for sphere in self.spheres}
         self._negatives: dict[tuple[TrainingSphere, int], Negative] = {}
 
     def _texts(self, config: NcaConfig) -> tuple[torch.Tensor, torch.Tensor]:

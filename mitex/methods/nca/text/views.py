@@ -92,8 +92,8 @@ class Figure:
         height = corners[:, layout["height"][0]]
         shade = self._shade(self.relief.normals(height), points, hit, cameras)
         coloured = shade * values[:, list(layout["albedo"])].clamp(0, 1)
-        pictures = (_picture(colours, hit, cameras) for colours in (coloured, shade * GREY))
-        return Views(*pictures, values, height)
+        plain = shade * GREY
+        return Views(_picture(coloured, hit, cameras), _picture(plain, hit, cameras), values, height)
 
     def _seen(self, cameras: Cameras) -> tuple[torch.Tensor, Points]:
         """Which pixels meet the surface, (K H W,) bool, and where."""

@@ -139,6 +139,8 @@ def test_bad_input_leaves_nothing_behind(clip, tmp_path, text, options, error, p
 
 
 def test_settings_for_words_are_refused_for_an_exemplar():
-    for options in ({"preset": "text"}, {"set": ["text=red"]}):
-        with pytest.raises(ConfigError, match="the settings are for words, not for an exemplar"):
-            nca.fit("lava", **options)
+    problem = "the settings are for words, not for an exemplar"
+    with pytest.raises(ConfigError, match=problem):
+        nca.fit("lava", preset="text")
+    with pytest.raises(ConfigError, match=problem):
+        nca.fit("lava", set=["text=red"])

@@ -60,8 +60,9 @@ def test_an_empty_text_and_presets_for_exemplars():
 
 def test_a_text_that_is_given_twice():
     assert worded({}, "red", None) == {"set": {"text": "red"}, "preset": "text"}
-    assert worded({"set": ["text=red"], "preset": "text-paper"}, "red", "words")["preset"] == "text-paper"
-    assert worded({"resume": True}, "red", None)["preset"] is None
+    paper = worded({"set": ["text=red"], "preset": "text-paper"}, "red", "words")
+    assert paper == {"set": {"text": "red", "text_model": "words"}, "preset": "text-paper"}
+    assert worded({"resume": True}, "red", None).get("preset", "") is None
     with pytest.raises(ConfigError, match="text is set to green and to red; give it once"):
         worded({"set": ["text=green"]}, "red", None)
     with pytest.raises(ConfigError, match="text_model is set to a and to b"):
