@@ -33,8 +33,8 @@ def text_scores(
 
     Args:
         model: of texts and images.
-        pictures: (K, R, R, 3) sRGB in [0, 1], R the model's resolution: the object from all sides, in 24 views
-            in the paper.
+        pictures: (K, R, R, 3) sRGB in [0, 1], R the model's resolution: the object from all sides, 24 views in
+            the paper.
         bare: (K, R, R, 3), the same views of the object in grey.
         text: such as "an image of a vase made of bark".
         thing: the object's name.
