@@ -33,7 +33,7 @@ def text_scores(
 
     Args:
         model: of texts and images.
-        pictures: (K, R, R, 3) sRGB in [0, 1], R the model's resolution: the object from all sides, 24 views in
+        pictures: (K, R, R, 3) sRGB in [0, 1], R the model's resolution: the object from all sides, as 24 in
             the paper.
         bare: (K, R, R, 3), the same views of the object in grey.
         text: such as "an image of a vase made of bark".
