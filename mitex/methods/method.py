@@ -61,13 +61,14 @@ class Method:
 
     @property
     def learns_from(self) -> str:
-        """The option of `mitex fit` that names what it learns from: the one that must be given."""
-        return next(one.name for one in fields(self.load_fit()) if _is_required(one))
+        """The option of `mitex fit` that names what it learns from: the one that must be given, if any."""
+        fit = self.load_fit()
+        return fit.source or next(one.name for one in fields(fit) if _is_required(one))
 
     @property
     def fits_to_mesh(self) -> bool:
         """Whether a fit is of one mesh, rather than for any that its texture is put on later."""
-        return any(one.name == "mesh" for one in fields(self.load_fit()))
+        return self.load_fit().fits_to_mesh
 
     @property
     def resumes(self) -> bool:

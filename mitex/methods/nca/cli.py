@@ -43,6 +43,7 @@ class Fit(TrainingOptions):
     """
 
     only_at_start: ClassVar[frozenset[str]] = frozenset({"init"})
+    source: ClassVar[str | None] = "exemplar"
 
     exemplar: Annotated[str | None, arg(metavar="IMAGE|DIR|NAME", help_behavior_hint="")] = None
     """PNG or JPEG, a folder with any of albedo, height, normal, roughness, ambient_occlusion, or a name."""

@@ -123,6 +123,8 @@ class FitOnMesh(Fit):
 
     name: ClassVar[str] = "inlay"
 
+    fits_to_mesh: ClassVar[bool] = True
+
     mesh: Annotated[str, arg(metavar="MESH")]
     """A file."""
 
