@@ -39,6 +39,7 @@ ORDER = [
     "images",
     "colour",
     "runtime",
+    "cuts",
     "sparse",
     "cache",
     "cache_entries",
@@ -61,6 +62,7 @@ LAZY = {
 # What belongs to a baseline -> the method that it is compared with, and further baselines that it needs.
 COMPARED = {
     "displacement": {"geometric"},
+    "multi_view_gram": {"surface"},
     "quilted": {"nerf"},
     "plain_field": {"nerf"},
 }

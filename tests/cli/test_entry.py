@@ -207,7 +207,8 @@ class TestUsage:
             (
                 ["fit", "--exemplar", "a.png"],
                 "`mitex fit` knows no method '--exemplar'; use one of geometric, nca, nerf, surface, "
-                "displacement, plain_field, quilted",
+                "displacement, gatys, image_quilting, multi_view_gram, plain_field, quilted, "
+                "reaction_diffusion",
             ),
             (["fit", "nca"], "--exemplar is missing; see `mitex fit nca --help`"),
             (["apply"], "RUN|MODEL is missing; see `mitex apply --help`"),

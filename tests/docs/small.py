@@ -31,6 +31,7 @@ from mitex.methods.registry import methods
 from mitex.training.run import CONFIG
 from tests.cli.test_nerf import save
 from tests.docs.blocks import ROOT, blocks
+from tests.features.clip.folders import write_folder
 from tests.methods.nerf.tiny import tiny_capture, write_capture
 
 STEPS, RESUMED_STEPS = 2, 3
@@ -43,6 +44,10 @@ TINY: dict[str, dict[str, Any]] = {
     "nca": {"frequency": 4, "pool": 1, "view_count": 1, "zooms": 1, "min_steps": 2, "max_steps": 2}
     | {"resolution": 32, "target_size": 32, "exemplar_size": 32, "layers": ("relu1_1",), "order_weight": 0.0},
     "surface": {"resolution": 32, "exemplar_size": 32, "scales": 0, "layers": ("relu1_1",)},
+    "gatys": {"size": 32, "exemplar_size": 32, "layers": ("relu1_1",)},
+    "multi_view_gram": {"resolution": 32, "exemplar_size": 32, "view": 32, "layers": ("relu1_1",)},
+    "reaction_diffusion": {"hidden": 8, "channels": 4, "grid": 32, "exemplar_size": 32, "pool": 1}
+    | {"min_steps": 2, "max_steps": 2, "layers": ("relu1_1",)},
     "nerf": {
         "base_steps": 2,
         "rays": 64,
@@ -59,6 +64,7 @@ TINY: dict[str, dict[str, Any]] = {
 def prepare(folder: Path) -> None:
     """Writes the files that pages name and that the user brings along, or has from a script."""
     save(icosphere(6), folder / "bunny.obj")
+    write_folder(folder / "models" / "clip-b32")
     write_capture(tiny_capture(views=8, side=24, spp=1), folder / "captures" / "cobbles")
     plan = next(block for block in blocks(ROOT / "docs" / "batch.md") if block.language == "toml")
     (folder / "plan.toml").write_text(plan.text)
