@@ -15,7 +15,6 @@ from mitex.batch.inputs import Input, digest, find
 from mitex.batch.plan import MethodPlan, Plan
 from mitex.errors import ConfigError
 from mitex.methods.method import Method
-from mitex.methods.options import ExemplarOptions
 from mitex.methods.registry import methods
 
 RESULTS = "results"  # folder of what the jobs write, in the batch folder
@@ -144,7 +143,7 @@ def _exemplar_names(method: Method) -> list[str] | None:
     """The exemplars that ship with Mitex; None for methods that learn from something else."""
     from mitex.exemplar import names
 
-    return names() if issubclass(method.load_fit(), ExemplarOptions) else None
+    return names() if method.learns_from == "exemplar" else None
 
 
 def _mesh_names() -> list[str]:
