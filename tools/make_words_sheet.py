@@ -30,7 +30,7 @@ TEXTS = (
     "yellow stars on dark blue",
 )
 SIDE = 96  # of a picture [px]
-STEPS = 400
+STEPS = 250
 PIECES = 8  # that are compared with the text in each step
 COLUMNS = 6
 START = "grey"

@@ -33,6 +33,8 @@ def test_places_of_words_count_and_filling_does_not():
     with torch.no_grad():
         one = text(numbered([["red", "dots", "on", "white"]]))
         other = text(numbered([["white", "dots", "on", "red"]]))
-        filled = text(numbered([["red", "dots", "on", "white"], ["red", "dots", "on", "white", "and", "blue"]]))
+        filled = text(
+            numbered([["red", "dots", "on", "white"], ["red", "dots", "on", "white", "and", "blue"]])
+        )
     assert torch.allclose(one[0], filled[0], atol=1e-5)
     assert (one - other).norm() > 0.01 * one.norm()
