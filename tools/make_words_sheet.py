@@ -21,57 +21,63 @@ TEXTS = (
     "small blue dots on yellow",
     "black and white zigzag",
     "large green stripes on beige",
+    "red and white checks",
     "red brick wall",
-    "stained glass",
     "lava",
     "black rings on orange",
-    "grey pebbles",
+    "colourful mosaic on black",
     "blue scales",
     "yellow stars on dark blue",
 )
-SIDE = 96  # of a picture [px]
-STEPS = 400
-PIECES = 8  # that are compared with the text in each step
+TILE = 48  # of a picture, which repeats it two by two [px]
+LEVELS = 4
+STEPS = 120
+PIECES = 6  # that are compared with the text in each step
+NOISE = 0.04  # that is added to the pieces
 COLUMNS = 6
-START = "grey"
 
 
-def optimised(model: WordsModel, text: str, seed: int = 0, steps: int = STEPS) -> np.ndarray:
-    """A picture for a text, (96, 96, 3) sRGB in [0, 1], from grey, by the directions of both from grey.
+def optimised(model: WordsModel, text: str, seed: int = 0) -> np.ndarray:
+    """A picture for a text, (96, 96, 3) sRGB in [0, 1], from noise, by the cosine of random pieces and text.
 
-    It is a sum of grids of all sizes, and random pieces of it are compared, so that no single pixel matters.
+    Its tile is a sum of grids of several sizes, so that the gradient may change what is large as well.
     """
     generator = torch.Generator().manual_seed(seed)
-    sizes = [SIDE // 2**k for k in range(6)]
-    levels = [0.02 * torch.randn(1, 3, size, size, generator=generator) for size in sizes]
-    optimizer = torch.optim.Adam([level.requires_grad_() for level in levels], 0.03)
-    meant = F.normalize(model.encode_texts([text]) - model.encode_texts([START]), dim=1)
-    plain = model.encode_images(torch.full((1, model.resolution, model.resolution, 3), 0.5))
-    for _ in range(steps):
+    sizes = [TILE // 2**k for k in range(LEVELS)]
+    levels = [0.3 * torch.randn(1, 3, size, size, generator=generator) for size in sizes]
+    optimizer = torch.optim.Adam([level.requires_grad_() for level in levels], 0.05)
+    meant = model.encode_texts([text])
+    for _ in range(STEPS):
         pieces = _pieces(_picture(levels), model.resolution, generator)
-        seen = F.normalize(model.encode_images(pieces.permute(0, 2, 3, 1)) - plain + 1e-6, dim=1)
+        pieces = (pieces + NOISE * torch.randn(pieces.shape, generator=generator)).clamp(0, 1)
+        seen = model.encode_images(pieces.permute(0, 2, 3, 1))
         optimizer.zero_grad()
-        (1 - (seen * meant).sum(1)).mean().backward()
+        (1 - F.cosine_similarity(seen, meant)).mean().backward()
         optimizer.step()
     return _picture(levels)[0].permute(1, 2, 0).detach().numpy()
 
 
 def _picture(levels: list[torch.Tensor]) -> torch.Tensor:
-    """(1, 3, 96, 96) in [0, 1]."""
-    fine = [F.interpolate(level, size=SIDE, mode="bilinear", align_corners=False) for level in levels]
-    return torch.sigmoid(2 * torch.stack(fine).sum(0))
+    """(1, 3, 96, 96) in [0, 1]: the sum of the levels, which go on over their borders, two by two times."""
+    total = torch.zeros(1, 3, TILE, TILE)
+    for level in levels:
+        times = TILE // level.shape[2]
+        wide = F.pad(level, (1, 1, 1, 1), "circular")
+        wide = F.interpolate(wide, scale_factor=float(times), mode="bilinear", align_corners=False)
+        total = total + wide[:, :, times : times + TILE, times : times + TILE]
+    return torch.sigmoid(total).repeat(1, 1, 2, 2)
 
 
 def _pieces(picture: torch.Tensor, side: int, generator: torch.Generator) -> torch.Tensor:
-    """(PIECES, 3, side, side): squares of half to the whole width of the picture, which repeats itself."""
-    shifts = torch.randint(SIDE, (2,), generator=generator).tolist()
-    picture = picture.roll(shifts, (2, 3))
-    scale = 0.5 + 0.5 * torch.rand(PIECES, generator=generator)
+    """(PIECES, 3, side, side): squares of about half to nine tenths of the width, at random places."""
+    shifts = torch.randint(TILE, (2,), generator=generator).tolist()
+    scale = 0.55 + 0.3 * torch.rand(PIECES, generator=generator)
     shift = (1 - scale) * (2 * torch.rand(2, PIECES, generator=generator) - 1)
     none = torch.zeros(PIECES)
     frames = torch.stack([scale, none, shift[0], none, scale, shift[1]], 1).view(PIECES, 2, 3)
     grid = F.affine_grid(frames, [PIECES, 3, side, side], align_corners=False)
-    return F.grid_sample(picture.expand(PIECES, -1, -1, -1), grid, align_corners=False)
+    rolled = picture.roll(shifts, (2, 3)).expand(PIECES, -1, -1, -1)
+    return F.grid_sample(rolled, grid, align_corners=False)
 
 
 def sheet(pictures: list[np.ndarray]) -> np.ndarray:

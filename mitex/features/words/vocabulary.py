@@ -185,5 +185,5 @@ def _known(word: str) -> tuple[str, ...]:
     for form in (word, word + "s", word.removesuffix("s"), word.removesuffix("es"), word + "es"):
         if form in _TABLE:
             return _TABLE[form]
-    near = suggestion(word, vocabulary(), "colours, patterns and materials that it knows are in the guide")
+    near = suggestion(word, vocabulary(), "use colours, patterns and materials, as in: red dots on white")
     raise ConfigError(f"the embedded text model does not know the word {word!r}", near)

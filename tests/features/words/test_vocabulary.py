@@ -36,7 +36,7 @@ def test_every_word_is_read_as_concepts():
     ("text", "message"),
     [
         ("red dotz on white", "'dotz'; did you mean dots?"),
-        ("a brown xylophone", "'xylophone'; .*guide"),
+        ("a brown xylophone", "'xylophone'; use colours"),
         ("", "says nothing"),
         ("an image of a texture", "says nothing"),
         ("?!", "says nothing"),
