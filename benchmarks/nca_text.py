@@ -1,7 +1,7 @@
 """A training step of MeshNCA from words, with its parts, and the image tower of CLIP in both precisions.
 
-Run it as `python -m benchmarks.nca_text`. The tower is a ViT-B/32 with random weights, on which its speed does
-not depend. All runs in one process on the same threads; every number is the best of its repetitions.
+Run it as `python -m benchmarks.nca_text`. The tower is a ViT-B/32 with random weights, on which its speed
+does not depend. All runs in one process on the same threads; every number is the best of its repetitions.
 """
 
 from __future__ import annotations
