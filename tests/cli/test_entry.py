@@ -209,7 +209,7 @@ class TestUsage:
                 "`mitex fit` knows no method '--exemplar'; use one of geometric, nca, nerf, surface, "
                 "displacement, plain_field, quilted",
             ),
-            (["fit", "nca"], "--exemplar is missing; see `mitex fit nca --help`"),
+            (["fit", "surface"], "--exemplar is missing; see `mitex fit surface --help`"),
             (["apply"], "RUN|MODEL is missing; see `mitex apply --help`"),
             (["apply", "waffle"], "--out is missing; see `mitex apply --help`"),
             (["apply", "spikes"], "--out and --mesh are missing; see `mitex apply --help`"),
