@@ -43,11 +43,12 @@ class Recipe:
 
 
 FINE = (*SHORT, "density=48")  # patterns that are small in their exemplar
+LONG = ("steps=700", "milestones=450,600")  # strict order
 QUICK = ("steps=200", "milestones=120,170")  # without order
 SMALL = ("view_count=8",)  # exemplars of 128 pixels have one zoom, so more views of it
 RECIPES = {
     PARENT: Recipe("scales", None, ()),
-    "bricks": Recipe("bricks"),
+    "bricks": Recipe("bricks", settings=(*LONG, "density=48")),
     "cobblestone": Recipe("cobblestone"),
     "fur": Recipe("Stylized_Fur_001", settings=(*QUICK, "density=48", *SMALL)),
     "hexagons": Recipe("hexagons"),
