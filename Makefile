@@ -39,6 +39,7 @@ bench: $(STAMP)
 	$(VENV)/bin/python -m benchmarks.nca
 	OMP_WAIT_POLICY=PASSIVE $(VENV)/bin/python -m benchmarks.nca_decoder
 	OMP_WAIT_POLICY=PASSIVE $(VENV)/bin/python -m benchmarks.nca_motion
+	OMP_WAIT_POLICY=PASSIVE $(VENV)/bin/python -m benchmarks.nca_text
 	$(VENV)/bin/python -m benchmarks.surface
 	$(VENV)/bin/python -m benchmarks.geometric
 	$(VENV)/bin/python -m benchmarks.flow

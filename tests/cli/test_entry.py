@@ -200,7 +200,7 @@ class TestUsage:
             (
                 ["xyzzy"],
                 "there is no command 'xyzzy'; use one of doctor, demo, fit, apply, animate, graft, cache, "
-                "models, render, try",
+                "models, batch, render, try",
             ),
             (["fit"], "`mitex fit` needs a method; try `mitex fit geometric --help`"),
             (["fit", "nac"], "`mitex fit` knows no method 'nac'; did you mean nca?"),
@@ -210,7 +210,7 @@ class TestUsage:
                 "displacement, gatys, image_quilting, multi_view_gram, plain_field, quilted, "
                 "reaction_diffusion",
             ),
-            (["fit", "nca"], "--exemplar is missing; see `mitex fit nca --help`"),
+            (["fit", "surface"], "--exemplar is missing; see `mitex fit surface --help`"),
             (["apply"], "RUN|MODEL is missing; see `mitex apply --help`"),
             (["apply", "waffle"], "--out is missing; see `mitex apply --help`"),
             (["apply", "spikes"], "--out and --mesh are missing; see `mitex apply --help`"),

@@ -9,12 +9,15 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
 - films have 4 frames of 32 pixels;
 - the photos that pages name are 8 of a ball in 24 x 24 pixels, which is its own base shape; its texture is
   joined from 30 patches to 128 texels;
-- pictures are traced in 16 x 16 pixels with one path each, and enlarged.
+- pictures are traced in 16 x 16 pixels with one path each, and enlarged;
+- jobs of a batch run in this process.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import os
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import chdir
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,10 +25,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mitex.cli import main
 from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods.registry import methods
 from mitex.training.run import CONFIG
 from tests.cli.test_nerf import save
+from tests.docs.blocks import ROOT, blocks
+from tests.features.clip.folders import write_folder
 from tests.methods.nerf.tiny import tiny_capture, write_capture
 
 STEPS, RESUMED_STEPS = 2, 3
@@ -58,7 +64,10 @@ TINY: dict[str, dict[str, Any]] = {
 def prepare(folder: Path) -> None:
     """Writes the files that pages name and that the user brings along, or has from a script."""
     save(icosphere(6), folder / "bunny.obj")
+    write_folder(folder / "models" / "clip-b32")
     write_capture(tiny_capture(views=8, side=24, spp=1), folder / "captures" / "cobbles")
+    plan = next(block for block in blocks(ROOT / "docs" / "batch.md") if block.language == "toml")
+    (folder / "plan.toml").write_text(plan.text)
 
 
 def shrink(patch: pytest.MonkeyPatch) -> None:
@@ -74,6 +83,7 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(texture, "healed", lambda growth, state, generator: state)
     patch.setattr(texture, "film", _with_few_frames(texture.film))
     patch.setattr(texture.GrowingTexture, "apply", _small_growth(texture.GrowingTexture.apply))
+    patch.setattr("mitex.batch.task.Process", _InThisProcess)
     patch.setattr(NcaTexture, "tile", _small_tile(NcaTexture.tile))
     patch.setattr(fitting, "find_base", lambda *_, **__: _ball_as_base())
     patch.setattr(NerfTexture, "synthesize", _small_quilt(NerfTexture.synthesize))
@@ -81,6 +91,19 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     for module in (renderer, shell):
         patch.setattr(module, "accumulated", sketch)
         patch.setattr(module, "sensor", lambda resolution: sensor(SIDE))
+
+
+class _InThisProcess:
+    """In place of `mitex.batch.process.Process`."""
+
+    pid = os.getpid()
+
+    def __init__(self, words: Sequence[str], folder: Path, *_: object) -> None:
+        self._words, self._folder = words, folder
+
+    def wait(self) -> tuple[int, int]:
+        with chdir(self._folder):
+            return main(self._words), 0
 
 
 def _ball_in_place_of(mesh: Mesh) -> Mesh:

@@ -7,7 +7,7 @@ from mitex.methods.method import Method
 
 METHOD = Method(
     name="nca",
-    title="learn a living texture from an image or PBR maps (MeshNCA)",
+    title="learn a living texture from an image, PBR maps or words (MeshNCA)",
     presets="mitex.methods.nca.config:PRESETS",
     fit="mitex.methods.nca.cli:Fit",
     apply="mitex.methods.nca.cli:Apply",
@@ -27,6 +27,7 @@ __all__ = [
     "NcaTexture",
     "Shooting",
     "fit",
+    "fit_text",
     "graft_weights",
 ]
 
@@ -42,6 +43,7 @@ __getattr__ = attributes(
         "Shooting": "mitex.methods.nca.film",
         "graft_weights": "mitex.methods.nca.weights",
         "fit": "mitex.methods.nca.fitting",
+        "fit_text": "mitex.methods.nca.text.fitting",
     },
 )
 
@@ -51,5 +53,6 @@ if TYPE_CHECKING:
     from mitex.methods.nca.fitting import fit
     from mitex.methods.nca.graft import Graft
     from mitex.methods.nca.model import MeshNCA
+    from mitex.methods.nca.text.fitting import fit_text
     from mitex.methods.nca.texture import GrowingTexture, NcaTexture
     from mitex.methods.nca.weights import graft_weights

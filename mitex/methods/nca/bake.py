@@ -11,7 +11,7 @@ from mitex.exemplar import MAPS
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import orthonormal, unit
 from mitex.methods.nca.cells import Cells
-from mitex.methods.nca.decoder.surface import Points, Surface
+from mitex.methods.nca.decoder.surface import Points, Surface, vertex_points
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.orientation import Turn, rightwards
 from mitex.methods.nca.palette import Palette
@@ -112,11 +112,8 @@ class Grown:
 
     def _vertices(self) -> tuple[np.ndarray, np.ndarray]:
         """A face (V,) and barycentrics (V, 3) of each vertex of the given mesh."""
-        mesh = self.cells.given
-        face, corner = np.zeros(len(mesh.vertices), np.int32), np.zeros(len(mesh.vertices), np.int64)
-        for k in range(3):
-            face[mesh.faces[:, k]], corner[mesh.faces[:, k]] = np.arange(len(mesh.faces)), k
-        return face, np.eye(3, dtype=np.float32)[corner]
+        points = vertex_points(self.cells.given)
+        return points.face.numpy(), points.barycentric.numpy()
 
     def _right(self, normals: np.ndarray, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """Where the exemplar's right points, (P, 3) unit, at points of the given mesh with these normals.

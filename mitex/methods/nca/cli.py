@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from tyro.conf import arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
 from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS, TILE_CELLS, TILE_SIDES
-from mitex.methods.options import EXPORTS, PICTURES, ExemplarOptions, OptionalMeshOptions
+from mitex.methods.options import EXPORTS, PICTURES, OptionalMeshOptions, TrainingOptions
+from mitex.training.settings import RunSettings
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
 
 RESOLUTION = 1024  # of baked textures [texels]
 MOST_VARIANTS = 32
+LONGEST = 60  # name of a run folder from words [characters]
 FIELD_FILES = (".npy", ".ply", ".json")
 
 
 @dataclass(kw_only=True)
-class Fit(ExemplarOptions):
-    """Learn a texture from an image or a set of PBR maps with a neural cellular automaton (MeshNCA).
+class Fit(TrainingOptions):
+    """Learn a texture from an image, a set of PBR maps, or words with a neural cellular automaton (MeshNCA).
 
     The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the texture; Ctrl-C
     saves, and --resume goes on.
@@ -33,16 +36,36 @@ class Fit(ExemplarOptions):
       mitex fit nca --exemplar cobblestone --steps 300 --set hidden=96
       mitex fit nca --exemplar maps/ --preset paper --out runs/paper
       mitex fit nca --exemplar lava --init lava --motion right --out runs/flowing
+      mitex fit nca --text "red bricks" --out runs/red-bricks
+      mitex fit nca --text "green moss" --mesh vase --clip models/clip-b32
       mitex fit nca --exemplar pebbles.png --out runs/pebbles --resume
       mitex fit nca --settings --preset paper
     """
 
+    only_at_start: ClassVar[frozenset[str]] = frozenset({"init"})
+    source: ClassVar[str | None] = "exemplar"
+
+    exemplar: Annotated[str | None, arg(metavar="IMAGE|DIR|NAME", help_behavior_hint="")] = None
+    """PNG or JPEG, a folder with any of albedo, height, normal, roughness, ambient_occlusion, or a name."""
+
+    text: Annotated[str | None, arg(metavar="WORDS", help_behavior_hint="")] = None
+    """In place of an exemplar: what the texture is made of. It gets colours and a relief."""
+
+    mesh: Annotated[str | None, arg(metavar="MESH|NAME", help_behavior_hint="(default: spheres)")] = None
+    """With --text: train on this mesh."""
+
+    clip: Annotated[str | None, arg(metavar="DIR|NAME", help_behavior_hint="")] = None
+    """With --text: folder of a CLIP model, name of one in Hugging Face's cache, or `words` for the small
+    embedded model. By default $MITEX_CLIP, else the cache, else the embedded one."""
+
     preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: patch)")] = None
     """Settings to start from: `patch` is fast, `paper` follows the publication; `motion` (the default with
-    --motion) and `motion-paper` likewise, for textures that move."""
+    --motion) and `motion-paper` likewise, for textures that move; `text` (the default with --text) and
+    `text-paper`, for those from words."""
 
     init: Annotated[str | None, arg(metavar="MODEL|RUN", help_behavior_hint="")] = None
-    """Start from the weights of a model or a run; of the still texture, for one that shall move."""
+    """Start from the weights of a model or a run; of the still texture, for one that shall move. With --text,
+    which starts from a model in any case, another one."""
 
     motion: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="")] = None
     """Vector field that the texture learns to move along, by name (right, up, about-y ...) or direction."""
@@ -54,19 +77,42 @@ class Fit(ExemplarOptions):
 
     def run(self) -> None:
         mutually_exclusive("--resume", "--init", self.resume and self.init is not None)
+        self._check_source()
         options = self.run_options(device=self.device)
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()
+        print(self._fit_exemplar(options) if self.text is None else self._fit_text(self.text, options))
+
+    def _check_source(self) -> None:
+        if self.exemplar is None and self.text is None:
+            raise ConfigError("--exemplar is missing", "give --exemplar IMAGE, or --text WORDS")
+        mutually_exclusive("--text", "--exemplar", self.text is not None and self.exemplar is not None)
+        mutually_exclusive("--text", "--motion", self.text is not None and self.motion is not None)
+        for option, value in (("--mesh", self.mesh), ("--clip", self.clip)):
+            if value is not None and self.text is None:
+                raise ConfigError(f"{option} means nothing without --text", "leave it out")
+
+    def _fit_exemplar(self, options: RunSettings) -> Path:
         from mitex.exemplar import Exemplar
 
-        exemplar = Exemplar.load(self.exemplar)
+        exemplar = Exemplar.load(str(self.exemplar))
         out = self.folder(exemplar.name)
         from mitex.methods import nca
 
         with self.progress() as on_step:
             nca.fit(exemplar, out, init=self.init, motion=self.motion, on_step=on_step, **options)
-        print(out)
+        return out
+
+    def _fit_text(self, text: str, options: RunSettings) -> Path:
+        from mitex.mesh import Mesh
+        from mitex.methods import nca
+
+        out = self.folder("-".join(re.findall(r"[a-z0-9]+", text.lower()))[:LONGEST] or "text")
+        mesh = None if self.mesh is None else Mesh.load(self.mesh)
+        with self.progress() as on_step:
+            nca.fit_text(text, out, mesh=mesh, clip=self.clip, init=self.init, on_step=on_step, **options)
+        return out
 
 
 @dataclass(kw_only=True)
@@ -112,6 +158,9 @@ class Apply(OptionalMeshOptions):
     keep_dense: Annotated[bool, arg(help_behavior_hint="")] = False
     """Write the subdivided, rounded mesh instead of the given one."""
 
+    displace: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Move the vertices by the relief of a texture from words; best with --keep-dense."""
+
     variants: Annotated[int, arg(metavar="N")] = 1
     """Looks that a .glb offers on the one mesh, each with the next seed (KHR_materials_variants)."""
 
@@ -156,6 +205,7 @@ class Apply(OptionalMeshOptions):
             "--resolution": self.resolution is not None,
             "--vertex-colors": self.vertex_colors,
             "--keep-dense": self.keep_dense,
+            "--displace": self.displace,
             "--variants": self.variants > 1,
         }
         for option, used in others.items():
@@ -226,6 +276,7 @@ class Apply(OptionalMeshOptions):
             "scale": self.scale,
             "resolution": (self.resolution or RESOLUTION) if textures else None,
             "keep_dense": self.keep_dense,
+            "displace": self.displace,
             "field": self.field,
             "speed": self.speed,
         }

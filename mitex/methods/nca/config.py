@@ -1,4 +1,4 @@
-"""Settings of the image-guided MeshNCA training, and its presets."""
+"""Settings of the MeshNCA trainings, and their presets."""
 
 from __future__ import annotations
 
@@ -102,6 +102,23 @@ class NcaConfig(TrainingConfig):
     motion_start: int = key(0, "training step from which on motion counts", 0)
     motion_turns: bool = key(True, "another rotation of the field in each step")
     motion_speeds: tuple[float, ...] = key((0.0, 2.0), "least and most factor of the field in a step", 0)
+    text: str | None = key(None, "what the texture is made of, in words, instead of an exemplar")
+    text_object: str | None = key(None, "what has the texture; by default a sphere, or the mesh's name")
+    text_prompt: str = key("an image of {object} made of {text}", "that the model of texts and images reads")
+    text_model: str | None = key(None, "CLIP folder, or words for the small embedded model")
+    text_parent: str | None = key(None, "model that training starts from if no other is given")
+    text_bank: int = key(64, "sets of views, drawn once, of which a step sees one", 1, 65_536)
+    text_distances: tuple[float, ...] = key((2.5,), "of the cameras, one for each set", 1.01, 100)
+    text_crops: int = key(2, "close-ups that are cut out of a view", 1, 64)
+    text_crop_area: float = key(0.1, "of a close-up, as a share of the view", 1e-3, 1)
+    text_tilt: float = key(0.5, "of what the model sees: the corners' way outwards [half sides]", 0, 2)
+    text_whole_weight: float = key(1.0, "of the distance of whole views from the text", 0)
+    text_close_weight: float = key(1.0, "of that of the close-ups", 0)
+    text_relief_weight: float = key(1.0, "of that of the close-ups without colours", 0)
+    text_relief: float = key(2.5, "that the surface is moved by at most [edges]", 0, 100)
+    text_roughness: float = key(0.01, "of the relief that costs nothing (xi)", 0)
+    text_smooth_weight: float = key(1.0, "of the relief's roughness beyond that", 0)
+    text_range_weight: float = key(10.0, "of values outside of what maps can hold", 0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -126,6 +143,10 @@ class NcaConfig(TrainingConfig):
             raise ConfigError(f"coordinates holds {unknown}", f"use some of {', '.join(COORDINATES)}")
         if len(self.motion_speeds) != 2 or self.motion_speeds[0] > self.motion_speeds[1]:
             raise ConfigError(f"motion_speeds holds {self.motion_speeds}", "give the least and the most")
+        if "{text}" not in self.text_prompt:
+            raise ConfigError(f"text_prompt = '{self.text_prompt}' leaves out the text", "put {text} in it")
+        if not self.text_distances:
+            raise ConfigError("text_distances holds nothing", "give one or more [normalised mesh units]")
         if not self.wave_frequencies:
             raise ConfigError("wave_frequencies holds nothing", "give one or more [cycles per edge]")
 
@@ -195,4 +216,31 @@ PRESETS["motion-paper"] = replace(
     motion_steps=64,
     motion_turns=False,
     motion_speeds=(1.0, 1.0),
+)
+PRESETS["text"] = replace(
+    DEFAULT,
+    preset="text",
+    text="red dots on white",
+    steps=1000,
+    views="full",
+    surfaces=("even", "uneven"),
+    order_weight=0.0,
+    resolution=224,
+    pool=32,
+    text_parent="knit",
+    text_distances=(2.0, 2.5),
+    milestones=(600, 850),
+)
+PRESETS["text-paper"] = replace(
+    PRESETS["paper"],
+    preset="text-paper",
+    text="red dots on white",
+    pool=64,
+    inject_every=32,
+    view_count=8,
+    resolution=224,
+    text_bank=256,
+    text_relief=5.0,
+    text_distances=(2.0, 3.0, 4.0),
+    text_crops=4,
 )

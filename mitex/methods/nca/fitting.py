@@ -5,19 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Unpack
 
-from mitex.errors import CheckpointError
+from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.methods.nca import files
-from mitex.methods.nca.config import PRESETS, NcaConfig
-from mitex.methods.nca.look import Look, traits, weights_key
+from mitex.methods.nca.config import PRESETS
+from mitex.methods.nca.look import Look, weights_key
 from mitex.methods.nca.motion.start import check_field, moving, with_condition
 from mitex.methods.nca.motion.task import MotionTask
 from mitex.methods.nca.palette import Palette
+from mitex.methods.nca.parents import fitting_lineage, resumed_lineage
 from mitex.methods.nca.settling import settling_steps
 from mitex.methods.nca.task import NcaTask
 from mitex.methods.nca.texture import NcaTexture
 from mitex.training.fit import Run
-from mitex.training.locate import CHECKPOINT, PREVIOUS, header
 from mitex.training.settings import RunOptions
 
 
@@ -50,16 +50,22 @@ def fit(
     """
     run = Run.of(PRESETS, out, **(options if motion is None else moving(options, motion)))
     config = run.config
+    if config.text is not None:
+        raise ConfigError(
+            "the settings are for words, not for an exemplar", "give a `text`, or another preset"
+        )
     if config.motion:
         check_field(config.motion)
     maps = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
     origin: dict[str, Any] = {"exemplar": maps.name, "density": config.density}
     if "albedo" in maps.maps:
         origin["palette"] = Palette.of(maps.maps["albedo"]).record()
-    parent, lineage = None, _lineage(run)
+    parent, lineage = None, resumed_lineage(run)
     if init is not None:
-        parent, about = _parent(init, config, sorted(maps.maps))
-        lineage = {"parent": str(about["name"]), "family": about["family"]}
+        parent, about = files.load(init)
+        if config.motion and config.motion_encoding and not parent.rule.condition:
+            parent = with_condition(parent)
+        lineage = fitting_lineage(parent, about, Look.of(config, sorted(maps.maps)))
     if config.motion:
         origin |= {"motion": config.motion, "motion_period": config.motion_period}
         origin["motion_speed"] = config.motion_speeds[1]
@@ -80,26 +86,3 @@ def fit(
         decay=config.decay,
         normalise_gradients=config.normalise_gradients,
     )
-
-
-def _parent(init: str | Path, config: NcaConfig, maps: list[str]) -> tuple[Look, dict[str, Any]]:
-    parent, about = files.load(init)
-    if config.motion and config.motion_encoding and not parent.rule.condition:
-        parent = with_condition(parent)
-    theirs, ours = (traits(look) for look in (parent, Look.of(config, maps)))
-    differing = sorted(name for name in theirs | ours if theirs.get(name) != ours.get(name))
-    if differing:
-        raise CheckpointError(
-            f"model '{about['name']}' differs from the config in {', '.join(differing)}",
-            "set channels, hidden, degree, aggregation and the decoder alike, for an exemplar with its maps",
-        )
-    return parent, about
-
-
-def _lineage(run: Run[NcaConfig]) -> dict[str, str]:
-    """What a run that is resumed has begun from."""
-    if not run.resume or run.folder is None:
-        return {}
-    heads = [head for name in (CHECKPOINT, PREVIOUS) if (head := header(run.folder / name))]
-    texts = heads[0][1] if heads else {}
-    return {key: texts[f"task.{key}"] for key in ("parent", "family") if f"task.{key}" in texts}

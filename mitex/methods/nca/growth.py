@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from copy import copy
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 import torch
@@ -13,6 +15,7 @@ from mitex.errors import ConfigError
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.surface import Surface
+from mitex.methods.nca.embossed import Embossed
 from mitex.methods.nca.look import Look, weights_key
 from mitex.methods.nca.orientation import Turn
 from mitex.methods.nca.palette import Palette
@@ -46,6 +49,14 @@ class Growth(ABC):
     def shown(self, state: torch.Tensor) -> Grown:
         """What a state (V, C) looks like on the mesh that the texture is for."""
 
+    def displaced(self) -> Self:
+        """The same on a mesh that its relief moves.
+
+        Raises:
+            ConfigError: it has no relief.
+        """
+        raise ConfigError("the texture has no relief that could displace a mesh", "train one from words")
+
     @abstractmethod
     def foreign(self, state: torch.Tensor) -> np.ndarray:
         """The vertices (V,) bool at which a state shows colours that the exemplar does not have."""
@@ -61,6 +72,7 @@ class LookGrowth(Growth):
         palette: the exemplar's colours; None if they are not known.
         operator: perception of the cells, if it is not simply that of their mesh.
         condition: of the cells, (V, 3), of a look that moves.
+        relief: how far the height moves the surface at most [edges]; 0 if it is a map and no more.
     """
 
     def __init__(
@@ -71,8 +83,9 @@ class LookGrowth(Growth):
         palette: Palette | None = None,
         operator: Perception | None = None,
         condition: torch.Tensor | None = None,
+        relief: float = 0.0,
     ) -> None:
-        self.condition = condition
+        self.condition, self.relief, self.moved = condition, relief, False
         self.look, self.cells, self.orientation, self.palette = look, cells, orientation, palette
         self.operator = operator or perception(cells.mesh, look.rule.degree, orientation, mean=look.mean)
 
@@ -90,7 +103,15 @@ class LookGrowth(Growth):
         return self.look.evolve(state[None], self.operator, steps, generator, self.condition)[0]
 
     def shown(self, state: torch.Tensor) -> Grown:
-        return Grown(self.look, state, self.cells, self.orientation, self.palette, self._surface)
+        parts = (self.look, state, self.cells, self.orientation, self.palette, self._surface)
+        return Embossed(self.relief, self.moved, *parts) if self.relief else Grown(*parts)
+
+    def displaced(self) -> Self:
+        if not self.relief:
+            return super().displaced()
+        growth = copy(self)
+        growth.moved = True
+        return growth
 
     def foreign(self, state: torch.Tensor) -> np.ndarray:
         if self.palette is None:

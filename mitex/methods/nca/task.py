@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import partial
-from typing import NamedTuple
+from collections.abc import Mapping
 
 import numpy as np
 import torch
@@ -12,10 +10,10 @@ import torch.nn.functional as F
 
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
-from mitex.losses import overflow_loss
 from mitex.methods.nca.appearance import Appearance
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.look import Look
+from mitex.methods.nca.pool import PoolTask, initial_look
 from mitex.methods.nca.relief import Relief
 from mitex.methods.nca.surfaces import (
     CloseUps,
@@ -28,22 +26,13 @@ from mitex.methods.nca.targets import Targets, enlarged
 from mitex.progress import announce
 from mitex.runtime import available_device, keep_freed_memory
 from mitex.scenes.cameras import Cameras, random_views
-from mitex.training import Step
 from mitex.triples import channel_triples, triple_images
 
 SMALLEST = 128  # side of the exemplar at the coarsest zoom [px], at least: a quarter is left at relu3_1
 PREVIEW = 256  # side of a preview's pictures [px]
 
 
-class Rollout(NamedTuple):
-    """A state that has evolved, (1, V, C); what that adds to the loss, by name; and to a step's `commit`."""
-
-    state: torch.Tensor
-    terms: dict[str, torch.Tensor]
-    commit: Callable[[], None] = lambda: None
-
-
-class NcaTask:
+class NcaTask(PoolTask):
     """Trains a look: states from a pool evolve on surfaces, and their views are compared at several zooms.
 
     Args:
@@ -63,24 +52,14 @@ class NcaTask:
         device = available_device(config.device)
         keep_freed_memory()
         announce("preparing spheres and the exemplar")
-        self.config, self.lineage = config, dict(lineage or {})
         self.exemplar = exemplar.resized(min(config.exemplar_size, *exemplar.size))
         self.maps = sorted(exemplar.maps)
-        self.look = Look.of(config, self.maps)
-        if init is None:
-            self.look.initialise(torch.Generator().manual_seed(config.seed), config.gain)
-        else:
-            self.look.load_state_dict(init.state_dict())
-        self.look.to(device)
-        self.surfaces = training_surfaces(config, self.look)
+        look = initial_look(config, self.maps, init, device)
+        super().__init__(config, look, training_surfaces(config, look), lineage)
         self.zooms = self._appearances()
         self.relief = None
         if config.relief_weight and {"height", "normal"} <= exemplar.maps.keys():
             self.relief = Relief(self.exemplar, self.look.layout, self.zooms)
-        # Rows beyond the cells of a state's surface stay zero.
-        most = max(surface.perception.vertices for surface in self.surfaces)
-        self.pool = torch.zeros(config.pool, most, config.channels, device=self.look.device)
-        self._touched = torch.zeros(config.pool, dtype=torch.bool)
 
     def _appearances(self) -> dict[int, Appearance]:
         """Size of the exemplar [px] -> comparison with it at that size; from the coarsest on."""
@@ -98,62 +77,16 @@ class NcaTask:
             zooms[size] = Appearance(config, targets, network, ordered=not zooms)
         return zooms
 
-    @property
-    def parameters(self) -> list[torch.nn.Parameter]:
-        return list(self.look.parameters())
-
-    def begin(self, step: int, generator: torch.Generator) -> None:
-        """Nothing changes before the loss."""
-
-    def loss(self, step: int, generator: torch.Generator) -> Step:
-        """Appearance and overflow of a state of the pool after some steps; `commit` puts it back, evolved."""
-        config = self.config
-        index = int(torch.randint(config.pool, (), generator=generator))
-        surface, state = self.surface(index), self.grown(index)
-        if step % config.inject_every == 0:
-            state = torch.zeros_like(state)
-        steps = int(torch.randint(config.min_steps, config.max_steps + 1, (), generator=generator))
-        rollout = self.rollout(index, state, step, steps, generator)
-        state = rollout.state
+    def terms(
+        self, surface: TrainingSurface, state: torch.Tensor, generator: torch.Generator
+    ) -> dict[str, torch.Tensor]:
         terms: dict[str, list[torch.Tensor]] = {"appearance": [], "relief": []}
         for size, appearance in self.zooms.items():
-            views = self.views(surface, state[0], size, generator)
+            views = self.views(surface, state, size, generator)
             terms["appearance"].append(appearance(views, generator))
             if self.relief and isinstance(surface, TrainingPlane):  # on spheres, "right" turns in a view
-                terms["relief"].append(config.relief_weight * self.relief(views, size))
-        means = {name: torch.stack(values).mean() for name, values in terms.items() if values}
-        means |= {"overflow": overflow_loss(state)} | rollout.terms
-        weights = {"overflow": config.overflow_weight}
-        return Step(
-            torch.stack([weights.get(name, 1.0) * mean for name, mean in means.items()]).sum(),
-            {name: mean.item() for name, mean in means.items()},
-            partial(self._commit, index, state.detach()[0], rollout.commit),
-        )
-
-    def rollout(
-        self, index: int, state: torch.Tensor, step: int, steps: int, generator: torch.Generator
-    ) -> Rollout:
-        """What becomes of a state (1, V, C) of the pool, or the seed in its place, in a training step."""
-        return Rollout(self.evolved(index, state, steps, generator), {})
-
-    def evolved(
-        self, index: int, state: torch.Tensor, steps: int, generator: torch.Generator
-    ) -> torch.Tensor:
-        """A state (1, V, C) after some steps of the rule, on the surface of the pool's state `index`."""
-        return self.look.rule.evolve(state, self.surface(index).perception, steps, generator)
-
-    def _commit(self, index: int, state: torch.Tensor, further: Callable[[], None]) -> None:
-        self.pool[index, : len(state)], self._touched[index] = state, True
-        self.look.track(state)
-        further()
-
-    def surface(self, index: int) -> TrainingSurface:
-        """Where a state of the pool grows."""
-        return self.surfaces[index % len(self.surfaces)]
-
-    def grown(self, index: int) -> torch.Tensor:
-        """A state of the pool, (1, V, C)."""
-        return self.pool[index][None, : self.surface(index).perception.vertices]
+                terms["relief"].append(self.config.relief_weight * self.relief(views, size))
+        return {name: torch.stack(values).mean() for name, values in terms.items() if values}
 
     def views(
         self, surface: TrainingSurface, state: torch.Tensor, size: int, generator: torch.Generator
@@ -175,27 +108,12 @@ class NcaTask:
         config = self.config
         return CloseUps(config.density * config.resolution / size, config.view_count, config.resolution)
 
-    def state(self) -> dict[str, torch.Tensor]:
-        """Weights, and the pool's states that are no longer the seed."""
-        weights = {f"model.{name}": value for name, value in self.look.state_dict().items()}
-        return weights | {"pool.touched": self._touched, "pool.states": self.pool[self._touched]}
-
-    def load_state(self, state: dict[str, torch.Tensor]) -> None:
-        weights = {name[6:]: value for name, value in state.items() if name.startswith("model.")}
-        self.look.load_state_dict(weights)
-        self._touched = state["pool.touched"]
-        self.pool.zero_()
-        self.pool[self._touched] = state["pool.states"].to(self.pool.device)
-
     @torch.no_grad()
     def preview(self, step: int) -> np.ndarray:
         """For each map a row: the exemplar, a patch as wide, a quarter of that, and the whole surface of an
         evolved state.
         """
-        generator = torch.Generator().manual_seed(step)
-        index = int(torch.randint(self.config.pool, (), generator=generator))
-        surface, look = self.surface(index), self.look
-        state = self.evolved(index, self.grown(index), self.config.max_steps, generator)[0]
+        (surface, state, generator), look = self.example(step), self.look
         views = [
             surface.patches(look, state, CloseUps(width, 1, PREVIEW, antialias=2), generator)[0]
             for width in (self.config.density, self.config.density / 4)

@@ -17,6 +17,7 @@ from mitex.atlas import Atlas, laid_out
 from mitex.mesh import Mesh
 from mitex.methods.nca import files
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.displacement import known_relief
 from mitex.methods.nca.field import fields
 from mitex.methods.nca.film import Shooting, film
 from mitex.methods.nca.growth import Growth, LookGrowth, grown_state
@@ -97,6 +98,7 @@ class GrowingTexture(ABC):
         scale: float = 1.0,
         resolution: int | None = 1024,
         keep_dense: bool = False,
+        displace: bool = False,
         field: Field | None = None,
         speed: float = 1.0,
     ) -> Asset:
@@ -117,6 +119,8 @@ class GrowingTexture(ABC):
             resolution: of the baked textures [texels], on the mesh's own UVs if nothing in them overlaps,
                 else on new ones. None leaves the maps at the vertices.
             keep_dense: returns the finer mesh itself, rounded by Loop subdivision, instead of the given one.
+            displace: moves the vertices by the relief of a texture from words, which else is a normal map
+                alone; a mesh of few vertices needs `keep_dense` to show it.
             field: vector field that a moving texture follows, see `mitex.mesh.fields`; None for the one that
                 it was trained with.
             speed: factor of the field, whose mean length is 1.
@@ -126,13 +130,14 @@ class GrowingTexture(ABC):
 
         Raises:
             ConfigError: options out of range, a field of a texture that does not move, or one that cannot be
-                used on the mesh.
+                used on the mesh; a texture without a relief that shall displace it.
             MeshError: the mesh cannot be remeshed.
         """
         laid = mesh if resolution is None or (keep_dense and scale != 1.0) else laid_out(mesh, resolution)
         announce("preparing the mesh")
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
         growth = self.growth_on(cells, mesh, orientation, field, speed)
+        growth = growth.displaced() if displace else growth
         grown = growth.shown(_healthy(growth, seed, self.steps if steps is None else steps))
         asset = grown.asset()
         if resolution is None:
@@ -308,7 +313,8 @@ class NcaTexture(GrowingTexture):
     def growth(
         self, cells: Cells, orientation: Turn = 0.0, condition: torch.Tensor | None = None
     ) -> LookGrowth:
-        return LookGrowth(self.look, cells, orientation, self._palette, condition=condition)
+        relief = known_relief(self.about, self.look.maps)
+        return LookGrowth(self.look, cells, orientation, self._palette, condition=condition, relief=relief)
 
     @property
     def steps(self) -> int:

@@ -435,9 +435,8 @@ OF_THE_DEVICE = {"device"}  # test_device
 
 
 def test_no_key_is_left_out():
-    assert {field.name for field in fields(NcaConfig)} == set(
-        CHECKS
-    ) | OF_THE_FIT | OF_THE_LOOP | OF_THE_DEVICE
+    keys = {field.name for field in fields(NcaConfig) if field.name.partition("_")[0] != "text"}
+    assert keys == set(CHECKS) | OF_THE_FIT | OF_THE_LOOP | OF_THE_DEVICE  # text/test_options has the others
 
 
 @pytest.fixture

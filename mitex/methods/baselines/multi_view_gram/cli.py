@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import arg
 
@@ -28,6 +28,8 @@ class Fit(ExemplarOptions):
       mitex fit multi_view_gram --exemplar painting.png --mesh bunny.obj --content bunny.png
       mitex fit multi_view_gram --exemplar lava --mesh vase --out runs/views --resume
     """
+
+    fits_to_mesh: ClassVar[bool] = True
 
     mesh: Annotated[str, arg(metavar="MESH|NAME")]
     """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""

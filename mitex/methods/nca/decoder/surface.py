@@ -68,6 +68,14 @@ class Surface:
         return values[:, :3], values[:, 3]
 
 
+def vertex_points(mesh: Mesh) -> Points:
+    """The vertices as points of the mesh, each at the corner of one of its faces."""
+    face, corner = np.zeros(len(mesh.vertices), np.int32), np.zeros(len(mesh.vertices), np.int64)
+    for k in range(3):
+        face[mesh.faces[:, k]], corner[mesh.faces[:, k]] = np.arange(len(mesh.faces)), k
+    return Points(torch.from_numpy(face), torch.from_numpy(np.eye(3, dtype=np.float32)[corner]))
+
+
 def decoder_units(mesh: Mesh) -> Similarity:
     """From a mesh's units to decoder units: the vertices' mean is the origin, the edges' mean is `EDGE`."""
     graph, points = mesh.edges, mesh.vertices.astype(np.float64)

@@ -16,8 +16,9 @@ from mitex.methods.nca.look import Look
 from mitex.methods.nca.motion.drift import Drift, draw_drift
 from mitex.methods.nca.motion.estimator import load_estimator
 from mitex.methods.nca.motion.pairs import Pairs, plane_pairs, sphere_pairs
+from mitex.methods.nca.pool import Rollout
 from mitex.methods.nca.surfaces import TrainingSphere
-from mitex.methods.nca.task import NcaTask, Rollout
+from mitex.methods.nca.task import NcaTask
 
 MOST_WAYS = 2**31
 POINTS = 8192  # at which the decoder's values are compared

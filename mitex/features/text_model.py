@@ -1,0 +1,41 @@
+"""The model of texts and images that a fit from words looks through."""
+
+from __future__ import annotations
+
+import os
+
+import torch
+
+from mitex.errors import WeightsError
+from mitex.features.clip import Clip, cached_folder, named_folder
+from mitex.features.clip.folder import remedy
+from mitex.features.text_image import TextImageModel
+
+
+def text_image_model(
+    clip: str | os.PathLike[str] | None = None, device: torch.device | str = "cpu"
+) -> TextImageModel:
+    """The first of these that there is: the named CLIP folder, that of `MITEX_CLIP`, a public CLIP model in
+    Hugging Face's cache, the small model that ships with Mitex.
+
+    Args:
+        clip: as of `mitex.features.clip.named_folder`; "words" for the model that ships with Mitex.
+        device: where its weights live.
+
+    Raises:
+        WeightsError: the named folder is not there, incomplete or damaged.
+        ConfigError: a CLIP model needs the package tokenizers.
+    """
+    folder = None if clip == EMBEDDED else named_folder(clip) or cached_folder()
+    return Clip(folder, device=device) if folder else _embedded()
+
+
+EMBEDDED = "words"
+
+
+def _embedded() -> TextImageModel:
+    try:
+        from mitex.features.words import words_model  # type: ignore[reportMissingImports]
+    except ImportError as e:
+        raise WeightsError("there is no CLIP model", remedy()) from e
+    return words_model()

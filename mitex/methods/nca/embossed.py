@@ -1,0 +1,83 @@
+"""A grown state whose height is a relief: as normals, and as a displacement of the mesh."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import torch
+
+from mitex.asset import Asset
+from mitex.atlas import Atlas
+from mitex.geometry.normal_maps import encode
+from mitex.geometry.triangles import interpolate
+from mitex.geometry.vectors import orthonormal, unit
+from mitex.mesh import Mesh
+from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.decoder.surface import vertex_points
+from mitex.methods.nca.displacement import Relief
+
+
+class Embossed(Grown):
+    """As `Grown`, with a normal map that follows from the height.
+
+    Args:
+        bound: how far the height moves the surface at most [mean edges of the automaton's mesh].
+        moved: whether the vertices are moved too; the normal map then tells what they do not.
+        grown: arguments of `Grown`, in their order.
+    """
+
+    def __init__(self, bound: float, moved: bool, *grown: Any) -> None:
+        super().__init__(*grown)
+        self.bound, self.moved = bound, moved
+
+    def asset(self) -> Asset:
+        plain, mesh = super().asset(), self._mesh
+        assert plain.tangents is not None
+        tangents = orthonormal(plain.tangents, mesh.normals)
+        normals = self._normals(plain.mesh.normals, *self._vertices())
+        encoded = encode(normals, tangents, np.cross(mesh.normals, tangents), mesh.normals)
+        maps = {**plain.vertex_maps, "normal": encoded}
+        return replace(plain, mesh=mesh, vertex_maps=maps, tangents=tangents)
+
+    def textures(self, atlas: Atlas) -> dict[str, np.ndarray]:
+        detail = np.zeros((*atlas.face.shape, 3), np.float32)
+        for rows in atlas.strips():
+            used = atlas.face[rows] >= 0
+            face, barycentric = atlas.face[rows][used], atlas.barycentric[rows][used].clip(0)
+            barycentric /= barycentric.sum(axis=1, keepdims=True)
+            normals = unit(interpolate(barycentric, self.cells.given.shading_normals[face]))
+            detail[rows][used] = self._normals(normals, face, barycentric)
+        return super().textures(atlas) | {"normal": atlas.normal_map(self._mesh, detail)}
+
+    @cached_property
+    def _relief(self) -> Relief:
+        return Relief(self.cells.mesh, self.bound)
+
+    @cached_property
+    @torch.no_grad()
+    def _height(self) -> torch.Tensor:
+        """(V,) at the vertices of the automaton's mesh."""
+        values = self._decoded(vertex_points(self.cells.mesh))
+        return torch.from_numpy(values[:, self.look.layout["height"][0]])
+
+    @cached_property
+    def _mesh(self) -> Mesh:
+        """The given mesh, moved if it shall be."""
+        mesh = self.cells.given
+        if not self.moved:
+            return mesh
+        offsets = self._at(self._relief.offsets(self._height)[:, None].numpy(), *self._vertices())
+        return mesh.with_vertices(mesh.vertices + offsets * mesh.normals)
+
+    def _normals(self, normals: np.ndarray, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """Normals of the relief (P, 3) at points of the given mesh, given its own there."""
+        slopes = self._at(self._relief.slopes(self._height).numpy(), face, barycentric)
+        return unit(normals - slopes).astype(np.float32)
+
+    def _at(self, values: np.ndarray, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """Values (V, C) of the automaton's vertices at points of the given mesh, (P, C)."""
+        located, weights = self.cells.locate(face, barycentric)
+        return interpolate(weights, values[self.cells.mesh.faces[located]])

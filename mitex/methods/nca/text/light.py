@@ -1,0 +1,41 @@
+"""The light of text-guided trainings: one lamp beside each camera, in spherical harmonics."""
+
+from __future__ import annotations
+
+import torch
+import torch.nn.functional as F
+
+from mitex.scenes.cameras import Cameras
+
+AMBIENT = 0.4
+BESIDE = (-0.6, 0.6)  # of the camera, right and up, where it is 1 away: slopes of all directions show
+
+
+def lamps(cameras: Cameras) -> torch.Tensor:
+    """Unit vectors (K, 3) float32 towards the lamp of each camera, to its upper left."""
+    right, up, forward = cameras.axes()
+    return F.normalize(torch.from_numpy(BESIDE[0] * right + BESIDE[1] * up - forward).float(), dim=1)
+
+
+def shading(normals: torch.Tensor, lamp: torch.Tensor) -> torch.Tensor:
+    """Factor of sRGB colours, from about `AMBIENT` to 1 where a normal points at the lamp.
+
+    The irradiance of a far lamp up to the second degree of the spherical harmonics, 1/4 + x/2 + 5/32 (3 x^2 -
+    1) with x the cosine of the angle (Ramamoorthi & Hanrahan 2001): smooth where a lamp's light would end.
+
+    Args:
+        normals: (P, 3) unit.
+        lamp: (P, 3) unit, towards the lamp.
+
+    Returns:
+        (P, 1).
+    """
+    x = (normals * lamp).sum(1, keepdim=True)
+    return AMBIENT + (1 - AMBIENT) / BRIGHTEST * _irradiance(x)
+
+
+def _irradiance(x):
+    return 0.25 + 0.5 * x + 5 / 32 * (3 * x * x - 1)
+
+
+BRIGHTEST = _irradiance(1.0)

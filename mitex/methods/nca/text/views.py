@@ -1,0 +1,117 @@
+"""What a model of texts and images is shown: a textured surface, and the same without its texture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as F
+
+from mitex.losses import Augmentation
+from mitex.methods.nca.config import NcaConfig
+from mitex.methods.nca.decoder.surface import Points
+from mitex.methods.nca.displacement import Relief
+from mitex.methods.nca.look import Look
+from mitex.methods.nca.surfaces import TrainingSphere
+from mitex.methods.nca.text.light import lamps, shading
+from mitex.scenes.cameras import Cameras, random_views
+from mitex.sparse import Weights
+
+GREY = 0.5  # sRGB, of a surface without colours
+BACKGROUND = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """K views, and what of them the model sees; drawn once, the same for any state.
+
+    Attributes:
+        cameras: the views.
+        whole: all of each view, tilted.
+        close: close-ups cut out of the views, tilted.
+    """
+
+    cameras: Cameras
+    whole: Augmentation
+    close: Augmentation
+
+    @staticmethod
+    def draw(config: NcaConfig, generator: torch.Generator) -> Sight:
+        """With the numbers of a config."""
+        distances, count = config.text_distances, config.view_count
+        distance = distances[int(torch.randint(len(distances), (), generator=generator))]
+        tilt = config.text_tilt
+        return Sight(
+            random_views(generator, count, distance, config.fov, config.resolution),
+            Augmentation.draw(generator, count, tilt=tilt),
+            Augmentation.draw(generator, count, config.text_crops, config.text_crop_area, tilt),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """Pictures of a textured surface (K, H, W, 3), sRGB, and what they were made from.
+
+    Attributes:
+        coloured: with its colours and its relief.
+        plain: grey, with its relief.
+        values: (P, C) of the maps where the pixels meet the surface.
+        height: (V,) of the vertices.
+    """
+
+    coloured: torch.Tensor
+    plain: torch.Tensor
+    values: torch.Tensor
+    height: torch.Tensor
+
+
+class Figure:
+    """A surface as cameras see it, shaded.
+
+    Args:
+        sphere: the surface.
+        bound: of the relief [edges].
+        device: of states.
+    """
+
+    def __init__(self, sphere: TrainingSphere, bound: float, device: torch.device | str = "cpu") -> None:
+        self.sphere, self.relief = sphere, Relief(sphere.mesh, bound, device)
+        self._faces = torch.tensor(sphere.mesh.faces, device=device)
+
+    def bare(self, cameras: Cameras) -> torch.Tensor:
+        """Pictures (K, H, W, 3) without any texture, grey and even."""
+        hit, points = self._seen(cameras)
+        return _picture(GREY * self._shade(self.relief.plain, points, hit, cameras), hit, cameras)
+
+    def textured(self, look: Look, state: torch.Tensor, cameras: Cameras) -> Views:
+        """With what a state (V, C) shows; differentiable in the state and the look's decoder."""
+        hit, points = self._seen(cameras)
+        surface, layout = self.sphere.surface, look.layout
+        table = surface.table(state)
+        values, corners = (look.decoder(surface, table, where) for where in (points, self.relief.corners))
+        height = corners[:, layout["height"][0]]
+        shade = self._shade(self.relief.normals(height), points, hit, cameras)
+        coloured = shade * values[:, list(layout["albedo"])].clamp(0, 1)
+        plain = shade * GREY
+        return Views(_picture(coloured, hit, cameras), _picture(plain, hit, cameras), values, height)
+
+    def _seen(self, cameras: Cameras) -> tuple[torch.Tensor, Points]:
+        """Which pixels meet the surface, (K H W,) bool, and where."""
+        hits = self.sphere.stage.hits(cameras)
+        return hits.hit.to(self._faces.device), Points(hits.face, hits.barycentric)
+
+    def _shade(
+        self, normals: torch.Tensor, points: Points, hit: torch.Tensor, cameras: Cameras
+    ) -> torch.Tensor:
+        """The light (P, 1) at points, between the normals of the vertices (V, 3)."""
+        device = self._faces.device
+        corners, weights = self._faces[points.face.long().to(device)], points.barycentric.to(device)
+        between = F.normalize(Weights(corners, weights, len(normals))(normals), dim=1)
+        lamp = lamps(cameras).to(device).repeat_interleave(cameras.width * cameras.height, 0)[hit]
+        return shading(between, lamp)
+
+
+def _picture(colours: torch.Tensor, hit: torch.Tensor, cameras: Cameras) -> torch.Tensor:
+    """(K, H, W, 3) of colours (P, 1 or 3) where pixels meet the surface."""
+    picture = colours.new_full((len(hit), 3), BACKGROUND)
+    return picture.index_put((hit,), colours.expand(-1, 3)).view(*cameras.shape, 3)
