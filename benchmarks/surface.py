@@ -22,9 +22,9 @@ from rich.table import Table
 
 from mitex.features.layers import CHANNELS, LAYERS
 from mitex.mesh import Mesh, icosphere
+from mitex.methods.layout import with_layout
 from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.domain import SurfaceDomain
-from mitex.methods.surface.fitting import with_layout
 from mitex.methods.surface.levels import Levels
 from mitex.methods.surface.network import ALL_LAYERS, SurfaceVgg
 from mitex.runtime import keep_freed_memory
@@ -54,7 +54,7 @@ def measure(mesh: Mesh, resolution: int, repetitions: int) -> Result:
     """Prepares a mesh and times the best of some steps."""
     config = replace(PRESETS["fast"], resolution=resolution, scales=0)
     start = time.perf_counter()
-    domain = SurfaceDomain.of(with_layout(mesh, config, keep_uvs=False), config)
+    domain = SurfaceDomain.of(with_layout(mesh, config.resolution), config)
     between = time.perf_counter()
     levels = domain.compute_levels()
     prepared = time.perf_counter()

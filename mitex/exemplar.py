@@ -101,6 +101,16 @@ class Exemplar:
             raise ImageError(f"there is no exemplar {path}", suggestion(str(path), names(), otherwise))
         return Exemplar({"albedo": _check_side(read_image(source), source)}, source.stem)
 
+    def of_albedo(self) -> Exemplar:
+        """The exemplar's albedo alone, for methods that know colours only.
+
+        Raises:
+            ImageError: it has none.
+        """
+        if "albedo" not in self.maps:
+            raise ImageError(f"exemplar {self.name} has no albedo", "give an image, or a folder with one")
+        return Exemplar({"albedo": self.maps["albedo"]}, self.name)
+
     def resized(self, size: int) -> Exemplar:
         """The central square of every map, resized to `size` x `size` [px] with antialiasing."""
         if size < 1:

@@ -137,6 +137,19 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise
 
 
+@contextmanager
+def writing(target: Path) -> Iterator[Path]:
+    """Yields the place that is written to within the context.
+
+    Raises:
+        OutputError: The operating system refused.
+    """
+    try:
+        yield target
+    except OSError as e:
+        raise _translated(e, target) from e
+
+
 def is_temporary(path: Path) -> bool:
     """Whether a file is named as `atomic_write` names its temporary ones: in a killed process they stay."""
     return _TEMPORARY.fullmatch(path.name) is not None and path.is_file()

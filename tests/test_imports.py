@@ -17,6 +17,7 @@ ORDER = [
     "__main__",
     "cli",
     "demo",
+    "batch",
     "methods",
     "evaluation",
     "render",
@@ -38,6 +39,7 @@ ORDER = [
     "images",
     "colour",
     "runtime",
+    "cuts",
     "sparse",
     "cache",
     "cache_entries",
@@ -60,6 +62,7 @@ LAZY = {
 # What belongs to a baseline -> the method that it is compared with, and further baselines that it needs.
 COMPARED = {
     "displacement": {"geometric"},
+    "multi_view_gram": {"surface"},
     "quilted": {"nerf"},
     "plain_field": {"nerf"},
 }
@@ -170,9 +173,9 @@ def test_each_lazy_import_is_there_and_needed(site):
     assert circle(rest)
 
 
-def test_only_the_command_line_and_the_demo_import_methods():
+def test_only_the_command_line_the_demo_and_batches_import_methods():
     users = {part(link.importer) for link in links() if part(link.target) == "methods"}
-    assert users == {"cli", "demo", "methods"}
+    assert users == {"batch", "cli", "demo", "methods"}
 
 
 def test_methods_do_not_import_each_other():

@@ -16,6 +16,8 @@ COMMANDS = {
     "demo": ("mitex.demo:Demo", "synthesize, grow, render and export textures in a few minutes"),
     "cache": ("mitex.cli.cache:Cache", "show or clear what is kept on disk to save time"),
     "models": ("mitex.cli.models:Models", "list the textures that ship with Mitex"),
+    "batch": ("mitex.cli.batch:Batch", "run a plan of many fits, on one machine or on many"),
+    "batch status": ("mitex.cli.batch:Status", "tell how far the jobs of a plan are"),
     "render": ("mitex.cli.render:Render", "path-trace an asset: a still or a turntable"),
 }
 # Commands whose options are those of the model's method.
@@ -67,7 +69,10 @@ def find(words: Sequence[str]) -> Call:
     word, rest = words[0], list(words[1:])
     if word in OF_MODELS:
         return _of_model(word, rest)
-    if word in (single := COMMANDS | of_methods()):
+    single = COMMANDS | of_methods()
+    if (two := " ".join(words[:2])) in single:
+        word, rest = two, rest[1:]
+    if word in single:
         call = Call(f"mitex {word}", load(single[word][0]), rest)
     elif word == "fit" and rest and rest[0] in methods():
         method = methods()[rest[0]]

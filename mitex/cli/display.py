@@ -113,7 +113,7 @@ class _Lines:
     def show(self, work: str, details: str) -> None:
         with self._lock:
             if work != self._work:
-                # Many short works in a row get a line too, so a new one does not put off the line that is due.
+                # Many short works in a row get a line too: a new one does not put off one that is due.
                 self._due = min(self._due, time.monotonic() + FIRST_LINE)
             self._work, self._text = work, work + details
         if self._thread is None and self._due < math.inf:

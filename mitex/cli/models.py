@@ -21,26 +21,44 @@ class Models:
     examples:
       mitex models
       mitex models --json
+      mitex models --like "grey pebbles"
     """
 
     json: Annotated[bool, arg(help_behavior_hint="")] = False
     """For programs: a JSON list of objects."""
 
+    like: str | None = None
+    """The most similar first, by a small model of pictures and words: it knows common colours, patterns and
+    materials, and says so when it does not know a word."""
+
     def run(self) -> None:
         models = listing()
+        if self.like is not None:
+            models = _by_likeness(models, self.like)
         if self.json:
             print(json.dumps(models, indent=2))
             return
         for model in models:
-            origin = [
-                f"{key} {_text(model[key])}" for key in ("preset", "steps", "seconds", "loss") if key in model
-            ]
+            keys = ("likeness", "preset", "steps", "seconds", "loss")
+            origin = [f"{key} {_text(model[key])}" for key in keys if key in model]
             print(f"{model['name']:16}  {model['method']}: {', '.join(model.get('maps', ['relief']))}")
             print(f"{'':16}  {', '.join(origin)}")
             if model["thumbnail"]:
                 print(f"{'':16}  {model['thumbnail']}")
         for family, names in _families(models).items():
             print(f"family {family}, which can be grafted with each other: {', '.join(names)}")
+
+
+def _by_likeness(models: list[dict[str, Any]], text: str) -> list[dict[str, Any]]:
+    """The models whose thumbnails fit a text best first; those without one last."""
+    from mitex.features.words import likeness
+    from mitex.images import read_image
+
+    seen = [model for model in models if model["thumbnail"]]
+    cosines = likeness(text, [read_image(model["thumbnail"]) for model in seen])
+    fits = [model | {"likeness": cosine} for model, cosine in zip(seen, cosines, strict=True)]
+    fits.sort(key=lambda model: model["likeness"], reverse=True)
+    return fits + [model for model in models if not model["thumbnail"]]
 
 
 def _families(models: list[dict[str, Any]]) -> dict[str, list[str]]:

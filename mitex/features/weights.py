@@ -13,6 +13,8 @@ VGG16_FILE = "vgg16_conv_fp16.safetensors"
 VGG16_SHA256 = "bb5788b61d3a34c37ba2a93772a503da31be4676f46e9bc45243f09542557316"
 FLOW_FILE = "flow.safetensors"
 FLOW_SHA256 = "cd69fffabcc5fd97d1d9f64742aa4644ce1a3666866a906cda6bbc3a1b5e9914"
+WORDS_FILE = "words.safetensors"
+WORDS_SHA256 = "9fe08a52821b1d92a2a0b422b9a1161f560f18ba1abf058753e44cea2c593393"
 FOLDER = Path(__file__).parents[1] / "data" / "weights"
 
 
@@ -37,6 +39,18 @@ def flow_path() -> Path:
     path = FOLDER / FLOW_FILE
     if not path.is_file():
         raise WeightsError(f"the weights of the flow network are not at {path}", "reinstall mitex")
+    return path
+
+
+def words_path() -> Path:
+    """The weights of the embedded text-image model that ship with the package.
+
+    Raises:
+        WeightsError: the file is missing.
+    """
+    path = FOLDER / WORDS_FILE
+    if not path.is_file():
+        raise WeightsError(f"the weights of the text-image model are not at {path}", "reinstall mitex")
     return path
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import MISSING, Field, dataclass, field, fields
 from typing import TYPE_CHECKING
 
 from mitex.lazy import load
@@ -59,6 +59,27 @@ class Method:
         """The class of its textures."""
         return load(self.texture)
 
+    @property
+    def learns_from(self) -> str:
+        """The option of `mitex fit` that names what it learns from: the one that must be given, if any."""
+        fit = self.load_fit()
+        return fit.source or next(one.name for one in fields(fit) if _is_required(one))
+
+    @property
+    def fits_to_mesh(self) -> bool:
+        """Whether a fit is of one mesh, rather than for any that its texture is put on later."""
+        return self.load_fit().fits_to_mesh
+
+    @property
+    def resumes(self) -> bool:
+        """Whether its fits can go on from a checkpoint."""
+        return any(one.name == "resume" for one in fields(self.load_fit()))
+
+    @property
+    def applies_to_meshes(self) -> bool:
+        """Whether `mitex apply` puts its textures on a mesh."""
+        return any(one.name == "mesh" for one in fields(self.load_apply()))
+
     def recognises(self, tensors: frozenset[str], metadata: Mapping[str, str]) -> bool:
         """Whether a safetensors file with these tensors and metadata is one of this method's.
 
@@ -69,3 +90,7 @@ class Method:
         if metadata.get("format", "").startswith("mitex-"):
             return metadata["format"].removeprefix("mitex-").rpartition("-")[0] == self.name
         return bool(self.tensors) and tensors == self.tensors
+
+
+def _is_required(option: Field) -> bool:
+    return option.default is MISSING and option.default_factory is MISSING

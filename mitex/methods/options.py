@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
@@ -22,7 +22,17 @@ PICTURES = (".png", ".jpg", ".jpeg")
 
 @dataclass(kw_only=True)
 class FitOptions:
-    """Options of every `mitex fit METHOD`."""
+    """Options of every `mitex fit METHOD`.
+
+    Attributes:
+        only_at_start: names of options that a run which is resumed does not take again.
+        source: name of the option for what it usually learns from, if none of them must be given.
+        fits_to_mesh: whether a fit is of one mesh, rather than for any that its texture is put on later.
+    """
+
+    only_at_start: ClassVar[frozenset[str]] = frozenset()
+    source: ClassVar[str | None] = None
+    fits_to_mesh: ClassVar[bool] = False
 
     out: Annotated[Path | None, arg(metavar="RUN", help_behavior_hint="(default: a folder in runs/)")] = None
     """Run folder."""

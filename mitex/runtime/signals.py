@@ -4,7 +4,7 @@ import logging
 import signal
 import threading
 from types import FrameType
-from typing import Any
+from typing import Any, ClassVar
 
 log = logging.getLogger(__name__)
 
@@ -15,7 +15,13 @@ class StopSignals:
     Outside the main thread, where Python allows no handlers, it does nothing. A signal that the parent
     process asked to ignore (`nohup`, a script's background job) stays ignored. Earlier handlers come back at
     exit.
+
+    Attributes:
+        second_raises: whether a second signal does what is said above; without, it changes nothing, for
+            processes that are told to stop by more than one other.
     """
+
+    second_raises: ClassVar[bool] = True
 
     def __init__(self) -> None:
         self.requested = False
@@ -35,7 +41,9 @@ class StopSignals:
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if self.requested:
-            raise KeyboardInterrupt
+            if self.second_raises:
+                raise KeyboardInterrupt
+            return
         self.requested = True
         # The lock of `logging` lets its own thread in again; a handler that writes unbuffered is safe here.
         log.info("stopping after this step; once more to stop at once")

@@ -9,6 +9,9 @@ from pathlib import Path
 
 from mitex.errors import ConfigError
 
+THREADS = (
+    "MITEX_THREADS"  # of the environment: how many threads Dr.Jit gets, as OMP_NUM_THREADS says for torch
+)
 WORKER_NAME = "nt ["  # what Dr.Jit calls its worker threads, with a number
 WORKER_NICENESS = 10  # added to the process's when they are to give way
 WORKER_IDLE_TIME = 0.05  # after which they sleep [s]
@@ -32,9 +35,12 @@ def threads(count: int) -> None:
 
 
 def apply_thread_count() -> None:
-    """Gives Dr.Jit, once it is loaded, the number of threads that `threads` was called with before."""
-    if _threads is not None and _threads != import_module("drjit").thread_count():
-        set_workers(_threads)
+    """Gives Dr.Jit, once it is loaded, the number of threads that `threads` was called with before, or that
+    the environment's MITEX_THREADS says."""
+    text = os.environ.get(THREADS, "")
+    count = _threads or (int(text) if text.isdecimal() else 0)
+    if count and count != import_module("drjit").thread_count():
+        set_workers(count)
 
 
 def let_idle_threads_sleep() -> None:

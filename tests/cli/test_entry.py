@@ -200,14 +200,15 @@ class TestUsage:
             (
                 ["xyzzy"],
                 "there is no command 'xyzzy'; use one of doctor, demo, fit, apply, animate, graft, cache, "
-                "models, render, try",
+                "models, batch, render, try",
             ),
             (["fit"], "`mitex fit` needs a method; try `mitex fit geometric --help`"),
             (["fit", "nac"], "`mitex fit` knows no method 'nac'; did you mean nca?"),
             (
                 ["fit", "--exemplar", "a.png"],
                 "`mitex fit` knows no method '--exemplar'; use one of geometric, nca, nerf, surface, "
-                "displacement, plain_field, quilted",
+                "displacement, gatys, image_quilting, multi_view_gram, plain_field, quilted, "
+                "reaction_diffusion",
             ),
             (["fit", "surface"], "--exemplar is missing; see `mitex fit surface --help`"),
             (["apply"], "RUN|MODEL is missing; see `mitex apply --help`"),

@@ -9,12 +9,15 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
 - films have 4 frames of 32 pixels;
 - the photos that pages name are 8 of a ball in 24 x 24 pixels, which is its own base shape; its texture is
   joined from 30 patches to 128 texels;
-- pictures are traced in 16 x 16 pixels with one path each, and enlarged.
+- pictures are traced in 16 x 16 pixels with one path each, and enlarged;
+- jobs of a batch run in this process.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import os
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import chdir
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,10 +25,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mitex.cli import main
 from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods.registry import methods
 from mitex.training.run import CONFIG
 from tests.cli.test_nerf import save
+from tests.docs.blocks import ROOT, blocks
 from tests.features.clip.folders import write_folder
 from tests.methods.nerf.tiny import tiny_capture, write_capture
 
@@ -39,6 +44,10 @@ TINY: dict[str, dict[str, Any]] = {
     "nca": {"frequency": 4, "pool": 1, "view_count": 1, "zooms": 1, "min_steps": 2, "max_steps": 2}
     | {"resolution": 32, "target_size": 32, "exemplar_size": 32, "layers": ("relu1_1",), "order_weight": 0.0},
     "surface": {"resolution": 32, "exemplar_size": 32, "scales": 0, "layers": ("relu1_1",)},
+    "gatys": {"size": 32, "exemplar_size": 32, "layers": ("relu1_1",)},
+    "multi_view_gram": {"resolution": 32, "exemplar_size": 32, "view": 32, "layers": ("relu1_1",)},
+    "reaction_diffusion": {"hidden": 8, "channels": 4, "grid": 32, "exemplar_size": 32, "pool": 1}
+    | {"min_steps": 2, "max_steps": 2, "layers": ("relu1_1",)},
     "nerf": {
         "base_steps": 2,
         "rays": 64,
@@ -57,6 +66,8 @@ def prepare(folder: Path) -> None:
     save(icosphere(6), folder / "bunny.obj")
     write_folder(folder / "models" / "clip-b32")
     write_capture(tiny_capture(views=8, side=24, spp=1), folder / "captures" / "cobbles")
+    plan = next(block for block in blocks(ROOT / "docs" / "batch.md") if block.language == "toml")
+    (folder / "plan.toml").write_text(plan.text)
 
 
 def shrink(patch: pytest.MonkeyPatch) -> None:
@@ -72,6 +83,7 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(texture, "healed", lambda growth, state, generator: state)
     patch.setattr(texture, "film", _with_few_frames(texture.film))
     patch.setattr(texture.GrowingTexture, "apply", _small_growth(texture.GrowingTexture.apply))
+    patch.setattr("mitex.batch.task.Process", _InThisProcess)
     patch.setattr(NcaTexture, "tile", _small_tile(NcaTexture.tile))
     patch.setattr(fitting, "find_base", lambda *_, **__: _ball_as_base())
     patch.setattr(NerfTexture, "synthesize", _small_quilt(NerfTexture.synthesize))
@@ -79,6 +91,19 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     for module in (renderer, shell):
         patch.setattr(module, "accumulated", sketch)
         patch.setattr(module, "sensor", lambda resolution: sensor(SIDE))
+
+
+class _InThisProcess:
+    """In place of `mitex.batch.process.Process`."""
+
+    pid = os.getpid()
+
+    def __init__(self, words: Sequence[str], folder: Path, *_: object) -> None:
+        self._words, self._folder = words, folder
+
+    def wait(self) -> tuple[int, int]:
+        with chdir(self._folder):
+            return main(self._words), 0
 
 
 def _ball_in_place_of(mesh: Mesh) -> Mesh:

@@ -62,6 +62,26 @@ FITS = {
         resume="",
         source="nerf",
     ),
+    "multi_view_gram": TinyFit(
+        "--exemplar photo.png --mesh cube.obj --steps 2 --set resolution=32 exemplar_size=32 view=32 "
+        f"layers=relu1_1 {SMALL_RUN}",
+        "--mesh cube.obj",
+    ),
+    "gatys": TinyFit(
+        "--exemplar photo.png --steps 2 --set size=32 resolution=32 exemplar_size=32 layers=relu1_1 "
+        f"{SMALL_RUN}",
+        "--mesh cube.obj --resolution 64",
+    ),
+    "image_quilting": TinyFit(
+        "--exemplar photo.png --set size=32 resolution=32 exemplar_size=32 block=12",
+        "--mesh cube.obj --resolution 64",
+        resume="",
+    ),
+    "reaction_diffusion": TinyFit(
+        "--exemplar photo.png --steps 2 --set channels=4 hidden=8 grid=32 exemplar_size=32 pool=1 "
+        f"min_steps=1 max_steps=2 layers=relu1_1 {SMALL_RUN}",
+        "--mesh cube.obj --resolution 64 --steps 2 --scale 4",
+    ),
     "displacement": TinyFit("--reference spikes --set resolution=16", "--mesh cube.obj", resume=""),
 }
 

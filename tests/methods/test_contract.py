@@ -195,6 +195,14 @@ class TestDescription:
         assert f"mitex fit {name} " in (method.load_fit().__doc__ or "")
         assert "mitex apply " in (method.load_apply().__doc__ or "")
 
+    def test_batches_are_told_what_it_takes(self, name):
+        method, options = methods()[name], {field.name for field in fields(methods()[name].load_fit())}
+        assert f"--{method.learns_from} " in FITS[name].fit.replace("-", "_").replace("__", "--")
+        assert method.fits_to_mesh == ("--mesh " in FITS[name].fit)
+        assert method.applies_to_meshes == ("--mesh " in FITS[name].apply)
+        assert method.resumes == bool(FITS[name].resume)
+        assert method.load_fit().only_at_start <= options
+
     def test_its_settings_are_listed(self, name, capsys):
         assert main(["fit", name, "--settings"]) == 0
         assert capsys.readouterr().out.startswith("preset = ")

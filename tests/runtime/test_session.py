@@ -189,6 +189,11 @@ def test_threads_chosen_before_the_start_are_kept():
     assert run(code).stdout.strip() == "1"
 
 
+def test_threads_that_the_environment_says():
+    code = "import mitex.runtime as r; r.init(); import drjit as dr; print(dr.thread_count())"
+    assert run(code, MITEX_THREADS="3").stdout.strip() == "3"
+
+
 def test_torch_yields_cores_unless_the_user_says_otherwise(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("OMP_WAIT_POLICY", "ACTIVE")
     mitex.runtime.let_idle_threads_sleep()

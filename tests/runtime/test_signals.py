@@ -30,6 +30,14 @@ def test_the_first_asks_and_the_second_forces(first, second):
     assert signal.getsignal(second) is signal.default_int_handler
 
 
+def test_where_many_may_ask_the_second_changes_nothing(monkeypatch):
+    monkeypatch.setattr(StopSignals, "second_raises", False)
+    with StopSignals() as stop:
+        for _ in range(3):
+            os.kill(os.getpid(), signal.SIGTERM)
+        assert stop.requested
+
+
 def test_handlers_come_back_after_an_error():
     with pytest.raises(RuntimeError), StopSignals():
         raise RuntimeError

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from tyro.conf import arg
 
@@ -41,6 +41,9 @@ class Fit(TrainingOptions):
       mitex fit nca --exemplar pebbles.png --out runs/pebbles --resume
       mitex fit nca --settings --preset paper
     """
+
+    only_at_start: ClassVar[frozenset[str]] = frozenset({"init"})
+    source: ClassVar[str | None] = "exemplar"
 
     exemplar: Annotated[str | None, arg(metavar="IMAGE|DIR|NAME", help_behavior_hint="")] = None
     """PNG or JPEG, a folder with any of albedo, height, normal, roughness, ambient_occlusion, or a name."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import arg
 
@@ -35,6 +35,8 @@ class Fit(ExemplarOptions):
       mitex fit surface --exemplar pebbles.png --mesh bunny.obj --out runs/bunny --resume
       mitex fit surface --exemplar maps/ --tile 1024 --out runs/tile
     """
+
+    fits_to_mesh: ClassVar[bool] = True
 
     mesh: Annotated[str | None, arg(metavar="MESH|NAME", help_behavior_hint="")] = None
     """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Unpack
 
 import numpy as np
 
-from mitex.atlas import unwrap, usable_uv
 from mitex.cache import content_key
 from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh
 from mitex.mesh.fields import read_vectors
+from mitex.methods.layout import with_layout
 from mitex.methods.surface.config import PRESETS, SurfaceConfig
 from mitex.methods.surface.content import AO, content_colours
 from mitex.methods.surface.domain import SurfaceDomain
@@ -31,7 +30,6 @@ from mitex.training.settings import RunOptions
 
 # Peak over precomputation and steps, measured at 512^2 and 1024^2 with bfloat16 features.
 BYTES_PER_TEXEL, BYTES_PER_TRIPLE = 3600, 900
-PADDING = 2  # texels between charts: bilinear taps of one never see the other
 
 
 def fit(
@@ -76,9 +74,8 @@ def fit(
             raise ConfigError("a tile takes no UVs, content or orientation", "leave them out")
         domain: SurfaceDomain = TileDomain.flat(settings)
     else:
-        surface = with_layout(
-            mesh if isinstance(mesh, Mesh) else Mesh.load(mesh), settings, keep_uvs or image
-        )
+        given = mesh if isinstance(mesh, Mesh) else Mesh.load(mesh)
+        surface = with_layout(given, settings.resolution, keep_uvs or image)
         if isinstance(orientation, str | Path):
             field = read_vectors(surface, orientation).astype(np.float32)
         else:
@@ -99,24 +96,6 @@ def fit(
         decay=settings.decay,
         optimizer=Lbfgs if settings.optimizer == "lbfgs" else partial(Adam, shared=settings.shared_moment),
     )
-
-
-def with_layout(mesh: Mesh, config: SurfaceConfig, keep_uvs: bool) -> Mesh:
-    """The mesh with the UVs that its texels shall have.
-
-    Raises:
-        ConfigError: its own are wanted but missing, out of range or overlapping.
-    """
-    if not keep_uvs:
-        return replace(mesh, uv=unwrap(mesh, config.resolution, PADDING))
-    if mesh.uv is None:
-        raise ConfigError(f"mesh '{mesh.name}' has no UVs to keep", "leave out `keep_uvs`")
-    if not usable_uv(mesh, mesh.uv):
-        raise ConfigError(
-            f"the UVs of mesh '{mesh.name}' overlap, leave [0, 1] or are incomplete",
-            "leave out `keep_uvs` to have it unwrapped",
-        )
-    return mesh
 
 
 def check_memory(mesh: Mesh, config: SurfaceConfig, maps: int = 1) -> None:

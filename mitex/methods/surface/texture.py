@@ -20,6 +20,7 @@ from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import rotate_about, unit_normals
 from mitex.mesh import Mesh
 from mitex.mesh.arrays import mesh_arrays, mesh_of_arrays
+from mitex.methods.layout import same_surface
 from mitex.methods.surface import METHOD
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.training import model_file
@@ -131,8 +132,3 @@ class SurfaceTexture:
         flat = unit_normals(self.mesh.face_crosses[texels.face])
         detail = decode(self.values[:, channels], right, up, flat) - flat + smooth
         return atlas.normal_map(self.mesh, spread(texels.image(detail), used, PADDING))
-
-
-def same_surface(a: Mesh, b: Mesh) -> bool:
-    """Whether two meshes have the same vertices and faces."""
-    return np.array_equal(a.vertices, b.vertices) and np.array_equal(a.faces, b.faces)

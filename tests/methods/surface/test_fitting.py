@@ -15,12 +15,12 @@ from mitex.exemplar import Exemplar
 from mitex.images import write_image
 from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods import surface
+from mitex.methods.layout import with_layout
 from mitex.methods.registry import method_of
 from mitex.methods.surface import METHOD
 from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.content import content_colours
 from mitex.methods.surface.domain import SurfaceDomain
-from mitex.methods.surface.fitting import with_layout
 from mitex.methods.surface.network import ALL_LAYERS
 from mitex.methods.surface.task import VIEW, SurfaceTask
 from mitex.methods.surface.texels import charts
@@ -225,7 +225,7 @@ class TestOrientation:
 
 def small_task(mesh, exemplar, *settings) -> SurfaceTask:
     config = resolve(PRESETS, None, None, [*SMALL, *settings])
-    laid = with_layout(mesh, config, False)
+    laid = with_layout(mesh, config.resolution)
     return SurfaceTask(config, exemplar, SurfaceDomain.of(laid, config))
 
 
@@ -309,25 +309,25 @@ class TestLayouts:
     CONFIG = resolve(PRESETS, None, None, ["resolution=64"])
 
     def test_own_uvs_are_kept_on_request(self, mesh):
-        laid = with_layout(mesh, self.CONFIG, False)
+        laid = with_layout(mesh, self.CONFIG.resolution)
         assert laid.uv is not None and usable_uv(laid, laid.uv)
-        assert with_layout(laid, self.CONFIG, True) is laid
+        assert with_layout(laid, self.CONFIG.resolution, True) is laid
         assert len(np.unique(charts(laid, laid.uv))) >= 2
 
     def test_missing_uvs(self, mesh):
         with pytest.raises(ConfigError, match="no UVs to keep"):
-            with_layout(mesh, self.CONFIG, True)
+            with_layout(mesh, self.CONFIG.resolution, True)
 
     @pytest.mark.parametrize("damage", ["overlap", "outside", "nan"])
     def test_unusable_uvs(self, mesh, damage):
-        uv = np.array(with_layout(mesh, self.CONFIG, False).uv)
+        uv = np.array(with_layout(mesh, self.CONFIG.resolution).uv)
         uv[: len(uv) // 2] = uv[len(uv) // 2 :] if damage == "overlap" else uv[: len(uv) // 2]
         if damage == "outside":
             uv = 2 * uv
         if damage == "nan":
             uv[0, 0] = 1e30
         with pytest.raises(ConfigError, match="overlap"):
-            with_layout(replace(mesh, uv=uv), self.CONFIG, True)
+            with_layout(replace(mesh, uv=uv), self.CONFIG.resolution, True)
 
 
 def test_one_triangle_is_enough(exemplar, tmp_path):

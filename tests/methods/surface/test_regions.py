@@ -9,10 +9,10 @@ from scipy.spatial.distance import pdist
 
 from mitex.features import Vgg16
 from mitex.mesh import Mesh, embedded, icosphere
+from mitex.methods.layout import with_layout
 from mitex.methods.surface.comparison import GramComparison
 from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.domain import SurfaceDomain
-from mitex.methods.surface.fitting import with_layout
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.regions import bisect
 from mitex.training import resolve
@@ -44,7 +44,7 @@ MESHES = {"sphere": icosphere(12), "octopus": embedded("octopus")}
 def laid_out(name: str, resolution: int) -> Mesh:
     """The mesh with the UVs of a fit, which take seconds."""
     config = resolve(PRESETS, overrides=[f"resolution={resolution}"])
-    return with_layout(MESHES[name], config, False)
+    return with_layout(MESHES[name], config.resolution)
 
 
 @pytest.mark.parametrize("mesh", MESHES)

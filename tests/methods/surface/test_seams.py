@@ -8,9 +8,9 @@ import pytest
 from mitex.exemplar import Exemplar
 from mitex.mesh import icosphere
 from mitex.methods import surface
+from mitex.methods.layout import with_layout
 from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.domain import SurfaceDomain
-from mitex.methods.surface.fitting import with_layout
 from mitex.methods.surface.seams import seam_ratio
 from mitex.methods.surface.texture import SurfaceTexture
 from mitex.training import resolve
@@ -20,7 +20,7 @@ from mitex.training import resolve
 def blank():
     """A texture of nothing on a sphere of several charts."""
     config = resolve(PRESETS, None, None, ["resolution=96"])
-    domain = SurfaceDomain.of(with_layout(icosphere(12), config, False), config)
+    domain = SurfaceDomain.of(with_layout(icosphere(12), config.resolution), config)
     return SurfaceTexture(domain, np.zeros((len(domain.texels.index), 3), np.float32), ("albedo",))
 
 

@@ -12,16 +12,13 @@ import torch
 
 from mitex.asset import Asset
 from mitex.atlas import MAX_RESOLUTION, laid_out
-from mitex.colour import linear_to_srgb, srgb_to_linear
 from mitex.errors import ConfigError
-from mitex.evaluation.mip_map import MipMap
 from mitex.export.common import asset_from_textures
 from mitex.mesh import Mesh
 from mitex.methods.baselines.quilted import METHOD
 from mitex.methods.nerf.use.placement import UNWRAP_SIZE, in_scene_cube, uv_unit_length
+from mitex.methods.planar import repeated
 from mitex.training import model_file
-
-CHUNK = 1 << 18  # texels looked up at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,24 +86,5 @@ class QuiltedTexture:
         mesh = laid_out(mesh, UNWRAP_SIZE)
         assert mesh.uv is not None
         unit_length = uv_unit_length(in_scene_cube(mesh)[0])
-        albedo = self._repeated(unit_length / (self.gap * scale), resolution)
+        albedo = repeated(self.image, unit_length / (self.gap * scale), resolution)
         return asset_from_textures(mesh, mesh.uv, {"albedo": albedo}, mesh.name)
-
-    def _repeated(self, length: float, resolution: int) -> np.ndarray:
-        """(N, N, 3) sRGB in [0, 1]: what the unit square of the UVs shows, row 0 on top.
-
-        Args:
-            length: texels of the picture along its side.
-            resolution: N.
-        """
-        step = length / resolution
-        along = (np.arange(resolution) + 0.5) * step
-        column, row = np.meshgrid(along, along - length)  # the lower left corner is that of the picture
-        places = np.stack([column.ravel(), row.ravel()], axis=1)
-        look_up, footprint = MipMap(srgb_to_linear(self.image)), step * np.eye(2)
-        colours = np.empty((len(places), 3), np.float32)
-        for start in range(0, len(places), CHUNK):
-            part = slice(start, start + CHUNK)
-            footprints = np.broadcast_to(footprint, (len(places[part]), 2, 2))
-            colours[part] = linear_to_srgb(look_up(places[part], footprints)).clip(0, 1)
-        return colours.reshape(resolution, resolution, 3)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mitex.cuts import cheapest_path, feather, new_part, overlap_paths
 from mitex.errors import ConfigError
-from mitex.methods.nerf.synthesis.cuts import cheapest_path, feather, new_part, overlap_paths
 from mitex.methods.nerf.synthesis.guide import Guide, GuideDistance
 from mitex.methods.nerf.synthesis.matching import FLIPS, SIDES, Matcher, Source, mirror, overlap, strip
 from mitex.methods.nerf.synthesis.repetition import EVENNESS, Repetition

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import label
 
-from mitex.methods.nerf.synthesis.cuts import (
+from mitex.cuts import (
     FEATHER,
     NO_CUT,
     cheapest_path,

@@ -1,0 +1,157 @@
+"""Who works on a job: claim files that one process alone can make, also in a folder that machines share.
+
+A claim is `claim.N` in the job's folder, made with O_EXCL. Its lines are `host:pid:time`, one for each
+process at work. It is stale when these are gone, or, on another host, when nobody has touched it for a while.
+Whoever finds the newest claim stale makes the next one, so that no claim that somebody could hold is removed.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+from contextlib import suppress
+from pathlib import Path
+
+STALE_AFTER = 60.0  # without a touch, of another host's claim [s]
+SLACK = 2.0  # by which a process may seem to have started after it made its claim [s]
+
+
+class Claim:
+    """A claim that this process holds until it is released; a context.
+
+    Attributes:
+        path: its file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @staticmethod
+    def take(folder: Path) -> Claim | None:
+        """A claim on the job of a folder; None if another process has one.
+
+        Raises:
+            OSError: The folder cannot be written to.
+        """
+        try:
+            numbers = _numbers(folder)
+            if any(_is_live(folder / f"claim.{number}") for number in numbers):
+                return None
+            path = folder / f"claim.{max(numbers, default=-1) + 1}"
+            with path.open("x", encoding="utf-8") as file:
+                file.write(_line(os.getpid()))
+        except FileExistsError:
+            return None
+        return Claim(path)._confirmed()
+
+    def _confirmed(self) -> Claim | None:
+        """Itself, and stale ones are gone; None if somebody made a claim of another number at this moment."""
+        others = [other for other in _claims(self.path.parent) if other != self.path]
+        if any(map(_is_live, others)):
+            self.release()
+            return None
+        for other in others:
+            other.unlink(missing_ok=True)
+        return self
+
+    def note(self, pid: int) -> None:
+        """Adds a process that works on the job, and may live longer than this one."""
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(_line(pid))
+
+    def touch(self) -> bool:
+        """Tells that the work goes on; returns False if another process has taken the job over."""
+        try:
+            os.utime(self.path)
+        except FileNotFoundError:
+            return False
+        except OSError:  # a disk that is away for a moment
+            pass
+        return True
+
+    def release(self) -> None:
+        """Lets others claim the job."""
+        with suppress(OSError):
+            self.path.unlink(missing_ok=True)
+
+    def __enter__(self) -> Claim:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+
+def holder(folder: Path) -> str | None:
+    """Host of the process that works on the job of a folder; None if nobody does."""
+    live = [claim for claim in _claims(folder) if _is_live(claim)]
+    return _read(live[0])[0][0] if live and _read(live[0]) else None
+
+
+def _numbers(folder: Path) -> list[int]:
+    return sorted(int(claim.suffix[1:]) for claim in _claims(folder))
+
+
+def _claims(folder: Path) -> list[Path]:
+    return [path for path in folder.glob("claim.*") if path.suffix[1:].isdigit()]
+
+
+def _line(pid: int) -> str:
+    return f"{socket.gethostname()}:{pid}:{time.time():.2f}\n"
+
+
+def _read(path: Path) -> list[tuple[str, int, float]]:
+    """Host, process and time of each line; half a line is left out."""
+    entries = []
+    with suppress(OSError, ValueError):
+        for line in path.read_text(encoding="utf-8").splitlines(keepends=True):
+            host, pid, moment = line.rsplit(":", 2)
+            if line.endswith("\n"):
+                entries.append((host, int(pid), float(moment)))
+    return entries
+
+
+def _is_live(path: Path) -> bool:
+    """Whether somebody works under a claim."""
+    entries = _read(path)
+    if entries and entries[0][0] == socket.gethostname():
+        return any(_is_running(pid, moment) for _, pid, moment in entries)
+    try:
+        return _now(path.parent) - path.stat().st_mtime < STALE_AFTER
+    except FileNotFoundError:
+        return False
+
+
+def _is_running(pid: int, noted: float) -> bool:
+    """Whether the process lives that had this number at a time, and not a later one of the same number."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+        boot = time.time() - time.clock_gettime(time.CLOCK_BOOTTIME)
+        started = boot + int(fields[19]) / os.sysconf("SC_CLK_TCK")
+        return fields[0] not in "ZX" and started <= noted + SLACK
+    except FileNotFoundError:
+        return not Path("/proc/self/stat").exists() and _answers(pid)
+
+
+def _answers(pid: int) -> bool:
+    """Where there is no /proc."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        pass
+    return True
+
+
+def _now(folder: Path) -> float:
+    """The time by the clock of the file system, which may be another machine's."""
+    probe = folder / f".now.{os.getpid()}"
+    try:
+        probe.touch()
+        return probe.stat().st_mtime
+    except OSError:
+        return time.time()
+    finally:
+        with suppress(OSError):
+            probe.unlink(missing_ok=True)

@@ -1,0 +1,211 @@
+"""Running a plan: which job is next, what has ended, and stopping so that the next call goes on."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from mitex.batch.engines import Engine, Handle, WorkerLost
+from mitex.batch.engines.local import Local
+from mitex.batch.folder import FAILED, BatchFolder
+from mitex.batch.jobs import Job, jobs_of
+from mitex.batch.plan import Plan
+from mitex.batch.report import Report, status
+from mitex.batch.task import RETRIES, Outcome, Task
+from mitex.progress import announce
+from mitex.runtime.signals import StopSignals
+from mitex.training.progress import clock
+
+log = logging.getLogger(__name__)
+
+LOOK_ELSEWHERE = 1.0  # between two looks at a job that another call works on [s]
+
+EventState = Literal["submitted", "done", "failed", "interrupted", "elsewhere"]
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened to a job.
+
+    Attributes:
+        job: the job.
+        state: "submitted", or how it ended.
+        record: of a job that is done or failed: see `BatchFolder`.
+        ended: jobs that are done or failed so far.
+        total: jobs in all.
+    """
+
+    job: Job
+    state: EventState
+    record: dict[str, Any]
+    ended: int
+    total: int
+
+
+def run_plan(
+    plan: Plan,
+    folder: str | Path,
+    engine: Engine | None = None,
+    *,
+    threads: int | None = None,
+    retry: bool = False,
+    on_event: Callable[[Event], None] | None = None,
+) -> Report:
+    """Does all jobs of a plan that are not done, and writes results.csv.
+
+    Several calls may run on one folder, also of several machines: no job is done twice. A job that fails does
+    not stop the others, but those that need its result.
+
+    Args:
+        plan: what is to be made.
+        folder: new, empty, or that of an earlier call, which goes on.
+        engine: where the jobs run; one after the other on this machine if None.
+        threads: of each job; None leaves it to the engine.
+        retry: whether jobs that failed in earlier calls are tried again.
+        on_event: is told of each job that is submitted or ends, in the caller's thread.
+
+    Returns:
+        How far each job is.
+
+    Raises:
+        ConfigError: An input does not exist, or a job is there twice.
+        OutputError: The folder holds other files, or cannot be written to.
+        KeyboardInterrupt: Ctrl-C or SIGTERM; the fits that were running have saved their checkpoints.
+    """
+    jobs = jobs_of(plan)
+    place = BatchFolder.checked(folder)
+    with StopSignals() as signals, engine or Local() as workers, place.driven(jobs) as name:
+        if retry:
+            for job in jobs:
+                place.forget_failure(job)
+        run = _Run(jobs, place, workers, name, threads or workers.threads, on_event)
+        stopped = run.loop(signals)
+    summary = status(place.path)
+    summary.write_csv()
+    if stopped:
+        raise KeyboardInterrupt(
+            f"interrupted with {summary.count('done')} of {len(jobs)} jobs done; the same command goes on"
+        )
+    return summary
+
+
+@dataclass
+class _Run:
+    """One call of `run_plan`.
+
+    Attributes:
+        ended: jobs that this call has nothing more to do with, and how they ended.
+        handles: tasks that were submitted, by the jobs' ids.
+        losses: how many workers were lost with a job.
+        not_before: when to look again at jobs that other calls work on.
+    """
+
+    jobs: Sequence[Job]
+    folder: BatchFolder
+    engine: Engine
+    name: str
+    threads: int
+    on_event: Callable[[Event], None] | None
+    ended: dict[str, str] = field(default_factory=dict)
+    handles: dict[str, Handle] = field(default_factory=dict)
+    losses: Counter[str] = field(default_factory=Counter)
+    not_before: dict[str, float] = field(default_factory=dict)
+
+    def loop(self, signals: StopSignals) -> bool:
+        """Goes on until all jobs have ended; returns whether a signal came before."""
+        for job in self.jobs:
+            self._recall(job)
+        self._announce()
+        while len(self.ended) < len(self.jobs):
+            if signals.requested:
+                self._stop()
+                return True
+            self._submit()
+            self._collect()
+            time.sleep(self.engine.pause)
+        return False
+
+    def _recall(self, job: Job) -> bool:
+        """Whether another call has finished the job."""
+        for state, record in (("done", self.folder.done(job)), ("failed", self.folder.failed(job))):
+            if record:
+                self.ended[job.id] = state
+                return True
+        return False
+
+    def _submit(self) -> None:
+        """Submits the jobs that can begin, as many as the engine takes."""
+        for job in self.jobs:
+            if self.engine.at_once is not None and len(self.handles) >= self.engine.at_once:
+                break
+            if job.id in self.ended or job.id in self.handles:
+                continue
+            need = "done" if job.needs is None else self.ended.get(job.needs)
+            if need == "done":
+                self._begin(job)
+            elif need is not None:
+                self.ended[job.id] = "blocked"
+
+    def _begin(self, job: Job) -> None:
+        """Submits a job, unless another call works on it or has finished it."""
+        now = time.monotonic()
+        if now < self.not_before.get(job.id, 0.0) or self._recall(job):
+            return
+        if self.folder.holder(job):
+            self.not_before[job.id] = now + LOOK_ELSEWHERE
+            return
+        self.handles[job.id] = self.engine.submit(Task(job, self.folder, self.name, self.threads))
+        self._tell(job, "submitted", {})
+
+    def _collect(self) -> None:
+        """Takes note of the tasks that have ended."""
+        for job in self.jobs:
+            if job.id in self.handles and self.handles[job.id].done():
+                try:
+                    self._note(job, self.handles.pop(job.id).result())
+                except WorkerLost as loss:
+                    self._note_loss(job, loss)
+
+    def _note(self, job: Job, outcome: Outcome) -> None:
+        if outcome.state == "elsewhere":
+            self.not_before[job.id] = time.monotonic() + LOOK_ELSEWHERE
+            return
+        self.ended[job.id] = outcome.state
+        self._tell(job, outcome.state, outcome.record)
+
+    def _note_loss(self, job: Job, loss: WorkerLost) -> None:
+        """A job whose worker is gone is submitted again, but not for ever."""
+        self.losses[job.id] += 1
+        log.info("%s: %s", job.name, loss)
+        if self.losses[job.id] > RETRIES:
+            record = {"error": f"lost {self.losses[job.id]} workers; {loss}", "code": None}
+            self.folder.write(job, FAILED, record)
+            self._note(job, Outcome("failed", record))
+
+    def _stop(self) -> None:
+        """Takes back what has not begun, and waits for what has: fits save their checkpoints."""
+        self.folder.dismiss(self.name)
+        for job in self.jobs:
+            if job.id in self.handles and not self.folder.holder(job):
+                self.handles.pop(job.id).cancel()
+        while self.handles:
+            self._collect()
+            time.sleep(self.engine.pause)
+
+    def _tell(self, job: Job, state: EventState, record: dict[str, Any]) -> None:
+        count = len(self.ended)
+        if state == "done":
+            log.info("%s: done in %s", job.name, clock(record.get("seconds", 0)))
+        elif state != "submitted":
+            log.info("%s: %s", job.name, record.get("error", state))
+        if self.on_event:
+            self.on_event(Event(job, state, record, count, len(self.jobs)))
+        self._announce()
+
+    def _announce(self) -> None:
+        announce("running jobs", len(self.ended), len(self.jobs))

@@ -1,0 +1,117 @@
+"""Jobs of Slurm, through submitit.
+
+Slurm ends a job when its time is over or others go first. Shortly before, submitit gets a signal: the fit
+saves its checkpoint, and the job goes back into the queue.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mitex.batch.engines import Engine, WorkerLost
+from mitex.batch.task import Outcome, Task, end_processes
+from mitex.errors import ConfigError, RuntimeUnavailable
+
+FOLDER = "slurm"  # of what submitit keeps, in the batch folder
+MINUTES = 24 * 60  # that a job may take, if nobody says otherwise
+
+
+class Slurm(Engine):
+    """The queue of a Slurm cluster.
+
+    Args:
+        options: of sbatch, as KEY=VALUE.
+        jobs: how many are in the queue at once; None for all.
+        threads: processors of a job.
+        cluster: "slurm"; "local" stands in for it on one machine, for tests.
+
+    Raises:
+        ConfigError: An option is no KEY=VALUE.
+    """
+
+    def __init__(
+        self, options: Sequence[str] = (), jobs: int | None = None, threads: int = 1, cluster: str = "slurm"
+    ) -> None:
+        self._options = dict(map(_option, options))
+        self._cluster = cluster
+        self.at_once, self.threads = jobs, threads
+        self.pause = 2.0 if cluster == "slurm" else 0.1
+        self._executor: Any = None
+
+    def __enter__(self) -> Slurm:
+        if self._cluster == "slurm" and shutil.which("sbatch") is None:
+            raise RuntimeUnavailable("there is no sbatch here", "run this on a machine of the Slurm cluster")
+        return self
+
+    def submit(self, task: Task) -> _Queued:
+        self._executor = self._executor or self._opened(task.folder.path / FOLDER)
+        return _Queued(self._executor.submit(Requeueable(task)))
+
+    def _opened(self, folder: Path) -> Any:
+        try:
+            import submitit
+        except ImportError as e:
+            raise RuntimeUnavailable(
+                f"submitit is not installed ({e})", "run `pip install 'mitex[cluster]'`"
+            ) from e
+        executor = submitit.AutoExecutor(folder, cluster=self._cluster)
+        try:
+            executor.update_parameters(
+                timeout_min=MINUTES, cpus_per_task=self.threads, stderr_to_stdout=True, **self._options
+            )
+        except (NameError, TypeError, ValueError) as e:
+            raise ConfigError(
+                f"submitit refuses the options of Slurm ({e})", "mend or leave out the one that it names"
+            ) from e
+        return executor
+
+    def __exit__(self, *_: object) -> None:
+        """Nothing is held."""
+
+
+@dataclass
+class Requeueable:
+    """A task that goes back into the queue when Slurm ends it."""
+
+    task: Task
+
+    def __call__(self) -> Outcome:
+        return self.task()
+
+    def checkpoint(self) -> Any:
+        """Called by submitit, in the midst of the task, before Slurm ends it."""
+        import submitit
+
+        end_processes()
+        return submitit.helpers.DelayedSubmission(self)
+
+
+@dataclass
+class _Queued:
+    job: Any
+
+    def done(self) -> bool:
+        return self.job.done()
+
+    def result(self) -> Outcome:
+        from submitit.core.utils import FailedJobError, UncompletedJobError
+
+        try:
+            return self.job.result()
+        except (FailedJobError, UncompletedJobError) as e:
+            lines = str(e).strip().splitlines() or ["it says nothing"]
+            raise WorkerLost(f"job {self.job.job_id} of Slurm ended without a result ({lines[-1]})") from e
+
+    def cancel(self) -> None:
+        self.job.cancel(check=False)
+
+
+def _option(text: str) -> tuple[str, int | str]:
+    key, equals, value = text.partition("=")
+    if not (equals and key and value):
+        raise ConfigError(f"'{text}' is no option of Slurm", "write KEY=VALUE, such as partition=cpu")
+    return f"slurm_{key.replace('-', '_')}", int(value) if value.isdecimal() else value

@@ -1,0 +1,155 @@
+"""The batch folder: its jobs, and how far each of them is.
+
+plan.jsonl         the jobs, one a line
+results/ID/        what a job writes: a run folder, or an asset
+jobs/ID/done.json  time, seconds, memory, metrics and host of a job that is done
+jobs/ID/failed.json, log.txt, claim.N, starts.json
+drivers/NAME       of a command that is running; its jobs stop when the file is gone
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import socket
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mitex.batch import claims
+from mitex.batch.jobs import Job
+from mitex.errors import ConfigError, OutputError
+from mitex.paths import atomic_write, check_writable, expanded, is_temporary, writing
+
+PLAN = "plan.jsonl"
+DONE, FAILED, STARTS, LOG = "done.json", "failed.json", "starts.json", "log.txt"
+
+
+@dataclass(frozen=True)
+class BatchFolder:
+    """A folder with the jobs of a plan.
+
+    Attributes:
+        path: absolute.
+    """
+
+    path: Path
+
+    @staticmethod
+    def checked(out: str | Path) -> BatchFolder:
+        """A new or empty folder, or one of an earlier call; nothing is written.
+
+        Raises:
+            OutputError: It holds other files, or cannot be written to.
+        """
+        folder = BatchFolder(Path(os.path.abspath(expanded(out))))
+        check_writable(folder.path)
+        files = folder.path.iterdir() if folder.path.is_dir() else ()
+        # Another call may be about to write the plan.
+        if not all(map(is_temporary, files)) and not folder.is_ours():
+            raise OutputError(f"'{out}' holds other files", "name a new or empty folder with `out`")
+        return folder
+
+    @staticmethod
+    def existing(path: str | Path) -> BatchFolder:
+        """A folder that `mitex batch` has written.
+
+        Raises:
+            ConfigError: It is none.
+        """
+        folder = BatchFolder(Path(os.path.abspath(expanded(path))))
+        if not folder.is_ours():
+            raise ConfigError(f"'{path}' is no folder of `mitex batch`", "name what it was given as `out`")
+        return folder
+
+    def is_ours(self) -> bool:
+        """Whether its plan.jsonl is one that Mitex wrote."""
+        try:
+            return bool(self.jobs())
+        except (OSError, ValueError, TypeError, KeyError):
+            return False
+
+    def jobs(self) -> list[Job]:
+        """The jobs of its plan."""
+        text = (self.path / PLAN).read_text(encoding="utf-8")
+        return [Job.of_record(json.loads(line)) for line in text.splitlines()]
+
+    def of(self, job: Job) -> Path:
+        """The folder of a job's state."""
+        return self.path / "jobs" / job.id
+
+    def result(self, job: Job) -> Path:
+        """What a job writes."""
+        return self.path / job.result
+
+    def done(self, job: Job) -> dict[str, Any] | None:
+        """What is known of a job that is done; None of another, or if its result is gone."""
+        return _read(self.of(job) / DONE) if self.result(job).exists() else None
+
+    def failed(self, job: Job) -> dict[str, Any] | None:
+        """What is known of a job that failed; None of another."""
+        return _read(self.of(job) / FAILED)
+
+    def write(self, job: Job, name: str, record: Mapping[str, Any]) -> None:
+        """Writes one of the files of a job's state.
+
+        Raises:
+            OutputError: The disk is full, or the folder is not writable.
+        """
+        with atomic_write(self.of(job) / name) as temporary:
+            temporary.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+
+    def forget_failure(self, job: Job) -> None:
+        """Lets a job that failed be run again."""
+        (self.of(job) / FAILED).unlink(missing_ok=True)
+
+    def count_start(self, job: Job, driver: str) -> int:
+        """How often a job has been started for a driver, this time included, whether or not it ended."""
+        before = _read(self.of(job) / STARTS) or {}
+        count = before.get("count", 0) + 1 if before.get("driver") == driver else 1
+        self.write(job, STARTS, {"driver": driver, "count": count})
+        return count
+
+    def has_driver(self, name: str) -> bool:
+        """Whether a command goes on, rather than wanting its jobs to stop."""
+        return (self.path / "drivers" / name).exists()
+
+    def dismiss(self, name: str) -> None:
+        """Lets the jobs of a command stop."""
+        with suppress(OSError):
+            (self.path / "drivers" / name).unlink(missing_ok=True)
+
+    @contextmanager
+    def driven(self, jobs: Sequence[Job]) -> Iterator[str]:
+        """The name of a command that runs these jobs within the context; the folder's plan is of them now.
+
+        Raises:
+            OutputError: The folder cannot be written to.
+        """
+        lines = [json.dumps(job.record()) + "\n" for job in jobs]
+        with atomic_write(self.path / PLAN) as temporary:
+            temporary.write_text("".join(lines), encoding="utf-8")
+        name = f"{socket.gethostname()}-{os.getpid()}-{secrets.token_hex(4)}"
+        with writing(self.path / "drivers" / name) as file:
+            file.parent.mkdir(exist_ok=True)
+            file.write_text(f"{time.time()}\n", encoding="utf-8")
+        try:
+            yield name
+        finally:
+            self.dismiss(name)
+
+    def holder(self, job: Job) -> str | None:
+        """Host that works on a job; None if none does."""
+        return claims.holder(self.of(job))
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return content if isinstance(content, dict) else None

@@ -1,0 +1,152 @@
+"""The jobs of a plan: each one command, known by a hash of all that its result follows from."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from mitex import __version__
+from mitex.batch import options
+from mitex.batch.inputs import Input, digest, find
+from mitex.batch.plan import MethodPlan, Plan
+from mitex.errors import ConfigError
+from mitex.methods.method import Method
+from mitex.methods.registry import methods
+
+RESULTS = "results"  # folder of what the jobs write, in the batch folder
+LONGEST_NAME = 40  # of a part of a job's name [characters]
+
+
+@dataclass(frozen=True)
+class Job:
+    """One command, which is run in the batch folder.
+
+    Attributes:
+        id: a readable name, and a hash of the method, its options, its inputs' contents and Mitex's version.
+        words: after `mitex`.
+        resumed: the words with which an interrupted run goes on from its checkpoint; none if it cannot.
+        result: file or folder that it writes, relative to the batch folder.
+        needs: id of the job whose result it reads; None if it reads none.
+        about: what a table says of it: method, exemplar, seed, mesh.
+    """
+
+    id: str
+    words: tuple[str, ...]
+    resumed: tuple[str, ...]
+    result: str
+    needs: str | None
+    about: Mapping[str, Any]
+
+    @property
+    def name(self) -> str:
+        """For people: without the hash."""
+        return self.id.rpartition("-")[0]
+
+    def record(self) -> dict[str, Any]:
+        """The job as a JSON object."""
+        return asdict(self)
+
+    @staticmethod
+    def of_record(record: Mapping[str, Any]) -> Job:
+        """The inverse of `record`.
+
+        Raises:
+            TypeError, ValueError, KeyError: It is no record of a job.
+        """
+        words, resumed = (tuple(map(str, record[key])) for key in ("words", "resumed"))
+        return Job(**{**record, "words": words, "resumed": resumed, "about": dict(record["about"])})
+
+
+def jobs_of(plan: Plan) -> list[Job]:
+    """All jobs of a plan, those before the ones that need them.
+
+    Raises:
+        ConfigError: An input does not exist or cannot be read, or the same job is there twice.
+    """
+    digest.cache_clear()  # files may have changed since
+    jobs: dict[str, Job] = {}
+    for job in (job for part in plan.methods for job in _jobs(part, plan)):
+        if job.id in jobs:
+            raise ConfigError(f"the plan has the job {job.name} twice", "name every input and seed once")
+        jobs[job.id] = job
+    return list(jobs.values())
+
+
+def _jobs(part: MethodPlan, plan: Plan) -> Iterator[Job]:
+    method = methods()[part.method]
+    exemplars = find(part.exemplars, plan.folder, "exemplar", _exemplar_names(method))
+    meshes = find(part.meshes, plan.folder, "mesh", _mesh_names())
+    for exemplar in exemplars:
+        for seed in part.seeds or (None,):
+            for mesh in meshes if method.fits_to_mesh else [None]:
+                fit = _fit(part, method, plan, exemplar, seed, mesh)
+                yield fit
+                goals = [mesh] if mesh else meshes if method.applies_to_meshes else [None]
+                yield from (_apply(part, plan, fit, goal) for goal in goals)
+
+
+def _fit(
+    part: MethodPlan, method: Method, plan: Plan, exemplar: Input, seed: int | None, mesh: Input | None
+) -> Job:
+    source = Input(f"--{method.learns_from.replace('_', '-')}", None)
+    words = ["fit", method.name, "--quiet"]
+    inputs = [source, exemplar, *_option("mesh", mesh), *([] if seed is None else _pair("seed", seed))]
+    given = options.fit_words(method, part.fit, plan.folder)
+    about = {"method": part.label, "exemplar": exemplar.label, "seed": seed}
+    about |= {"mesh": mesh.label} if mesh else {}
+    id = _id("fit", about, [*words, *inputs, *given])
+    out = ("--out", f"{RESULTS}/{id}")
+    command = (*words, *(one.text for one in [*inputs, *given]), *out)
+    later = {key: value for key, value in part.fit.items() if key not in method.load_fit().only_at_start}
+    again = options.fit_words(method, later, plan.folder)
+    resumed = (*words, *(one.text for one in [*inputs, *again]), *out, "--resume")
+    return Job(id, command, resumed if method.resumes else (), out[1], None, about)
+
+
+def _apply(part: MethodPlan, plan: Plan, fit: Job, mesh: Input | None) -> Job:
+    inputs = [*_option("mesh", mesh), *options.apply_words(part.apply, plan.folder)]
+    about = dict(fit.about) | ({"mesh": mesh.label} if mesh else {})
+    id = _id("apply", about, [fit.id, part.output, *inputs])
+    name = mesh.label if mesh else str(about["exemplar"])
+    file = f"{_plain(name)}/" if part.output == "maps" else f"{_plain(name)}.{part.output}"
+    result = f"{RESULTS}/{id}"
+    words = ("apply", fit.result, "--quiet", *(one.text for one in inputs), "--out", f"{result}/{file}")
+    return Job(id, words, (), result, fit.id, about)
+
+
+def _option(name: str, value: Input | None) -> list[Input]:
+    return [] if value is None else [Input(f"--{name}", None), value]
+
+
+def _pair(name: str, value: object) -> list[Input]:
+    return [Input(f"--{name}", None), Input(str(value), None)]
+
+
+def _id(command: str, about: Mapping[str, Any], parts: Sequence[str | Input]) -> str:
+    keys = [part.key if isinstance(part, Input) else part for part in parts]
+    digest = hashlib.sha256(json.dumps([__version__, command, *keys]).encode("utf-8", "surrogateescape"))
+    seed = [] if about["seed"] is None else [f"s{about['seed']}"]
+    names = [about["method"], about["exemplar"], *seed, *([about["mesh"]] if "mesh" in about else [])]
+    return "-".join([command, *map(_plain, names), digest.hexdigest()[:16]])
+
+
+def _plain(name: str) -> str:
+    """A name as it can stand in a file's."""
+    return re.sub(r"[^\w.]+", "_", name, flags=re.ASCII).strip("._")[:LONGEST_NAME] or "x"
+
+
+def _exemplar_names(method: Method) -> list[str] | None:
+    """The exemplars that ship with Mitex; None for methods that learn from something else."""
+    from mitex.exemplar import names
+
+    return names() if method.learns_from == "exemplar" else None
+
+
+def _mesh_names() -> list[str]:
+    from mitex.mesh.embedded import embedded_names
+
+    return embedded_names()

@@ -1,0 +1,117 @@
+"""Options of a method's commands, from a plan's tables to the words of a command line."""
+
+from __future__ import annotations
+
+import types
+import typing
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, Union
+
+from mitex.batch.inputs import Input
+from mitex.errors import ConfigError
+from mitex.methods.method import Method
+from mitex.suggestions import suggestion
+from mitex.training import values
+from mitex.training.config import resolve
+
+PLANNED = {"out", "mesh", "model", "quiet", "resume", "set", "settings"}  # what a plan says otherwise
+
+
+def check_options(
+    method: Method, fit: Mapping[str, Any], apply: Mapping[str, Any], label: str, folder: Path
+) -> None:
+    """Checks the options that a plan gives to a method, without running anything.
+
+    Raises:
+        ConfigError: An unknown name, or a value of the wrong type or out of range.
+    """
+    options, keys = fit_kinds(method), _keys(method)
+    for name, value in fit.items():
+        if name not in (*options, *keys):
+            raise ConfigError(f"methods.{label} has no key '{name}'", suggestion(name, [*options, *keys]))
+        if name in options:
+            _check(name, value, options[name], label)
+    for name, value in apply.items():
+        kinds = apply_kinds(method)
+        if name not in kinds:
+            raise ConfigError(f"methods.{label}.apply has no key '{name}'", suggestion(name, kinds))
+        _check(name, value, kinds[name], f"{label}.apply")
+    settings = {name: value for name, value in fit.items() if name in keys}
+    file = None if "config" not in fit else Path(Input.of(fit["config"], folder).text)
+    resolve(method.load_presets(), fit.get("preset"), file, settings)
+
+
+def fit_kinds(method: Method) -> dict[str, Any]:
+    """The options of the method's fit that a plan may give: name -> type."""
+    return _kinds(method.load_fit(), {method.learns_from, "seed"})
+
+
+def apply_kinds(method: Method) -> dict[str, Any]:
+    """The options of the method's `mitex apply` that a plan may give: name -> type."""
+    return _kinds(method.load_apply(), set())
+
+
+def fit_words(method: Method, fit: Mapping[str, Any], folder: Path) -> list[Input]:
+    """The words of the options and settings of a fit; those that name files are absolute paths."""
+    options = fit_kinds(method)
+    words = list(_words({name: fit[name] for name in fit if name in options}, folder))
+    settings = [f"{name}={_text(value)}" for name, value in fit.items() if name not in options]
+    return [*words, *(Input(word, None) for word in (["--set", *settings] if settings else []))]
+
+
+def apply_words(apply: Mapping[str, Any], folder: Path) -> list[Input]:
+    """The words of the options of `mitex apply`; those that name files are absolute paths."""
+    return list(_words(apply, folder))
+
+
+def _words(options: Mapping[str, Any], folder: Path) -> Iterator[Input]:
+    for name, value in options.items():
+        option = f"--{name.replace('_', '-')}"
+        if value is True:
+            yield Input(option, None)
+        elif value is not False:
+            # A value that begins with a dash is one word with its option.
+            if isinstance(value, str) and not value.startswith("-"):
+                yield from (Input(option, None), Input.of(value, folder))
+            else:
+                yield Input(f"{option}={_text(value)}", None)
+
+
+def _text(value: Any) -> str:
+    """A value as `--set` and the options take it, with all its digits."""
+    if isinstance(value, list | tuple):
+        return ",".join(map(_text, value))
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _check(name: str, value: Any, kind: Any, place: str) -> None:
+    try:
+        values.check(value, kind)
+    except ValueError as e:
+        raise ConfigError(
+            f"{name} of methods.{place} cannot be {value!r}", f"give {values.describe(kind)}"
+        ) from e
+
+
+def _kinds(command: type, planned: set[str]) -> dict[str, Any]:
+    hints = typing.get_type_hints(command)
+    names = [field.name for field in fields(command) if field.name not in PLANNED | planned]
+    return {name: _plain(hints[name]) for name in names}
+
+
+def _plain(kind: Any) -> Any:
+    """The type in TOML: paths are texts, and what may be None is left out rather than none."""
+    if kind is Path:
+        return str
+    if typing.get_origin(kind) in (Union, types.UnionType):
+        members = [_plain(member) for member in typing.get_args(kind) if member is not types.NoneType]
+        return Union[tuple(members)]  # noqa: UP007
+    return kind
+
+
+def _keys(method: Method) -> set[str]:
+    """The settings of the method, but the seed and the preset, which are options."""
+    config = next(iter(method.load_presets().values()))
+    return {field.name for field in fields(config)} - {"seed", "preset"}

@@ -1,0 +1,150 @@
+"""A plan: which exemplars, meshes and methods, with which settings. Read from TOML and checked."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from mitex.batch.options import check_options
+from mitex.errors import ConfigError
+from mitex.methods.registry import methods
+from mitex.paths import expanded
+from mitex.suggestions import suggestion
+from mitex.training import values
+from mitex.training.settings import LARGEST_SEED
+
+MOST_BYTES = 1 << 20  # of a plan
+Output = Literal["glb", "obj", "ply", "exr", "png", "jpg", "maps"]
+LISTS = {"exemplars": tuple[str, ...], "meshes": tuple[str, ...], "seeds": tuple[int, ...]}
+KEYS = {**LISTS, "output": Output}
+OWN_KEYS = {**LISTS, "output": Output, "method": str}  # of a method's table, besides its options
+TABLES = {"methods": "tables such as [methods.NAME]", "apply": "a table such as [methods.NAME.apply]"}
+
+
+@dataclass(frozen=True)
+class MethodPlan:
+    """A method with its options, and what it is run on.
+
+    Attributes:
+        label: its name in the plan, of which there can be several for one method.
+        method: its name.
+        exemplars, meshes: paths, patterns or names; relative ones belong to the plan's folder.
+        seeds: of the fits; none for that of the preset.
+        output: what `apply` writes: a file of this format, or a folder of maps.
+        fit: options and settings of `mitex fit`, by name.
+        apply: options of `mitex apply`, by name.
+    """
+
+    label: str
+    method: str
+    exemplars: tuple[str, ...]
+    meshes: tuple[str, ...] = ()
+    seeds: tuple[int, ...] = ()
+    output: str = "glb"
+    fit: Mapping[str, Any] = field(default_factory=dict)
+    apply: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is to be made.
+
+    Attributes:
+        methods: each on all its exemplars, seeds and meshes.
+        folder: where relative paths begin.
+    """
+
+    methods: tuple[MethodPlan, ...]
+    folder: Path
+
+    @staticmethod
+    def read(path: str | Path) -> Plan:
+        """Reads a TOML file.
+
+        Raises:
+            ConfigError: It cannot be read, is no TOML, or not a plan: see `of`.
+        """
+        file = expanded(path)
+        return Plan.of(_content(file), file.parent)
+
+    @staticmethod
+    def of(content: Mapping[str, Any], folder: str | Path = ".") -> Plan:
+        """A plan from the tables of its TOML file.
+
+        Args:
+            content: `exemplars`, `meshes`, `seeds`, `output` and `methods`, name -> table. A method's table
+                has its options and settings, its own values of the former keys, and a table `apply`; it may
+                be of another name if it says `method = "NAME"`.
+            folder: where relative paths begin.
+
+        Raises:
+            ConfigError: An unknown key or method, a value of a wrong type or out of range, or nothing to do.
+        """
+        common, tables = _split(content, "methods", {key: KEYS[key] for key in KEYS}, "the plan")
+        if unknown := [key for key in content if key not in (*KEYS, "methods")]:
+            raise ConfigError(f"a plan has no key '{unknown[0]}'", suggestion(unknown[0], [*KEYS, "methods"]))
+        if not tables:
+            raise ConfigError("the plan has no methods", "add a table such as [methods.nca]")
+        place = Path(folder).absolute()
+        return Plan(tuple(_method(label, table, common, place) for label, table in tables.items()), place)
+
+
+def _content(file: Path) -> dict[str, Any]:
+    try:
+        if not file.is_file():
+            reason = "it is no file" if file.exists() else "there is no such file"
+            raise ConfigError(f"cannot read plan '{file}' ({reason})", "check the path")
+        if file.stat().st_size > MOST_BYTES:
+            raise ConfigError(f"plan '{file}' has more than {MOST_BYTES >> 20} MB", "is it a plan?")
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as e:
+        raise ConfigError(f"plan '{file}' is not valid TOML ({e})", "mend the file") from e
+    except (OSError, ValueError) as e:  # ValueError: a null byte in the name
+        reason = getattr(e, "strerror", None) or e
+        raise ConfigError(f"cannot read plan '{file}' ({reason})", "check the path") from e
+
+
+def _method(label: str, table: Any, common: Mapping[str, Any], folder: Path) -> MethodPlan:
+    if not isinstance(table, Mapping):
+        raise ConfigError(f"methods.{label} cannot be {table!r}", f"give {TABLES['methods']}")
+    own, apply = _split(table, "apply", OWN_KEYS, f"methods.{label}")
+    name = own.pop("method", label)
+    if name not in methods():
+        raise ConfigError(f"there is no method '{name}'", suggestion(name, methods()))
+    fit = {key: value for key, value in table.items() if key not in (*OWN_KEYS, "apply")}
+    check_options(methods()[name], fit, apply, label, folder)
+    plan = MethodPlan(label, name, fit=fit, apply=apply, **{"exemplars": (), **common, **own})
+    _check_lists(plan)
+    return plan
+
+
+def _split(
+    table: Mapping[str, Any], inner: str, kinds: Mapping[str, Any], place: str
+) -> tuple[dict[str, Any], Mapping[str, Any]]:
+    """The values of the known keys, checked, and the table `inner`."""
+    known = {}
+    for key in kinds.keys() & table.keys():
+        try:
+            known[key] = values.check(table[key], kinds[key])
+        except ValueError as e:
+            raise ConfigError(
+                f"{key} of {place} cannot be {table[key]!r}", f"give {values.describe(kinds[key])}"
+            ) from e
+    tables = table.get(inner, {})
+    if not isinstance(tables, Mapping):
+        raise ConfigError(f"{inner} of {place} cannot be {tables!r}", f"give {TABLES[inner]}")
+    return known, tables
+
+
+def _check_lists(plan: MethodPlan) -> None:
+    method = methods()[plan.method]
+    if not plan.exemplars:
+        raise ConfigError(f"methods.{plan.label} has no exemplars", "name some in the list `exemplars`")
+    if method.fits_to_mesh and not plan.meshes:
+        raise ConfigError(f"{plan.method} needs meshes", "name some in the list `meshes`")
+    for seed in plan.seeds:
+        if not 0 <= seed <= LARGEST_SEED:
+            raise ConfigError(f"seed {seed} is out of range", f"choose from 0 to {LARGEST_SEED}")

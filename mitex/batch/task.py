@@ -1,0 +1,204 @@
+"""Doing one job on whichever machine: claim it, run its command, watch it, write down how it ended."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import signal
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from mitex.batch.claims import Claim
+from mitex.batch.folder import DONE, FAILED, LOG, BatchFolder
+from mitex.batch.jobs import Job
+from mitex.batch.process import Process, environment
+from mitex.paths import writing
+from mitex.training.locate import CHECKPOINT, PREVIOUS
+
+METRICS = "metrics.jsonl"
+BEAT = 0.5  # between two looks at claim and driver [s]
+RETRIES = 3  # of a job that a signal ended
+INTERRUPTED = 130  # exit code
+
+State = Literal["done", "failed", "interrupted", "elsewhere"]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a task ended.
+
+    Attributes:
+        state: "elsewhere" if another process works on the job.
+        record: what is written down of a job that is done or failed.
+    """
+
+    state: State
+    record: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Task:
+    """A job to be done by whoever calls this, which an engine may send to another machine.
+
+    Attributes:
+        job: the job.
+        folder: of the batch.
+        driver: name of the command that wants it; the job stops when that is dismissed.
+        threads: of the job's process.
+    """
+
+    job: Job
+    folder: BatchFolder
+    driver: str
+    threads: int
+
+    def __call__(self) -> Outcome:
+        """Does the job, unless it is done or another process is at it; returns when its process has ended.
+
+        Raises:
+            OutputError: The batch folder cannot be written to.
+        """
+        place = self.folder.of(self.job)
+        if record := self.folder.done(self.job):
+            return Outcome("done", record)
+        with writing(place):
+            place.mkdir(parents=True, exist_ok=True)
+            claim = Claim.take(place)
+        if claim is None:
+            return Outcome("elsewhere")
+        with writing(place), claim:
+            if record := self.folder.done(self.job):  # since the first look
+                return Outcome("done", record)
+            if record := self.folder.failed(self.job):
+                return Outcome("failed", record)
+            return self._attempts(claim)
+
+    def _attempts(self, claim: Claim) -> Outcome:
+        why = "its machine or its worker ended while it ran"
+        while self.folder.has_driver(self.driver):
+            if self.folder.count_start(self.job, self.driver) > 1 + RETRIES:
+                return self._failure(f"started {1 + RETRIES} times; {why}")
+            began = time.time()
+            code, memory = self._run(claim)
+            if code == 0:
+                return self._success(began, memory)
+            if code == INTERRUPTED:
+                break
+            if code > 0:
+                return self._failure(_complaint(self.folder.of(self.job) / LOG), code)
+            why = f"ended by {_signal_name(code)}"
+        return Outcome("interrupted")
+
+    def _run(self, claim: Claim) -> tuple[int, int]:
+        """Exit code and memory of the job's command."""
+        words = self._words()
+        with (self.folder.of(self.job) / LOG).open("wb") as log:
+            process = Process(words, self.folder.path, log, environment(self.threads))
+            with _running(process), self._watched(process, claim):
+                claim.note(process.pid)
+                return process.wait()
+
+    def _words(self) -> tuple[str, ...]:
+        """Those that go on if there is a checkpoint; else what an earlier attempt left is removed."""
+        result = self.folder.result(self.job)
+        if self.job.resumed and any((result / name).is_file() for name in (CHECKPOINT, PREVIOUS)):
+            return self.job.resumed
+        shutil.rmtree(result, ignore_errors=True)
+        return self.job.words
+
+    @contextmanager
+    def _watched(self, process: Process, claim: Claim) -> Iterator[None]:
+        """Keeps the claim, and stops the process when the claim is lost or the driver wants it."""
+        over = threading.Event()
+
+        def watch() -> None:
+            while not over.wait(BEAT):
+                if not claim.touch() or not self.folder.has_driver(self.driver):
+                    process.stop()
+                    while not over.wait(BEAT):
+                        claim.touch()
+
+        watcher = threading.Thread(target=watch, daemon=True)
+        watcher.start()
+        try:
+            yield
+        finally:
+            over.set()
+            watcher.join()
+
+    def _success(self, began: float, memory: int) -> Outcome:
+        record = {
+            "time": time.strftime("%Y-%m-%dT%H:%M:%S%z", time.localtime(began)),
+            "seconds": round(time.time() - began, 3),
+            "memory": memory,
+            "host": socket.gethostname(),
+            "metrics": _last_metrics(self.folder.result(self.job) / METRICS),
+        }
+        self.folder.forget_failure(self.job)
+        self.folder.write(self.job, DONE, record)
+        return Outcome("done", record)
+
+    def _failure(self, error: str, code: int | None = None) -> Outcome:
+        record = {"error": error, "code": code, "host": socket.gethostname()}
+        self.folder.write(self.job, FAILED, record)
+        return Outcome("failed", record)
+
+
+_processes: set[Process] = set()  # those that run for this one
+
+
+def stop_processes(number: int = signal.SIGTERM) -> None:
+    """Sends a signal to the processes of all jobs that are done here and now."""
+    for process in tuple(_processes):
+        process.stop(number)
+
+
+def end_processes() -> None:
+    """Lets those processes save what they can, and waits for their end; may be called by a signal handler."""
+    stop_processes()
+    for process in tuple(_processes):
+        with suppress(ChildProcessError):  # it has ended
+            process.await_end()
+
+
+@contextmanager
+def _running(process: Process) -> Iterator[None]:
+    """While the context lasts the process may run; it does not survive it."""
+    _processes.add(process)
+    try:
+        yield
+    except BaseException:
+        process.stop()
+        process.wait()
+        raise
+    finally:
+        _processes.discard(process)
+
+
+def _complaint(log: Path) -> str:
+    """The line with which a command ended: that of the error, or else the last one."""
+    text = re.sub(r"\x1b\[[0-9;]*m", "", log.read_text(encoding="utf-8", errors="replace"))
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    errors = [line.removeprefix("error: ") for line in lines if line.startswith("error: ")]
+    return (errors or lines or ["it said nothing"])[-1]
+
+
+def _signal_name(code: int) -> str:
+    name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
+    return f"{name}, out of memory?" if name == "SIGKILL" else name
+
+
+def _last_metrics(file: Path) -> dict[str, Any]:
+    """The last line of a run's metrics; nothing where there are none."""
+    try:
+        record = json.loads(file.read_bytes().rstrip(b"\n").rpartition(b"\n")[2])
+    except (OSError, ValueError):
+        return {}
+    return record if isinstance(record, dict) else {}

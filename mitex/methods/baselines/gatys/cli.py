@@ -1,0 +1,44 @@
+"""The command-line options of flat pictures that are optimized by Gram matrices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mitex.methods.options import ExemplarOptions
+from mitex.methods.planar_options import PlanarOptions
+
+
+@dataclass(kw_only=True)
+class Fit(ExemplarOptions):
+    """Optimize a flat picture until its features have the Gram matrices of an exemplar's albedo, as Gatys et
+    al. (2015) do.
+
+    `mitex apply RUN --mesh MESH --out ASSET` puts the picture on any mesh by its UVs. Ctrl-C saves, and
+    --resume goes on.
+
+    examples:
+      mitex fit gatys --exemplar lava --out runs/flat-lava
+      mitex fit gatys --exemplar pebbles.png --preset paper --set size=1024
+      mitex fit gatys --exemplar lava --out runs/flat-lava --resume
+    """
+
+    def run(self) -> None:
+        options = self.run_options()
+        from mitex.exemplar import Exemplar
+        from mitex.methods.baselines import gatys
+
+        exemplar = Exemplar.load(self.exemplar)
+        out = self.folder(f"{exemplar.name}-gatys")
+        with self.progress() as on_step:
+            gatys.fit(exemplar, out, on_step=on_step, **options)
+        print(out)
+
+
+@dataclass(kw_only=True)
+class Apply(PlanarOptions):
+    """Put an optimized picture on a mesh by its UVs; where charts meet, the pattern breaks.
+
+    examples:
+      mitex apply runs/flat-lava --mesh vase --out vase.glb
+      mitex apply runs/flat-lava --mesh bunny.obj --out bunny.png --scale 0.5 --keep-uvs
+    """

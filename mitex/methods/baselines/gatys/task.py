@@ -1,0 +1,76 @@
+"""A flat picture whose features have an exemplar's Gram matrices, as a task (Gatys et al. 2015)."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch.nn.functional import pad
+
+from mitex.exemplar import Exemplar
+from mitex.features import Vgg16
+from mitex.losses.gram import gram_distance, gram_matrix
+from mitex.methods.baselines.gatys.config import GatysConfig
+from mitex.runtime import keep_freed_memory
+from mitex.training import ParameterTask, Step
+
+AROUND = 64  # pixels by which a periodic picture is continued; deeper layers see little beyond
+
+
+class GatysTask(ParameterTask):
+    """Pixels, that start as noise.
+
+    The paper takes VGG-19 with its weights scaled to a mean activation of one; here it is VGG-16, scaled
+    alike. Both pool by means.
+
+    Args:
+        config: settings.
+        exemplar: whose albedo is matched.
+    """
+
+    def __init__(self, config: GatysConfig, exemplar: Exemplar) -> None:
+        keep_freed_memory()
+        self.config, self.exemplar = config, exemplar
+        generator = torch.Generator().manual_seed(config.seed)
+        picture = torch.from_numpy(exemplar.resized(config.exemplar_size).maps["albedo"])
+        noise = torch.rand(config.size, config.size, 3, generator=generator)
+        super().__init__({"image": picture.mean((0, 1)).lerp(noise, config.noise)})
+        self.network = Vgg16()
+        features = self.network.features(picture[None], config.layers)
+        self.targets = {layer: gram_matrix(values.flatten(1, 2)[0]) for layer, values in features.items()}
+
+    @property
+    def image(self) -> torch.Tensor:
+        """(N, N, 3) sRGB in [0, 1]."""
+        return self.named["image"]
+
+    def loss(self, step: int, generator: torch.Generator) -> Step:
+        """A quarter of the squared distance of the Gram matrices (equation 4)."""
+        image, inside = self.image, {layer: slice(None) for layer in self.targets}
+        if self.config.periodic:
+            around = min(AROUND, self.config.size)
+            planes = pad(image.permute(2, 0, 1)[None], (around,) * 4, mode="circular")
+            image = planes[0].permute(1, 2, 0)
+            for layer in inside:
+                border = around >> (int(layer[4]) - 1)
+                inside[layer] = slice(border, border + (self.config.size >> (int(layer[4]) - 1)))
+        features = self.network.features(image[None], self.targets)
+        grams = {}
+        for layer, values in features.items():
+            part = inside[layer]
+            grams[layer] = gram_matrix(values[0, part, part].flatten(0, 1))
+        return Step(gram_distance(grams, self.targets) / 4, {}, self._clamp)
+
+    @torch.no_grad()
+    def _clamp(self) -> None:
+        self.image.clamp_(0, 1)
+
+    def preview(self, step: int) -> np.ndarray:
+        """The exemplar, and the picture."""
+        image = self.image.detach().numpy()
+        beside = np.zeros_like(image)
+        exemplar = self.exemplar.resized(self.config.exemplar_size).maps["albedo"][: len(image), : len(image)]
+        beside[: len(exemplar), : len(exemplar)] = exemplar
+        return np.hstack([beside, image])
+
+    def metadata(self) -> dict[str, str]:
+        return {"method": "gatys", "exemplar": self.exemplar.name, "exemplar_key": self.exemplar.key}

@@ -1,0 +1,54 @@
+"""Settings of the textures that are optimized through views, and their presets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from mitex.errors import ConfigError
+from mitex.features.layers import LAYERS
+from mitex.training.settings import TrainingConfig, key
+
+
+@dataclass(frozen=True)
+class MultiViewConfig(TrainingConfig):
+    """Everything that shapes a synthesis; every key can be set from a TOML file or with `--set`."""
+
+    steps: int = 400
+    resolution: int = key(512, "side of the texture [texels]", 16, 4096)
+    exemplar_size: int = key(
+        256, "side of the exemplar's central square on the mesh [texels], as of surface", 32, 2048
+    )
+    view: int = key(256, "side of the picture that a step compares [px]", 32, 2048)
+    fov: float = key(10.0, "field of view [degrees]", 1, 120)
+    nearest: float = key(10.0, "nearest camera [half extents of the mesh]", 1.01, 1000)
+    farthest: float = key(12.0, "farthest camera [half extents of the mesh]", 1.01, 1000)
+    antialias: int = key(2, "n for n x n rays per pixel; the paper: 1", 1, 8)
+    masked: bool = key(
+        True, "Gram matrices are of what shows the mesh; the paper: of the black background, too"
+    )
+    layers: tuple[str, ...] = key(
+        ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "VGG-16's that are compared"
+    )
+    memory: float = key(0.95, "decay of the moving average of the Gram matrices", 0, 0.9999)
+    content_layer: str = key("relu4_1", "whose features stay the content's")
+    content_weight: float = key(100.0, "how much that counts", 0)
+    lr: float = key(0.05, "learning rate of Adam", 0)
+    preview_every: int = 50
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        unknown = [layer for layer in (*self.layers, self.content_layer) if layer not in LAYERS]
+        if unknown or not self.layers:
+            named = ", ".join(unknown) or "none"
+            raise ConfigError(f"VGG-16's layers to compare are {named}", f"use some of {', '.join(LAYERS)}")
+        if self.nearest > self.farthest:
+            raise ConfigError(f"nearest = {self.nearest:g} is beyond farthest", "set it to less")
+
+
+DEFAULT = MultiViewConfig()
+PRESETS = {
+    DEFAULT.preset: DEFAULT,
+    "paper": replace(
+        DEFAULT, preset="paper", resolution=1024, exemplar_size=512, view=512, antialias=1, masked=False
+    ),
+}

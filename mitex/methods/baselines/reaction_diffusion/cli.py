@@ -1,0 +1,77 @@
+"""The command-line options of reaction-diffusion textures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import arg
+
+from mitex.methods.checks import SEEDS, in_range
+from mitex.methods.options import ExemplarOptions
+from mitex.methods.planar_options import PlanarOptions
+
+if TYPE_CHECKING:
+    from mitex.asset import Asset
+
+
+@dataclass(kw_only=True)
+class Fit(ExemplarOptions):
+    """Learn chemicals that react and diffuse to a pattern like an exemplar's albedo, as Mordvintsev et al.
+    (2021) do.
+
+    `mitex apply RUN --mesh MESH --out ASSET` grows it on any mesh. Ctrl-C saves, and --resume goes on.
+
+    examples:
+      mitex fit reaction_diffusion --exemplar lava --out runs/chemical-lava
+      mitex fit reaction_diffusion --exemplar pebbles.png --preset paper
+      mitex fit reaction_diffusion --exemplar lava --out runs/chemical-lava --resume
+    """
+
+    def run(self) -> None:
+        options = self.run_options()
+        from mitex.exemplar import Exemplar
+        from mitex.methods.baselines import reaction_diffusion
+
+        exemplar = Exemplar.load(self.exemplar)
+        out = self.folder(f"{exemplar.name}-reaction_diffusion")
+        with self.progress() as on_step:
+            reaction_diffusion.fit(exemplar, out, on_step=on_step, **options)
+        print(out)
+
+
+@dataclass(kw_only=True)
+class Apply(PlanarOptions):
+    """Let the chemicals react and diffuse on a mesh.
+
+    examples:
+      mitex apply runs/chemical-lava --mesh vase --out vase.glb
+      mitex apply runs/chemical-lava --mesh bunny.obj --out bunny.png --seed 7 --scale 2
+    """
+
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Random seed: another seed, another variant of the texture."""
+
+    steps: Annotated[int, arg(metavar="N")] = 500
+    """Steps of time."""
+
+    def check(self) -> None:
+        super().check()
+        in_range("--seed", self.seed, *SEEDS)
+        in_range("--steps", self.steps, 0, 10_000)
+
+    def applied(self, out: Path) -> Asset:
+        from mitex.mesh import Mesh
+        from mitex.methods.baselines.reaction_diffusion import ReactionDiffusionTexture
+        from mitex.runtime import let_idle_threads_sleep
+
+        let_idle_threads_sleep()
+        return ReactionDiffusionTexture.load(self.model).apply(
+            Mesh.load(self.mesh),
+            seed=self.seed,
+            steps=self.steps,
+            scale=self.scale,
+            resolution=self.resolution,
+            keep_uvs=self.keep_uvs,
+        )

@@ -1,0 +1,64 @@
+"""Settings of reaction-diffusion textures, and their presets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from mitex.errors import ConfigError
+from mitex.features.layers import LAYERS
+from mitex.training.settings import TrainingConfig, key
+
+STABLE = 0.125  # rate of diffusion up to which no explicit step overshoots, see `laplacian`
+
+
+@dataclass(frozen=True)
+class ReactionDiffusionConfig(TrainingConfig):
+    """Everything that shapes a training; every key can be set from a TOML file or with `--set`."""
+
+    steps: int = 1000
+    channels: int = key(32, "chemicals; the first three are red, green and blue", 3, 256)
+    hidden: int = key(128, "width of the hidden layer of the reaction", 1, 4096)
+    slowest: float = key(0.008, "rate of diffusion of the first chemical [cells^2 a step]", 0, STABLE)
+    fastest: float = key(STABLE, "rate of the last one; those between grow evenly in ratio", 1e-6, STABLE)
+    grid: int = key(64, "side of the square that is trained on, whose borders are joined [cells]", 16, 1024)
+    exemplar_size: int = key(64, "side of the exemplar [cells]", 16, 1024)
+    width: float = key(
+        0.5, "side of the exemplar on a mesh, of that of a layout's square: surface's 256 of 512", 0.01, 10
+    )
+    pool: int = key(16, "states kept between steps", 1, 4096)
+    inject_every: int = key(8, "steps after which the drawn state is replaced by a new start", 1, 4096)
+    min_steps: int = key(24, "fewest steps of time in a training step", 1, 4096)
+    max_steps: int = key(40, "most steps of time in a training step", 1, 4096)
+    layers: tuple[str, ...] = key(
+        ("relu1_1", "relu2_1", "relu3_1", "relu4_1"), "VGG-16's whose Gram matrices are compared"
+    )
+    overflow_weight: float = key(100.0, "of the overflow loss", 0)
+    lr: float = key(4e-3, "learning rate of Adam", 0)
+    milestones: tuple[int, ...] = key((700, 900), "steps at which the learning rate falls", 0)
+    decay: float = key(0.3, "factor of the learning rate at a milestone", 0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        unknown = [layer for layer in self.layers if layer not in LAYERS]
+        if unknown or not self.layers:
+            named = ", ".join(unknown) or "none"
+            raise ConfigError(f"VGG-16's layers to compare are {named}", f"use some of {', '.join(LAYERS)}")
+        if self.max_steps < self.min_steps:
+            raise ConfigError(f"max_steps = {self.max_steps}", f"choose {self.min_steps} or more")
+
+
+DEFAULT = ReactionDiffusionConfig()
+PRESETS = {
+    DEFAULT.preset: DEFAULT,
+    "paper": replace(
+        DEFAULT,
+        preset="paper",
+        steps=20_000,
+        grid=128,
+        exemplar_size=128,
+        pool=256,
+        min_steps=32,
+        max_steps=64,
+        milestones=(10_000, 15_000),
+    ),
+}

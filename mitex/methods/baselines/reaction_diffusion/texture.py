@@ -1,0 +1,161 @@
+"""`ReactionDiffusionTexture`: a learned reaction, and what it grows on any mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from mitex.asset import Asset
+from mitex.atlas import MAX_RESOLUTION, Atlas
+from mitex.errors import ConfigError
+from mitex.export.common import asset_from_textures
+from mitex.geometry.triangles import interpolate, twice_area
+from mitex.mesh import Mesh, remesh
+from mitex.mesh.nearest import surface_points
+from mitex.methods.baselines.reaction_diffusion import METHOD
+from mitex.methods.baselines.reaction_diffusion.laplacian import mesh_laplacian
+from mitex.methods.baselines.reaction_diffusion.reaction import BOUND, Reaction, colours
+from mitex.methods.layout import with_layout
+from mitex.progress import announce
+from mitex.runtime import keep_freed_memory
+from mitex.sparse import LinearMap
+from mitex.training import model_file
+
+STEPS = 500  # of time, after which patterns are in order
+MOST_STEPS = 10_000
+PERIOD = 16  # steps after which states are held within their bounds
+MOST_CELLS = 500_000
+LAYOUT = 512  # texels that charts are packed for, as those of surface textures
+PADDING = 8  # texels by which charts are continued outwards
+
+
+@dataclass(frozen=True, eq=False)
+class ReactionDiffusionTexture:
+    """Chemicals that react and diffuse.
+
+    Attributes:
+        reaction: the system.
+        cells: along the exemplar's width.
+        width: of the exemplar on a mesh [sides of a layout's square].
+        about: how it was made.
+    """
+
+    reaction: Reaction
+    cells: int
+    width: float
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def load(cls, source: str | Path) -> ReactionDiffusionTexture:
+        """Reads a run folder or a model file.
+
+        Raises:
+            CheckpointError: there is none, or it is damaged.
+        """
+        with model_file.opened(source, METHOD.name) as (tensors, about):
+            inner, bias, outer = tensors["inner"], tensors["bias"], tensors["outer"]
+            rates, cells, width = tensors["rates"], int(tensors["cells"]), float(tensors["width"])
+            shapes = (len(bias), len(rates)), (len(rates), len(bias))
+            if (inner.shape, outer.shape) != shapes or len(rates) < 3:
+                raise ValueError("weights whose shapes do not fit")
+            if not all(value.isfinite().all() for value in tensors.values()) or cells < 1 or not width > 0:
+                raise ValueError("values that are not finite, or an exemplar without a size")
+            reaction = Reaction({"inner": inner, "bias": bias, "outer": outer}, rates)
+            return cls(reaction, cells, width, about)
+
+    def save(self, path: str | Path) -> Path:
+        """Writes the model file (safetensors).
+
+        Raises:
+            OutputError: the place is not writable.
+        """
+        sizes = {"cells": torch.tensor(self.cells), "width": torch.tensor(self.width, dtype=torch.float64)}
+        tensors = {**self.reaction.tensors, "rates": self.reaction.rates, **sizes}
+        return model_file.save(path, tensors, METHOD.name, self.about)
+
+    def apply(
+        self,
+        mesh: Mesh,
+        *,
+        seed: int = 0,
+        steps: int = STEPS,
+        scale: float = 1.0,
+        resolution: int = 512,
+        keep_uvs: bool = False,
+    ) -> Asset:
+        """Lets the chemicals react and diffuse on a mesh.
+
+        The cells are the vertices of an even mesh of the same shape, as many as the size of the pattern asks
+        for: with the settings of the fit it is that of a surface texture.
+
+        Args:
+            mesh: any.
+            seed: of the blobs that it starts from: another one, another variant.
+            steps: of time.
+            scale: size of the pattern.
+            resolution: side of the asset's albedo [texels], 16 to 8192.
+            keep_uvs: use the mesh's own UVs.
+
+        Returns:
+            The mesh with an albedo texture, without seams.
+
+        Raises:
+            ConfigError: a number is out of range, or there would be too many cells.
+            MeshError: PyMeshLab is missing or fails.
+        """
+        if not 0.05 <= scale <= 20 or not 16 <= resolution <= MAX_RESOLUTION or not 0 <= steps <= MOST_STEPS:
+            raise ConfigError(
+                f"a texture of {scale:g} times the size, {steps} steps and {resolution} texels",
+                f"use sizes from 0.05 to 20, up to {MOST_STEPS} steps, and 16 to {MAX_RESOLUTION} texels",
+            )
+        laid = with_layout(mesh, LAYOUT, keep_uvs)
+        cells = even_cells(laid, scale * self.width / self.cells)
+        keep_freed_memory()
+        announce("letting the chemicals react")
+        at_cells = self.grown(cells, seed, steps)
+        assert laid.uv is not None
+        atlas = Atlas.from_uv(laid.uv, resolution, PADDING)
+        points = atlas.interpolate(laid.vertices[laid.faces])[atlas.face >= 0]
+        face, barycentric = surface_points(cells, points)
+        albedo = np.empty((resolution, resolution, 3), np.float32)
+        albedo[:] = at_cells.mean(0)
+        albedo[atlas.face >= 0] = interpolate(barycentric, at_cells[cells.faces[face]])
+        return asset_from_textures(laid, laid.uv, {"albedo": albedo}, mesh.name)
+
+    @torch.no_grad()
+    def grown(self, cells: Mesh, seed: int, steps: int) -> np.ndarray:
+        """(V, 3) sRGB in [0, 1] at the vertices of a mesh after some steps of time."""
+        laplacian = LinearMap(mesh_laplacian(cells))
+        state = self.reaction.start(len(cells.vertices), laplacian, torch.Generator().manual_seed(seed))
+        for done in range(0, steps, PERIOD):
+            state = self.reaction.evolve(state, laplacian, min(PERIOD, steps - done)).clamp(-BOUND, BOUND)
+        return colours(state).clamp(0, 1).numpy()
+
+
+def even_cells(mesh: Mesh, width: float) -> Mesh:
+    """A mesh of the same shape, each of whose cells is as large as a square of a side.
+
+    Args:
+        mesh: with UVs.
+        width: of the square [sides of the layout's square, at the median of the faces].
+
+    Raises:
+        ConfigError: there would be too many.
+    """
+    assert mesh.uv is not None
+    area, in_layout = mesh.face_areas.astype(np.float64), 0.5 * np.abs(twice_area(mesh.uv))
+    solid = (area > 0) & (in_layout > 0)
+    if not solid.any():
+        raise ConfigError(f"mesh '{mesh.name}' has no area in its layout", "unwrap it again")
+    side = width * float(np.median(np.sqrt(area[solid] / in_layout[solid])))
+    count = area.sum() / side**2
+    if count > MOST_CELLS:
+        raise ConfigError(
+            f"a pattern so small on '{mesh.name}' needs {count:,.0f} cells", "use a larger scale"
+        )
+    return remesh(mesh, max(round(count), 12))

@@ -1,0 +1,76 @@
+"""Real clusters of two workers, of which one dies, or whose scheduler does."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from mitex.batch import Event, status
+from mitex.batch.engines.dask_cluster import Dask
+from mitex.errors import RuntimeUnavailable
+
+CLUSTER = """
+import time
+from distributed import LocalCluster
+cluster = LocalCluster(2, threads_per_worker=1, dashboard_address=None, memory_limit=0)
+print(cluster.scheduler_address, flush=True)
+time.sleep(1000)
+"""
+STEPS = 8
+
+
+@pytest.fixture
+def plan(workshop, monkeypatch):
+    monkeypatch.setenv("STRIPES_PACE", "0.15")
+    return workshop.plan(steps=STEPS)
+
+
+def check_all_is_there(workshop, plan, patch):
+    """No step was done twice, and the files are those of a serial run."""
+    assert status(workshop.folder / "out").count("done") == 4
+    assert sorted(workshop.told("step")) == sorted(["fit-stripes-a", "fit-stripes-b"] * STEPS)
+    patch.setenv("STRIPES_PACE", "0")
+    workshop.run(plan, out="serial")
+    assert workshop.files() == workshop.files("serial")
+
+
+def when_both_run(workshop, wait_for, action):
+    """An `on_event` that does something when two fits have done a step each."""
+    submitted = []
+
+    def on_event(event: Event):
+        submitted.append(event.job.name)
+        if len(submitted) == 2:
+            wait_for(lambda: len(set(workshop.told("step"))) == 2)
+            action()
+
+    return on_event
+
+
+def test_a_worker_is_killed(workshop, plan, wait_for, monkeypatch):
+    """The fit that it was at goes on from its checkpoint, with another worker."""
+
+    def kill():
+        claim = next((workshop.folder / "out").glob("jobs/fit-stripes-a-*/claim.0"))
+        os.kill(int(claim.read_text().split(":")[1]), signal.SIGKILL)
+
+    on_event = when_both_run(workshop, wait_for, kill)
+    report = workshop.run(plan, engine=Dask(jobs=2), on_event=on_event)
+    assert report.count("done") == 4
+    assert workshop.told("start").count("fit-stripes-a") == 2
+    check_all_is_there(workshop, plan, monkeypatch)
+
+
+def test_the_scheduler_is_killed(workshop, plan, wait_for, monkeypatch):
+    """One line says so; another call, here without a cluster, does the rest."""
+    cluster = subprocess.Popen([sys.executable, "-c", CLUSTER], stdout=subprocess.PIPE, text=True)
+    assert cluster.stdout
+    with cluster, Dask(cluster.stdout.readline().strip()) as engine:
+        assert engine.threads >= 1 and engine.at_once is None
+        on_event = when_both_run(workshop, wait_for, cluster.kill)
+        with pytest.raises(RuntimeUnavailable, match="the Dask scheduler does not answer any more; start it"):
+            workshop.run(plan, engine=engine, on_event=on_event)
+    assert workshop.run(plan).count("done") == 4
+    check_all_is_there(workshop, plan, monkeypatch)

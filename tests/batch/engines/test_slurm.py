@@ -1,0 +1,45 @@
+"""Slurm's engine, on submitit's stand-in for one machine."""
+
+import os
+import signal
+
+import pytest
+
+from mitex.batch.engines.slurm import Slurm
+from mitex.errors import ConfigError, RuntimeUnavailable
+
+STEPS = 8
+
+
+def test_a_job_that_has_to_give_way_comes_back_and_goes_on(workshop, wait_for, monkeypatch):
+    """As Slurm does before it ends a job, submitit's process gets its signal."""
+    monkeypatch.setenv("STRIPES_PACE", "0.15")
+    plan = workshop.plan(("a.png",), steps=STEPS)
+
+    def interrupt(event):
+        if event.state == "submitted" and event.job.needs is None:
+            wait_for(lambda: workshop.told("step"))
+            claim = next((workshop.folder / "out").glob("jobs/fit-*/claim.0"))
+            os.kill(int(claim.read_text().split(":")[1]), signal.SIGUSR2)
+
+    report = workshop.run(plan, engine=Slurm(cluster="local"), on_event=interrupt)
+    assert report.count("done") == 2
+    assert workshop.told("start").count("fit-stripes-a") == 2
+    assert workshop.told("step") == ["fit-stripes-a"] * STEPS
+
+
+def test_options_are_those_of_sbatch(monkeypatch, tmp_path):
+    """Of a machine that says that it has Slurm."""
+    monkeypatch.setattr("submitit.slurm.slurm.SlurmExecutor.affinity", lambda *_: 2)
+    executor = Slurm(["partition=cpu", "time=90"], threads=3)._opened(tmp_path)
+    parameters = executor._executor.parameters
+    assert (parameters["partition"], parameters["time"], parameters["cpus_per_task"]) == ("cpu", 90, 3)
+    with pytest.raises(ConfigError, match="submitit refuses"):
+        Slurm(["partitoin=cpu"])._opened(tmp_path)
+
+
+def test_without_slurm(workshop):
+    with pytest.raises(RuntimeUnavailable, match="there is no sbatch here"):
+        workshop.run(workshop.plan(), engine=Slurm())
+    assert not (workshop.folder / "out").exists()
+    assert workshop.told("start") == []

@@ -1,0 +1,139 @@
+"""From a plan to jobs: how many, in which order, with which commands, and what their ids follow from."""
+
+import json
+import shutil
+
+import pytest
+
+from mitex.batch import Job, Plan
+from mitex.batch.jobs import jobs_of
+from mitex.errors import ConfigError
+
+
+@pytest.fixture
+def jobs(workshop):
+    """The jobs of a plan, which begins as one fit of a.png on m.obj."""
+
+    def jobs(methods=None, **keys):
+        content = {"exemplars": ["a.png"], "meshes": ["m.obj"], "methods": methods or {"stripes": {}}} | keys
+        return jobs_of(Plan.of(content, workshop.folder))
+
+    return jobs
+
+
+def names(jobs):
+    return [job.name for job in jobs]
+
+
+class TestExpansion:
+    def test_a_texture_for_any_mesh_is_learned_once(self, jobs, workshop):
+        shutil.copy(workshop.folder / "m.obj", workshop.folder / "n.obj")
+        fit, *applies = jobs(meshes=["m.obj", "n.obj"])
+        assert names([fit, *applies]) == ["fit-stripes-a", "apply-stripes-a-m", "apply-stripes-a-n"]
+        assert fit.needs is None and [job.needs for job in applies] == [fit.id] * 2
+        assert all(job.words[1] == fit.result for job in applies)
+
+    def test_a_fit_that_needs_its_mesh_is_made_for_each(self, jobs, workshop):
+        (workshop.folder / "n.obj").write_text("n")
+        every = jobs({"inlay": {}}, meshes=["*.obj"])
+        assert names(every) == ["fit-inlay-a-m", "apply-inlay-a-m", "fit-inlay-a-n", "apply-inlay-a-n"]
+        assert [job.needs for job in every] == [None, every[0].id, None, every[2].id]
+
+    def test_seeds_and_patterns(self, jobs):
+        every = jobs(exemplars=["*.png"], seeds=[0, 7], meshes=[])
+        assert names(every) == [f"fit-stripes-{name}-s{seed}" for name in "ab" for seed in (0, 7)]
+        assert every[1].words[-4:-2] == ("--seed", "7")
+
+    def test_a_method_has_its_own_lists_and_another_name(self, jobs):
+        every = jobs({"wide": {"method": "stripes", "width": 2.5, "exemplars": ["b.png"]}, "stripes": {}})
+        assert names(every)[::2] == ["fit-wide-b", "fit-stripes-a"]
+        assert every[0].words[-4:-2] == ("--set", "width=2.5") and every[0].words[1] == "stripes"
+
+    def test_names_of_what_ships_with_mitex(self, jobs):
+        fit, apply = jobs(exemplars=["lava"], meshes=["vase"])
+        assert fit.words[3:5] == ("--exemplar", "lava") and "vase" in apply.words
+
+    def test_methods_are_asked_what_they_learn_from(self, jobs):
+        (fit, _) = jobs({"geometric": {"exemplars": ["spikes"], "steps": 3}})
+        assert fit.words[:7] == ("fit", "geometric", "--quiet", "--reference", "spikes", "--steps=3", "--out")
+
+
+class TestCommands:
+    def test_options_settings_and_outputs(self, jobs, workshop):
+        (workshop.folder / "salt").mkdir()
+        fit, apply = jobs(
+            {"stripes": {"steps": 3, "salt": "salt", "depth": 0.25, "apply": {"turn": -4.5}}}, output="maps"
+        )
+        folder = workshop.folder
+        assert fit.words == (
+            *("fit", "stripes", "--quiet", "--exemplar", f"{folder}/a.png", "--steps=3"),
+            *("--salt", f"{folder}/salt", "--set", "depth=0.25", "--out", fit.result),
+        )
+        assert fit.resumed == tuple(
+            word for word in (*fit.words, "--resume") if "salt" not in word.removeprefix(str(folder))
+        )
+        assert apply.words == (
+            *("apply", fit.result, "--quiet", "--mesh", f"{folder}/m.obj", "--turn=-4.5"),
+            *("--out", f"{apply.result}/m/"),
+        )
+
+    @pytest.mark.parametrize(("value", "words"), [(True, ["--keep-uvs"]), (False, [])])
+    def test_flags(self, jobs, value, words):
+        fit, _ = jobs({"surface": {"exemplars": ["lava"], "meshes": ["vase"], "keep_uvs": value}})
+        assert [word for word in fit.words if word.startswith("--keep")] == words
+
+    def test_records_come_back(self, jobs):
+        for job in jobs(seeds=[3]):
+            assert Job.of_record(json.loads(json.dumps(job.record()))) == job
+
+
+class TestIds:
+    """A job is known by all that its result follows from, and by nothing else."""
+
+    def test_the_same_files_elsewhere_are_the_same_job(self, jobs, workshop):
+        before = jobs()
+        moved = workshop.folder / "moved"
+        moved.mkdir()
+        for name in ("a.png", "m.obj"):
+            (workshop.folder / name).rename(moved / name)
+        assert [job.id for job in jobs(exemplars=["moved/a.png"], meshes=["moved/m.obj"])] == [
+            job.id for job in before
+        ]
+
+    @pytest.mark.parametrize("kind", ["setting", "option", "exemplar", "mesh", "seed", "version"])
+    def test_what_changes_it(self, kind, jobs, workshop, monkeypatch):
+        before = [job.id for job in jobs()]
+        table, keys = {}, {}
+        match kind:
+            case "setting":
+                table = {"width": 2.0}
+            case "option":
+                table = {"salt": "x"}
+            case "exemplar":
+                (workshop.folder / "a.png").write_text("other")
+            case "mesh":
+                (workshop.folder / "m.obj").write_text("other")
+            case "seed":
+                keys = {"seeds": [1]}
+            case "version":
+                monkeypatch.setattr("mitex.batch.jobs.__version__", "9")
+        after = [job.id for job in jobs({"stripes": table}, **keys)]
+        changed = [old != new for old, new in zip(before, after, strict=True)]
+        assert changed == ([False, True] if kind == "mesh" else [True, True])
+
+    def test_a_folder_is_known_by_names_and_contents(self, jobs, workshop):
+        maps = workshop.folder / "maps"
+        maps.mkdir()
+        (maps / "x").write_text("1")
+        ids = set()
+        for change in ("", "2", "rename"):
+            if change == "rename":
+                (maps / "x").rename(maps / "y")
+            else:
+                (maps / "x").write_text(change)
+            ids.add(jobs(exemplars=["maps"])[0].id)
+        assert len(ids) == 3
+
+    def test_the_same_job_twice_is_refused(self, jobs):
+        with pytest.raises(ConfigError, match="the job fit-stripes-a twice"):
+            jobs(exemplars=["a.png", "./a.png"])
