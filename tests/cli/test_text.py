@@ -30,8 +30,8 @@ def test_from_words_to_a_file(files, capsys):
     assert main(words) == 0
     assert capsys.readouterr().out == "runs/red-dots-on-red\n"
     assert main([*words[:6], "--resume", "--steps", "3", "--out", "runs/red-dots-on-red", "--quiet"]) == 0
-    apply = "apply runs/red-dots-on-red --mesh ball.ply --out ball.glb --resolution 64 --steps 2 --subdivide 1 --quiet"
-    assert main([*apply.split(), "--displace"]) == 0
+    apply = "apply runs/red-dots-on-red --mesh ball.ply --out ball.glb --resolution 64 --steps 2 --quiet"
+    assert main([*apply.split(), "--displace", "--subdivide", "1"]) == 0
     assert (files / "ball.glb").stat().st_size > 10_000
 
 
