@@ -6,10 +6,11 @@ import os
 
 import torch
 
-from mitex.errors import WeightsError
 from mitex.features.clip import Clip, cached_folder, named_folder
-from mitex.features.clip.folder import remedy
 from mitex.features.text_image import TextImageModel
+from mitex.features.words import words_model
+
+EMBEDDED = "words"
 
 
 def text_image_model(
@@ -27,15 +28,4 @@ def text_image_model(
         ConfigError: a CLIP model needs the package tokenizers.
     """
     folder = None if clip == EMBEDDED else named_folder(clip) or cached_folder()
-    return Clip(folder, device=device) if folder else _embedded()
-
-
-EMBEDDED = "words"
-
-
-def _embedded() -> TextImageModel:
-    try:
-        from mitex.features.words import words_model  # type: ignore[reportMissingImports]
-    except ImportError as e:
-        raise WeightsError("there is no CLIP model", remedy()) from e
-    return words_model()
+    return Clip(folder, device=device) if folder else words_model()

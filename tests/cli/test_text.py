@@ -31,7 +31,7 @@ def test_from_words_to_a_file(files, capsys):
     assert capsys.readouterr().out == "runs/red-dots-on-red\n"
     assert main([*words[:6], "--resume", "--steps", "3", "--out", "runs/red-dots-on-red", "--quiet"]) == 0
     apply = "apply runs/red-dots-on-red --mesh ball.ply --out ball.glb --resolution 64 --steps 2 --quiet"
-    assert main([*apply.split(), "--displace"]) == 0
+    assert main([*apply.split(), "--displace", "--subdivide", "1"]) == 0
     assert (files / "ball.glb").stat().st_size > 10_000
 
 
@@ -61,5 +61,16 @@ def test_texts_of_no_use(files, capsys, text):
 
 
 def test_only_textures_with_a_relief_move_a_mesh(files, capsys):
-    words = ["apply", "pebbles", "--mesh", "vase", "--out", "a.glb", "--displace", "--quiet"]
+    words = [
+        "apply",
+        "pebbles",
+        "--mesh",
+        "vase",
+        "--out",
+        "a.ply",
+        "--displace",
+        "--quiet",
+        "--subdivide",
+        "0",
+    ]
     check_refused(files, words, "the texture has no relief that could displace a mesh", capsys)
