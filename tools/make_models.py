@@ -53,7 +53,7 @@ RECIPES = {
     "fur": Recipe("Stylized_Fur_001", settings=(*QUICK, "density=48", *SMALL)),
     "hexagons": Recipe("hexagons"),
     "honeycomb": Recipe("Honeycomb_002", settings=(*FINE, *SMALL)),
-    "knit": Recipe("knit", settings=FINE),
+    "knit": Recipe("knit", settings=(*LONG, "density=64")),
     "lava": Recipe("lava"),
     "leather": Recipe("leather", settings=(*QUICK, "density=64")),
     "mosaic": Recipe("Abstract_008", settings=(*QUICK, *SMALL)),
