@@ -8,7 +8,7 @@ from mitex.losses.laplacian import laplacian_excess
 from mitex.losses.motion import MotionLoss, motion_loss
 from mitex.losses.overflow import overflow_loss
 from mitex.losses.slopes import slope_correlation
-from mitex.losses.text import directional_distance, mean_direction
+from mitex.losses.text import directional_distance, mean_direction, text_distance
 from mitex.losses.transport import channel_transport, moment_distance, relaxed_transport
 
 __all__ = [
@@ -28,4 +28,5 @@ __all__ = [
     "overflow_loss",
     "relaxed_transport",
     "slope_correlation",
+    "text_distance",
 ]

@@ -33,3 +33,13 @@ def directional_distance(
     step = pictures - negatives
     aim = F.normalize(F.normalize(text, dim=0) - F.normalize(negative_text, dim=0), dim=0)
     return 1 - step @ aim / (step.square().sum() + SHORT**2).sqrt()
+
+
+def text_distance(pictures: torch.Tensor, text: torch.Tensor) -> torch.Tensor:
+    """1 - cos(R, T), from 0 to 2: what MeshNCA compares its equation 9 with (figure 17).
+
+    Args:
+        pictures: (D,), a `mean_direction`, not zero.
+        text: (D,) embedding of what is wanted.
+    """
+    return 1 - F.cosine_similarity(pictures, text, dim=0)

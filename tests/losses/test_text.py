@@ -3,7 +3,7 @@ import math
 import pytest
 import torch
 
-from mitex.losses import directional_distance, mean_direction
+from mitex.losses import directional_distance, mean_direction, text_distance
 from mitex.losses.text import SHORT
 
 
@@ -70,3 +70,9 @@ def test_its_gradient():
         ),
         _vectors(2).requires_grad_(),
     )
+
+
+def test_the_plain_distance_is_one_less_the_cosine():
+    text, across = torch.tensor([2.0, 0, 0]), torch.tensor([0, 3.0, 0])
+    values = [text_distance(pictures, text).item() for pictures in (5 * text, across, text + across, -text)]
+    assert values == pytest.approx([0, 1, 1 - 2 / math.sqrt(13), 2], abs=1e-6)

@@ -107,6 +107,9 @@ class NcaConfig(TrainingConfig):
     text_prompt: str = key("an image of {object} made of {text}", "that the model of texts and images reads")
     text_model: str | None = key(None, "CLIP folder, or words for the small embedded model")
     text_parent: str | None = key(None, "model that training starts from if no other is given")
+    text_directional: bool = key(
+        True, "compare the steps from the grey surface; false: pictures and text themselves"
+    )
     text_bank: int = key(64, "sets of views, drawn once, of which a step sees one", 1, 65_536)
     text_distances: tuple[float, ...] = key((2.5,), "of the cameras, one for each set", 1.01, 100)
     text_crops: int = key(2, "close-ups that are cut out of a view", 1, 64)

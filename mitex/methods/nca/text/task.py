@@ -11,7 +11,13 @@ import torch
 from mitex.cache import content_key
 from mitex.errors import ConfigError
 from mitex.features.text_image import TextImageModel
-from mitex.losses import directional_distance, laplacian_excess, mean_direction, overflow_loss
+from mitex.losses import (
+    directional_distance,
+    laplacian_excess,
+    mean_direction,
+    overflow_loss,
+    text_distance,
+)
 from mitex.mesh import Mesh
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.config import NcaConfig
@@ -120,13 +126,17 @@ class TextTask(PoolTask):
         }
         parts = {name: part for name, part in parts.items() if part[0]}
         squares = [augmentation(pictures, size) for _, augmentation, pictures, _ in parts.values()]
-        texts = self.text, self.negative_text
         return {
-            name: weight * directional_distance(direction, bare, *texts)
+            name: weight * self._distance(direction, bare)
             for (name, (weight, _, _, bare)), direction in zip(
                 parts.items(), self._directions(squares), strict=True
             )
         }
+
+    def _distance(self, pictures: torch.Tensor, bare: torch.Tensor) -> torch.Tensor:
+        if self.config.text_directional:
+            return directional_distance(pictures, bare, self.text, self.negative_text)
+        return text_distance(pictures, self.text)
 
     def _directions(self, groups: list[torch.Tensor]) -> list[torch.Tensor]:
         """The mean direction (D,) of each group of pictures (N, R, R, 3), all encoded at once."""

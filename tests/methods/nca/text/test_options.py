@@ -51,6 +51,18 @@ def text(build):
 
 
 @check
+def text_directional(build):
+    """Without it the distance is that of the pictures themselves, whatever the grey sphere looks like."""
+    one = build("text_directional=false")
+    surface, generator = one.spheres[0], torch.Generator().manual_seed(0)
+    sight = one.sight(int(torch.randint(one.config.text_bank, (), generator=generator)))
+    views = one.figures[surface].textured(one.look, one.pool[0], sight.cameras)
+    (pictures,) = one._directions([sight.whole(views.coloured, one.model.resolution)])
+    assert _terms(one)["whole"] == pytest.approx(1 - torch.cosine_similarity(pictures, one.text, 0).item())
+    assert _terms(one)["whole"] != pytest.approx(_terms(build())["whole"])
+
+
+@check
 def text_object(build):
     one = build("text_object=torus")
     assert one.metadata()["text"] == "an image of a torus made of red"
