@@ -8,7 +8,7 @@ import torch
 def laplacian_excess(
     values: torch.Tensor, rows: torch.Tensor, neighbours: torch.Tensor, tolerance: float
 ) -> torch.Tensor:
-    """max(0, mean_i |sum_j (v_j - v_i)| - tolerance), j the neighbours of i (MeshNCA, equations 16 and 17).
+    """`max(0, mean_i |sum_j (v_j - v_i)| - tolerance)`, j the neighbours of i (MeshNCA, equations 16 and 17).
 
     The paper prints the sum without its absolute value. As each edge counts once with either sign, the mean
     of those is zero for any values, and would constrain nothing.
