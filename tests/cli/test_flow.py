@@ -104,7 +104,7 @@ def test_options_reach_the_library(folder, monkeypatch, capsys):
         "field": None,
         "speed": 1.0,
     }
-    assert options == expected | {"resolution": None, "keep_dense": False}
+    assert options == expected | {"resolution": None, "keep_dense": False, "displace": False}
     assert main([*words.split(), "--keep-dense"]) == 0
     assert options == expected | {"resolution": None, "keep_dense": True}
 
