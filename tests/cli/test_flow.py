@@ -103,8 +103,9 @@ def test_options_reach_the_library(folder, monkeypatch, capsys):
         "scale": 1.0,
         "field": None,
         "speed": 1.0,
+        "displace": False,
     }
-    assert options == expected | {"resolution": None, "keep_dense": False, "displace": False}
+    assert options == expected | {"resolution": None, "keep_dense": False}
     assert main([*words.split(), "--keep-dense"]) == 0
     assert options == expected | {"resolution": None, "keep_dense": True}
 
