@@ -40,6 +40,7 @@ ORDER = [
     "colour",
     "runtime",
     "cuts",
+    "mip_map",
     "sparse",
     "cache",
     "cache_entries",

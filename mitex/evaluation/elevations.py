@@ -15,8 +15,8 @@ import numpy as np
 
 from mitex.colour import linear_to_srgb, srgb_to_linear
 from mitex.evaluation.metrics import single_image_frechet
-from mitex.evaluation.mip_map import MipMap
 from mitex.evaluation.windows import PLACES, WINDOW, Photos, Rendering, Surface, Window, select_windows
+from mitex.mip_map import MipMap
 
 HALF = 1.0  # half the side of the plane [scene units]
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from mitex.errors import ConfigError
+
 WIDTHS = (64, 128, 256, 512, 512)  # channels of the blocks
 
 
@@ -15,6 +17,14 @@ def _names(counts: Sequence[int]) -> tuple[str, ...]:
 LAYERS = _names((2, 2, 3, 3, 3))  # of VGG-16
 LAYERS_19 = _names((2, 2, 4, 4, 4))
 CHANNELS = {name: WIDTHS[int(name[4]) - 1] for name in LAYERS_19}
+
+
+def check_layers(names: Sequence[str]) -> None:
+    """Raises a ConfigError if names are not some of VGG-16's layers."""
+    unknown = [name for name in names if name not in LAYERS]
+    if unknown or not names:
+        named = ", ".join(map(str, unknown)) or "none"
+        raise ConfigError(f"VGG-16's layers to compare are {named}", f"use some of {', '.join(LAYERS)}")
 
 
 def with_poolings(convolutions: Sequence[str]) -> tuple[str, ...]:

@@ -30,27 +30,15 @@ def vgg16_path() -> Path:
     return path
 
 
-def flow_path() -> Path:
-    """The weights of the flow network that ship with the package.
+def shipped(file: str) -> Path:
+    """Weights that ship with the package and cannot be replaced: `FLOW_FILE` or `WORDS_FILE`.
 
     Raises:
         WeightsError: the file is missing.
     """
-    path = FOLDER / FLOW_FILE
+    path = FOLDER / file
     if not path.is_file():
-        raise WeightsError(f"the weights of the flow network are not at {path}", "reinstall mitex")
-    return path
-
-
-def words_path() -> Path:
-    """The weights of the embedded text-image model that ship with the package.
-
-    Raises:
-        WeightsError: the file is missing.
-    """
-    path = FOLDER / WORDS_FILE
-    if not path.is_file():
-        raise WeightsError(f"the weights of the text-image model are not at {path}", "reinstall mitex")
+        raise WeightsError(f"the weights are not at {path}", "reinstall mitex")
     return path
 
 

@@ -14,10 +14,10 @@ from mitex.asset import Asset
 from mitex.atlas import MAX_RESOLUTION
 from mitex.colour import linear_to_srgb, srgb_to_linear
 from mitex.errors import ConfigError
-from mitex.evaluation.mip_map import MipMap
 from mitex.export.common import asset_from_textures
 from mitex.mesh import Mesh
 from mitex.methods.layout import with_layout
+from mitex.mip_map import MipMap
 from mitex.training import model_file
 
 CHUNK = 1 << 18  # texels looked up at a time

@@ -145,7 +145,7 @@ def flow_network() -> FlowNetwork:
 def _load() -> dict[str, torch.Tensor]:
     from safetensors.torch import load_file
 
-    path = weights.flow_path()
+    path = weights.shipped(weights.FLOW_FILE)
     weights.verify(path, weights.FLOW_SHA256)
     return load_file(path)
 

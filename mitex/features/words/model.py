@@ -66,7 +66,7 @@ def words_model() -> WordsModel:
     """
     from safetensors.torch import load_file
 
-    path = weights.words_path()
+    path = weights.shipped(weights.WORDS_FILE)
     weights.verify(path, weights.WORDS_SHA256)
     network = WordsNetwork()
     network.load_state_dict(load_file(path))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 from mitex.errors import ConfigError
-from mitex.features.layers import LAYERS
+from mitex.features.layers import check_layers
 from mitex.methods.nca.decoder.shape import COORDINATES, DecoderShape
 from mitex.training.settings import TrainingConfig, key
 
@@ -129,9 +129,7 @@ class NcaConfig(TrainingConfig):
             raise ConfigError(
                 f"max_steps = {self.max_steps} is out of range", f"choose {self.min_steps} or more"
             )
-        unknown = [layer for layer in self.layers if layer not in LAYERS]
-        if unknown or not self.layers:
-            raise ConfigError(f"layers holds {unknown or 'nothing'}", f"use some of {', '.join(LAYERS)}")
+        check_layers(self.layers)
         unknown = [name for name in self.surfaces if name not in SURFACES]
         if unknown or not self.surfaces:
             raise ConfigError(
@@ -152,6 +150,16 @@ class NcaConfig(TrainingConfig):
             raise ConfigError("text_distances holds nothing", "give one or more [normalised mesh units]")
         if not self.wave_frequencies:
             raise ConfigError("wave_frequencies holds nothing", "give one or more [cycles per edge]")
+
+    @property
+    def schedule(self) -> dict[str, Any]:
+        """How the loop takes its steps."""
+        return {
+            "lr": self.lr,
+            "milestones": self.milestones,
+            "decay": self.decay,
+            "normalise_gradients": self.normalise_gradients,
+        }
 
     @property
     def decoder_shape(self) -> DecoderShape:

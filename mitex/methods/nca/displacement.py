@@ -20,7 +20,7 @@ from mitex.methods.nca.decoder.surface import EDGE, decoder_units, vertex_points
 from mitex.sparse import LinearMap
 
 
-class Relief:
+class Displacement:
     """Heights of a mesh's V vertices as a relief.
 
     Args:

@@ -17,7 +17,7 @@ from mitex.geometry.vectors import orthonormal, unit
 from mitex.mesh import Mesh
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.decoder.surface import vertex_points
-from mitex.methods.nca.displacement import Relief
+from mitex.methods.nca.displacement import Displacement
 
 
 class Embossed(Grown):
@@ -53,8 +53,8 @@ class Embossed(Grown):
         return super().textures(atlas) | {"normal": atlas.normal_map(self._mesh, detail)}
 
     @cached_property
-    def _relief(self) -> Relief:
-        return Relief(self.cells.mesh, self.bound)
+    def _relief(self) -> Displacement:
+        return Displacement(self.cells.mesh, self.bound)
 
     @cached_property
     @torch.no_grad()

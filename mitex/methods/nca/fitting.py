@@ -77,12 +77,4 @@ def fit(
         family = {"family": weights_key(look)}
         return NcaTexture(look, about | origin | family | lineage | {"growth_steps": steps})
 
-    return run.train(
-        task,
-        maps.name,
-        texture,
-        lr=config.lr,
-        milestones=config.milestones,
-        decay=config.decay,
-        normalise_gradients=config.normalise_gradients,
-    )
+    return run.train(task, maps.name, texture, **config.schedule)

@@ -135,7 +135,7 @@ def test_other_weights(folder, damage):
 def test_the_file_is_small_and_tells_how_it_was_made():
     from safetensors import safe_open
 
-    path = weights.flow_path()
+    path = weights.shipped(weights.FLOW_FILE)
     assert path.stat().st_size < 1_000_000
     with safe_open(path, "pt") as file:
         about = file.metadata()

@@ -120,7 +120,7 @@ def test_other_weights(folder, damage):
 def test_the_file_is_small_and_tells_how_it_was_made():
     from safetensors import safe_open
 
-    path = weights.words_path()
+    path = weights.shipped(weights.WORDS_FILE)
     assert path.stat().st_size < 5_000_000
     with safe_open(path, "pt") as file:
         about = file.metadata()

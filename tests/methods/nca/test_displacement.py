@@ -12,7 +12,7 @@ from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh, grid, icosphere
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.cells import Cells
-from mitex.methods.nca.displacement import Relief, known_relief
+from mitex.methods.nca.displacement import Displacement, known_relief
 from mitex.methods.nca.embossed import Embossed
 from mitex.methods.nca.growth import LookGrowth
 from tests.methods.nca.tiny import texture
@@ -34,7 +34,7 @@ def _ramp(mesh, slope):
 
 
 def test_offsets_end_at_the_bound():
-    relief = Relief(icosphere(6), 2.0)
+    relief = Displacement(icosphere(6), 2.0)
     edges = icosphere(6).edges
     points = icosphere(6).vertices
     mean = np.linalg.norm(points[edges.indices] - points[edges.rows], axis=1).mean()
@@ -43,7 +43,7 @@ def test_offsets_end_at_the_bound():
 
 
 def test_the_normals_of_a_ramp(plate):
-    relief = Relief(plate, 2.0)
+    relief = Displacement(plate, 2.0)
     normals = relief.normals(_ramp(plate, 0.05)).numpy()
     steep = relief.bound * 2 * 0.05
     assert np.allclose(normals, unit(plate.normals - [steep, 0, 0]), atol=1e-4)
@@ -53,7 +53,7 @@ def test_the_normals_are_those_of_the_moved_mesh():
     """But for what the curvature of the sphere adds, and for the size of its faces."""
     mesh = icosphere(24)
     height = torch.from_numpy(0.5 + 0.2 * np.sin(4 * mesh.vertices).prod(axis=1))
-    relief = Relief(mesh, 1.0)
+    relief = Displacement(mesh, 1.0)
     moved = mesh.with_vertices(mesh.vertices + relief.offsets(height)[:, None].numpy() * mesh.normals)
     cosine = (moved.normals * relief.normals(height).numpy()).sum(axis=1)
     tilt = (moved.normals * mesh.normals).sum(axis=1)
@@ -62,7 +62,7 @@ def test_the_normals_are_those_of_the_moved_mesh():
 
 def test_gradients_by_finite_differences():
     mesh = icosphere(4)
-    relief, generator = Relief(mesh, 2.0), torch.Generator().manual_seed(0)
+    relief, generator = Displacement(mesh, 2.0), torch.Generator().manual_seed(0)
     height, weights = torch.rand(162, generator=generator), torch.rand(162, 3, generator=generator)
     step = torch.randn(162, generator=generator)
     (slope,) = torch.autograd.grad(
@@ -104,7 +104,7 @@ def _embossed(mesh: Mesh, moved: bool) -> Embossed:
 
 def test_a_relief_is_a_normal_map(plate):
     shown = _embossed(plate, moved=False)
-    asset, steep = shown.asset(), Relief(plate, 2.0).bound * 0.1
+    asset, steep = shown.asset(), Displacement(plate, 2.0).bound * 0.1
     assert np.array_equal(asset.mesh.vertices, plate.vertices)
     assert np.allclose(asset.detail_normals(), unit(plate.normals - [steep, 0, 0]), atol=2e-3)
     atlas = Atlas.build(plate, 64)
@@ -116,7 +116,7 @@ def test_a_relief_is_a_normal_map(plate):
 def test_a_moved_mesh_has_the_relief_in_its_shape(plate):
     """And an even normal map, where it has a vertex for each cell."""
     asset = _embossed(plate, moved=True).asset()
-    steep = Relief(plate, 2.0).bound * 0.1
+    steep = Displacement(plate, 2.0).bound * 0.1
     expected = plate.vertices + steep * plate.vertices[:, :1] * plate.normals
     assert np.allclose(asset.mesh.vertices, expected, atol=1e-6)
     assert np.allclose(asset.vertex_maps["normal"], [0.5, 0.5, 1.0], atol=5e-3)
@@ -131,7 +131,7 @@ def test_textures_with_and_without_a_relief():
     assert set(plain.maps) == set(plain.vertex_maps) == {"albedo", "height", "normal"}
     assert np.array_equal(plain.mesh.vertices, sphere.vertices)
     offsets = np.linalg.norm(moved.mesh.vertices, axis=1) - 1
-    bound = Relief(sphere, 2.0).bound
+    bound = Displacement(sphere, 2.0).bound
     assert 0.001 < np.abs(offsets).max() <= bound * 1.001
     still = texture(("albedo", "height"))
     assert set(still.apply(sphere, **options).maps) == {"albedo", "height"}

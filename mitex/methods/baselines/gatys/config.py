@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from mitex.errors import ConfigError
-from mitex.features.layers import LAYERS
+from mitex.features.layers import check_layers
 from mitex.training.settings import TrainingConfig, key
 
 
@@ -33,10 +33,7 @@ class GatysConfig(TrainingConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        unknown = [layer for layer in self.layers if layer not in LAYERS]
-        if unknown or not self.layers:
-            named = ", ".join(unknown) or "none"
-            raise ConfigError(f"VGG-16's layers to compare are {named}", f"use some of {', '.join(LAYERS)}")
+        check_layers(self.layers)
         if self.size % 16:
             raise ConfigError(f"a picture of {self.size} pixels", "use a multiple of 16, which can be halved")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from mitex.errors import ConfigError
-from mitex.features.layers import LAYERS
+from mitex.features.layers import check_layers
 from mitex.training.settings import TrainingConfig, key
 
 
@@ -37,10 +37,8 @@ class MultiViewConfig(TrainingConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        unknown = [layer for layer in (*self.layers, self.content_layer) if layer not in LAYERS]
-        if unknown or not self.layers:
-            named = ", ".join(unknown) or "none"
-            raise ConfigError(f"VGG-16's layers to compare are {named}", f"use some of {', '.join(LAYERS)}")
+        check_layers(self.layers)
+        check_layers([self.content_layer])
         if self.nearest > self.farthest:
             raise ConfigError(f"nearest = {self.nearest:g} is beyond farthest", "set it to less")
 

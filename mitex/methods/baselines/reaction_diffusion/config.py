@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from mitex.errors import ConfigError
-from mitex.features.layers import LAYERS
+from mitex.features.layers import check_layers
 from mitex.training.settings import TrainingConfig, key
 
 STABLE = 0.125  # rate of diffusion up to which no explicit step overshoots, see `laplacian`
@@ -39,10 +39,7 @@ class ReactionDiffusionConfig(TrainingConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        unknown = [layer for layer in self.layers if layer not in LAYERS]
-        if unknown or not self.layers:
-            named = ", ".join(unknown) or "none"
-            raise ConfigError(f"VGG-16's layers to compare are {named}", f"use some of {', '.join(LAYERS)}")
+        check_layers(self.layers)
         if self.max_steps < self.min_steps:
             raise ConfigError(f"max_steps = {self.max_steps}", f"choose {self.min_steps} or more")
 

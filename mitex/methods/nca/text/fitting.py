@@ -64,15 +64,7 @@ def fit_text(
         family = {"family": weights_key(look)}
         return NcaTexture(look, about | {"density": config.density} | known | family | lineage)
 
-    return run.train(
-        task,
-        str(config.text),
-        texture,
-        lr=config.lr,
-        milestones=config.milestones,
-        decay=config.decay,
-        normalise_gradients=config.normalise_gradients,
-    )
+    return run.train(task, str(config.text), texture, **config.schedule)
 
 
 def _start(init: str | Path | None, run: Run[NcaConfig]) -> tuple[Look | None, dict[str, str]]:

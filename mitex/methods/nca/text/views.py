@@ -10,7 +10,7 @@ import torch.nn.functional as F
 from mitex.losses import Augmentation
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.decoder.surface import Points
-from mitex.methods.nca.displacement import Relief
+from mitex.methods.nca.displacement import Displacement
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.surfaces import TrainingSphere
 from mitex.methods.nca.text.light import lamps, shading
@@ -75,7 +75,7 @@ class Figure:
     """
 
     def __init__(self, sphere: TrainingSphere, bound: float, device: torch.device | str = "cpu") -> None:
-        self.sphere, self.relief = sphere, Relief(sphere.mesh, bound, device)
+        self.sphere, self.relief = sphere, Displacement(sphere.mesh, bound, device)
         self._faces = torch.tensor(sphere.mesh.faces, device=device)
 
     def bare(self, cameras: Cameras) -> torch.Tensor:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitex.evaluation.mip_map import MipMap
+from mitex.mip_map import MipMap
 
 SQUARE = np.eye(2)[None]
 
