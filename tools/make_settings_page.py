@@ -1,4 +1,4 @@
-"""Writes docs/settings.md: every setting of every method, as the dataclasses declare them.
+"""Writes docs/reference/settings.md: every setting of every method, as the dataclasses declare them.
 
 usage: python tools/make_settings_page.py
 """
@@ -12,7 +12,7 @@ from mitex.methods.method import Method
 from mitex.methods.registry import PACKAGES, methods
 from mitex.training.settings import rows
 
-PAGE = Path(__file__).parents[1] / "docs" / "settings.md"
+PAGE = Path(__file__).parents[1] / "docs" / "reference" / "settings.md"
 INTRODUCTION = """\
 # Settings
 
@@ -43,7 +43,7 @@ them.
 
 
 def page() -> str:
-    """The text of docs/settings.md, for the methods that ship with Mitex."""
+    """The text of docs/reference/settings.md, for the methods that ship with Mitex."""
     built_in = [method for method in methods().values() if method.presets.startswith(PACKAGES)]
     return "\n".join([INTRODUCTION, *(line for method in built_in for line in section(method))])
 

@@ -12,10 +12,10 @@ GROUPS = {
     "Guides": [
         "docs/moving",
         "docs/batch",
-        *(f"docs/{name}" for name in ("blender", "plugins", "embedding", "settings", "runs", "times")),
+        *(f"docs/{name}" for name in ("blender", "plugins", "embedding", "runs", "times")),
         "docs/*",
     ],
-    "Reference": ["docs/reference/mitex", "docs/reference/*"],
+    "Reference": ["docs/reference/settings", "docs/reference/mitex", "docs/reference/*"],
     "Results": ["docs/results/*"],
     "Developers": ["docs/developers/*", "CONTRIBUTING", "CHANGELOG"],
     "About": ["*"],

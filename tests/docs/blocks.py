@@ -11,6 +11,7 @@ from markdown_it import MarkdownIt
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/*.md")), *sorted(ROOT.glob("docs/developers/*.md"))]
+PAGES += [ROOT / "docs" / "reference" / "settings.md"]
 PROGRAMS = ("mitex", "make", "pip", "python", ".venv/bin/python", ".venv/bin/mitex")
 MARK = re.compile(r"<!--\s*(not run|part of):\s*(.+?)\s*-->", re.DOTALL)
 

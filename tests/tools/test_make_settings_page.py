@@ -19,7 +19,7 @@ def script():
 
 
 def test_the_page_is_up_to_date(script):
-    written = (ROOT / "docs" / "settings.md").read_text(encoding="utf-8")
+    written = (ROOT / "docs" / "reference" / "settings.md").read_text(encoding="utf-8")
     assert written == script.page(), "run `python tools/make_settings_page.py`"
 
 
