@@ -109,10 +109,10 @@ class WordsTask(ParameterTask):
     def loss(self, step: int, generator: torch.Generator) -> Step:
         """One batch; the metric is the share of pictures whose caption is found among all."""
         fresh = self.again is None
-        images, chosen = self._draw(generator) if self.again is None else self.again
+        images, indices = self._draw(generator) if self.again is None else self.again
         images.requires_grad_()
         seed = int(torch.randint(2**31, (), generator=generator))
-        value, metrics = self._contrast(images, [self.subjects[i] for i in chosen], seed)
+        value, metrics = self._contrast(images, [self.subjects[i] for i in indices], seed)
         begin, end = MISLEADING
         most = self.config.attack * min(1, max(0, step - begin) / (end - begin))
         size = most * torch.rand(len(images), 1, 1, 1, generator=generator)
@@ -120,7 +120,7 @@ class WordsTask(ParameterTask):
         def commit() -> None:
             if fresh and images.grad is not None and most:
                 slope = images.grad / images.grad.flatten(1).norm(dim=1).clamp(min=1e-12)[:, None, None, None]
-                self.again = (images.detach() + size * slope).clamp(0, 1), chosen
+                self.again = (images.detach() + size * slope).clamp(0, 1), indices
             else:
                 self.again = None
             for name, average in self.average.items():
@@ -134,12 +134,12 @@ class WordsTask(ParameterTask):
 
     def _draw(self, generator: torch.Generator) -> tuple[torch.Tensor, list[int]]:
         rng = np.random.default_rng(int(torch.randint(2**31, (), generator=generator)))
-        chosen = rng.integers(len(self.pictures), size=self.config.batch).tolist()
+        indices = rng.integers(len(self.pictures), size=self.config.batch).tolist()
         for start in range(0, self.config.batch // 2, ALIKE):
             same = self.alike[rng.integers(len(self.alike))]
-            chosen[start : start + ALIKE] = rng.choice(same, ALIKE).tolist()
-        images = torch.from_numpy(self.pictures[chosen]).permute(0, 3, 1, 2) / 255
-        return augmented(images, RESOLUTION, generator), chosen
+            indices[start : start + ALIKE] = rng.choice(same, ALIKE).tolist()
+        images = torch.from_numpy(self.pictures[indices]).permute(0, 3, 1, 2) / 255
+        return augmented(images, RESOLUTION, generator), indices
 
     def _contrast(
         self, images: torch.Tensor, shown: list[Subject], seed: int
@@ -162,8 +162,8 @@ class WordsTask(ParameterTask):
         own = logits[:, : len(shown)]
         loss = (F.cross_entropy(logits, target) + F.cross_entropy(own.T, target)) / 2
         attributes, kinds = self._attributes(pictures.float(), shown)
-        found = (logits.argmax(1) == target).float().mean().item()
-        return loss + attributes, {"found": found, "kinds": kinds}
+        accuracy = (logits.argmax(1) == target).float().mean().item()
+        return loss + attributes, {"accuracy": accuracy, "kinds": kinds}
 
     def _attributes(self, pictures: torch.Tensor, shown: list[Subject]) -> tuple[torch.Tensor, float]:
         """How well linear maps tell the attributes, for a faster training; the share of right patterns."""

@@ -54,9 +54,9 @@ def _by_likeness(models: list[dict[str, Any]], text: str) -> list[dict[str, Any]
     from mitex.features.words import likeness
     from mitex.images import read_image
 
-    seen = [model for model in models if model["thumbnail"]]
-    cosines = likeness(text, [read_image(model["thumbnail"]) for model in seen])
-    fits = [model | {"likeness": cosine} for model, cosine in zip(seen, cosines, strict=True)]
+    with_thumbnail = [model for model in models if model["thumbnail"]]
+    cosines = likeness(text, [read_image(model["thumbnail"]) for model in with_thumbnail])
+    fits = [model | {"likeness": cosine} for model, cosine in zip(with_thumbnail, cosines, strict=True)]
     fits.sort(key=lambda model: model["likeness"], reverse=True)
     return fits + [model for model in models if not model["thumbnail"]]
 

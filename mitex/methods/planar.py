@@ -87,10 +87,10 @@ class PlanarTexture:
                 f"a texture of {scale:g} times the size and {resolution} texels",
                 f"use sizes from 0.05 to 20, and 16 to {MAX_RESOLUTION} texels",
             )
-        laid = with_layout(mesh, self.texels, keep_uvs)
-        assert laid.uv is not None
+        unwrapped = with_layout(mesh, self.texels, keep_uvs)
+        assert unwrapped.uv is not None
         albedo = repeated(self.image, self.texels / scale, resolution)
-        return asset_from_textures(laid, laid.uv, {"albedo": albedo}, mesh.name)
+        return asset_from_textures(unwrapped, unwrapped.uv, {"albedo": albedo}, mesh.name)
 
 
 def repeated(image: np.ndarray, length: float, resolution: int) -> np.ndarray:

@@ -32,11 +32,11 @@ def likeness(text: str, pictures: Sequence[np.ndarray], model: WordsModel | None
         WeightsError: the model's file is missing or not the expected one.
     """
     model = model or words_model()
-    meant = F.normalize(model.encode_texts([text]), dim=1)
+    direction = F.normalize(model.encode_texts([text]), dim=1)
     cosines = []
     for picture in pictures:
-        seen = model.encode_images(torch.from_numpy(_pieces(picture, model.resolution)))
-        cosines.append((F.normalize(seen, dim=1) @ meant.T).mean().item())
+        embeddings = model.encode_images(torch.from_numpy(_pieces(picture, model.resolution)))
+        cosines.append((F.normalize(embeddings, dim=1) @ direction.T).mean().item())
     return cosines
 
 

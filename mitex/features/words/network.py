@@ -94,10 +94,10 @@ class TextEncoder(nn.Module):
 
     def forward(self, numbers: torch.Tensor) -> torch.Tensor:
         """(N, 128) of (N, L) places in `CONCEPTS` from 1 on, filled up with 0."""
-        said = numbers > 0
+        present = numbers > 0
         x = self.concepts(numbers) + self.places[: numbers.shape[1]]
-        x = self.layers(x, src_key_padding_mask=~said) * said[..., None]
-        return self.out(x.sum(1) / said.sum(1, keepdim=True))
+        x = self.layers(x, src_key_padding_mask=~present) * present[..., None]
+        return self.out(x.sum(1) / present.sum(1, keepdim=True))
 
 
 class WordsNetwork(nn.Module):

@@ -62,11 +62,13 @@ def test_a_periodic_picture_has_no_borders(exemplar):
 
 
 def test_the_contract(exemplar):
+    threads(1)
     assert_loss_is_pure(GatysTask(CONFIG, exemplar), 0)
 
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_skipped_step_leaves_no_trace(fault, exemplar):
+    threads(1)
     assert_third_step_leaves_no_trace(lambda: GatysTask(CONFIG, exemplar), CONFIG, fault)
 
 

@@ -169,12 +169,14 @@ class TestViews:
 
 class TestTask:
     def test_the_contract(self, ball, exemplar):
+        threads(1)
         task = MultiViewTask(CONFIG, exemplar, ball)
         task.average.add({name: torch.eye(gram.shape[0]) for name, gram in task.average.sums.items()})
         assert_loss_is_pure(task, 1)
 
     @pytest.mark.parametrize("fault", FAULTS)
     def test_a_skipped_step_leaves_no_trace(self, fault, ball, exemplar):
+        threads(1)
         assert_third_step_leaves_no_trace(lambda: MultiViewTask(CONFIG, exemplar, ball), CONFIG, fault)
 
     def test_the_exemplar_is_as_large_as_on_the_texels(self, exemplar):

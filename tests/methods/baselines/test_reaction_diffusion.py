@@ -140,10 +140,12 @@ class TestReaction:
 
 class TestTask:
     def test_the_contract(self, exemplar):
+        threads(1)
         assert_loss_is_pure(ReactionDiffusionTask(CONFIG, exemplar), 1)
 
     @pytest.mark.parametrize("fault", FAULTS)
     def test_a_skipped_step_leaves_no_trace(self, fault, exemplar):
+        threads(1)
         assert_third_step_leaves_no_trace(lambda: ReactionDiffusionTask(CONFIG, exemplar), CONFIG, fault)
 
     def test_the_pool_goes_on_and_starts_anew(self, exemplar):

@@ -97,9 +97,9 @@ def test_what_cannot_be_healed_is_said(look, cells):
     with torch.no_grad():
         look.rule.fc2.bias[:3] = 0.1
     state, _ = _blob(cells)
-    with pytest.warns(TextureWarning) as said:
+    with pytest.warns(TextureWarning) as warnings:
         result = healed(LookGrowth(look, cells, palette=GREY), state, torch.Generator().manual_seed(0))
-    assert "100.0% of 'icosphere8' has colours" in str(said[0].message)
+    assert "100.0% of 'icosphere8' has colours" in str(warnings[0].message)
     assert result.shape == state.shape and GREY.unlike(result[:, :3].numpy() + 0.5).all()
 
 

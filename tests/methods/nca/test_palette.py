@@ -96,9 +96,9 @@ def test_what_does_not_heal_is_said(grown, monkeypatch):
     monkeypatch.setattr(healing, "STEPS", 1)
     nowhere = Palette(np.full((1, 3), 9.0), 0.1)
     state = torch.zeros(len(cells.mesh.vertices), 16)
-    with pytest.warns(TextureWarning) as said:
+    with pytest.warns(TextureWarning) as warnings:
         result = _heal(grown, state, nowhere)
-    assert "100.0% of 'icosphere6' has colours that the exemplar" in str(said[0].message)
+    assert "100.0% of 'icosphere6' has colours that the exemplar" in str(warnings[0].message)
     assert result.shape == state.shape and result.isfinite().all()
 
 

@@ -81,8 +81,8 @@ class MultiViewTask(ParameterTask):
         if self.content is None:
             layers = dict.fromkeys(self.config.layers)
         features = self.network.features(picture[None], layers)
-        seen = coverage if self.config.masked else None
-        grams = {layer: covered_gram(features[layer][0], seen) for layer in self.config.layers}
+        mask = coverage if self.config.masked else None
+        grams = {layer: covered_gram(features[layer][0], mask) for layer in self.config.layers}
         blended = self.average.blended(grams)
         total = torch.zeros(())
         for layer, target in self.targets.items():

@@ -113,19 +113,19 @@ class ReactionDiffusionTexture:
                 f"a texture of {scale:g} times the size, {steps} steps and {resolution} texels",
                 f"use sizes from 0.05 to 20, up to {MOST_STEPS} steps, and 16 to {MAX_RESOLUTION} texels",
             )
-        laid = with_layout(mesh, LAYOUT, keep_uvs)
-        cells = even_cells(laid, scale * self.width / self.cells)
+        unwrapped = with_layout(mesh, LAYOUT, keep_uvs)
+        cells = even_cells(unwrapped, scale * self.width / self.cells)
         keep_freed_memory()
         announce("letting the chemicals react")
         at_cells = self.grown(cells, seed, steps)
-        assert laid.uv is not None
-        atlas = Atlas.from_uv(laid.uv, resolution, PADDING)
-        points = atlas.interpolate(laid.vertices[laid.faces])[atlas.face >= 0]
+        assert unwrapped.uv is not None
+        atlas = Atlas.from_uv(unwrapped.uv, resolution, PADDING)
+        points = atlas.interpolate(unwrapped.vertices[unwrapped.faces])[atlas.face >= 0]
         face, barycentric = surface_points(cells, points)
         albedo = np.empty((resolution, resolution, 3), np.float32)
         albedo[:] = at_cells.mean(0)
         albedo[atlas.face >= 0] = interpolate(barycentric, at_cells[cells.faces[face]])
-        return asset_from_textures(laid, laid.uv, {"albedo": albedo}, mesh.name)
+        return asset_from_textures(unwrapped, unwrapped.uv, {"albedo": albedo}, mesh.name)
 
     @torch.no_grad()
     def grown(self, cells: Mesh, seed: int, steps: int) -> np.ndarray:

@@ -80,12 +80,12 @@ class Figure:
 
     def bare(self, cameras: Cameras) -> torch.Tensor:
         """Pictures (K, H, W, 3) without any texture, grey and even."""
-        hit, points = self._seen(cameras)
+        hit, points = self._visible(cameras)
         return _picture(GREY * self._shade(self.relief.plain, points, hit, cameras), hit, cameras)
 
     def textured(self, look: Look, state: torch.Tensor, cameras: Cameras) -> Views:
         """With what a state (V, C) shows; differentiable in the state and the look's decoder."""
-        hit, points = self._seen(cameras)
+        hit, points = self._visible(cameras)
         surface, layout = self.sphere.surface, look.layout
         table = surface.table(state)
         values, corners = (look.decoder(surface, table, where) for where in (points, self.relief.corners))
@@ -95,7 +95,7 @@ class Figure:
         plain = shade * GREY
         return Views(_picture(coloured, hit, cameras), _picture(plain, hit, cameras), values, height)
 
-    def _seen(self, cameras: Cameras) -> tuple[torch.Tensor, Points]:
+    def _visible(self, cameras: Cameras) -> tuple[torch.Tensor, Points]:
         """Which pixels meet the surface, (K H W,) bool, and where."""
         hits = self.sphere.stage.hits(cameras)
         return hits.hit.to(self._faces.device), Points(hits.face, hits.barycentric)
