@@ -51,7 +51,7 @@ RECIPES = {
     "bricks": Recipe("bricks", settings=(*LONG, "density=48")),
     "cobblestone": Recipe("cobblestone"),
     "fur": Recipe("Stylized_Fur_001", settings=(*QUICK, "density=48", *SMALL)),
-    "hexagons": Recipe("hexagons"),
+    "hexagons": Recipe("hexagons", settings=(*LONG, "density=48")),
     "honeycomb": Recipe("Honeycomb_002", settings=(*LONG, "density=64", *SMALL)),
     "knit": Recipe("knit", settings=(*LONG, "density=64")),
     "lava": Recipe("lava"),
@@ -62,7 +62,7 @@ RECIPES = {
     "rust": Recipe("rust", settings=QUICK),
     "shells": Recipe("Wall_Shells_001", settings=(*FINE, *SMALL)),
     "waffle": Recipe("Waffle_001", settings=(*LONG, "density=48", *SMALL)),
-    "wicker": Recipe("wicker"),
+    "wicker": Recipe("wicker", settings=(*LONG, "density=48")),
 }
 
 
