@@ -127,7 +127,8 @@ def _measured(report: Report, folder: Path) -> Comparison:
 
 def _write(comparison: Comparison, report: Report) -> None:
     targets = {name: Target(name) for name in dict.fromkeys(r.exemplar for r in comparison.results)}
-    floors = {name: target.floor for name, target in targets.items()}
+    kept = Kept(comparison.folder / MEASURED)
+    floors = {name: kept.floor(target) for name, target in targets.items()}
     images = {name: target.image for name, target in targets.items()}
     page = Page(comparison.results, comparison.tables, images, floors, comparison.failures)
     with atomic_write(comparison.report) as temporary:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from mitex.errors import ImageError
 from mitex.evaluation.metrics import evaluation_network, frechet_distance, whole_cells
 from mitex.evaluation.patches import Views
 from mitex.losses import gram_distance, gram_matrix, relaxed_transport
@@ -52,7 +53,6 @@ def patch_features(views: Views) -> Vectors:
 
     Raises:
         ConfigError: patches too small for the deepest layer.
-        ImageError: no place counts.
     """
     network, parts = evaluation_network(), {layer: [] for layer in (*LAYERS, FINE)}
     for image, mask in zip(*views, strict=True):
@@ -71,6 +71,10 @@ def likeness(ours: Vectors, theirs: Vectors, seed: int = 0) -> Likeness:
     Raises:
         ImageError: fewer than two vectors in a layer.
     """
+    if min(len(vectors[k]) for vectors in (ours, theirs) for k in vectors) < 2:
+        raise ImageError(
+            "too few places of the patches count", "give larger patches, or masks of more pixels"
+        )
     generator = torch.Generator().manual_seed(seed)
     fine, coarse = (frechet_distance(ours[k].double(), theirs[k].double()) for k in (FINE, COARSE))
     transport = sum(
