@@ -1,4 +1,4 @@
-"""`mitex compare`."""
+"""`mitex compare` and `mitex compare answers`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import UseAppendAction, arg
+from tyro.conf import Positional, UseAppendAction, arg
 
 from mitex.cli.engines import JobOptions, refuse_missing
 from mitex.errors import ConfigError
@@ -45,6 +45,9 @@ class Compare(JobOptions):
     ] = ()
     """Any option or setting of a method's fit; with METHOD:apply.KEY=VALUE, an option of `mitex apply`."""
 
+    study: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Write study.html, too: a page for a blind test of preference that others can open."""
+
     out: Annotated[Path, arg(metavar="DIR")]
     """Folder for everything."""
 
@@ -68,8 +71,33 @@ class Compare(JobOptions):
         let_idle_threads_sleep()
         from mitex.comparison.run import compare
 
-        done = compare(plan, self.out, self.chosen_engine(), threads=self.threads, retry=self.retry)
+        options = {"threads": self.threads, "retry": self.retry, "study": self.study}
+        done = compare(plan, self.out, self.chosen_engine(), **options)
         for line in done.failures:
             print(f"failed   {line}")
         print(done.report)
+        if self.study:
+            print(done.folder / "study.html")
         refuse_missing(done.missing, done.total)
+
+
+@dataclass
+class Answers:
+    """Evaluate the answers to the page that `mitex compare --study` wrote: who was preferred, and by chance?
+
+    examples:
+      mitex compare answers out/compare answers/*.json
+    """
+
+    folder: Annotated[Positional[Path], arg(metavar="DIR")]
+    """What was given as --out."""
+
+    files: Annotated[Positional[tuple[Path, ...]], arg(metavar="FILE ...")]
+    """What people saved."""
+
+    def run(self) -> None:
+        from mitex.comparison.answers import evaluate, read_answers
+        from mitex.comparison.study import Study
+
+        study = Study.load(self.folder)
+        print(evaluate(study, read_answers(study, self.files)).text())

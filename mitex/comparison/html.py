@@ -47,11 +47,14 @@ def items(texts: Iterable[str]) -> str:
     return "".join(f"<li>{escape(text)}</li>" for text in texts)
 
 
-def number_text(value: float) -> str:
-    """A number with three significant digits."""
-    if value != 0 and abs(value) < 1e-3:
-        return f"{value:.1e}"
-    return f"{value:,.0f}" if abs(value) >= 100 or value == 0 else f"{value:#.3g}".rstrip(".")
+def number_text(value: float, digits: int = 3) -> str:
+    """A number with some significant digits."""
+    size = abs(value)
+    if size == 0 or size >= 10 ** (digits - 1):
+        text = f"{size:,.0f}"
+    else:
+        text = f"{size:.1e}" if size < 1e-3 else f"{size:#.{digits}g}".rstrip(".")
+    return f"−{text}" if value < 0 else text
 
 
 def count_text(count: int, noun: str) -> str:

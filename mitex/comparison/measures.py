@@ -31,7 +31,7 @@ def _off_one(value: float) -> float:
     return abs(value - 1)
 
 
-LOWER, TO_ZERO, TO_ONE = "lower is better", "nearer to 0 is better", "nearer to 1 is better"
+LOWER, TO_ZERO, TO_ONE = "low is better", "best is 0", "best is 1"
 
 MEASURES = (
     Measure(

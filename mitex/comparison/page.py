@@ -38,14 +38,14 @@ class Page:
         results: all results.
         tables: means of them.
         exemplars: path or name -> picture (S, S, 3), sRGB in [0, 1].
-        floors: exemplar -> measure -> value of the exemplar beside itself.
+        floors: exemplar and mesh -> measure -> value of the exemplar beside itself.
         failures: a line for each job or measurement that failed.
     """
 
     results: Sequence[Result]
     tables: Sequence[Summary]
     exemplars: Mapping[str, np.ndarray]
-    floors: Mapping[str, Mapping[str, float]]
+    floors: Mapping[tuple[str, str], Mapping[str, float]]
     failures: Sequence[str]
 
     def html(self) -> str:
@@ -75,10 +75,8 @@ class Page:
         return list(dict.fromkeys(result.seed for result in self.results))
 
     def _title(self) -> str:
-        names = self.methods
-        return (
-            f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "".join(names) or "Nothing yet"
-        )
+        *names, last = self.methods or ["nothing"]
+        return f"Comparing {', '.join(names)} and {last}" if names else f"Measuring {last}"
 
     def _subtitle(self) -> str:
         meshes = list(dict.fromkeys(label(result.mesh) for result in self.results))
@@ -112,7 +110,8 @@ class Page:
         heads = "".join(f"<th>{escape(name)}</th>" for name in self.methods)
         head = f"<tr><th>{escape(label(exemplar))}</th><th></th>{heads}</tr>"
         content = f"<thead>{head}</thead><tbody>{''.join(rows)}</tbody>"
-        return f'<div class="wide"><table class="looks">{content}</table></div>'
+        columns = f"--columns: {len(self.methods) + 1}"
+        return f'<div class="wide"><table class="looks" style="{columns}">{content}</table></div>'
 
     def _look(self, results: Iterable[Result], mesh: str, method: str) -> str:
         """A cell with the picture of each seed, of which one is shown."""
@@ -141,5 +140,5 @@ class Page:
     def _tables(self) -> str:
         """That of the means over all pairs first."""
         ordered = sorted(self.tables, key=lambda table: table.pair is not None)
-        floors = [self.floors.get(table.pair[0], {}) if table.pair else {} for table in ordered]
+        floors = [self.floors.get(table.pair, {}) if table.pair else {} for table in ordered]
         return "".join(map(table_html, ordered, floors))

@@ -6,7 +6,7 @@ import csv
 import json
 import logging
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
@@ -14,10 +14,12 @@ from typing import Any
 
 from mitex.batch import Engine, Event, Plan, Report, run_plan
 from mitex.batch.folder import BatchFolder
+from mitex.comparison.kept import Kept
 from mitex.comparison.measures import MEASURES
-from mitex.comparison.measuring import Kept, Place, Target
 from mitex.comparison.page import Page
+from mitex.comparison.pair import Pair, forget_inputs, picture_of
 from mitex.comparison.results import Result, results_of
+from mitex.comparison.study import write_study
 from mitex.comparison.summary import Summary, summaries
 from mitex.errors import MitexError, OutputError
 from mitex.paths import atomic_write, check_writable, expanded, is_temporary
@@ -62,6 +64,7 @@ def compare(
     *,
     threads: int | None = None,
     retry: bool = False,
+    study: bool = False,
     on_event: Callable[[Event], None] | None = None,
 ) -> Comparison:
     """Does what is not done of a plan, measures what is not measured, and writes report.html, .csv and .json.
@@ -72,6 +75,7 @@ def compare(
         plan: as `comparison_plan` or `prepared` make it.
         folder: new, empty, or that of an earlier call, which goes on.
         engine, threads, retry, on_event: as of `run_plan`.
+        study: whether to write study.html and study.json, too.
 
     Returns:
         What was measured.
@@ -84,7 +88,7 @@ def compare(
     place = checked_folder(folder)
     report = run_plan(plan, place / BATCH, engine, threads=threads, retry=retry, on_event=on_event)
     comparison = _measured(report, place)
-    _write(comparison, report)
+    _write(comparison, study)
     return comparison
 
 
@@ -104,7 +108,8 @@ def checked_folder(folder: str | Path) -> Path:
 
 def _measured(report: Report, folder: Path) -> Comparison:
     """Measures the results that were not measured before; one that cannot be is a failure of its own."""
-    kept, place_of, target_of = Kept(folder / MEASURED), cache(Place), cache(Target)
+    forget_inputs()
+    kept, pair_of = Kept(folder / MEASURED), cache(Pair)
     results, failures = [], [f"{row.job.name}: {row.record.get('error')}" for row in report.failures]
     made = results_of(report)
     for k, result in enumerate(made):
@@ -112,7 +117,7 @@ def _measured(report: Report, folder: Path) -> Comparison:
         known = kept.completed(result)
         if known is None:
             try:
-                known = kept.measured(result, place_of(result.mesh), target_of(result.exemplar))
+                known = kept.measured(result, pair_of(*result.pair))
             except OutputError:
                 raise
             except MitexError as e:
@@ -125,19 +130,19 @@ def _measured(report: Report, folder: Path) -> Comparison:
     return Comparison(folder, tuple(results), tables, tuple(failures), missing, total)
 
 
-def _write(comparison: Comparison, report: Report) -> None:
-    targets = {name: Target(name) for name in dict.fromkeys(r.exemplar for r in comparison.results)}
-    kept = Kept(comparison.folder / MEASURED)
-    floors = {name: kept.floor(target) for name, target in targets.items()}
-    images = {name: target.image for name, target in targets.items()}
-    page = Page(comparison.results, comparison.tables, images, floors, comparison.failures)
+def _write(comparison: Comparison, study: bool) -> None:
+    kept, results = Kept(comparison.folder / MEASURED), comparison.results
+    floors = {pair: kept.floor(Pair(*pair)) for pair in dict.fromkeys(r.pair for r in results)}
+    images = {name: picture_of(name) for name in dict.fromkeys(r.exemplar for r in results)}
+    page = Page(results, comparison.tables, images, floors, comparison.failures)
     with atomic_write(comparison.report) as temporary:
         temporary.write_text(page.html(), encoding="utf-8", errors="replace")
+    if study:
+        write_study(comparison.folder, comparison.results, images)
     _write_csv(comparison.folder / TABLE, comparison.results)
     record: dict[str, Any] = {
         "results": [_flat(result, comparison.folder) for result in comparison.results],
-        "means": [_record(table) for table in comparison.tables],
-        "exemplars_beside_themselves": floors,
+        "means": [_record(table, floors) for table in comparison.tables],
         "failures": list(comparison.failures),
         "measures": {m.key: {"better": m.better, "meaning": m.meaning} for m in MEASURES},
     }
@@ -161,9 +166,11 @@ def _flat(result: Result, folder: Path) -> dict[str, Any]:
     return {**names, **result.numbers, "asset": os.path.relpath(result.asset, folder)}
 
 
-def _record(table: Summary) -> dict[str, Any]:
+def _record(table: Summary, floors: Mapping[tuple[str, str], Mapping[str, float]]) -> dict[str, Any]:
     cells = [
         {"method": method, "measure": key} | {k: v if v == v else None for k, v in asdict(cell).items()}
         for (method, key), cell in table.cells.items()
     ]
-    return {"exemplar": table.pair and table.pair[0], "mesh": table.pair and table.pair[1], "cells": cells}
+    exemplar, mesh = table.pair or (None, None)
+    own = {} if table.pair is None else floors[table.pair]
+    return {"exemplar": exemplar, "mesh": mesh, "cells": cells, "exemplar_beside_itself": own}

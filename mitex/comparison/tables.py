@@ -47,7 +47,7 @@ def _cell(cell: Cell | None, measure: Measure) -> str:
     if cell is None:
         return f'<td data-value="">{DASH}</td>'
     value = measure.distance(cell.mean) if measure.distance else cell.mean
-    spread = f"± {number_text(cell.spread * measure.scale)}" if cell.count > 1 else ""
+    spread = f"± {number_text(cell.spread * measure.scale, 2)}" if cell.count > 1 and cell.spread else ""
     mark = ' class="best"' if cell.best else ""
     mean = number_text(cell.mean * measure.scale)
     return f'<td data-value="{value:.9g}"{mark}>{mean}<span class="spread">{spread}</span></td>'

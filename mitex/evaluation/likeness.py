@@ -10,7 +10,7 @@ import torch
 
 from mitex.errors import ImageError
 from mitex.evaluation.metrics import evaluation_network, frechet_distance, whole_cells
-from mitex.evaluation.patches import Views
+from mitex.evaluation.patches import Views, filled
 from mitex.losses import gram_distance, gram_matrix, relaxed_transport
 
 FINE, COARSE = "relu2_2", "relu4_1"  # layers of the Frechet distances
@@ -37,15 +37,23 @@ class Likeness:
     gram: float
 
 
-def exemplar_patches(image: np.ndarray, count: int, pixels: int, seed: int = 0) -> Views:
-    """Patches of an image (H, W, 3), at random places; all their pixels count."""
+def exemplar_patches(image: np.ndarray, masks: np.ndarray, seed: int = 0) -> Views:
+    """Patches of an image (H, W, 3), at random places, of which as much counts as of others.
+
+    Args:
+        image: sRGB in [0, 1].
+        masks: (K, S, S) bool, of the patches that they shall be compared with: what the network sees of
+            borders is the same then.
+        seed: of the places.
+    """
     generator = np.random.default_rng(seed)
+    count, pixels = masks.shape[:2]
     height, width = (n - pixels for n in image.shape[:2])
     corners = zip(
         generator.integers(0, height + 1, count), generator.integers(0, width + 1, count), strict=True
     )
     patches = np.stack([image[y : y + pixels, x : x + pixels] for y, x in corners])
-    return patches.astype(np.float32), np.ones(patches.shape[:3], bool)
+    return filled(patches, masks), masks
 
 
 def patch_features(views: Views) -> Vectors:

@@ -60,9 +60,13 @@ def albedo_views(asset: Asset, cameras: Cameras) -> Views:
     samples = np.zeros((len(hits.hit), 3))
     samples[hits.hit.numpy()] = _colours(asset, hits.face.numpy(), hits.barycentric.numpy())
     linear = samples.reshape(*cameras.shape, ANTIALIAS**2, 3).mean(3)
-    mean = linear[mask].mean(0) if mask.any() else srgb_to_linear(np.full(3, CLAY))
-    images = np.where(mask[..., None], linear, mean)
-    return linear_to_srgb(images.clip(0, 1)).astype(np.float32), mask
+    return filled(linear_to_srgb(linear.clip(0, 1)), mask), mask
+
+
+def filled(images: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Images (K, S, S, 3) float32 with the mean of the pixels that count, (K, S, S), at all others."""
+    mean = images[mask].mean(0) if mask.any() else CLAY
+    return np.where(mask[..., None], images, mean).astype(np.float32)
 
 
 def _counting(mesh: Mesh, cameras: Cameras, hits: Hits, antialias: int) -> np.ndarray:

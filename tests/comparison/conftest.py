@@ -29,7 +29,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Jobs run in this process, with few and small patches and pictures."""
     monkeypatch.setattr("mitex.batch.task.Process", InThisProcess)
     for name, value in {"PATCHES": 2, "WINDOWS": 1, "CELL": 16, "SPP": 1}.items():
-        monkeypatch.setattr(f"mitex.comparison.measuring.{name}", value)
+        monkeypatch.setattr(f"mitex.comparison.pair.{name}", value)
 
 
 def write_mesh(path: Path) -> None:

@@ -7,7 +7,8 @@ import pytest
 
 from mitex.cli import main
 from mitex.comparison import compare, comparison_plan
-from mitex.comparison.measuring import Kept, optimized_numbers
+from mitex.comparison.kept import Kept, optimized_numbers
+from mitex.comparison.pair import SETTINGS
 from tests.cli import bad_files as bad
 
 QUILT = ["image_quilting:size=64", "image_quilting:exemplar_size=32", "image_quilting:block=12"]
@@ -70,8 +71,6 @@ def test_numbers_of_other_settings_are_measured_again(tmp_path, place, monkeypat
     assert kept.completed(one) is None
     bad.image(tmp_path / "kept" / f"{one.id}.jpg", kind="JPEG")
     file = tmp_path / "kept" / f"{one.id}.json"
-    from mitex.comparison.measuring import SETTINGS
-
     file.write_text(json.dumps({"settings": SETTINGS, "numbers": {"gram": 2.5}}))
     known = kept.completed(one)
     assert known is not None and known.numbers["gram"] == 2.5

@@ -11,7 +11,8 @@ from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
 from mitex.losses import gram_loss
 
-COUNT, SIDE = 2, 48
+SIDE = 48
+ALL = np.ones((2, SIDE, SIDE), bool)
 
 
 @pytest.fixture(scope="module")
@@ -23,8 +24,8 @@ def images():
 def features(images):
     """Of lava, of lava at other places, and of wicker."""
     lava, wicker = images
-    views = exemplar_patches(lava, COUNT, SIDE), exemplar_patches(lava, COUNT, SIDE, 1)
-    return [patch_features(one) for one in (*views, exemplar_patches(wicker, COUNT, SIDE))]
+    views = exemplar_patches(lava, ALL), exemplar_patches(lava, ALL, 1), exemplar_patches(wicker, ALL)
+    return list(map(patch_features, views))
 
 
 def test_equal_patches_are_nearest_then_those_of_the_same_texture(features):
@@ -49,8 +50,11 @@ def test_one_patch_gives_the_distances_of_the_two_images(images):
 
 
 def test_pixels_that_do_not_count_leave_their_places_out(images):
-    patches, mask = exemplar_patches(images[0], 1, SIDE)
+    mask = ALL[:1].copy()
     mask[:, :, SIDE // 2 :] = False
+    patches, masks = exemplar_patches(images[0], mask)
+    assert masks is mask and np.ptp(patches[~mask], axis=0).max() == 0
+    assert patches[~mask][0] == pytest.approx(patches[mask].mean(0), abs=1e-5)
     features = patch_features((patches, mask))
     assert len(features["relu1_1"]) == SIDE * SIDE // 2
     assert len(features["relu4_1"]) == SIDE * SIDE // 2 // 64
@@ -59,8 +63,8 @@ def test_pixels_that_do_not_count_leave_their_places_out(images):
 
 
 def test_patches_of_an_exemplar_lie_in_it_and_depend_on_the_seed(images):
-    whole, _ = exemplar_patches(images[0], 2, 96)
+    whole, _ = exemplar_patches(images[0], np.ones((2, 96, 96), bool))
     assert np.array_equal(whole[0], images[0]) and np.array_equal(whole[1], images[0])
-    first, second = (exemplar_patches(images[0], 2, SIDE, seed)[0] for seed in (0, 1))
+    first, second = (exemplar_patches(images[0], ALL, seed)[0] for seed in (0, 1))
     assert not np.array_equal(first, second)
-    assert np.array_equal(first, exemplar_patches(images[0], 2, SIDE)[0])
+    assert np.array_equal(first, exemplar_patches(images[0], ALL)[0])
