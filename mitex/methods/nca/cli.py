@@ -143,6 +143,10 @@ class Apply(OptionalMeshOptions):
     scale: Annotated[float, arg(metavar="X")] = 1.0
     """Size of the pattern."""
 
+    exemplar_width: Annotated[float | None, arg(metavar="X", help_behavior_hint="")] = None
+    """In place of --scale: width of the exemplar, as large as on a surface texture at 0.5 [sides of the UV
+    layout's square]."""
+
     field: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="(default: the training's)")] = None
     """Vector field that a moving texture follows: a name, a direction, or a file (.npy .ply .json)."""
 
@@ -180,6 +184,8 @@ class Apply(OptionalMeshOptions):
         in_range("--steps", self.steps, 1, MOST_STEPS)
         oriented(self.orientation)
         in_range("--scale", self.scale, 0.05, 20.0)
+        in_range("--exemplar-width", self.exemplar_width, 1e-3, 100.0)
+        mutually_exclusive("--exemplar-width", "--scale", self.exemplar_width is not None and self.scale != 1)
         in_range("--speed", self.speed, *SPEEDS)
         in_range("--resolution", self.resolution, 64, 8192)
         mutually_exclusive(
@@ -202,6 +208,7 @@ class Apply(OptionalMeshOptions):
             "--subdivide": self.subdivide != "auto",
             "--orientation": oriented(self.orientation) != 0,
             "--scale": self.scale != 1,
+            "--exemplar-width": self.exemplar_width is not None,
             "--resolution": self.resolution is not None,
             "--vertex-colors": self.vertex_colors,
             "--keep-dense": self.keep_dense,
@@ -274,6 +281,7 @@ class Apply(OptionalMeshOptions):
             "subdivide": levels(self.subdivide),
             "orientation": oriented(self.orientation),
             "scale": self.scale,
+            "exemplar_width": self.exemplar_width,
             "resolution": (self.resolution or RESOLUTION) if textures else None,
             "keep_dense": self.keep_dense,
             "displace": self.displace,
