@@ -33,6 +33,7 @@ ORDER = [
     "features",
     "losses",
     "atlas",
+    "flat_charts",
     "mesh",
     "triples",
     "exemplar",
