@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
 from mitex.cli.engines import JobOptions, refuse_missing
 from mitex.errors import ConfigError
-from mitex.methods.checks import in_range
+from mitex.methods.checks import in_range, mutually_exclusive
+
+if TYPE_CHECKING:
+    from mitex.batch import Plan
+
+MOST_SEEDS = 1000
 
 
 @dataclass(kw_only=True)
@@ -35,8 +40,17 @@ class Compare(JobOptions):
     methods: Annotated[str | None, arg(metavar="NAME,NAME,...", help_behavior_hint="")] = None
     """The methods, as of `mitex fit`."""
 
-    seeds: Annotated[int, arg(metavar="N")] = 1
+    seeds: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 1, or the plan's)")] = None
     """Fits of each method with another seed; from 2 on, the spread is known."""
+
+    plan: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None
+    """In place of these lists, a plan as of `mitex batch`."""
+
+    preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
+    """In place of these lists, a paper's comparison: surface-fig4, nca-fig10."""
+
+    data: Annotated[Path, arg(metavar="DIR")] = Path("../shared/data")
+    """Folder with what a paper's comparison needs that does not ship with Mitex."""
 
     set: Annotated[
         tuple[tuple[str, ...], ...],
@@ -53,19 +67,8 @@ class Compare(JobOptions):
 
     def run(self) -> None:
         self.check_jobs()
-        in_range("--seeds", self.seeds, 1, 1000)
-        from mitex.comparison.plan import comparison_plan
-
-        for option, values in (
-            ("--exemplar", self.exemplar),
-            ("--mesh", self.mesh),
-            ("--methods", self.methods),
-        ):
-            if not values:
-                raise ConfigError(f"{option} is missing", "see `mitex compare --help`")
-        names = [name for name in (self.methods or "").split(",") if name.strip()]
-        settings = [word for words in self.set for word in words]
-        plan = comparison_plan(self.exemplar, self.mesh, names, seeds=self.seeds, settings=settings)
+        in_range("--seeds", self.seeds, 1, MOST_SEEDS)
+        plan = self._plan()
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()
@@ -79,6 +82,36 @@ class Compare(JobOptions):
         if self.study:
             print(done.folder / "study.html")
         refuse_missing(done.missing, done.total)
+
+    def _plan(self) -> Plan:
+        from mitex.comparison.plan import comparison_plan, prepared
+
+        lists = {
+            "--exemplar": self.exemplar,
+            "--mesh": self.mesh,
+            "--methods": self.methods,
+            "--set": self.set,
+        }
+        if self.plan is not None or self.preset is not None:
+            mutually_exclusive("--plan", "--preset", self.plan is not None and self.preset is not None)
+            for option, values in lists.items():
+                mutually_exclusive("--plan" if self.plan else "--preset", option, bool(values))
+            return prepared(self._named_plan(), self.seeds)
+        for option, values in lists.items():
+            if not values and option != "--set":
+                raise ConfigError(f"{option} is missing", "see `mitex compare --help`")
+        names = [name for name in (self.methods or "").split(",") if name.strip()]
+        settings = [word for words in self.set for word in words]
+        return comparison_plan(self.exemplar, self.mesh, names, seeds=self.seeds or 1, settings=settings)
+
+    def _named_plan(self) -> Plan:
+        if self.plan is not None:
+            from mitex.batch import Plan
+
+            return Plan.read(self.plan)
+        from mitex.comparison.presets import preset_plan
+
+        return preset_plan(str(self.preset), self.data)
 
 
 @dataclass

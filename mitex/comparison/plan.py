@@ -62,13 +62,20 @@ def comparison_plan(
     return prepared(Plan.of(content, folder))
 
 
-def prepared(plan: Plan) -> Plan:
+def prepared(plan: Plan, seeds: int | None = None) -> Plan:
     """A plan of `mitex batch`, checked and completed so that what its methods make can be compared.
+
+    Args:
+        plan: the plan.
+        seeds: how many, in place of those of the plan.
 
     Raises:
         ConfigError: A method does not learn from an exemplar or is put on no mesh, or the output is no .glb.
     """
-    return replace(plan, methods=tuple(map(_prepared, plan.methods)))
+    parts = tuple(map(_prepared, plan.methods))
+    if seeds is not None:
+        parts = tuple(replace(part, seeds=tuple(range(seeds))) for part in parts)
+    return replace(plan, methods=parts)
 
 
 def _prepared(part: MethodPlan) -> MethodPlan:

@@ -2,9 +2,11 @@
 
 import pytest
 
+from mitex.batch import Plan
 from mitex.batch.jobs import jobs_of
 from mitex.cli import main
-from mitex.comparison.plan import comparison_plan
+from mitex.comparison.plan import comparison_plan, prepared
+from mitex.comparison.presets import preset_plan, presets
 
 GOOD = {"--exemplar": "a.png", "--mesh": "ball.obj", "--methods": "image-quilting", "--out": "out"}
 
@@ -74,3 +76,38 @@ def test_patterns_are_as_large_for_all_unless_their_size_is_given(place):
     assert "--exemplar-width=0.5" in nca and "--exemplar-width" not in gatys
     assert "--exemplar-width=0.3" in words("nca:apply.exemplar-width=0.3")[0]
     assert "--exemplar-width" not in words("nca:apply.scale=2")[0]
+
+
+class TestPlanFiles:
+    def test_a_plan_and_its_seeds(self, place):
+        (place / "plan.toml").write_text(
+            'exemplars = ["a.png"]\nmeshes = ["ball.obj"]\nseeds = [5]\n[methods.gatys]\nsteps = 3\n'
+        )
+        plan = Plan.read("plan.toml")
+        assert prepared(plan).methods[0].seeds == (5,)
+        assert prepared(plan, seeds=2).methods[0].seeds == (0, 1)
+
+    @pytest.mark.parametrize(
+        ("words", "message"),
+        [
+            ("--plan no.toml", "there is no such file"),
+            ("--preset nca-fig1", "there is no comparison 'nca-fig1'; did you mean nca-fig10"),
+            ("--preset nca-fig10 --mesh vase", "--preset and --mesh contradict each other"),
+            ("--preset nca-fig10 --plan a.toml", "--plan and --preset contradict each other"),
+            ("--preset nca-fig10 --data .", "there is no exemplar 'exemplars/Abstract_008'"),
+        ],
+    )
+    def test_broken_ones(self, words, message, place, capsys):
+        assert main(["compare", *words.split(), "--out", "out", "--quiet"]) == 2
+        assert message in capsys.readouterr().err
+        assert not (place / "out").exists()
+
+    @pytest.mark.parametrize("name", presets())
+    def test_the_papers_comparisons_have_jobs(self, name, tmp_path):
+        plan = preset_plan(name, tmp_path)
+        for part in plan.methods:
+            for text in (*part.exemplars, *part.meshes):
+                if "/" in text:
+                    (tmp_path / text).parent.mkdir(exist_ok=True)
+                    (tmp_path / text).touch()
+        assert len(jobs_of(prepared(plan))) > 20
