@@ -15,6 +15,7 @@ from mitex.export.common import GENERATOR, foreign
 from mitex.geometry.tangents import split_at_hard_edges
 from mitex.mesh import Mesh
 from mitex.mesh.polygons import outlines
+from mitex.mesh.readers import Budget
 from mitex.mesh.readers.ply import read_tables, soup_of_tables
 from mitex.paths import atomic_write
 
@@ -109,7 +110,7 @@ def read_ply(path: Path) -> Asset:
     own = lines[:2] == [b"ply", b"format binary_little_endian 1.0"] and GENERATOR.encode() in lines[2:3][0]
     if not own:
         raise foreign(path)
-    tables, left = read_tables(str(path), data, len(data))
+    tables, left = read_tables(str(path), data, Budget(len(data)))
     if left:
         raise foreign(path, "holds more than its header says")
     table, soup = tables["vertex"], soup_of_tables(str(path), tables)
