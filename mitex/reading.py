@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import stat
 import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -30,6 +31,7 @@ FAULTS = (
     ValueError,
     SafetensorError,
     struct.error,
+    tokenize.TokenError,  # NumPy's of damaged headers
     zipfile.BadZipFile,
     zlib.error,
 )
@@ -43,7 +45,7 @@ def reading(
     error: type[MitexError],
     remedy: str,
     what: str = "cannot be read",
-    also: type[MitexError] | None = None,
+    also: tuple[type[MitexError], ...] = (),
 ) -> Iterator[None]:
     """The border of a loader: whatever a file causes in the body becomes an error that names the file.
 
@@ -52,11 +54,11 @@ def reading(
         error: raised instead, with the reason.
         remedy: what to do then.
         what: said of the file.
-        also: an error of Mitex that, in the body, means no more than that the file is damaged. Others pass.
+        also: errors of Mitex that, in the body, mean no more than that the file is damaged. Others pass.
     """
     try:
         yield
-    except (*FAULTS, *([also] if also else [])) as e:
+    except (*FAULTS, *also) as e:
         if isinstance(e, error) or (isinstance(e, AttributeError) and type(e.obj) not in OF_JSON):
             raise
         raise error(f"'{path}' {what} ({reason(e)})", remedy) from e

@@ -36,8 +36,8 @@ def load(path: str | os.PathLike[str], max_vertices: int = 2_000_000) -> Mesh:
             refused before its content is allocated.
 
     Returns:
-        The mesh, in the file's units, order and place; but one that is more than 1000 times its size away from
-        the origin is moved there, since single precision would lose its shape.
+        The mesh, in the file's units, order and place; but one that is more than 1000 times its size away
+        from the origin is moved there, since single precision would lose its shape.
 
     Raises:
         MeshError: missing, unreadable, of an unknown kind, damaged, empty, over budget, or what `validate`
@@ -52,7 +52,9 @@ def load(path: str | os.PathLike[str], max_vertices: int = 2_000_000) -> Mesh:
     soup = read(source, budget)
     soup.vertices, centre = near_origin(soup.vertices)
     if centre.any():
-        soup.notes.append(f"it lies far from the origin and was moved there, by {np.round(-centre, 3).tolist()}")
+        soup.notes.append(
+            f"it lies far from the origin and was moved there, by {np.round(-centre, 3).tolist()}"
+        )
     for note in soup.notes:
         warnings.warn(f"{path}: {note}", MeshWarning, stacklevel=2)
     vertices, faces = weld(soup)

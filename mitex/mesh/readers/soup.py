@@ -77,14 +77,14 @@ def polygon_soup(
 
 
 def near_origin(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions in single precision, which far from the origin are moved there, so that they keep their shape.
+    """Positions in single precision; far from the origin they are moved there, so that they keep their shape.
 
     Args:
         vertices: (V, 3) float64, maybe not finite.
 
     Returns:
-        (V, 3) float32, and the (3,) float64 centre that was subtracted: zero unless the box of the vertices is
-        `FAR` times farther away than it is large.
+        (V, 3) float32, and the (3,) float64 centre that was subtracted: zero unless the box of the vertices
+        is `FAR` times farther away than it is large.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         low, high = vertices.min(axis=0, initial=np.inf), vertices.max(axis=0, initial=-np.inf)
