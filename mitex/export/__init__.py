@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mitex.asset import Asset
-from mitex.errors import MeshError
+from mitex.errors import ConfigError, MeshError
+from mitex.export.common import REMEDY
 from mitex.export.exr import read_exr, write_exr, write_textures, write_views
 from mitex.export.folder import Format, check_folder, write_folder, write_maps
 from mitex.export.glb import read_glb, write_glb, write_variants
@@ -16,6 +17,7 @@ from mitex.export.ply import read_ply, write_ply
 from mitex.export.together import Inputs
 from mitex.paths import expanded, prepare_output
 from mitex.progress import announce
+from mitex.reading import reading
 
 __all__ = [
     "Format",
@@ -90,7 +92,5 @@ def read_asset(path: str | os.PathLike[str]) -> Asset:
     if not os.path.isfile(source):
         raise MeshError(f"there is no asset file {path}", "check the path")
     announce(f"reading {source.name}")
-    try:
+    with reading(source, MeshError, REMEDY, "is damaged or was not written by Mitex", also=(ConfigError,)):
         return reader(source)
-    except OSError as e:
-        raise MeshError(f"{path} cannot be read ({e.strerror})", "check its permissions") from e
