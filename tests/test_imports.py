@@ -22,6 +22,7 @@ ORDER = [
     "evaluation",
     "render",
     "export",
+    "page",
     "asset",
     "training",
     "bridge",

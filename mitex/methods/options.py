@@ -112,7 +112,13 @@ class ExemplarOptions(TrainingOptions):
 
 @dataclass(kw_only=True)
 class ApplyOptions:
-    """Options of every `mitex apply RUN|MODEL`."""
+    """Options of every `mitex apply RUN|MODEL`.
+
+    Attributes:
+        exports: suffixes of the files that it writes, beside pictures.
+    """
+
+    exports: ClassVar[tuple[str, ...]] = EXPORTS
 
     model: Annotated[Positional[str], arg(metavar="RUN|MODEL")]
     """Run folder, model file, or name of a bundled model (see `mitex models`)."""
@@ -140,7 +146,7 @@ class ApplyOptions:
         """--out as an absolute path, once it is sure that it can be written."""
         from mitex.export import is_folder, prepare_export
 
-        out = prepare_export(self.out, EXPORTS + PICTURES, self.inputs(), self.maps_format)
+        out = prepare_export(self.out, self.exports + PICTURES, self.inputs(), self.maps_format)
         reject_unused("--maps-format", out, self.maps_format == "exr" and not is_folder(self.out))
         return out
 

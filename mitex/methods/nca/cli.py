@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 RESOLUTION = 1024  # of baked textures [texels]
 MOST_VARIANTS = 32
 LONGEST = 60  # name of a run folder from words [characters]
+PAGE = ".html"
 FIELD_FILES = (".npy", ".ply", ".json")
 
 
@@ -124,9 +125,17 @@ class Apply(OptionalMeshOptions):
       mitex apply pebbles --mesh bunny.obj --out bunny.glb --subdivide 2 --resolution 2048
       mitex apply pebbles --mesh scan.ply --out scan.glb --vertex-colors --seed 7 --orientation 45
       mitex apply pebbles --mesh bunny.obj --out bunny.glb --variants 5
+      mitex apply pebbles --mesh bunny.obj --out bunny.html
       mitex apply pebbles --mesh bunny.obj --out maps/ --maps-format exr
       mitex apply pebbles --tile 1024 --out pebbles-tile
     """
+
+    exports: ClassVar[tuple[str, ...]] = (*EXPORTS, PAGE)
+
+    out: Annotated[str, arg(metavar="ASSET|PICTURE|PAGE|DIR/")]
+    """File to write: .glb (PBR textures), .obj (with .mtl and PNG maps), .ply (vertex colours), .exr (the
+    maps as layers), a picture (.png .jpg), or .html: a page in which the texture grows, for any browser. A
+    folder, which exists or ends with a slash, gets each map as a file of its own, and mesh.obj."""
 
     seed: Annotated[int, arg(metavar="N")] = 0
     """Random seed: another seed, another variant of the texture."""
@@ -211,7 +220,7 @@ class Apply(OptionalMeshOptions):
         for option, used in others.items():
             mutually_exclusive("--tile", option, used)
         place = Path(self.out)
-        reject_unused("--tile", place, place.suffix.lower() in EXPORTS + PICTURES)
+        reject_unused("--tile", place, place.suffix.lower() in self.exports + PICTURES)
 
     def inputs(self) -> list[Path | str]:
         return [*super().inputs(), *field_files(self.field, self.orientation)]
@@ -231,6 +240,10 @@ class Apply(OptionalMeshOptions):
             reject_unused("--vertex-colors", out, self.vertex_colors and not coloured)
             reject_unused("--resolution", out, self.resolution is not None and suffix == ".ply")
             reject_unused("--variants", out, self.variants > 1 and suffix != ".glb")
+            page = suffix == PAGE
+            reject_unused("--resolution", out, page and self.resolution is not None)
+            reject_unused("--keep-dense", out, page and self.keep_dense)
+            reject_unused("--displace", out, page and self.displace)
 
     def write(self, out: Path) -> None:
         from mitex.runtime import let_idle_threads_sleep
@@ -251,8 +264,27 @@ class Apply(OptionalMeshOptions):
             options = self._growth(out)
             assets = NcaTexture.load(self.model).variants(Mesh.load(self._mesh), seeds, **options)
             write_variants(assets, out)
+        elif out.suffix.lower() == PAGE:
+            self._write_page(out)
         else:
             super().write(out)
+
+    def _write_page(self, out: Path) -> None:
+        from mitex.mesh import Mesh
+        from mitex.methods.nca import NcaTexture, living_page
+
+        living_page(
+            NcaTexture.load(self.model),
+            Mesh.load(self._mesh),
+            out,
+            seed=self.seed,
+            steps=self.steps,
+            subdivide=levels(self.subdivide),
+            orientation=oriented(self.orientation),
+            scale=self.scale,
+            field=self.field,
+            speed=self.speed,
+        )
 
     def applied(self, out: Path) -> Asset:
         from mitex.mesh import Mesh
