@@ -21,8 +21,6 @@ from mitex.geometry.vectors import orthonormal, scatter_add
 from mitex.mesh import Mesh
 
 GENERATOR = "Mitex"
-DEFAULT_ALBEDO = 0.8  # linear grey where an asset has no albedo
-DEFAULT_ROUGHNESS = 0.5
 
 
 def foreign(path: object, what: str = "was not written by Mitex") -> MeshError:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from mitex.methods.interface import Applied
     from mitex.training.progress import ProgressDisplay
 
-EXPORTS = (".glb", ".obj", ".ply", ".exr")
+EXPORTS = (".glb", ".obj", ".ply", ".exr", ".html")
 PICTURES = (".png", ".jpg", ".jpeg")
 
 
@@ -112,21 +112,16 @@ class ExemplarOptions(TrainingOptions):
 
 @dataclass(kw_only=True)
 class ApplyOptions:
-    """Options of every `mitex apply RUN|MODEL`.
-
-    Attributes:
-        exports: suffixes of the files that it writes, beside pictures.
-    """
-
-    exports: ClassVar[tuple[str, ...]] = EXPORTS
+    """Options of every `mitex apply RUN|MODEL`."""
 
     model: Annotated[Positional[str], arg(metavar="RUN|MODEL")]
     """Run folder, model file, or name of a bundled model (see `mitex models`)."""
 
-    out: Annotated[str, arg(metavar="ASSET|PICTURE|DIR/")]
+    out: Annotated[str, arg(metavar="ASSET|PAGE|PICTURE|DIR/")]
     """File to write: .glb (PBR textures), .obj (with .mtl and PNG maps), .ply (vertex colours), .exr (the
-    maps as layers), or a picture (.png .jpg). A folder, which exists or ends with a slash, gets each map as a
-    file of its own, and mesh.obj."""
+    maps as layers), .html (a page for any browser, in which an automaton's texture grows), or a picture
+    (.png .jpg). A folder, which exists or ends with a slash, gets each map as a file of its own, and mesh.obj.
+    """
 
     maps_format: Annotated[Literal["png", "exr"], arg(metavar="png|exr")] = "png"
     """Format of the maps in a folder."""
@@ -146,7 +141,7 @@ class ApplyOptions:
         """--out as an absolute path, once it is sure that it can be written."""
         from mitex.export import is_folder, prepare_export
 
-        out = prepare_export(self.out, self.exports + PICTURES, self.inputs(), self.maps_format)
+        out = prepare_export(self.out, EXPORTS + PICTURES, self.inputs(), self.maps_format)
         reject_unused("--maps-format", out, self.maps_format == "exr" and not is_folder(self.out))
         return out
 

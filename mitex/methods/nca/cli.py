@@ -130,13 +130,6 @@ class Apply(OptionalMeshOptions):
       mitex apply pebbles --tile 1024 --out pebbles-tile
     """
 
-    exports: ClassVar[tuple[str, ...]] = (*EXPORTS, PAGE)
-
-    out: Annotated[str, arg(metavar="ASSET|PICTURE|PAGE|DIR/")]
-    """File to write: .glb (PBR textures), .obj (with .mtl and PNG maps), .ply (vertex colours), .exr (the
-    maps as layers), a picture (.png .jpg), or .html: a page in which the texture grows, for any browser. A
-    folder, which exists or ends with a slash, gets each map as a file of its own, and mesh.obj."""
-
     seed: Annotated[int, arg(metavar="N")] = 0
     """Random seed: another seed, another variant of the texture."""
 
@@ -220,7 +213,7 @@ class Apply(OptionalMeshOptions):
         for option, used in others.items():
             mutually_exclusive("--tile", option, used)
         place = Path(self.out)
-        reject_unused("--tile", place, place.suffix.lower() in self.exports + PICTURES)
+        reject_unused("--tile", place, place.suffix.lower() in EXPORTS + PICTURES)
 
     def inputs(self) -> list[Path | str]:
         return [*super().inputs(), *field_files(self.field, self.orientation)]

@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from PIL import Image
 
+from mitex.cache import content_key
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh
 from mitex.mesh.fields import NAMES
@@ -20,7 +21,7 @@ from mitex.methods.nca.decoder.surface import EDGE
 from mitex.methods.nca.displacement import known_relief
 from mitex.methods.nca.film import PreviewCamera, Shooting
 from mitex.methods.nca.growth import grown_state
-from mitex.methods.nca.look import MARGIN, Look
+from mitex.methods.nca.look import MARGIN, Look, traits
 from mitex.methods.nca.motion.condition import Field, fastest, followed_field
 from mitex.methods.nca.orientation import Orientation
 from mitex.methods.nca.palette import NEARLY, TOLERANCE, Palette
@@ -98,7 +99,7 @@ def look_data(texture: NcaTexture) -> dict[str, Any]:
     return {
         "name": str(texture.about.get("name", "texture")),
         "steps": texture.steps,
-        "family": texture.family,
+        "family": content_key(texture.family, repr(sorted(traits(look).items()))),
         "relief": 0.0 if "normal" in look.maps else 2 * EDGE * known_relief(texture.about, look.maps),
         "fastest": longest if np.isfinite(longest) else None,
         "channels": rule.channels,

@@ -12,6 +12,7 @@ uniform sampler2D occlusion;
 //: BLOCKS
 #if GRAFT
 uniform sampler2D shares;
+uniform bool shareShown;  // in place of the colours
 #endif
 uniform vec4 palette[COLOURS];       // colours
 uniform vec4 otherPalette[COLOURS];  // of the look that is grafted on
@@ -55,6 +56,7 @@ void main() {
   //: MAPS
 #if GRAFT
   albedo = mix(within(albedo, palette, limits.x), within(albedo, otherPalette, limits.y), share0);
+  if (shareShown) albedo = vec3(share0);
 #else
   albedo = within(albedo, palette, limits.x);
 #endif

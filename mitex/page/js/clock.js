@@ -6,7 +6,7 @@ const FINEST = 2; // samples along a side of a pixel
 
 class Clock {
   constructor(page, whenDrawn) {
-    Object.assign(this, { page, whenDrawn, playing: true, rate: 30, due: 0, drawn: 0, taken: 0, since: 0 });
+    Object.assign(this, { page, whenDrawn, playing: Boolean(page.automaton), rate: 30, due: 0, drawn: 0, taken: 0, since: 0, quietUntil: 0 });
     this.frame = this.frame.bind(this);
     requestAnimationFrame(this.frame);
   }
@@ -41,7 +41,7 @@ class Clock {
 
   _count(now) {
     const seconds = (now - this.since) / 1000;
-    this.whenDrawn({ frames: this.drawn / seconds, steps: this.taken / seconds });
+    if (now > this.quietUntil) this.whenDrawn({ frames: this.drawn / seconds, steps: this.taken / seconds });
     Object.assign(this, { since: now, drawn: 0, taken: 0 });
   }
 }

@@ -141,13 +141,13 @@ class Decoder {
   }
 
   // Into four textures, see decode.frag.
-  decode(target, ids, automaton, occlusion) {
+  decode(target, ids, automaton, occlusion, shown) {
     const { surface } = automaton;
     const states = this.shape.smooth ? automaton.readable() : textures(automaton.states[0], "state");
     this.graphics.fill(target, this.program, {
       ...this.buffers, ...this.uniforms, ...states, ids, occlusion, shares: automaton.shares,
       corners: surface.corners, place: surface.place, normals: surface.normals, turn: surface.turn,
-      height: surface.height,
+      height: surface.height, shareShown: shown,
     });
   }
 }

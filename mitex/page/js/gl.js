@@ -53,6 +53,16 @@ class Graphics {
     return this.texture(format, width, height, padded);
   }
 
+  // An image as a texture with mip maps.
+  picture(image) {
+    const { gl } = this;
+    const texture = this.texture("RGBA8", image.width, image.height, null, "LINEAR");
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, gl.RGBA, gl.UNSIGNED_BYTE, image);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
+    gl.generateMipmap(gl.TEXTURE_2D);
+    return texture;
+  }
+
   refill(texture, values) {
     const { gl } = this;
     const [layout, kind, Kind] = FORMATS[texture.format];

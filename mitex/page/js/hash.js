@@ -24,6 +24,11 @@ class Slots {
     this.vertexAt.forEach((vertex, slot) => { this.slotOf[vertex] = slot; });
   }
 
+  // Numbers by vertex in the order of the cells.
+  order(values) {
+    return Float32Array.from(this.vertexAt, (vertex) => values[vertex]);
+  }
+
   // Rows of values by vertex (count x width) as rows of a texture with four channels.
   spread(values, width, Kind = Float32Array) {
     const rows = new Kind(4 * this.count);

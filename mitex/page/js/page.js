@@ -1,13 +1,10 @@
-// The page: one mesh, a look that grows on it, and pictures of both. Everything that can be done with it is a
-// method here; the panel and tests call them.
+// A look that grows on a mesh. Everything that can be done with it is a method; the panel and tests call them.
 
-class Page {
+class Page extends View {
   constructor(data, canvas) {
-    this.graphics = new Graphics(canvas);
-    Object.assign(this, { data, canvas, looks: data.looks, seed: data.seed, turn: data.turn, samples: 1 });
-    Object.assign(this, { field: data.field, speed: data.speed });
-    this.studio = new Studio(this.graphics);
-    this.chosen = 0;
+    super(data, canvas);
+    Object.assign(this, { looks: data.looks, seed: data.seed, field: data.field, speed: data.speed });
+    Object.assign(this, { chosen: 0, grafted: null });
     this.setMesh(meshOf(data.mesh), data.mesh.levels);
   }
 
@@ -18,15 +15,19 @@ class Page {
   // Grows the look on a mesh that is subdivided so many times.
   setMesh(base, levels) {
     Object.assign(this, { base, levels });
+    this.show(dense(base, levels));
+    this.radius = 0.15 * this.studio.radius * this.surface.scale; // of the brush [mesh units]
+    this._grow();
+  }
+
+  // Cells on the surface, from the seed.
+  _grow() {
     this.automaton?.drop();
-    this.surface?.drop();
-    this.surface = new Surface(this.graphics, dense(base, levels), this.data.edge, this.turn);
-    this.studio.setSurface(this.surface);
-    this.studio.relief = this.look.relief;
     this.automaton = new Automaton(this.graphics, this.surface, this.look);
     this.decoder ??= new Decoder(this.graphics, this.look);
+    this._weights();
+    this.setShare(0);
     this.move(this.field, this.speed);
-    this.radius = 0.15 * this.studio.radius * this.surface.scale; // of the brush [mesh units]
     this.reset();
   }
 
@@ -57,16 +58,49 @@ class Page {
     this.graphics.refill(this.automaton.condition, slots.spread(told, 3));
   }
 
-  // What the picture shows: one of MODES.
-  setMode(name) {
-    this.studio.mode = MODES.indexOf(name);
+  // Another look on the mesh; one of the same family goes on from the state that is there.
+  setLook(chosen) {
+    const related = this.looks[chosen].family === this.look.family;
+    Object.assign(this, { chosen, grafted: null });
+    if (related) this._weights();
+    else {
+      this.decoder = null;
+      this._grow();
+    }
+  }
+
+  // Grafts another look of the family onto the one that is there; null for none.
+  setGraft(grafted) {
+    this.grafted = grafted;
+    this._weights();
+  }
+
+  // Its share of all cells, in [0, 1].
+  setShare(share) {
+    this._shares(new Float32Array(this.surface.mesh.count).fill(share));
+  }
+
+  // Gives it the cells around a point, softly towards the brush's border.
+  graft(point, radius = this.radius) {
+    for (const [vertex, apart] of brushed(this.surface.mesh, point, radius)) {
+      const share = clamp(2 - (2 * apart) / radius, 0, 1);
+      this.shares[vertex] = Math.max(this.shares[vertex], share * share * (3 - 2 * share));
+    }
+    this._shares(this.shares);
+  }
+
+  _shares(shares) {
+    this.shares = shares;
+    this.graphics.refill(this.automaton.shares, this.surface.slots.order(shares));
     this.changed = true;
   }
 
-  // The point of the surface at a place of the picture [pixels from its upper left corner].
-  pick(x, y) {
-    this.see();
-    return this.studio.pick(Math.floor(x), this.canvas.height - 1 - Math.floor(y));
+  _weights() {
+    const other = this.grafted === null ? null : this.looks[this.grafted];
+    this.automaton.setLooks(this.look, other);
+    this.decoder.setLooks(this.look, other);
+    this.studio.relief = this.look.relief;
+    this.changed = true;
   }
 
   // Sets the cells around a point of the surface back to the seed.
@@ -77,35 +111,8 @@ class Page {
     return vertices;
   }
 
-  // Which points of the surface the pixels see.
-  see() {
-    this.studio.resize(this.canvas.width, this.canvas.height, this.samples);
-    this.studio.look();
+  // The maps at the points of a picture of ids.
+  decode(target, ids) {
+    this.decoder.decode(target, ids, this.automaton, this.studio.occlusion.cells.textures[0], this.studio.mode === GRAFT);
   }
-
-  // A picture on the canvas.
-  draw() {
-    this.see();
-    this.decoder.decode(this.studio.maps, this.studio.picture.textures[0], this.automaton,
-      this.studio.occlusion.cells.textures[0]);
-    this.studio.render();
-    this.changed = false;
-  }
-
-  // The picture as pixels, row 0 below.
-  pixels() {
-    this.draw();
-    const { gl } = this.graphics;
-    const { width, height } = this.canvas;
-    const values = new Uint8Array(4 * width * height);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, values);
-    return values;
-  }
-}
-
-function meshOf({ low, step, positions, faces, name }) {
-  const quanta = summed(positions, 3, Uint16Array);
-  const places = Float32Array.from(quanta, (value, k) => low[k % 3] + step[k % 3] * value);
-  return new Mesh(places, Uint32Array.from(summed(faces, 3, faces.constructor)), name);
 }

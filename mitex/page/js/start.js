@@ -4,7 +4,7 @@ async function open() {
   const by = (id) => document.getElementById(id);
   const data = await unpacked(JSON.parse(by("data").textContent));
   const canvas = by("picture");
-  const page = new Page(data, canvas);
+  const page = data.looks ? new Page(data, canvas) : await StillPage.of(data, canvas);
   page.studio.paper = paperOf(canvas);
   const still = location.hash === "#still";
   const fit = () => {
@@ -18,17 +18,35 @@ async function open() {
   by("instead").hidden = true;
   if (still) return page;
   new ResizeObserver(fit).observe(canvas);
-  const clock = new Clock(page, ({ frames, steps }) => {
-    const { automaton, surface } = page;
-    by("status").textContent = [`${automaton.steps.toLocaleString()} steps`, `${Math.round(steps)} a second`,
-      `${Math.round(frames)} frames/s`, `${surface.mesh.count.toLocaleString()} cells`].join(" · ");
-  });
-  page.panel = new Panel(page, clock, new Pointer(page, by("cursor")), by("panel"));
+  const clock = new Clock(page, (counts) => { by("status").textContent = counted(page, counts); });
+  const panel = new Panel(page, clock, new Pointer(page, by("cursor")), { panel: by("panel"), status: by("status") });
+  listenToKeys(page, panel);
+  listenToDrops(panel);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     page.studio.paper = paperOf(canvas);
     page.changed = true;
   });
   return page;
+}
+
+function counted({ automaton, surface }, { frames, steps }) {
+  if (!automaton) return `${surface.faceCount.toLocaleString()} faces`;
+  return [`${automaton.steps.toLocaleString()} steps`, `${Math.round(steps)} a second`,
+    `${Math.round(frames)} frames/s`, `${surface.mesh.count.toLocaleString()} cells`].join(" · ");
+}
+
+function listenToDrops(panel) {
+  const { body } = document;
+  const over = (event, on) => {
+    event.preventDefault();
+    body.classList.toggle("over", on);
+  };
+  body.addEventListener("dragover", (event) => over(event, true));
+  body.addEventListener("dragleave", (event) => over(event, false));
+  body.addEventListener("drop", (event) => {
+    over(event, false);
+    panel.open(event.dataTransfer.files[0]);
+  });
 }
 
 // The colour of the page's paper, linear.

@@ -1,6 +1,7 @@
 // Pictures of the surface: ids of what pixels see, their maps, and light on them.
 
 const MODES = ["light", "albedo", "normal", "height", "roughness", "ambient_occlusion", "graft"];
+const GRAFT = MODES.indexOf("graft");
 const KEY = [-2.6, 3.0, 3.2]; // where the key light is, for a camera on +z
 const SHADOWS = 1024; // side of the shadow map [px]
 
