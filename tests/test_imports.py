@@ -23,6 +23,7 @@ ORDER = [
     "evaluation",
     "render",
     "export",
+    "page",
     "asset",
     "training",
     "bridge",
