@@ -10,6 +10,7 @@ import xatlas
 from scipy.ndimage import distance_transform_edt
 
 from mitex.errors import ConfigError, MeshError
+from mitex.flat_charts import projected_charts, sides
 from mitex.geometry.constant import constant, sealed
 from mitex.geometry.normal_maps import FLAT, encode
 from mitex.geometry.raster import covered_texels, rasterize
@@ -21,7 +22,7 @@ from mitex.progress import announce
 
 MAX_RESOLUTION = 8192
 LARGE = 40_000  # meshes of more faces are unwrapped in pieces
-SMOOTHINGS = 8  # rounds over the neighbours before faces are sorted by the direction that they look in
+HUGE = 150_000  # meshes of more faces are projected: unwrapping takes a minute from here on
 ROUGHNESS = 0.03  # by which vertices are moved before unwrapping [edge lengths], see `_rough`
 STRIP = 1 << 18  # texels
 FULL = 1.001  # the area of the unit square, and some rounding
@@ -182,6 +183,8 @@ def spread(image: np.ndarray, used: np.ndarray, padding: int) -> np.ndarray:
 def unwrap(mesh: Mesh, resolution: int, padding: int) -> np.ndarray:
     """Cuts the mesh into charts and packs them into the unit square (xatlas).
 
+    Charts are flattened, or, on meshes of more than `HUGE` faces, projected along an axis.
+
     Args:
         mesh: any mesh; degenerate faces get (0, 0).
         resolution: side of the map that the charts are packed for [texels].
@@ -191,20 +194,27 @@ def unwrap(mesh: Mesh, resolution: int, padding: int) -> np.ndarray:
         (F, 3, 2) float32 in [0, 1], v upwards. Charts may be mirrored.
     """
     announce("unwrapping the mesh")
-    atlas = xatlas.Atlas()
     # xatlas has absolute tolerances; a power of two changes no digits.
     extent = float(np.ptp(mesh.vertices, axis=0).max())
     if extent > 0:
         mesh = mesh.with_vertices(mesh.vertices * 2.0 ** -np.rint(np.log2(extent / 2)))
-    pieces, positions = _pieces(mesh), _rough(mesh)
-    for piece in pieces:
-        used, faces = np.unique(mesh.faces[piece], return_inverse=True)
-        atlas.add_mesh(positions[used], faces.reshape(-1, 3).astype(np.uint32))
     pack = xatlas.PackOptions()
     pack.resolution = resolution
     # xatlas only estimates the texel size and packs into up to 1.4 times the side asked for.
     pack.padding = int(np.ceil(1.4 * padding))
     pack.bilinear = True
+    if len(mesh.faces) > HUGE:
+        return projected_charts(mesh, pack)[0]
+    return _flattened(mesh, pack)
+
+
+def _flattened(mesh: Mesh, pack: xatlas.PackOptions) -> np.ndarray:
+    """The charts of xatlas, in the unit square (F, 3, 2)."""
+    atlas = xatlas.Atlas()
+    pieces, positions = _pieces(mesh), _rough(mesh)
+    for piece in pieces:
+        used, faces = np.unique(mesh.faces[piece], return_inverse=True)
+        atlas.add_mesh(positions[used], faces.reshape(-1, 3).astype(np.uint32))
     chart = xatlas.ChartOptions()
     # Flattening a chart takes more than linear time; this keeps a mesh of 20k faces at one or two seconds.
     chart.max_chart_area = 0.1 * float(mesh.face_areas.sum())
@@ -226,12 +236,7 @@ def _pieces(mesh: Mesh) -> list[np.ndarray]:
     """
     if len(mesh.faces) <= LARGE:
         return [np.arange(len(mesh.faces))]
-    normals = mesh.normals
-    for _ in range(SMOOTHINGS):
-        normals = normals + scatter_add(mesh.edges.rows, normals[mesh.edges.indices], len(normals))
-    towards = normals[mesh.faces].sum(1)
-    axis = np.abs(towards).argmax(1)
-    side = 2 * axis + (np.take_along_axis(towards, axis[:, None], 1)[:, 0] > 0)
+    side = sides(mesh)
     return [piece for k in range(6) if len(piece := np.flatnonzero(side == k))]
 
 

@@ -17,11 +17,13 @@ ORDER = [
     "__main__",
     "cli",
     "demo",
+    "comparison",
     "batch",
     "methods",
     "evaluation",
     "render",
     "export",
+    "page",
     "asset",
     "training",
     "bridge",
@@ -32,6 +34,7 @@ ORDER = [
     "features",
     "losses",
     "atlas",
+    "flat_charts",
     "mesh",
     "triples",
     "exemplar",
@@ -178,7 +181,7 @@ def test_each_lazy_import_is_there_and_needed(site):
 
 def test_only_the_command_line_the_demo_and_batches_import_methods():
     users = {part(link.importer) for link in links() if part(link.target) == "methods"}
-    assert users == {"batch", "cli", "demo", "methods"}
+    assert users == {"batch", "cli", "comparison", "demo", "methods"}
 
 
 def test_methods_do_not_import_each_other():

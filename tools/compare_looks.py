@@ -1,17 +1,18 @@
 """Measures how near textures of `nca` come to their exemplars, map by map.
 
-usage: python tools/compare_looks.py EXEMPLARS EXEMPLAR=MODEL[,MODEL ...] ...
+usage: python tools/compare_looks.py EXEMPLARS EXEMPLAR=MODEL[,MODEL ...] ... [--meshes M ...]
 
 EXEMPLARS is a folder; names of embedded exemplars work too. A MODEL is a bundled one, a file or a run folder.
 Six patches of a sphere, at the exemplar's scale, are compared with the exemplar: the Frechet distances of
 VGG-16's features at relu2_2 and relu4_1, the relaxed transport over five layers, and the regularity beside
-the exemplar's. Prints a Markdown table.
+the exemplar's. On other meshes, patches are half as wide. Prints a Markdown table.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
-import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,45 +24,69 @@ from mitex.exemplar import Exemplar
 from mitex.exemplar import names as exemplar_names
 from mitex.features import Vgg16
 from mitex.losses import relaxed_transport
-from mitex.mesh import icosphere
+from mitex.mesh import Mesh, icosphere
 from mitex.methods.nca import NcaTexture
+from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.surfaces import TrainingSphere
-from mitex.scenes.cameras import patch_views
+from mitex.scenes.cameras import Cameras, patch_views
 
+SPHERE = "sphere"
 PATCHES, WIDEST, SIDE = 6, 0.65, 256
+TRIES = 8  # places on a mesh for each patch that is compared: some look past thin parts
 FREQUENCIES = {True: 32, False: 48}  # of the training spheres, with a decoder and without
 FRECHET = ("relu2_2", "relu4_1")
 LAYERS = ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1")
 
 
 def main() -> None:
-    folder = Path(sys.argv[1])
-    print("| exemplar | map | model | relu2_2 | relu4_1 | transport | regularity |\n" + "| --- " * 7 + "|")
-    for word in sys.argv[2:]:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("exemplars", type=Path)
+    parser.add_argument("looks", nargs="+", metavar="EXEMPLAR=MODEL")
+    parser.add_argument("--meshes", nargs="+", default=[SPHERE])
+    arguments = parser.parse_args()
+    titles = "exemplar | map | model | surface | relu2_2 | relu4_1 | transport | regularity"
+    print(f"| {titles} |\n" + "| --- " * 8 + "|")
+    for word in arguments.looks:
         name, models = word.split("=")
-        source = Exemplar.load(name if name in exemplar_names() else folder / name)
+        source = Exemplar.load(name if name in exemplar_names() else arguments.exemplars / name)
         exemplar = source.resized(min(SIDE, *source.size))
-        for model in models.split(","):
-            texture = NcaTexture.load(model)
-            for map_name, views in patches(texture, exemplar.size[0]).items():
+        for model, mesh in ((model, mesh) for model in models.split(",") for mesh in arguments.meshes):
+            for map_name, views in patches(NcaTexture.load(model), exemplar.size[0], mesh).items():
                 target = rgb(exemplar.maps[map_name])
                 numbers = " | ".join(f"{value:.3g}" for value in distances(target, views))
                 order = f"{np.mean([regularity(view) for view in views]):.2f} of {regularity(target):.2f}"
-                print(f"| {name} | {map_name} | {model} | {numbers} | {order} |", flush=True)
+                surface = Path(mesh).stem
+                print(f"| {name} | {map_name} | {model} | {surface} | {numbers} | {order} |", flush=True)
 
 
 @torch.no_grad()
-def patches(texture: NcaTexture, size: int) -> dict[str, np.ndarray]:
+def patches(texture: NcaTexture, size: int, surface: str) -> dict[str, np.ndarray]:
     """Patches (K, h, w, 3) of each map, in which the exemplar's width would be `size` [px]."""
-    mesh = icosphere(FREQUENCIES[hasattr(texture.look.decoder, "network")])
-    sphere, state = TrainingSphere.of(mesh, texture.look), texture.grow(mesh)
-    edge = math.sqrt(8 * math.pi / math.sqrt(3) / len(mesh.vertices))
+    decoded = hasattr(texture.look.decoder, "network")
+    mesh = icosphere(FREQUENCIES[decoded]) if surface == SPHERE else cells(surface, decoded)
+    ground, state = TrainingSphere.of(mesh, texture.look), texture.grow(mesh)
+    edge = math.sqrt(4 / math.sqrt(3) * float(mesh.face_areas.sum()) / len(mesh.faces))
     width = float(texture.about["density"]) * edge
-    half = min(0.5 * width, WIDEST)
+    half = min(0.5 * width, WIDEST) if surface == SPHERE else 0.25 * width
+    count = PATCHES if surface == SPHERE else PATCHES * TRIES
     pixels = round(size * 2 * half / width)
-    cameras = patch_views(torch.Generator().manual_seed(0), mesh, PATCHES, half, pixels)
-    views = sphere.views(texture.look, state, cameras, antialias=2).clamp(0, 1).numpy()
+    cameras = patch_views(torch.Generator().manual_seed(0), mesh, count, half, pixels)
+    cameras = most_covered(ground, cameras)
+    views = ground.views(texture.look, state, cameras, antialias=2).clamp(0, 1).numpy()
     return {name: rgb(views[..., list(columns)]) for name, columns in texture.look.layout.items()}
+
+
+def most_covered(ground: TrainingSphere, cameras: Cameras) -> Cameras:
+    """The `PATCHES` cameras that see the most surface, the first ones where several see as much."""
+    hit = np.asarray(ground.stage.hits(cameras, 1).hit).reshape(len(cameras), -1)
+    best = np.argsort(-hit.mean(1), kind="stable")[:PATCHES]
+    return replace(cameras, origin=cameras.origin[best], target=cameras.target[best], up=cameras.up[best])
+
+
+def cells(name: str, decoded: bool) -> Mesh:
+    """The automaton's mesh; without a decoder it needs twice as many cells along an edge."""
+    mesh = Cells.dense(Mesh.load(name)).mesh
+    return mesh if decoded else Cells.dense(mesh, 1).mesh
 
 
 def rgb(image: np.ndarray) -> np.ndarray:

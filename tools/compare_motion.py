@@ -29,6 +29,7 @@ from mitex.mesh import Mesh, icosphere
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.growth import Growth
+from mitex.methods.nca.motion.condition import cell_vectors
 from mitex.scenes.cameras import Cameras, patch_views
 from mitex.scenes.screen import screen_motion
 from mitex.scenes.stage import Stage
@@ -96,14 +97,16 @@ class CloseUps:
 
 def motion_of(texture: NcaTexture, closeups: CloseUps, field: str) -> tuple[float, float, list[float]]:
     """Direction error [degrees], speed ratio, and distances from the exemplar after `LATER`."""
-    condition = texture.condition(closeups.cells, field)
-    if condition is None:
+    if "motion" not in texture.about:
         raise ConfigError(f"{texture.about['name']} does not move", "train it with `motion`")
+    encoded = texture.look.rule.condition > 0  # else it moves along the field of its training alone
+    condition = texture.condition(closeups.cells, field) if encoded else None
     growth = texture.growth(closeups.cells, 0.0, condition)
     generator = torch.Generator().manual_seed(0)
     state = growth.evolve(growth.seed(), texture.steps, generator)
     period = float(texture.about["motion_period"])
-    target = closeups.target(condition.numpy().astype(np.float64))
+    mesh = closeups.cells.mesh
+    target = closeups.target(cell_vectors(mesh, mesh, field, 1.0).astype(np.float64))
     films = np.stack(list(film(growth, state, closeups)), axis=1)
     errors = [
         measured_motion(frames, motion, covered, steps=STEPS, period=period)

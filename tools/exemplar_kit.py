@@ -89,7 +89,7 @@ def relaxed_points(rng: np.random.Generator, count: int, rounds: int) -> np.ndar
     points = rng.random((count, 2))
     samples = rng.random((count * 400, 2))
     for _ in range(rounds):
-        owner = np.asarray(spatial.KDTree(points, boxsize=1.0).query(samples)[1])
+        owner = np.asarray(spatial.KDTree(points, boxsize=1.0).query(samples, workers=-1)[1])
         offset = (samples - points[owner] + 0.5) % 1.0 - 0.5
         total = np.stack([np.bincount(owner, offset[:, k], count) for k in range(2)], axis=1)
         points = (points + total / np.maximum(np.bincount(owner, minlength=count), 1)[:, None]) % 1.0
@@ -102,7 +102,7 @@ def cells(points: np.ndarray, x: np.ndarray, y: np.ndarray, softness: float) -> 
     The distance is a soft minimum over the bisectors to the next neighbours, which rounds the corners.
     """
     here = np.stack([x, y], axis=-1).reshape(-1, 2) % 1.0
-    distance, index = map(np.asarray, spatial.KDTree(points, boxsize=1.0).query(here, k=8))
+    distance, index = map(np.asarray, spatial.KDTree(points, boxsize=1.0).query(here, k=8, workers=-1))
     owner = index[:, 0]
     gaps = []
     for k in range(1, 8):

@@ -51,18 +51,18 @@ RECIPES = {
     "bricks": Recipe("bricks", settings=(*LONG, "density=48")),
     "cobblestone": Recipe("cobblestone"),
     "fur": Recipe("Stylized_Fur_001", settings=(*QUICK, "density=48", *SMALL)),
-    "hexagons": Recipe("hexagons"),
-    "honeycomb": Recipe("Honeycomb_002", settings=(*FINE, *SMALL)),
+    "hexagons": Recipe("hexagons", settings=(*LONG, "density=48")),
+    "honeycomb": Recipe("Honeycomb_002", settings=(*LONG, "density=64", *SMALL)),
     "knit": Recipe("knit", settings=(*LONG, "density=64")),
     "lava": Recipe("lava"),
     "leather": Recipe("leather", settings=(*QUICK, "density=64")),
     "mosaic": Recipe("Abstract_008", settings=(*QUICK, *SMALL)),
     "pebbles": Recipe("Pebbles_025", settings=(*QUICK, "density=64", *SMALL)),
-    "planks": Recipe("planks"),
+    "planks": Recipe("planks", settings=(*LONG, "density=48")),
     "rust": Recipe("rust", settings=QUICK),
     "shells": Recipe("Wall_Shells_001", settings=(*FINE, *SMALL)),
-    "waffle": Recipe("Waffle_001", settings=(*SHORT, *SMALL)),
-    "wicker": Recipe("wicker"),
+    "waffle": Recipe("Waffle_001", settings=(*LONG, "density=48", *SMALL)),
+    "wicker": Recipe("wicker", settings=(*LONG, "density=48")),
 }
 
 

@@ -23,13 +23,13 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from mitex.evaluation.seams import seam_ratio
 from mitex.exemplar import Exemplar
 from mitex.exemplar import names as exemplar_names
 from mitex.images import write_image
 from mitex.mesh import Mesh, embedded_names, grid, remesh, subdivide_midpoint, torus
 from mitex.mesh.topology import welded
 from mitex.methods import surface
-from mitex.methods.surface.seams import seam_ratio
 from mitex.render import sheet, still, tone
 from mitex.training import checkpoint
 from mitex.training.locate import NAME
@@ -130,7 +130,8 @@ def main() -> None:
         mesh, exemplar = find_mesh(mesh_name, meshes), find_exemplar(exemplar_name, exemplars, maps)
         run = runs / "-".join([name, mesh_name, exemplar_name, *(word.replace("=", "") for word in own)])
         result = texture(exemplar, mesh, run, settings)
-        print(f"{run.name}: {result.about['seconds']} s, seams {seam_ratio(result):.3f}", flush=True)
+        seams = seam_ratio(result.apply(), result.domain.texels.size)
+        print(f"{run.name}: {result.about['seconds']} s, seams {seams:.3f}", flush=True)
         if exemplar_name != last:
             cells.append(exemplar.resized(side).maps["albedo"])
             labels.append(f"exemplar {exemplar.name}")

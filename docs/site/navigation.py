@@ -12,6 +12,7 @@ GROUPS = {
     "Guides": [
         "docs/moving",
         "docs/batch",
+        "docs/compare",
         *(f"docs/{name}" for name in ("blender", "plugins", "embedding", "runs", "times")),
         "docs/*",
     ],

@@ -18,6 +18,12 @@ COMMANDS = {
     "models": ("mitex.cli.models:Models", "list the textures that ship with Mitex"),
     "batch": ("mitex.cli.batch:Batch", "run a plan of many fits, on one machine or on many"),
     "batch status": ("mitex.cli.batch:Status", "tell how far the jobs of a plan are"),
+    "compare": ("mitex.cli.compare:Compare", "compare methods on the same exemplars and meshes, as a report"),
+    "compare answers": ("mitex.cli.compare:Answers", "evaluate a blind test of preference"),
+    "evaluate": (
+        "mitex.cli.evaluate:Evaluate",
+        "measure how near a texture comes to its exemplar, or to words",
+    ),
     "render": ("mitex.cli.render:Render", "path-trace an asset: a still or a turntable"),
 }
 # Commands whose options are those of the model's method.

@@ -100,7 +100,7 @@ def vgg_distance(
     for layer, maps in _features(np.stack((a, b)), layers).items():
         one, other = F.normalize(maps.double(), dim=3)
         squares = (one - other).square().sum(2).numpy()
-        total += float(_masked(squares, _cells(a, mask, layer)).mean())
+        total += float(_masked(squares, whole_cells(a, mask, layer)).mean())
     return total
 
 
@@ -128,7 +128,7 @@ def single_image_frechet(
         ConfigError: an unknown layer, or images too small for it.
         ImageError: an image or mask of an unusable shape, or too few positions.
     """
-    return _frechet(*(_vectors(image, layer, mask) for image, mask in ((a, mask_a), (b, mask_b))))
+    return frechet_distance(*(_vectors(image, layer, mask) for image, mask in ((a, mask_a), (b, mask_b))))
 
 
 def gaussian_frechet(
@@ -147,8 +147,12 @@ def gaussian_frechet(
     return float((mean_a - mean_b).square().sum() + spread.clamp(min=0))
 
 
-def _frechet(a: torch.Tensor, b: torch.Tensor) -> float:
-    """`gaussian_frechet` of two sets of feature vectors (n, C), (m, C)."""
+def frechet_distance(a: torch.Tensor, b: torch.Tensor) -> float:
+    """`gaussian_frechet` of two sets of feature vectors (n, C), (m, C) float64.
+
+    Raises:
+        ImageError: a set of fewer than two.
+    """
     if min(len(a), len(b)) < 2:
         raise ImageError("a single position has no covariance", "give a larger image or mask")
     return gaussian_frechet(a.mean(0), torch.cov(a.T), b.mean(0), torch.cov(b.T))
@@ -161,29 +165,30 @@ def _root(symmetric: torch.Tensor) -> torch.Tensor:
 
 
 @cache
-def _network() -> Vgg16:
+def evaluation_network() -> Vgg16:
+    """VGG-16 of the package's weights, layers divided by their mean activation: that of all evaluations."""
     # Pooling as trained, and full precision: evaluations should agree between machines.
     return Vgg16("max", "float32")
 
 
 def _features(images: np.ndarray, layers: Sequence[str]) -> dict[str, torch.Tensor]:
     with torch.no_grad():
-        return _network().features(torch.from_numpy(np.asarray(images, np.float32)), layers)
+        return evaluation_network().features(torch.from_numpy(np.asarray(images, np.float32)), layers)
 
 
 def _vectors(image: np.ndarray, layer: str, mask: np.ndarray | None) -> torch.Tensor:
     """Features of the positions that count, (n, C) float64."""
     _check(image)
     (maps,) = _features(image[None], [layer])[layer].double().numpy()
-    return torch.from_numpy(_masked(maps, _cells(image, mask, layer)))
+    return torch.from_numpy(_masked(maps, whole_cells(image, mask, layer)))
 
 
-def _cells(image: np.ndarray, mask: np.ndarray | None, layer: str) -> np.ndarray | None:
-    """The mask for a layer's map: cells of pixels that lie in it wholly."""
+def whole_cells(image: np.ndarray, mask: np.ndarray | None, layer: str) -> np.ndarray | None:
+    """The mask (h, w) of a layer's map for that of an image: the cells of pixels that lie in it wholly."""
     if mask is None:
         return None
     _check_mask(image, mask)
-    rows, columns = _network().extent(layer, *mask.shape)
+    rows, columns = evaluation_network().extent(layer, *mask.shape)
     side = 2 ** (int(layer[4]) - 1)
     whole = mask[: rows * side, : columns * side].reshape(rows, side, columns, side)
     return np.asarray(whole.all((1, 3)))

@@ -1,4 +1,4 @@
-"""Writing assets as GLB, OBJ, PLY, EXR or folders of maps, and reading the first three back."""
+"""Writing assets as GLB, OBJ, PLY, EXR, HTML or folders of maps, and reading the first three back."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from mitex.export.glb import read_glb, write_glb, write_variants
 from mitex.export.obj import check_side_files, read_obj, write_obj
 from mitex.export.ply import read_ply, write_ply
 from mitex.export.together import Inputs
+from mitex.page import write_still
 from mitex.paths import expanded, prepare_output
 from mitex.progress import announce
 from mitex.reading import reading
@@ -41,9 +42,15 @@ __all__ = [
     "write_views",
 ]
 
-SUFFIXES = (".glb", ".obj", ".ply", ".exr")
+SUFFIXES = (".glb", ".obj", ".ply", ".exr", ".html")
 SLASHES = tuple(filter(None, (os.sep, os.altsep)))
-_WRITERS = {".glb": write_glb, ".obj": write_obj, ".ply": write_ply, ".exr": write_textures}
+_WRITERS = {
+    ".glb": write_glb,
+    ".obj": write_obj,
+    ".ply": write_ply,
+    ".exr": write_textures,
+    ".html": write_still,
+}
 _READERS = {".glb": read_glb, ".obj": read_obj, ".ply": read_ply}
 
 

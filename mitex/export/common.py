@@ -21,8 +21,6 @@ from mitex.geometry.vectors import orthonormal, scatter_add
 from mitex.mesh import Mesh
 
 GENERATOR = "Mitex"
-DEFAULT_ALBEDO = 0.8  # linear grey where an asset has no albedo
-DEFAULT_ROUGHNESS = 0.5
 REMEDY = "give an asset that Mitex exported, or use the file as a mesh"  # of a file that is none
 
 

@@ -9,11 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mitex.asset import Asset
+from mitex.asset import DEFAULT_ALBEDO, Asset
 from mitex.errors import ImageError, MeshError
 from mitex.exemplar import MAPS
 from mitex.export.common import (
-    DEFAULT_ALBEDO,
     GENERATOR,
     asset_from_textures,
     foreign,

@@ -8,8 +8,11 @@ import numpy as np
 
 from mitex.atlas import unwrap, usable_uv
 from mitex.errors import ConfigError
+from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh
 
+RESOLUTION = 512  # of the layout that sizes of patterns are relative to [texels]
+EXEMPLAR_WIDTH = 0.5  # of the exemplar, unless something else is asked for [sides of the layout's square]
 PADDING = 2  # texels between charts: bilinear taps of one never see the other
 
 
@@ -34,6 +37,20 @@ def with_layout(mesh: Mesh, resolution: int, keep_uvs: bool = False) -> Mesh:
             "leave out `keep_uvs` to have it unwrapped",
         )
     return mesh
+
+
+def layout_side(mesh: Mesh) -> float:
+    """How long the side of the layout's square is on the surface, at the median of the faces [mesh units].
+
+    Raises:
+        ConfigError: no face has an area both on the surface and in the layout.
+    """
+    assert mesh.uv is not None
+    area, in_layout = mesh.face_areas.astype(np.float64), 0.5 * np.abs(twice_area(mesh.uv))
+    solid = (area > 0) & (in_layout > 0)
+    if not solid.any():
+        raise ConfigError(f"mesh '{mesh.name}' has no area in its layout", "unwrap it again")
+    return float(np.median(np.sqrt(area[solid] / in_layout[solid])))
 
 
 def same_surface(a: Mesh, b: Mesh) -> bool:

@@ -10,7 +10,7 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
 - the photos that pages name are 8 of a ball in 24 x 24 pixels, which is its own base shape; its texture is
   joined from 30 patches to 128 texels;
 - pictures are traced in 16 x 16 pixels with one path each, and enlarged;
-- jobs of a batch run in this process.
+- jobs of a batch run in this process, and comparisons look at one patch.
 """
 
 from __future__ import annotations
@@ -84,6 +84,8 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(texture, "film", _with_few_frames(texture.film))
     patch.setattr(texture.GrowingTexture, "apply", _small_growth(texture.GrowingTexture.apply))
     patch.setattr("mitex.batch.task.Process", _InThisProcess)
+    for name in ("PATCHES", "WINDOWS"):
+        patch.setattr(f"mitex.comparison.pair.{name}", 1)
     patch.setattr(NcaTexture, "tile", _small_tile(NcaTexture.tile))
     patch.setattr(fitting, "find_base", lambda *_, **__: _ball_as_base())
     patch.setattr(NerfTexture, "synthesize", _small_quilt(NerfTexture.synthesize))

@@ -35,3 +35,12 @@ def test_wicker_is_more_regular_than_lava():
         regularity(Exemplar.load(name).resized(256).maps["albedo"]) for name in ("wicker", "lava")
     )
     assert wicker > 2 * lava
+
+
+def test_what_is_masked_does_not_count():
+    """A round piece of a grid is as regular as the grid, whatever lies around it."""
+    rows, columns = np.mgrid[:128, :128] - 63.5
+    inside = np.hypot(rows, columns) < 56
+    noise = RNG.random((128, 128, 1)).astype(np.float32)
+    cut = np.where(inside[..., None], grid(0.0), noise)
+    assert regularity(cut, inside) > 0.9 > regularity(cut)

@@ -52,3 +52,12 @@ def test_gradients():
     a = torch.rand(2, 6, 7, 2, dtype=torch.float64, generator=torch.Generator().manual_seed(1))
     b = torch.rand(2, 8, 6, 2, dtype=torch.float64, generator=torch.Generator().manual_seed(2))
     assert torch.autograd.gradcheck(lambda x: autocorrelation_distance(x, b), a.requires_grad_())
+
+
+def test_places_outside_the_mask_do_not_count():
+    maps = torch.rand(1, 9, 12, 2, generator=torch.Generator().manual_seed(3))
+    mask = torch.zeros(9, 12)
+    mask[2:7, 3:11] = 1
+    values, piece = autocorrelation(maps, mask)[0], autocorrelation(maps[:, 2:7, 3:11])[0]
+    for dy in range(-4, 5):
+        assert values[dy, :8].tolist() == pytest.approx(piece[dy, :8].tolist(), abs=1e-5)

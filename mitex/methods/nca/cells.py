@@ -6,6 +6,7 @@ meshed anew, for the automaton alone; points of the given mesh are looked up on 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh, remesh, subdivide_loop, subdivide_midpoint
 from mitex.mesh.nearest import nearest_points
 from mitex.mesh.subdivide import child_points
+from mitex.methods.layout import RESOLUTION, layout_side, with_layout
 
 ENOUGH_VERTICES = 8_000  # "auto" subdivides until a mesh has them: the training has 10,242
 MOST_LEVELS = 6
@@ -59,6 +61,23 @@ class Cells:
             return child_points(face, barycentric, self.levels)
         corners = self.given.vertices[self.given.faces[face]]
         return nearest_points(self.mesh, interpolate(barycentric, corners))
+
+
+def scale_of_width(mesh: Mesh, width: float, density: float, subdivide: int | str = "auto") -> float:
+    """The `scale` at which an exemplar is as wide as on a surface texture.
+
+    Args:
+        mesh: any mesh.
+        width: of the exemplar [sides of the square of the layout that surface textures have].
+        density: cells along the exemplar's width.
+        subdivide: as of `NcaTexture.apply`.
+
+    Raises:
+        ConfigError: an option is out of range, or the mesh has no area.
+    """
+    count = len(mesh.vertices) * 4 ** check(mesh, subdivide, 1.0)
+    edge = math.sqrt(2 * float(mesh.face_areas.sum()) / (math.sqrt(3) * count))  # of even triangles
+    return width * layout_side(with_layout(mesh, RESOLUTION)) / (density * edge)
 
 
 def check(mesh: Mesh, subdivide: int | str, scale: float) -> int:

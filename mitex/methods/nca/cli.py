@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 RESOLUTION = 1024  # of baked textures [texels]
 MOST_VARIANTS = 32
 LONGEST = 60  # name of a run folder from words [characters]
+PAGE = ".html"
 FIELD_FILES = (".npy", ".ply", ".json")
 
 
@@ -124,6 +125,7 @@ class Apply(OptionalMeshOptions):
       mitex apply pebbles --mesh bunny.obj --out bunny.glb --subdivide 2 --resolution 2048
       mitex apply pebbles --mesh scan.ply --out scan.glb --vertex-colors --seed 7 --orientation 45
       mitex apply pebbles --mesh bunny.obj --out bunny.glb --variants 5
+      mitex apply pebbles --mesh bunny.obj --out bunny.html
       mitex apply pebbles --mesh bunny.obj --out maps/ --maps-format exr
       mitex apply pebbles --tile 1024 --out pebbles-tile
     """
@@ -142,6 +144,10 @@ class Apply(OptionalMeshOptions):
 
     scale: Annotated[float, arg(metavar="X")] = 1.0
     """Size of the pattern."""
+
+    exemplar_width: Annotated[float | None, arg(metavar="X", help_behavior_hint="")] = None
+    """In place of --scale: width of the exemplar, as large as on a surface texture at 0.5 [sides of the UV
+    layout's square]."""
 
     field: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="(default: the training's)")] = None
     """Vector field that a moving texture follows: a name, a direction, or a file (.npy .ply .json)."""
@@ -180,6 +186,8 @@ class Apply(OptionalMeshOptions):
         in_range("--steps", self.steps, 1, MOST_STEPS)
         oriented(self.orientation)
         in_range("--scale", self.scale, 0.05, 20.0)
+        in_range("--exemplar-width", self.exemplar_width, 1e-3, 100.0)
+        mutually_exclusive("--exemplar-width", "--scale", self.exemplar_width is not None and self.scale != 1)
         in_range("--speed", self.speed, *SPEEDS)
         in_range("--resolution", self.resolution, 64, 8192)
         mutually_exclusive(
@@ -202,6 +210,7 @@ class Apply(OptionalMeshOptions):
             "--subdivide": self.subdivide != "auto",
             "--orientation": oriented(self.orientation) != 0,
             "--scale": self.scale != 1,
+            "--exemplar-width": self.exemplar_width is not None,
             "--resolution": self.resolution is not None,
             "--vertex-colors": self.vertex_colors,
             "--keep-dense": self.keep_dense,
@@ -231,6 +240,10 @@ class Apply(OptionalMeshOptions):
             reject_unused("--vertex-colors", out, self.vertex_colors and not coloured)
             reject_unused("--resolution", out, self.resolution is not None and suffix == ".ply")
             reject_unused("--variants", out, self.variants > 1 and suffix != ".glb")
+            page = suffix == PAGE
+            reject_unused("--resolution", out, page and self.resolution is not None)
+            reject_unused("--keep-dense", out, page and self.keep_dense)
+            reject_unused("--displace", out, page and self.displace)
 
     def write(self, out: Path) -> None:
         from mitex.runtime import let_idle_threads_sleep
@@ -251,8 +264,27 @@ class Apply(OptionalMeshOptions):
             options = self._growth(out)
             assets = NcaTexture.load(self.model).variants(Mesh.load(self._mesh), seeds, **options)
             write_variants(assets, out)
+        elif out.suffix.lower() == PAGE:
+            self._write_page(out)
         else:
             super().write(out)
+
+    def _write_page(self, out: Path) -> None:
+        from mitex.mesh import Mesh
+        from mitex.methods.nca import NcaTexture, living_page
+
+        living_page(
+            NcaTexture.load(self.model),
+            Mesh.load(self._mesh),
+            out,
+            seed=self.seed,
+            steps=self.steps,
+            subdivide=levels(self.subdivide),
+            orientation=oriented(self.orientation),
+            scale=self.scale,
+            field=self.field,
+            speed=self.speed,
+        )
 
     def applied(self, out: Path) -> Asset:
         from mitex.mesh import Mesh
@@ -274,6 +306,7 @@ class Apply(OptionalMeshOptions):
             "subdivide": levels(self.subdivide),
             "orientation": oriented(self.orientation),
             "scale": self.scale,
+            "exemplar_width": self.exemplar_width,
             "resolution": (self.resolution or RESOLUTION) if textures else None,
             "keep_dense": self.keep_dense,
             "displace": self.displace,

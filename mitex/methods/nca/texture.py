@@ -16,7 +16,7 @@ from mitex.asset import Asset
 from mitex.atlas import Atlas, laid_out
 from mitex.mesh import Mesh
 from mitex.methods.nca import files
-from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.cells import Cells, scale_of_width
 from mitex.methods.nca.displacement import known_relief
 from mitex.methods.nca.field import fields
 from mitex.methods.nca.film import Shooting, film
@@ -48,6 +48,12 @@ class GrowingTexture(ABC):
     @abstractmethod
     def steps(self) -> int:
         """Of the automaton, until the pattern is in order."""
+
+    @property
+    def density(self) -> float:
+        """Cells along the exemplar's width, as it was learned."""
+        density = self.about.get("density")
+        return float(density) if isinstance(density, int | float) and density > 0 else DENSITY
 
     @abstractmethod
     def condition(
@@ -96,6 +102,7 @@ class GrowingTexture(ABC):
         subdivide: int | str = "auto",
         orientation: Orientation = 0.0,
         scale: float = 1.0,
+        exemplar_width: float | None = None,
         resolution: int | None = 1024,
         keep_dense: bool = False,
         displace: bool = False,
@@ -116,6 +123,8 @@ class GrowingTexture(ABC):
                 that its up follows, see `mitex.mesh.fields`.
             scale: size of the pattern, 1 for what the density gives; others need a remeshing of the copy to
                 the fitting density (extra `remesh`).
+            exemplar_width: in place of `scale`: how wide the exemplar is, 0.5 as on a surface texture [sides
+                of the layout's square, see `mitex.methods.layout`].
             resolution: of the baked textures [texels], on the mesh's own UVs if nothing in them overlaps,
                 else on new ones. None leaves the maps at the vertices.
             keep_dense: returns the finer mesh itself, rounded by Loop subdivision, instead of the given one.
@@ -133,6 +142,8 @@ class GrowingTexture(ABC):
                 used on the mesh; a texture without a relief that shall displace it.
             MeshError: the mesh cannot be remeshed.
         """
+        if exemplar_width is not None:
+            scale *= scale_of_width(mesh, exemplar_width, self.density, subdivide)
         laid = mesh if resolution is None or (keep_dense and scale != 1.0) else laid_out(mesh, resolution)
         announce("preparing the mesh")
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
@@ -264,7 +275,7 @@ class NcaTexture(GrowingTexture):
         Raises:
             ConfigError: options out of range, or a field as of `apply`.
         """
-        lattice = flat_cells(self._tile_cells() if cells is None else cells, resolution)
+        lattice = flat_cells(square_cells(self.density) if cells is None else cells, resolution)
         operator = lattice_perception(lattice, self.look.rule.degree, self.look.mean)
         cells_of_square = Cells(lattice.joined, 0, lattice.joined)
         condition = tile_condition(self.look, self.about, lattice, field, speed)
@@ -326,12 +337,6 @@ class NcaTexture(GrowingTexture):
     def family(self) -> str:
         """What it has in common with textures that were trained from it, or from what it was trained from."""
         return str(self.about.get("family") or weights_key(self.look))
-
-    def _tile_cells(self) -> int:
-        density = self.about.get("density")
-        if not isinstance(density, int | float) or not density > 0:
-            density = DENSITY
-        return square_cells(density)
 
     @property
     def _palette(self) -> Palette | None:

@@ -14,13 +14,13 @@ from mitex.asset import Asset
 from mitex.atlas import MAX_RESOLUTION, Atlas
 from mitex.errors import ConfigError
 from mitex.export.common import asset_from_textures
-from mitex.geometry.triangles import interpolate, twice_area
+from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh, remesh
 from mitex.mesh.nearest import surface_points
 from mitex.methods.baselines.reaction_diffusion import METHOD
 from mitex.methods.baselines.reaction_diffusion.laplacian import mesh_laplacian
 from mitex.methods.baselines.reaction_diffusion.reaction import BOUND, Reaction, colours
-from mitex.methods.layout import with_layout
+from mitex.methods.layout import RESOLUTION, layout_side, with_layout
 from mitex.progress import announce
 from mitex.runtime import keep_freed_memory
 from mitex.sparse import LinearMap
@@ -30,7 +30,6 @@ STEPS = 500  # of time, after which patterns are in order
 MOST_STEPS = 10_000
 PERIOD = 16  # steps after which states are held within their bounds
 MOST_CELLS = 500_000
-LAYOUT = 512  # texels that charts are packed for, as those of surface textures
 PADDING = 8  # texels by which charts are continued outwards
 
 
@@ -113,7 +112,7 @@ class ReactionDiffusionTexture:
                 f"a texture of {scale:g} times the size, {steps} steps and {resolution} texels",
                 f"use sizes from 0.05 to 20, up to {MOST_STEPS} steps, and 16 to {MAX_RESOLUTION} texels",
             )
-        unwrapped = with_layout(mesh, LAYOUT, keep_uvs)
+        unwrapped = with_layout(mesh, RESOLUTION, keep_uvs)
         cells = even_cells(unwrapped, scale * self.width / self.cells)
         keep_freed_memory()
         announce("letting the chemicals react")
@@ -145,15 +144,9 @@ def even_cells(mesh: Mesh, width: float) -> Mesh:
         width: of the square [sides of the layout's square, at the median of the faces].
 
     Raises:
-        ConfigError: there would be too many.
+        ConfigError: there would be too many, or the layout has no area.
     """
-    assert mesh.uv is not None
-    area, in_layout = mesh.face_areas.astype(np.float64), 0.5 * np.abs(twice_area(mesh.uv))
-    solid = (area > 0) & (in_layout > 0)
-    if not solid.any():
-        raise ConfigError(f"mesh '{mesh.name}' has no area in its layout", "unwrap it again")
-    side = width * float(np.median(np.sqrt(area[solid] / in_layout[solid])))
-    count = area.sum() / side**2
+    count = mesh.face_areas.sum(dtype=np.float64) / (width * layout_side(mesh)) ** 2
     if count > MOST_CELLS:
         raise ConfigError(
             f"a pattern so small on '{mesh.name}' needs {count:,.0f} cells", "use a larger scale"

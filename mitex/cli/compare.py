@@ -1,0 +1,136 @@
+"""`mitex compare` and `mitex compare answers`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, UseAppendAction, arg
+
+from mitex.cli.engines import JobOptions, refuse_missing
+from mitex.errors import ConfigError
+from mitex.methods.checks import in_range, mutually_exclusive
+
+if TYPE_CHECKING:
+    from mitex.batch import Plan
+
+MOST_SEEDS = 1000
+
+
+@dataclass(kw_only=True)
+class Compare(JobOptions):
+    """Compare methods: the same exemplars on the same meshes by each of them, measured alike, as one report.
+
+    DIR gets report.html with pictures and tables, report.csv and report.json, and in batch/ the runs and
+    assets. The same command again goes on; `mitex batch status DIR/batch` tells how far it is.
+
+    examples:
+      mitex compare --exemplar lava --mesh vase --methods surface,image-quilting --out out/compare
+      mitex compare --exemplar lava rust --mesh vase a.obj --methods surface,nca --seeds 3 --out out/compare
+      mitex compare --exemplar lava --mesh vase --methods nca,gatys --set nca:steps=300 --out out/compare
+    """
+
+    exemplar: Annotated[tuple[str, ...], arg(metavar="IMAGE|DIR|NAME ...")] = ()
+    """Images, folders of maps, patterns such as "photos/*.png", or names that ship with Mitex."""
+
+    mesh: Annotated[tuple[str, ...], arg(metavar="MESH|NAME ...")] = ()
+    """Mesh files, patterns, or names that ship with Mitex."""
+
+    methods: Annotated[str | None, arg(metavar="NAME,NAME,...", help_behavior_hint="")] = None
+    """The methods, as of `mitex fit`."""
+
+    seeds: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 1, or the plan's)")] = None
+    """Fits of each method with another seed; from 2 on, the spread is known."""
+
+    plan: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None
+    """In place of these lists, a plan as of `mitex batch`."""
+
+    preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
+    """In place of these lists, a paper's comparison: surface-fig4, nca-fig10."""
+
+    data: Annotated[Path, arg(metavar="DIR")] = Path("../shared/data")
+    """Folder with what a paper's comparison needs that does not ship with Mitex."""
+
+    set: Annotated[
+        tuple[tuple[str, ...], ...],
+        UseAppendAction,
+        arg(metavar="METHOD:KEY=VALUE ...", help_behavior_hint="(repeatable)"),
+    ] = ()
+    """Any option or setting of a method's fit; with METHOD:apply.KEY=VALUE, an option of `mitex apply`."""
+
+    study: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Write study.html, too: a page for a blind test of preference that others can open."""
+
+    out: Annotated[Path, arg(metavar="DIR")]
+    """Folder for everything."""
+
+    def run(self) -> None:
+        self.check_jobs()
+        in_range("--seeds", self.seeds, 1, MOST_SEEDS)
+        plan = self._plan()
+        from mitex.runtime import let_idle_threads_sleep
+
+        let_idle_threads_sleep()
+        from mitex.comparison.run import compare
+
+        options = {"threads": self.threads, "retry": self.retry, "study": self.study}
+        done = compare(plan, self.out, self.chosen_engine(), **options)
+        for line in done.failures:
+            print(f"failed   {line}")
+        print(done.report)
+        if self.study:
+            print(done.folder / "study.html")
+        refuse_missing(done.missing, done.total)
+
+    def _plan(self) -> Plan:
+        from mitex.comparison.plan import comparison_plan, prepared
+
+        lists = {
+            "--exemplar": self.exemplar,
+            "--mesh": self.mesh,
+            "--methods": self.methods,
+            "--set": self.set,
+        }
+        if self.plan is not None or self.preset is not None:
+            mutually_exclusive("--plan", "--preset", self.plan is not None and self.preset is not None)
+            for option, values in lists.items():
+                mutually_exclusive("--plan" if self.plan else "--preset", option, bool(values))
+            return prepared(self._named_plan(), self.seeds)
+        for option, values in lists.items():
+            if not values and option != "--set":
+                raise ConfigError(f"{option} is missing", "see `mitex compare --help`")
+        names = [name for name in (self.methods or "").split(",") if name.strip()]
+        settings = [word for words in self.set for word in words]
+        return comparison_plan(self.exemplar, self.mesh, names, seeds=self.seeds or 1, settings=settings)
+
+    def _named_plan(self) -> Plan:
+        if self.plan is not None:
+            from mitex.batch import Plan
+
+            return Plan.read(self.plan)
+        from mitex.comparison.presets import preset_plan
+
+        return preset_plan(str(self.preset), self.data)
+
+
+@dataclass
+class Answers:
+    """Evaluate the answers to the page that `mitex compare --study` wrote: who was preferred, and by chance?
+
+    examples:
+      mitex compare answers out/compare answers/*.json
+    """
+
+    folder: Annotated[Positional[Path], arg(metavar="DIR")]
+    """What was given as --out."""
+
+    files: Annotated[Positional[tuple[Path, ...]], arg(metavar="FILE ...")]
+    """What people saved."""
+
+    def run(self) -> None:
+        from mitex.comparison.answers import evaluate, read_answers
+        from mitex.comparison.study import Study
+
+        study = Study.load(self.folder)
+        print(evaluate(study, read_answers(study, self.files)).text())

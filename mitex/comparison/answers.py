@@ -1,0 +1,202 @@
+"""What people answered in a blind test: how often each method was preferred, and whether that is chance.
+
+As in the study of Kovacs et al. (2024): the share of answers that prefer a method, its mean and standard
+deviation over the cases, which are pairs of exemplar and mesh; a one-way analysis of variance over the
+methods, and t-tests of each two of them.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.stats
+
+from mitex.comparison.study import Study
+from mitex.errors import ConfigError
+from mitex.paths import expanded
+
+MOST_BYTES = 1 << 20  # of a file of answers
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What somebody preferred.
+
+    Attributes:
+        question: its number in the study.
+        choice: 0 or 1, of the question's methods; None if they look alike.
+    """
+
+    question: int
+    choice: int | None
+
+
+@dataclass(frozen=True)
+class Preference:
+    """How often a method was preferred.
+
+    Attributes:
+        method: its label.
+        wins: answers that prefer it; half of one where no difference was seen.
+        count: answers to questions about it.
+        interval: of the share, 95 %, Wilson's, if answers were independent.
+        mean, spread: of the shares in the cases, and their standard deviation; NaN of a single case.
+    """
+
+    method: str
+    wins: float
+    count: int
+    interval: tuple[float, float]
+    mean: float
+    spread: float
+
+    @property
+    def share(self) -> float:
+        """Of the answers."""
+        return self.wins / self.count
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What a study has come to.
+
+    Attributes:
+        preferences: the most preferred method first.
+        f, p: of the analysis of variance over methods, with the cases as samples; NaN of fewer than two.
+        pairs: two methods -> p of a t-test of their shares in the cases, adjusted by Holm's procedure.
+        people: whose answers there are.
+    """
+
+    preferences: tuple[Preference, ...]
+    f: float
+    p: float
+    pairs: Mapping[tuple[str, str], float]
+    people: int
+
+    def text(self) -> str:
+        """A line for each method, then the tests."""
+        lines = [f"answers of {self.people} {'person' if self.people == 1 else 'people'}"]
+        width = max(len(one.method) for one in self.preferences)
+        for one in self.preferences:
+            low, high = (100 * bound for bound in one.interval)
+            spread = (
+                ""
+                if math.isnan(one.spread)
+                else f"; over cases {_percent(one.mean)} ± {_percent(one.spread)}"
+            )
+            share = f"{_percent(one.share)} (95 %: {low:.0f} to {high:.0f} %)"
+            lines.append(f"{one.method:{width}}  {share} of {one.count}{spread}")
+        if math.isnan(self.p):
+            return "\n".join([*lines, "analysis of variance: needs two cases that differ, or more"])
+        lines.append(f"analysis of variance: F = {self.f:.3f}, p = {self.p:.2g}")
+        pairs = [f"{one} and {other}: p = {p:.2g}" for (one, other), p in self.pairs.items()]
+        return "\n".join([*lines, *pairs])
+
+
+def read_answers(study: Study, files: Iterable[str | Path]) -> dict[str, list[Answer]]:
+    """The answers in files that the page saved: participant -> answers.
+
+    Raises:
+        ConfigError: A file cannot be read, is of another study, or the same person's as another.
+    """
+    people: dict[str, list[Answer]] = {}
+    for file in files:
+        name, answers = _read(study, expanded(file))
+        if name in people:
+            raise ConfigError(f"the answers in '{file}' are there twice", "name every file once")
+        people[name] = answers
+    if not any(people.values()):
+        raise ConfigError("there are no answers", "name files that the study's page has saved")
+    return people
+
+
+def evaluate(study: Study, people: Mapping[str, Sequence[Answer]]) -> Evaluation:
+    """Shares, their spread over the cases, and the tests."""
+    wins: defaultdict[tuple[str, str], float] = defaultdict(float)
+    counts: defaultdict[tuple[str, str], int] = defaultdict(int)
+    for answer in (answer for answers in people.values() for answer in answers):
+        question = study.questions[answer.question]
+        case = f"{question.exemplar}\0{question.mesh}"
+        for k, method in enumerate(question.methods):
+            counts[method, case] += 1
+            wins[method, case] += 0.5 if answer.choice is None else float(answer.choice == k)
+    methods = list(dict.fromkeys(method for method, _ in counts))
+    shares = {m: [wins[key] / counts[key] for key in counts if key[0] == m] for m in methods}
+    preferences = [_preference(m, shares[m], _total(wins, m), int(_total(counts, m))) for m in methods]
+    f, p, pairs = _tests(shares)
+    ordered = sorted(preferences, key=lambda one: -one.share)
+    return Evaluation(tuple(ordered), f, p, pairs, len(people))
+
+
+def _read(study: Study, file: Path) -> tuple[str, list[Answer]]:
+    try:
+        if not file.is_file() or file.stat().st_size > MOST_BYTES:
+            raise ConfigError(f"'{file}' is no file of answers", "name one that the study's page has saved")
+        record = json.loads(file.read_text(encoding="utf-8"))
+        if record["study"] != study.id:
+            raise ConfigError(f"'{file}' answers another study", "name answers to this one")
+        return str(record["participant"]), [_answer(study, entry) for entry in record["answers"]]
+    except (OSError, ValueError, TypeError, KeyError, IndexError, RecursionError) as e:
+        raise ConfigError(f"'{file}' holds no answers", "name a file that the study's page has saved") from e
+
+
+def _answer(study: Study, entry: Mapping[str, Any]) -> Answer:
+    question, choice = entry["question"], entry["choice"]
+    if type(question) is not int or not 0 <= question < len(study.questions) or choice not in (0, 1, None):
+        raise ValueError(entry)
+    return Answer(question, choice)
+
+
+def _total(counter: Mapping[tuple[str, str], float], method: str) -> float:
+    return sum(value for (name, _), value in counter.items() if name == method)
+
+
+def _preference(method: str, shares: Sequence[float], wins: float, count: int) -> Preference:
+    interval = scipy.stats.binomtest(round(wins), count).proportion_ci(method="wilson")
+    spread = float(np.std(shares, ddof=1)) if len(shares) > 1 else math.nan
+    return Preference(
+        method, wins, count, (float(interval.low), float(interval.high)), float(np.mean(shares)), spread
+    )
+
+
+def _tests(shares: Mapping[str, Sequence[float]]) -> tuple[float, float, dict[tuple[str, str], float]]:
+    """F and p of the analysis of variance, and of the t-tests the adjusted p; NaN where nothing varies."""
+    varies = any(np.ptp(values) > 0 for values in shares.values())
+    if len(shares) < 2 or min(map(len, shares.values())) < 2 or not varies:
+        return math.nan, math.nan, {}
+    f, p = scipy.stats.f_oneway(*shares.values())
+    raw = {pair: _t_test(*(shares[m] for m in pair)) for pair in combinations(shares, 2)}
+    return float(f), float(p), holm(raw)
+
+
+def _t_test(one: Sequence[float], other: Sequence[float]) -> float:
+    """p that shares have the same mean; of shares that do not vary it is known."""
+    if np.ptp(one) == 0 and np.ptp(other) == 0:
+        return float(one[0] == other[0])
+    test: Any = scipy.stats.ttest_ind(one, other)
+    return float(test.pvalue)
+
+
+def holm(raw: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], float]:
+    """p values, adjusted for how many tests there are (Holm 1979).
+
+    The least is multiplied by the number of tests, the next one by one less, and so on; none becomes less
+    than the one before, nor more than 1.
+    """
+    adjusted, least = {}, 0.0
+    for k, pair in enumerate(sorted(raw, key=lambda pair: raw[pair])):
+        least = max(least, min(raw[pair] * (len(raw) - k), 1.0))
+        adjusted[pair] = least
+    return adjusted
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %"

@@ -1,0 +1,87 @@
+"""What was measured, kept in a folder: a later call measures only what is new."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from safetensors import safe_open
+
+from mitex.asset import Asset
+from mitex.comparison.pair import SETTINGS, Pair
+from mitex.comparison.results import Result
+from mitex.images import write_image
+from mitex.paths import atomic_write
+from mitex.training.locate import CHECKPOINT
+
+OPTIMIZED = ("optimizer/first/", "optimizer/point")  # tensors of a checkpoint, as large as what is optimized
+
+
+class Kept:
+    """A folder with numbers and a picture of each result, and the numbers of exemplars beside themselves."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def completed(self, result: Result) -> Result | None:
+        """The result with what is known of it; None if that is not all."""
+        picture, numbers = self._file(result, ".jpg"), _read(self._file(result, ".json"))
+        return None if numbers is None or not picture.is_file() else _with(result, numbers, picture)
+
+    def measured(self, result: Result, pair: Pair) -> Result:
+        """The result, measured now and kept.
+
+        Raises:
+            MitexError: The asset cannot be read or measured, or the disk is full.
+        """
+        asset = Asset.load(result.asset)
+        numbers = pair.numbers(asset) | {"parameters": optimized_numbers(result.run)}
+        known = {key: value for key, value in numbers.items() if math.isfinite(value)}
+        picture = write_image(self._file(result, ".jpg"), pair.picture(asset))
+        _write(self._file(result, ".json"), known)
+        return _with(result, known, picture)
+
+    def floor(self, pair: Pair) -> dict[str, float]:
+        """That of a pair."""
+        path = self.folder / f"exemplar-{pair.key}.json"
+        if (known := _read(path)) is None:
+            known = pair.floor()
+            _write(path, known)
+        return known
+
+    def _file(self, result: Result, suffix: str) -> Path:
+        return self.folder / f"{result.id}{suffix}"
+
+
+def optimized_numbers(run: Path) -> int:
+    """How many numbers a fit has optimized, by its checkpoint; 0 without one."""
+    path = run / CHECKPOINT
+    if not path.is_file():
+        return 0
+    with safe_open(path, framework="pt") as file:
+        names = [name for name in file.keys() if name.startswith(OPTIMIZED)]  # noqa: SIM118
+        return sum(math.prod(file.get_slice(name).get_shape()) for name in names)
+
+
+def _read(path: Path) -> dict[str, float] | None:
+    """Numbers that were kept; None if there are none, or if they were measured with other settings."""
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        if record["settings"] != SETTINGS:
+            return None
+        return {key: float(value) for key, value in record["numbers"].items()}
+    except (OSError, ValueError, TypeError, KeyError, AttributeError):
+        return None
+
+
+def _write(path: Path, numbers: Mapping[str, float]) -> None:
+    record = {"settings": SETTINGS, "numbers": dict(numbers)}
+    with atomic_write(path) as temporary:
+        temporary.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+
+
+def _with(result: Result, numbers: Mapping[str, float], picture: Path) -> Result:
+    return replace(result, numbers={**result.numbers, **numbers}, pictures={"picture": picture})

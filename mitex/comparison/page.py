@@ -1,0 +1,144 @@
+"""The report as one HTML file that works offline: pictures inside, tables that can be sorted."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+
+from mitex import __version__
+from mitex.comparison.html import count_text, items, jpeg, picture, template, text_of
+from mitex.comparison.measures import MEASURES
+from mitex.comparison.results import Result, label
+from mitex.comparison.summary import Summary
+from mitex.comparison.tables import meaning_html, table_html
+
+CONDITIONS = (
+    "Exemplars, meshes and seeds: every method has made the same ones, but where a cell is empty.",
+    "The size of the pattern: the exemplar is half as wide as the side of the UV layout's square, as far as "
+    "the settings of the methods leave it at that.",
+    "What is measured: colours alone, read off the asset that mitex apply wrote, without light, by the same "
+    "cameras: 16 patches of the surface, three eighths of the exemplar wide, with as many pixels as there, "
+    "beside as many patches of the exemplar.",
+    "Pixels that are seen at more than 60 degrees from the normal, or beside the mesh, do not count.",
+    "Pictures: the same camera and light. What a method has learned besides colours shows in them.",
+    "Not the same: steps and settings, which are each method's own defaults unless something else was asked "
+    "for, and the load of the machine while seconds were measured.",
+)
+
+
+@dataclass(frozen=True)
+class Page:
+    """What a report shows.
+
+    Attributes:
+        results: all results.
+        tables: means of them.
+        exemplars: path or name -> picture (S, S, 3), sRGB in [0, 1].
+        floors: exemplar and mesh -> measure -> value of the exemplar beside itself.
+        failures: a line for each job or measurement that failed.
+    """
+
+    results: Sequence[Result]
+    tables: Sequence[Summary]
+    exemplars: Mapping[str, np.ndarray]
+    floors: Mapping[tuple[str, str], Mapping[str, float]]
+    failures: Sequence[str]
+
+    def html(self) -> str:
+        """The text of the file."""
+        return template("report.html").substitute(
+            style=text_of("style.css"),
+            title=escape(self._title()),
+            subtitle=escape(self._subtitle()),
+            failures=self._failures(),
+            seeds=self._seed_buttons(),
+            looks="".join(map(self._looks, self.exemplars)),
+            numbers_note=escape(self._note()),
+            tables=self._tables(),
+            meanings="".join(map(meaning_html, MEASURES)),
+            conditions=items(CONDITIONS),
+            footer=f"Mitex {escape(__version__)}, {time.strftime('%-d %B %Y')}",
+        )
+
+    @property
+    def methods(self) -> list[str]:
+        """Labels, in the plan's order."""
+        return list(dict.fromkeys(result.method for result in self.results))
+
+    @property
+    def seeds(self) -> list[int | None]:
+        """Of all results."""
+        return list(dict.fromkeys(result.seed for result in self.results))
+
+    def _title(self) -> str:
+        *names, last = self.methods or ["nothing"]
+        return f"Comparing {', '.join(names)} and {last}" if names else f"Measuring {last}"
+
+    def _subtitle(self) -> str:
+        meshes = list(dict.fromkeys(label(result.mesh) for result in self.results))
+        exemplars = ", ".join(map(label, self.exemplars))
+        return f"{exemplars} on {', '.join(meshes)}; {count_text(len(self.seeds), 'seed')}"
+
+    def _failures(self) -> str:
+        return (
+            f'<div class="failed"><p>Not done:</p><ul>{items(self.failures)}</ul></div>'
+            if self.failures
+            else ""
+        )
+
+    def _seed_buttons(self) -> str:
+        if len(self.seeds) < 2:
+            return ""
+        buttons = "".join(
+            f'<button value="{seed}" aria-pressed="{str(k == 0).lower()}">{seed}</button>'
+            for k, seed in enumerate(self.seeds)
+        )
+        return f'<p class="seeds"><span class="soft">Seed</span> {buttons}</p>'
+
+    def _looks(self, exemplar: str) -> str:
+        """The pictures of an exemplar: a row for each mesh, a column for each method."""
+        results = [result for result in self.results if result.exemplar == exemplar]
+        rows = []
+        for mesh in dict.fromkeys(result.mesh for result in results):
+            image = "" if rows else picture(jpeg(self.exemplars[exemplar]), f"exemplar {label(exemplar)}")
+            cells = "".join(self._look(results, mesh, name) for name in self.methods)
+            rows.append(f"<tr><td>{image}</td><th>{escape(label(mesh))}</th>{cells}</tr>")
+        heads = "".join(f"<th>{escape(name)}</th>" for name in self.methods)
+        head = f"<tr><th>{escape(label(exemplar))}</th><th></th>{heads}</tr>"
+        content = f"<thead>{head}</thead><tbody>{''.join(rows)}</tbody>"
+        columns = f"--columns: {len(self.methods) + 1}"
+        return f'<div class="wide"><table class="looks" style="{columns}">{content}</table></div>'
+
+    def _look(self, results: Iterable[Result], mesh: str, method: str) -> str:
+        """A cell with the picture of each seed, of which one is shown."""
+        images = [
+            picture(
+                result.pictures["picture"].read_bytes(),
+                f"{label(result.exemplar)} on {label(mesh)} by {method}, seed {result.seed}",
+                f' data-seed="{result.seed}"' + (" hidden" if result.seed != self.seeds[0] else ""),
+            )
+            for result in results
+            if result.mesh == mesh and result.method == method and result.pictures
+        ]
+        return f"<td>{''.join(images)}</td>" if images else '<td class="none">not done</td>'
+
+    def _note(self) -> str:
+        if len(self.seeds) < 2:
+            return (
+                "Of one seed: how much is due to chance is not known, so nothing is marked as the best. More "
+                "seeds (--seeds 3) tell. Click on a heading to sort."
+            )
+        return (
+            f"Means over {len(self.seeds)} seeds ± their standard deviation. Green is what is better than "
+            "every other method by more than both spreads together. Click on a heading to sort."
+        )
+
+    def _tables(self) -> str:
+        """That of the means over all pairs first."""
+        ordered = sorted(self.tables, key=lambda table: table.pair is not None)
+        floors = [self.floors.get(table.pair, {}) if table.pair else {} for table in ordered]
+        return "".join(map(table_html, ordered, floors))

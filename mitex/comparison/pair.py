@@ -1,0 +1,134 @@
+"""An exemplar and a mesh: all that results on them are measured with, which is the same for all methods."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import asdict
+from functools import cache, cached_property
+
+import numpy as np
+
+from mitex.asset import Asset, clay
+from mitex.cache import content_key
+from mitex.errors import ImageError
+from mitex.evaluation.likeness import Vectors, exemplar_patches, likeness, patch_features
+from mitex.evaluation.patches import albedo_views, patch_cameras
+from mitex.evaluation.regularity import regularity
+from mitex.evaluation.seams import seam_ratio
+from mitex.exemplar import Exemplar
+from mitex.mesh import Mesh
+from mitex.methods.layout import EXEMPLAR_WIDTH, RESOLUTION, layout_side, with_layout
+from mitex.render.picture import AZIMUTH, ELEVATION, tone
+from mitex.render.renderer import OrbitRenderer
+from mitex.scenes.cameras import Cameras
+
+log = logging.getLogger(__name__)
+
+SIDE = 256  # of the exemplar, at most [px]
+PATCHES, SHARE = 16, 0.375  # patches, and their width [widths of the exemplar]
+WINDOWS = 6  # as wide as the exemplar, for the repetition
+CELL, SPP = 384, 64  # side of a picture [px], and rays of each pixel
+SETTINGS = {"version": 2, "patches": PATCHES, "share": SHARE, "windows": WINDOWS, "cell": CELL, "spp": SPP}
+
+
+@cache
+def picture_of(exemplar: str) -> np.ndarray:
+    """The central square of an exemplar's albedo, (S, S, 3) sRGB in [0, 1], at most `SIDE` wide.
+
+    Raises:
+        ImageError: It cannot be read, or has no albedo.
+    """
+    source = Exemplar.load(exemplar).of_albedo()
+    return source.resized(min(SIDE, *source.size)).maps["albedo"]
+
+
+@cache
+def sized_mesh(mesh: str) -> tuple[Mesh, float]:
+    """A mesh, and how wide the exemplar is on it [mesh units].
+
+    Raises:
+        MeshError: It cannot be read.
+    """
+    loaded = Mesh.load(mesh)
+    return loaded, EXEMPLAR_WIDTH * layout_side(with_layout(loaded, RESOLUTION))
+
+
+def forget_inputs() -> None:
+    """Lets exemplars and meshes be read anew: files may have changed."""
+    picture_of.cache_clear()
+    sized_mesh.cache_clear()
+
+
+class Pair:
+    """An exemplar and a mesh.
+
+    Args:
+        exemplar, mesh: paths or names.
+    """
+
+    def __init__(self, exemplar: str, mesh: str) -> None:
+        self.image = picture_of(exemplar)
+        self.mesh, self.width = sized_mesh(mesh)
+
+    @property
+    def key(self) -> str:
+        """A hash of both."""
+        return content_key(self.image, self.mesh.vertices, self.mesh.faces)
+
+    def numbers(self, asset: Asset) -> dict[str, float]:
+        """What is measured of an asset; NaN, or nothing, where that is not possible."""
+        return {
+            **self._likeness(asset),
+            "seams": seam_ratio(asset, self.width / len(self.image)),
+            "repetition": self._regularity(albedo_views(asset, self._windows)[0]) - self._own_regularity,
+        }
+
+    def floor(self) -> dict[str, float]:
+        """The distances of other patches of the exemplar: the least that is to be expected."""
+        try:
+            others = patch_features(exemplar_patches(self.image, self._patch_masks, seed=1))
+            return asdict(likeness(others, self._features))
+        except ImageError:
+            return {}
+
+    def picture(self, asset: Asset) -> np.ndarray:
+        """(CELL, CELL, 3) sRGB in [0, 1]: the asset in light, path-traced."""
+        renderer = OrbitRenderer(asset, resolution=CELL, like=self.mesh)
+        return tone(renderer.render(AZIMUTH, renderer.fit_view(AZIMUTH, ELEVATION), SPP))
+
+    def _likeness(self, asset: Asset) -> dict[str, float]:
+        """Distances of patches; none on a mesh so thin that they show too little of it."""
+        try:
+            ours = patch_features(albedo_views(asset, self._patches))
+            return asdict(likeness(ours, self._features))
+        except ImageError as e:
+            log.info("%s: %s", self.mesh.name, e)
+            return {}
+
+    def _regularity(self, images: np.ndarray) -> float:
+        """The mean over windows."""
+        return float(np.mean([regularity(*view) for view in zip(images, self._window_masks, strict=True)]))
+
+    @cached_property
+    def _patches(self) -> Cameras:
+        return patch_cameras(self.mesh, PATCHES, SHARE * self.width, round(SHARE * len(self.image)))
+
+    @cached_property
+    def _windows(self) -> Cameras:
+        return patch_cameras(self.mesh, WINDOWS, self.width, len(self.image))
+
+    @cached_property
+    def _patch_masks(self) -> np.ndarray:
+        return albedo_views(clay(self.mesh), self._patches)[1]
+
+    @cached_property
+    def _window_masks(self) -> np.ndarray:
+        return albedo_views(clay(self.mesh), self._windows)[1]
+
+    @cached_property
+    def _features(self) -> Vectors:
+        return patch_features(exemplar_patches(self.image, self._patch_masks))
+
+    @cached_property
+    def _own_regularity(self) -> float:
+        return self._regularity(np.broadcast_to(self.image, (WINDOWS, *self.image.shape)))

@@ -1,0 +1,123 @@
+"""The plan of a comparison: from lists of exemplars, meshes and methods to the jobs of a batch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from mitex.batch import MethodPlan, Plan
+from mitex.batch.options import apply_kinds, fit_kinds
+from mitex.errors import ConfigError
+from mitex.methods.layout import EXEMPLAR_WIDTH
+from mitex.methods.registry import methods
+from mitex.suggestions import suggestion
+from mitex.training import values
+
+WIDTH = "exemplar_width"  # option of `mitex apply` of methods whose pattern has another size without it
+SCALES = (WIDTH, "scale")
+SOURCE = "exemplar"  # what methods that can be compared learn from
+
+
+def comparison_plan(
+    exemplars: Sequence[str],
+    meshes: Sequence[str],
+    names: Sequence[str],
+    *,
+    seeds: int = 1,
+    settings: Sequence[str] = (),
+    folder: str | Path = ".",
+) -> Plan:
+    """Every method on every exemplar and mesh, each fit once for each seed.
+
+    Args:
+        exemplars, meshes: paths, patterns or names, as in a plan of `mitex batch`.
+        names: of the methods; dashes stand for underscores.
+        seeds: how many: 0, 1, ...
+        settings: `METHOD:KEY=VALUE`, an option or setting of `mitex fit METHOD`, or `METHOD:apply.KEY=VALUE`,
+            an option of `mitex apply`.
+        folder: where relative paths begin.
+
+    Raises:
+        ConfigError: An unknown method or key, a value that does not fit, or nothing to do.
+    """
+    if not 1 <= seeds <= 1000:
+        raise ConfigError(f"{seeds} seeds", "use 1 to 1000")
+    tables: dict[str, dict[str, Any]] = {}
+    for name in (name.strip().replace("-", "_") for name in names):
+        if name not in methods():
+            raise ConfigError(f"there is no method '{name}'", suggestion(name, methods()))
+        if name in tables:
+            raise ConfigError(f"method '{name}' is named twice", "name it once")
+        tables[name] = {}
+    for setting in settings:
+        _add(tables, setting)
+    content = {
+        "exemplars": list(exemplars),
+        "meshes": list(meshes),
+        "seeds": list(range(seeds)),
+        "methods": tables,
+    }
+    return prepared(Plan.of(content, folder))
+
+
+def prepared(plan: Plan, seeds: int | None = None) -> Plan:
+    """A plan of `mitex batch`, checked and completed so that what its methods make can be compared.
+
+    Args:
+        plan: the plan.
+        seeds: how many, in place of those of the plan.
+
+    Raises:
+        ConfigError: A method does not learn from an exemplar or is put on no mesh, or the output is no .glb.
+    """
+    parts = tuple(map(_prepared, plan.methods))
+    if seeds is not None:
+        parts = tuple(replace(part, seeds=tuple(range(seeds))) for part in parts)
+    return replace(plan, methods=parts)
+
+
+def _prepared(part: MethodPlan) -> MethodPlan:
+    method = methods()[part.method]
+    if method.learns_from != SOURCE or not method.applies_to_meshes:
+        able = [one.name for one in methods().values() if one.learns_from == SOURCE]
+        raise ConfigError(
+            f"{method.name} learns from a {method.learns_from}, which is not compared yet",
+            f"name some of {', '.join(able)}",
+        )
+    if not part.meshes:
+        raise ConfigError("there are no meshes to compare on", "name some")
+    if part.output != "glb":
+        raise ConfigError(f"methods.{part.label} writes {part.output}", 'leave out `output`, or say "glb"')
+    sized = WIDTH in apply_kinds(method) and not any(name in part.apply for name in SCALES)
+    return replace(part, apply={**part.apply, WIDTH: EXEMPLAR_WIDTH}) if sized else part
+
+
+def _add(tables: Mapping[str, dict[str, Any]], setting: str) -> None:
+    """Puts `METHOD:KEY=VALUE` into the method's table."""
+    name, colon, rest = setting.partition(":")
+    key, equals, text = rest.partition("=")
+    if not (colon and equals and key.strip()):
+        raise ConfigError(f"'{setting}' is not a setting", "write METHOD:KEY=VALUE, such as nca:steps=300")
+    label = name.strip().replace("-", "_")
+    if label not in tables:
+        raise ConfigError(f"'{setting}' is of no method that is compared", suggestion(label, tables))
+    key, method, table = key.strip().replace("-", "_"), methods()[label], tables[label]
+    if key.startswith("apply."):
+        key, table = key.removeprefix("apply."), table.setdefault("apply", {})
+        table[key] = _value(key, text.strip(), apply_kinds(method), label)
+    else:
+        table[key] = _value(key, text.strip(), fit_kinds(method), label)
+
+
+def _value(key: str, text: str, kinds: Mapping[str, Any], label: str) -> Any:
+    """The value of an option; that of a setting stays a text, which its config reads."""
+    if key not in kinds:
+        return text
+    try:
+        return values.parse(text, kinds[key])
+    except ValueError as e:
+        raise ConfigError(
+            f"{key} of {label} cannot be '{text}'", f"give {values.describe(kinds[key])}"
+        ) from e

@@ -1,0 +1,85 @@
+"""The results of a comparison's jobs: which fit and which asset belong together, and what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mitex.batch import Job, Report, Row
+from mitex.comparison.plan import SOURCE
+
+
+@dataclass(frozen=True)
+class Result:
+    """A texture on a mesh, by one method and seed.
+
+    Attributes:
+        id: of the job that wrote it.
+        exemplar, mesh: paths or names.
+        method: its label in the plan.
+        seed: of the fit.
+        asset: the file.
+        run: the run folder of the fit.
+        numbers: measure -> value, as of `MEASURES`; without those that could not be measured.
+        pictures: kind -> file.
+    """
+
+    id: str
+    exemplar: str
+    mesh: str
+    method: str
+    seed: int | None
+    asset: Path
+    run: Path
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    pictures: Mapping[str, Path] = field(default_factory=dict)
+
+    @property
+    def pair(self) -> tuple[str, str]:
+        """Exemplar and mesh."""
+        return self.exemplar, self.mesh
+
+
+def results_of(report: Report) -> list[Result]:
+    """What the jobs of a batch that are done have written, with the time and memory that they took."""
+    rows = {row.job.id: row for row in report.rows}
+    return [
+        _result(report.folder, row, rows[row.job.needs])
+        for row in report.rows
+        if row.state == "done" and row.job.needs is not None
+    ]
+
+
+def _result(folder: Path, row: Row, fit: Row) -> Result:
+    job = row.job
+    return Result(
+        id=job.id,
+        exemplar=_argument(fit.job, SOURCE),
+        mesh=_argument(job, "mesh"),
+        method=str(job.about["method"]),
+        seed=job.about["seed"],
+        asset=folder / _argument(job, "out"),
+        run=folder / fit.job.result,
+        numbers=_costs(row.record, fit.record),
+    )
+
+
+def _costs(applied: Mapping[str, Any], fitted: Mapping[str, Any]) -> dict[str, float]:
+    return {
+        "fit_seconds": float(fitted["seconds"]),
+        "apply_seconds": float(applied["seconds"]),
+        "memory": float(max(fitted["memory"], applied["memory"])),
+    }
+
+
+def _argument(job: Job, option: str) -> str:
+    """The value of an option in the words of a job."""
+    words: Sequence[str] = job.words
+    return words[words.index(f"--{option}") + 1]
+
+
+def label(text: str) -> str:
+    """What people call a path or a name."""
+    return Path(text).stem

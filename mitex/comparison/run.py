@@ -1,0 +1,176 @@
+"""Running a comparison: the jobs of its plan, what they made measured, and the report."""
+
+from __future__ import annotations
+
+import csv
+import json
+import logging
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from mitex.batch import Engine, Event, Plan, Report, run_plan
+from mitex.batch.folder import BatchFolder
+from mitex.comparison.kept import Kept
+from mitex.comparison.measures import MEASURES
+from mitex.comparison.page import Page
+from mitex.comparison.pair import Pair, forget_inputs, picture_of
+from mitex.comparison.results import Result, results_of
+from mitex.comparison.study import write_study
+from mitex.comparison.summary import Summary, summaries
+from mitex.errors import MitexError, OutputError
+from mitex.paths import atomic_write, check_writable, expanded, is_temporary
+from mitex.progress import announce
+
+log = logging.getLogger(__name__)
+
+BATCH, MEASURED = "batch", "measured"  # folders: of the jobs, and of what was measured of their results
+REPORT, TABLE, RECORD = "report.html", "report.csv", "report.json"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What a comparison has come to.
+
+    Attributes:
+        folder: of everything.
+        results: what was made and measured.
+        tables: means of it.
+        failures: a line for each job or measurement that failed.
+        missing: jobs that are not done, and results that cannot be measured.
+        total: jobs in all.
+    """
+
+    folder: Path
+    results: tuple[Result, ...]
+    tables: tuple[Summary, ...]
+    failures: tuple[str, ...] = field(default=())
+    missing: int = 0
+    total: int = 0
+
+    @property
+    def report(self) -> Path:
+        """The HTML file."""
+        return self.folder / REPORT
+
+
+def compare(
+    plan: Plan,
+    folder: str | Path,
+    engine: Engine | None = None,
+    *,
+    threads: int | None = None,
+    retry: bool = False,
+    study: bool = False,
+    on_event: Callable[[Event], None] | None = None,
+) -> Comparison:
+    """Does what is not done of a plan, measures what is not measured, and writes report.html, .csv and .json.
+
+    A job that fails does not stop the others; the report has a line for it.
+
+    Args:
+        plan: as `comparison_plan` or `prepared` make it.
+        folder: new, empty, or that of an earlier call, which goes on.
+        engine, threads, retry, on_event: as of `run_plan`.
+        study: whether to write study.html and study.json, too.
+
+    Returns:
+        What was measured.
+
+    Raises:
+        ConfigError: An input does not exist, or a job is there twice.
+        OutputError: The folder holds other files, or cannot be written to.
+        KeyboardInterrupt: As of `run_plan`; what was measured is kept.
+    """
+    place = checked_folder(folder)
+    report = run_plan(plan, place / BATCH, engine, threads=threads, retry=retry, on_event=on_event)
+    comparison = _measured(report, place)
+    _write(comparison, study)
+    return comparison
+
+
+def checked_folder(folder: str | Path) -> Path:
+    """A folder that is new, empty, or an earlier comparison's; absolute. Nothing is written.
+
+    Raises:
+        OutputError: It holds other files, or cannot be written to.
+    """
+    place = Path(os.path.abspath(expanded(folder)))
+    check_writable(place)
+    files = place.iterdir() if place.is_dir() else ()
+    if not all(map(is_temporary, files)) and not BatchFolder(place / BATCH).is_ours():
+        raise OutputError(f"'{folder}' holds other files", "name a new or empty folder with `out`")
+    return place
+
+
+def _measured(report: Report, folder: Path) -> Comparison:
+    """Measures the results that were not measured before; one that cannot be is a failure of its own."""
+    forget_inputs()
+    kept, pair_of = Kept(folder / MEASURED), cache(Pair)
+    results, failures = [], [f"{row.job.name}: {row.record.get('error')}" for row in report.failures]
+    made = results_of(report)
+    for k, result in enumerate(made):
+        announce("measuring", k, len(made))
+        known = kept.completed(result)
+        if known is None:
+            try:
+                known = kept.measured(result, pair_of(*result.pair))
+            except OutputError:
+                raise
+            except MitexError as e:
+                failures.append(f"{result.id.rpartition('-')[0]} cannot be measured: {e}")
+                continue
+        results.append(known)
+    total = len(report.rows)
+    missing = total - report.count("done") + len(made) - len(results)
+    tables = tuple(summaries(results))
+    return Comparison(folder, tuple(results), tables, tuple(failures), missing, total)
+
+
+def _write(comparison: Comparison, study: bool) -> None:
+    kept, results = Kept(comparison.folder / MEASURED), comparison.results
+    floors = {pair: kept.floor(Pair(*pair)) for pair in dict.fromkeys(r.pair for r in results)}
+    images = {name: picture_of(name) for name in dict.fromkeys(r.exemplar for r in results)}
+    page = Page(results, comparison.tables, images, floors, comparison.failures)
+    with atomic_write(comparison.report) as temporary:
+        temporary.write_text(page.html(), encoding="utf-8", errors="replace")
+    if study:
+        write_study(comparison.folder, comparison.results, images)
+    _write_csv(comparison.folder / TABLE, comparison.results)
+    record: dict[str, Any] = {
+        "results": [_flat(result, comparison.folder) for result in comparison.results],
+        "means": [_record(table, floors) for table in comparison.tables],
+        "failures": list(comparison.failures),
+        "measures": {m.key: {"better": m.better, "meaning": m.meaning} for m in MEASURES},
+    }
+    with atomic_write(comparison.folder / RECORD) as temporary:
+        temporary.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+
+
+def _write_csv(path: Path, results: Sequence[Result]) -> None:
+    columns = ("exemplar", "mesh", "method", "seed", *(measure.key for measure in MEASURES), "asset")
+    with (
+        atomic_write(path) as temporary,
+        temporary.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file,
+    ):
+        writer = csv.DictWriter(file, columns, restval="")
+        writer.writeheader()
+        writer.writerows(_flat(result, path.parent) for result in results)
+
+
+def _flat(result: Result, folder: Path) -> dict[str, Any]:
+    names = {key: getattr(result, key) for key in ("exemplar", "mesh", "method", "seed")}
+    return {**names, **result.numbers, "asset": os.path.relpath(result.asset, folder)}
+
+
+def _record(table: Summary, floors: Mapping[tuple[str, str], Mapping[str, float]]) -> dict[str, Any]:
+    cells = [
+        {"method": method, "measure": key} | {k: v if v == v else None for k, v in asdict(cell).items()}
+        for (method, key), cell in table.cells.items()
+    ]
+    exemplar, mesh = table.pair or (None, None)
+    own = {} if table.pair is None else floors[table.pair]
+    return {"exemplar": exemplar, "mesh": mesh, "cells": cells, "exemplar_beside_itself": own}

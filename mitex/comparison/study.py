@@ -1,0 +1,125 @@
+"""A page for a blind test of preference: pairs of pictures beside their exemplar, without names.
+
+The page shuffles questions and sides for each who opens it, and saves the answers as a file. Which methods a
+question is about stands in study.json, which stays with whoever asks.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import random
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mitex.comparison.html import jpeg, template, text_of
+from mitex.comparison.results import Result
+from mitex.errors import ConfigError
+from mitex.paths import atomic_write, expanded
+
+PAGE, KEY = "study.html", "study.json"
+MOST = 40  # questions to one person, as MeshNCA asked
+
+
+@dataclass(frozen=True)
+class Question:
+    """Two methods on one exemplar and mesh.
+
+    Attributes:
+        exemplar, mesh: paths or names.
+        methods: labels, of the first picture and of the second.
+    """
+
+    exemplar: str
+    mesh: str
+    methods: tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Study:
+    """What is asked.
+
+    Attributes:
+        id: which answers tell that they are of this study.
+        questions: in an order that says nothing.
+    """
+
+    id: str
+    questions: tuple[Question, ...]
+
+    @staticmethod
+    def load(folder: str | Path) -> Study:
+        """That of a comparison's folder.
+
+        Raises:
+            ConfigError: There is none.
+        """
+        try:
+            record = json.loads((expanded(folder) / KEY).read_text(encoding="utf-8"))
+            questions = [Question(**{**q, "methods": tuple(q["methods"])}) for q in record["questions"]]
+            return Study(str(record["id"]), tuple(questions))
+        except (OSError, ValueError, TypeError, KeyError) as e:
+            problem = f"'{folder}' holds no study of `mitex compare`"
+            raise ConfigError(problem, "name what was given as --out, with --study") from e
+
+
+def write_study(folder: Path, results: Sequence[Result], exemplars: Mapping[str, np.ndarray]) -> Path:
+    """Writes study.html and study.json: all pairs of methods, on each exemplar and mesh that both have done.
+
+    Args:
+        folder: of the comparison.
+        results: with their pictures, of which the first seed's are shown.
+        exemplars: path or name -> picture.
+
+    Returns:
+        The page.
+
+    Raises:
+        ConfigError: There are no two methods to compare.
+        OutputError: The folder cannot be written to.
+    """
+    shown = {(*result.pair, result.method): result for result in reversed(results) if result.pictures}
+    pictures: dict[str, bytes] = {}
+    asked: list[tuple[Question, dict[str, Any]]] = []
+    for exemplar, mesh in dict.fromkeys(result.pair for result in results):
+        methods = sorted({method for one, other, method in shown if (one, other) == (exemplar, mesh)})
+        pictures.setdefault(exemplar, jpeg(exemplars[exemplar]))
+        for pair in combinations(methods, 2):
+            files = [shown[exemplar, mesh, method].pictures["picture"] for method in pair]
+            pictures |= {str(file): file.read_bytes() for file in files}
+            asked.append(
+                (Question(exemplar, mesh, pair), {"exemplar": exemplar, "choices": list(map(str, files))})
+            )
+    if not asked:
+        raise ConfigError("there are no two methods to ask about", "name more methods, or see what failed")
+    return _write(folder, asked, pictures)
+
+
+def _write(
+    folder: Path, asked: Sequence[tuple[Question, dict[str, Any]]], pictures: dict[str, bytes]
+) -> Path:
+    digest = hashlib.sha256(b"".join(hashlib.sha256(content).digest() for content in pictures.values()))
+    id = digest.hexdigest()[:16]
+    shuffle = random.Random(id)
+    asked = shuffle.sample(asked, len(asked))
+    names = shuffle.sample(list(pictures), len(pictures))  # so that their places tell nothing either
+    place = {name: k for k, name in enumerate(names)}
+    questions = [
+        {"exemplar": place[shown["exemplar"]], "choices": [place[name] for name in shown["choices"]]}
+        for _, shown in asked
+    ]
+    encoded = [base64.b64encode(pictures[name]).decode() for name in names]
+    data = {"id": id, "most": MOST, "questions": questions, "pictures": encoded}
+    page = template(PAGE).substitute(style=text_of("style.css"), data=json.dumps(data))
+    key = {"id": id, "questions": [asdict(question) for question, _ in asked]}
+    with atomic_write(folder / KEY) as temporary:
+        temporary.write_text(json.dumps(key, indent=1) + "\n", encoding="utf-8")
+    with atomic_write(folder / PAGE) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+    return folder / PAGE

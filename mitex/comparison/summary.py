@@ -1,0 +1,116 @@
+"""Means over seeds, their spread, and which method is the best where that is certain."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mitex.comparison.measures import MEASURES, Measure
+from mitex.comparison.results import Result
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A measure of a method.
+
+    Attributes:
+        mean: over seeds.
+        spread: standard deviation over seeds; NaN of a single one.
+        count: of the seeds.
+        best: whether no other method comes within the spread.
+    """
+
+    mean: float
+    spread: float
+    count: int
+    best: bool = False
+
+
+@dataclass(frozen=True)
+class Summary:
+    """A table: methods by measures.
+
+    Attributes:
+        pair: exemplar and mesh; None for means over all pairs.
+        methods: labels, in the plan's order.
+        cells: (method, measure's key) -> cell; without those that were not measured.
+    """
+
+    pair: tuple[str, str] | None
+    methods: tuple[str, ...]
+    cells: dict[tuple[str, str], Cell]
+
+
+def summaries(results: Sequence[Result]) -> list[Summary]:
+    """The tables of all pairs, then, if there are several, that of the means over pairs."""
+    pairs = list(dict.fromkeys(result.pair for result in results))
+    tables = [_summary(pair, [r for r in results if r.pair == pair]) for pair in pairs]
+    return [*tables, _overall(results, pairs)] if len(pairs) > 1 else tables
+
+
+def _summary(pair: tuple[str, str], results: Sequence[Result]) -> Summary:
+    methods = _methods(results)
+    cells = {}
+    for method in methods:
+        for measure in MEASURES:
+            values = [
+                r.numbers[measure.key] for r in results if r.method == method and measure.key in r.numbers
+            ]
+            if values:
+                cells[method, measure.key] = _cell(values)
+    return Summary(pair, methods, _marked(cells, methods))
+
+
+def _overall(results: Sequence[Result], pairs: Sequence[tuple[str, str]]) -> Summary:
+    """Over seeds, the means over pairs; only seeds with which a method has done all pairs count."""
+    methods = _methods(results)
+    cells = {}
+    for method in methods:
+        for measure in MEASURES:
+            values = {}
+            for r in results:
+                if r.method == method and measure.key in r.numbers:
+                    values.setdefault(r.seed, []).append(r.numbers[measure.key])
+            complete = [float(np.mean(of_seed)) for of_seed in values.values() if len(of_seed) == len(pairs)]
+            if complete:
+                cells[method, measure.key] = _cell(complete)
+    return Summary(None, methods, _marked(cells, methods))
+
+
+def _methods(results: Iterable[Result]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(result.method for result in results))
+
+
+def _cell(values: Sequence[float]) -> Cell:
+    spread = float(np.std(values, ddof=1)) if len(values) > 1 else math.nan
+    return Cell(float(np.mean(values)), spread, len(values))
+
+
+def _marked(cells: dict[tuple[str, str], Cell], methods: Sequence[str]) -> dict[tuple[str, str], Cell]:
+    marked = dict(cells)
+    for measure in MEASURES:
+        of_methods = {
+            method: cells[method, measure.key] for method in methods if (method, measure.key) in cells
+        }
+        if winner := best(measure, of_methods):
+            cell = cells[winner, measure.key]
+            marked[winner, measure.key] = Cell(cell.mean, cell.spread, cell.count, True)
+    return marked
+
+
+def best(measure: Measure, cells: dict[str, Cell]) -> str | None:
+    """The method that is better than each other one by more than both spreads together, if there is one.
+
+    A single seed has no spread, so that nothing is certain.
+    """
+    if measure.distance is None or len(cells) < 2:
+        return None
+    distances = {method: measure.distance(cell.mean) for method, cell in cells.items()}
+    first, *others = sorted(cells, key=lambda method: distances[method])
+    for other in others:
+        if not distances[other] - distances[first] > cells[first].spread + cells[other].spread:
+            return None
+    return first

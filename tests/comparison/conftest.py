@@ -1,0 +1,55 @@
+"""A folder with an exemplar and a mesh, and comparisons in it that are small and run in this process."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from contextlib import chdir
+from pathlib import Path
+
+import pytest
+
+from mitex.cli import main
+from mitex.mesh import icosphere
+from tests.cli import bad_files as bad
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working folder, with a.png and ball.obj."""
+    bad.image(tmp_path / "a.png", (96, 96))
+    write_mesh(tmp_path / "ball.obj")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Jobs run in this process, with few and small patches and pictures."""
+    monkeypatch.setattr("mitex.batch.task.Process", InThisProcess)
+    for name, value in {"PATCHES": 2, "WINDOWS": 1, "CELL": 16, "SPP": 1}.items():
+        monkeypatch.setattr(f"mitex.comparison.pair.{name}", value)
+
+
+def write_mesh(path: Path) -> None:
+    ball = icosphere(6)
+    lines = [f"v {x} {y} {z}" for x, y, z in ball.vertices.tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (ball.faces + 1).tolist()]
+    path.write_text("\n".join(lines) + "\n")
+
+
+class InThisProcess:
+    """In place of `mitex.batch.process.Process`."""
+
+    pid = os.getpid()
+
+    def __init__(self, words: Sequence[str], folder: Path, *_: object) -> None:
+        self._words, self._folder, self._began = words, folder, time.monotonic()
+
+    def stop(self, *_: object) -> None:
+        """It cannot be stopped."""
+
+    def wait(self) -> tuple[int, int]:
+        with chdir(self._folder):
+            return main(self._words), 1000

@@ -1,0 +1,113 @@
+"""From the command line's lists to jobs; what cannot be compared is refused: code 2, one line, no file."""
+
+import pytest
+
+from mitex.batch import Plan
+from mitex.batch.jobs import jobs_of
+from mitex.cli import main
+from mitex.comparison.plan import comparison_plan, prepared
+from mitex.comparison.presets import preset_plan, presets
+
+GOOD = {"--exemplar": "a.png", "--mesh": "ball.obj", "--methods": "image-quilting", "--out": "out"}
+
+# Name -> (changed options, words of the message)
+BROKEN = {
+    "no exemplar": ({"--exemplar": None}, "--exemplar is missing"),
+    "no mesh": ({"--mesh": None}, "--mesh is missing"),
+    "no methods": ({"--methods": ","}, "has no methods"),
+    "an unknown method": ({"--methods": "image-qilting"}, "no method 'image_qilting'; did you mean image_"),
+    "a method twice": ({"--methods": "gatys,gatys"}, "method 'gatys' is named twice"),
+    "a method of another kind": ({"--methods": "geometric"}, "geometric learns from a reference"),
+    "an exemplar that does not exist": ({"--exemplar": "no.png"}, "there is no exemplar 'no.png'"),
+    "a mesh that does not exist": ({"--mesh": "no.obj"}, "there is no mesh 'no.obj'"),
+    "an exemplar twice": ({"--exemplar": "a.png a.png"}, "the job fit-image_quilting-a-s0 twice"),
+    "no setting": ({"--set": "block"}, "'block' is not a setting"),
+    "a setting of another method": ({"--set": "gatys:steps=3"}, "of no method that is compared"),
+    "an unknown setting": ({"--set": "image-quilting:blok=3"}, "no key 'blok'; did you mean block"),
+    "a setting out of range": ({"--set": "image-quilting:block=1"}, "block = 1 is out of range"),
+    "an option of apply that is no number": (
+        {"--set": "image-quilting:apply.scale=big"},
+        "scale of image_quilting cannot be 'big'; give a finite number",
+    ),
+    "no seeds": ({"--seeds": "0"}, "--seeds 0 is out of range"),
+    "a folder of something else": ({"--out": "."}, "'.' holds other files"),
+    "an address without Dask": ({"--address": "tcp://a:1"}, "--address means nothing without Dask"),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_broken_comparisons(name, place, capsys):
+    changes, message = BROKEN[name]
+    options = {key: value for key, value in (GOOD | changes).items() if value is not None}
+    before = sorted(place.rglob("*"))
+    words = [word for key, value in options.items() for word in (key, *value.split(" "))]
+    assert main(["compare", *words, "--quiet"]) == 2
+    printed = capsys.readouterr()
+    assert printed.err.startswith("error: ") and printed.err.count("\n") == 1 and not printed.out
+    assert message in printed.err and "; " in printed.err
+    assert sorted(place.rglob("*")) == before
+
+
+def test_each_method_is_fit_as_often_as_it_must_be(place):
+    """For any mesh at once, or for each; with every seed."""
+    bundled = ["vase", "octopus"]
+    plan = comparison_plan(["a.png", "lava"], bundled, ["nca", "multi-view-gram"], seeds=2)
+    fits = [job for job in jobs_of(plan) if job.needs is None]
+    applied = [job for job in jobs_of(plan) if job.needs is not None]
+    of = {name: sum(job.about["method"] == name for job in fits) for name in ("nca", "multi_view_gram")}
+    assert of == {"nca": 4, "multi_view_gram": 8}
+    assert len(applied) == 16
+
+
+def test_settings_reach_fit_and_apply(place):
+    settings = ["nca:steps=7", "nca:preset=paper", "nca:apply.resolution=256", "nca:layers=relu1_1,relu2_1"]
+    fit, applied = jobs_of(comparison_plan(["lava"], ["vase"], ["nca"], settings=settings))
+    words = " ".join(fit.words)
+    assert "--steps=7" in words and "--preset paper" in words and "layers=relu1_1,relu2_1" in words
+    assert "--resolution=256" in applied.words
+
+
+def test_patterns_are_as_large_for_all_unless_their_size_is_given(place):
+    def words(*settings):
+        plan = comparison_plan(["lava"], ["vase"], ["nca", "gatys"], settings=settings)
+        return [" ".join(job.words) for job in jobs_of(plan) if job.needs is not None]
+
+    nca, gatys = words()
+    assert "--exemplar-width=0.5" in nca and "--exemplar-width" not in gatys
+    assert "--exemplar-width=0.3" in words("nca:apply.exemplar-width=0.3")[0]
+    assert "--exemplar-width" not in words("nca:apply.scale=2")[0]
+
+
+class TestPlanFiles:
+    def test_a_plan_and_its_seeds(self, place):
+        (place / "plan.toml").write_text(
+            'exemplars = ["a.png"]\nmeshes = ["ball.obj"]\nseeds = [5]\n[methods.gatys]\nsteps = 3\n'
+        )
+        plan = Plan.read("plan.toml")
+        assert prepared(plan).methods[0].seeds == (5,)
+        assert prepared(plan, seeds=2).methods[0].seeds == (0, 1)
+
+    @pytest.mark.parametrize(
+        ("words", "message"),
+        [
+            ("--plan no.toml", "there is no such file"),
+            ("--preset nca-fig1", "there is no comparison 'nca-fig1'; did you mean nca-fig10"),
+            ("--preset nca-fig10 --mesh vase", "--preset and --mesh contradict each other"),
+            ("--preset nca-fig10 --plan a.toml", "--plan and --preset contradict each other"),
+            ("--preset nca-fig10 --data .", "there is no exemplar 'exemplars/Abstract_008'"),
+        ],
+    )
+    def test_broken_ones(self, words, message, place, capsys):
+        assert main(["compare", *words.split(), "--out", "out", "--quiet"]) == 2
+        assert message in capsys.readouterr().err
+        assert not (place / "out").exists()
+
+    @pytest.mark.parametrize("name", presets())
+    def test_the_papers_comparisons_have_jobs(self, name, tmp_path):
+        plan = preset_plan(name, tmp_path)
+        for part in plan.methods:
+            for text in (*part.exemplars, *part.meshes):
+                if "/" in text:
+                    (tmp_path / text).parent.mkdir(exist_ok=True)
+                    (tmp_path / text).touch()
+        assert len(jobs_of(prepared(plan))) > 20

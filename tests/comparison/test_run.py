@@ -1,0 +1,97 @@
+"""From exemplar and mesh to the report; what was done and measured is not done again; failures are listed."""
+
+import csv
+import json
+
+import pytest
+
+from mitex.cli import main
+from mitex.comparison import compare, comparison_plan
+from mitex.comparison.kept import Kept, optimized_numbers
+from mitex.comparison.pair import SETTINGS
+from tests.cli import bad_files as bad
+
+QUILT = ["image_quilting:size=64", "image_quilting:exemplar_size=32", "image_quilting:block=12"]
+
+
+def quilting(exemplars=("a.png",), seeds=1):
+    return comparison_plan(exemplars, ["ball.obj"], ["image_quilting"], seeds=seeds, settings=QUILT)
+
+
+@pytest.fixture
+def measurings(monkeypatch):
+    """Which results are measured."""
+    measured, names = Kept.measured, []
+
+    def counted(self, result, *others):
+        names.append(result.id.rpartition("-")[0])
+        return measured(self, result, *others)
+
+    monkeypatch.setattr(Kept, "measured", counted)
+    return names
+
+
+@pytest.mark.usefixtures("small", "own_cache")
+def test_a_comparison_goes_on_and_ends_in_files(place, measurings, capsys):
+    """One call fails for a broken exemplar; the next one, with another seed, measures only what is new."""
+    bad.text(place / "b.png")
+    words = ["compare", "--exemplar", "a.png", "b.png", "--mesh", "ball.obj", "--methods", "image-quilting"]
+    code = main([*words, "--set", *QUILT, "--out", "out", "--quiet"])
+    printed = capsys.readouterr()
+    assert code == 2 and "2 of 4 jobs are not done" in printed.err
+    assert "failed   fit-image_quilting-b-s0: " in printed.out
+    assert measurings == ["apply-image_quilting-a-s0-ball"]
+    assert "fit-image_quilting-b-s0" in (place / "out" / "report.html").read_text()
+
+    done = compare(quilting(seeds=2), place / "out")
+    assert done.missing == 0 and measurings[1:] == ["apply-image_quilting-a-s1-ball"]
+    check_files(place / "out")
+
+
+def check_files(folder):
+    with (folder / "report.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["seed"] for row in rows] == ["0", "1"]
+    for key in ("frechet_fine", "frechet_coarse", "transport", "gram", "seams", "fit_seconds", "memory"):
+        assert all(float(row[key]) > 0 for row in rows), key
+    assert all((folder / row["asset"]).is_file() for row in rows)
+    record = json.loads((folder / "report.json").read_text())
+    (table,) = record["means"]
+    cells = {cell["measure"]: cell for cell in table["cells"]}
+    assert cells["gram"]["mean"] == pytest.approx(sum(float(row["gram"]) for row in rows) / 2)
+    assert cells["parameters"]["mean"] == 0
+    html = (folder / "report.html").read_text()
+    assert html.count("data:image/jpeg;base64,") == 3 and "http" not in html
+
+
+def test_numbers_of_other_settings_are_measured_again(tmp_path, place, monkeypatch):
+    from tests.comparison.test_summary import result
+
+    kept, one = Kept(tmp_path / "kept"), result("a", 0)
+    assert kept.completed(one) is None
+    bad.image(tmp_path / "kept" / f"{one.id}.jpg", kind="JPEG")
+    file = tmp_path / "kept" / f"{one.id}.json"
+    file.write_text(json.dumps({"settings": SETTINGS, "numbers": {"gram": 2.5}}))
+    known = kept.completed(one)
+    assert known is not None and known.numbers["gram"] == 2.5
+    for content in ({"settings": SETTINGS | {"version": 0}, "numbers": {}}, [], {"settings": SETTINGS}):
+        file.write_text(json.dumps(content))
+        assert kept.completed(one) is None
+    file.write_text("{")
+    assert kept.completed(one) is None
+
+
+def test_what_a_fit_optimizes_is_counted_by_its_checkpoint(tmp_path):
+    import numpy as np
+    from safetensors.numpy import save_file
+
+    assert optimized_numbers(tmp_path) == 0
+    names = {
+        "optimizer/first/0": (3, 4),
+        "optimizer/first/1": (5,),
+        "optimizer/second/0": (3, 4),
+        "task/x": (9,),
+    }
+    arrays = {name: np.zeros(shape, np.float32) for name, shape in names.items()}
+    save_file(arrays, tmp_path / "checkpoint.safetensors")
+    assert optimized_numbers(tmp_path) == 17

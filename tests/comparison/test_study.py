@@ -1,0 +1,145 @@
+"""A blind test: what the page tells, and what is made of the answers."""
+
+import base64
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.stats
+
+from mitex.cli import main
+from mitex.comparison.answers import Answer, evaluate, holm, read_answers
+from mitex.comparison.study import KEY, PAGE, Question, Study, write_study
+from mitex.errors import ConfigError
+from tests.cli import bad_files as bad
+from tests.comparison.test_summary import result
+
+EXEMPLARS = {"lava": np.zeros((4, 4, 3))}
+
+
+@pytest.fixture
+def study(tmp_path):
+    """Of three methods on two meshes, but one of them on one alone; two seeds."""
+    results = []
+    for k, (method, mesh) in enumerate(
+        [("a", "ball"), ("b", "ball"), ("c", "ball"), ("a", "vase"), ("b", "vase")]
+    ):
+        for seed in (0, 1):
+            one = result(method, seed, mesh)
+            picture = bad.image(tmp_path / f"{one.id}.jpg", (8, 8), "JPEG", seed=10 * k + seed)
+            results.append(replace(one, pictures={"picture": picture}))
+    write_study(tmp_path, results, EXEMPLARS)
+    return Study.load(tmp_path)
+
+
+def test_all_pairs_of_what_was_made_are_asked_about(study):
+    asked = sorted((question.mesh, question.methods) for question in study.questions)
+    assert asked == [("ball", ("a", "b")), ("ball", ("a", "c")), ("ball", ("b", "c")), ("vase", ("a", "b"))]
+
+
+def test_the_page_shows_the_pictures_and_names_nothing(study, tmp_path):
+    page = (tmp_path / PAGE).read_text()
+    data = json.loads(re.findall(r'<script id="data" type="application/json">(.*?)</script>', page)[0])
+    assert data["id"] == study.id and len(data["pictures"]) == 6  # the first seed's, and the exemplar
+    for asked, question in zip(data["questions"], study.questions, strict=True):
+        for choice, method in zip(asked["choices"], question.methods, strict=True):
+            shown = base64.b64decode(data["pictures"][choice])
+            assert shown == (tmp_path / f"{method}-0-{question.mesh}.jpg").read_bytes()
+    assert "http" not in page and "lava" not in page and "vase" not in page
+
+
+def test_one_method_is_nothing_to_ask_about(tmp_path):
+    with pytest.raises(ConfigError, match="no two methods"):
+        write_study(tmp_path, [result("a", 0)], EXEMPLARS)
+    assert not (tmp_path / KEY).exists()
+
+
+CASES = Study("x", tuple(Question("lava", mesh, ("a", "b")) for mesh in ("ball", "vase", "knot")))
+
+
+def answers(*choices):
+    return [Answer(k, choice) for k, choice in enumerate(choices)]
+
+
+class TestEvaluation:
+    def test_shares_and_their_interval(self):
+        done = evaluate(CASES, {"x": answers(0, 0, 1), "y": answers(0, None, 0)})
+        first, second = done.preferences
+        assert (first.method, first.wins, first.count) == ("a", 4.5, 6)
+        assert second.share == 0.25
+        low, high = first.interval
+        z = scipy.stats.norm.ppf(0.975)  # Wilson's interval solves |p - 4 / 6| = z sqrt(p (1 - p) / 6)
+        for p in (low, high):
+            assert abs(p - 4 / 6) == pytest.approx(z * np.sqrt(p * (1 - p) / 6), rel=1e-6)
+
+    def test_the_spread_is_over_cases_and_the_tests_take_them_as_samples(self):
+        """a was preferred by all on the ball, by half on the vase and the knot."""
+        done = evaluate(CASES, {"x": answers(0, 0, 1), "y": answers(0, 1, 0)})
+        a, b = [1.0, 0.5, 0.5], [0.0, 0.5, 0.5]
+        assert done.preferences[0].mean == pytest.approx(2 / 3)
+        assert done.preferences[0].spread == pytest.approx(np.std(a, ddof=1))
+        between, within = 3 * 2 * (1 / 6) ** 2 / 1, 2 * (1 / 9 + 2 / 36) / 4  # mean squares
+        assert done.f == pytest.approx(between / within)
+        t = scipy.stats.ttest_ind(a, b)
+        assert done.p == pytest.approx(t.pvalue)  # of two groups both tests are one
+        assert done.pairs == {("a", "b"): pytest.approx(t.pvalue)}
+
+    def test_p_is_adjusted_by_holms_procedure(self):
+        raw = {("a", "b"): 0.01, ("a", "c"): 0.04, ("b", "c"): 0.03}
+        assert holm(raw) == {("a", "b"): 0.03, ("b", "c"): 0.06, ("a", "c"): 0.06}
+
+    def test_one_case_has_no_spread(self):
+        done = evaluate(CASES, {"x": answers(0), "y": answers(1)})
+        assert np.isnan([done.f, done.p]).all() and done.pairs == {}
+        assert "needs two cases" in done.text() and "±" not in done.text()
+
+
+def saved(path, study="x", participant="p", entries=((0, 0), (1, 1), (2, 0))):
+    record = {
+        "study": study,
+        "participant": participant,
+        "answers": [{"question": q, "choice": c, "seconds": 1.5} for q, c in entries],
+    }
+    path.write_text(json.dumps(record))
+    return path
+
+
+def test_files_to_answers(tmp_path):
+    files = [saved(tmp_path / "1.json"), saved(tmp_path / "2.json", participant="q", entries=((2, None),))]
+    people = read_answers(CASES, files)
+    assert people == {"p": answers(0, 1, 0), "q": [Answer(2, None)]}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"study": "y"}, "answers another study"),
+        ({"entries": ((3, 0),)}, "holds no answers"),
+        ({"entries": ((-1, 0),)}, "holds no answers"),
+        ({"entries": ((0, 2),)}, "holds no answers"),
+        ({"entries": ()}, "there are no answers"),
+    ],
+)
+def test_answers_that_do_not_fit(tmp_path, change, message):
+    with pytest.raises(ConfigError, match=message):
+        read_answers(CASES, [saved(tmp_path / "1.json", **change)])
+
+
+def test_files_that_are_none(tmp_path):
+    (tmp_path / "bad.json").write_text("[" * 100_000)
+    for name in ("bad.json", "missing.json", "."):
+        with pytest.raises(ConfigError, match="answers"):
+            read_answers(CASES, [tmp_path / name])
+    twice = saved(tmp_path / "1.json")
+    with pytest.raises(ConfigError, match="there twice"):
+        read_answers(CASES, [twice, twice])
+
+
+def test_the_command(study, tmp_path, capsys):
+    file = saved(tmp_path / "1.json", study.id)
+    assert main(["compare", "answers", str(tmp_path), str(file)]) == 0
+    assert capsys.readouterr().out.startswith("answers of 1 person\n")
+    assert main(["compare", "answers", str(tmp_path / "no"), str(file)]) == 2
+    assert "holds no study" in capsys.readouterr().err

@@ -1,0 +1,61 @@
+"""Means, spreads, and what is marked as the best."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from mitex.comparison.measures import BY_KEY
+from mitex.comparison.results import Result
+from mitex.comparison.summary import Cell, best, summaries
+
+
+def result(method, seed, mesh="ball", **numbers):
+    return Result(f"{method}-{seed}-{mesh}", "lava", mesh, method, seed, Path("a"), Path("b"), numbers)
+
+
+def test_mean_and_spread_over_seeds():
+    (table,) = summaries([result("a", k, gram=value) for k, value in enumerate((1.0, 2.0, 6.0))])
+    cell = table.cells["a", "gram"]
+    assert (cell.mean, cell.count) == (3.0, 3)
+    assert cell.spread == pytest.approx(math.sqrt(7))  # (4 + 1 + 9) / (3 - 1)
+    assert ("a", "transport") not in table.cells
+
+
+def test_the_overall_spread_is_that_of_means_over_pairs():
+    """Pairs differ far more than seeds: that is no spread. Seeds that lack a pair do not count."""
+    numbers = {("ball", 0): 1.0, ("vase", 0): 101.0, ("ball", 1): 3.0, ("vase", 1): 103.0, ("ball", 2): 900.0}
+    tables = summaries([result("a", seed, mesh, gram=v) for (mesh, seed), v in numbers.items()])
+    assert [table.pair for table in tables] == [("lava", "ball"), ("lava", "vase"), None]
+    cell = tables[-1].cells["a", "gram"]
+    assert (cell.mean, cell.count) == (52.0, 2)
+    assert cell.spread == pytest.approx(math.sqrt(2))
+
+
+class TestBest:
+    def of(self, key, **cells):
+        return best(BY_KEY[key], {name: Cell(mean, spread, 3) for name, (mean, spread) in cells.items()})
+
+    def test_the_lowest_by_more_than_both_spreads(self):
+        assert self.of("gram", a=(1.0, 0.2), b=(1.5, 0.2)) == "a"
+        assert self.of("gram", a=(1.0, 0.3), b=(1.5, 0.2)) is None
+
+    def test_better_than_every_other(self):
+        assert self.of("gram", a=(1.0, 0.1), b=(2.0, 0.1), c=(3.0, 2.5)) is None
+
+    def test_nearest_to_one_and_to_zero(self):
+        assert self.of("seams", a=(0.5, 0.01), b=(1.1, 0.01)) == "b"
+        assert self.of("repetition", a=(-0.5, 0.01), b=(0.1, 0.01)) == "b"
+
+    def test_nothing_is_certain_of_one_seed_or_one_method(self):
+        assert self.of("gram", a=(1.0, math.nan), b=(9.0, math.nan)) is None
+        assert self.of("gram", a=(1.0, 0.1)) is None
+
+    def test_more_parameters_are_neither_good_nor_bad(self):
+        assert self.of("parameters", a=(1.0, 0.0), b=(9.0, 0.0)) is None
+
+    def test_it_is_marked_in_the_table(self):
+        values = {"a": (1.0, 1.1), "b": (2.0, 2.1)}
+        results = [result(name, k, gram=v) for name, pair in values.items() for k, v in enumerate(pair)]
+        (table,) = summaries(results)
+        assert [table.cells[name, "gram"].best for name in ("a", "b")] == [True, False]
