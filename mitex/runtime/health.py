@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from importlib import import_module
 
 from mitex.errors import MitexError, RuntimeUnavailable
-from mitex.runtime import llvm, precision, session
+from mitex.runtime import cores, llvm, precision, session
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,7 @@ def doctor() -> list[Check]:
         "LLVM": (_llvm, llvm.REMEDY),
         "Mitsuba": (_mitsuba, "reinstall it: `pip install --force-reinstall 'mitsuba>=3.9,<3.10'`"),
         "Dr.Jit": (_drjit, "mend LLVM and Mitsuba first"),
+        "cores": (_cores, ""),
         "torch": (_torch, "reinstall it: `pip install --force-reinstall 'torch>=2.13,<2.14'`"),
         "bfloat16": (_bfloat16, f"unset {precision.VARIABLE}"),
         "CUDA": (_cuda, ""),
@@ -66,6 +67,12 @@ def _drjit() -> str:
             raise ArithmeticError(f"a test kernel gave {value} instead of 48")
     number = ".".join(map(str, dr.detail.llvm_version()))
     return f"{dr.__version__}, LLVM {number}, {dr.thread_count()} threads"
+
+
+def _cores() -> str:
+    """Others may need some, which is no failure; fits then take fewer threads."""
+    free = cores.free_cores()
+    return f"{cores.cores():g}" if free is None else f"{free:.1f} of {cores.cores():g} free"
 
 
 def _torch() -> str:

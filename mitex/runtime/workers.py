@@ -34,6 +34,11 @@ def threads(count: int) -> None:
         set_workers(count)
 
 
+def is_set() -> bool:
+    """Whether `threads` has been called."""
+    return _threads is not None
+
+
 def apply_thread_count() -> None:
     """Gives Dr.Jit, once it is loaded, the number of threads that `threads` was called with before, or that
     the environment's MITEX_THREADS says."""

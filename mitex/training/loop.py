@@ -12,6 +12,7 @@ import torch
 
 from mitex.errors import ConfigError
 from mitex.progress import announce
+from mitex.runtime.cores import following_threads
 from mitex.runtime.signals import StopSignals
 from mitex.training import keeping, optim
 from mitex.training.control import ALONE, Control, Progress
@@ -94,8 +95,9 @@ def train(
         kept.begin(state)
         announce("")  # the training shows itself
         tell = _teller(state, kept.place, control)
-        with StopSignals() as stop:
+        with StopSignals() as stop, following_threads() as threads:
             while state.step < config.steps and not (stop.requested or control.cancelled):
+                threads.look()
                 record = state.advance()
                 kept.write(record)
                 if state.skipped >= PATIENCE:

@@ -73,7 +73,7 @@ def read(path: Path) -> tuple[dict[str, torch.Tensor], dict[str, str]]:
 
 def _description(text: str) -> dict[str, Any]:
     about = json.loads(text)
-    if not isinstance(about["name"], str):
+    if not isinstance(about.get("name", ""), str):
         raise ValueError("a name that is no text")
     return about
 

@@ -7,7 +7,7 @@ import pytest
 from mitex.errors import RuntimeUnavailable
 from mitex.runtime import Check, doctor, health, llvm
 
-NAMES = ["LLVM", "Mitsuba", "Dr.Jit", "torch", "bfloat16", "CUDA", "weights", "ffmpeg"]
+NAMES = ["LLVM", "Mitsuba", "Dr.Jit", "cores", "torch", "bfloat16", "CUDA", "weights", "ffmpeg"]
 
 
 def report() -> dict[str, Check]:

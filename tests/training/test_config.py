@@ -186,9 +186,9 @@ def test_unreadable_files(tmp_path):
     binary = tmp_path / "b.toml"
     binary.write_bytes(b"steps = \xff\xfe")
     assert "not valid TOML" in _error(file=binary)
-    assert "cannot read config" in _error(file=tmp_path / "missing.toml")
-    assert "cannot read config" in _error(file=tmp_path)
-    assert "cannot read config" in _error(file="a\0b")
+    assert "cannot be read" in _error(file=tmp_path / "missing.toml")
+    assert "cannot be read" in _error(file=tmp_path)
+    assert "cannot be read" in _error(file="a\0b")
 
 
 def test_where_the_preset_comes_from(tmp_path):

@@ -112,10 +112,10 @@ def test_a_damaged_cache_is_made_again(photos, monkeypatch):
     monkeypatch.setattr(colmap, "VERSION", "damaged")
     monkeypatch.setattr(colmap, "_reconstruct", lambda folder, names: tree(COUNT))
     cache = colmap.cache_dir() / "captures"
-    before = set(cache.glob("*/*.json"))
+    before = set(cache.glob("*/transforms.json"))
     assert len(colmap.photo_frames(photos)) == COUNT
-    (path,) = set(cache.glob("*/*.json")) - before
-    for damage in ('{"fra', "{}"):
+    (path,) = set(cache.glob("*/transforms.json")) - before
+    for damage in ('{"fra', "{}", "[1]", '{"frames": 3}'):
         path.write_text(damage)
         assert len(colmap.photo_frames(photos)) == COUNT
         assert json.loads(path.read_text()) == tree(COUNT)
