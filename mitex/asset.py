@@ -20,6 +20,8 @@ from mitex.geometry.tangents import HardSplit, split_at_hard_edges
 from mitex.mesh import Mesh
 
 CLAY = 0.7  # sRGB
+DEFAULT_ALBEDO = 0.8  # linear grey where an asset has no albedo
+DEFAULT_ROUGHNESS = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +126,7 @@ class Asset:
         - `.obj`: with `.mtl` and PNG maps beside it; bakes at the default resolution if not yet baked.
         - `.ply`: binary, vertex colours, the other maps as float properties.
         - `.exr`: the maps in texture space, named channels; bakes if not yet baked.
+        - `.html`: a page that shows it in any browser with WebGL2, without a network.
         - a folder, which exists or ends with a slash: each map as a file of its own in `maps_format`, named
           as in an exemplar's folder, and mesh.obj; bakes if not yet baked.
 

@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from mitex.cache_entries import limit, touch, trim
+from mitex.manifest import is_whole, seal
 
 Result = TypeVar("Result")
 
@@ -42,13 +43,14 @@ def cached(
 ) -> Result:
     """The result kept in the folder `place`, else that of `compute`, which is kept then.
 
-    A cache that cannot be read or written is no error: the result is computed again. After a new result the
+    A cache that cannot be read or written is no error, and neither is one that was damaged, by its manifest:
+    the result is computed again. After a new result the
     cache is trimmed to its `limit`.
 
     Args:
         place: of this result alone.
         compute: the long computation.
-        read: gives the result from a folder; OSError, EOFError, ValueError or KeyError if it is not whole.
+        read: gives the result from a folder that holds what `write` has written, byte for byte.
         write: fills an empty folder, which is renamed afterwards, so that all files appear together.
         keep: whether a computed result is kept; without, nothing is written.
 
@@ -56,10 +58,11 @@ def cached(
         ConfigError: the limit that the user has set is none.
     """
     most = limit()
-    with suppress(OSError, EOFError, ValueError, KeyError):  # EOFError: numpy's of an empty file
-        result = read(place)
-        touch(place)
-        return result
+    with suppress(OSError):
+        if is_whole(place):
+            result = read(place)
+            touch(place)
+            return result
     result = compute()
     if not keep:
         return result
@@ -68,6 +71,7 @@ def cached(
         filling = Path(tempfile.mkdtemp(prefix=".filling-", dir=place.parent))
         try:
             write(filling, result)
+            seal(filling)
             shutil.rmtree(place, ignore_errors=True)  # a damaged one
             os.rename(filling, place)
             trim(place, most)

@@ -12,6 +12,7 @@ import numpy as np
 
 from mitex.cache import content_key
 from mitex.errors import ImageError
+from mitex.geometry.normal_maps import is_normal_map
 from mitex.geometry.vectors import unit
 from mitex.images import SUFFIXES, read_image, resize
 from mitex.paths import expanded
@@ -149,7 +150,7 @@ def _from_folder(folder: Path) -> Exemplar:
         if name == "normal_dx":
             array[:, :, 1] = 1.0 - array[:, :, 1]
             name = "normal"
-        if name == "normal" and array[:, :, 2].mean() <= 0.5:
+        if name == "normal" and not is_normal_map(array):
             raise ImageError(
                 f"{file} is not a tangent-space normal map", "export one (mostly blue) or remove the file"
             )

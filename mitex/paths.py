@@ -26,7 +26,8 @@ def prepare_output(
     `atomic_write` makes them.
 
     Args:
-        path: The file to be written; `~` is expanded.
+        path: The file to be written; `~` is expanded, and a symbolic link followed: what it points to is
+            replaced, and the link stays.
         suffixes: Allowed endings with their dot, in lower case, such as `(".png", ".exr")`; empty allows any.
         inputs: What the work reads, which must not be replaced; names that are no files do not matter.
 
@@ -34,8 +35,8 @@ def prepare_output(
         The path, absolute.
 
     Raises:
-        OutputError: The suffix is not allowed, a folder has that name, the place is not writable, or the file
-            is one of the inputs, be it through a link or in another spelling.
+        OutputError: The suffix is not allowed, a folder, pipe or device has that name, the place is not
+            writable, or the file is one of the inputs, be it through a link or in another spelling.
     """
     target = _absolute(path)
     if suffixes and target.suffix.lower() not in suffixes:
@@ -46,6 +47,7 @@ def prepare_output(
         if target.is_dir():
             raise OutputError(f"'{path}' is a folder", "name a file")
         _check_folder(target.parent)
+        _check_regular(target)
         if target.exists() and not os.access(target, os.W_OK):
             raise OutputError(f"'{path}' is write-protected", "change its permissions or name another file")
         if any(_same_file(target, source) for source in inputs if source is not None):
@@ -99,18 +101,20 @@ def missing_folders(path: str | os.PathLike[str]) -> list[Path]:
 def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yields a temporary path beside `path`; on success its file is fsynced and renamed to `path`.
 
-    Readers see the old file or the new one, never a part. When the block raises, the temporary file is
+    Readers see the old file or the new one, never a part; a symbolic link stays, and the file that it points
+    to is replaced. When the block raises, the temporary file is
     removed and the old file stays. Missing folders are made. The temporary name ends like `path`, since many
     writers choose the format by suffix; the file gets the usual permissions, whatever the writer does.
 
     Raises:
-        OutputError: The operating system refused (disk full, permission, ...) or no file was written;
-            other errors pass unchanged.
+        OutputError: The operating system refused (disk full, permission, ...), no file was written, or the
+            path is a pipe or a device; other errors pass unchanged.
     """
     target = _absolute(path)
     temporary = target.with_name(f".{target.stem[:40]}.{secrets.token_hex(4)}.tmp{target.suffix}")
     created: list[Path] = []
     try:
+        _check_regular(target)
         created = missing_folders(target.parent)
         target.parent.mkdir(parents=True, exist_ok=True)
         temporary.touch()
@@ -175,7 +179,15 @@ def cache_dir() -> Path:
 def _absolute(path: str | os.PathLike[str]) -> Path:
     if not os.fspath(path) or "\0" in os.fspath(path):
         raise OutputError(f"{os.fspath(path)!r} is not a path", "name a file or folder")
-    return Path(os.path.abspath(expanded(path)))
+    target = os.path.abspath(expanded(path))
+    return Path(os.path.realpath(target) if os.path.islink(target) else target)
+
+
+def _check_regular(target: Path) -> None:
+    if target.exists() and not target.is_file():
+        raise OutputError(
+            f"'{target}' is a pipe or a device, and results are written as a whole", "name a file"
+        )
 
 
 def _same_file(target: Path, source: str | os.PathLike[str]) -> bool:

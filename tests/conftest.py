@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.browser import Browser
+
 # As the commands do that go to and fro between torch and Dr.Jit; see `mitex.runtime.let_idle_threads_sleep`.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
@@ -65,6 +67,14 @@ def quick_settling() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("mitex.methods.nca.settling.STEPS", (2, 5, 10))
         yield
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """One browser for all tests."""
+    browser = Browser()
+    yield browser
+    browser.close()
 
 
 @pytest.fixture

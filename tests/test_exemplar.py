@@ -209,3 +209,22 @@ class TestEmbedded:
         assert "CC0" in (exemplar.DATA / "LICENSE").read_text()
         for name in exemplar.names():
             assert sum(p.stat().st_size for p in (exemplar.DATA / name).glob("*.png")) < 1.75e6, name
+
+
+class TestNormalMaps:
+    """What is taken for one: normals around the neutral, whichever of its two bytes is used."""
+
+    @pytest.mark.parametrize("neutral", [127, 128])
+    @pytest.mark.parametrize("order", [[2, 1, 0], [0, 2, 1]])
+    def test_swapped_channels_are_refused(self, tmp_path, rng, neutral, order):
+        bumps = rng.integers(-20, 21, (32, 32, 3))
+        pixels = (np.array([neutral, neutral, 250]) + np.minimum(bumps, [20, 20, 5])).astype(np.uint8)
+        Image.fromarray(pixels).save(tmp_path / "normal.png")
+        Exemplar.load(tmp_path)
+        Image.fromarray(pixels[..., order]).save(tmp_path / "normal.png")
+        assert_refused(tmp_path, "normal.png", "not a tangent-space normal map")
+
+    def test_heights_are_refused(self, tmp_path, rng):
+        grey = rng.integers(60, 256, (32, 32, 1), np.uint8).repeat(3, axis=2)
+        Image.fromarray(grey).save(tmp_path / "normal.png")
+        assert_refused(tmp_path, "normal.png", "not a tangent-space normal map")

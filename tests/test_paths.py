@@ -218,3 +218,26 @@ def test_names_that_begin_with_a_tilde(tmp_path: Path, monkeypatch: pytest.Monke
     assert expanded("~/a.png") == tmp_path / "a.png"
     assert expanded("~nobody-of-this-name.png") == Path("~nobody-of-this-name.png")
     assert prepare_output("~nobody-of-this-name.png") == tmp_path / "~nobody-of-this-name.png"
+
+
+def test_a_link_stays_and_what_it_points_to_is_replaced(tmp_path: Path):
+    (tmp_path / "there").mkdir()
+    file, link = tmp_path / "there" / "a.txt", tmp_path / "link.txt"
+    for _ in range(2):  # the first time it points to nothing yet
+        link.unlink(missing_ok=True)
+        link.symlink_to(file)
+        assert prepare_output(link) == file
+        with atomic_write(link) as temporary:
+            temporary.write_text("new")
+        assert link.is_symlink() and file.read_text() == "new"
+    assert listing(tmp_path / "there") == ["a.txt"]
+
+
+def test_pipes_and_devices_are_refused(tmp_path: Path):
+    os.mkfifo(tmp_path / "pipe.txt")
+    for place in (tmp_path / "pipe.txt", Path(os.devnull)):
+        with pytest.raises(OutputError, match="pipe or a device"):
+            prepare_output(place)
+        with pytest.raises(OutputError, match="pipe or a device"), atomic_write(place):
+            pass
+        assert not place.is_file()

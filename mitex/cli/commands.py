@@ -20,6 +20,10 @@ COMMANDS = {
     "batch status": ("mitex.cli.batch:Status", "tell how far the jobs of a plan are"),
     "compare": ("mitex.cli.compare:Compare", "compare methods on the same exemplars and meshes, as a report"),
     "compare answers": ("mitex.cli.compare:Answers", "evaluate a blind test of preference"),
+    "evaluate": (
+        "mitex.cli.evaluate:Evaluate",
+        "measure how near a texture comes to its exemplar, or to words",
+    ),
     "render": ("mitex.cli.render:Render", "path-trace an asset: a still or a turntable"),
 }
 # Commands whose options are those of the model's method.

@@ -6,6 +6,7 @@ with what could be saved saved; anything else that escapes is a bug and shows it
 
 from __future__ import annotations
 
+import io
 import logging
 import os
 import sys
@@ -32,6 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if argv is None else argv)
     command = None
+    _print_any_name()
     with warnings.catch_warnings():
         _route_warnings()
         try:
@@ -77,17 +79,25 @@ def _command(words: list[str]) -> Any:
 def _run(command: Any) -> int:
     """Runs a command, with what it is at and what Mitex logs as lines on stderr, but for --quiet."""
     from mitex.cli.display import shown
+    from mitex.runtime.signals import terminable
 
     log, lines, quiet = logging.getLogger("mitex"), _Lines(), getattr(command, "quiet", False)
     level = log.level
     log.addHandler(lines)
     log.setLevel(logging.WARNING if quiet else logging.INFO)
     try:
-        with shown(quiet):
+        with terminable(), shown(quiet):
             return command.run() or 0
     finally:
         log.setLevel(level)
         log.removeHandler(lines)
+
+
+def _print_any_name() -> None:
+    """File names may hold what the encoding of stdout or stderr lacks: it is shown escaped."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 class _Lines(logging.Handler):
@@ -95,7 +105,7 @@ class _Lines(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         with suppress(OSError):
-            os.write(2, f"{self.format(record)}\n".encode())
+            os.write(2, f"{self.format(record)}\n".encode(errors="backslashreplace"))
 
 
 def _route_warnings() -> None:

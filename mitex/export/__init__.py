@@ -1,4 +1,4 @@
-"""Writing assets as GLB, OBJ, PLY, EXR or folders of maps, and reading the first three back."""
+"""Writing assets as GLB, OBJ, PLY, EXR, HTML or folders of maps, and reading the first three back."""
 
 from __future__ import annotations
 
@@ -7,15 +7,18 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mitex.asset import Asset
-from mitex.errors import MeshError
+from mitex.errors import ConfigError, MeshError
+from mitex.export.common import REMEDY
 from mitex.export.exr import read_exr, write_exr, write_textures, write_views
 from mitex.export.folder import Format, check_folder, write_folder, write_maps
 from mitex.export.glb import read_glb, write_glb, write_variants
 from mitex.export.obj import check_side_files, read_obj, write_obj
 from mitex.export.ply import read_ply, write_ply
 from mitex.export.together import Inputs
+from mitex.page import write_still
 from mitex.paths import expanded, prepare_output
 from mitex.progress import announce
+from mitex.reading import reading
 
 __all__ = [
     "Format",
@@ -39,9 +42,15 @@ __all__ = [
     "write_views",
 ]
 
-SUFFIXES = (".glb", ".obj", ".ply", ".exr")
+SUFFIXES = (".glb", ".obj", ".ply", ".exr", ".html")
 SLASHES = tuple(filter(None, (os.sep, os.altsep)))
-_WRITERS = {".glb": write_glb, ".obj": write_obj, ".ply": write_ply, ".exr": write_textures}
+_WRITERS = {
+    ".glb": write_glb,
+    ".obj": write_obj,
+    ".ply": write_ply,
+    ".exr": write_textures,
+    ".html": write_still,
+}
 _READERS = {".glb": read_glb, ".obj": read_obj, ".ply": read_ply}
 
 
@@ -90,7 +99,5 @@ def read_asset(path: str | os.PathLike[str]) -> Asset:
     if not os.path.isfile(source):
         raise MeshError(f"there is no asset file {path}", "check the path")
     announce(f"reading {source.name}")
-    try:
+    with reading(source, MeshError, REMEDY, "is damaged or was not written by Mitex", also=(ConfigError,)):
         return reader(source)
-    except OSError as e:
-        raise MeshError(f"{path} cannot be read ({e.strerror})", "check its permissions") from e

@@ -21,13 +21,12 @@ from mitex.geometry.vectors import orthonormal, scatter_add
 from mitex.mesh import Mesh
 
 GENERATOR = "Mitex"
-DEFAULT_ALBEDO = 0.8  # linear grey where an asset has no albedo
-DEFAULT_ROUGHNESS = 0.5
+REMEDY = "give an asset that Mitex exported, or use the file as a mesh"  # of a file that is none
 
 
 def foreign(path: object, what: str = "was not written by Mitex") -> MeshError:
     """The error for a file that is damaged or comes from elsewhere."""
-    return MeshError(f"{path} {what}", "give an asset that Mitex exported, or use the file as a mesh")
+    return MeshError(f"{path} {what}", REMEDY)
 
 
 def plain_name(name: str) -> str:

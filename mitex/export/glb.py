@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from mitex.asset import Asset
+from mitex.asset import DEFAULT_ALBEDO, DEFAULT_ROUGHNESS, Asset
 from mitex.colour import srgb_to_linear
 from mitex.errors import ConfigError, OutputError
-from mitex.export.common import DEFAULT_ALBEDO, DEFAULT_ROUGHNESS, GENERATOR, png
+from mitex.export.common import GENERATOR, png
 from mitex.export.glb_read import read_glb
 from mitex.geometry.tangents import HardSplit, split_at_hard_edges, split_at_seams
 from mitex.paths import atomic_write, prepare_output

@@ -15,7 +15,6 @@ from PIL import Image
 
 from mitex.asset import Asset
 from mitex.colour import linear_to_srgb
-from mitex.errors import MeshError
 from mitex.exemplar import MAPS
 from mitex.export.common import GENERATOR, asset_from_textures, foreign
 from mitex.images import MAX_PIXELS
@@ -31,16 +30,10 @@ def read_glb(path: Path) -> Asset:
     Raises:
         MeshError: damaged, or not written by Mitex.
     """
-    data = path.read_bytes()
-    try:
-        document, blob = _chunks(data, path)
-        if document["asset"]["generator"] != GENERATOR:
-            raise foreign(path)
-        return _asset(document, blob, path)
-    except MeshError:
-        raise
-    except Exception as e:  # a file that lies about itself can fail anywhere in the above
-        raise foreign(path, "is damaged or was not written by Mitex") from e
+    document, blob = _chunks(path.read_bytes(), path)
+    if document["asset"]["generator"] != GENERATOR:
+        raise foreign(path)
+    return _asset(document, blob, path)
 
 
 def _chunks(data: bytes, path: Path) -> tuple[dict[str, Any], bytes]:

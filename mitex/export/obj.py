@@ -9,11 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mitex.asset import Asset
+from mitex.asset import DEFAULT_ALBEDO, Asset
 from mitex.errors import ImageError, MeshError
 from mitex.exemplar import MAPS
 from mitex.export.common import (
-    DEFAULT_ALBEDO,
     GENERATOR,
     asset_from_textures,
     foreign,
@@ -25,6 +24,7 @@ from mitex.geometry.tangents import split_at_hard_edges
 from mitex.images import read_image
 from mitex.mesh import Mesh
 from mitex.mesh.polygons import outlines
+from mitex.mesh.readers import Budget
 from mitex.mesh.readers.obj import read_obj as read_obj_soup
 
 # Material keywords, the first one is read back. `norm` and `map_Pr` are the PBR extension of the format;
@@ -135,7 +135,7 @@ def read_obj(path: Path) -> Asset:
     if lines[0] != f"# {GENERATOR}".encode() or not re.match(rb"mtllib \S", b"".join(lines[1:2])):
         raise foreign(path)
     try:
-        soup = read_obj_soup(str(path), data, len(data))
+        soup = read_obj_soup(str(path), data, Budget(len(data)))
         if soup.uv is None or soup.normals is None:
             raise foreign(path, "is damaged")
         mesh = Mesh(soup.vertices, soup.faces, soup.uv, path.stem, polygons=soup.polygons)

@@ -15,6 +15,7 @@ from mitex.export.common import GENERATOR, foreign
 from mitex.geometry.tangents import split_at_hard_edges
 from mitex.mesh import Mesh
 from mitex.mesh.polygons import outlines
+from mitex.mesh.readers import Budget
 from mitex.mesh.readers.ply import read_tables, soup_of_tables
 from mitex.paths import atomic_write
 
@@ -109,21 +110,18 @@ def read_ply(path: Path) -> Asset:
     own = lines[:2] == [b"ply", b"format binary_little_endian 1.0"] and GENERATOR.encode() in lines[2:3][0]
     if not own:
         raise foreign(path)
-    tables, left = read_tables(str(path), data, len(data))
+    tables, left = read_tables(str(path), data, Budget(len(data)))
     if left:
         raise foreign(path, "holds more than its header says")
     table, soup = tables["vertex"], soup_of_tables(str(path), tables)
     first, faces = np.arange(len(soup.vertices)), soup.faces
-    try:
-        if "vertex" in table:
-            _, first, vertex = np.unique(table["vertex"], return_index=True, return_inverse=True)
-            faces = vertex[faces]
-        maps = {k: _columns(table, p)[first] for k, p in _FLOATS.items() if p[0] in table}
-        if "red" in table:
-            maps["albedo"] = _columns(table, _COLOURS)[first] / np.float32(255.0)
-        tangents = _columns(table, _TANGENT)[first] if _TANGENT[0] in table else None
-    except KeyError as e:
-        raise foreign(path, "has a damaged header") from e
+    if "vertex" in table:
+        _, first, vertex = np.unique(table["vertex"], return_index=True, return_inverse=True)
+        faces = vertex[faces]
+    maps = {k: _columns(table, p)[first] for k, p in _FLOATS.items() if p[0] in table}
+    if "red" in table:
+        maps["albedo"] = _columns(table, _COLOURS)[first] / np.float32(255.0)
+    tangents = _columns(table, _TANGENT)[first] if _TANGENT[0] in table else None
     if not maps or soup.normals is None:
         raise foreign(path, "holds no maps or no normals")
     mesh = Mesh(soup.vertices[first], faces, soup.uv, path.stem, polygons=soup.polygons)

@@ -7,6 +7,20 @@ from typing import Protocol
 
 import torch
 
+PROMPT = "an image of {object} made of {text}"  # MeshNCA, section 4.2
+
+
+def object_prompt(text: str, thing: str, template: str = PROMPT) -> str:
+    """What a model reads of a texture on an object.
+
+    Args:
+        text: what the texture is made of.
+        thing: the object, without an article.
+        template: with `{object}` and `{text}` in it.
+    """
+    article = "an" if thing[:1].lower() in list("aeiou") else "a"
+    return template.replace("{object}", f"{article} {thing}").replace("{text}", text)
+
 
 class TextImageModel(Protocol):
     """A frozen pair of encoders, trained so that a text and its picture point in the same direction."""

@@ -11,7 +11,21 @@ import numpy as np
 from mitex.geometry.vectors import orthonormal, unit
 
 FLAT = (0.5, 0.5, 1.0)  # the normal map of an even surface
+LEAST = 0.1  # of the mean normal, along the surface's own
+ROUNDING = 0.01  # of 8 bits, whose neutral 127 or 128 is no half
+BELOW = 0.05  # share of normals that may point into the surface
 MIN_Z = 0.05  # detail normals stay this far above the surface: maps cannot show an overhang
+
+
+def is_normal_map(encoded: np.ndarray) -> bool:
+    """Whether map values (H, W, 3) in [0, 1] are normals in tangent space.
+
+    Of such ones nearly all point out of the surface, and their mean more than to any side: swapped channels
+    and heights do neither.
+    """
+    n = 2.0 * encoded.reshape(-1, 3) - 1.0
+    x, y, z = np.abs(n.mean(axis=0, dtype=np.float64)) * (1, 1, np.sign(n[:, 2].mean(dtype=np.float64)))
+    return bool(z > max(x, y, LEAST) and (n[:, 2] > -ROUNDING).mean() > 1 - BELOW)
 
 
 def decode(encoded: np.ndarray, tangent: np.ndarray, bitangent: np.ndarray, normal: np.ndarray) -> np.ndarray:

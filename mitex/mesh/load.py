@@ -13,15 +13,12 @@ from mitex.errors import MeshError, MeshWarning
 from mitex.mesh.embedded import embedded, embedded_names
 from mitex.mesh.mesh import Mesh
 from mitex.mesh.polygons import Polygons
-from mitex.mesh.readers import SUFFIXES, Soup, read
+from mitex.mesh.readers import SUFFIXES, Budget, Soup, read
+from mitex.mesh.readers.soup import near_origin
 from mitex.mesh.validate import validate
 from mitex.paths import expanded
 from mitex.progress import announce
 from mitex.suggestions import suggestion
-
-# A generous text line per vertex, normal, UV and two faces, and room for textures in a .glb.
-BYTES_PER_VERTEX = 400
-BYTES_ALLOWED_ANYWAY = 256 << 20
 
 
 def load(path: str | os.PathLike[str], max_vertices: int = 2_000_000) -> Mesh:
@@ -35,10 +32,12 @@ def load(path: str | os.PathLike[str], max_vertices: int = 2_000_000) -> Mesh:
 
     Args:
         path: .obj, .ply, .stl, .glb, .gltf or .off; or the name of a mesh that ships with Mitex.
-        max_vertices: budget; a file is refused by its header and size before it is parsed.
+        max_vertices: budget, from which those of corners, parts and bytes follow; a file that goes beyond is
+            refused before its content is allocated.
 
     Returns:
-        The mesh, in the file's units, order and place.
+        The mesh, in the file's units, order and place; but one that is more than 1000 times its size away
+        from the origin is moved there, since single precision would lose its shape.
 
     Raises:
         MeshError: missing, unreadable, of an unknown kind, damaged, empty, over budget, or what `validate`
@@ -47,14 +46,15 @@ def load(path: str | os.PathLike[str], max_vertices: int = 2_000_000) -> Mesh:
     source = expanded(path)
     if not os.path.exists(source) and str(path) in embedded_names():
         return embedded(str(path))
-    max_bytes = BYTES_ALLOWED_ANYWAY + BYTES_PER_VERTEX * max_vertices
-    _check_file(source, max_bytes)
+    budget = Budget(max_vertices)
+    _check_file(source, budget.bytes)
     announce(f"reading {source.name}")
-    try:
-        soup = read(source, max_vertices, max_bytes)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise MeshError(f"{path} cannot be read ({reason})", "check its permissions") from error
+    soup = read(source, budget)
+    soup.vertices, centre = near_origin(soup.vertices)
+    if centre.any():
+        soup.notes.append(
+            f"it lies far from the origin and was moved there, by {np.round(-centre, 3).tolist()}"
+        )
     for note in soup.notes:
         warnings.warn(f"{path}: {note}", MeshWarning, stacklevel=2)
     vertices, faces = weld(soup)

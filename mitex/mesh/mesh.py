@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -161,6 +162,18 @@ class Similarity:
 
     center: np.ndarray
     scale: float
+
+    @staticmethod
+    def of_record(record: Mapping[str, Any]) -> Similarity:
+        """From the `centre` and the `scale` that a model file holds.
+
+        Raises:
+            KeyError, TypeError, ValueError: they are missing, or no three numbers and a positive one.
+        """
+        center, scale = np.array(record["centre"], np.float64), float(record["scale"])
+        if center.shape != (3,) or not (np.isfinite([*center, scale]).all() and scale > 0):
+            raise ValueError("a centre or a scale that is none")
+        return Similarity(center, scale)
 
     def apply(self, points: np.ndarray) -> np.ndarray:
         """Maps points (..., 3) in mesh units to normalised ones, float64."""

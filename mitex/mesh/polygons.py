@@ -10,7 +10,6 @@ import numpy as np
 
 from mitex.errors import MeshError
 from mitex.geometry.triangles import triangle_crosses
-from mitex.geometry.vectors import cross_2d
 
 MAX_CORNERS = 2000
 
@@ -118,7 +117,7 @@ def triangulate(points: np.ndarray, corners: np.ndarray, sizes: np.ndarray) -> n
     """Cuts polygons into triangles that keep their winding and order.
 
     A quad is cut along its shorter diagonal, or along the one that stays inside where only one does; larger
-    polygons by ear clipping in their mean plane, shortest cut first.
+    polygons in their mean plane.
 
     Args:
         points: (V, 3) positions.
@@ -143,7 +142,7 @@ def triangulate(points: np.ndarray, corners: np.ndarray, sizes: np.ndarray) -> n
         elif size == 4:
             triangles = np.take_along_axis(index[:, None, :], _cut_quads(points[corners[index]]), axis=2)
         else:
-            triangles = np.stack([row[_clip_ears(points[corners[row]])] for row in index])
+            triangles = np.stack([row[_cut(points[corners[row]])] for row in index])
         pieces.append(triangles.reshape(-1, 3))
         owners.append(np.repeat(which, size - 2))
     if not pieces:
@@ -164,24 +163,13 @@ def _cut_quads(quads: np.ndarray) -> np.ndarray:
     return options[(cost[1] < cost[0] * (1.0 - 1e-6)).astype(int)]
 
 
-def _clip_ears(polygon: np.ndarray) -> np.ndarray:
-    """(n, 3) positions -> (n - 2, 3) corner numbers."""
-    plane = _flatten(polygon)
-    left = np.arange(len(polygon))
-    triangles = []
-    while len(left) > 3:
-        a, b, c = (plane[np.roll(left, shift)] for shift in (1, 0, -1))
-        turn = cross_2d(b - a, c - b)
-        ear = turn > 0.0
-        for point in left[turn <= 0.0]:
-            ear &= ~_contains(a, b, c, plane[point])
-        length = np.linalg.norm(c - a, axis=1)
-        if not ear.any():  # only for polygons that cross themselves
-            ear[:] = True
-        k = int(np.argmin(np.where(ear, length, np.inf)))
-        triangles.append([left[k - 1], left[k], left[(k + 1) % len(left)]])
-        left = np.delete(left, k)
-    return np.array([*triangles, left])
+def _cut(polygon: np.ndarray) -> np.ndarray:
+    """(n, 3) positions -> (n - 2, 3) corner numbers, by Manifold, whatever the polygon is like."""
+    import manifold3d
+
+    if not np.isfinite(polygon).all():
+        polygon = np.zeros_like(polygon)  # the mesh will be refused
+    return np.asarray(manifold3d.triangulate([_flatten(polygon)], allow_convex=False), np.int64)
 
 
 def _flatten(polygon: np.ndarray) -> np.ndarray:
@@ -191,14 +179,3 @@ def _flatten(polygon: np.ndarray) -> np.ndarray:
     axis = int(np.argmax(np.abs(normal)))
     plane = centred[:, [(axis + 1) % 3, (axis + 2) % 3]]
     return plane if normal[axis] >= 0.0 else plane[:, ::-1]
-
-
-def _contains(a: np.ndarray, b: np.ndarray, c: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """Whether counter-clockwise triangles contain a point, corners excepted."""
-    inside = (
-        (cross_2d(b - a, point - a) >= 0)
-        & (cross_2d(c - b, point - b) >= 0)
-        & (cross_2d(a - c, point - c) >= 0)
-    )
-    corner = (a == point).all(axis=1) | (b == point).all(axis=1) | (c == point).all(axis=1)
-    return inside & ~corner

@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from mitex.errors import ConfigError, MeshError
+from mitex.mesh.readers import Budget
 from mitex.mesh.readers.ply import read_tables
 from mitex.paths import expanded
+from mitex.reading import content, reading
 
 MAX_VERTICES = 2_000_000
 
@@ -22,12 +24,9 @@ def read_array(path: str | Path, meaning: str) -> np.ndarray:
     Raises:
         ConfigError: there is no such file, or it holds no array of numbers.
     """
-    with readable(path, meaning) as place:
-        try:
-            # Mapped: a header that claims more than there is fails before anything is allocated.
-            return np.lib.format.open_memmap(place, mode="r")
-        except (ValueError, EOFError) as e:
-            raise ConfigError(f"'{place}' is not a NumPy array ({e})", "write it with numpy.save") from e
+    with readable(path, meaning, "is not a NumPy array", "write it with numpy.save") as place:
+        # Mapped: a header that claims more than there is fails before anything is allocated.
+        return np.lib.format.open_memmap(place, mode="r")
 
 
 def read_properties(
@@ -38,9 +37,10 @@ def read_properties(
     Raises:
         ConfigError: there is no such file, it cannot be read, or its vertices have none of the groups.
     """
+    budget = Budget(MAX_VERTICES)
     with readable(path, meaning) as place:
         try:
-            points = read_tables(str(place), place.read_bytes(), MAX_VERTICES)[0].get("vertex", {})
+            points = read_tables(str(place), content(place, budget.bytes), budget)[0].get("vertex", {})
         except MeshError as e:
             raise ConfigError(e.problem, e.remedy) from e
     for names in groups:
@@ -52,8 +52,10 @@ def read_properties(
 
 
 @contextmanager
-def readable(path: str | Path, meaning: str) -> Iterator[Path]:
-    """A context that reads a file, given its expanded path.
+def readable(
+    path: str | Path, meaning: str, what: str = "cannot be read", remedy: str = "check what wrote it"
+) -> Iterator[Path]:
+    """A context that reads a file, given its expanded path; `what` and `remedy` are as of `reading`.
 
     Raises:
         ConfigError: there is no such file, or the context cannot read it.
@@ -61,8 +63,5 @@ def readable(path: str | Path, meaning: str) -> Iterator[Path]:
     place = expanded(path)
     if not os.path.isfile(place):  # unlike Path.is_file, also answers for impossible names
         raise ConfigError(f"there is no file of {meaning} at '{place}'", "check the path")
-    try:
+    with reading(place, ConfigError, remedy, what):
         yield place
-    except OSError as e:
-        reason = e.strerror or str(e)
-        raise ConfigError(f"'{place}' cannot be read ({reason})", "check its permissions") from e

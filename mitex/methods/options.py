@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from mitex.methods.interface import Applied
     from mitex.training.progress import ProgressDisplay
 
-EXPORTS = (".glb", ".obj", ".ply", ".exr")
+EXPORTS = (".glb", ".obj", ".ply", ".exr", ".html")
 PICTURES = (".png", ".jpg", ".jpeg")
 
 
@@ -117,10 +117,11 @@ class ApplyOptions:
     model: Annotated[Positional[str], arg(metavar="RUN|MODEL")]
     """Run folder, model file, or name of a bundled model (see `mitex models`)."""
 
-    out: Annotated[str, arg(metavar="ASSET|PICTURE|DIR/")]
+    out: Annotated[str, arg(metavar="ASSET|PAGE|PICTURE|DIR/")]
     """File to write: .glb (PBR textures), .obj (with .mtl and PNG maps), .ply (vertex colours), .exr (the
-    maps as layers), or a picture (.png .jpg). A folder, which exists or ends with a slash, gets each map as a
-    file of its own, and mesh.obj."""
+    maps as layers), .html (a page for any browser, in which an automaton's texture grows), or a picture
+    (.png .jpg). A folder, which exists or ends with a slash, gets each map as a file of its own, and mesh.obj.
+    """
 
     maps_format: Annotated[Literal["png", "exr"], arg(metavar="png|exr")] = "png"
     """Format of the maps in a folder."""

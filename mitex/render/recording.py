@@ -202,4 +202,4 @@ def _checked_target(path: str | os.PathLike[str], frames: int, fps: int, side: i
     if place.is_dir() and any(place.iterdir()):
         raise OutputError(f"folder '{path}' is not empty", "name a new one")
     check_writable(place)
-    return Path(os.path.abspath(place))
+    return Path(os.path.realpath(place))

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mitex.asset import Asset
+from mitex.asset import DEFAULT_ALBEDO, DEFAULT_ROUGHNESS, Asset
 from mitex.colour import srgb_to_linear
 from mitex.errors import ConfigError
-from mitex.export.common import DEFAULT_ALBEDO, DEFAULT_ROUGHNESS
 from mitex.geometry.tangents import HardSplit, split_at_hard_edges, split_at_seams
 from mitex.geometry.triangles import twice_area
 from mitex.geometry.vectors import unit

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
+from subprocess import DEVNULL, PIPE, Popen
+from tempfile import TemporaryFile
 
 import numpy as np
 from PIL import Image
@@ -14,6 +18,7 @@ from mitex.paths import atomic_write, prepare_output
 from mitex.progress import counted
 
 VIDEO_SUFFIXES = (".mp4", ".gif")
+QUALITY = 15  # of H.264: the constant rate factor, of which lower ones look better
 
 
 def check_video(path: str | os.PathLike[str], frames: int, fps: int, resolution: int) -> Path:
@@ -66,26 +71,30 @@ def write_video(
 
 
 def _write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: int, side: int) -> None:
-    import imageio_ffmpeg
+    from imageio_ffmpeg import get_ffmpeg_exe
 
-    encoder = imageio_ffmpeg.write_frames(
-        str(path),
-        (side, side),
-        fps=fps,
-        codec="libx264",
-        quality=7,
-        macro_block_size=2,
-        output_params=["-movflags", "+faststart"],
-        ffmpeg_log_level="error",
-    )
-    encoder.send(None)
-    try:
-        for picture in pictures:
-            encoder.send(np.ascontiguousarray(picture))
-    finally:
-        encoder.close()
-    if not path.is_file() or path.stat().st_size == 0:
-        raise OutputError("ffmpeg wrote no video", "check the free space and `mitex doctor`")
+    raw = f"-f rawvideo -pix_fmt rgb24 -s {side}x{side} -r {fps} -i -"
+    mp4 = f"-an -vcodec libx264 -pix_fmt yuv420p -crf {QUALITY} -movflags +faststart"
+    command = [get_ffmpeg_exe(), "-y", "-loglevel", "error", *raw.split(), *mp4.split(), str(path)]
+    # What ffmpeg says goes to a file: a pipe that nobody reads would fill up.
+    with TemporaryFile() as log, Popen(command, stdin=PIPE, stdout=DEVNULL, stderr=log) as encoder:
+        assert encoder.stdin is not None
+        try:
+            with suppress(BrokenPipeError):  # it has ended by itself, and its exit status tells
+                for picture in pictures:
+                    encoder.stdin.write(np.ascontiguousarray(picture).data)
+                encoder.stdin.close()
+            failed = encoder.wait() != 0
+        except BaseException:
+            encoder.kill()
+            raise
+        log.seek(0)
+        words = log.read().decode("utf-8", "replace").split()
+    if os.strerror(errno.ENOSPC) in " ".join(words):
+        raise OSError(errno.ENOSPC, "ffmpeg")
+    if failed:
+        reason = " ".join(words)[-200:] or "it did not say why"
+        raise OutputError(f"ffmpeg wrote no video ({reason})", "check the free space and `mitex doctor`")
 
 
 def _write_gif(path: Path, pictures: Iterator[np.ndarray], fps: int, side: int) -> None:

@@ -3,6 +3,8 @@
 import logging
 import signal
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType
 from typing import Any, ClassVar
 
@@ -47,3 +49,20 @@ class StopSignals:
         self.requested = True
         # The lock of `logging` lets its own thread in again; a handler that writes unbuffered is safe here.
         log.info("stopping after this step; once more to stop at once")
+
+
+@contextmanager
+def terminable() -> Iterator[None]:
+    """Context where SIGTERM raises KeyboardInterrupt as Ctrl-C does, so that what is half-written is removed.
+
+    Only in the main thread, and where nobody has asked for something else than the process's end.
+    """
+    alone = threading.current_thread() is threading.main_thread()
+    if not alone or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
+        yield
+        return
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)

@@ -1,13 +1,14 @@
 """Checkpoints: everything a run needs to go on, in one safetensors file that is replaced in one step."""
 
 import json
+import math
 import os
 import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import torch
 from safetensors import SafetensorError, safe_open
@@ -15,6 +16,7 @@ from safetensors.torch import save_file
 
 from mitex.errors import CheckpointError, MitexWarning
 from mitex.paths import atomic_write
+from mitex.reading import reading
 from mitex.training import model_file
 from mitex.training.locate import CHECKPOINT as NAME
 from mitex.training.locate import PREVIOUS
@@ -120,22 +122,31 @@ def read(path: Path) -> Checkpoint:
     Raises:
         CheckpointError: It is missing, damaged, or not a Mitex checkpoint.
     """
-    try:
+    with reading(path, CheckpointError, "use another checkpoint"):
         tensors, metadata = model_file.read(path)
         if metadata.get("mitex_checkpoint") != FORMAT:
             raise CheckpointError(
                 f"'{path}' is not a checkpoint of this version of Mitex", "name the run folder of a fit"
             )
         return Checkpoint(
-            **json.loads(metadata["run"]),
+            **_counters(json.loads(metadata["run"])),
             task=_under("task/", tensors),
             optimizer=_under("optimizer/", tensors),
             generator=tensors["generator"],
             metadata=_under("task.", metadata),
         )
-    except (SafetensorError, OSError, KeyError, ValueError, TypeError) as e:
-        reason = "it is missing" if isinstance(e, FileNotFoundError) else str(e)
-        raise CheckpointError(f"cannot read checkpoint '{path}' ({reason})", "use another checkpoint") from e
+
+
+def _counters(run: dict[str, Any]) -> dict[str, Any]:
+    """What a checkpoint says besides its tensors, once it is sure that these are numbers and settings."""
+    for key in ("step", "skipped"):
+        if type(run[key]) is not int or run[key] < 0:
+            raise ValueError(f"{key} = {run[key]!r}")
+    if type(run["loss"]) not in (int, float) or not 0 <= float(run["seconds"]) < math.inf:
+        raise ValueError("a loss or a time that is no number")
+    if not isinstance(run["config"], dict):
+        raise ValueError("a config that is none")
+    return run
 
 
 def _is_whole(path: Path) -> bool:

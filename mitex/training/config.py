@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from mitex.errors import ConfigError
+from mitex.reading import content, reading
 from mitex.suggestions import suggestion
 from mitex.training import values
 
 Config = TypeVar("Config")
 
+LARGEST = 16 << 20  # config file [bytes]
 RECORD_TABLES = ("run", "versions")  # what a run folder's config.toml tells besides the config
 
 
@@ -46,6 +48,17 @@ def resolve(
     if name not in presets:
         raise ConfigError(f"there is no preset '{name}'", suggestion(name, presets))
     return replace(presets[name], **(from_file | from_overrides | {"preset": name}))  # type: ignore[type-var]
+
+
+def of_record(config: type[Config], record: Mapping[str, Any]) -> Config:
+    """The config of the keys that a model or a checkpoint holds; it may hold others, and lack some.
+
+    Raises:
+        ValueError: A value of the wrong type, or not finite.
+        ConfigError: One out of its range.
+    """
+    kinds = typing.get_type_hints(config)
+    return config(**{key: values.check(value, kinds[key]) for key, value in record.items() if key in kinds})
 
 
 def _agreed(places: Mapping[str, str | None]) -> str | None:
@@ -86,18 +99,14 @@ def _value(value: Any, kind: Any) -> Any:
 
 
 def _from_file(file: Path, kinds: Mapping[str, Any]) -> dict[str, Any]:
-    try:
-        with file.open("rb") as stream:
-            content = tomllib.load(stream)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as e:
-        raise ConfigError(f"'{file}' is not valid TOML ({e})", "mend the file") from e
-    except (OSError, ValueError) as e:  # ValueError: a null byte in the name
-        reason = getattr(e, "strerror", None) or e
-        raise ConfigError(f"cannot read config '{file}' ({reason})", "check the path") from e
+    with reading(file, ConfigError, "check the path"):
+        data = content(file, LARGEST)
+    with reading(file, ConfigError, "mend the file", "is not valid TOML"):
+        settings = tomllib.loads(data.decode())
     for table in RECORD_TABLES:
-        if isinstance(content.get(table), dict):
-            del content[table]
-    return {key: _read(key, value, kinds, values.check) for key, value in content.items()}
+        if isinstance(settings.get(table), dict):
+            del settings[table]
+    return {key: _read(key, value, kinds, values.check) for key, value in settings.items()}
 
 
 def _read(key: str, value: Any, kinds: Mapping[str, Any], reader: Callable[[Any, Any], Any]) -> Any:

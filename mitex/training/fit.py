@@ -100,6 +100,7 @@ class Run(Generic[Config]):
         result = train(task, self.config, self.folder, resume=self.resume, control=self.control, **training)
         learned = texture(result.about(name, self.config.preset))
         if self.folder is not None:
+            run.check_there(self.folder)
             learned.save(self.folder / NAME)
         return learned
 
@@ -128,6 +129,7 @@ class Run(Generic[Config]):
             computed = texture(about)
             seconds = round(time.monotonic() - began, 1)
             metrics.write({"step": 0, "seconds": seconds})
+            run.check_there(folder)
             computed.save(folder / NAME)
         return computed
 

@@ -83,10 +83,12 @@ class RunFolder(Nothing):
         if self._preview_every and (last or state.step % self._preview_every == 0):
             picture = state.task.preview(state.step)
             if picture is not None:
+                run.check_there(self._folder)
                 write_image(self._folder / run.PREVIEWS / f"{state.step:06}.png", picture)
 
     def save(self, state: TrainState) -> None:
         if self._saved != state.step:
+            run.check_there(self._folder)
             self._metrics.sync()
             checkpoint.save(self._folder, state.snapshot())
             self._saved = state.step

@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors import SafetensorError, safe_open
+from safetensors import safe_open
 from safetensors.torch import save_file
 
-from mitex.errors import CheckpointError, MeshError
+from mitex.errors import CheckpointError, ConfigError, MeshError
 from mitex.paths import atomic_write
+from mitex.reading import reading
 from mitex.training.locate import CHECKPOINT, PREVIOUS, locate
 
 
@@ -47,25 +48,34 @@ def opened(source: str | Path, kind: str) -> Iterator[tuple[dict[str, torch.Tens
         raise CheckpointError(
             f"there is no finished {kind} texture at '{source}'", "finish its fit, which can be resumed"
         )
-    try:
+    remedy = f"name the run folder of a {kind} fit"
+    with reading(path, CheckpointError, remedy, f"is not a {kind} texture", also=(MeshError, ConfigError)):
         tensors, metadata = read(path)
         if metadata.get("format") != _format(kind):
             raise ValueError("another format")
-        yield tensors, json.loads(metadata["about"])
-    except (SafetensorError, MeshError, OSError, ValueError, KeyError, TypeError, RuntimeError) as e:
-        raise CheckpointError(
-            f"'{path}' is not a {kind} texture ({e})", f"name the run folder of a {kind} fit"
-        ) from e
+        yield tensors, _description(metadata["about"])
 
 
 def read(path: Path) -> tuple[dict[str, torch.Tensor], dict[str, str]]:
     """Tensors, in memory of their own, and metadata of any safetensors file.
 
     Raises:
-        SafetensorError, OSError: it is missing or damaged.
+        SafetensorError, OSError, ValueError: it is missing or damaged.
     """
     with safe_open(path, "pt") as file:
+        most = path.stat().st_size
+        for name in file.keys():  # noqa: SIM118
+            # Only a tensor without elements can have such a side; what is built beside it would be huge.
+            if max(file.get_slice(name).get_shape(), default=0) > most:
+                raise ValueError(f"tensor {name} is larger than the file")
         return {key: file.get_tensor(key) for key in file.keys()}, file.metadata() or {}  # noqa: SIM118
+
+
+def _description(text: str) -> dict[str, Any]:
+    about = json.loads(text)
+    if not isinstance(about["name"], str):
+        raise ValueError("a name that is no text")
+    return about
 
 
 def _format(kind: str) -> str:

@@ -96,6 +96,18 @@ def prepare(folder: Path, config: Any, metadata: Mapping[str, str]) -> None:
         temporary.write_text(to_toml(config, {"run": metadata, "versions": versions()}), encoding="utf-8")
 
 
+def check_there(folder: Path) -> None:
+    """Checks that the folder of a run is where it was made.
+
+    Raises:
+        OutputError: Somebody has removed it: what a write would leave is no run.
+    """
+    if not (folder / CONFIG).is_file():
+        raise OutputError(
+            f"the run folder '{folder}' was removed or emptied during the fit", "start the fit again"
+        )
+
+
 def versions() -> dict[str, str]:
     """Versions of Mitex and of what it computes with, read without importing them."""
     numbers = {"mitex": __version__}

@@ -75,6 +75,9 @@ FITS = {
     "config that is no TOML": (lambda d: bad.text(d / "c.toml", "steps = = 3"), "--config c.toml", "TOML"),
     "binary config": (lambda d: (d / "c.toml").write_bytes(b"\xff\xfe\0"), "--config c.toml", "c.toml"),
     "config is a folder": (lambda d: (d / "c.toml").mkdir(), "--config c.toml", "c.toml"),
+    "endless config": (None, "--config /dev/zero", "no regular file"),
+    "config of no user": (None, "--config ~nosuchuser/c.toml", "cannot be read"),
+    "config of an endless name": (None, f"--config {'c' * 300}", "cannot be read"),
     "unknown key in the config": (
         lambda d: bad.text(d / "c.toml", "stepps = 3"),
         "--config c.toml",
@@ -132,6 +135,14 @@ MESHES = {
     ),
     "glb without meshes": (lambda d: bad.glb_without_meshes(d / "a.glb"), "a.glb", "a.glb"),
     "gltf that is no JSON": (lambda d: bad.text(d / "a.gltf", "{"), "a.gltf", "a.gltf"),
+    "required extensions that are no list": (
+        lambda d: bad.text(d / "a.gltf", '{"asset": {"version": "2.0"}, "extensionsRequired": 3}'),
+        "a.gltf",
+        "not valid glTF",
+    ),
+    "huge index": (lambda d: bad.text(d / "a.obj", bad.CUBE + f"f 1 2 {'9' * 30}\n"), "a.obj", "a.obj"),
+    "endless name": (lambda d: None, "x" * 300 + ".obj", "there is no mesh"),
+    "of no user": (lambda d: None, "~nosuchuser/a.obj", "there is no mesh"),
     "empty off": (lambda d: bad.text(d / "a.off", "OFF\n0 0 0\n"), "a.off", "a.off"),
 }
 
@@ -150,6 +161,11 @@ APPLIES = {
     "no suffix": (apply(out="out/a"), "no suffix"),
     "below a file": (apply(out="good.obj/a.glb"), "is a file"),
     "a folder": (apply(out="folder.glb"), "is a folder"),
+    "a pipe": (apply(out="pipe.glb"), "pipe or a device"),
+    "a field with a damaged header": (apply("--orientation field.npy"), "field.npy"),
+    "a field of no user": (apply("--orientation ~nosuchuser/a.npy"), "no file of vectors"),
+    "a capture of no user": ("fit nerf --capture ~nosuchuser/a --out out/a", "not a folder"),
+    "a capture of an endless name": (f"fit nerf --capture {'x' * 300} --out out/a", "not a folder"),
     "endless name": (apply(out="out/" + "x" * 300 + ".glb"), "too long"),
     "scale 0": (apply("--scale 0"), "--scale 0"),
     "negative scale": (apply("--scale -1"), "--scale -1"),
@@ -205,6 +221,10 @@ def more_files(files):
     (files / "model.pt").write_bytes(b"\x80\x04cposix\nsystem\n(S'touch out/hacked'\ntR.")
     (files / "empty").mkdir()
     (files / "folder.glb").mkdir()
+    os.mkfifo(files / "pipe.glb")
+    np.save(files / "field.npy", np.zeros((8, 3)))
+    header = (files / "field.npy").read_bytes().replace(b"'shape': (8, 3)", b"'shape': (8, [)")
+    (files / "field.npy").write_bytes(header)
     return files
 
 

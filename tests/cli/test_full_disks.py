@@ -3,13 +3,15 @@
 import errno
 import os
 import resource
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from mitex.cli import main
 from tests.cli import bad_files as bad
-from tests.cli.refusals import QUICK, apply, check_complaint, check_refused, fit, program, tree
+from tests.cli.refusals import QUICK, ROOT, apply, check_complaint, check_refused, fit, program, tree
 
 
 class TestFullDisks:
@@ -109,3 +111,21 @@ class TestInProcesses:
             "fit nca --exemplar huge.png", preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, limit)
         )
         assert (done.returncode, "over the limit" in done.stderr) == (2, True), done.stderr
+
+
+class TestSignals:
+    def test_sigterm_ends_an_apply_as_ctrl_c_does(self, files):
+        """Outside a training loop, in the middle of the work: nothing is left, and the exit code is 130."""
+        bad.model(files / "m.safetensors")
+        before = tree(files)
+        words = "-m mitex apply m.safetensors --mesh good.obj --subdivide 5 --steps 2000 --out out/new/a.glb"
+        environment = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}
+        process = subprocess.Popen(
+            [sys.executable, *words.split()], env=environment, stderr=subprocess.PIPE, text=True
+        )
+        assert process.stderr is not None
+        process.stderr.readline()  # its first line of progress: it is at work
+        process.terminate()
+        _, rest = process.communicate(timeout=120)
+        assert (process.returncode, rest.splitlines()[-1]) == (130, "interrupted"), rest
+        assert tree(files) == before

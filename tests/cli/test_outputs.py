@@ -1,5 +1,8 @@
 """No command writes over what it reads, or over what somebody else wrote."""
 
+import io
+import sys
+
 import pytest
 
 from mitex.asset import Asset
@@ -56,3 +59,13 @@ def test_a_file_of_ours_may_be_written_again(scene, capsys):
     )
     assert Asset.load(scene / "ours.obj").mesh.vertices.shape == (8, 3)
     assert (scene / "mine.obj").read_text() == "mtllib mine.mtl\n" + bad.CUBE
+
+
+def test_a_name_that_stdout_cannot_encode(files, monkeypatch):
+    """The file is there, and its name is printed as far as it can be."""
+    bad.model(files / "m.safetensors")
+    name = "out/\u00fc\u2603.ply"
+    printed = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(printed, encoding="ascii"))
+    assert main(apply("--subdivide 0 --steps 1 --quiet", model="m.safetensors", out=name)) == 0
+    assert printed.getvalue() == b"out/\\xfc\\u2603.ply\n" and (files / name).is_file()

@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from mitex.runtime.signals import StopSignals
+from mitex.runtime.signals import StopSignals, terminable
 
 
 @pytest.fixture(autouse=True)
@@ -68,3 +68,22 @@ def test_the_first_signal_is_answered_in_the_log(caplog):
     with caplog.at_level("INFO", "mitex"), StopSignals():
         os.kill(os.getpid(), signal.SIGTERM)
     assert "stopping after this step" in caplog.text
+
+
+class TestTerminable:
+    def test_sigterm_interrupts_as_ctrl_c_does(self):
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        with pytest.raises(KeyboardInterrupt), terminable():
+            os.kill(os.getpid(), signal.SIGTERM)
+        assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+    def test_within_it_a_training_still_ends_its_step(self):
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        with terminable(), StopSignals() as stop:
+            os.kill(os.getpid(), signal.SIGTERM)
+            assert stop.requested
+
+    def test_handlers_of_others_stay(self):
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        with terminable():
+            os.kill(os.getpid(), signal.SIGTERM)

@@ -5,6 +5,7 @@ import math
 import os
 import resource
 import struct
+from dataclasses import replace
 
 import pytest
 import torch
@@ -146,7 +147,7 @@ def test_nothing_to_load(tmp_path):
     (tmp_path / PREVIOUS).write_bytes(b"y")
     with pytest.raises(CheckpointError, match="cannot read checkpoint .*previous"):
         checkpoint.load(tmp_path)
-    with pytest.raises(CheckpointError, match="it is missing"):
+    with pytest.raises(CheckpointError, match="No such file"):
         checkpoint.read(tmp_path / "none")
 
 
@@ -175,3 +176,30 @@ def test_no_space_is_named(tmp_path, monkeypatch):
     with pytest.raises(OutputError, match="no space left"):
         checkpoint.save(tmp_path, _checkpoint())
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"step": "five"},
+        {"step": -1},
+        {"step": True},
+        {"skipped": -1},
+        {"loss": "low"},
+        {"seconds": math.inf},
+        {"seconds": None},
+        {"config": [1]},
+    ],
+    ids=str,
+)
+def test_counters_that_are_none(tmp_path, changes):
+    checkpoint.save(tmp_path, replace(_checkpoint(), **changes))
+    with pytest.raises(CheckpointError, match=NAME):
+        checkpoint.load(tmp_path)
+
+
+def test_a_description_without_end(tmp_path):
+    metadata = {"mitex_checkpoint": checkpoint.FORMAT, "run": "[" * 100_000}
+    save_file({"generator": torch.zeros(1)}, tmp_path / NAME, metadata)
+    with pytest.raises(CheckpointError, match=NAME):
+        checkpoint.load(tmp_path)

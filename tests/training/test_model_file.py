@@ -2,6 +2,7 @@
 
 import pytest
 import torch
+from safetensors.torch import save_file
 
 from mitex.errors import CheckpointError
 from mitex.mesh import Mesh
@@ -34,3 +35,21 @@ def test_a_file_of_another_method(tmp_path):
         model_file.opened(path, "other"),
     ):
         pass
+
+
+def test_a_tensor_without_elements_may_not_be_larger_than_its_file(tmp_path):
+    """A network built beside it would ask for terabytes."""
+    path = _saved(tmp_path, values=torch.zeros(0, 2**40))
+    with pytest.raises(CheckpointError, match="larger than the file"), model_file.opened(path, "toy"):
+        pass
+
+
+@pytest.mark.parametrize(
+    "about", ["[1]", '{"name": 1}', "{}", "null", "[" * 100_000, '{"name": Infinity}'], ids=range(6)
+)
+def test_descriptions_of_another_kind(tmp_path, about):
+    metadata = {"format": "mitex-toy-1", "about": about}
+    save_file({"values": torch.zeros(1)}, tmp_path / "a.safetensors", metadata)
+    with pytest.raises(CheckpointError, match="a.safetensors.*not a toy"):  # noqa: SIM117
+        with model_file.opened(tmp_path / "a.safetensors", "toy"):
+            pass

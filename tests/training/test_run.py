@@ -1,14 +1,15 @@
 """The run folder."""
 
+import shutil
 import tomllib
 from unittest.mock import Mock
 
 import pytest
 
 from mitex.errors import CheckpointError, OutputError
-from mitex.training import checkpoint, run
+from mitex.training import checkpoint, run, train
 
-from .task import SmallConfig
+from .task import SmallConfig, SmallTask
 
 
 def _files(folder):
@@ -152,3 +153,15 @@ def test_a_second_run_leaves_the_first_alone(tmp_path):
             pass
         metrics.write({"step": 1})
         assert _files(folder) == ["config.toml", "metrics.jsonl"]
+
+
+def test_a_folder_that_is_removed_during_the_run_does_not_come_back(tmp_path):
+    class Watched(SmallTask):
+        def begin(self, step, generator):
+            if step == 2:
+                shutil.rmtree(tmp_path / "run")
+            return super().begin(step, generator)
+
+    with pytest.raises(OutputError, match="was removed"):
+        train(Watched(), SmallConfig(steps=4, checkpoint_every=1), tmp_path / "run", lr=0.1)
+    assert not _files(tmp_path)

@@ -28,8 +28,10 @@ from mitex.mesh.cotangents import cotangent_weights
 from mitex.mesh.mesh import Mesh
 from mitex.mesh.vertex_files import readable
 from mitex.progress import announce
+from mitex.reading import content
 
 NEAR = 0.1  # how far off the surface a stroke may be, relative to the diagonal of the mesh's box
+LARGEST = 64 << 20  # file of strokes [bytes]
 FAINT = 1e-3  # of the strokes' directions at a vertex: less than that along the surface is none
 LOST = 1e-12  # nothing of the strokes arrives where less than that does
 WEIGHTS = 1e-6, 1e4  # of edges: positive for the solver, and no slivers beyond its digits
@@ -42,12 +44,9 @@ def read_strokes(place: Path) -> list[np.ndarray]:
         ConfigError: there is no such file, it cannot be read, or something else is in it.
     """
     form = 'write {"strokes": [[[x, y, z], ...], ...]}'
-    with readable(place, "strokes"):
-        try:
-            strokes = json.loads(place.read_text("utf-8"))["strokes"]
-            return [np.array(stroke, np.float64).reshape(len(stroke), 3) for stroke in strokes]
-        except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as e:
-            raise ConfigError(f"'{place}' holds no strokes", form) from e
+    with readable(place, "strokes", "holds no strokes", form):
+        strokes = json.loads(content(place, LARGEST))["strokes"]
+        return [np.array(stroke, np.float64).reshape(len(stroke), 3) for stroke in strokes]
 
 
 def stroke_vectors(mesh: Mesh, strokes: Sequence[np.ndarray]) -> np.ndarray:

@@ -20,48 +20,44 @@ from urllib.parse import unquote, urlsplit
 import numpy as np
 
 from mitex.errors import MeshError
-from mitex.mesh.readers.soup import DAMAGED, Soup, check_budget, check_indices
+from mitex.mesh.readers.budget import Budget
+from mitex.mesh.readers.soup import DAMAGED, Soup, check_indices
+from mitex.reading import content
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 COMPRESSIONS = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 TRIANGLES, STRIP, FAN = 4, 5, 6
+READ = ("POSITION", "NORMAL", "TEXCOORD_0")  # attributes
 
 
-def read_gltf(name: str, data: bytes, max_vertices: int, folder: Path, max_bytes: int) -> Soup:
+def read_gltf(name: str, data: bytes, budget: Budget, folder: Path) -> Soup:
     """Reads the default scene, or all root nodes where none is named, with the transforms of its nodes.
 
     Args:
         name: for messages.
         data: the file.
-        max_vertices: budget, summed over all instances.
+        budget: of all instances together.
         folder: where relative buffer paths start, and which they must not leave.
-        max_bytes: limit for all buffers together.
 
     Raises:
-        MeshError: not glTF 2.0, compressed geometry, damaged or missing data, a path outside `folder`, too
-            many vertices.
+        MeshError: not glTF 2.0, compressed geometry, damaged or missing data, a path outside `folder`, more
+            than the budget.
+        LookupError, TypeError, ValueError, OverflowError, AttributeError: not valid glTF.
     """
     tree, chunk = _container(name, data)
     version = str(tree.get("asset", {}).get("version", "?"))
     if not version.startswith("2"):
         raise MeshError(f"{name} is glTF version {version}", "export it as glTF 2.0")
-    try:
-        required = tree.get("extensionsRequired", [])
-        for extension in COMPRESSIONS:
-            if extension in required:
-                raise MeshError(
-                    f"{name} is compressed with {extension}", "export it without mesh compression"
-                )
-        instances = list(_instances(tree))
-        total = sum(tree["accessors"][p["attributes"]["POSITION"]]["count"] for p, _ in instances)
-        check_budget(name, total, max_vertices)
-        buffers = _buffers(name, tree, chunk, folder, max_bytes)
-        source = _Accessors(tree, buffers, 6 * max_vertices)
-        return _join(name, [(source, p, matrix) for p, matrix in instances])
-    except (LookupError, TypeError, ValueError, OverflowError, AttributeError) as error:
-        detail = f"{type(error).__name__}: {error}"
-        raise MeshError(f"{name} is not valid glTF ({detail})", DAMAGED) from error
+    required = tree.get("extensionsRequired", [])
+    for extension in COMPRESSIONS:
+        if extension in required:
+            raise MeshError(f"{name} is compressed with {extension}", "export it without mesh compression")
+    meshes = [_triangle_primitives(mesh) for mesh in tree.get("meshes", [])]
+    placed = list(_placed(tree))
+    _check_budget(name, tree, [meshes[mesh] for mesh, _ in placed], budget)
+    source = _Accessors(tree, _buffers(name, tree, chunk, folder, budget.bytes))
+    return _join(name, [(source, primitive, matrix) for mesh, matrix in placed for primitive in meshes[mesh]])
 
 
 def _container(name: str, data: bytes) -> tuple[dict[str, Any], bytes | None]:
@@ -90,18 +86,20 @@ def _container(name: str, data: bytes) -> tuple[dict[str, Any], bytes | None]:
 
 
 def _buffers(name: str, tree: dict, chunk: bytes | None, folder: Path, max_bytes: int) -> list[bytes]:
-    buffers = []
+    buffers, fetched = [], {}
     for number, buffer in enumerate(tree.get("buffers", [])):
         uri = buffer.get("uri")
-        if uri is not None:
-            blob = _fetch(name, uri, folder, max_bytes)
+        if uri in fetched:
+            blob = fetched[uri]
+        elif uri is not None:
+            blob = fetched[uri] = _fetch(name, uri, folder, max_bytes)
+            max_bytes -= len(blob)
         elif number == 0 and chunk is not None:
             blob = chunk
         else:
             raise MeshError(f"{name} has no data for buffer {number}", DAMAGED)
         if len(blob) < buffer["byteLength"]:
             raise MeshError(f"buffer {number} of {name} is cut off", DAMAGED)
-        max_bytes -= len(blob)
         buffers.append(blob)
     return buffers
 
@@ -124,13 +122,38 @@ def _fetch(name: str, uri: str, folder: Path, max_bytes: int) -> bytes:
             raise MeshError(f"{name} refers to '{excerpt}', which does not exist", remedy)
         if path.stat().st_size > max_bytes:
             raise MeshError(f"the buffer '{excerpt}' of {name} is too large", "simplify the mesh")
-        return path.read_bytes()
+        return content(path, max_bytes)
     except (OSError, ValueError) as error:
         raise MeshError(f"{name} refers to '{excerpt}', which cannot be read", remedy) from error
 
 
-def _instances(tree: dict[str, Any]) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
-    """Yields (primitive, 4x4 matrix) of every triangle primitive in the scene."""
+def _triangle_primitives(mesh: dict[str, Any]) -> list[dict[str, Any]]:
+    return [p for p in mesh["primitives"] if p.get("mode", TRIANGLES) in (TRIANGLES, STRIP, FAN)]
+
+
+def _check_budget(name: str, tree: dict[str, Any], placed: list[list[dict]], budget: Budget) -> None:
+    """Refuses a scene of meshes, each with its primitives, before they are multiplied."""
+    budget.check(name, instances=sum(map(len, placed)))
+    vertices = corners = 0
+    for primitives in placed:
+        for primitive in primitives:
+            counts = {k: _count(tree, index) for k, index in primitive["attributes"].items() if k in READ}
+            if set(counts.values()) != {counts["POSITION"]}:
+                raise ValueError(f"attributes of {counts} elements")
+            vertices += counts["POSITION"]
+            corners += _count(tree, primitive["indices"]) if "indices" in primitive else counts["POSITION"]
+            budget.check(name, vertices=vertices, corners=corners)
+
+
+def _count(tree: dict[str, Any], accessor: int) -> int:
+    count = tree["accessors"][accessor]["count"]
+    if not isinstance(count, int) or count < 0:
+        raise ValueError(f"an accessor of {count} elements")
+    return count
+
+
+def _placed(tree: dict[str, Any]) -> Iterator[tuple[int, np.ndarray]]:
+    """Yields (mesh, 4x4 matrix) of every node in the scene that has a mesh."""
     nodes = tree.get("nodes", [])
     scenes = tree.get("scenes", [])
     children = {child for node in nodes for child in node.get("children", [])}
@@ -148,9 +171,7 @@ def _instances(tree: dict[str, Any]) -> Iterator[tuple[dict[str, Any], np.ndarra
         matrix = parent @ _matrix(node)
         stack.extend((child, matrix) for child in reversed(node.get("children", [])))
         if "mesh" in node:
-            for primitive in tree["meshes"][node["mesh"]]["primitives"]:
-                if primitive.get("mode", TRIANGLES) in (TRIANGLES, STRIP, FAN):
-                    yield primitive, matrix
+            yield node["mesh"], matrix
 
 
 def _matrix(node: dict) -> np.ndarray:
@@ -176,15 +197,12 @@ class _Accessors:
 
     tree: dict
     buffers: list[bytes]
-    max_count: int
 
     def __getitem__(self, index: int) -> np.ndarray:
         """(count, width) numbers; normalised integers as float64 in [0, 1] or [-1, 1]."""
         accessor = self.tree["accessors"][index]
         kind, width = np.dtype(COMPONENTS[accessor["componentType"]]), WIDTHS[accessor["type"]]
-        count = int(accessor["count"])
-        if not 0 <= count <= self.max_count:
-            raise ValueError(f"an accessor of {count} elements")
+        count = _count(self.tree, index)
         if "bufferView" in accessor:
             values = self._view(accessor["bufferView"], accessor.get("byteOffset", 0), kind, width, count)
         else:

@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mitex.errors import MeshError
-from mitex.mesh.readers.soup import DAMAGED, Soup, check_budget, polygon_soup
+from mitex.mesh.readers.budget import Budget
+from mitex.mesh.readers.soup import DAMAGED, Soup, polygon_soup
 
 MISSING = -(2**62)  # a corner without texture coordinate or normal
 
@@ -28,7 +29,7 @@ class _Lines:
     sizes: list[int] = field(default_factory=list)
 
 
-def read_obj(name: str, data: bytes, max_vertices: int) -> Soup:
+def read_obj(name: str, data: bytes, budget: Budget) -> Soup:
     """Reads an OBJ file: `v`, `vt`, `vn` and `f` lines; groups, materials, lines and points are ignored.
 
     Raises:
@@ -36,13 +37,14 @@ def read_obj(name: str, data: bytes, max_vertices: int) -> Soup:
     """
     if b"\0" in data[:4096]:
         raise MeshError(f"{name} is binary, an OBJ file is text", "check its suffix")
-    check_budget(name, data.count(b"\nv ") + data.startswith(b"v "), max_vertices)
-    lines = _scan(name, data)
+    budget.check(name, vertices=data.count(b"\nv ") + data.startswith(b"v "))
+    budget.check(name, corners=max(data.count(b"\nvt "), data.count(b"\nvn ")))
+    lines = _scan(name, data, budget)
     if not lines.vertices:
         raise MeshError(
             f"{name} holds no vertices", "check that it is an OBJ file and was exported completely"
         )
-    check_budget(name, len(lines.vertices), max_vertices)
+    budget.check(name, vertices=len(lines.vertices), corners=len(lines.corners))
     corners = np.array(lines.corners, np.int64).reshape(-1, 3)
     uv = _looked_up(name, "texture coordinate", lines.uvs, corners[:, 1], 2)
     normals = _looked_up(name, "normal", lines.normals, corners[:, 2], 3)
@@ -58,7 +60,7 @@ def read_obj(name: str, data: bytes, max_vertices: int) -> Soup:
     return soup
 
 
-def _scan(name: str, data: bytes) -> _Lines:
+def _scan(name: str, data: bytes, budget: Budget) -> _Lines:
     lines = _Lines()
     known: dict[bytes, tuple[int, int, int]] = {}
     for number, line in enumerate(data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines(), 1):
@@ -67,6 +69,8 @@ def _scan(name: str, data: bytes) -> _Lines:
         except (ValueError, IndexError) as error:
             text = line[:40].decode("ascii", "replace")
             raise MeshError(f"line {number} of {name} is not valid OBJ: '{text}'", DAMAGED) from error
+        if len(lines.corners) > budget.corners:
+            break  # to be refused
     return lines
 
 

@@ -6,12 +6,15 @@ Read here and not through trimesh, because trimesh 5.2 refuses binary files that
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import warnings
+from dataclasses import dataclass, field, replace
+from itertools import accumulate
 
 import numpy as np
 
 from mitex.errors import MeshError
-from mitex.mesh.readers.soup import DAMAGED, Soup, check_budget, check_indices, polygon_soup
+from mitex.mesh.readers.budget import Budget
+from mitex.mesh.readers.soup import DAMAGED, Soup, check_indices, polygon_soup
 
 # Types by any of their names, as numpy codes without byte order.
 TYPES = {
@@ -49,16 +52,16 @@ class _Ragged:
     sizes: np.ndarray
 
 
-def read_ply(name: str, data: bytes, max_vertices: int) -> Soup:
+def read_ply(name: str, data: bytes, budget: Budget) -> Soup:
     """Reads a PLY file: positions, faces, and UVs and normals where there are some.
 
     Raises:
         MeshError: not a PLY file, a damaged header, data that end early, too many vertices.
     """
-    return soup_of_tables(name, read_tables(name, data, max_vertices)[0])
+    return soup_of_tables(name, read_tables(name, data, budget)[0])
 
 
-def read_tables(name: str, data: bytes, max_vertices: int) -> tuple[dict[str, dict], int]:
+def read_tables(name: str, data: bytes, budget: Budget) -> tuple[dict[str, dict], int]:
     """The elements of a PLY file up to vertices and faces, and how many bytes or numbers come after them.
 
     Returns:
@@ -70,17 +73,19 @@ def read_tables(name: str, data: bytes, max_vertices: int) -> tuple[dict[str, di
     order, elements, start = _header(name, data)
     for element in elements:
         if element.name == "vertex":
-            check_budget(name, element.count, max_vertices)
+            budget.check(name, vertices=element.count)
         if element.properties and element.count > len(data):
             problem = f"{name} promises {element.count:,} {element.name} elements, more than it has bytes"
             raise MeshError(problem, DAMAGED)
+        if element.properties:
+            budget.check(name, corners=element.count)
     body = _Text(name, data[start:]) if order == "" else _Binary(name, data, start, order)
     tables: dict[str, dict] = {}
     for element in elements:
         tables[element.name] = _read_element(body, element)
         if "vertex" in tables and "face" in tables:
             break
-    return tables, body.left
+    return tables, body.end - body.position
 
 
 def soup_of_tables(name: str, tables: dict[str, dict]) -> Soup:
@@ -152,50 +157,73 @@ def _header(name: str, data: bytes) -> tuple[str, list[_Element], int]:
 
 
 class _Binary:
-    """Reads numbers from bytes."""
+    """Reads numbers from bytes; positions are counted in bytes."""
 
     def __init__(self, name: str, data: bytes, start: int, order: str):
         self.name, self.data, self.position, self.order = name, data, start, order
+        self.end = len(data)
 
-    @property
-    def left(self) -> int:
-        """Bytes not yet read."""
-        return len(self.data) - self.position
+    def dtype(self, kind: str) -> np.dtype:
+        """The type of a number of that kind."""
+        return np.dtype(self.order + kind)
+
+    def width(self, kind: str) -> int:
+        """How many positions a number takes."""
+        return self.dtype(kind).itemsize
+
+    def number(self, position: int, kind: str) -> float:
+        """The number at a position."""
+        return np.frombuffer(self.data, self.dtype(kind), 1, position)[0].item()
+
+    def numbers(self, kept: np.ndarray, start: int, kind: str) -> np.ndarray:
+        """The numbers at those positions from `start` on that `kept` (N,) bool tells."""
+        return np.frombuffer(self.data, np.uint8, len(kept), start)[kept].view(self.dtype(kind))
 
     def table(self, columns: list[tuple[str, str, int]], count: int) -> dict[str, np.ndarray] | None:
         """`count` rows of columns (name, type, width), each (count, width); None if the data end before."""
         # Numbered fields, because the header may repeat a name.
         fields = [(str(k), self.order + kind, (width,)) for k, (_, kind, width) in enumerate(columns)]
-        dtype = np.dtype(fields)
-        if self.position + dtype.itemsize * count > len(self.data):
+        length = sum(self.width(kind) * width for _, kind, width in columns)
+        if self.position + length * count > self.end:
             return None
-        if not dtype.itemsize:
+        if not length:
             return {name: np.empty((count, 0), kind) for name, kind, _ in columns}
-        rows = np.frombuffer(self.data, dtype, count, self.position)
-        self.position += dtype.itemsize * count
+        rows = np.frombuffer(self.data, np.dtype(fields), count, self.position)
+        self.position += length * count
         return {name: rows[str(k)] for k, (name, _, _) in enumerate(columns)}
 
 
 class _Text:
-    """Reads numbers from text."""
+    """Reads numbers from text; positions are counted in numbers."""
 
     def __init__(self, name: str, text: bytes):
         self.name, self.position = name, 0
         try:
-            self.numbers = np.array(list(map(float, text.split())))
-        except ValueError as error:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", DeprecationWarning)  # numpy's of text that is no number
+                self.values = np.fromstring(text, sep=" ")
+        except (ValueError, DeprecationWarning) as error:
             raise MeshError(f"{name} has something between its numbers that is none", DAMAGED) from error
+        self.end = len(self.values)
 
-    @property
-    def left(self) -> int:
-        """Numbers not yet read."""
-        return len(self.numbers) - self.position
+    def width(self, kind: str) -> int:
+        """How many positions a number takes."""
+        return 1
+
+    def number(self, position: int, kind: str) -> float:
+        """The number at a position."""
+        return self.values[position].item()
+
+    def numbers(self, kept: np.ndarray, start: int, kind: str) -> np.ndarray:
+        """The numbers at those positions from `start` on that `kept` (N,) bool tells."""
+        return self.values[start : start + len(kept)][kept]
 
     def table(self, columns: list[tuple[str, str, int]], count: int) -> dict[str, np.ndarray] | None:
-        ends = np.cumsum([width for _, _, width in columns])
-        if self.position + ends[-1] * count > len(self.numbers):
+        """As of `_Binary`."""
+        ends = list(accumulate(width for _, _, width in columns))
+        if self.position + ends[-1] * count > self.end:
             return None
-        rows = self.numbers[self.position : self.position + ends[-1] * count].reshape(count, ends[-1])
+        rows = self.values[self.position : self.position + ends[-1] * count].reshape(count, ends[-1])
         self.position += ends[-1] * count
         return {name: rows[:, end - width : end] for (name, _, width), end in zip(columns, ends, strict=True)}
 
@@ -215,13 +243,14 @@ def _read_element(body: _Binary | _Text, element: _Element) -> dict:
 def _uniform(body: _Binary | _Text, element: _Element) -> dict | None:
     """All rows at once, if their lists are as long as those of the first row; otherwise None."""
     start = body.position
-    lengths = _first_lengths(body, element) if element.count else {}
+    first = _row_by_row(body, replace(element, count=min(element.count, 1)))
     body.position = start
-    columns = []
+    columns, lengths = [], {}
     for name, size_type, kind in element.properties:
         if size_type:
+            lengths[name] = int(first[name].sizes.sum())
             columns.append((f"{name} size", size_type, 1))
-        columns.append((name, kind, lengths.get(name, 0) if size_type else 1))
+        columns.append((name, kind, lengths.get(name, 1)))
     table = body.table(columns, element.count)
     if table is None:
         return None
@@ -230,7 +259,7 @@ def _uniform(body: _Binary | _Text, element: _Element) -> dict | None:
         values = table[name]
         if size_type:
             sizes = table[f"{name} size"][:, 0]
-            if not (sizes == lengths.get(name, 0)).all():
+            if not (sizes == lengths[name]).all():
                 return None
             result[name] = _Ragged(values.ravel(), sizes.astype(np.int64))
         else:
@@ -238,37 +267,48 @@ def _uniform(body: _Binary | _Text, element: _Element) -> dict | None:
     return result
 
 
-def _first_lengths(body: _Binary | _Text, element: _Element) -> dict[str, int]:
-    row = _one_row(body, element)
-    return {name: len(row[name]) for name, size_type, _ in element.properties if size_type}
-
-
 def _row_by_row(body: _Binary | _Text, element: _Element) -> dict:
-    rows = [_one_row(body, element) for _ in range(element.count)]
-    result: dict = {}
-    for name, size_type, _ in element.properties:
-        values = [row[name] for row in rows]
-        flat = np.concatenate(values) if values else np.empty(0)
-        sizes = np.array([len(v) for v in values], np.int64)
-        result[name] = _Ragged(flat, sizes) if size_type else flat
+    """Lists of different lengths: row by row only where they are, then all of a property at once."""
+    starts = {name: np.zeros(element.count, np.int64) for name, _, _ in element.properties}
+    sizes = {name: np.ones(element.count, np.int64) for name, _, _ in element.properties}
+    begin = position = body.position
+    for row in range(element.count):
+        for name, size_type, kind in element.properties:
+            size = 1
+            if size_type:
+                size = _list_size(body, element, position, size_type)
+                position += body.width(size_type)
+            starts[name][row], sizes[name][row] = position - begin, size
+            position += size * body.width(kind)
+            if position > body.end:
+                raise _too_short(body, element)
+    body.position, result = position, {}
+    for name, size_type, kind in element.properties:
+        ends = starts[name] + sizes[name] * body.width(kind)
+        flat = body.numbers(_covered(starts[name], ends, position - begin), begin, kind)
+        result[name] = _Ragged(flat, sizes[name]) if size_type else flat
     return result
 
 
-def _one_row(body: _Binary | _Text, element: _Element) -> dict[str, np.ndarray]:
-    row = {}
-    for name, size_type, kind in element.properties:
-        length = 1
-        if size_type:
-            size = _take(body, element, size_type, 1)[0]
-            if not 0 <= size < 2**31:
-                raise MeshError(f"{body.name} has a {element.name} list of {size} numbers", DAMAGED)
-            length = int(size)
-        row[name] = _take(body, element, kind, length)
-    return row
+def _covered(starts: np.ndarray, ends: np.ndarray, length: int) -> np.ndarray:
+    """(length,) bool: what lies in one of the half-open intervals, which do not overlap."""
+    long = ends > starts
+    change = np.zeros(length + 1, np.int8)
+    change[starts[long]] += 1
+    change[ends[long]] -= 1
+    return np.cumsum(change[:-1], dtype=np.int8).astype(bool)
 
 
-def _take(body: _Binary | _Text, element: _Element, kind: str, length: int) -> np.ndarray:
-    table = body.table([("", kind, length)], 1)
-    if table is None:
-        raise MeshError(f"{body.name} ends before its {element.count} {element.name} elements do", DAMAGED)
-    return table[""][0]
+def _list_size(body: _Binary | _Text, element: _Element, position: int, kind: str) -> int:
+    if position + body.width(kind) > body.end:
+        raise _too_short(body, element)
+    size = body.number(position, kind)
+    if not 0 <= size < 2**31:
+        raise MeshError(f"{body.name} has a {element.name} list of {size} numbers", DAMAGED)
+    if size > body.end - position:
+        raise _too_short(body, element)
+    return int(size)
+
+
+def _too_short(body: _Binary | _Text, element: _Element) -> MeshError:
+    return MeshError(f"{body.name} ends before its {element.count} {element.name} elements do", DAMAGED)

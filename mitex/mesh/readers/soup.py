@@ -9,6 +9,7 @@ import numpy as np
 from mitex.errors import MeshError
 from mitex.mesh.polygons import Polygons, triangulate
 
+FAR = 1e3  # sizes of a mesh: there its positions keep four digits of float32's seven
 DAMAGED = "the file is damaged or cut off; export or download it again"
 
 
@@ -65,9 +66,7 @@ def polygon_soup(
         used = np.repeat(~short, sizes)
         corners, sizes = corners[used], sizes[~short]
         uv, normals = (None if values is None else values[used] for values in (uv, normals))
-    with np.errstate(over="ignore"):
-        points = vertices.astype(np.float32).astype(np.float64)
-    triangles = triangulate(points, corners, sizes)
+    triangles = triangulate(near_origin(vertices)[0].astype(np.float64), corners, sizes)
     soup = Soup(vertices, corners[triangles])
     soup.uv, soup.normals = (None if values is None else values[triangles] for values in (uv, normals))
     if (sizes > 3).any():
@@ -75,6 +74,24 @@ def polygon_soup(
     if short.any():
         soup.notes.append(f"left out faces with fewer than 3 corners: {short.sum():,}")
     return soup
+
+
+def near_origin(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions in single precision; far from the origin they are moved there, so that they keep their shape.
+
+    Args:
+        vertices: (V, 3) float64, maybe not finite.
+
+    Returns:
+        (V, 3) float32, and the (3,) float64 centre that was subtracted: zero unless the box of the vertices
+        is `FAR` times farther away than it is large.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        low, high = vertices.min(axis=0, initial=np.inf), vertices.max(axis=0, initial=-np.inf)
+        centre, size = low / 2 + high / 2, float((high - low).max())
+        if not (np.abs(centre).max() > FAR * size > 0 and np.isfinite(centre).all()):
+            centre = np.zeros(3)
+        return (vertices - centre).astype(np.float32), centre
 
 
 def check_indices(name: str, corners: np.ndarray, count: int) -> None:
@@ -87,10 +104,3 @@ def check_indices(name: str, corners: np.ndarray, count: int) -> None:
     if high >= count:
         problem = f"{name} has a face that refers to vertex {high} (counted from 0) of only {count}"
         raise MeshError(problem, DAMAGED)
-
-
-def check_budget(name: str, count: int, max_vertices: int) -> None:
-    """Raises MeshError if a mesh of `count` vertices is over the budget."""
-    if count > max_vertices:
-        problem = f"{name} has {count:,} vertices, more than the budget of {max_vertices:,}"
-        raise MeshError(problem, "simplify it, or raise max_vertices")

@@ -9,12 +9,13 @@ import struct
 import numpy as np
 
 from mitex.errors import MeshError
-from mitex.mesh.readers.soup import DAMAGED, Soup, check_budget, check_indices
+from mitex.mesh.readers.budget import Budget
+from mitex.mesh.readers.soup import DAMAGED, Soup, check_indices
 
 NOT_A_MESH = "check its suffix and how it was exported"
 
 
-def read_stl(name: str, data: bytes, max_vertices: int) -> Soup:
+def read_stl(name: str, data: bytes, budget: Budget) -> Soup:
     """Reads an STL file, text or binary. Its triangles are separate; the caller welds them.
 
     Raises:
@@ -30,12 +31,12 @@ def read_stl(name: str, data: bytes, max_vertices: int) -> Soup:
             problem = f"{name} promises {faces:,} triangles but is {len(data):,} bytes long"
             raise MeshError(problem, DAMAGED)
         data = data[: 84 + 50 * faces]  # some programs append their own data
-    check_budget(name, faces // 2, max_vertices)  # a closed mesh has twice as many faces as vertices
+    budget.check(name, vertices=faces // 2)  # a closed mesh has twice as many faces as vertices
     vertices, triangles = _trimesh(name, data, "stl")
     return Soup(vertices, triangles, split=True)
 
 
-def read_off(name: str, data: bytes, max_vertices: int) -> Soup:
+def read_off(name: str, data: bytes, budget: Budget) -> Soup:
     """Reads an OFF file.
 
     Raises:
@@ -48,7 +49,7 @@ def read_off(name: str, data: bytes, max_vertices: int) -> Soup:
         count, faces = int(words[1]), int(words[2])
     except ValueError as error:
         raise MeshError(f"{name} does not say how many vertices and faces it has", DAMAGED) from error
-    check_budget(name, count, max_vertices)
+    budget.check(name, vertices=count, corners=3 * faces)
     if count < 0 or faces < 0 or count + faces > len(data):
         raise MeshError(f"{name} promises {count:,} vertices and {faces:,} faces, too many for it", DAMAGED)
     if not faces:

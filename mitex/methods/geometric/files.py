@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -51,6 +52,8 @@ def load(source: str | Path) -> tuple[list[FaceNetwork], Mesh, torch.Tensor, dic
             raise ValueError("values that are not finite")
         if tensors["fixed"].shape != tensors["vertices"].shape:
             raise ValueError("noise of another template")
+        if not 0 <= float(about["noise"]) < math.inf or not isinstance(about["remeasure"], bool):
+            raise ValueError("noise that is no number, or features of another kind")
         return _generators(tensors, int(about["levels"])), template, tensors["fixed"], about
 
 

@@ -29,6 +29,7 @@ __all__ = [
     "fit",
     "fit_text",
     "graft_weights",
+    "living_page",
 ]
 
 __getattr__ = attributes(
@@ -42,6 +43,7 @@ __getattr__ = attributes(
         "NcaTexture": "mitex.methods.nca.texture",
         "Shooting": "mitex.methods.nca.film",
         "graft_weights": "mitex.methods.nca.weights",
+        "living_page": "mitex.methods.nca.page",
         "fit": "mitex.methods.nca.fitting",
         "fit_text": "mitex.methods.nca.text.fitting",
     },
@@ -53,6 +55,7 @@ if TYPE_CHECKING:
     from mitex.methods.nca.fitting import fit
     from mitex.methods.nca.graft import Graft
     from mitex.methods.nca.model import MeshNCA
+    from mitex.methods.nca.page import living_page
     from mitex.methods.nca.text.fitting import fit_text
     from mitex.methods.nca.texture import GrowingTexture, NcaTexture
     from mitex.methods.nca.weights import graft_weights

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 RESOLUTION = 1024  # of baked textures [texels]
 MOST_VARIANTS = 32
 LONGEST = 60  # name of a run folder from words [characters]
+PAGE = ".html"
 FIELD_FILES = (".npy", ".ply", ".json")
 
 
@@ -124,6 +125,7 @@ class Apply(OptionalMeshOptions):
       mitex apply pebbles --mesh bunny.obj --out bunny.glb --subdivide 2 --resolution 2048
       mitex apply pebbles --mesh scan.ply --out scan.glb --vertex-colors --seed 7 --orientation 45
       mitex apply pebbles --mesh bunny.obj --out bunny.glb --variants 5
+      mitex apply pebbles --mesh bunny.obj --out bunny.html
       mitex apply pebbles --mesh bunny.obj --out maps/ --maps-format exr
       mitex apply pebbles --tile 1024 --out pebbles-tile
     """
@@ -238,6 +240,10 @@ class Apply(OptionalMeshOptions):
             reject_unused("--vertex-colors", out, self.vertex_colors and not coloured)
             reject_unused("--resolution", out, self.resolution is not None and suffix == ".ply")
             reject_unused("--variants", out, self.variants > 1 and suffix != ".glb")
+            page = suffix == PAGE
+            reject_unused("--resolution", out, page and self.resolution is not None)
+            reject_unused("--keep-dense", out, page and self.keep_dense)
+            reject_unused("--displace", out, page and self.displace)
 
     def write(self, out: Path) -> None:
         from mitex.runtime import let_idle_threads_sleep
@@ -258,8 +264,27 @@ class Apply(OptionalMeshOptions):
             options = self._growth(out)
             assets = NcaTexture.load(self.model).variants(Mesh.load(self._mesh), seeds, **options)
             write_variants(assets, out)
+        elif out.suffix.lower() == PAGE:
+            self._write_page(out)
         else:
             super().write(out)
+
+    def _write_page(self, out: Path) -> None:
+        from mitex.mesh import Mesh
+        from mitex.methods.nca import NcaTexture, living_page
+
+        living_page(
+            NcaTexture.load(self.model),
+            Mesh.load(self._mesh),
+            out,
+            seed=self.seed,
+            steps=self.steps,
+            subdivide=levels(self.subdivide),
+            orientation=oriented(self.orientation),
+            scale=self.scale,
+            field=self.field,
+            speed=self.speed,
+        )
 
     def applied(self, out: Path) -> Asset:
         from mitex.mesh import Mesh

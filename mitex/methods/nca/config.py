@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from mitex.errors import ConfigError
 from mitex.features.layers import check_layers
+from mitex.features.text_image import PROMPT
 from mitex.methods.nca.decoder.shape import COORDINATES, DecoderShape
 from mitex.training.settings import TrainingConfig, key
 
@@ -104,7 +105,7 @@ class NcaConfig(TrainingConfig):
     motion_speeds: tuple[float, ...] = key((0.0, 2.0), "least and most factor of the field in a step", 0)
     text: str | None = key(None, "what the texture is made of, in words, instead of an exemplar")
     text_object: str | None = key(None, "what has the texture; by default a sphere, or the mesh's name")
-    text_prompt: str = key("an image of {object} made of {text}", "that the model of texts and images reads")
+    text_prompt: str = key(PROMPT, "that the model of texts and images reads")
     text_model: str | None = key(None, "CLIP folder, or words for the small embedded model")
     text_parent: str | None = key(None, "model that training starts from if no other is given")
     text_directional: bool = key(

@@ -11,10 +11,9 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
 import torch
-from safetensors import SafetensorError
 
 from mitex.errors import CheckpointError, ConfigError
 from mitex.methods.nca import METHOD
@@ -26,9 +25,12 @@ from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import HARMONICS
 from mitex.paths import expanded
-from mitex.training import checkpoint, model_file, values
+from mitex.reading import reading
+from mitex.training import checkpoint, model_file
+from mitex.training.config import of_record
 from mitex.training.locate import CHECKPOINT, NAME, PREVIOUS, locate
 
+REMEDY = "give a file written by mitex fit nca, or its run folder"
 RULE = "rule."  # before names of the rule's tensors, which files leave out
 
 
@@ -56,14 +58,16 @@ def load(source: str | Path) -> tuple[Look, dict[str, Any]]:
         CheckpointError: nothing there, not a model, or weights of an impossible shape.
     """
     path = _newest(source)
+    with reading(path, CheckpointError, REMEDY, "does not hold a MeshNCA model", also=(ConfigError,)):
+        return _read(path, source)
+
+
+def _read(path: Path, source: str | Path) -> tuple[Look, dict[str, Any]]:
     if path.name in (CHECKPOINT, PREVIOUS):
         # Of a run folder any readable checkpoint will do; a file is read as it was named.
         folder = expanded(source).is_dir()
         return _from_checkpoint(checkpoint.load(path.parent) if folder else checkpoint.read(path), path)
-    try:
-        tensors, metadata = model_file.read(path)
-    except (SafetensorError, OSError, ValueError) as e:
-        raise CheckpointError(f"'{path}' is not a model ({e})", "give a model file or a run folder") from e
+    tensors, metadata = model_file.read(path)
     about = _about(metadata, path)
     rule = _rule(tensors, metadata.get("degree"), path)
     shape = _shape(metadata["decoder"], path) if "decoder" in metadata else None
@@ -78,12 +82,7 @@ def _from_checkpoint(state: checkpoint.Checkpoint, path: Path) -> tuple[Look, di
     maps = state.metadata.get("maps", "albedo").split(",")
     about: dict[str, Any] = {"name": state.metadata.get("exemplar", path.parent.name), "maps": maps}
     about |= {"steps": state.step, "preset": state.config.get("preset")}
-    try:
-        look = Look.of(_config(state.config), maps)
-    except (ConfigError, LookupError, ValueError) as e:
-        raise CheckpointError(
-            f"'{path}' does not hold a MeshNCA model ({e})", "give a run of mitex fit nca"
-        ) from e
+    look = Look.of(of_record(NcaConfig, state.config), maps)
     _fill(look, {k[6:]: v for k, v in state.task.items() if k.startswith("model.")}, path)
     return look, {"family": state.metadata.get("family", weights_key(look))} | about
 
@@ -94,15 +93,9 @@ def _shape(text: str, path: Path) -> DecoderShape:
         parts = json.loads(text)
         if parts.keys() != set(DECODER_KEYS.values()):
             raise ValueError(f"parts {', '.join(parts)}")
-        return _config({key: parts[part] for key, part in DECODER_KEYS.items()}).decoder_shape
-    except (ConfigError, ValueError, AttributeError) as e:
+        return of_record(NcaConfig, {key: parts[part] for key, part in DECODER_KEYS.items()}).decoder_shape
+    except (ConfigError, ValueError, AttributeError, RecursionError) as e:
         raise CheckpointError(f"the decoder in '{path}' is damaged ({e})", "save the model again") from e
-
-
-def _config(content: Mapping[str, Any]) -> NcaConfig:
-    """Settings of those keys that a file has."""
-    kinds = get_type_hints(NcaConfig)
-    return NcaConfig(**{k: values.check(v, kinds[k]) for k, v in content.items() if k in kinds})
 
 
 def _fill(module: torch.nn.Module, tensors: dict[str, torch.Tensor], path: Path) -> None:
@@ -129,10 +122,12 @@ def _about(metadata: dict[str, str], path: Path) -> dict[str, Any]:
     try:
         about = json.loads(metadata.get("about", "{}"))
         maps = sorted(about.get("maps", STATE_CHANNELS))
+        if not all(isinstance(about.get(key, ""), str) for key in ("name", "family")):
+            raise ValueError("a name that is no text")
         if "palette" in about:
             Palette.from_record(about["palette"])
             maps.index("albedo")  # which the palette is of
-    except (LookupError, ValueError, TypeError, AttributeError) as e:
+    except (LookupError, ValueError, TypeError, AttributeError, RecursionError) as e:
         raise CheckpointError(f"the description in '{path}' is damaged ({e})", "save the model again") from e
     return {"name": path.stem} | about | {"maps": maps}
 
@@ -158,7 +153,9 @@ def _rule(tensors: dict[str, torch.Tensor], degree: object, path: Path) -> MeshN
     weights = [tensors.get(name) for name in ("fc1.weight", "fc2.weight")]
     if any(weight is None or weight.ndim != 2 for weight in weights):
         raise problem
-    (channels, hidden), inputs = tensors["fc2.weight"].shape, tensors["fc1.weight"].shape[1]
+    (channels, hidden), (rows, inputs) = tensors["fc2.weight"].shape, tensors["fc1.weight"].shape
+    if rows != hidden or not hidden:  # the network of the two would be larger than the file
+        raise problem
     highest = _degree(degree, channels, inputs)
     if highest is None or not channels:
         raise problem

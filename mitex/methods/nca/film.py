@@ -11,11 +11,11 @@ from typing import Any, Literal, Protocol
 import numpy as np
 import torch
 
+from mitex.asset import DEFAULT_ALBEDO
 from mitex.atlas import Atlas
 from mitex.cache import content_key
 from mitex.colour import linear_to_srgb
 from mitex.errors import ConfigError
-from mitex.export.common import DEFAULT_ALBEDO
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from mitex.mesh import Mesh
+from mitex.mesh import Mesh, Similarity
 from mitex.methods.nerf import METHOD
 from mitex.methods.nerf.base.coarse import BaseShape
 from mitex.methods.nerf.config import NerfConfig
@@ -20,6 +20,7 @@ from mitex.methods.nerf.field.networks import MATRICES, weight_shapes
 from mitex.methods.nerf.field.occupancy import packed_cells, unpacked_cells
 from mitex.runtime import init
 from mitex.training import model_file
+from mitex.training.config import of_record
 
 SETTINGS = (  # that the model depends on
     "table",
@@ -57,9 +58,14 @@ class Model:
     about: dict[str, Any]
 
     @property
+    def similarity(self) -> Similarity:
+        """The capture's world -> scene cube."""
+        return Similarity.of_record(self.about)
+
+    @property
     def config(self) -> NerfConfig:
         """As far as the model depends on it."""
-        return NerfConfig(**{key: self.about[key] for key in SETTINGS})
+        return of_record(NerfConfig, {key: self.about[key] for key in SETTINGS})
 
 
 def save(path: Path, model: Model) -> Path:
@@ -110,6 +116,7 @@ def _check(model: Model) -> None:
         "frames": (model.frames.shape, (len(model.base.mesh.faces), 3, 3)),
         "light": (tuple(model.light.shape), (COEFFICIENTS,)),
     }
+    model.similarity  # noqa: B018  (raises where its numbers are none)
     for name, (shape, expected) in shapes.items():
         if shape != expected:
             raise ValueError(f"{name} of another shape")

@@ -122,8 +122,7 @@ class NerfTexture:
     @property
     def similarity(self) -> Similarity:
         """The capture's world -> scene cube."""
-        about = self.model.about
-        return Similarity(np.array(about["centre"]), about["scale"])
+        return self.model.similarity
 
     def synthesize(
         self,

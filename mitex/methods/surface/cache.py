@@ -35,8 +35,6 @@ def _read(place: Path) -> Levels:
         return np.load(place / f"{name}.npy", mmap_mode="c", allow_pickle=False)
 
     count = len(list(place.glob("taps*.npy")))
-    if not count:
-        raise KeyError(place)
     levels = tuple(Level(array(f"taps{n}"), array(f"sizes{n}")) for n in range(count))
     order, position = array("order"), array("position")
 

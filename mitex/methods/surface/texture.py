@@ -22,8 +22,10 @@ from mitex.mesh import Mesh
 from mitex.mesh.arrays import mesh_arrays, mesh_of_arrays
 from mitex.methods.layout import same_surface
 from mitex.methods.surface import METHOD
+from mitex.methods.surface.config import SurfaceConfig
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.training import model_file
+from mitex.training.config import of_record
 
 PADDING = 8  # texels by which charts are continued outwards
 
@@ -106,9 +108,9 @@ class SurfaceTexture:
         with model_file.opened(source, METHOD.name) as (tensors, about):
             arrays = {key: tensor.numpy() for key, tensor in tensors.items()}
             mesh = mesh_of_arrays(arrays, str(about["mesh"]))
-            resolution, angle = int(about["resolution"]), float(about["angle"])
+            config = of_record(SurfaceConfig, {key: about[key] for key in ("resolution", "frames", "angle")})
             orientation = arrays.get("orientation")
-            domain = SurfaceDomain(mesh, resolution, str(about["frames"]), angle, orientation)
+            domain = SurfaceDomain(mesh, config.resolution, config.frames, config.angle, orientation)
             values, maps = arrays["values"].astype(np.float32), tuple(about["maps"])
             channels = sum(map(len, texel_layout(list(maps)).values()))
             if values.shape != (len(domain.texels.index), channels):

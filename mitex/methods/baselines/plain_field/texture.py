@@ -22,6 +22,7 @@ from mitex.methods.nerf.training.plain import PlainField, hash_grid, parameter_s
 from mitex.runtime import init
 from mitex.runtime.jit import mi
 from mitex.training import model_file
+from mitex.training.config import of_record
 
 SETTINGS = ("table", "ray_steps", "occupancy")  # that the model depends on
 
@@ -54,6 +55,7 @@ class PlainFieldTexture:
             shapes = parameter_shapes(hash_grid(texture.config))
             if {name: tuple(value.shape) for name, value in tensors.items()} != shapes:
                 raise ValueError("parameters of another shape")
+            texture.similarity  # noqa: B018  (raises where its numbers are none)
             if not all(value.isfinite().all() for value in tensors.values()):
                 raise ValueError("values that are not finite")
             return cls({name: tensors[name] for name in shapes}, occupied, about)
@@ -70,7 +72,7 @@ class PlainFieldTexture:
     @property
     def config(self) -> PlainFieldConfig:
         """As far as the model depends on it."""
-        return PlainFieldConfig(**{key: self.about[key] for key in SETTINGS})
+        return of_record(PlainFieldConfig, {key: self.about[key] for key in SETTINGS})
 
     @cached_property
     def field(self) -> PlainField:
@@ -82,7 +84,7 @@ class PlainFieldTexture:
     @property
     def similarity(self) -> Similarity:
         """The capture's world -> scene cube."""
-        return Similarity(np.array(self.about["centre"]), self.about["scale"])
+        return Similarity.of_record(self.about)
 
     def apply(self, mesh: Mesh | None = None, *, density: float = 1.0) -> AppliedField:
         """The object itself, in the capture's world.

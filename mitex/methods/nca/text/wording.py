@@ -7,6 +7,7 @@ from copy import deepcopy
 import torch
 
 from mitex.errors import ConfigError
+from mitex.features.text_image import object_prompt
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.look import Look
@@ -58,9 +59,7 @@ def check(config: NcaConfig) -> None:
 
 def prompts(config: NcaConfig, thing: str) -> tuple[str, str]:
     """What the model reads: of the texture on a thing, and of the thing without it (section 4.2)."""
-    article = "an" if thing[:1].lower() in list("aeiou") else "a"
-    prompt = config.text_prompt.replace("{object}", f"{article} {thing}")
-    return prompt.replace("{text}", config.text or ""), thing
+    return object_prompt(config.text or "", thing, config.text_prompt), thing
 
 
 def with_maps(look: Look, maps: tuple[str, ...]) -> Look:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,6 +21,7 @@ from mitex.methods.nerf.capture.colmap import photo_frames
 from mitex.methods.nerf.capture.distortion import folds, undistort
 from mitex.methods.nerf.capture.transforms import Frame, no_mask, read_frames, transforms_files
 from mitex.methods.nerf.capture.visual_hull import Hull, View, project, visual_hull
+from mitex.paths import expanded
 from mitex.progress import announce, counted
 
 MIN_VIEWS = 8
@@ -121,8 +123,8 @@ def load_capture(folder: str | Path) -> Capture:
         CaptureError: the folder, its files, poses, lenses or masks cannot be used, or there are too few.
         ImageError: an image is missing, damaged or not a PNG or JPEG.
     """
-    folder = Path(folder).expanduser()
-    if not folder.is_dir():
+    folder = expanded(folder)
+    if not os.path.isdir(folder):
         raise CaptureError(f"{folder} is not a folder", "give the folder of a capture")
     files = transforms_files(folder)
     frames = [frame for path in files for frame in read_frames(path)] if files else photo_frames(folder)

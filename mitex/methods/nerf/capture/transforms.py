@@ -13,9 +13,11 @@ import numpy as np
 
 from mitex.errors import CaptureError
 from mitex.images import SUFFIXES
+from mitex.reading import content, reading
 
 ONE_FILE = "transforms.json"
 SPLIT_FILES = ("transforms_train.json", "transforms_val.json", "transforms_test.json")
+LARGEST = 256 << 20  # such a file [bytes]
 FOCAL = (0.02, 1e4)  # focal lengths that a lens may have [image sizes]
 FARTHEST = 1e9  # coordinate of a camera that float64 can work with
 D = TypeVar("D", float, None)
@@ -105,11 +107,8 @@ def read_frames(path: Path) -> list[Frame]:
     Raises:
         CaptureError: The file is damaged, or a frame lacks its image or a proper pose.
     """
-    try:
-        tree = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError) as error:
-        reason = " ".join(str(error).split())
-        raise CaptureError(f"{path} cannot be read ({reason})", "write it again") from error
+    with reading(path, CaptureError, "write it again"):
+        tree = json.loads(content(path, LARGEST))
     return parse_frames(tree, path.parent, path.name)
 
 

@@ -1,0 +1,97 @@
+"""`mitex evaluate`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from mitex.errors import ConfigError
+
+
+@dataclass
+class Evaluate:
+    """Measure an asset: how near its texture comes to an exemplar, or how well it fits words.
+
+    With --exemplar, patches of the surface are compared with the picture: Frechet distances, transport, Gram
+    matrices, seams and repetition, as in the reports of `mitex compare`. With --text, a model of texts and
+    images looks at it from 24 sides: MES and MES-dir of the MeshNCA paper, in which more is better. Take
+    another model than the one that it was trained with.
+
+    examples:
+      mitex evaluate vase.glb --exemplar lava
+      mitex evaluate dots.glb --text "red dots on white" --object vase --clip models/clip-b16
+    """
+
+    asset: Annotated[Positional[Path], arg(metavar="ASSET")]
+    """File written by `mitex apply` (.glb .obj .ply)."""
+
+    exemplar: Annotated[str | None, arg(metavar="IMAGE|DIR|NAME")] = None
+    """Picture that the texture was made from."""
+
+    text: Annotated[str | None, arg(metavar="WORDS")] = None
+    """What it shall be made of."""
+
+    object: Annotated[str | None, arg(metavar="WORD", help_behavior_hint="(default: object)")] = None
+    """What the words call the object."""
+
+    clip: Annotated[str | None, arg(metavar="DIR|NAME", help_behavior_hint="(default: as of `fit`)")] = None
+    """CLIP folder, or `words` for the small model that ships with Mitex."""
+
+    json: Annotated[bool, arg(help_behavior_hint="")] = False
+    """For programs: a JSON object."""
+
+    quiet: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Show no progress."""
+
+    def run(self) -> None:
+        if self.exemplar is None and self.text is None:
+            raise ConfigError("nothing to compare the asset with", "give --exemplar, --text or both")
+        for option, value in (("--object", self.object), ("--clip", self.clip)):
+            if value is not None and self.text is None:
+                raise ConfigError(f"{option} belongs to --text", "give both, or none")
+        from mitex.runtime import let_idle_threads_sleep
+
+        let_idle_threads_sleep()
+        numbers = {**self._likeness(), **self._fit_of_words()}
+        if self.json:
+            print(json.dumps({label: value for label, (value, _) in numbers.items()}, indent=2))
+            return
+        for label, (value, better) in numbers.items():
+            print(f"{label:18}  {value:9.4g}  {better}")
+
+    def _likeness(self) -> dict[str, tuple[float, str]]:
+        """Numbers beside the exemplar: label -> value, and which way better lies."""
+        if self.exemplar is None:
+            return {}
+        from mitex.asset import Asset
+        from mitex.comparison.measures import BY_KEY
+        from mitex.comparison.pair import Pair
+
+        numbers = Pair(self.exemplar, str(self.asset)).numbers(Asset.load(self.asset))
+        return {BY_KEY[key].label: (value, BY_KEY[key].better) for key, value in numbers.items()}
+
+    def _fit_of_words(self) -> dict[str, tuple[float, str]]:
+        """Scores beside the words, as `_likeness`."""
+        if self.text is None:
+            return {}
+        import torch
+
+        from mitex.asset import Asset, clay
+        from mitex.evaluation.text import text_scores
+        from mitex.features.text_image import object_prompt
+        from mitex.features.text_model import text_image_model
+        from mitex.render.sides import sides
+
+        model, thing = text_image_model(self.clip), self.object or "object"
+        prompt = object_prompt(self.text, thing)
+        model.encode_texts([prompt, thing])  # before it takes the time of pictures: unknown words are refused
+        asset = Asset.load(self.asset)
+        textured, bare = (
+            torch.from_numpy(sides(shown, model.resolution)) for shown in (asset, clay(asset.mesh))
+        )
+        scores = text_scores(model, textured, bare, prompt, thing)
+        return {"MES": (scores.score, "high is better"), "MES-dir": (scores.direction, "high is better")}

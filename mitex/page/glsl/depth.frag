@@ -1,0 +1,3 @@
+#version 300 es
+// For depth alone.
+void main() {}

@@ -1,0 +1,118 @@
+// A look that grows on a mesh. Everything that can be done with it is a method; the panel and tests call them.
+
+class Page extends View {
+  constructor(data, canvas) {
+    super(data, canvas);
+    Object.assign(this, { looks: data.looks, seed: data.seed, field: data.field, speed: data.speed });
+    Object.assign(this, { chosen: 0, grafted: null });
+    this.setMesh(meshOf(data.mesh), data.mesh.levels);
+  }
+
+  get look() {
+    return this.looks[this.chosen];
+  }
+
+  // Grows the look on a mesh that is subdivided so many times.
+  setMesh(base, levels) {
+    Object.assign(this, { base, levels });
+    this.show(dense(base, levels));
+    this.radius = 0.15 * this.studio.radius * this.surface.scale; // of the brush [mesh units]
+    this._grow();
+  }
+
+  // Cells on the surface, from the seed.
+  _grow() {
+    this.automaton?.drop();
+    this.automaton = new Automaton(this.graphics, this.surface, this.look);
+    this.decoder ??= new Decoder(this.graphics, this.look);
+    this._weights();
+    this.setShare(0);
+    this.move(this.field, this.speed);
+    this.reset();
+  }
+
+  reset(seed = this.seed) {
+    this.seed = seed;
+    this.automaton.reset(seed);
+    this.changed = true;
+  }
+
+  step(count = 1) {
+    for (let k = 0; k < count; k++) this.automaton.step();
+    this.changed = true;
+  }
+
+  // Turns the texture on the surface [rad].
+  orient(turn) {
+    this.turn = turn;
+    this.surface.orient(turn);
+    this.move(this.field, this.speed);
+  }
+
+  // Lets a moving texture follow a field at some speed.
+  move(field, speed) {
+    Object.assign(this, { field, speed, changed: true });
+    if (!this.look.condition) return;
+    const { mesh, slots } = this.surface;
+    const told = conditionOf(mesh, field, speed, this.look.fastest ?? Infinity, this.turn);
+    this.graphics.refill(this.automaton.condition, slots.spread(told, 3));
+  }
+
+  // Another look on the mesh; one of the same family goes on from the state that is there.
+  setLook(chosen) {
+    const related = this.looks[chosen].family === this.look.family;
+    Object.assign(this, { chosen, grafted: null });
+    if (related) this._weights();
+    else {
+      this.decoder = null;
+      this._grow();
+    }
+  }
+
+  // Grafts another look of the family onto the one that is there; null for none.
+  setGraft(grafted) {
+    this.grafted = grafted;
+    this._weights();
+  }
+
+  // Its share of all cells, in [0, 1].
+  setShare(share) {
+    this._shares(new Float32Array(this.surface.mesh.count).fill(share));
+  }
+
+  // Gives it the cells around a point, softly towards the brush's border.
+  graft(point, radius = this.radius) {
+    for (const [vertex, apart] of brushed(this.surface.mesh, point, radius)) {
+      const share = clamp(2 - (2 * apart) / radius, 0, 1);
+      this.shares[vertex] = Math.max(this.shares[vertex], share * share * (3 - 2 * share));
+    }
+    this._shares(this.shares);
+  }
+
+  _shares(shares) {
+    this.shares = shares;
+    this.graphics.refill(this.automaton.shares, this.surface.slots.order(shares));
+    this.changed = true;
+  }
+
+  _weights() {
+    const other = this.grafted === null ? null : this.looks[this.grafted];
+    this.automaton.setLooks(this.look, other);
+    this.decoder.setLooks(this.look, other);
+    this.studio.relief = this.look.relief;
+    this.changed = true;
+  }
+
+  // Sets the cells around a point of the surface back to the seed.
+  erase(point, radius = this.radius) {
+    const vertices = brushed(this.surface.mesh, point, radius).map(([vertex]) => vertex);
+    this.automaton.clear(vertices);
+    this.changed = true;
+    return vertices;
+  }
+
+  // The maps at the points of a picture of ids.
+  decode(target, ids) {
+    this.decoder.decode(target, ids, this.automaton, this.studio.occlusion.cells.textures[0], this.studio.mode === GRAFT);
+  }
+}

@@ -1,0 +1,200 @@
+// The panel: what can be done with the page, in sections.
+
+const SPEEDS = [2, 5, 10, 20, 30, 60, 120, 240, 480]; // steps a second
+const VIEWS = [
+  ["light", "Light"], ["albedo", "Colour"], ["normal", "Normal"], ["height", "Height"],
+  ["roughness", "Rough"], ["ambient_occlusion", "Occlusion"], ["graft", "Graft"],
+];
+const TOOLS = [
+  ["turn", "Turn", "Drag to turn the object (T)"], ["erase", "Erase", "Wipe the texture off, and see it heal (E)"],
+  ["graft", "Graft", "Paint the other texture (G)"],
+];
+const NONE = "none";
+
+class Panel {
+  constructor(page, clock, pointer, { panel, status }) {
+    Object.assign(this, { page, clock, pointer, place: panel, status });
+    this.build();
+  }
+
+  // All of it; what a look or a mesh does not have is left out.
+  build() {
+    const { page } = this;
+    if (!page.automaton) {
+      this._buildStill();
+      return;
+    }
+    this.title = element("p", {}, `${page.look.name}, growing as you watch`);
+    this.play = button("", "Pause or go on (space)", () => this.pause(), "main");
+    this.place.replaceChildren(
+      element("header", {}, element("h1", {}, page.surface.mesh.name), this.title),
+      element("div", { className: "row" }, this.play,
+        button("Grow anew", "Back to the seed (R)", () => page.reset()),
+        button("New seed", "The same look, another arrangement (N)", () => this.reseed())),
+      ...this._looks(), this._hand(), this._texture(), ...this._motion(), this._view(), this._keep(), keysHelp(),
+    );
+    this.pause(this.clock.playing);
+    this.choose(this.pointer.tool);
+  }
+
+  // Of an asset that does not grow.
+  _buildStill() {
+    const { page, place } = this;
+    this.tools = this.brush = null;
+    place.replaceChildren(element("header", {}, element("h1", {}, page.surface.mesh.name),
+      element("p", {}, page.look.name)), this._view(), this._keep(), keysHelp());
+  }
+
+  _looks() {
+    const { page } = this;
+    const { looks } = page;
+    if (looks.length < 2) return [];
+    this.looks = choice("Look", looks.map(({ name }, k) => [k, name]), page.chosen, (k) => this.look(k));
+    const related = looks.map(({ name, family }, k) => [k, name, family])
+      .filter(([k, , family]) => k !== page.chosen && family === page.look.family);
+    const parts = [section("Look", this.looks)];
+    if (!related.length) return parts;
+    this.grafts = choice("Graft", [[NONE, "none"], ...related], page.grafted ?? NONE, (k) => this.graft(k));
+    this.share = slider("Everywhere", { low: 0, high: 100, step: 1, value: 0, text: (x) => `${x} %` },
+      (x) => page.setShare(x / 100));
+    this.share.hidden = page.grafted === null;
+    return [...parts, section("Graft onto it", this.grafts, this.share)];
+  }
+
+  _hand() {
+    const tools = TOOLS.filter(([key]) => key !== "graft" || this.page.grafted !== null);
+    this.tools = choice("Tool", tools, this.pointer.tool, (tool) => this.choose(tool));
+    this.brush = slider("Brush", { low: 2, high: 40, step: 1, value: 15, text: (x) => `${x} %` }, (x) => this.size(x));
+    return section("Hand", this.tools, this.brush);
+  }
+
+  _texture() {
+    const { page, clock } = this;
+    return section("Texture",
+      slider("Speed", { low: 0, high: SPEEDS.length - 1, step: 1, value: SPEEDS.indexOf(clock.rate),
+        text: (k) => `${SPEEDS[k]} steps/s` }, (k) => { clock.rate = SPEEDS[k]; }),
+      slider("Orientation", { low: -180, high: 180, step: 1, value: Math.round((page.turn * 180) / Math.PI),
+        text: (x) => `${x}°` }, (x) => page.orient((x * Math.PI) / 180)),
+      this._density());
+  }
+
+  // Cells: each level of subdivision has four times as many, and patterns of half the size.
+  _density() {
+    const { page } = this;
+    const levels = [0, 1, 2, 3, 4, 5, 6].filter((k) => page.base.count * 4 ** k <= MOST_VERTICES);
+    if (levels.length < 2) return "";
+    const cells = (k) => `${Math.round((page.base.count * 4 ** k) / 100) / 10} k cells`;
+    return slider("Density", { low: 0, high: levels.at(-1), step: 1, value: page.levels, text: cells },
+      (k) => page.setMesh(page.base, k));
+  }
+
+  // Where a texture moves that can.
+  _motion() {
+    const { page } = this;
+    if (!page.look.condition) return [];
+    const fields = choice("Direction", FIELDS.map((name) => [name, name.replace("-", " ")]), page.field, (name) => {
+      page.move(name, page.speed);
+      fields.set(name);
+    });
+    return [section("Motion", fields, slider("Pace", { low: 0, high: 3, step: 0.1, value: page.speed,
+      text: (x) => `${x.toFixed(1)} ×` }, (x) => page.move(page.field, x)))];
+  }
+
+  _view() {
+    const { page } = this;
+    const views = VIEWS.filter(([key]) =>
+      key === "light" || page.look.maps[key] || (key === "graft" && page.grafted != null));
+    this.view = choice("View", views, MODES[page.studio.mode], (mode) => this.show(mode));
+    return section("View", this.view, slider("Exposure", { low: -2, high: 2, step: 0.1, value: page.studio.exposure,
+      text: (x) => `${x > 0 ? "+" : ""}${x.toFixed(1)}` }, (x) => this.expose(x)));
+  }
+
+  _keep() {
+    const { page } = this;
+    const file = element("input", { type: "file", accept: ".obj,.ply,.glb", hidden: true,
+      onchange: () => this.open(file.files[0]) });
+    this.film = button("Film", "Record until it is pressed again (F)", () => this.record());
+    const another = page.automaton ? [button("Open a mesh …", "OBJ, PLY or GLB; or drop one onto the page (O)",
+      () => file.click()), file] : [];
+    return section("Keep", element("div", { className: "row" },
+      button("Picture", "Save what is shown (S)", () => savePicture(page)), this.film,
+      button("GLB", "Save the mesh with the texture as it is now", () => this.attempt(() => saveAsset(page))),
+      ...another));
+  }
+
+  pause(playing = !this.clock.playing) {
+    this.clock.playing = playing;
+    this.play.textContent = playing ? "Pause" : "Play";
+  }
+
+  reseed() {
+    this.page.reset(Math.floor(Math.random() * 2 ** 31));
+  }
+
+  choose(tool) {
+    if (!this.tools || (tool === "graft" && this.page.grafted === null)) return;
+    this.pointer.tool = tool;
+    this.tools.set(tool);
+  }
+
+  look(chosen) {
+    this.page.setLook(chosen);
+    if (this.pointer.tool === "graft") this.pointer.tool = "turn";
+    this.build();
+  }
+
+  graft(chosen) {
+    this.page.setGraft(chosen === NONE ? null : chosen);
+    this.pointer.tool = chosen === NONE ? "turn" : "graft";
+    this.build();
+  }
+
+  show(mode) {
+    this.page.setMode(mode);
+    this.view.set(mode);
+  }
+
+  size(percent) {
+    this.brush.set(percent);
+    this.page.radius = (percent / 100) * this.page.studio.radius * this.page.surface.scale;
+  }
+
+  expose(stops) {
+    this.page.studio.exposure = stops;
+    this.page.changed = true;
+  }
+
+  record() {
+    if (this.recorder) {
+      this.recorder.stop();
+      this.recorder = null;
+    } else {
+      this.recorder = startFilm(this.page);
+      if (!this.recorder) this.say("This browser cannot record films.");
+    }
+    this.film.textContent = this.recorder ? "Stop" : "Film";
+  }
+
+  // Grows the texture on a mesh of the user's.
+  open(file) {
+    if (!file || !this.page.automaton) return;
+    this.attempt(async () => {
+      const mesh = readMesh(new Uint8Array(await file.arrayBuffer()), file.name);
+      this.page.setMesh(mesh, autoLevels(mesh.count));
+      this.build();
+    });
+  }
+
+  async attempt(act) {
+    try {
+      await act();
+    } catch (error) {
+      this.say(error.message);
+    }
+  }
+
+  say(text) {
+    this.status.textContent = text;
+    this.clock.quietUntil = performance.now() + 6000;
+  }
+}

@@ -1,0 +1,94 @@
+"""An asset as a page: the same light and hands, without anything that grows."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from mitex.asset import DEFAULT_ALBEDO, DEFAULT_ROUGHNESS, Asset
+from mitex.colour import linear_to_srgb
+from mitex.geometry.normal_maps import decode
+from mitex.geometry.tangents import split_at_hard_edges
+from mitex.page.document import write_page
+from mitex.page.packing import packed
+from mitex.page.surface import mesh_data
+
+EDGE = 0.04  # mean length of the mesh's edges in the page's own units; any will do
+QUALITY = 90  # of the images (WebP)
+ROW = {"occlusion": "ambient_occlusion", "roughness": "roughness", "height": "height"}
+
+
+def write_still(asset: Asset, path: Path) -> Path:
+    """Writes an asset as one HTML file that any browser with WebGL2 shows.
+
+    Raises:
+        OutputError: the place is not writable.
+        MeshError: the mesh has no faces.
+    """
+    return write_page(path, asset.name, still_data(asset), _portrait(asset))
+
+
+def still_data(asset: Asset) -> dict[str, Any]:
+    """An asset as JSON values: its textures, with normals in object space, or its values at the vertices."""
+    data = {
+        "name": asset.mesh.name,
+        "look": asset.name,
+        "edge": EDGE,
+        "mesh": mesh_data(asset.mesh, 0),
+        "maps": {name: True for name in asset.maps},
+    }
+    if asset.atlas is None:
+        rows = {name: _bytes(values) for name, values in _vertex_images(asset).items()}
+        return data | {"rows": {name: packed(values) for name, values in rows.items()}}
+    images = {name: _webp(values) for name, values in _images(asset).items()}
+    uv = np.round(asset.atlas.uv.astype(np.float64) * 65535).astype(np.uint16)
+    return data | {"images": images, "uv": packed(uv)}
+
+
+def _vertex_images(asset: Asset) -> dict[str, np.ndarray]:
+    images = _plain(asset.vertex_maps, (len(asset.mesh.vertices),))
+    if "normal" in asset.vertex_maps:
+        images["details"] = 0.5 + 0.5 * asset.detail_normals()
+    return images
+
+
+def _images(asset: Asset) -> dict[str, np.ndarray]:
+    assert asset.atlas is not None and asset.texture_maps is not None
+    images = _plain(asset.texture_maps, asset.atlas.face.shape)
+    if "normal" in asset.texture_maps:
+        frames = asset.atlas.shading_frames(asset.mesh)
+        images["details"] = 0.5 + 0.5 * decode(asset.texture_maps["normal"], *frames)
+    elif asset.mesh.corner_normals is not None:
+        split = split_at_hard_edges(asset.mesh)
+        images["details"] = 0.5 + 0.5 * asset.atlas.interpolate(split.normals[split.faces])
+    return images
+
+
+def _plain(maps: Any, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
+    """Colours (..., 3), and occlusion, roughness and height (..., 3)."""
+    grey = np.full((*shape, 3), linear_to_srgb(np.float32(DEFAULT_ALBEDO)), np.float32)
+    default = {"ambient_occlusion": 1.0, "roughness": DEFAULT_ROUGHNESS, "height": 0.5}
+    rows = [maps.get(name, np.full((*shape, 1), default[name], np.float32)) for name in ROW.values()]
+    return {"colours": maps.get("albedo", grey), "materials": np.concatenate(rows, axis=-1)}
+
+
+def _bytes(values: np.ndarray) -> np.ndarray:
+    return np.round(values * 255).clip(0, 255).astype(np.uint8)
+
+
+def _webp(image: np.ndarray) -> dict[str, str]:
+    buffer = io.BytesIO()
+    Image.fromarray(_bytes(image)).save(buffer, "WEBP", quality=QUALITY, method=4)
+    return packed(np.frombuffer(buffer.getvalue(), np.uint8))
+
+
+def _portrait(asset: Asset) -> bytes:
+    """JPEG for browsers without WebGL2: the mean colour of the asset, on which the message stands."""
+    colour = _bytes(_plain(asset.vertex_maps, (len(asset.mesh.vertices),))["colours"].mean(axis=0))
+    buffer = io.BytesIO()
+    Image.new("RGB", (64, 64), tuple(int(value) for value in colour)).save(buffer, "JPEG")
+    return buffer.getvalue()
