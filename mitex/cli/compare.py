@@ -47,7 +47,7 @@ class Compare(JobOptions):
     """In place of these lists, a plan as of `mitex batch`."""
 
     preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
-    """In place of these lists, a paper's comparison: surface-fig4, nca-fig10."""
+    """In place of these lists, a paper's comparison: surface-fig4, nca-fig10, nca-fig11, geometric-fig11."""
 
     data: Annotated[Path, arg(metavar="DIR")] = Path("../shared/data")
     """Folder with what a paper's comparison needs that does not ship with Mitex."""

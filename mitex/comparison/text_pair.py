@@ -9,17 +9,11 @@ import torch
 
 from mitex.asset import Asset, clay
 from mitex.cache import content_key
-from mitex.colour import linear_to_srgb
 from mitex.comparison.inputs import lit, mesh_of
-from mitex.evaluation.patches import surface_colours
 from mitex.evaluation.text import text_scores
-from mitex.features.text_image import TextImageModel
+from mitex.features.text_image import TextImageModel, object_prompt
 from mitex.features.text_model import text_image_model
-from mitex.geometry.triangles import interpolate
-from mitex.geometry.vectors import unit
-from mitex.render.preview import PreviewRenderer
-
-VIEWS, ELEVATIONS = 24, (10.0, 35.0, -15.0)  # pictures, as in the paper, and heights of the camera [degrees]
+from mitex.render.sides import sides
 
 
 @cache
@@ -48,8 +42,8 @@ class TextPair:
 
     def numbers(self, asset: Asset) -> dict[str, float]:
         """The scores of MeshNCA, section G.1."""
-        text = f"an image of a {self.mesh.name} made of {self.words}"
-        scores = text_scores(model(), views(asset), self._bare, text, f"an image of a {self.mesh.name}")
+        prompt = object_prompt(self.words, self.mesh.name)
+        scores = text_scores(model(), _seen(asset), self._bare, prompt, self.mesh.name)
         return {"mes": scores.score, "mes_dir": scores.direction}
 
     def floor(self) -> dict[str, float]:
@@ -62,21 +56,9 @@ class TextPair:
 
     @cached_property
     def _bare(self) -> torch.Tensor:
-        return views(clay(self.mesh))
+        return _seen(clay(self.mesh))
 
 
-def views(asset: Asset) -> torch.Tensor:
+def _seen(asset: Asset) -> torch.Tensor:
     """(24, R, R, 3) sRGB in [0, 1]: an asset from all sides, R the model's resolution."""
-    return torch.from_numpy(np.stack([_view(asset, k) for k in range(VIEWS)]))
-
-
-def _view(asset: Asset, k: int) -> np.ndarray:
-    renderer = PreviewRenderer(
-        asset.mesh,
-        resolution=model().resolution,
-        azimuth=360.0 * k / VIEWS,
-        elevation=ELEVATIONS[k % len(ELEVATIONS)],
-    )
-    colours = linear_to_srgb(surface_colours(asset, renderer.face, renderer.barycentric))
-    corners = asset.detail_normals()[asset.mesh.faces[renderer.face]]
-    return renderer.render(colours, unit(interpolate(renderer.barycentric, corners)))
+    return torch.from_numpy(sides(asset, model().resolution))

@@ -58,7 +58,7 @@ def albedo_views(asset: Asset, cameras: Cameras) -> Views:
     hits = Stage(asset.mesh).hits(cameras, ANTIALIAS)
     mask = _counting(asset.mesh, cameras, hits, ANTIALIAS)
     samples = np.zeros((len(hits.hit), 3))
-    samples[hits.hit.numpy()] = surface_colours(asset, hits.face.numpy(), hits.barycentric.numpy())
+    samples[hits.hit.numpy()] = _colours(asset, hits.face.numpy(), hits.barycentric.numpy())
     linear = samples.reshape(*cameras.shape, ANTIALIAS**2, 3).mean(3)
     return filled(linear_to_srgb(linear.clip(0, 1)), mask), mask
 
@@ -79,7 +79,7 @@ def _counting(mesh: Mesh, cameras: Cameras, hits: Hits, antialias: int) -> np.nd
     return np.all(facing.reshape(*cameras.shape, antialias**2), axis=3)
 
 
-def surface_colours(asset: Asset, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+def _colours(asset: Asset, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
     """Linear colours (P, 3) at points of an asset's surface, by faces (P,) and barycentrics (P, 3)."""
     if asset.atlas is not None and asset.texture_maps is not None and "albedo" in asset.texture_maps:
         return bilinear(

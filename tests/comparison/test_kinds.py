@@ -28,19 +28,22 @@ def test_a_surface_beside_itself_is_nearer_than_a_rough_one(place, monkeypatch):
 
 
 def test_what_the_words_say_scores_high(place, monkeypatch):
-    monkeypatch.setattr(text_pair, "VIEWS", 2)
+    monkeypatch.setattr("mitex.render.sides.AZIMUTHS", (0,))
+    monkeypatch.setattr("mitex.render.sides.ELEVATIONS", (0.0,))
     monkeypatch.setattr(text_pair, "model", MeanColour)
-    pair, ball = TextPair("red", "ball.obj"), Mesh.load("ball.obj")
+    (place / "ball.obj").rename("sphere.obj")
+    pair, ball = TextPair("red", "sphere.obj"), Mesh.load("sphere.obj")
 
     def scores(*rgb):
-        albedo = np.broadcast_to(np.float32(rgb), (len(ball.vertices), 3))
+        albedo = np.tile(np.array(rgb, np.float32), (len(ball.vertices), 1))
         return pair.numbers(Asset(ball, {"albedo": albedo}))
 
     red, blue = scores(1, 0.1, 0.1), scores(0.1, 0.1, 1)
     assert red.keys() == {measure.key for measure in TEXTS}
     for key, value in red.items():
         assert value > blue[key] + 1
-        assert BY_KEY[key].distance(value) < BY_KEY[key].distance(blue[key])
+        distance = BY_KEY[key].distance
+        assert distance is not None and distance(value) < distance(blue[key])
 
 
 def text_plan(**table):
