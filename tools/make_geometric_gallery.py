@@ -26,12 +26,12 @@ import numpy as np
 from make_surface_gallery import find_mesh
 
 from mitex.asset import clay
+from mitex.evaluation.surface_statistics import statistic_distances
 from mitex.images import write_image
 from mitex.mesh import Mesh, remesh
 from mitex.methods.baselines.displacement import DisplacementMap
 from mitex.methods.geometric import GeometricTexture
 from mitex.methods.geometric.references import find_reference
-from mitex.methods.geometric.statistics import statistic_distances
 from mitex.methods.geometric.texture import START
 from mitex.render import sheet, still, tone
 

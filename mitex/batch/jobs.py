@@ -78,7 +78,7 @@ def jobs_of(plan: Plan) -> list[Job]:
 
 def _jobs(part: MethodPlan, plan: Plan) -> Iterator[Job]:
     method = methods()[part.method]
-    exemplars = find(part.exemplars, plan.folder, "exemplar", _exemplar_names(method))
+    exemplars = _exemplars(part, plan)
     meshes = find(part.meshes, plan.folder, "mesh", _mesh_names())
     for exemplar in exemplars:
         for seed in part.seeds or (None,):
@@ -92,7 +92,7 @@ def _jobs(part: MethodPlan, plan: Plan) -> Iterator[Job]:
 def _fit(
     part: MethodPlan, method: Method, plan: Plan, exemplar: Input, seed: int | None, mesh: Input | None
 ) -> Job:
-    source = Input(f"--{method.learns_from.replace('_', '-')}", None)
+    source = Input(f"--{part.learns_from.replace('_', '-')}", None)
     words = ["fit", method.name, "--quiet"]
     inputs = [source, exemplar, *_option("mesh", mesh), *([] if seed is None else _pair("seed", seed))]
     given = options.fit_words(method, part.fit, plan.folder)
@@ -116,6 +116,12 @@ def _apply(part: MethodPlan, plan: Plan, fit: Job, mesh: Input | None) -> Job:
     result = f"{RESULTS}/{id}"
     words = ("apply", fit.result, "--quiet", *(one.text for one in inputs), "--out", f"{result}/{file}")
     return Job(id, words, (), result, fit.id, about)
+
+
+def _exemplars(part: MethodPlan, plan: Plan) -> list[Input]:
+    if part.source is not None:  # which may be words as well as files
+        return [Input.of(text, plan.folder) for text in part.exemplars]
+    return find(part.exemplars, plan.folder, "exemplar", _exemplar_names(methods()[part.method]))
 
 
 def _option(name: str, value: Input | None) -> list[Input]:

@@ -43,6 +43,17 @@ def check_options(
     resolve(method.load_presets(), fit.get("preset"), file, settings)
 
 
+def check_source(method: Method, source: str | None, label: str) -> None:
+    """Checks the option that a plan gives its exemplars to, if it is not the method's usual one.
+
+    Raises:
+        ConfigError: The method's fit has no such option, or it takes no text.
+    """
+    texts = [name for name, kind in fit_kinds(method).items() if kind in (str, Union[str])]  # noqa: UP007
+    if source is not None and source not in (*texts, method.learns_from):
+        raise ConfigError(f"source of methods.{label} cannot be '{source}'", suggestion(source, texts))
+
+
 def fit_kinds(method: Method) -> dict[str, Any]:
     """The options of the method's fit that a plan may give: name -> type."""
     return _kinds(method.load_fit(), {method.learns_from, "seed"})

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from mitex.batch.options import check_options
+from mitex.batch.options import check_options, check_source
 from mitex.errors import ConfigError
 from mitex.methods.registry import methods
 from mitex.paths import expanded
@@ -20,7 +20,12 @@ MOST_BYTES = 1 << 20  # of a plan
 Output = Literal["glb", "obj", "ply", "exr", "png", "jpg", "maps"]
 LISTS = {"exemplars": tuple[str, ...], "meshes": tuple[str, ...], "seeds": tuple[int, ...]}
 KEYS = {**LISTS, "output": Output}
-OWN_KEYS = {**LISTS, "output": Output, "method": str}  # of a method's table, besides its options
+OWN_KEYS = {
+    **LISTS,
+    "output": Output,
+    "method": str,
+    "source": str,
+}  # of a method's table, besides its options
 TABLES = {"methods": "tables such as [methods.NAME]", "apply": "a table such as [methods.NAME.apply]"}
 
 
@@ -36,6 +41,7 @@ class MethodPlan:
         output: what `apply` writes: a file of this format, or a folder of maps.
         fit: options and settings of `mitex fit`, by name.
         apply: options of `mitex apply`, by name.
+        source: option of `mitex fit` that the exemplars are given to, if not the method's usual one: "text".
     """
 
     label: str
@@ -46,6 +52,12 @@ class MethodPlan:
     output: str = "glb"
     fit: Mapping[str, Any] = field(default_factory=dict)
     apply: Mapping[str, Any] = field(default_factory=dict)
+    source: str | None = None
+
+    @property
+    def learns_from(self) -> str:
+        """The option of `mitex fit` that the exemplars are given to."""
+        return self.source or methods()[self.method].learns_from
 
 
 @dataclass(frozen=True)
@@ -116,6 +128,7 @@ def _method(label: str, table: Any, common: Mapping[str, Any], folder: Path) -> 
         raise ConfigError(f"there is no method '{name}'", suggestion(name, methods()))
     fit = {key: value for key, value in table.items() if key not in (*OWN_KEYS, "apply")}
     check_options(methods()[name], fit, apply, label, folder)
+    check_source(methods()[name], own.get("source"), label)
     plan = MethodPlan(label, name, fit=fit, apply=apply, **{"exemplars": (), **common, **own})
     _check_lists(plan)
     return plan

@@ -27,8 +27,8 @@ class Compare(JobOptions):
 
     examples:
       mitex compare --exemplar lava --mesh vase --methods surface,image-quilting --out out/compare
-      mitex compare --exemplar lava rust --mesh vase a.obj --methods surface,nca --seeds 3 --out out/compare
-      mitex compare --exemplar lava --mesh vase --methods nca,gatys --set nca:steps=300 --out out/compare
+      mitex compare --exemplar lava rust --mesh vase --methods gatys,image-quilting --seeds 3 --out out/all
+      mitex compare --exemplar lava --mesh vase --methods gatys --set gatys:steps=300 --out out/compare
     """
 
     exemplar: Annotated[tuple[str, ...], arg(metavar="IMAGE|DIR|NAME ...")] = ()
@@ -47,7 +47,7 @@ class Compare(JobOptions):
     """In place of these lists, a plan as of `mitex batch`."""
 
     preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
-    """In place of these lists, a paper's comparison: surface-fig4, nca-fig10."""
+    """In place of these lists, a paper's comparison, by name."""
 
     data: Annotated[Path, arg(metavar="DIR")] = Path("../shared/data")
     """Folder with what a paper's comparison needs that does not ship with Mitex."""

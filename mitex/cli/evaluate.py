@@ -68,10 +68,10 @@ class Evaluate:
         if self.exemplar is None:
             return {}
         from mitex.asset import Asset
+        from mitex.comparison.look_pair import LookPair
         from mitex.comparison.measures import BY_KEY
-        from mitex.comparison.pair import Pair
 
-        numbers = Pair(self.exemplar, str(self.asset)).numbers(Asset.load(self.asset))
+        numbers = LookPair(self.exemplar, str(self.asset)).numbers(Asset.load(self.asset))
         return {BY_KEY[key].label: (value, BY_KEY[key].better) for key, value in numbers.items()}
 
     def _fit_of_words(self) -> dict[str, tuple[float, str]]:

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING
 
 from mitex.lazy import attributes
 
-__all__ = ["MEASURES", "Measure", "Result", "Summary", "compare", "comparison_plan"]
+__all__ = ["KINDS", "Kind", "Measure", "Result", "Summary", "compare", "comparison_plan"]
 
 __getattr__ = attributes(
     __name__,
     {
-        "MEASURES": "mitex.comparison.measures",
+        "KINDS": "mitex.comparison.kinds",
+        "Kind": "mitex.comparison.kinds",
         "Measure": "mitex.comparison.measures",
         "Result": "mitex.comparison.results",
         "Summary": "mitex.comparison.summary",
@@ -27,7 +28,8 @@ __getattr__ = attributes(
 )
 
 if TYPE_CHECKING:
-    from mitex.comparison.measures import MEASURES, Measure
+    from mitex.comparison.kinds import KINDS, Kind
+    from mitex.comparison.measures import Measure
     from mitex.comparison.plan import comparison_plan
     from mitex.comparison.results import Result
     from mitex.comparison.run import compare

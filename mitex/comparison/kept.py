@@ -11,12 +11,13 @@ from pathlib import Path
 from safetensors import safe_open
 
 from mitex.asset import Asset
-from mitex.comparison.pair import SETTINGS, Pair
+from mitex.comparison.kinds import Pair
 from mitex.comparison.results import Result
 from mitex.images import write_image
 from mitex.paths import atomic_write
 from mitex.training.locate import CHECKPOINT
 
+VERSION = 2  # of what is measured: numbers of another one are measured again
 OPTIMIZED = ("optimizer/first/", "optimizer/point")  # tensors of a checkpoint, as large as what is optimized
 
 
@@ -67,10 +68,10 @@ def optimized_numbers(run: Path) -> int:
 
 
 def _read(path: Path) -> dict[str, float] | None:
-    """Numbers that were kept; None if there are none, or if they were measured with other settings."""
+    """Numbers that were kept; None if there are none, or if they were measured by another version."""
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
-        if record["settings"] != SETTINGS:
+        if record["version"] != VERSION:
             return None
         return {key: float(value) for key, value in record["numbers"].items()}
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
@@ -78,7 +79,7 @@ def _read(path: Path) -> dict[str, float] | None:
 
 
 def _write(path: Path, numbers: Mapping[str, float]) -> None:
-    record = {"settings": SETTINGS, "numbers": dict(numbers)}
+    record = {"version": VERSION, "numbers": dict(numbers)}
     with atomic_write(path) as temporary:
         temporary.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 

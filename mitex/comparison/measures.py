@@ -31,9 +31,14 @@ def _off_one(value: float) -> float:
     return abs(value - 1)
 
 
+def _negative(value: float) -> float:
+    return -value
+
+
+HIGHER = "high is better"
 LOWER, TO_ZERO, TO_ONE = "low is better", "best is 0", "best is 1"
 
-MEASURES = (
+LOOKS = (
     Measure(
         "frechet_fine",
         "Fréchet, fine",
@@ -76,6 +81,55 @@ MEASURES = (
         "The highest peak of the autocorrelation beside the one at no shift, minus that of the exemplar. "
         "Above 0: it repeats more than the exemplar; below: it is less regular. No network is involved.",
     ),
+)
+TEXTS = (
+    Measure(
+        "mes_dir",
+        "MES-dir",
+        HIGHER,
+        "Cosine times 100 of the step from the grey object to the textured one, among pictures, and of the "
+        "step from its name to the words, among texts (MeshNCA, section G.1). It agrees with people.",
+        _negative,
+    ),
+    Measure(
+        "mes",
+        "MES",
+        HIGHER,
+        "Cosine times 100 of the pictures and the words. It rises with patterns that only the model likes. "
+        "Both scores are by the model of texts and images that is here; if it is the one that a method was "
+        "trained with, they say little.",
+        _negative,
+    ),
+)
+RELIEFS = (
+    Measure(
+        "dihedral",
+        "Dihedral angles",
+        LOWER,
+        "Wasserstein distance of the distributions of signed angles between neighbouring faces, on the "
+        "surface and on the reference [rad]. Meshes of equal density compare best.",
+    ),
+    Measure(
+        "edges",
+        "Edge lengths",
+        LOWER,
+        "The same of edge lengths, relative to their mean.",
+    ),
+    Measure(
+        "curvature",
+        "Curvature",
+        LOWER,
+        "The same of signed mean curvatures at the vertices, times the mean edge length.",
+    ),
+    Measure(
+        "shading",
+        "Shading",
+        LOWER,
+        "Fréchet distance of features at relu2_2 of VGG-16 between four shaded views of the surface and of "
+        "the reference, both grey: in the place of SIFID, whose network is another.",
+    ),
+)
+COSTS = (
     Measure(
         "parameters",
         "Parameters",
@@ -99,4 +153,4 @@ MEASURES = (
         scale=1e-9,
     ),
 )
-BY_KEY = {measure.key: measure for measure in MEASURES}
+BY_KEY = {measure.key: measure for measure in (*LOOKS, *TEXTS, *RELIEFS, *COSTS)}

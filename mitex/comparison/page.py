@@ -11,20 +11,14 @@ import numpy as np
 
 from mitex import __version__
 from mitex.comparison.html import count_text, items, jpeg, picture, template, text_of
-from mitex.comparison.measures import MEASURES
+from mitex.comparison.kinds import Kind
 from mitex.comparison.results import Result, label
 from mitex.comparison.summary import Summary
 from mitex.comparison.tables import meaning_html, table_html
 
-CONDITIONS = (
-    "Exemplars, meshes and seeds: every method has made the same ones, but where a cell is empty.",
-    "The size of the pattern: the exemplar is half as wide as the side of the UV layout's square, as far as "
-    "the settings of the methods leave it at that.",
-    "What is measured: colours alone, read off the asset that mitex apply wrote, without light, by the same "
-    "cameras: 16 patches of the surface, three eighths of the exemplar wide, with as many pixels as there, "
-    "beside as many patches of the exemplar.",
-    "Pixels that are seen at more than 60 degrees from the normal, or beside the mesh, do not count.",
-    "Pictures: the same camera and light. What a method has learned besides colours shows in them.",
+FIRST = "Exemplars, meshes and seeds: every method has made the same ones, but where a cell is empty."
+LAST = (
+    "Pictures: the same camera and light. What a method has learned besides what is measured shows in them.",
     "Not the same: steps and settings, which are each method's own defaults unless something else was asked "
     "for, and the load of the machine while seconds were measured.",
 )
@@ -37,16 +31,18 @@ class Page:
     Attributes:
         results: all results.
         tables: means of them.
-        exemplars: path or name -> picture (S, S, 3), sRGB in [0, 1].
+        exemplars: path, name or words -> picture (S, S, 3), sRGB in [0, 1]; None without one.
         floors: exemplar and mesh -> measure -> value of the exemplar beside itself.
         failures: a line for each job or measurement that failed.
+        kind: of the comparison.
     """
 
     results: Sequence[Result]
     tables: Sequence[Summary]
-    exemplars: Mapping[str, np.ndarray]
+    exemplars: Mapping[str, np.ndarray | None]
     floors: Mapping[tuple[str, str], Mapping[str, float]]
     failures: Sequence[str]
+    kind: Kind
 
     def html(self) -> str:
         """The text of the file."""
@@ -59,8 +55,8 @@ class Page:
             looks="".join(map(self._looks, self.exemplars)),
             numbers_note=escape(self._note()),
             tables=self._tables(),
-            meanings="".join(map(meaning_html, MEASURES)),
-            conditions=items(CONDITIONS),
+            meanings="".join(map(meaning_html, self.kind.measures)),
+            conditions=items((FIRST, *self.kind.conditions, *LAST)),
             footer=f"Mitex {escape(__version__)}, {time.strftime('%-d %B %Y')}",
         )
 
@@ -104,7 +100,7 @@ class Page:
         results = [result for result in self.results if result.exemplar == exemplar]
         rows = []
         for mesh in dict.fromkeys(result.mesh for result in results):
-            image = "" if rows else picture(jpeg(self.exemplars[exemplar]), f"exemplar {label(exemplar)}")
+            image = "" if rows else self._exemplar(exemplar)
             cells = "".join(self._look(results, mesh, name) for name in self.methods)
             rows.append(f"<tr><td>{image}</td><th>{escape(label(mesh))}</th>{cells}</tr>")
         heads = "".join(f"<th>{escape(name)}</th>" for name in self.methods)
@@ -112,6 +108,10 @@ class Page:
         content = f"<thead>{head}</thead><tbody>{''.join(rows)}</tbody>"
         columns = f"--columns: {len(self.methods) + 1}"
         return f'<div class="wide"><table class="looks" style="{columns}">{content}</table></div>'
+
+    def _exemplar(self, exemplar: str) -> str:
+        image = self.exemplars[exemplar]
+        return "" if image is None else picture(jpeg(image), f"exemplar {label(exemplar)}")
 
     def _look(self, results: Iterable[Result], mesh: str, method: str) -> str:
         """A cell with the picture of each seed, of which one is shown."""

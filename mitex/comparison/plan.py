@@ -9,6 +9,7 @@ from typing import Any
 
 from mitex.batch import MethodPlan, Plan
 from mitex.batch.options import apply_kinds, fit_kinds
+from mitex.comparison.kinds import KINDS
 from mitex.errors import ConfigError
 from mitex.methods.layout import EXEMPLAR_WIDTH
 from mitex.methods.registry import methods
@@ -17,7 +18,6 @@ from mitex.training import values
 
 WIDTH = "exemplar_width"  # option of `mitex apply` of methods whose pattern has another size without it
 SCALES = (WIDTH, "scale")
-SOURCE = "exemplar"  # what methods that can be compared learn from
 
 
 def comparison_plan(
@@ -70,27 +70,48 @@ def prepared(plan: Plan, seeds: int | None = None) -> Plan:
         seeds: how many, in place of those of the plan.
 
     Raises:
-        ConfigError: A method does not learn from an exemplar or is put on no mesh, or the output is no .glb.
+        ConfigError: Methods learn from different things, or from what is not compared; one is put on no mesh;
+            the output is no .glb.
     """
+    source_of(plan)
     parts = tuple(map(_prepared, plan.methods))
     if seeds is not None:
         parts = tuple(replace(part, seeds=tuple(range(seeds))) for part in parts)
     return replace(plan, methods=parts)
 
 
+def source_of(plan: Plan) -> str:
+    """What all methods of a plan learn from: a key of `KINDS`.
+
+    Raises:
+        ConfigError: They learn from different things, or from what is not compared.
+    """
+    first, *others = plan.methods
+    for part in others:
+        if part.learns_from != first.learns_from:
+            problem = (
+                f"{first.label} learns from {first.learns_from}, and {part.label} from {part.learns_from}"
+            )
+            raise ConfigError(problem, "compare methods that learn from the same")
+    if first.learns_from not in KINDS:
+        problem = f"methods that learn from a {first.learns_from} are not compared"
+        raise ConfigError(problem, f"name some that learn from: {', '.join(KINDS)}")
+    return first.learns_from
+
+
 def _prepared(part: MethodPlan) -> MethodPlan:
     method = methods()[part.method]
-    if method.learns_from != SOURCE or not method.applies_to_meshes:
-        able = [one.name for one in methods().values() if one.learns_from == SOURCE]
-        raise ConfigError(
-            f"{method.name} learns from a {method.learns_from}, which is not compared yet",
-            f"name some of {', '.join(able)}",
-        )
+    if not method.applies_to_meshes:
+        raise ConfigError(f"textures of {method.name} are put on no mesh", "compare others")
     if not part.meshes:
         raise ConfigError("there are no meshes to compare on", "name some")
     if part.output != "glb":
         raise ConfigError(f"methods.{part.label} writes {part.output}", 'leave out `output`, or say "glb"')
-    sized = WIDTH in apply_kinds(method) and not any(name in part.apply for name in SCALES)
+    sized = (
+        part.learns_from == "exemplar"
+        and WIDTH in apply_kinds(method)
+        and not any(name in part.apply for name in SCALES)
+    )
     return replace(part, apply={**part.apply, WIDTH: EXEMPLAR_WIDTH}) if sized else part
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from mitex.batch import Job, Report, Row
-from mitex.comparison.plan import SOURCE
 
 
 @dataclass(frozen=True)
@@ -42,21 +42,26 @@ class Result:
         return self.exemplar, self.mesh
 
 
-def results_of(report: Report) -> list[Result]:
-    """What the jobs of a batch that are done have written, with the time and memory that they took."""
+def results_of(report: Report, source: str) -> list[Result]:
+    """What the jobs of a batch that are done have written, with the time and memory that they took.
+
+    Args:
+        report: of the batch.
+        source: option of the fits that names what they learn from.
+    """
     rows = {row.job.id: row for row in report.rows}
     return [
-        _result(report.folder, row, rows[row.job.needs])
+        _result(report.folder, row, rows[row.job.needs], source)
         for row in report.rows
         if row.state == "done" and row.job.needs is not None
     ]
 
 
-def _result(folder: Path, row: Row, fit: Row) -> Result:
+def _result(folder: Path, row: Row, fit: Row, source: str) -> Result:
     job = row.job
     return Result(
         id=job.id,
-        exemplar=_argument(fit.job, SOURCE),
+        exemplar=_argument(fit.job, source),
         mesh=_argument(job, "mesh"),
         method=str(job.about["method"]),
         seed=job.about["seed"],
@@ -81,5 +86,5 @@ def _argument(job: Job, option: str) -> str:
 
 
 def label(text: str) -> str:
-    """What people call a path or a name."""
-    return Path(text).stem
+    """What people call a path or a name; words are called as they are."""
+    return Path(text).stem if os.sep in text else text

@@ -14,10 +14,11 @@ from typing import Any
 
 from mitex.batch import Engine, Event, Plan, Report, run_plan
 from mitex.batch.folder import BatchFolder
+from mitex.comparison.inputs import forget
 from mitex.comparison.kept import Kept
-from mitex.comparison.measures import MEASURES
+from mitex.comparison.kinds import KINDS, Kind
 from mitex.comparison.page import Page
-from mitex.comparison.pair import Pair, forget_inputs, picture_of
+from mitex.comparison.plan import source_of
 from mitex.comparison.results import Result, results_of
 from mitex.comparison.study import write_study
 from mitex.comparison.summary import Summary, summaries
@@ -87,8 +88,9 @@ def compare(
     """
     place = checked_folder(folder)
     report = run_plan(plan, place / BATCH, engine, threads=threads, retry=retry, on_event=on_event)
-    comparison = _measured(report, place)
-    _write(comparison, study)
+    kind = KINDS[source_of(plan)]
+    comparison = _measured(results_of(report, source_of(plan)), report, kind, place)
+    _write(comparison, kind, study)
     return comparison
 
 
@@ -106,12 +108,11 @@ def checked_folder(folder: str | Path) -> Path:
     return place
 
 
-def _measured(report: Report, folder: Path) -> Comparison:
+def _measured(made: Sequence[Result], report: Report, kind: Kind, folder: Path) -> Comparison:
     """Measures the results that were not measured before; one that cannot be is a failure of its own."""
-    forget_inputs()
-    kept, pair_of = Kept(folder / MEASURED), cache(Pair)
+    forget()
+    kept, pair_of = Kept(folder / MEASURED), cache(kind.pair_of)
     results, failures = [], [f"{row.job.name}: {row.record.get('error')}" for row in report.failures]
-    made = results_of(report)
     for k, result in enumerate(made):
         announce("measuring", k, len(made))
         known = kept.completed(result)
@@ -126,32 +127,33 @@ def _measured(report: Report, folder: Path) -> Comparison:
         results.append(known)
     total = len(report.rows)
     missing = total - report.count("done") + len(made) - len(results)
-    tables = tuple(summaries(results))
+    tables = tuple(summaries(results, kind.measures))
     return Comparison(folder, tuple(results), tables, tuple(failures), missing, total)
 
 
-def _write(comparison: Comparison, study: bool) -> None:
+def _write(comparison: Comparison, kind: Kind, study: bool) -> None:
     kept, results = Kept(comparison.folder / MEASURED), comparison.results
-    floors = {pair: kept.floor(Pair(*pair)) for pair in dict.fromkeys(r.pair for r in results)}
-    images = {name: picture_of(name) for name in dict.fromkeys(r.exemplar for r in results)}
-    page = Page(results, comparison.tables, images, floors, comparison.failures)
+    pairs = {pair: kind.pair_of(*pair) for pair in dict.fromkeys(r.pair for r in results)}
+    floors = {names: kept.floor(pair) for names, pair in pairs.items()}
+    images = {exemplar: pair.image for (exemplar, _), pair in pairs.items()}
+    page = Page(results, comparison.tables, images, floors, comparison.failures, kind)
     with atomic_write(comparison.report) as temporary:
         temporary.write_text(page.html(), encoding="utf-8", errors="replace")
     if study:
         write_study(comparison.folder, comparison.results, images)
-    _write_csv(comparison.folder / TABLE, comparison.results)
+    _write_csv(comparison.folder / TABLE, results, kind)
     record: dict[str, Any] = {
         "results": [_flat(result, comparison.folder) for result in comparison.results],
         "means": [_record(table, floors) for table in comparison.tables],
         "failures": list(comparison.failures),
-        "measures": {m.key: {"better": m.better, "meaning": m.meaning} for m in MEASURES},
+        "measures": {m.key: {"better": m.better, "meaning": m.meaning} for m in kind.measures},
     }
     with atomic_write(comparison.folder / RECORD) as temporary:
         temporary.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 
-def _write_csv(path: Path, results: Sequence[Result]) -> None:
-    columns = ("exemplar", "mesh", "method", "seed", *(measure.key for measure in MEASURES), "asset")
+def _write_csv(path: Path, results: Sequence[Result], kind: Kind) -> None:
+    columns = ("exemplar", "mesh", "method", "seed", *(measure.key for measure in kind.measures), "asset")
     with (
         atomic_write(path) as temporary,
         temporary.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file,

@@ -69,7 +69,7 @@ class Study:
             raise ConfigError(problem, "name what was given as --out, with --study") from e
 
 
-def write_study(folder: Path, results: Sequence[Result], exemplars: Mapping[str, np.ndarray]) -> Path:
+def write_study(folder: Path, results: Sequence[Result], exemplars: Mapping[str, np.ndarray | None]) -> Path:
     """Writes study.html and study.json: all pairs of methods, on each exemplar and mesh that both have done.
 
     Args:
@@ -81,7 +81,7 @@ def write_study(folder: Path, results: Sequence[Result], exemplars: Mapping[str,
         The page.
 
     Raises:
-        ConfigError: There are no two methods to compare.
+        ConfigError: There are no two methods to compare, or an exemplar has no picture.
         OutputError: The folder cannot be written to.
     """
     shown = {(*result.pair, result.method): result for result in reversed(results) if result.pictures}
@@ -89,7 +89,9 @@ def write_study(folder: Path, results: Sequence[Result], exemplars: Mapping[str,
     asked: list[tuple[Question, dict[str, Any]]] = []
     for exemplar, mesh in dict.fromkeys(result.pair for result in results):
         methods = sorted({method for one, other, method in shown if (one, other) == (exemplar, mesh)})
-        pictures.setdefault(exemplar, jpeg(exemplars[exemplar]))
+        if (image := exemplars[exemplar]) is None:
+            raise ConfigError("words have no picture to show", "leave out `study`")
+        pictures.setdefault(exemplar, jpeg(image))
         for pair in combinations(methods, 2):
             files = [shown[exemplar, mesh, method].pictures["picture"] for method in pair]
             pictures |= {str(file): file.read_bytes() for file in files}

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from mitex.comparison.measures import MEASURES, Measure
+from mitex.comparison.measures import Measure
 from mitex.comparison.results import Result
 
 
@@ -36,52 +36,39 @@ class Summary:
     Attributes:
         pair: exemplar and mesh; None for means over all pairs.
         methods: labels, in the plan's order.
+        measures: the columns.
         cells: (method, measure's key) -> cell; without those that were not measured.
     """
 
     pair: tuple[str, str] | None
     methods: tuple[str, ...]
+    measures: tuple[Measure, ...]
     cells: dict[tuple[str, str], Cell]
 
 
-def summaries(results: Sequence[Result]) -> list[Summary]:
+def summaries(results: Sequence[Result], measures: tuple[Measure, ...]) -> list[Summary]:
     """The tables of all pairs, then, if there are several, that of the means over pairs."""
     pairs = list(dict.fromkeys(result.pair for result in results))
-    tables = [_summary(pair, [r for r in results if r.pair == pair]) for pair in pairs]
-    return [*tables, _overall(results, pairs)] if len(pairs) > 1 else tables
+    tables = [_summary(pair, [r for r in results if r.pair == pair], 1, measures) for pair in pairs]
+    return [*tables, _summary(None, results, len(pairs), measures)] if len(pairs) > 1 else tables
 
 
-def _summary(pair: tuple[str, str], results: Sequence[Result]) -> Summary:
-    methods = _methods(results)
-    cells = {}
-    for method in methods:
-        for measure in MEASURES:
-            values = [
-                r.numbers[measure.key] for r in results if r.method == method and measure.key in r.numbers
-            ]
-            if values:
-                cells[method, measure.key] = _cell(values)
-    return Summary(pair, methods, _marked(cells, methods))
-
-
-def _overall(results: Sequence[Result], pairs: Sequence[tuple[str, str]]) -> Summary:
+def _summary(
+    pair: tuple[str, str] | None, results: Sequence[Result], pairs: int, measures: tuple[Measure, ...]
+) -> Summary:
     """Over seeds, the means over pairs; only seeds with which a method has done all pairs count."""
-    methods = _methods(results)
+    methods = tuple(dict.fromkeys(result.method for result in results))
     cells = {}
     for method in methods:
-        for measure in MEASURES:
-            values = {}
+        for measure in measures:
+            by_seed: dict[int | None, list[float]] = {}
             for r in results:
                 if r.method == method and measure.key in r.numbers:
-                    values.setdefault(r.seed, []).append(r.numbers[measure.key])
-            complete = [float(np.mean(of_seed)) for of_seed in values.values() if len(of_seed) == len(pairs)]
-            if complete:
-                cells[method, measure.key] = _cell(complete)
-    return Summary(None, methods, _marked(cells, methods))
-
-
-def _methods(results: Iterable[Result]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(result.method for result in results))
+                    by_seed.setdefault(r.seed, []).append(r.numbers[measure.key])
+            values = [float(np.mean(of_seed)) for of_seed in by_seed.values() if len(of_seed) == pairs]
+            if values:
+                cells[method, measure.key] = _cell(values)
+    return Summary(pair, methods, measures, _marked(cells, methods, measures))
 
 
 def _cell(values: Sequence[float]) -> Cell:
@@ -89,9 +76,11 @@ def _cell(values: Sequence[float]) -> Cell:
     return Cell(float(np.mean(values)), spread, len(values))
 
 
-def _marked(cells: dict[tuple[str, str], Cell], methods: Sequence[str]) -> dict[tuple[str, str], Cell]:
+def _marked(
+    cells: dict[tuple[str, str], Cell], methods: Sequence[str], measures: Sequence[Measure]
+) -> dict[tuple[str, str], Cell]:
     marked = dict(cells)
-    for measure in MEASURES:
+    for measure in measures:
         of_methods = {
             method: cells[method, measure.key] for method in methods if (method, measure.key) in cells
         }

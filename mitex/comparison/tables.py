@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from html import escape
 
 from mitex.comparison.html import DASH, number_text
-from mitex.comparison.measures import MEASURES, Measure
+from mitex.comparison.measures import Measure
 from mitex.comparison.results import label
 from mitex.comparison.summary import Cell, Summary
 
@@ -19,9 +19,9 @@ def table_html(table: Summary, floor: Mapping[str, float]) -> str:
         floor: measure -> value of the exemplar beside itself, for the last row; empty for none.
     """
     title = "Means over all of them" if table.pair is None else " on ".join(map(label, table.pair))
-    head = "<tr><th><button>method</button></th>" + "".join(map(_head, MEASURES)) + "</tr>"
+    head = "<tr><th><button>method</button></th>" + "".join(map(_head, table.measures)) + "</tr>"
     rows = "".join(_row(table, method) for method in table.methods)
-    foot = f"<tfoot><tr><td>exemplar beside itself</td>{_floor(floor)}</tr></tfoot>" if floor else ""
+    foot = f"<tfoot><tr><td>exemplar beside itself</td>{_floor(table, floor)}</tr></tfoot>" if floor else ""
     content = f"<thead>{head}</thead><tbody>{rows}</tbody>{foot}"
     return f'<h3>{escape(title)}</h3><div class="wide"><table class="numbers">{content}</table></div>'
 
@@ -38,7 +38,7 @@ def _head(measure: Measure) -> str:
 
 
 def _row(table: Summary, method: str) -> str:
-    cells = "".join(_cell(table.cells.get((method, measure.key)), measure) for measure in MEASURES)
+    cells = "".join(_cell(table.cells.get((method, measure.key)), measure) for measure in table.measures)
     return f'<tr><td data-value="{escape(method)}">{escape(method)}</td>{cells}</tr>'
 
 
@@ -53,6 +53,6 @@ def _cell(cell: Cell | None, measure: Measure) -> str:
     return f'<td data-value="{value:.9g}"{mark}>{mean}<span class="spread">{spread}</span></td>'
 
 
-def _floor(values: Mapping[str, float]) -> str:
-    known = (values.get(measure.key) for measure in MEASURES)
+def _floor(table: Summary, values: Mapping[str, float]) -> str:
+    known = (values.get(measure.key) for measure in table.measures)
     return "".join(f"<td>{DASH if value is None else number_text(value)}</td>" for value in known)

@@ -80,7 +80,7 @@ def _counting(mesh: Mesh, cameras: Cameras, hits: Hits, antialias: int) -> np.nd
 
 
 def _colours(asset: Asset, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
-    """(P, 3) linear colours at points of the surface."""
+    """Linear colours (P, 3) at points of an asset's surface, by faces (P,) and barycentrics (P, 3)."""
     if asset.atlas is not None and asset.texture_maps is not None and "albedo" in asset.texture_maps:
         return bilinear(
             srgb_to_linear(asset.texture_maps["albedo"]), interpolate(barycentric, asset.atlas.uv[face])

@@ -31,6 +31,7 @@ class PreviewRenderer:
     Attributes:
         face: (P,) int32, the triangle under each sample that sees the mesh.
         barycentric: (P, 3) float32, where on it.
+        covered: (H, W) bool, pixels that show nothing but the mesh.
 
     Raises:
         ConfigError: an option out of range.
@@ -51,6 +52,8 @@ class PreviewRenderer:
         cameras = Cameras("perspective", origin, target, up, fov=math.degrees(FOV), **size)
         hits = Stage(normalised).hits(cameras, ANTIALIAS)
         self._hit = hits.hit.numpy()
+        samples = self._hit.reshape(resolution, resolution, ANTIALIAS**2)
+        self.covered = np.all(samples, axis=2)
         self.face, self.barycentric = hits.face.numpy(), hits.barycentric.numpy()
 
     def render(

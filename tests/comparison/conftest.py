@@ -28,8 +28,9 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Jobs run in this process, with few and small patches and pictures."""
     monkeypatch.setattr("mitex.batch.task.Process", InThisProcess)
-    for name, value in {"PATCHES": 2, "WINDOWS": 1, "CELL": 16, "SPP": 1}.items():
-        monkeypatch.setattr(f"mitex.comparison.pair.{name}", value)
+    values = {"look_pair.PATCHES": 2, "look_pair.WINDOWS": 1, "inputs.CELL": 16, "inputs.SPP": 1}
+    for name, value in values.items():
+        monkeypatch.setattr(f"mitex.comparison.{name}", value)
 
 
 def write_mesh(path: Path) -> None:

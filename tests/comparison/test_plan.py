@@ -17,7 +17,14 @@ BROKEN = {
     "no methods": ({"--methods": ","}, "has no methods"),
     "an unknown method": ({"--methods": "image-qilting"}, "no method 'image_qilting'; did you mean image_"),
     "a method twice": ({"--methods": "gatys,gatys"}, "method 'gatys' is named twice"),
-    "a method of another kind": ({"--methods": "geometric"}, "geometric learns from a reference"),
+    "methods of two kinds": (
+        {"--methods": "gatys,geometric"},
+        "gatys learns from exemplar, and geometric from reference",
+    ),
+    "methods of a kind without measures": (
+        {"--methods": "nerf"},
+        "that learn from a capture are not compared",
+    ),
     "an exemplar that does not exist": ({"--exemplar": "no.png"}, "there is no exemplar 'no.png'"),
     "a mesh that does not exist": ({"--mesh": "no.obj"}, "there is no mesh 'no.obj'"),
     "an exemplar twice": ({"--exemplar": "a.png a.png"}, "the job fit-image_quilting-a-s0 twice"),
@@ -91,7 +98,7 @@ class TestPlanFiles:
         ("words", "message"),
         [
             ("--plan no.toml", "there is no such file"),
-            ("--preset nca-fig1", "there is no comparison 'nca-fig1'; did you mean nca-fig10"),
+            ("--preset nca-fog10", "there is no comparison 'nca-fog10'; did you mean nca-fig10?"),
             ("--preset nca-fig10 --mesh vase", "--preset and --mesh contradict each other"),
             ("--preset nca-fig10 --plan a.toml", "--plan and --preset contradict each other"),
             ("--preset nca-fig10 --data .", "there is no exemplar 'exemplars/Abstract_008'"),

@@ -7,8 +7,7 @@ import pytest
 
 from mitex.cli import main
 from mitex.comparison import compare, comparison_plan
-from mitex.comparison.kept import Kept, optimized_numbers
-from mitex.comparison.pair import SETTINGS
+from mitex.comparison.kept import VERSION, Kept, optimized_numbers
 from tests.cli import bad_files as bad
 
 QUILT = ["image_quilting:size=64", "image_quilting:exemplar_size=32", "image_quilting:block=12"]
@@ -64,17 +63,17 @@ def check_files(folder):
     assert html.count("data:image/jpeg;base64,") == 3 and "http" not in html
 
 
-def test_numbers_of_other_settings_are_measured_again(tmp_path, place, monkeypatch):
+def test_numbers_of_another_version_are_measured_again(tmp_path, place, monkeypatch):
     from tests.comparison.test_summary import result
 
     kept, one = Kept(tmp_path / "kept"), result("a", 0)
     assert kept.completed(one) is None
     bad.image(tmp_path / "kept" / f"{one.id}.jpg", kind="JPEG")
     file = tmp_path / "kept" / f"{one.id}.json"
-    file.write_text(json.dumps({"settings": SETTINGS, "numbers": {"gram": 2.5}}))
+    file.write_text(json.dumps({"version": VERSION, "numbers": {"gram": 2.5}}))
     known = kept.completed(one)
     assert known is not None and known.numbers["gram"] == 2.5
-    for content in ({"settings": SETTINGS | {"version": 0}, "numbers": {}}, [], {"settings": SETTINGS}):
+    for content in ({"version": VERSION - 1, "numbers": {}}, [], {"version": VERSION}):
         file.write_text(json.dumps(content))
         assert kept.completed(one) is None
     file.write_text("{")

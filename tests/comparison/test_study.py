@@ -4,6 +4,7 @@ import base64
 import json
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -82,7 +83,7 @@ class TestEvaluation:
         assert done.preferences[0].spread == pytest.approx(np.std(a, ddof=1))
         between, within = 3 * 2 * (1 / 6) ** 2 / 1, 2 * (1 / 9 + 2 / 36) / 4  # mean squares
         assert done.f == pytest.approx(between / within)
-        t = scipy.stats.ttest_ind(a, b)
+        t: Any = scipy.stats.ttest_ind(a, b)
         assert done.p == pytest.approx(t.pvalue)  # of two groups both tests are one
         assert done.pairs == {("a", "b"): pytest.approx(t.pvalue)}
 

@@ -5,13 +5,18 @@ from pathlib import Path
 
 import pytest
 
-from mitex.comparison.measures import BY_KEY
+from mitex.comparison import summary
+from mitex.comparison.measures import BY_KEY, COSTS, LOOKS
 from mitex.comparison.results import Result
-from mitex.comparison.summary import Cell, best, summaries
+from mitex.comparison.summary import Cell, best
 
 
 def result(method, seed, mesh="ball", **numbers):
     return Result(f"{method}-{seed}-{mesh}", "lava", mesh, method, seed, Path("a"), Path("b"), numbers)
+
+
+def summaries(results):
+    return summary.summaries(results, (*LOOKS, *COSTS))
 
 
 def test_mean_and_spread_over_seeds():

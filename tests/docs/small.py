@@ -85,7 +85,7 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(texture.GrowingTexture, "apply", _small_growth(texture.GrowingTexture.apply))
     patch.setattr("mitex.batch.task.Process", _InThisProcess)
     for name in ("PATCHES", "WINDOWS"):
-        patch.setattr(f"mitex.comparison.pair.{name}", 1)
+        patch.setattr(f"mitex.comparison.look_pair.{name}", 1)
     patch.setattr(NcaTexture, "tile", _small_tile(NcaTexture.tile))
     patch.setattr(fitting, "find_base", lambda *_, **__: _ball_as_base())
     patch.setattr(NerfTexture, "synthesize", _small_quilt(NerfTexture.synthesize))

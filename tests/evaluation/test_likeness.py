@@ -40,7 +40,7 @@ def test_one_patch_gives_the_distances_of_the_two_images(images):
     """By the functions for whole images."""
     a, b = (image[:SIDE, :SIDE] for image in images)
     views = [(image[None], np.ones((1, SIDE, SIDE), bool)) for image in (a, b)]
-    result = likeness(*map(patch_features, views))
+    result = likeness(patch_features(views[0]), patch_features(views[1]))
     assert result.frechet_fine == pytest.approx(single_image_frechet(a, b, "relu2_2"), rel=1e-4)
     network = Vgg16("max", "float32")
     maps = [network.features(torch.from_numpy(image[None]), LAYERS) for image in (a, b)]

@@ -1,15 +1,16 @@
-"""An exemplar and a mesh: all that results on them are measured with, which is the same for all methods."""
+"""An exemplar and a mesh: how near the colours of textures on the mesh come to the exemplar."""
 
 from __future__ import annotations
 
 import logging
 from dataclasses import asdict
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 
 from mitex.asset import Asset, clay
 from mitex.cache import content_key
+from mitex.comparison.inputs import lit, mesh_of, read_once
 from mitex.errors import ImageError
 from mitex.evaluation.likeness import Vectors, exemplar_patches, likeness, patch_features
 from mitex.evaluation.patches import albedo_views, patch_cameras
@@ -18,8 +19,6 @@ from mitex.evaluation.seams import seam_ratio
 from mitex.exemplar import Exemplar
 from mitex.mesh import Mesh
 from mitex.methods.layout import EXEMPLAR_WIDTH, RESOLUTION, layout_side, with_layout
-from mitex.render.picture import AZIMUTH, ELEVATION, tone
-from mitex.render.renderer import OrbitRenderer
 from mitex.scenes.cameras import Cameras
 
 log = logging.getLogger(__name__)
@@ -27,11 +26,9 @@ log = logging.getLogger(__name__)
 SIDE = 256  # of the exemplar, at most [px]
 PATCHES, SHARE = 16, 0.375  # patches, and their width [widths of the exemplar]
 WINDOWS = 6  # as wide as the exemplar, for the repetition
-CELL, SPP = 384, 64  # side of a picture [px], and rays of each pixel
-SETTINGS = {"version": 2, "patches": PATCHES, "share": SHARE, "windows": WINDOWS, "cell": CELL, "spp": SPP}
 
 
-@cache
+@read_once
 def picture_of(exemplar: str) -> np.ndarray:
     """The central square of an exemplar's albedo, (S, S, 3) sRGB in [0, 1], at most `SIDE` wide.
 
@@ -42,24 +39,18 @@ def picture_of(exemplar: str) -> np.ndarray:
     return source.resized(min(SIDE, *source.size)).maps["albedo"]
 
 
-@cache
+@read_once
 def sized_mesh(mesh: str) -> tuple[Mesh, float]:
     """A mesh, and how wide the exemplar is on it [mesh units].
 
     Raises:
         MeshError: It cannot be read.
     """
-    loaded = Mesh.load(mesh)
+    loaded = mesh_of(mesh)
     return loaded, EXEMPLAR_WIDTH * layout_side(with_layout(loaded, RESOLUTION))
 
 
-def forget_inputs() -> None:
-    """Lets exemplars and meshes be read anew: files may have changed."""
-    picture_of.cache_clear()
-    sized_mesh.cache_clear()
-
-
-class Pair:
+class LookPair:
     """An exemplar and a mesh.
 
     Args:
@@ -92,9 +83,8 @@ class Pair:
             return {}
 
     def picture(self, asset: Asset) -> np.ndarray:
-        """(CELL, CELL, 3) sRGB in [0, 1]: the asset in light, path-traced."""
-        renderer = OrbitRenderer(asset, resolution=CELL, like=self.mesh)
-        return tone(renderer.render(AZIMUTH, renderer.fit_view(AZIMUTH, ELEVATION), SPP))
+        """As of `mitex.comparison.inputs.lit`."""
+        return lit(asset, self.mesh)
 
     def _likeness(self, asset: Asset) -> dict[str, float]:
         """Distances of patches; none on a mesh so thin that they show too little of it."""

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from mitex.evaluation.surface_statistics import local_statistics, statistic_distances
 from mitex.mesh import Mesh, grid, icosphere
-from mitex.methods.geometric.statistics import local_statistics, statistic_distances
 
 
 def test_a_plane():

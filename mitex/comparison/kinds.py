@@ -1,0 +1,94 @@
+"""Kinds of comparisons, by what the methods learn from: what is measured then, and how."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from mitex.asset import Asset
+from mitex.comparison.measures import COSTS, LOOKS, RELIEFS, TEXTS, Measure
+from mitex.lazy import load
+
+
+class Pair(Protocol):
+    """What is learned from, and a mesh: all that results on them are measured with, whatever the method."""
+
+    @property
+    def key(self) -> str:
+        """A hash of both."""
+        ...
+
+    @property
+    def image(self) -> np.ndarray | None:
+        """(S, S, 3) sRGB in [0, 1]: what is learned from; None if that has no picture."""
+        ...
+
+    def numbers(self, asset: Asset) -> dict[str, float]:
+        """What is measured of an asset; NaN, or nothing, where that is not possible."""
+        ...
+
+    def floor(self) -> dict[str, float]:
+        """The same of what is learned from beside itself, as far as that is known."""
+        ...
+
+    def picture(self, asset: Asset) -> np.ndarray:
+        """(N, N, 3) sRGB in [0, 1]: the asset in light."""
+        ...
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of comparison.
+
+    Attributes:
+        measures: what results have.
+        pair: reference to the class of its pairs.
+        conditions: what was the same for all, besides inputs and pictures.
+    """
+
+    measures: tuple[Measure, ...]
+    pair: str
+    conditions: tuple[str, ...]
+
+    def pair_of(self, exemplar: str, mesh: str) -> Pair:
+        """What results are measured with.
+
+        Raises:
+            MitexError: One of the two cannot be read.
+        """
+        return load(self.pair)(exemplar, mesh)
+
+
+SIZE = (
+    "The size of the pattern: the exemplar is half as wide as the side of the UV layout's square, as far as "
+    "the settings of the methods leave it at that."
+)
+KINDS: Mapping[str, Kind] = {
+    "exemplar": Kind(
+        (*LOOKS, *COSTS),
+        "mitex.comparison.look_pair:LookPair",
+        (
+            SIZE,
+            "What is measured: colours alone, read off the asset that mitex apply wrote, without light, by "
+            "the same cameras: 16 patches of the surface, three eighths of the exemplar wide, with as many "
+            "pixels as there, beside as many patches of the exemplar, of which the same pixels count.",
+            "Pixels that are seen at more than 60 degrees from the normal, or beside the mesh, do not count.",
+        ),
+    ),
+    "text": Kind(
+        (*TEXTS, *COSTS),
+        "mitex.comparison.text_pair:TextPair",
+        ("What is measured: the same 24 views of the object in light, and of the object in grey.",),
+    ),
+    "reference": Kind(
+        (*RELIEFS, *COSTS),
+        "mitex.comparison.relief_pair:ReliefPair",
+        (
+            "What is measured: the surface that mitex apply wrote, and four views of it in grey, in the same "
+            "light as the reference.",
+        ),
+    ),
+}

@@ -1,0 +1,84 @@
+"""A surface with relief, and a mesh: how near the details of displaced meshes come to it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from mitex.asset import CLAY, Asset, clay
+from mitex.cache import content_key
+from mitex.comparison.inputs import lit, mesh_of, read_once
+from mitex.evaluation.metrics import single_image_frechet
+from mitex.evaluation.surface_statistics import statistic_distances
+from mitex.mesh import Mesh
+from mitex.methods.geometric.references import find_reference
+from mitex.render.preview import PreviewRenderer
+
+VIEWS, SIDE = 4, 192  # pictures from around, and their side [px]
+ELEVATION = 15.0  # of the camera [degrees]
+
+
+@read_once
+def reference_of(name: str) -> Mesh:
+    """A reference by its path or name.
+
+    Raises:
+        MeshError: It cannot be read.
+    """
+    return find_reference(name)
+
+
+class ReliefPair:
+    """A reference and a mesh.
+
+    Args:
+        exemplar: path or name of the reference.
+        mesh: path or name.
+    """
+
+    def __init__(self, exemplar: str, mesh: str) -> None:
+        self.reference, self.mesh = reference_of(exemplar), mesh_of(mesh)
+
+    @property
+    def key(self) -> str:
+        """A hash of both."""
+        return content_key(
+            *(array for mesh in (self.reference, self.mesh) for array in (mesh.vertices, mesh.faces))
+        )
+
+    @property
+    def image(self) -> np.ndarray:
+        """The reference in light."""
+        return lit(clay(self.reference))
+
+    def numbers(self, asset: Asset) -> dict[str, float]:
+        """Distances of the statistics of edges and vertices, and of shaded pictures."""
+        pairs = zip(views(asset.mesh), self._views, strict=True)
+        shading = [
+            single_image_frechet(ours, theirs, mask_a=mask, mask_b=other)
+            for (ours, mask), (theirs, other) in pairs
+        ]
+        return {**statistic_distances(asset.mesh, self.reference), "shading": float(np.mean(shading))}
+
+    def floor(self) -> dict[str, float]:
+        """The reference is the mesh that others are beside: all is 0."""
+        return {}
+
+    def picture(self, asset: Asset) -> np.ndarray:
+        """As of `mitex.comparison.inputs.lit`."""
+        return lit(asset)
+
+    @cached_property
+    def _views(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        return views(self.reference)
+
+
+def views(mesh: Mesh) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Pictures (SIDE, SIDE, 3) of a mesh in grey from around, and (SIDE, SIDE) bool what shows it."""
+    result = []
+    for k in range(VIEWS):
+        renderer = PreviewRenderer(mesh, resolution=SIDE, azimuth=360.0 * k / VIEWS, elevation=ELEVATION)
+        grey = np.full((len(renderer.face), 3), CLAY, np.float32)
+        result.append((renderer.render(grey, mesh.face_normals[renderer.face]), renderer.covered))
+    return result
