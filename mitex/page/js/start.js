@@ -22,6 +22,7 @@ async function open() {
   const panel = new Panel(page, clock, new Pointer(page, by("cursor")), { panel: by("panel"), status: by("status") });
   listenToKeys(page, panel);
   listenToDrops(panel);
+  if (data.live) follow(page, panel);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     page.studio.paper = paperOf(canvas);
     page.changed = true;
