@@ -44,9 +44,9 @@ class Gallery:
         from mitex.page import Content, thumbnail
 
         meshes = [Mesh.load(name) for name in ([self.mesh] if self.mesh else MESHES)]
-        method = next(method for method in methods().values() if method.page is not None)
+        method, page = next((method, method.page) for method in methods().values() if method.page)
         models = [model for model in listing() if model["method"] == method.name]
         pictures = [model["thumbnail"] and thumbnail(Path(model["thumbnail"]), SIDE) for model in models]
-        content = load(method.page)([model["name"] for model in models], meshes)
+        content = load(page)([model["name"] for model in models], meshes)
         Content("Gallery", content.extended(thumbnails=pictures).data).write(out)
         print(self.out)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import webbrowser
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -54,10 +55,8 @@ class View:
             print(server.url, flush=True)
             if not self.no_browser:
                 webbrowser.open(server.url)
-            try:
+            with suppress(KeyboardInterrupt):  # the usual end
                 server.serve_forever()
-            except KeyboardInterrupt:
-                pass  # the usual end
 
     def shown(self) -> tuple[Callable[[], Content], Callable[[], Any]]:
         """What gives the page and what is new in it.

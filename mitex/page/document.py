@@ -52,8 +52,8 @@ def document(title: str, data: Mapping[str, Any], picture: bytes) -> str:
     """The page as HTML.
 
     Nothing in it is fetched: a Content-Security-Policy forbids all but its own script and style, known by
-    their hashes, and pictures that the page holds itself. Only one with `live` in its data, which `mitex view`
-    serves, may ask its own server for what is new.
+    their hashes, and pictures that the page holds itself. Only one with `live` in its data, which `mitex
+    view` serves, may ask its own server for what is new.
 
     Args:
         title: of the document; any text.

@@ -29,7 +29,7 @@ class Panel {
     this.place.replaceChildren(
       element("header", {}, element("h1", {}, page.surface.mesh.name), this.title),
       element("div", { className: "row" }, this.play,
-        button("Grow anew", "Back to the seed (R)", () => page.reset()),
+        button("Regrow", "Back to the seed (R)", () => page.reset()),
         button("New seed", "The same look, another arrangement (N)", () => this.reseed())),
       ...this._training(), ...this._looks(), ...this._meshes(), this._hand(), this._texture(), ...this._motion(), this._view(), this._keep(), keysHelp(),
     );
