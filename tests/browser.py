@@ -32,14 +32,13 @@ class Browser:
     def __init__(self) -> None:
         self._chromium = self._driver = None
 
-    def open(self, path: Path | str, size: tuple[int, int] = (128, 128), fragment: str = "#still") -> "Tab":
-        """A page from a file, in a window of `size` pixels."""
+    def open(self, path: Path, side: int = 128) -> "Tab":
+        """A page from a file, which stands still; its picture is a square of `side` pixels."""
         if self._chromium is None:
             self._start()
         assert self._chromium is not None
-        address = path if isinstance(path, str) else path.as_uri() + fragment
-        page = self._chromium.new_page(viewport={"width": size[0], "height": size[1]})
-        return Tab(page, address)
+        page = self._chromium.new_page(viewport={"width": 640, "height": 480})
+        return Tab(page, f"{path.as_uri()}#still={side}")
 
     def close(self) -> None:
         if self._chromium is not None and self._driver is not None:

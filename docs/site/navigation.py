@@ -11,6 +11,7 @@ GROUPS = {
     "Methods": ["docs/nca", "docs/surface", "docs/geometric", "docs/nerf"],
     "Guides": [
         "docs/moving",
+        "docs/living-page",
         "docs/batch",
         "docs/compare",
         *(f"docs/{name}" for name in ("blender", "plugins", "embedding", "runs", "times")),

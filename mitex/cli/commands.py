@@ -16,6 +16,8 @@ COMMANDS = {
     "demo": ("mitex.demo:Demo", "synthesize, grow, render and export textures in a few minutes"),
     "cache": ("mitex.cli.cache:Cache", "show or clear what is kept on disk to save time"),
     "models": ("mitex.cli.models:Models", "list the textures that ship with Mitex"),
+    "gallery": ("mitex.cli.gallery:Gallery", "write a page in which each of them grows"),
+    "view": ("mitex.cli.view:View", "look at an asset, or at a texture as it grows, in the browser"),
     "batch": ("mitex.cli.batch:Batch", "run a plan of many fits, on one machine or on many"),
     "batch status": ("mitex.cli.batch:Status", "tell how far the jobs of a plan are"),
     "compare": ("mitex.cli.compare:Compare", "compare methods on the same exemplars and meshes, as a report"),

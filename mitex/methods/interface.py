@@ -22,7 +22,7 @@ class Applied(Protocol):
         ...
 
     def export(self, path: str | os.PathLike[str], maps_format: Literal["png", "exr"] = "png") -> Path:
-        """Writes it; the suffix chooses the format (.glb, .obj, .ply, .exr, .html), or it is a folder of maps.
+        """Writes it; the suffix chooses the format (.glb, .obj, .ply, .exr, .html), or it is a folder.
 
         Raises:
             OutputError: Another suffix, or an unwritable place.

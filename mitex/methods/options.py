@@ -120,8 +120,7 @@ class ApplyOptions:
     out: Annotated[str, arg(metavar="ASSET|PAGE|PICTURE|DIR/")]
     """File to write: .glb (PBR textures), .obj (with .mtl and PNG maps), .ply (vertex colours), .exr (the
     maps as layers), .html (a page for any browser, in which an automaton's texture grows), or a picture
-    (.png .jpg). A folder, which exists or ends with a slash, gets each map as a file of its own, and mesh.obj.
-    """
+    (.png .jpg). A folder, which exists or ends with a slash, gets each map as a file, and mesh.obj."""
 
     maps_format: Annotated[Literal["png", "exr"], arg(metavar="png|exr")] = "png"
     """Format of the maps in a folder."""

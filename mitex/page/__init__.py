@@ -3,9 +3,21 @@
 The page's own parts are beside this file: `js`, `glsl`, `page.html` and `page.css`, which `document` joins.
 """
 
-from mitex.page.document import document, write_page
+from mitex.page.content import Content, data_url, jpeg, thumbnail
+from mitex.page.document import document
 from mitex.page.packing import packed
-from mitex.page.still import still_data, write_still
+from mitex.page.still import still_content, write_still
 from mitex.page.surface import mesh_data, quantised
 
-__all__ = ["document", "mesh_data", "packed", "quantised", "still_data", "write_page", "write_still"]
+__all__ = [
+    "Content",
+    "data_url",
+    "document",
+    "jpeg",
+    "mesh_data",
+    "packed",
+    "quantised",
+    "still_content",
+    "thumbnail",
+    "write_still",
+]

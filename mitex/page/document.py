@@ -10,8 +10,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from mitex.paths import atomic_write
-
 PARTS = Path(__file__).parent
 # In the order in which each uses only those before it at once.
 SCRIPTS = (
@@ -42,6 +40,8 @@ SCRIPTS = (
     "clock",
     "pointer",
     "save",
+    "chart",
+    "live",
     "panel",
     "keys",
     "start",
@@ -52,23 +52,26 @@ def document(title: str, data: Mapping[str, Any], picture: bytes) -> str:
     """The page as HTML.
 
     Nothing in it is fetched: a Content-Security-Policy forbids all but its own script and style, known by
-    their hashes, and pictures that the page holds itself.
+    their hashes, and pictures that the page holds itself. Only one with `live` in its data, which `mitex
+    view` serves, may ask its own server for what is new.
 
     Args:
         title: of the document; any text.
         data: what the scripts read, as JSON values.
-        picture: JPEG that is shown where the texture cannot grow.
+        picture: JPEG that is shown where the texture cannot grow; empty for none.
     """
     script, style = _script(), _read("page.css")
     policy = (
         f"default-src 'none'; script-src '{_digest(script)}'; style-src '{_digest(style)}'; "
         "img-src data: blob:; media-src blob:; base-uri 'none'; form-action 'none'"
     )
+    if "live" in data:
+        policy += "; connect-src 'self'"
     values = {
         "POLICY": policy,
         "TITLE": html.escape(title),
         "STYLE": style,
-        "PICTURE": f"data:image/jpeg;base64,{base64.b64encode(picture).decode()}",
+        "PICTURE": _image(picture, title),
         "DATA": _json(data),
         "SCRIPT": script,
     }
@@ -77,22 +80,17 @@ def document(title: str, data: Mapping[str, Any], picture: bytes) -> str:
     return before + "".join(values[name] + after for name, _, after in rest)
 
 
-def write_page(path: Path, title: str, data: Mapping[str, Any], picture: bytes) -> Path:
-    """Writes `document` to a file.
-
-    Raises:
-        OutputError: the place is not writable.
-    """
-    text = document(title, data, picture)
-    with atomic_write(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return path
-
-
 def _script() -> str:
     shaders = {file.name: file.read_text(encoding="utf-8") for file in sorted((PARTS / "glsl").iterdir())}
     code = "\n".join(_read(f"js/{name}.js") for name in SCRIPTS)
     return f'"use strict";\n(() => {{\nconst SHADERS = {_json(shaders)};\n{code}\n}})();'
+
+
+def _image(picture: bytes, title: str) -> str:
+    if not picture:
+        return ""
+    address = f"data:image/jpeg;base64,{base64.b64encode(picture).decode()}"
+    return f'<img src="{address}" alt="{html.escape(title)}">'
 
 
 def _json(value: object) -> str:

@@ -13,7 +13,7 @@ from mitex.asset import DEFAULT_ALBEDO, DEFAULT_ROUGHNESS, Asset
 from mitex.colour import linear_to_srgb
 from mitex.geometry.normal_maps import decode
 from mitex.geometry.tangents import split_at_hard_edges
-from mitex.page.document import write_page
+from mitex.page.content import Content, jpeg
 from mitex.page.packing import packed
 from mitex.page.surface import mesh_data
 
@@ -29,7 +29,16 @@ def write_still(asset: Asset, path: Path) -> Path:
         OutputError: the place is not writable.
         MeshError: the mesh has no faces.
     """
-    return write_page(path, asset.name, still_data(asset), _portrait(asset))
+    return still_content(asset).write(path)
+
+
+def still_content(asset: Asset) -> Content:
+    """What the page of an asset shows.
+
+    Raises:
+        MeshError: the mesh has no faces.
+    """
+    return Content(asset.name, still_data(asset), _portrait(asset))
 
 
 def still_data(asset: Asset) -> dict[str, Any]:
@@ -87,8 +96,6 @@ def _webp(image: np.ndarray) -> dict[str, str]:
 
 
 def _portrait(asset: Asset) -> bytes:
-    """JPEG for browsers without WebGL2: the mean colour of the asset, on which the message stands."""
-    colour = _bytes(_plain(asset.vertex_maps, (len(asset.mesh.vertices),))["colours"].mean(axis=0))
-    buffer = io.BytesIO()
-    Image.new("RGB", (64, 64), tuple(int(value) for value in colour)).save(buffer, "JPEG")
-    return buffer.getvalue()
+    """For browsers without WebGL2: the colours of the asset, and no more."""
+    colours = _plain(asset.vertex_maps, (len(asset.mesh.vertices),))["colours"]
+    return jpeg(np.broadcast_to(colours.mean(axis=0), (64, 64, 3)))

@@ -83,6 +83,18 @@ class Metrics:
             ) from e
 
 
+def losses(path: Path, most: int) -> list[tuple[int, float]]:
+    """Steps and losses in a file so far, evenly spread, `most` of them at most; none if there is no file.
+
+    Half a line at the end, which a training is about to write, does not count.
+    """
+    if not path.is_file():
+        return []
+    lines = path.read_bytes().split(b"\n")[:-1]
+    chosen = lines[:: len(lines) // most + 1]
+    return [(row["step"], row["loss"]) for row in map(json.loads, chosen) if row.get("loss") is not None]
+
+
 def plain(record: Mapping[str, Any]) -> dict[str, Any]:
     """The record with every non-finite number replaced by None."""
     return {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in record.items()}

@@ -13,6 +13,7 @@ METHOD = Method(
     apply="mitex.methods.nca.cli:Apply",
     texture="mitex.methods.nca.texture:NcaTexture",
     animate="mitex.methods.nca.animation:Animate",
+    page="mitex.methods.nca.page:contents",
     commands={"graft": ("mitex.methods.nca.grafting:Grafted", "let two textures grow into each other")},
     tensors=frozenset({"fc1.weight", "fc1.bias", "fc2.weight", "fc2.bias"}),
 )

@@ -125,7 +125,7 @@ class Apply(OptionalMeshOptions):
       mitex apply pebbles --mesh bunny.obj --out bunny.glb --subdivide 2 --resolution 2048
       mitex apply pebbles --mesh scan.ply --out scan.glb --vertex-colors --seed 7 --orientation 45
       mitex apply pebbles --mesh bunny.obj --out bunny.glb --variants 5
-      mitex apply pebbles --mesh bunny.obj --out bunny.html
+      mitex apply pebbles --mesh bunny.obj --out bunny.html --looks lava,knit
       mitex apply pebbles --mesh bunny.obj --out maps/ --maps-format exr
       mitex apply pebbles --tile 1024 --out pebbles-tile
     """
@@ -157,6 +157,9 @@ class Apply(OptionalMeshOptions):
 
     resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {RESOLUTION})")] = None
     """Side of the baked textures [texels]."""
+
+    looks: Annotated[str | None, arg(metavar="MODEL,...", help_behavior_hint="")] = None
+    """Further textures that a page (.html) offers, and grafts if they are of the same family."""
 
     vertex_colors: Annotated[bool, arg(help_behavior_hint="")] = False
     """Write colours at the vertices instead of textures."""
@@ -216,6 +219,7 @@ class Apply(OptionalMeshOptions):
             "--keep-dense": self.keep_dense,
             "--displace": self.displace,
             "--variants": self.variants > 1,
+            "--looks": self.looks is not None,
         }
         for option, used in others.items():
             mutually_exclusive("--tile", option, used)
@@ -223,7 +227,7 @@ class Apply(OptionalMeshOptions):
         reject_unused("--tile", place, place.suffix.lower() in EXPORTS + PICTURES)
 
     def inputs(self) -> list[Path | str]:
-        return [*super().inputs(), *field_files(self.field, self.orientation)]
+        return [*super().inputs(), *self._looks, *field_files(self.field, self.orientation)]
 
     def prepared(self) -> Path:
         if self.tile is None:
@@ -241,6 +245,7 @@ class Apply(OptionalMeshOptions):
             reject_unused("--resolution", out, self.resolution is not None and suffix == ".ply")
             reject_unused("--variants", out, self.variants > 1 and suffix != ".glb")
             page = suffix == PAGE
+            reject_unused("--looks", out, not page and self.looks is not None)
             reject_unused("--resolution", out, page and self.resolution is not None)
             reject_unused("--keep-dense", out, page and self.keep_dense)
             reject_unused("--displace", out, page and self.displace)
@@ -277,6 +282,7 @@ class Apply(OptionalMeshOptions):
             NcaTexture.load(self.model),
             Mesh.load(self._mesh),
             out,
+            looks=[NcaTexture.load(model) for model in self._looks],
             seed=self.seed,
             steps=self.steps,
             subdivide=levels(self.subdivide),
@@ -292,6 +298,10 @@ class Apply(OptionalMeshOptions):
 
         texture, mesh = NcaTexture.load(self.model), Mesh.load(self._mesh)
         return texture.apply(mesh, seed=self.seed, **self._growth(out))
+
+    @property
+    def _looks(self) -> list[str]:
+        return [] if self.looks is None else self.looks.split(",")
 
     @property
     def _mesh(self) -> str:

@@ -2,36 +2,27 @@
 
 from __future__ import annotations
 
-import io
 import os
+from collections.abc import Sequence
+from math import radians
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import torch
-from PIL import Image
-
-from mitex.cache import content_key
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh
 from mitex.mesh.fields import NAMES
 from mitex.methods.nca.cells import Cells
-from mitex.methods.nca.decoder.decoder import Decoder, Readout
 from mitex.methods.nca.decoder.surface import EDGE
-from mitex.methods.nca.displacement import known_relief
 from mitex.methods.nca.film import PreviewCamera, Shooting
-from mitex.methods.nca.growth import grown_state
-from mitex.methods.nca.look import MARGIN, Look, traits
-from mitex.methods.nca.motion.condition import Field, fastest, followed_field
+from mitex.methods.nca.look_data import look_data
+from mitex.methods.nca.motion.condition import Field, followed_field
 from mitex.methods.nca.orientation import Orientation
-from mitex.methods.nca.palette import NEARLY, TOLERANCE, Palette
-from mitex.methods.nca.texture import NcaTexture
-from mitex.page import mesh_data, packed, quantised, write_page
+from mitex.methods.nca.texture import NcaTexture, grown_state
+from mitex.page import Content, jpeg, mesh_data, quantised
 from mitex.paths import prepare_output
 from mitex.progress import announce
 
 PICTURE = 384  # side of the picture for browsers without WebGL2 [px]
-QUALITY = 82  # of its JPEG
 
 
 def living_page(
@@ -39,6 +30,7 @@ def living_page(
     mesh: Mesh,
     path: str | os.PathLike[str],
     *,
+    looks: Sequence[NcaTexture] = (),
     seed: int = 0,
     steps: int | None = None,
     subdivide: int | str = "auto",
@@ -53,8 +45,9 @@ def living_page(
         texture: what grows.
         mesh: any mesh.
         path: target, .html.
-        steps: of the picture that browsers without WebGL2 show; None as of `NcaTexture.apply`.
+        looks: further textures that the page offers; those of one family can be grafted onto each other.
         seed, subdivide, scale, speed: as of `NcaTexture.apply`.
+        steps: of the picture that browsers without WebGL2 show; None as of `NcaTexture.apply`.
         orientation: an angle [degrees].
         field: name of a vector field, or a direction.
 
@@ -72,82 +65,34 @@ def living_page(
     announce("preparing the mesh")
     cells = Cells.of(mesh, subdivide, scale)
     base, levels = (cells.given, cells.levels) if cells.levels is not None else (cells.mesh, 0)
+    content = _content([texture, *looks], [mesh_data(base, levels)], followed)
     shown = quantised(base)
-    name = str(texture.about.get("name", "texture"))
-    data = {
-        "name": mesh.name,
-        "seed": seed,
-        "turn": np.radians(turn),
-        "edge": EDGE,
-        "field": followed,
-        "speed": speed,
-        "mesh": mesh_data(base, levels),
-        "looks": [look_data(texture)],
-    }
     growth = texture.growth_on(Cells.of(shown, levels), shown, turn, _source(followed), speed)
     state = grown_state(growth, seed, texture.steps if steps is None else steps)
-    camera = PreviewCamera(shown, Shooting(resolution=PICTURE))
-    picture = _jpeg(camera.picture(growth.shown(state)))
-    return write_page(target, f"{name} on {mesh.name}", data, picture)
+    picture = PreviewCamera(shown, Shooting(resolution=PICTURE)).picture(growth.shown(state))
+    options = {"seed": seed, "turn": radians(turn), "speed": speed}
+    return Content(content.title, {**content.data, **options}, jpeg(picture)).write(target)
 
 
-def look_data(texture: NcaTexture) -> dict[str, Any]:
-    """A texture as JSON values: its rule, the bounds of its states, its decoder and its palette."""
-    look: Look = texture.look
-    rule, margin = look.rule, MARGIN * (look.high - look.low)
-    record, longest = texture.about.get("palette"), fastest(texture.about)
-    return {
-        "name": str(texture.about.get("name", "texture")),
-        "steps": texture.steps,
-        "family": content_key(texture.family, repr(sorted(traits(look).items()))),
-        "relief": 0.0 if "normal" in look.maps else 2 * EDGE * known_relief(texture.about, look.maps),
-        "fastest": longest if np.isfinite(longest) else None,
-        "channels": rule.channels,
-        "hidden": rule.hidden,
-        "condition": rule.condition,
-        "degree": rule.degree,
-        "mean": look.mean,
-        "weight1": _numbers(rule.fc1.weight),
-        "bias1": _numbers(rule.fc1.bias),
-        "weight2": _numbers(rule.fc2.weight),
-        "bias2": _numbers(rule.fc2.bias),
-        "low": _numbers(look.low - margin),
-        "high": _numbers(look.high + margin),
-        "maps": {key: list(columns) for key, columns in look.layout.items()},
-        "decoder": _decoder_data(look.decoder),
-        "palette": None if record is None else _palette_data(Palette.from_record(record)),
-    }
+def contents(sources: Sequence[str | Path], meshes: Sequence[Mesh]) -> Content:
+    """What a page shows that offers some models, files or run folders, on some meshes.
+
+    Raises:
+        CheckpointError: one of them does not exist, or is damaged.
+        MeshError: a mesh without faces.
+    """
+    textures = [NcaTexture.load(source) for source in sources]
+    levels = [Cells.of(mesh).levels or 0 for mesh in meshes]
+    data = [mesh_data(mesh, level) for mesh, level in zip(meshes, levels, strict=True)]
+    return _content(textures, data, _field(textures[0], None, 1.0))
 
 
-def _decoder_data(decoder: Decoder | Readout) -> dict[str, Any]:
-    if isinstance(decoder, Readout):
-        return {"channels": decoder.channels}
-    shape, waves = decoder.shape, decoder.waves
-    return {
-        "interpolation": shape.interpolation,
-        "coordinates": list(shape.coordinates),
-        "omega": shape.omega,
-        "waves": _numbers(torch.cat([waves.vectors, waves.phases[:, None]], 1)),
-        "amplitude": waves.amplitude,
-        "layers": [
-            {
-                "outputs": layer.out_features,
-                "inputs": layer.in_features,
-                "weight": _numbers(layer.weight),
-                "bias": _numbers(layer.bias),
-            }
-            for layer in decoder.network.linear
-        ],
-    }
-
-
-def _palette_data(palette: Palette) -> dict[str, Any]:
-    limit = np.float32(palette.radius + TOLERANCE) * NEARLY
-    return {"colours": palette.colours.tolist(), "limit": float(limit)}
-
-
-def _numbers(values: torch.Tensor) -> dict[str, str]:
-    return packed(values.detach().float().cpu().numpy())
+def _content(
+    textures: Sequence[NcaTexture], meshes: Sequence[dict[str, Any]], field: str | list[float] | None
+) -> Content:
+    looks = [look_data(texture) for texture in textures]
+    data = {"edge": EDGE, "seed": 0, "turn": 0.0, "speed": 1.0, "field": field}
+    return Content(f"{looks[0]['name']} on {meshes[0]['name']}", data | {"meshes": meshes, "looks": looks})
 
 
 def _angle(orientation: Orientation) -> float:
@@ -166,18 +111,10 @@ def _field(texture: NcaTexture, field: Field | None, speed: float) -> str | list
     except ValueError:
         direction = []
     if len(direction) != 3:
-        raise ConfigError(
-            "a page knows no vector field from a file", f"use one of {', '.join(NAMES)}, or a direction"
-        )
+        names = ", ".join(NAMES)
+        raise ConfigError("a page knows no vector field from a file", f"use one of {names}, or a direction")
     return direction
 
 
 def _source(field: str | list[float] | None) -> str | None:
     return ",".join(map(str, field)) if isinstance(field, list) else field
-
-
-def _jpeg(picture: np.ndarray) -> bytes:
-    """A picture (H, W, 3) in [0, 1] as JPEG."""
-    buffer = io.BytesIO()
-    Image.fromarray((picture * 255).round().astype(np.uint8)).save(buffer, "JPEG", quality=QUALITY)
-    return buffer.getvalue()

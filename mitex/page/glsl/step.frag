@@ -34,6 +34,11 @@ vec4 held(vec4 state, vec4 low, vec4 high) {
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   //: OWN
+#if GRAFT
+  float share0 = texelFetch(shares, at, 0).r;
+#else
+  const float share0 = 0.0;
+#endif
   // The cells of a tile of 8 x 4 texels update together or not at all: whole groups of threads are idle in
   // half of the steps, which is what makes a step cost half.
   uint tile = uint((at.y >> 2) * (WIDTH >> 3) + (at.x >> 3));
@@ -55,11 +60,6 @@ void main() {
   }
 #if CONDITION
   vec4 told = texelFetch(condition, at, 0);
-#endif
-#if GRAFT
-  float share0 = texelFetch(shares, at, 0).r;
-#else
-  const float share0 = 0.0;
 #endif
   //: CHANGES
   //: RULES

@@ -7,6 +7,9 @@ const FINEST = 2; // samples along a side of a pixel
 class Clock {
   constructor(page, whenDrawn) {
     Object.assign(this, { page, whenDrawn, playing: Boolean(page.automaton), rate: 30, due: 0, drawn: 0, taken: 0, since: 0, quietUntil: 0 });
+  }
+
+  start() {
     this.frame = this.frame.bind(this);
     requestAnimationFrame(this.frame);
   }

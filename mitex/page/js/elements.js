@@ -41,3 +41,18 @@ function choice(name, options, chosen, act) {
   set(chosen);
   return Object.assign(group, { set });
 }
+
+// A list of which one is chosen.
+function menu(name, options, chosen, act) {
+  const rows = options.map(([key, text]) => element("option", { value: key, selected: key === chosen || undefined }, text));
+  const list = element("select", { "aria-label": name, onchange: () => act(list.value) }, ...rows);
+  return list;
+}
+
+// Pictures of which one is chosen; a look without one has its name alone.
+function gallery(looks, pictures, chosen, act) {
+  const items = looks.map(({ name }, k) => element("button",
+    { type: "button", title: name, "aria-pressed": String(k === chosen), onclick: () => act(k) },
+    ...(pictures[k] ? [element("img", { src: pictures[k], alt: "" })] : []), element("span", {}, name)));
+  return element("div", { className: "gallery", role: "group", "aria-label": "Look" }, ...items);
+}

@@ -5,7 +5,18 @@ class Page extends View {
     super(data, canvas);
     Object.assign(this, { looks: data.looks, seed: data.seed, field: data.field, speed: data.speed });
     Object.assign(this, { chosen: 0, grafted: null });
-    this.setMesh(meshOf(data.mesh), data.mesh.levels);
+    this.setMesh(meshOf(data.meshes[0]), data.meshes[0].levels);
+  }
+
+  // Grows it on another one of the page's own meshes.
+  chooseMesh(k) {
+    this.setMesh(meshOf(this.data.meshes[k]), this.data.meshes[k].levels);
+  }
+
+  // Other weights for all looks, as a training has them; the states go on.
+  refresh(looks) {
+    this.looks = looks;
+    this._weights();
   }
 
   get look() {

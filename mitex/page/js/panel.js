@@ -29,9 +29,9 @@ class Panel {
     this.place.replaceChildren(
       element("header", {}, element("h1", {}, page.surface.mesh.name), this.title),
       element("div", { className: "row" }, this.play,
-        button("Grow anew", "Back to the seed (R)", () => page.reset()),
+        button("Regrow", "Back to the seed (R)", () => page.reset()),
         button("New seed", "The same look, another arrangement (N)", () => this.reseed())),
-      ...this._looks(), this._hand(), this._texture(), ...this._motion(), this._view(), this._keep(), keysHelp(),
+      ...this._training(), ...this._looks(), ...this._meshes(), this._hand(), this._texture(), ...this._motion(), this._view(), this._keep(), keysHelp(),
     );
     this.pause(this.clock.playing);
     this.choose(this.pointer.tool);
@@ -49,16 +49,44 @@ class Panel {
     const { page } = this;
     const { looks } = page;
     if (looks.length < 2) return [];
-    this.looks = choice("Look", looks.map(({ name }, k) => [k, name]), page.chosen, (k) => this.look(k));
+    const pictures = page.data.thumbnails;
+    this.looks = pictures ? gallery(looks, pictures, page.chosen, (k) => this.look(k))
+      : choice("Look", looks.map(({ name }, k) => [k, name]), page.chosen, (k) => this.look(k));
     const related = looks.map(({ name, family }, k) => [k, name, family])
       .filter(([k, , family]) => k !== page.chosen && family === page.look.family);
     const parts = [section("Look", this.looks)];
     if (!related.length) return parts;
-    this.grafts = choice("Graft", [[NONE, "none"], ...related], page.grafted ?? NONE, (k) => this.graft(k));
+    this.grafts = menu("Graft", [[NONE, "nothing"], ...related], page.grafted ?? NONE,
+      (k) => this.graft(k === NONE ? NONE : Number(k)));
     this.share = slider("Everywhere", { low: 0, high: 100, step: 1, value: 0, text: (x) => `${x} %` },
       (x) => page.setShare(x / 100));
     this.share.hidden = page.grafted === null;
     return [...parts, section("Graft onto it", this.grafts, this.share)];
+  }
+
+  _meshes() {
+    const { page } = this;
+    const { meshes } = page.data;
+    if (meshes.length < 2) return [];
+    const shown = meshes.findIndex(({ name }) => name === page.base.name);
+    return [section("Mesh", choice("Mesh", meshes.map(({ name }, k) => [k, name]), shown, (k) => {
+      page.chooseMesh(k);
+      this.build();
+    }))];
+  }
+
+  // How far the training of a run is.
+  _training() {
+    if (!this.page.data.live) return [];
+    this.loss = element("div", { className: "chart" });
+    this.drawLoss();
+    return [section("Training", this.loss)];
+  }
+
+  drawLoss() {
+    const { loss } = this.page.data;
+    const [step, value] = loss.at(-1) ?? [0, NaN];
+    this.loss.replaceChildren(chart(loss), element("p", {}, `step ${step.toLocaleString()}, loss ${value.toPrecision(3)}`));
   }
 
   _hand() {

@@ -51,7 +51,7 @@ class RuleShape {
       BLOCKS: rules.map((rule) => each(this.blocks, (b) =>
         blockText(`${rule}${b}`, this.perBlock * this.stride))).join(""),
       OWN: each(n, (c) => `vec4 s${c} = texelFetch(state${c}, at, 0);`),
-      KEEP: each(n, (c) => `next${c} = s${c};`),
+      KEEP: each(n, (c) => `next${c} = ${this._held(rules, c, "")};`),
       ZERO: all((k, c) => `vec4 ${z(k, c)} = vec4(0.0);`),
       NEIGHBOUR: each(n, (c) => `vec4 o${c} = texelFetch(state${c}, other, 0) - s${c};`) + "\n"
         + kinds.map((k) => `float w${k} = ${HARMONICS[k]};`).join("\n") + "\n"
@@ -59,12 +59,17 @@ class RuleShape {
       MEAN: all((k, c) => `${z(k, c)} *= share;`),
       CHANGES: rules.map((rule) => each(n, (c) => `vec4 ${rule}u${c} = ${rule}Bias[${c}];`)).join("\n"),
       RULES: rules.map((rule, r) => this._network(rule, ["share0 < 1.0", "share0 > 0.0"][r])).join("\n"),
-      NEXT: each(n, (c) => rules.length > 1
-        ? `next${c} = held(s${c} + mix(ruleu${c}, otheru${c}, share0), mix(ruleLow[${c}], otherLow[${c}], share0), mix(ruleHigh[${c}], otherHigh[${c}], share0));`
-        : `next${c} = held(s${c} + ruleu${c}, ruleLow[${c}], ruleHigh[${c}]);`),
+      NEXT: each(n, (c) => `next${c} = ${this._held(rules, c,
+        rules.length > 1 ? ` + mix(ruleu${c}, otheru${c}, share0)` : ` + ruleu${c}`)};`),
       BOUNDS: rules.map((rule) =>
         `uniform vec4 ${rule}Low[VECTORS], ${rule}High[VECTORS], ${rule}Bias[VECTORS];`).join("\n"),
     });
+  }
+
+  // A state and its change, within the bounds of the training.
+  _held(rules, c, change) {
+    const bound = (name) => (rules.length > 1 ? `mix(rule${name}[${c}], other${name}[${c}], share0)` : `rule${name}[${c}]`);
+    return `held(s${c}${change}, ${bound("Low")}, ${bound("High")})`;
   }
 
   _network(rule, needed) {

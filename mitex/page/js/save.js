@@ -19,7 +19,7 @@ function savePicture(page) {
 
 async function saveAsset(page) {
   const side = page.surface.faceCount > 6000 ? 2048 : 1024;
-  download(new Blob([await glbOf(page, side)], { type: "model/gltf-binary" }), fileName(page, ".glb"));
+  download(new Blob([await page.glb(side)], { type: "model/gltf-binary" }), fileName(page, ".glb"));
 }
 
 // A film of the canvas; null where the browser cannot record.

@@ -1,4 +1,5 @@
-// Opens the page. With #still nothing moves by itself, which is for those who drive it from outside.
+// Opens the page. With #still=SIDE nothing moves by itself, and pictures are squares of so many pixels: for
+// those who drive it from outside.
 
 async function open() {
   const by = (id) => document.getElementById(id);
@@ -6,22 +7,25 @@ async function open() {
   const canvas = by("picture");
   const page = data.looks ? new Page(data, canvas) : await StillPage.of(data, canvas);
   page.studio.paper = paperOf(canvas);
-  const still = location.hash === "#still";
+  const still = Number(/^#still=(\d+)$/.exec(location.hash)?.[1]);
   const fit = () => {
-    const scale = still ? 1 : Math.min(window.devicePixelRatio || 1, 2);
-    canvas.width = Math.max(Math.round(canvas.clientWidth * scale), 1);
-    canvas.height = Math.max(Math.round(canvas.clientHeight * scale), 1);
+    const scale = Math.min(window.devicePixelRatio || 1, 2);
+    canvas.width = still || Math.max(Math.round(canvas.clientWidth * scale), 1);
+    canvas.height = still || Math.max(Math.round(canvas.clientHeight * scale), 1);
     page.changed = true;
   };
   fit();
   page.draw();
   by("instead").hidden = true;
-  if (still) return page;
-  new ResizeObserver(fit).observe(canvas);
   const clock = new Clock(page, (counts) => { by("status").textContent = counted(page, counts); });
   const panel = new Panel(page, clock, new Pointer(page, by("cursor")), { panel: by("panel"), status: by("status") });
   listenToKeys(page, panel);
   listenToDrops(panel);
+  page.panel = panel;
+  if (still) return page;
+  clock.start();
+  new ResizeObserver(fit).observe(canvas);
+  if (data.live) follow(page, panel);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     page.studio.paper = paperOf(canvas);
     page.changed = true;

@@ -40,6 +40,11 @@ class View {
     this.changed = false;
   }
 
+  // Bytes of a GLB file with textures of `side` texels.
+  glb(side) {
+    return glbOf(this, side);
+  }
+
   // The picture as pixels, row 0 below.
   pixels() {
     this.draw();

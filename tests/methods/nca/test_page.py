@@ -1,15 +1,22 @@
 """The living page in a browser: its states and its pixels against Python's."""
 
+from unittest.mock import patch
+
 import numpy as np
 import pytest
 import torch
+import trimesh
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
 
 from mitex.errors import ConfigError, OutputError
+from mitex.export.common import bilinear
 from mitex.geometry.vectors import unit
-from mitex.mesh import subdivide_midpoint, torus
+from mitex.mesh import Mesh, icosphere, subdivide_midpoint, torus
 from mitex.methods.nca import NcaTexture, living_page
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.graft import GraftedGrowth
 from mitex.methods.nca.perception import perception
 from mitex.page import quantised
 from tests.page.hashes import mask
@@ -25,13 +32,14 @@ def texture():
 @pytest.fixture(scope="module")
 def cells():
     """The page's automaton's mesh."""
-    return subdivide_midpoint(quantised(torus(14, 8)), 1)
+    return subdivide_midpoint(quantised(torus(12, 6)), 1)
 
 
 @pytest.fixture(scope="module")
 def tab(browser, texture, tmp_path_factory):
     path = tmp_path_factory.mktemp("page") / "torus.html"
-    living_page(texture, torus(14, 8), path, seed=SEED, steps=1, subdivide=1, orientation=TURN)
+    looks = [NcaTexture.load("lava")]
+    living_page(texture, torus(12, 6), path, looks=looks, seed=SEED, steps=1, subdivide=1, orientation=TURN)
     return browser.open(path)
 
 
@@ -97,17 +105,111 @@ def test_the_same_picture_as_of_pythons_state(tab, grown):
     assert ours.std() > 0.05
 
 
-def test_erased_cells_are_the_seed_and_grow_again(tab):
+@pytest.mark.parametrize("azimuth", [0.4, 2.5, 4.6])
+def test_the_brush_is_where_the_pixel_looks(tab, cells, azimuth):
+    camera = tab.run(
+        """page.studio.camera.azimuth = argument; page.studio.camera.fit(); page.draw();
+        const { camera } = page.studio; const { right, up, back } = camera.axes();
+        return [camera.eye, right, up, back, camera.slopes(1), page.surface.centre, page.surface.scale]""",
+        azimuth,
+    )
+    rows, columns = np.nonzero(tab.maps()[-1][..., 0])
+    for k in np.linspace(0, len(rows) - 1, 7).astype(int)[1:-1]:
+        point = tab.run("return page.pick(...argument)", [int(columns[k]), int(127 - rows[k])])
+        face, _ = nearest_hit(cells, camera, (columns[k] + 0.5) / 64 - 1, (rows[k] + 0.5) / 64 - 1)
+        assert point["face"] == face
+
+
+def nearest_hit(mesh, camera, x, y):
+    """The face that the ray through a place of the picture meets first, and how far away."""
+    eye, right, up, back, slopes, centre, scale = map(np.asarray, camera)
+    way = x * slopes[0] * right + y * slopes[1] * up - back
+    a, b, c = ((mesh.vertices[mesh.faces[:, k]].astype(float) - centre) / scale for k in range(3))
+    # Cramer's rule for eye + t way = a + u (b - a) + v (c - a).
+    solved = np.linalg.solve(
+        np.stack([b - a, c - a, np.broadcast_to(-way, a.shape)], 2), (eye - a)[..., None]
+    )
+    u, v, t = solved[..., 0].T
+    t = np.where((u >= 0) & (v >= 0) & (u + v <= 1), t, np.inf)
+    return int(t.argmin()), t.min()
+
+
+def test_erased_cells_are_the_seed_and_grow_again(tab, cells):
     rows, columns = np.nonzero(tab.maps()[-1][..., 0])
     middle = [int(columns[len(rows) // 3]), int(127 - rows[len(rows) // 3])]
-    point = tab.run("return page.pick(...argument)", middle)
-    erased = tab.run("return page.erase(argument, 0.35)", point)
-    count = tab.run("return page.surface.mesh.count")
-    state = tab.array("page.automaton.read()").reshape(count, -1)
-    assert 5 < len(erased) < count / 4
+    # A ball as wide as the tube would reach its other side, which no path of this length does.
+    erased = tab.run("return page.erase(page.pick(...argument), 0.85)", middle)
+    state = tab.array("page.automaton.read()").reshape(len(cells.vertices), -1)
     assert (state[erased] == 0).all() and (np.delete(state, erased, 0) != 0).any(1).all()
-    tab.run("page.step(60)")
-    assert (tab.array("page.automaton.read()").reshape(count, -1)[erased] != 0).any(1).all()
+    graph, points = cells.edges, cells.vertices[cells.edges.indices] - cells.vertices[cells.edges.rows]
+    lengths = csr_array((np.linalg.norm(points, axis=1), graph.indices, graph.indptr))
+    paths = dijkstra(lengths, indices=erased)[:, erased]
+    assert len(erased) > 10 and paths.max() < 2.2 * 0.85 * 1.15
+    tab.run("page.step(40)")
+    grown = tab.array("page.automaton.read()").reshape(state.shape)
+    assert (grown[erased] != 0).any(1).all()
+
+
+@torch.no_grad()
+def test_grafted_looks_share_their_steps_and_their_pictures(tab, texture, cells):
+    tab.run("page.setGraft(1); page.reset(); page.step(30)")
+    before = torch.from_numpy(tab.array("page.automaton.read()").reshape(len(cells.vertices), -1).copy())
+    weights = np.clip(0.5 + cells.vertices[:, 0], 0, 1)
+    cells_ = Cells(cells, 0, cells)
+    growths = [look.growth(cells_, np.radians(TURN)) for look in (texture, NcaTexture.load("lava"))]
+    graft = GraftedGrowth(*growths, weights)
+    tab.run("page._shares(Float32Array.from(argument)); page.step(1)", weights.tolist())
+    fires = torch.from_numpy(mask(len(weights), 30, SEED))[None]
+    with patch("torch.rand", lambda *_, **__: 1 - fires.float()):
+        expected = graft._step(before[None], torch.Generator())[0]
+    after = tab.array("page.automaton.read()").reshape(before.shape)
+    assert np.abs(after - expected.numpy()).max() < 1e-4
+    colour, *_, ids = tab.maps()
+    hit = ids[..., 0] > 0
+    face, bits = ids[hit][:, 0].astype(np.int32) - 1, ids[hit][:, 1:3].copy().view(np.float32)
+    values = graft.shown(torch.from_numpy(after.copy())).values(
+        face, np.column_stack([bits, 1 - bits.sum(1)])
+    )
+    assert np.abs(colour[hit][:, :3] - values[:, :3]).max() < 4e-3
+    tab.run("page.setGraft(null); page.setShare(0)")
+
+
+def test_a_downloaded_asset_shows_what_the_page_shows(tab, texture, cells, tmp_path):
+    path = tmp_path / "torus.glb"
+    path.write_bytes(tab.array("await page.glb(256)").tobytes())
+    mesh = Mesh.load(path)
+    assert len(mesh.faces) == len(cells.faces)
+    assert np.abs(mesh.vertices[mesh.faces] - cells.vertices[cells.faces]).max() < 1e-6
+    scene = trimesh.load(path, process=False)
+    (geometry,) = scene.geometry.values()
+    image = np.asarray(geometry.visual.material.baseColorTexture.convert("RGB")) / 255
+    state = torch.from_numpy(tab.array("page.automaton.read()").reshape(len(cells.vertices), -1).copy())
+    faces = np.arange(len(cells.faces), dtype=np.int32)
+    middles = np.full((len(faces), 3), 1 / 3, np.float32)
+    grown = Grown(texture.look, state, Cells(cells, 0, cells), np.radians(TURN), texture._palette)
+    expected = grown.maps(grown.values(faces, middles))["albedo"]
+    uv = geometry.visual.uv.reshape(-1, 3, 2).mean(axis=1)  # trimesh has v upwards
+    baked = bilinear(image, uv)
+    assert np.abs(baked - expected).mean() < 0.02 < expected.std()
+
+
+HOSTILE = "<img src=x onerror=window.attacked=1></script><script>window.attacked=1</script>"
+
+
+def test_a_dropped_mesh_is_grown_on_and_its_name_is_text(tab):
+    obj = "\n".join(
+        [f"v {x} {y} {z}" for x, y, z in icosphere(2).vertices]
+        + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in icosphere(2).faces]
+    )
+    count = tab.run(
+        """page.panel.open(new File([argument[0]], argument[1] + ".obj"));
+        while (page.surface.mesh.name === "torus") await new Promise((done) => setTimeout(done, 20));
+        return [page.base.count, page.levels, page.surface.mesh.count,
+                document.querySelector("h1").textContent, window.attacked ?? null]""",
+        [obj, HOSTILE],
+    )
+    assert count == [42, 4, len(subdivide_midpoint(icosphere(2), 4).vertices), HOSTILE, None]
+    assert tab.picture().std() > 0.02
 
 
 def test_nothing_is_fetched_and_nothing_goes_wrong(tab):
