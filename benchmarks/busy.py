@@ -39,9 +39,8 @@ def step_times(follow: bool, seconds: float) -> list[float]:
             if follow:
                 threads.look()
             begin = time.monotonic()
-            sum(
-                f.square().mean() for f in network.features(images, ["relu1_1", "relu3_1"]).values()
-            ).backward()
+            features = network.features(images, ["relu1_1", "relu3_1"]).values()
+            torch.stack([f.square().mean() for f in features]).sum().backward()
             times.append(time.monotonic() - begin)
     return times[len(times) // 2 :]
 

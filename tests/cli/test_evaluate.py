@@ -15,7 +15,7 @@ from mitex.render.sides import sides
 def red(tmp_path_factory):
     """A red sphere."""
     mesh = icosphere(6)
-    asset = Asset(mesh, {"albedo": np.tile(np.float32([0.8, 0.1, 0.1]), (len(mesh.vertices), 1))})
+    asset = Asset(mesh, {"albedo": np.tile(np.array([0.8, 0.1, 0.1], np.float32), (len(mesh.vertices), 1))})
     path = tmp_path_factory.mktemp("evaluate") / "red.glb"
     asset.export(path)
     return path
@@ -53,7 +53,7 @@ def test_beside_an_exemplar(red, tmp_path, capsys):
     from mitex.images import write_image
 
     for name, colour in {"red": [0.8, 0.1, 0.1], "blue": [0.1, 0.1, 0.8]}.items():
-        picture = np.clip(np.float32(colour) + np.random.default_rng(0).normal(0, 0.02, (96, 96, 3)), 0, 1)
+        picture = np.clip(np.array(colour) + np.random.default_rng(0).normal(0, 0.02, (96, 96, 3)), 0, 1)
         write_image(tmp_path / f"{name}.png", picture.astype(np.float32))
     near, far = (numbers(capsys, str(red), "--exemplar", str(tmp_path / f"{n}.png")) for n in ("red", "blue"))
     assert near["Transport"] < far["Transport"] and near["Fréchet, fine"] < far["Fréchet, fine"]
@@ -90,7 +90,7 @@ def test_a_missing_asset_is_one_line(capsys):
 
 def test_sides_go_all_around():
     mesh = icosphere(6)
-    colours = np.float32(0.5 + 0.4 * mesh.vertices)
+    colours = (0.5 + 0.4 * mesh.vertices).astype(np.float32)
     pictures = sides(Asset(mesh, {"albedo": colours}), 32, spp=4)
     assert pictures.shape == (24, 32, 32, 3)
     middle = pictures[:, 12:20, 12:20].mean((1, 2))

@@ -16,7 +16,7 @@ from mitex.mesh import torus
 def asset():
     mesh = torus(24, 12)
     ramp = 0.5 + 0.3 * mesh.vertices
-    normal = np.broadcast_to(np.float32([0.7, 0.5, 0.9]), mesh.vertices.shape)
+    normal = np.broadcast_to(np.array([0.7, 0.5, 0.9], np.float32), mesh.vertices.shape)
     maps = {"albedo": ramp, "roughness": ramp[:, :1], "height": ramp[:, 1:2], "normal": normal}
     return Asset(mesh, maps, default_tangents(mesh), name="a torus")
 

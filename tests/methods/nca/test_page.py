@@ -156,8 +156,8 @@ def test_grafted_looks_share_their_steps_and_their_pictures(tab, texture, cells)
     before = torch.from_numpy(tab.array("page.automaton.read()").reshape(len(cells.vertices), -1).copy())
     weights = np.clip(0.5 + cells.vertices[:, 0], 0, 1)
     cells_ = Cells(cells, 0, cells)
-    growths = [look.growth(cells_, np.radians(TURN)) for look in (texture, NcaTexture.load("lava"))]
-    graft = GraftedGrowth(*growths, weights)
+    first, second = (look.growth(cells_, np.radians(TURN)) for look in (texture, NcaTexture.load("lava")))
+    graft = GraftedGrowth(first, second, weights)
     tab.run("page._shares(Float32Array.from(argument)); page.step(1)", weights.tolist())
     fires = torch.from_numpy(mask(len(weights), 30, SEED))[None]
     with patch("torch.rand", lambda *_, **__: 1 - fires.float()):
@@ -180,7 +180,7 @@ def test_a_downloaded_asset_shows_what_the_page_shows(tab, texture, cells, tmp_p
     mesh = Mesh.load(path)
     assert len(mesh.faces) == len(cells.faces)
     assert np.abs(mesh.vertices[mesh.faces] - cells.vertices[cells.faces]).max() < 1e-6
-    scene = trimesh.load(path, process=False)
+    scene = trimesh.load_scene(path, process=False)
     (geometry,) = scene.geometry.values()
     image = np.asarray(geometry.visual.material.baseColorTexture.convert("RGB")) / 255
     state = torch.from_numpy(tab.array("page.automaton.read()").reshape(len(cells.vertices), -1).copy())
