@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from mitex.evaluation.metrics import single_image_frechet
+from mitex.evaluation.metrics import single_image_frechet, whole_cells
 from mitex.evaluation.regularity import regularity
 from mitex.exemplar import Exemplar
 from mitex.exemplar import names as exemplar_names
@@ -51,17 +51,19 @@ def main() -> None:
         source = Exemplar.load(name if name in exemplar_names() else arguments.exemplars / name)
         exemplar = source.resized(min(SIDE, *source.size))
         for model, mesh in ((model, mesh) for model in models.split(",") for mesh in arguments.meshes):
-            for map_name, views in patches(NcaTexture.load(model), exemplar.size[0], mesh).items():
+            maps, masks = patches(NcaTexture.load(model), exemplar.size[0], mesh)
+            for map_name, views in maps.items():
                 target = rgb(exemplar.maps[map_name])
-                numbers = " | ".join(f"{value:.3g}" for value in distances(target, views))
-                order = f"{np.mean([regularity(view) for view in views]):.2f} of {regularity(target):.2f}"
+                numbers = " | ".join(f"{value:.3g}" for value in distances(target, views, masks))
+                orders = [regularity(view, mask) for view, mask in zip(views, masks, strict=True)]
+                order = f"{np.mean(orders):.2f} of {regularity(target):.2f}"
                 surface = Path(mesh).stem
                 print(f"| {name} | {map_name} | {model} | {surface} | {numbers} | {order} |", flush=True)
 
 
 @torch.no_grad()
-def patches(texture: NcaTexture, size: int, surface: str) -> dict[str, np.ndarray]:
-    """Patches (K, h, w, 3) of each map, in which the exemplar's width would be `size` [px]."""
+def patches(texture: NcaTexture, size: int, surface: str) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Patches (K, h, w, 3) of each map, in which the exemplar is `size` [px] wide, and what shows surface."""
     decoded = hasattr(texture.look.decoder, "network")
     mesh = icosphere(FREQUENCIES[decoded]) if surface == SPHERE else cells(surface, decoded)
     ground, state = TrainingSphere.of(mesh, texture.look), texture.grow(mesh)
@@ -73,7 +75,8 @@ def patches(texture: NcaTexture, size: int, surface: str) -> dict[str, np.ndarra
     cameras = patch_views(torch.Generator().manual_seed(0), mesh, count, half, pixels)
     cameras = most_covered(ground, cameras)
     views = ground.views(texture.look, state, cameras, antialias=2).clamp(0, 1).numpy()
-    return {name: rgb(views[..., list(columns)]) for name, columns in texture.look.layout.items()}
+    masks = np.all(np.asarray(ground.stage.hits(cameras, 2).hit).reshape(*cameras.shape, 4), axis=3)
+    return {name: rgb(views[..., list(columns)]) for name, columns in texture.look.layout.items()}, masks
 
 
 def most_covered(ground: TrainingSphere, cameras: Cameras) -> Cameras:
@@ -94,28 +97,35 @@ def rgb(image: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(np.repeat(image, 3 // image.shape[-1], axis=-1), np.float32)
 
 
-def distances(target: np.ndarray, views: np.ndarray) -> list[float]:
+def distances(target: np.ndarray, views: np.ndarray, masks: np.ndarray) -> list[float]:
     """Means over the views: Frechet distances of `FRECHET`, then the transport."""
-    frechet = [[single_image_frechet(target, view, layer=layer) for view in views] for layer in FRECHET]
-    return [*(float(np.mean(values)) for values in frechet), transport(target, views)]
+    pairs = list(zip(views, masks, strict=True))
+    frechet = [
+        [single_image_frechet(target, view, layer=layer, mask_b=mask) for view, mask in pairs]
+        for layer in FRECHET
+    ]
+    return [*(float(np.mean(values)) for values in frechet), transport(target, views, masks)]
 
 
 @torch.no_grad()
-def transport(target: np.ndarray, views: np.ndarray) -> float:
+def transport(target: np.ndarray, views: np.ndarray, masks: np.ndarray) -> float:
     """Relaxed transport (MeshNCA, equation 4), summed over layers, of up to 2,048 random features each."""
     network, generator = Vgg16("max", precision="float32"), torch.Generator().manual_seed(0)
     total = 0.0
     for layer in LAYERS:
-        theirs = some(network.features(torch.from_numpy(target)[None], [layer])[layer], generator)
-        for view in views:
-            ours = some(network.features(torch.from_numpy(view)[None], [layer])[layer], generator)
+        theirs = some(
+            network.features(torch.from_numpy(target)[None], [layer])[layer].flatten(1, 2), generator
+        )
+        for view, mask in zip(views, masks, strict=True):
+            (features,) = network.features(torch.from_numpy(view)[None], [layer])[layer]
+            whole = whole_cells(view, mask, layer)
+            ours = some(features[torch.from_numpy(whole)][None], generator)
             total += float(relaxed_transport(ours, theirs)) / len(views)
     return total
 
 
-def some(features: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
-    """(1, n, C) features at random places of a map (1, h, w, C)."""
-    vectors = features.flatten(1, 2)
+def some(vectors: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
+    """(1, n, C) random ones of (1, N, C)."""
     return vectors[:, torch.randperm(vectors.shape[1], generator=generator)[:2048]]
 
 

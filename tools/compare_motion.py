@@ -135,9 +135,11 @@ def distance(texture: NcaTexture, closeups: CloseUps, growth: Growth, state: tor
     """Mean Frechet distance of close-ups from the exemplar, as wide as it is there."""
     pixels = round(PIXELS * float(texture.about["density"]))
     exemplar = Exemplar.load(texture.about["exemplar"]).resized(pixels).maps["albedo"]
-    pictures = closeups.pictures(growth, state)
-    whole = [view for view, covered in zip(pictures, closeups.covered, strict=True) if covered.all()]
-    return float(np.mean([single_image_frechet(exemplar, view) for view in whole]))
+    pictures = zip(closeups.pictures(growth, state), closeups.covered, strict=True)
+    distances = [
+        single_image_frechet(exemplar, view, mask_b=seen) for view, seen in pictures if seen.mean() > 0.5
+    ]
+    return float(np.mean(distances))
 
 
 def still_distance(texture: NcaTexture, closeups: CloseUps) -> float:
