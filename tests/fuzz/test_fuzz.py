@@ -12,6 +12,7 @@ from tests.fuzz.loaders import LOADERS
 
 ROOT = Path(__file__).parents[2]
 BATCH = 2000  # cases of a process
+CACHES = ("cache", "manifest")  # what is damaged in them is computed again
 
 
 def reports(loader: str, first: int, count: int) -> list[dict]:
@@ -30,7 +31,7 @@ def reports(loader: str, first: int, count: int) -> list[dict]:
 def check(report: dict, count: int) -> None:
     assert not report["faults"], (report["loader"], report["faults"][0])
     assert report["read"] + report["refused"] == count
-    assert report["refused"] > 0
+    assert report["refused"] > 0 or report["loader"] in CACHES
 
 
 def test_every_loader_500_times():

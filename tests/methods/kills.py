@@ -22,6 +22,7 @@ import torch
 from mitex.cli import main
 from mitex.methods.registry import methods
 from mitex.training import checkpoint
+from mitex.training.locate import NAME as RESULT
 from tests.methods.fits import FITS, prepare
 
 STEPS = 12
@@ -68,8 +69,8 @@ def check(method: str, out: Path, before: int) -> int:
     metrics = out / "metrics.jsonl"
     done = metrics.read_bytes().count(b"\n") if metrics.exists() else 0
     assert not FITS[method].resume or done - step <= 1, (done, step)  # a checkpoint follows each step
-    if (out / "texture.safetensors").exists():
-        methods()[method].load_texture().load(out / "texture.safetensors")
+    if (out / RESULT).exists():
+        methods()[method].load_texture().load(out / RESULT)
     return step
 
 
@@ -88,6 +89,8 @@ def run(method: str, count: int, folder: Path) -> dict[str, int]:
         if strike(process, out, aim, rng):
             kills[aim] += 1
             step = check(method, out, step)
+            if not FITS[method].resume and (out / RESULT).exists():  # it was finished, and stays
+                number += 1
         else:
             check(method, out, step)
             number, step = number + 1, 0
