@@ -28,10 +28,10 @@ def check_files(files: Iterable[Path], whole: str, inputs: Inputs = ()) -> None:
     """
     inputs = list(inputs)
     for file in files:
-        place = prepare_output(file, inputs=inputs)
-        if os.path.lexists(place) and not is_ours(place):
+        prepare_output(file, inputs=inputs)
+        if os.path.lexists(file) and not is_ours(file):  # a link to nowhere is somebody's, too
             raise OutputError(
-                f"'{whole}' comes with '{place}', and a file of that name exists that Mitex did not write",
+                f"'{whole}' comes with '{file}', and a file of that name exists that Mitex did not write",
                 "name another place",
             )
 

@@ -200,7 +200,7 @@ class TestUsage:
             (
                 ["xyzzy"],
                 "there is no command 'xyzzy'; use one of doctor, demo, fit, apply, animate, graft, cache, "
-                "models, batch, compare, evaluate, render, try",
+                "models, gallery, view, batch, compare, evaluate, render, try",
             ),
             (["fit"], "`mitex fit` needs a method; try `mitex fit geometric --help`"),
             (["fit", "nac"], "`mitex fit` knows no method 'nac'; did you mean nca?"),

@@ -64,7 +64,9 @@ class TestMethod:
 
     def test_apply(self, name):
         method = methods()[name]
-        told = parameters(method.load_texture().apply, shell_still)
+        # An asset and a living page are two calls in Python.
+        pages = (nca.living_page,) if name == "nca" else ()
+        told = parameters(method.load_texture().apply, shell_still, *pages)
         assert names(method.load_apply()) - told <= APPLY_ONLY
 
 

@@ -9,7 +9,7 @@ from tyro.conf import Positional, arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range
-from mitex.methods.nca.cli import field_files, levels, oriented
+from mitex.methods.nca.arguments import field_files, levels, oriented
 from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS
 
 FADE = 12  # frames over which a loop fades

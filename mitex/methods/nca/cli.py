@@ -11,6 +11,7 @@ from tyro.conf import arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
+from mitex.methods.nca.arguments import RESOLUTION, field_files, levels, oriented
 from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS, TILE_CELLS, TILE_SIDES
 from mitex.methods.options import EXPORTS, PICTURES, OptionalMeshOptions, TrainingOptions
 from mitex.training.settings import RunSettings
@@ -18,11 +19,9 @@ from mitex.training.settings import RunSettings
 if TYPE_CHECKING:
     from mitex.asset import Asset
 
-RESOLUTION = 1024  # of baked textures [texels]
 MOST_VARIANTS = 32
 LONGEST = 60  # name of a run folder from words [characters]
 PAGE = ".html"
-FIELD_FILES = (".npy", ".ply", ".json")
 
 
 @dataclass(kw_only=True)
@@ -323,35 +322,3 @@ class Apply(OptionalMeshOptions):
             "field": self.field,
             "speed": self.speed,
         }
-
-
-def field_files(*fields: str | None) -> list[str]:
-    """The files that --field and --orientation name, if they do."""
-    return [field for field in fields if field and Path(field).suffix.lower() in FIELD_FILES]
-
-
-def oriented(orientation: str) -> float | str:
-    """What --orientation means: an angle [degrees], or a vector field.
-
-    Raises:
-        ConfigError: an angle out of range.
-    """
-    try:
-        angle = float(orientation)
-    except ValueError:
-        return orientation
-    in_range("--orientation", angle, -360.0, 360.0)
-    return angle
-
-
-def levels(subdivide: str) -> int | str:
-    """What --subdivide means.
-
-    Raises:
-        ConfigError: neither auto nor a number of levels.
-    """
-    if subdivide == "auto":
-        return "auto"
-    if subdivide not in list("0123456"):
-        raise ConfigError(f"--subdivide cannot be {subdivide!r}", "use auto or a number from 0 to 6")
-    return int(subdivide)
