@@ -101,6 +101,7 @@ def test_options_reach_the_library(folder, monkeypatch, capsys):
         "subdivide": 0,
         "orientation": 90,
         "scale": 1.0,
+        "exemplar_width": None,
         "field": None,
         "speed": 1.0,
         "displace": False,
