@@ -66,7 +66,7 @@ class Study:
             return Study(str(record["id"]), tuple(questions))
         except (OSError, ValueError, TypeError, KeyError) as e:
             problem = f"'{folder}' holds no study of `mitex compare`"
-            raise ConfigError(problem, "name what was given as --out, with --study") from e
+            raise ConfigError(problem, "name the folder of a comparison that was made with a study") from e
 
 
 def write_study(folder: Path, results: Sequence[Result], exemplars: Mapping[str, np.ndarray | None]) -> Path:
