@@ -87,3 +87,5 @@ class TestTerminable:
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         with terminable():
             os.kill(os.getpid(), signal.SIGTERM)
+            assert signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
+        assert signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
