@@ -149,8 +149,7 @@ def _from_folder(folder: Path) -> Exemplar:
     for name, file in sorted(files.items()):
         array = _check_side(read_image(file, "L" if MAPS.get(name) == 1 else "RGB"), file)
         if name == "normal_dx":
-            array[:, :, 1] = 1.0 - array[:, :, 1]
-            name = "normal"
+            array, name = _turned(array), "normal"
         arrays[name] = _upright(array, file) if name == "normal" else array
     return Exemplar(_one_size(arrays, folder), folder.resolve().name)
 
@@ -166,8 +165,13 @@ def _upright(normals: np.ndarray, file: Path) -> np.ndarray:
         raise ImageError(f"red and green of {file} are exchanged", "exchange them, or remove the file")
     if agreement.downward:
         announce(f"green points down in {file.name}, as in DirectX: turned over")
-        return normals * np.float32((1, -1, 1)) + np.float32((0, 1, 0))
+        return _turned(normals)
     return normals
+
+
+def _turned(normals: np.ndarray) -> np.ndarray:
+    red, green, blue = np.moveaxis(normals, 2, 0)
+    return np.dstack([red, 1.0 - green, blue])
 
 
 def _find_maps(folder: Path) -> dict[str, Path]:

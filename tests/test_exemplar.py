@@ -147,7 +147,7 @@ class TestRefuses:
     @pytest.mark.parametrize("name", ["normal", "normal_gl", "normal_dx"])
     def test_green_points_up_whatever_the_name_says(self, tmp_path, name):
         true = read_image(EMBEDDED)
-        for array in (true, true * np.float32((1, -1, 1)) + np.float32((0, 1, 0))):
+        for array in (true, true * np.array([1, -1, 1]) + np.array([0, 1, 0])):
             write_image(tmp_path / f"{name}.png", array)
             np.testing.assert_allclose(Exemplar.load(tmp_path).maps["normal"], true, atol=2 / 255)
 
