@@ -69,7 +69,9 @@ class Words:
 
     def views(self) -> None:
         state = self.state.clone().requires_grad_()
-        views = self.task.figures[self.sphere].textured(self.task.look, state, self.task.sight(0).cameras)
+        views = self.task.figures[self.sphere].textured(
+            self.task.look, state, self.task.sight(self.sphere, 0).cameras
+        )
         torch.autograd.grad((views.coloured + views.plain).sum(), state)
 
     def tower(self, dtype: torch.dtype) -> None:

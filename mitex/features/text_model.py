@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 import torch
 
@@ -27,5 +28,10 @@ def text_image_model(
         WeightsError: the named folder is not there, incomplete or damaged.
         ConfigError: a CLIP model needs the package tokenizers.
     """
-    folder = None if clip == EMBEDDED else named_folder(clip) or cached_folder()
+    folder = model_folder(clip)
     return Clip(folder, device=device) if folder else words_model()
+
+
+def model_folder(clip: str | os.PathLike[str] | None = None) -> Path | None:
+    """Where the CLIP model is that `text_image_model` would take; None if that is the one that ships."""
+    return None if clip == EMBEDDED else named_folder(clip) or cached_folder()

@@ -60,12 +60,12 @@ class Fit(TrainingOptions):
 
     preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: patch)")] = None
     """Settings to start from: `patch` is fast, `paper` follows the publication; `motion` (the default with
-    --motion) and `motion-paper` likewise, for textures that move; `text` (the default with --text) and
-    `text-paper`, for those from words."""
+    --motion) and `motion-paper` likewise, for textures that move; `text`, `text-words` (the default with the
+    small embedded model) and `text-paper`, for those from words."""
 
     init: Annotated[str | None, arg(metavar="MODEL|RUN", help_behavior_hint="")] = None
-    """Start from the weights of a model or a run; of the still texture, for one that shall move. With --text,
-    which starts from a model in any case, another one."""
+    """Start from the weights of a model or a run; of the still texture, for one that shall move. The preset
+    `text` starts from a model in any case."""
 
     motion: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="")] = None
     """Vector field that the texture learns to move along, by name (right, up, about-y ...) or direction."""
@@ -88,7 +88,6 @@ class Fit(TrainingOptions):
         if self.exemplar is None and self.text is None:
             raise ConfigError("--exemplar is missing", "give --exemplar IMAGE, or --text WORDS")
         mutually_exclusive("--text", "--exemplar", self.text is not None and self.exemplar is not None)
-        mutually_exclusive("--text", "--motion", self.text is not None and self.motion is not None)
         for option, value in (("--mesh", self.mesh), ("--clip", self.clip)):
             if value is not None and self.text is None:
                 raise ConfigError(f"{option} means nothing without --text", "leave it out")
@@ -111,7 +110,16 @@ class Fit(TrainingOptions):
         out = self.folder("-".join(re.findall(r"[a-z0-9]+", text.lower()))[:LONGEST] or "text")
         mesh = None if self.mesh is None else Mesh.load(self.mesh)
         with self.progress() as on_step:
-            nca.fit_text(text, out, mesh=mesh, clip=self.clip, init=self.init, on_step=on_step, **options)
+            nca.fit_text(
+                text,
+                out,
+                mesh=mesh,
+                clip=self.clip,
+                init=self.init,
+                motion=self.motion,
+                on_step=on_step,
+                **options,
+            )
         return out
 
 

@@ -243,6 +243,26 @@ PRESETS["text"] = replace(
     text_distances=(2.0, 2.5),
     milestones=(600, 850),
 )
+PRESETS["text-words"] = replace(
+    PRESETS["text"],
+    preset="text-words",
+    steps=300,
+    frequency=24,
+    min_steps=12,
+    max_steps=24,
+    views="patch",
+    view_count=6,
+    resolution=64,
+    density=24.0,
+    coordinates=(),
+    milestones=(180, 255),
+    text_parent=None,
+    text_prompt="{text}",
+    text_directional=False,
+    text_tilt=0.0,
+    text_close_weight=0.0,
+    text_relief_weight=0.0,
+)
 PRESETS["text-paper"] = replace(
     PRESETS["paper"],
     preset="text-paper",

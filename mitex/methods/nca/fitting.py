@@ -10,7 +10,7 @@ from mitex.exemplar import Exemplar
 from mitex.methods.nca import files
 from mitex.methods.nca.config import PRESETS
 from mitex.methods.nca.look import Look, weights_key
-from mitex.methods.nca.motion.start import check_field, moving, with_condition
+from mitex.methods.nca.motion.start import check_field, learner, motion_record, moving
 from mitex.methods.nca.motion.task import MotionTask
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.parents import fitting_lineage, resumed_lineage
@@ -63,12 +63,9 @@ def fit(
     parent, lineage = None, resumed_lineage(run)
     if init is not None:
         parent, about = files.load(init)
-        if config.motion and config.motion_encoding and not parent.rule.condition:
-            parent = with_condition(parent)
+        parent = learner(config, parent)
         lineage = fitting_lineage(parent, about, Look.of(config, sorted(maps.maps)))
-    if config.motion:
-        origin |= {"motion": config.motion, "motion_period": config.motion_period}
-        origin["motion_speed"] = config.motion_speeds[1]
+    origin |= motion_record(config)
     task = (MotionTask if config.motion else NcaTask)(config, maps, parent, lineage)
 
     def texture(about: dict[str, Any]) -> NcaTexture:

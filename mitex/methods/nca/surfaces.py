@@ -72,8 +72,9 @@ class TrainingSphere:
 
     @property
     def edge(self) -> float:
-        """Length of the edges [mesh units], of as many equilateral faces."""
-        return math.sqrt(8 * math.pi / math.sqrt(3) / len(self.mesh.vertices))
+        """Length of the edges [mesh units], of as many equilateral faces on the same area."""
+        area = float(self.mesh.face_areas.sum(dtype=np.float64))
+        return math.sqrt(2 * area / math.sqrt(3) / len(self.mesh.vertices))
 
     def views(self, look: Look, state: torch.Tensor, cameras: Cameras, antialias: int = 1) -> torch.Tensor:
         """Images (K, H, W, C) of a state (V, C); see `render_views`."""

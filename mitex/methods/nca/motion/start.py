@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from typing import Any
 
 import torch
 
 from mitex.errors import ConfigError
 from mitex.mesh import icosphere
 from mitex.mesh.fields import vector_field
+from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.motion.condition import WIDTH
@@ -44,6 +46,21 @@ def check_field(field: str) -> None:
             "train with a name or a direction, and give the file as `field` when it is applied",
         )
     vector_field(icosphere(2), field)
+
+
+def motion_record(config: NcaConfig) -> dict[str, Any]:
+    """What the file of a texture tells of how it learned to move; nothing of a still one."""
+    if not config.motion:
+        return {}
+    about = {"motion": config.motion, "motion_period": config.motion_period}
+    return about | {"motion_speed": config.motion_speeds[1]}
+
+
+def learner(config: NcaConfig, look: Look) -> Look:
+    """The look that a training starts from, whose cells are told a vector if the settings want it."""
+    return (
+        with_condition(look) if config.motion and config.motion_encoding and not look.rule.condition else look
+    )
 
 
 def with_condition(look: Look) -> Look:

@@ -11,7 +11,9 @@ from mitex.mesh import Mesh
 from mitex.methods.nca import files
 from mitex.methods.nca.config import PRESETS, NcaConfig
 from mitex.methods.nca.look import Look, weights_key
+from mitex.methods.nca.motion.start import learner, motion_record
 from mitex.methods.nca.parents import fitting_lineage, resumed_lineage
+from mitex.methods.nca.text.moving import MovingTextTask
 from mitex.methods.nca.text.task import TextTask
 from mitex.methods.nca.text.wording import MAPS, check, with_maps, worded
 from mitex.methods.nca.texture import NcaTexture
@@ -26,6 +28,7 @@ def fit_text(
     mesh: Mesh | None = None,
     clip: str | os.PathLike[str] | None = None,
     init: str | Path | None = None,
+    motion: str | None = None,
     **options: Unpack[RunOptions],
 ) -> NcaTexture:
     """Trains a MeshNCA to be what words say; writes a run folder with the texture in it.
@@ -40,7 +43,9 @@ def fit_text(
             its name, unless `text_object` is set.
         clip: CLIP folder, or "words" for the model that ships with Mitex; None for the first that there is.
         init: model to start from; the setting `text_parent` if None.
-        options: preset ("text" or "text-paper"), and those of `RunOptions`.
+        motion: the vector field that the texture learns to move along, as of `mitex.methods.nca.fit`.
+        options: preset ("text", "text-words" or "text-paper"), and those of `RunOptions`; by default
+            "text-words" for the model that ships with Mitex, else "text".
 
     Returns:
         The texture, also saved as `texture.safetensors` in `out` if that is given.
@@ -50,17 +55,18 @@ def fit_text(
         Cancelled: by `cancel`; a checkpoint has been saved if there is a folder.
         Interrupted: by Ctrl-C, likewise.
     """
-    run = Run.of(PRESETS, out, **worded(options, text, None if clip is None else os.fspath(clip)))
+    run = Run.of(PRESETS, out, **worded(options, text, None if clip is None else os.fspath(clip), motion))
     config = run.config
     check(config)
     look, lineage = _start(init, run)
     model = text_image_model(config.text_model, config.device)
-    task = TextTask(config, model, look, lineage, mesh)
+    task = (MovingTextTask if config.motion else TextTask)(config, model, look, lineage, mesh)
     run.check_inputs(task.metadata())
 
     def texture(about: dict[str, Any]) -> NcaTexture:
         look = task.look.to("cpu")
         known = {"text": config.text, "text_model": model.name, "relief": config.text_relief}
+        known |= motion_record(config)
         family = {"family": weights_key(look)}
         return NcaTexture(look, about | {"density": config.density} | known | family | lineage)
 
@@ -73,5 +79,5 @@ def _start(init: str | Path | None, run: Run[NcaConfig]) -> tuple[Look | None, d
     if source is None or run.resume:
         return None, resumed_lineage(run)
     parent, about = files.load(source)
-    parent = with_maps(parent, MAPS)
+    parent = learner(run.config, with_maps(parent, MAPS))
     return parent, fitting_lineage(parent, about, Look.of(run.config, MAPS))

@@ -93,7 +93,7 @@ class TextTask(PoolTask):
         assert isinstance(surface, TrainingSphere)
         config = self.config
         index = int(torch.randint(config.text_bank, (), generator=generator))
-        sight = self.sight(index)
+        sight = self.sight(surface, index)
         views = self.figures[surface].textured(self.look, state, sight.cameras)
         excess = laplacian_excess(2 * views.height - 1, *self._edges[surface], config.text_roughness)
         return self._distances(views, sight, self.negative(surface, index)) | {
@@ -101,16 +101,16 @@ class TextTask(PoolTask):
             "range": config.text_range_weight * overflow_loss(2 * views.values - 1),
         }
 
-    def sight(self, index: int) -> Sight:
+    def sight(self, surface: TrainingSphere, index: int) -> Sight:
         """One of the bank's."""
         seed = self.config.seed * self.config.text_bank + index
-        return Sight.draw(self.config, torch.Generator().manual_seed(seed))
+        return Sight.draw(self.config, surface, torch.Generator().manual_seed(seed))
 
     @torch.no_grad()
     def negative(self, surface: TrainingSphere, index: int) -> Negative:
         """Of a sight of the bank, computed when it is wanted first."""
         if (surface, index) not in self._negatives:
-            sight = self.sight(index)
+            sight = self.sight(surface, index)
             pictures, size = self.figures[surface].bare(sight.cameras), self.model.resolution
             squares = [sight.whole(pictures, size), sight.close(pictures, size)]
             self._negatives[surface, index] = Negative(*self._directions(squares))

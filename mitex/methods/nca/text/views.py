@@ -12,7 +12,7 @@ from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.decoder.surface import Points
 from mitex.methods.nca.displacement import Displacement
 from mitex.methods.nca.look import Look
-from mitex.methods.nca.surfaces import TrainingSphere
+from mitex.methods.nca.surfaces import CloseUps, TrainingSphere
 from mitex.methods.nca.text.light import lamps, shading
 from mitex.scenes.cameras import Cameras, random_views
 from mitex.sparse import Weights
@@ -36,16 +36,24 @@ class Sight:
     close: Augmentation
 
     @staticmethod
-    def draw(config: NcaConfig, generator: torch.Generator) -> Sight:
+    def draw(config: NcaConfig, sphere: TrainingSphere, generator: torch.Generator) -> Sight:
         """With the numbers of a config."""
-        distances, count = config.text_distances, config.view_count
-        distance = distances[int(torch.randint(len(distances), (), generator=generator))]
-        tilt = config.text_tilt
+        count, tilt = config.view_count, config.text_tilt
         return Sight(
-            random_views(generator, count, distance, config.fov, config.resolution),
+            training_cameras(config, sphere, generator),
             Augmentation.draw(generator, count, tilt=tilt),
             Augmentation.draw(generator, count, config.text_crops, config.text_crop_area, tilt),
         )
+
+
+def training_cameras(config: NcaConfig, sphere: TrainingSphere, generator: torch.Generator) -> Cameras:
+    """Random views of a step: of the whole surface, or of patches as wide as the density."""
+    count, resolution = config.view_count, config.resolution
+    if config.views == "patch":
+        return sphere.cameras(CloseUps(config.density, count, resolution), generator)
+    distances = config.text_distances
+    distance = distances[int(torch.randint(len(distances), (), generator=generator))]
+    return random_views(generator, count, distance, config.fov, resolution)
 
 
 @dataclass(frozen=True, eq=False)

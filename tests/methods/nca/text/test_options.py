@@ -36,6 +36,10 @@ def _spread(augmentation):
     return (moved[..., :2] / moved[..., 2:]).abs().max().item()
 
 
+def _sight(one):
+    return one.sight(one.spheres[0], 0)
+
+
 CHECKS = {}
 
 
@@ -55,7 +59,7 @@ def text_directional(build):
     """Without it the distance is that of the pictures themselves, whatever the grey sphere looks like."""
     one = build("text_directional=false")
     surface, generator = one.spheres[0], torch.Generator().manual_seed(0)
-    sight = one.sight(int(torch.randint(one.config.text_bank, (), generator=generator)))
+    sight = one.sight(surface, int(torch.randint(one.config.text_bank, (), generator=generator)))
     views = one.figures[surface].textured(one.look, one.pool[0], sight.cameras)
     (pictures,) = one._directions([sight.whole(views.coloured, one.model.resolution)])
     assert _terms(one)["whole"] == pytest.approx(1 - torch.cosine_similarity(pictures, one.text, 0).item())
@@ -86,24 +90,26 @@ def text_bank(build):
 @check
 def text_distances(build):
     one = build("text_distances=2,4", "text_bank=8")
-    distances = {round(float(np.linalg.norm(one.sight(k).cameras.origin[0])), 3) for k in range(8)}
+    distances = {
+        round(float(np.linalg.norm(one.sight(one.spheres[0], k).cameras.origin[0])), 3) for k in range(8)
+    }
     assert distances == {2.0, 4.0}
 
 
 @check
 def text_crops(build):
-    assert len(build("text_crops=3").sight(0).close.picture) == 6
+    assert len(_sight(build("text_crops=3")).close.picture) == 6
 
 
 @check
 def text_crop_area(build):
-    assert build("text_crop_area=0.04").sight(0).close.side == pytest.approx(0.2)
+    assert _sight(build("text_crop_area=0.04")).close.side == pytest.approx(0.2)
 
 
 @check
 def text_tilt(build):
-    assert _spread(build("text_tilt=0").sight(0).whole) == pytest.approx(1.0, abs=1e-5)
-    assert 1.2 < _spread(build("text_tilt=1").sight(0).whole) <= 2
+    assert _spread(_sight(build("text_tilt=0")).whole) == pytest.approx(1.0, abs=1e-5)
+    assert 1.2 < _spread(_sight(build("text_tilt=1")).whole) <= 2
 
 
 def _weight(key, name):

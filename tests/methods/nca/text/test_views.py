@@ -9,7 +9,7 @@ from tests.methods.nca.text.tiny_text import config, grown, task
 def scene():
     """A figure, a look, a state of it, and cameras."""
     one = grown(task())
-    return one.figures[one.spheres[0]], one.look, one.pool[0], one.sight(0).cameras
+    return one.figures[one.spheres[0]], one.look, one.pool[0], one.sight(one.spheres[0], 0).cameras
 
 
 def test_the_background_is_white_and_the_rest_is_shaded(scene):

@@ -1,0 +1,118 @@
+"""The part of a training of motion that does not depend on what the texture is learned from."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import torch
+
+from mitex.losses.advection import advection_residual
+from mitex.losses.motion import motion_loss
+from mitex.methods.nca.config import NcaConfig
+from mitex.methods.nca.motion.drift import Drift, draw_drift
+from mitex.methods.nca.motion.estimator import load_estimator
+from mitex.methods.nca.motion.pairs import Pairs
+from mitex.methods.nca.pool import PoolTask, Rollout
+
+MOST_WAYS = 2**31
+POINTS = 8192  # at which the decoder's values are compared
+FLOOR = 0.1  # of residuals: as much as a way of a third of a cell, in usual patterns
+
+
+class MovingPool(PoolTask):
+    """States that move along a vector field (MeshNCA, section 4.3).
+
+    The first base of a task; the second tells what still pictures shall look like.
+
+    Args:
+        config: settings.
+        arguments: of the second base.
+    """
+
+    def __init__(self, config: NcaConfig, *arguments: Any) -> None:
+        super().__init__(config, *arguments)
+        # A state moves in one way until the seed replaces it, so that the rule learns what becomes of its
+        # pattern where the field goes on coming together, or apart. These are the random seeds of the ways.
+        self.ways = torch.zeros(config.pool, dtype=torch.int64)
+        self.estimator = load_estimator(config.motion_estimator, self.look.device)
+
+    @abstractmethod
+    def pairs(self, states: Sequence[torch.Tensor], drift: Drift, generator: torch.Generator) -> Pairs:
+        """What the estimator looks at, of two states (V, C)."""
+
+    def rollout(
+        self, index: int, state: torch.Tensor, step: int, steps: int, generator: torch.Generator
+    ) -> Rollout:
+        config, way, seed = self.config, self.ways[index], not state.any()
+        if seed:
+            way = torch.randint(MOST_WAYS, (), generator=generator)
+        drift = self.drift(index, way)
+        apart = min(config.motion_steps, steps)
+        states = [self._moved(state, drift, steps % apart, generator)]
+        for _ in range(steps // apart):
+            states.append(self._moved(states[-1], drift, apart, generator))
+        terms = {}
+        if not seed and step >= config.motion_start:  # else there is no pattern yet that could move
+            loss = self.motion([state[0] for state in states], drift, apart, generator)
+            terms = {"motion": config.motion_weight * loss}
+        return Rollout(states[-1], terms, partial(self._keep, index, way))
+
+    def evolved(
+        self, index: int, state: torch.Tensor, steps: int, generator: torch.Generator
+    ) -> torch.Tensor:
+        return self._moved(state, self.drift(index, self.ways[index]), steps, generator)
+
+    def drift(self, index: int, way: torch.Tensor) -> Drift:
+        """How the pool's state `index` moves, given the random seed of its way."""
+        return draw_drift(self.config, self.surface(index), torch.Generator().manual_seed(int(way)))
+
+    def _moved(
+        self, state: torch.Tensor, drift: Drift, steps: int, generator: torch.Generator
+    ) -> torch.Tensor:
+        rule, operator = self.look.rule, drift.surface.perception
+        condition = drift.condition.to(state.device) if rule.condition else None
+        return rule.evolve(state, operator, steps, generator, condition)
+
+    def _keep(self, index: int, way: torch.Tensor) -> None:
+        self.ways[index] = way
+
+    def state(self) -> dict[str, torch.Tensor]:
+        return super().state() | {"pool.ways": self.ways}
+
+    def load_state(self, state: dict[str, torch.Tensor]) -> None:
+        super().load_state(state)
+        self.ways = state["pool.ways"]
+
+    def motion(
+        self, states: Sequence[torch.Tensor], drift: Drift, apart: int, generator: torch.Generator
+    ) -> torch.Tensor:
+        """How far states (V, C), each `apart` automaton steps from the next, are from moving with a drift."""
+        period, gamma = self.config.motion_period, self.config.motion_gamma
+        if self.estimator is None:
+            transport = drift.transport(apart / period)
+            residuals = [advection_residual(a, b, transport(a), FLOOR) for a, b in pairwise(states)]
+            shown = self._shown(states[-2].detach(), states[-1], drift, apart / period, generator)
+            return torch.stack(residuals).mean() + shown
+        pairs = self.pairs((states[-2].detach(), states[-1]), drift, generator)
+        flow = self.estimator(pairs.first, pairs.second)
+        return motion_loss(flow, pairs.target, pairs.mask, steps=apart, period=period, gamma=gamma).total
+
+    def _shown(
+        self,
+        before: torch.Tensor,
+        after: torch.Tensor,
+        drift: Drift,
+        share: float,
+        generator: torch.Generator,
+    ) -> torch.Tensor:
+        """The residual of what two states (V, C) show at random points: grain that stays in place costs."""
+        points, upstream = drift.random_places(POINTS, share, generator)
+        surface, decoder = drift.surface.surface, self.look.decoder
+        table = drift.table(before)
+        with torch.no_grad():
+            there, here = (decoder(surface, table, where) for where in (upstream, points))
+        return advection_residual(here, decoder(surface, drift.table(after), points), there, FLOOR)
