@@ -12,6 +12,7 @@ from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.methods import nca
 from mitex.methods.nca import NcaConfig
+from mitex.methods.nca.motion import pool as motion_pool
 from mitex.methods.nca.motion import task as motion_task
 from mitex.methods.nca.motion.drift import Drift, draw_drift
 from mitex.methods.nca.motion.pairs import sphere_pairs
@@ -404,7 +405,8 @@ def motion_in_pictures(build):
         targets.append(result.target)
         return result
 
-    with patch.multiple(motion_task, load_estimator=load, sphere_pairs=pairs):
+    loading = patch.object(motion_pool, "load_estimator", load)
+    with loading, patch.object(motion_task, "sphere_pairs", pairs):
         settings = (*MOVING, "motion_estimator=lucas-kanade")
         tasks = [build(*settings, f"motion_gamma={gamma}") for gamma in (0.5, 4, 7.5)]
         losses = [_motion(MotionTask(task.config, task.exemplar)) for task in tasks]

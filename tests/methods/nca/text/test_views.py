@@ -24,6 +24,16 @@ def test_the_background_is_white_and_the_rest_is_shaded(scene):
     assert torch.allclose(views.coloured[hit], shade * views.values[:, :3].clamp(0, 1), atol=1e-6)
 
 
+def test_close_ups_are_as_wide_as_the_density():
+    """Seen along the normals, nothing but the surface in them, and other ones for other seeds."""
+    one = task("views=patch", "density=4", "view_count=3")
+    cameras, other = (one.sight(one.spheres[0], index).cameras for index in (0, 1))
+    assert (cameras.kind, len(cameras)) == ("orthographic", 3)
+    assert cameras.half_width == pytest.approx(2 * one.spheres[0].edge)
+    assert one.spheres[0].stage.hits(cameras).hit.all()
+    assert not (cameras.origin == other.origin).any()
+
+
 def test_the_relief_of_a_grey_picture_does_not_depend_on_colours(scene):
     figure, look, state, cameras = scene
     first = figure.textured(look, state, cameras)
@@ -50,6 +60,6 @@ def test_gradients_by_finite_differences(scene, picture):
 
 def test_a_sight_is_drawn_from_its_settings():
     settings = config("text_distances=3", "text_crops=4", "view_count=3")
-    sight = Sight.draw(settings, torch.Generator().manual_seed(0))
+    sight = Sight.draw(settings, task().spheres[0], torch.Generator().manual_seed(0))
     assert len(sight.whole.picture) == 3 and len(sight.close.picture) == 12
     assert torch.tensor(sight.cameras.origin).norm(dim=1).sub(3).abs().max() < 1e-5

@@ -5,6 +5,7 @@ from mitex.errors import ConfigError
 from mitex.mesh import icosphere
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.text.wording import check, prompts, with_maps, worded
+from tests.features.clip.folders import write_folder
 from tests.methods.nca.text.tiny_text import config
 from tests.methods.nca.tiny import texture
 
@@ -37,7 +38,9 @@ def test_a_look_without_a_map():
     ("settings", "problem"),
     [
         ((), None),
-        (("motion=right",), "cannot learn to move"),
+        (("motion=right",), None),
+        (("motion=sideways",), "sideways"),
+        (("motion=wind.npy",), "of one mesh"),
         (("surfaces=even,uneven,flat", "views=patch"), "flat"),
     ],
 )
@@ -59,7 +62,8 @@ def test_an_empty_text_and_presets_for_exemplars():
 
 
 def test_a_text_that_is_given_twice():
-    assert worded({}, "red", None) == {"set": {"text": "red"}, "preset": "text"}
+    given = {"set": {"text": "red", "motion": "up"}, "preset": "text"}
+    assert worded({"preset": "text"}, "red", None, "up") == given
     paper = worded({"set": ["text=red"], "preset": "text-paper"}, "red", "words")
     assert paper == {"set": {"text": "red", "text_model": "words"}, "preset": "text-paper"}
     assert worded({"resume": True}, "red", None).get("preset", "") is None
@@ -67,3 +71,17 @@ def test_a_text_that_is_given_twice():
         worded({"set": ["text=green"]}, "red", None)
     with pytest.raises(ConfigError, match="text_model is set to a and to b"):
         worded({"set": {"text_model": "a"}}, "red", "b")
+    with pytest.raises(ConfigError, match="motion is set to up and to right"):
+        worded({"set": ["motion=up"]}, "red", None, "right")
+
+
+def test_the_preset_is_the_one_for_the_model(tmp_path, monkeypatch):
+    """The embedded one where no CLIP model is named or cached."""
+    monkeypatch.setenv("HF_HUB_CACHE", str(tmp_path / "hub"))
+    monkeypatch.delenv("MITEX_CLIP", raising=False)
+    clip = str(write_folder(tmp_path / "clip"))
+    presets = {name: worded({}, "red", name)["preset"] for name in (None, "words", clip)}
+    assert presets == {None: "text-words", "words": "text-words", clip: "text"}
+    monkeypatch.setenv("MITEX_CLIP", clip)
+    assert worded({}, "red", None)["preset"] == "text"
+    assert worded({"set": ["text_model=words"]}, "red", None)["preset"] == "text-words"

@@ -1,0 +1,54 @@
+"""Textures from words that move: both losses in one step, and a model that follows fields."""
+
+import json
+
+import pytest
+import torch
+
+from mitex.mesh import icosphere
+from mitex.methods import nca
+from mitex.methods.nca import NcaTexture
+from mitex.methods.nca.text.moving import MovingTextTask
+from mitex.runtime import threads
+from tests.features.clip.folders import write_folder
+from tests.methods.nca.text.tiny_text import SETTINGS, MeanColour, config, grown, loss, task
+
+MOVING = ("motion=right", "motion_steps=2", "resolution=32")
+
+
+def moving(*settings: str) -> MovingTextTask:
+    one = MovingTextTask(config(*MOVING, *settings), MeanColour())
+    grown(one)
+    return one
+
+
+@pytest.mark.parametrize("estimator", ["advection", "lucas-kanade"])
+def test_a_step_has_both_losses(estimator):
+    """The motion's once, and with its weight; the pictures' as without a field that cells know of."""
+    threads(1)
+    one, three = (moving(f"motion_estimator={estimator}", f"motion_weight={w}") for w in (1, 3))
+    first, second = (loss(one).metrics for one in (one, three))
+    assert first["motion"] > 1e-6 and second["motion"] == pytest.approx(3 * first["motion"], rel=1e-4)
+    still = loss(grown(task("resolution=32"))).metrics
+    assert first.keys() == still.keys() | {"motion"}
+
+
+def test_a_texture_from_words_learns_to_move(tmp_path):
+    """From a still one, as which it starts."""
+    threads(1)
+    clip, out = write_folder(tmp_path / "clip"), tmp_path / "run"
+    settings = [*SETTINGS, "motion_steps=2", "preset=text"]
+    still = nca.fit_text("red dots", tmp_path / "still", clip=clip, set=[*settings, "steps=2"])
+    first = nca.fit_text(
+        "red dots", clip=clip, init=tmp_path / "still", motion="up", set=[*settings, "steps=0"]
+    )
+    sphere = icosphere(4)
+    assert torch.equal(first.grow(sphere, steps=6, speed=1.5), still.grow(sphere, steps=6))
+    nca.fit_text("red dots", out, clip=clip, init=tmp_path / "still", motion="up", set=[*settings, "steps=4"])
+    moved = NcaTexture.load(out)
+    about = (moved.about[name] for name in ("motion", "motion_speed", "text", "parent"))
+    assert tuple(about) == ("up", 2.0, "red dots", "red dots")
+    here, there = (moved.grow(sphere, steps=6, field=field) for field in ("about-y", "up"))
+    assert (here - there).abs().max() > 1e-6
+    metrics = [json.loads(line) for line in (out / "metrics.jsonl").read_text().splitlines()]
+    assert any(line.get("motion", 0) > 0 for line in metrics) and "whole" in metrics[-1]
