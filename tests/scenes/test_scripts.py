@@ -2,6 +2,7 @@
 
 import ast
 import importlib.util
+from functools import partialmethod
 from pathlib import Path
 from types import ModuleType
 
@@ -12,6 +13,7 @@ from mitex.asset import Asset
 from mitex.exemplar import Exemplar
 from mitex.images import read_image
 from mitex.mesh import icosphere
+from mitex.methods.nca import NcaTexture
 
 pytestmark = pytest.mark.usefixtures("own_cache")
 SCRIPTS = Path(__file__).parents[2] / "scenes"
@@ -118,6 +120,20 @@ def test_surface_synthesis_script(mi, tmp_path: Path, monkeypatch: pytest.Monkey
         assert green > red + 0.1
     asset = Asset.load(tmp_path / "octopus.glb")
     assert len(asset.mesh.faces) == len(ball.faces) and ("roughness" in asset.vertex_maps) == large
+
+
+def test_text_texture_script(mi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Two balls on white, whose colours come near to the words in a few steps of a coarse training."""
+    script = load("text_texture")
+    monkeypatch.setattr(script, "embedded", lambda _name: icosphere(6))
+    quick = partialmethod(NcaTexture.apply, steps=4, subdivide=0, resolution=64)
+    monkeypatch.setattr(NcaTexture, "apply", quick)
+    tiny = ["frequency=8", "density=8", "steps=10", "pool=1", "inject_every=1", "lr=0.02", "preview_every=0"]
+    script.main(str(tmp_path / "a.png"), "plain red", [*tiny, "min_steps=2", "max_steps=4"], 32, 4)
+    picture = read_image(tmp_path / "a.png")
+    assert picture.shape[1] > 2 * 32
+    middle = picture[picture.shape[0] // 2 - 4 :][:8, 12:20].reshape(-1, 3).mean(0)
+    assert middle[0] > middle[1] + 0.05 and middle[0] > middle[2] + 0.05
 
 
 def test_shape_from_images_script(mi, tmp_path: Path):

@@ -81,9 +81,12 @@ class TextTask(PoolTask):
         self._negatives: dict[tuple[TrainingSphere, int], Negative] = {}
 
     def _texts(self, config: NcaConfig) -> tuple[torch.Tensor, torch.Tensor]:
+        """Directions of what is wanted and of the bare object, whose name counts in steps from it alone."""
         text, negative = prompts(config, self.thing)
+        if not config.text_directional:
+            negative = text
         both = torch.nn.functional.normalize(self.model.encode_texts([text, negative]), dim=1)
-        if (both[0] - both[1]).square().sum() < SAME:
+        if config.text_directional and (both[0] - both[1]).square().sum() < SAME:
             raise ConfigError(f"'{text}' means no more than '{negative}'", "say more about the texture")
         return both[0], both[1]
 

@@ -1,12 +1,14 @@
 """What a step of a training from words compares."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
 from mitex.errors import ConfigError
 from mitex.losses import directional_distance, laplacian_excess, mean_direction, overflow_loss
-from mitex.mesh import torus
+from mitex.mesh import icosphere, torus
 from mitex.methods.nca.text.task import TextTask
 from mitex.methods.nca.text.wording import MAPS
 from mitex.runtime import threads
@@ -99,6 +101,15 @@ def test_it_learns_a_colour():
         others = [change[k] for k in range(3) if k != channel]
         assert change[channel] > 0.1 + max(others), (text, change)
     assert one.look.maps == MAPS
+
+
+def test_an_object_whose_name_nobody_knows():
+    """Matters only where its name is read."""
+    mesh = replace(icosphere(3), name="my_scan")
+    plain = task("text_directional=false", "text_prompt={text}", mesh=mesh)
+    assert plain.metadata()["text"] == "red"
+    with pytest.raises(StopIteration):
+        task("text_prompt={text}", mesh=mesh)
 
 
 def test_texts_that_mean_the_same():
