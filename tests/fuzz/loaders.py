@@ -31,6 +31,8 @@ from mitex.methods.baselines.plain_field.texture import SETTINGS, PlainFieldText
 from mitex.methods.baselines.quilted.texture import QuiltedTexture
 from mitex.methods.baselines.reaction_diffusion.reaction import Reaction
 from mitex.methods.baselines.reaction_diffusion.texture import ReactionDiffusionTexture
+from mitex.methods.baselines.solid_texture.generator import Generator
+from mitex.methods.baselines.solid_texture.texture import SolidTexture
 from mitex.methods.nca.config import PRESETS, NcaConfig
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.weights import graft_weights
@@ -179,6 +181,10 @@ def _reaction_diffusion(path: Path) -> None:
     ReactionDiffusionTexture(reaction, 16, 0.5, {"name": "a"}).save(path)
 
 
+def _solid(path: Path) -> None:
+    SolidTexture(Generator.random(torch.Generator().manual_seed(0)), 16, 0.5, {"name": "a"}).save(path)
+
+
 def _photos(path: Path) -> None:
     write_capture(path.parents[1], 8)
 
@@ -229,6 +235,7 @@ LOADERS = {
     "quilted": Loader("a.safetensors", _quilted, mitex.load),
     "plain_field": Loader("a.safetensors", _plain_field, mitex.load),
     "reaction_diffusion": Loader("a.safetensors", _reaction_diffusion, mitex.load),
+    "solid_texture": Loader("a.safetensors", _solid, mitex.load),
     "multi_view_gram": Loader("a.safetensors", _multi_view, mitex.load),
     "checkpoint": Loader("checkpoint.safetensors", _checkpoint, lambda path: checkpoint.load(path.parent)),
     "checkpoint as a texture": Loader(

@@ -82,6 +82,10 @@ FITS = {
         f"min_steps=1 max_steps=2 layers=relu1_1 {SMALL_RUN}",
         "--mesh cube.obj --resolution 64 --steps 2 --scale 4",
     ),
+    "solid_texture": TinyFit(
+        f"--exemplar photo.png --steps 2 --set exemplar_size=32 slice_size=32 layers=relu1_1 {SMALL_RUN}",
+        "--mesh cube.obj --resolution 64 --scale 8",
+    ),
     "displacement": TinyFit("--reference spikes --set resolution=16", "--mesh cube.obj", resume=""),
 }
 

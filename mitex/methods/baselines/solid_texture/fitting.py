@@ -38,7 +38,7 @@ def fit(
     return run.train(
         task,
         target.name,
-        lambda about: SolidTexture(task.generator, config.exemplar_size, config.width, about),
+        lambda about: SolidTexture(task.settled(), config.exemplar_size, config.width, about),
         lr=config.lr,
         milestones=config.milestones,
         decay=config.decay,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -16,6 +17,7 @@ from mitex.methods.baselines.solid_texture.generator import NOISE, SCALES, Gener
 from mitex.runtime import keep_freed_memory
 from mitex.training import ParameterTask, Step
 
+SETTLING = 10  # slices across each axis, by which statistics come from the last weights
 SHIFTS = 1 << (SCALES - 1)  # places of a slice among the voxels of the coarsest scale
 
 
@@ -67,8 +69,19 @@ class SolidTask(ParameterTask):
         beside = np.zeros((side, side, 3), np.float32)
         picture = self._picture.numpy()[:side, :side]
         beside[: len(picture), : picture.shape[1]] = picture
-        slices = [self._slices(axis, side, generator, None)[0].clamp(0, 1).numpy() for axis in range(3)]
+        updated = {name: value.clone() for name, value in self.generator.statistics.items()}
+        slices = [self._slices(axis, side, generator, updated)[0].clamp(0, 1).numpy() for axis in range(3)]
         return np.hstack([beside, *slices])
+
+    @torch.no_grad()
+    def settled(self) -> Generator:
+        """The generator with statistics of its present weights; those of the training lag behind."""
+        generator = torch.Generator().manual_seed(self.config.seed)
+        updated = {name: value.clone() for name, value in self.generator.statistics.items()}
+        for _ in range(SETTLING):
+            for axis in range(3):
+                self._slices(axis, self.config.slice_size, generator, updated)
+        return replace(self.generator, statistics=updated)
 
     def metadata(self) -> dict[str, str]:
         return {
@@ -78,13 +91,13 @@ class SolidTask(ParameterTask):
         }
 
     def _slices(
-        self, axis: int, side: int, generator: torch.Generator, updated: dict[str, torch.Tensor] | None
+        self, axis: int, side: int, generator: torch.Generator, updated: dict[str, torch.Tensor]
     ) -> torch.Tensor:
-        """(K, N, N, 3) sRGB slices of one voxel across an axis, at a random place."""
+        """(K, N, N, 3) sRGB slices of one voxel across an axis, at a random place; moves the statistics."""
         start = torch.randint(0, SHIFTS, (3,), generator=generator).tolist()
         box = Box(tuple(start), tuple(1 if k == axis else side for k in range(3)))
-        count = 1 if updated is None else self.config.slices
-        noise = [torch.rand(count, NOISE, *b.size, generator=generator) for b in noise_boxes(box)]
+        shapes = [(self.config.slices, NOISE, *b.size) for b in noise_boxes(box)]
+        noise = [torch.rand(shape, generator=generator) for shape in shapes]
         colours = self.generator.colours(box, noise, updated)
         return colours.squeeze(2 + axis).movedim(1, -1).contiguous()
 
