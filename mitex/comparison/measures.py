@@ -64,7 +64,7 @@ LOOKS = (
         "Gram",
         LOWER,
         "Squared distance of the Gram matrices of five layers of VGG-16. surface, gatys, multi_view_gram, "
-        "reaction_diffusion and solid_texture train with it.",
+        "reaction_diffusion, solid_texture and style_mesh train with it.",
     ),
     Measure(
         "seams",
