@@ -156,7 +156,7 @@ class TestTask:
 
     def test_options_matter(self, ball, exemplar):
         def gradients(**options) -> torch.Tensor:
-            config = replace(CONFIG, **({"resolution": 128} | options))
+            config = replace(CONFIG, **({"resolution": 256} | options))
             task = StyleMeshTask(config, exemplar, ball)
             noise = torch.Generator().manual_seed(1)
             for value in task.parameters:
