@@ -4,7 +4,8 @@ usage: python tools/compare_looks.py EXEMPLARS EXEMPLAR=MODEL[,MODEL ...] ... [-
 
 EXEMPLARS is a folder; names of embedded exemplars work too. A MODEL is a bundled one, a file or a run folder.
 Six patches of a sphere, at the exemplar's scale, are compared with the exemplar by their features
-(`mitex.evaluation.likeness`) and their regularity. On other meshes, patches are half as wide. Prints a Markdown table.
+(`mitex.evaluation.likeness`) and their regularity. On other meshes, patches are half as wide.
+Prints a Markdown table.
 """
 
 from __future__ import annotations
