@@ -31,6 +31,9 @@ from mitex.methods.baselines.plain_field.texture import SETTINGS, PlainFieldText
 from mitex.methods.baselines.quilted.texture import QuiltedTexture
 from mitex.methods.baselines.reaction_diffusion.reaction import Reaction
 from mitex.methods.baselines.reaction_diffusion.texture import ReactionDiffusionTexture
+from mitex.methods.baselines.solid_texture.generator import Generator
+from mitex.methods.baselines.solid_texture.texture import SolidTexture
+from mitex.methods.baselines.style_mesh.texture import StyleMeshTexture
 from mitex.methods.nca.config import PRESETS, NcaConfig
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.weights import graft_weights
@@ -160,6 +163,10 @@ def _multi_view(path: Path) -> None:
     MultiViewTexture(grid(1, 1), np.full((8, 8, 3), 0.5, np.float32), {"name": "a"}).save(path)
 
 
+def _style_mesh(path: Path) -> None:
+    StyleMeshTexture(grid(1, 1), np.full((8, 8, 3), 0.5, np.float32), {"name": "a"}).save(path)
+
+
 def _nerf(path: Path) -> None:
     from tests.methods.nerf.small import small_texture
 
@@ -177,6 +184,10 @@ def _plain_field(path: Path) -> None:
 def _reaction_diffusion(path: Path) -> None:
     reaction = Reaction.random(3, 4, torch.full((3,), 0.1), torch.Generator().manual_seed(0))
     ReactionDiffusionTexture(reaction, 16, 0.5, {"name": "a"}).save(path)
+
+
+def _solid(path: Path) -> None:
+    SolidTexture(Generator.random(torch.Generator().manual_seed(0)), 16, 0.5, {"name": "a"}).save(path)
 
 
 def _photos(path: Path) -> None:
@@ -229,6 +240,8 @@ LOADERS = {
     "quilted": Loader("a.safetensors", _quilted, mitex.load),
     "plain_field": Loader("a.safetensors", _plain_field, mitex.load),
     "reaction_diffusion": Loader("a.safetensors", _reaction_diffusion, mitex.load),
+    "solid_texture": Loader("a.safetensors", _solid, mitex.load),
+    "style_mesh": Loader("a.safetensors", _style_mesh, mitex.load),
     "multi_view_gram": Loader("a.safetensors", _multi_view, mitex.load),
     "checkpoint": Loader("checkpoint.safetensors", _checkpoint, lambda path: checkpoint.load(path.parent)),
     "checkpoint as a texture": Loader(
