@@ -36,10 +36,13 @@ def directional_distance(
 
 
 def text_distance(pictures: torch.Tensor, text: torch.Tensor) -> torch.Tensor:
-    """1 - cos(R, T), from 0 to 2: what MeshNCA compares its equation 9 with (figure 17).
+    """1 - R T / |T|, from 0 to 2: one minus the mean cosine of the pictures with the text.
+
+    MeshNCA compares its equation 9 with the cosine of the mean (figure 17), to which it does not matter how
+    much the pictures differ.
 
     Args:
-        pictures: (D,), a `mean_direction`, not zero.
+        pictures: (D,), a `mean_direction`.
         text: (D,) embedding of what is wanted.
     """
-    return 1 - F.cosine_similarity(pictures, text, dim=0)
+    return 1 - pictures @ F.normalize(text, dim=0)

@@ -72,7 +72,9 @@ def test_its_gradient():
     )
 
 
-def test_the_plain_distance_is_one_less_the_cosine():
+def test_the_plain_distance_is_one_less_the_mean_cosine():
+    """Of each picture, whatever the lengths."""
     text, across = torch.tensor([2.0, 0, 0]), torch.tensor([0, 3.0, 0])
-    values = [text_distance(pictures, text).item() for pictures in (5 * text, across, text + across, -text)]
-    assert values == pytest.approx([0, 1, 1 - 2 / math.sqrt(13), 2], abs=1e-6)
+    groups = [[5 * text], [across], [text + across], [-text], [text, -3 * text], [text, across]]
+    values = [text_distance(mean_direction(torch.stack(group)), text).item() for group in groups]
+    assert values == pytest.approx([0, 1, 1 - 2 / math.sqrt(13), 2, 1, 0.5], abs=1e-6)

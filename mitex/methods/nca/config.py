@@ -247,6 +247,7 @@ PRESETS["text-words"] = replace(
     PRESETS["text"],
     preset="text-words",
     steps=300,
+    surfaces=("even",),
     frequency=24,
     min_steps=12,
     max_steps=24,

@@ -62,7 +62,7 @@ def text_directional(build):
     sight = one.sight(surface, int(torch.randint(one.config.text_bank, (), generator=generator)))
     views = one.figures[surface].textured(one.look, one.pool[0], sight.cameras)
     (pictures,) = one._directions([sight.whole(views.coloured, one.model.resolution)])
-    assert _terms(one)["whole"] == pytest.approx(1 - torch.cosine_similarity(pictures, one.text, 0).item())
+    assert _terms(one)["whole"] == pytest.approx(1 - (pictures @ one.text).item())
     assert _terms(one)["whole"] != pytest.approx(_terms(build())["whole"])
 
 
