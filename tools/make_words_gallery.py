@@ -26,7 +26,7 @@ def main() -> None:
     parser.add_argument("--columns", type=int, help="pictures in a row; by default the surfaces of a texture")
     parser.add_argument("--out", type=Path, default=SHEET)
     options = parser.parse_args()
-    surfaces = [icosphere(24), *(Mesh.load(mesh) for mesh in options.meshes.split(","))]
+    surfaces = [icosphere(32), *(Mesh.load(mesh) for mesh in options.meshes.split(","))]
     pictures, labels = [], []
     for run in options.runs:
         texture = NcaTexture.load(run)

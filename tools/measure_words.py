@@ -78,7 +78,7 @@ def measured(mesh: Mesh, names: np.ndarray, figure: str, density: float) -> Meas
 
 def row(texture: NcaTexture, surface: str) -> str:
     """A line of the table."""
-    mesh = icosphere(24) if surface == SPHERE else Mesh.load(surface)
+    mesh = icosphere(32) if surface == SPHERE else Mesh.load(surface)
     asset = texture.apply(mesh, resolution=None, keep_dense=True)
     text = str(texture.about["text"])
     colours = named(text)
