@@ -14,10 +14,12 @@ from mitex.methods import nca
 from mitex.render import sheet, still, tone
 from mitex.training.progress import ProgressDisplay
 
+TEXT = "red dots on white"
+
 
 def main(
     out: str = "dots.png",
-    text: str = "red dots on white",
+    text: str = TEXT,
     settings: Sequence[str] = (),
     resolution: int = 384,
     spp: int = 64,
@@ -30,4 +32,4 @@ def main(
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:3])
+    main(*sys.argv[1:2], text=sys.argv[2] if len(sys.argv) > 2 else TEXT)
