@@ -9,7 +9,7 @@ import torch
 from mitex.exemplar import Exemplar
 from mitex.methods.nca import task as still_training
 from mitex.methods.nca.look import Look
-from mitex.methods.nca.motion import task as training
+from mitex.methods.nca.motion import pool as training
 from mitex.methods.nca.motion.start import with_condition
 from mitex.methods.nca.motion.task import MotionTask
 from mitex.methods.nca.surfaces import TrainingPlane, TrainingSphere
