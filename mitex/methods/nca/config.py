@@ -9,6 +9,7 @@ from mitex.errors import ConfigError
 from mitex.features.layers import check_layers
 from mitex.features.text_image import PROMPT
 from mitex.methods.nca.decoder.shape import COORDINATES, DecoderShape
+from mitex.methods.nca.ranges import MOST_STEPS
 from mitex.training.settings import TrainingConfig, key
 
 SURFACES = ("even", "uneven", "flat")
@@ -111,6 +112,7 @@ class NcaConfig(TrainingConfig):
     text_directional: bool = key(
         True, "compare the steps from the grey surface; false: pictures and text themselves"
     )
+    text_growth_steps: int = key(200, "automaton steps after which it is taken for grown", 1, MOST_STEPS)
     text_bank: int = key(64, "sets of views, drawn once, of which a step sees one", 1, 65_536)
     text_distances: tuple[float, ...] = key((2.5,), "of the cameras, one for each set", 1.01, 100)
     text_crops: int = key(2, "close-ups that are cut out of a view", 1, 64)
@@ -260,6 +262,7 @@ PRESETS["text-words"] = replace(
     text_parent=None,
     text_prompt="{text}",
     text_directional=False,
+    text_growth_steps=80,
     text_tilt=0.0,
     text_close_weight=0.0,
     text_relief_weight=0.0,

@@ -66,7 +66,7 @@ def fit_text(
     def texture(about: dict[str, Any]) -> NcaTexture:
         look = task.look.to("cpu")
         known = {"text": config.text, "text_model": model.name, "relief": config.text_relief}
-        known |= motion_record(config)
+        known |= motion_record(config) | {"growth_steps": config.text_growth_steps}
         family = {"family": weights_key(look)}
         return NcaTexture(look, about | {"density": config.density} | known | family | lineage)
 

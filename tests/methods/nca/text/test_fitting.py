@@ -34,7 +34,7 @@ def no_other_models(monkeypatch, tmp_path):
 @pytest.fixture(scope="module")
 def run(tmp_path_factory, clip):
     out = tmp_path_factory.mktemp("fit") / "run"
-    settings = [*SETTINGS, "steps=4", "preview_every=4", "checkpoint_every=2"]
+    settings = [*SETTINGS, "steps=4", "preview_every=4", "checkpoint_every=2", "text_growth_steps=7"]
     threads(1)
     return out, nca.fit_text(TEXT, out, clip=clip, set=settings)
 
@@ -56,6 +56,7 @@ def test_the_model_works_on_another_mesh(run):
     out, result = run
     about = result.about
     assert (about["name"], about["text"], about["text_model"]) == (TEXT, TEXT, "clip")
+    assert about["growth_steps"] == 7
     assert about["preset"] == "text" and about["relief"] == 2.5 and result.look.maps == ("albedo", "height")
     sphere = icosphere(6)
     grown = result.apply(sphere, steps=4, subdivide=0, resolution=None)
@@ -71,7 +72,7 @@ def test_the_model_works_on_another_mesh(run):
 
 def test_a_run_that_is_resumed_is_the_run_that_was_not_interrupted(run, clip, tmp_path):
     out, _ = run
-    settings = [*SETTINGS, "preview_every=4", "checkpoint_every=2"]
+    settings = [*SETTINGS, "preview_every=4", "checkpoint_every=2", "text_growth_steps=7"]
     nca.fit_text(TEXT, tmp_path / "parts", clip=clip, set=[*settings, "steps=2"])
     nca.fit_text(TEXT, tmp_path / "parts", steps=4, resume=True)
     assert_same_checkpoint(out, tmp_path / "parts")

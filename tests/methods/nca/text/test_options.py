@@ -166,4 +166,4 @@ def test_the_check_of_a_key_fails_where_it_is_ignored(build, key):
 
 def test_no_key_is_left_out():
     keys = {field.name for field in fields(NcaConfig) if field.name.partition("_")[0] == "text"}
-    assert keys == set(CHECKS) | {"text_model", "text_parent"}  # test_fitting
+    assert keys == set(CHECKS) | {"text_growth_steps", "text_model", "text_parent"}  # test_fitting
