@@ -62,7 +62,8 @@ def test_layers_of_the_authors():
 
 
 def test_names_and_default():
-    assert list(PRESETS) == ["patch", "paper", "motion", "motion-paper", "text", "text-paper"]
+    presets = ["patch", "paper", "motion", "motion-paper", "text", "text-words", "text-paper"]
+    assert list(PRESETS) == presets
     assert all(config.preset == name for name, config in PRESETS.items())
     assert resolve(PRESETS).preset == "patch"
 
