@@ -19,6 +19,7 @@ from mitex.methods.layout import with_layout
 from mitex.methods.surface.config import PRESETS, SurfaceConfig
 from mitex.methods.surface.content import AO, content_colours
 from mitex.methods.surface.domain import SurfaceDomain
+from mitex.methods.surface.scale_map import ScaleMap
 from mitex.methods.surface.task import SurfaceTask
 from mitex.methods.surface.texture import SurfaceTexture
 from mitex.methods.surface.tile import TileDomain
@@ -40,6 +41,7 @@ def fit(
     keep_uvs: bool = False,
     content: str | Path | None = None,
     orientation: np.ndarray | str | Path | None = None,
+    scale_map: np.ndarray | str | Path | None = None,
     **options: Unpack[RunOptions],
 ) -> SurfaceTexture:
     """Synthesizes the look of an exemplar on a mesh; writes a run folder with the texture in it.
@@ -53,6 +55,7 @@ def fit(
             for the mesh's ambient occlusion.
         orientation: (V, 3) where the exemplar's right shall point, or a file of it, see
             `mitex.mesh.fields.read_vectors`; else the frames follow the config.
+        scale_map: where the pattern's size varies: factors of it, see `ScaleMap.of`.
         options: preset ("fast", "paper", or "style", the default with `content`), and those of `RunOptions`.
 
     Returns:
@@ -70,8 +73,8 @@ def fit(
     image = content is not None and str(content) != AO
     field = None
     if mesh is None:
-        if keep_uvs or content is not None or orientation is not None:
-            raise ConfigError("a tile takes no UVs, content or orientation", "leave them out")
+        if keep_uvs or any(option is not None for option in (content, orientation, scale_map)):
+            raise ConfigError("a tile takes no UVs, content, orientation or scale map", "leave them out")
         domain: SurfaceDomain = TileDomain.flat(settings)
     else:
         given = mesh if isinstance(mesh, Mesh) else Mesh.load(mesh)
@@ -80,11 +83,15 @@ def fit(
             field = read_vectors(surface, orientation).astype(np.float32)
         else:
             field = orientation
-        domain = SurfaceDomain.of(surface, settings, field, keep=run.folder is not None)
+        sizes = None if scale_map is None else ScaleMap.of(scale_map, given)
+        domain = SurfaceDomain.of(surface, settings, field, sizes, keep=run.folder is not None)
     run.control.check()
+    settings.exemplar_side(domain.mean_scale)
     check_memory(domain.mesh, settings, len(target.maps))
     start = None if content is None else content_colours(content, domain)
     inputs = {"content_key": content_key(start), "orientation_key": content_key(field)}
+    if domain.factors is not None:
+        inputs["scale_map_key"] = content_key(domain.factors)
     task = SurfaceTask(settings, target, domain, start, inputs)
     origin: dict[str, Any] = {key: getattr(settings, key) for key in ("resolution", "frames", "angle")}
     return run.train(

@@ -23,6 +23,7 @@ from mitex.methods.surface.comparison import Comparison, GramComparison, Transpo
 from mitex.methods.surface.config import SurfaceConfig
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.network import SurfaceVgg
+from mitex.methods.surface.palette import Palette
 from mitex.methods.surface.texture import texel_layout
 from mitex.methods.surface.views import Views
 from mitex.progress import announce
@@ -95,9 +96,10 @@ class SurfaceTask(ParameterTask):
                 self.levels, config.pooling, bilinear=config.bilinear, scale=scale, weights=weights
             )
             self.networks.append(network)
-            size = max(config.exemplar_size >> scale, 16)
+            size = max(config.exemplar_side(domain.mean_scale) >> scale, 16)
             images = torch.from_numpy(triple_images(exemplar.resized(size), self.triples, self.layout))
-            self.comparisons.append(_comparison(config, image_network, images))
+            palette = Palette(self.levels, images, scale) if config.colours else None
+            self.comparisons.append(_comparison(config, image_network, images, palette))
         self.content: torch.Tensor | None = None
         if content is not None:
             start = torch.from_numpy(content[self.levels.order].astype(np.float32))
@@ -204,10 +206,12 @@ def _weights(config: SurfaceConfig, generator: torch.Generator) -> Weights:
     return convolutions(config.pooling, normalised=config.loss == "transport")
 
 
-def _comparison(config: SurfaceConfig, network: Vgg16, images: torch.Tensor) -> Comparison:
+def _comparison(
+    config: SurfaceConfig, network: Vgg16, images: torch.Tensor, palette: Palette | None
+) -> Comparison:
     if config.loss == "gram":
         region = round((config.region * images.shape[1]) ** 2) or None
-        return GramComparison(network, images, config.compared, region)
+        return GramComparison(network, images, config.compared, region, palette, config.colours)
     return TransportComparison(network, images, config.compared, config.samples, config.moment_weight)
 
 
