@@ -31,6 +31,7 @@ from mitex.training.settings import RunOptions
 
 # Peak over precomputation and steps, measured at 512^2 and 1024^2 with bfloat16 features.
 BYTES_PER_TEXEL, BYTES_PER_TRIPLE = 3600, 900
+VALUES = np.array([128, 256, 768, 1536, 1536])  # that VGG-16 has of each element, block by block
 
 
 def fit(
@@ -87,7 +88,7 @@ def fit(
         domain = SurfaceDomain.of(surface, settings, field, sizes, keep=run.folder is not None)
     run.control.check()
     settings.exemplar_side(domain.mean_scale)
-    check_memory(domain.mesh, settings, len(target.maps))
+    check_memory(domain.mesh, settings, len(target.maps), domain.steps)
     start = None if content is None else content_colours(content, domain)
     inputs = {"content_key": content_key(start), "orientation_key": content_key(field)}
     if domain.factors is not None:
@@ -105,8 +106,16 @@ def fit(
     )
 
 
-def check_memory(mesh: Mesh, config: SurfaceConfig, maps: int = 1) -> None:
+def check_memory(
+    mesh: Mesh, config: SurfaceConfig, maps: int = 1, steps: np.ndarray | None = None
+) -> None:
     """Refuses a resolution whose synthesis does not fit into the memory that is free.
+
+    Args:
+        mesh: with the texture's UVs.
+        config: settings.
+        maps: of the exemplar.
+        steps: (N,) how far apart the taps of the texels are, if that varies.
 
     Raises:
         ConfigError: with the estimate.
@@ -114,7 +123,7 @@ def check_memory(mesh: Mesh, config: SurfaceConfig, maps: int = 1) -> None:
     assert mesh.uv is not None
     share = 0.5 * np.abs(twice_area(mesh.uv)).sum()
     each = BYTES_PER_TEXEL + BYTES_PER_TRIPLE * (min(config.triples, maps) - 1)
-    memory = each * share * config.resolution**2
+    memory = each * share * config.resolution**2 * (1.0 if steps is None else _crowding(steps))
     free = available_memory()
     if free is not None and memory > free:
         fits = int(config.resolution * math.sqrt(free / memory))
@@ -123,3 +132,13 @@ def check_memory(mesh: Mesh, config: SurfaceConfig, maps: int = 1) -> None:
             f"and {free / 1e9:.1f} GB are free",
             f"set resolution to {max(fits, 1)} or less",
         )
+
+
+def _crowding(steps: np.ndarray) -> float:
+    """How many times as many values the network has where taps of texels are `steps` (N,) of them apart.
+
+    Pooling joins texels that are nearer to each other than the taps, so that small steps leave more elements.
+    """
+    pooled = 2.0 ** np.arange(len(VALUES))
+    elements = np.minimum(1.0, (pooled * steps[:, None]) ** -2).mean(axis=0)
+    return float(elements @ VALUES / (pooled**-2 @ VALUES))

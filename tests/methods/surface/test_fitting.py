@@ -199,6 +199,10 @@ def test_more_than_the_memory_is_refused_with_the_estimate(mesh, monkeypatch):
         match=r"2000\^2 needs about 7.2 GB of memory, and 1.8 GB are free; set resolution to 1000",
     ):
         room.check_memory(half, config)
+    monkeypatch.setattr(room, "available_memory", lambda: 2_000_000 * room.BYTES_PER_TEXEL + 1)
+    room.check_memory(half, config, steps=np.ones(3))
+    with pytest.raises(ConfigError, match="needs about 4[0-9]"):  # its pattern hardly pools
+        room.check_memory(half, config, steps=np.full(3, 0.25))
     monkeypatch.setattr(room, "available_memory", lambda: None)
     room.check_memory(half, config)
 
