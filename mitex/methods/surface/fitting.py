@@ -106,9 +106,7 @@ def fit(
     )
 
 
-def check_memory(
-    mesh: Mesh, config: SurfaceConfig, maps: int = 1, steps: np.ndarray | None = None
-) -> None:
+def check_memory(mesh: Mesh, config: SurfaceConfig, maps: int = 1, steps: np.ndarray | None = None) -> None:
     """Refuses a resolution whose synthesis does not fit into the memory that is free.
 
     Args:

@@ -48,7 +48,7 @@ def test_the_distance_along_an_axis_is_the_mean_of_squared_shifts():
 
 
 def test_stones_in_another_order_are_the_same_but_their_mean_is_not(levels):
-    """Shuffled pixels have the right colours one by one; of 4 x 4 and 16 x 16 of them only the mean is left."""
+    """Shuffled pixels have the right colours one by one, but only their mean is left of squares."""
     image = stones(hue=0.2)
     palette = Palette(levels, image[None])
     moved = torch.roll(image.flip(0), (STONE, 2 * STONE), (0, 1))
