@@ -1,76 +1,77 @@
-"""The colours of an exemplar, from pixels to whole stones, as distributions that a texture shall have.
+"""The colours of an exemplar, of pixels and of whole stones, as distributions that a texture shall have.
 
 Gram matrices are sums over many places: they are nearly right when each of many large, separate things has
-the mean of their colours. So the means of squares of 1, 4 and 16 texels, in which a stone counts as much as
-its colour is its own, are compared as distributions, by the squared Wasserstein-2 distance along six
-directions (sliced optimal transport, Rabin, Peyre, Delon and Bernot 2011).
+the mean of their colours. So the texels, and means of squares in which a stone's colour is left, are compared
+as distributions: by the squared Wasserstein-2 distance along six directions (sliced optimal transport, Rabin,
+Peyre, Delon and Bernot 2011).
 """
 
 from __future__ import annotations
+
+import math
 
 import torch
 import torch.nn.functional as F
 
 from mitex.methods.surface.levels import Levels
 
-POOLED = (0, 2, 4)  # how often colours are pooled before they are compared
-WHOLE = (0.5, 2.0)  # of a full group's number of texels: others, at borders and slopes, are left out
-LEAST = 256  # values that are compared at least
-FAINT = 0.1  # spread along a principal component, of the largest, below which less is expected of it
+SQUARES = 16  # along the exemplar's side
+WHOLE = (0.5, 2.0)  # of a full square's number of texels: others, at borders and slopes, are left out
+LEAST = 32  # squares on a surface; of fewer only texels are compared
+FAINT = 0.1  # of the texels' largest spread: smaller ones of squares count less
 GOLDEN = (1 + 5**0.5) / 2
 # (3, 6) the axes of an icosahedron: unit vectors, spread evenly.
-DIRECTIONS = (
-    torch.tensor(
-        [
-            [0.0, 0.0, 1.0, -1.0, GOLDEN, GOLDEN],
-            [1.0, -1.0, GOLDEN, GOLDEN, 0.0, 0.0],
-            [GOLDEN, GOLDEN, 0.0, 0.0, 1.0, -1.0],
-        ]
-    )
-    / (1 + GOLDEN**2) ** 0.5
-)
+DIRECTIONS = torch.tensor(
+    [
+        [0.0, 0.0, 1.0, -1.0, GOLDEN, GOLDEN],
+        [1.0, -1.0, GOLDEN, GOLDEN, 0.0, 0.0],
+        [GOLDEN, GOLDEN, 0.0, 0.0, 1.0, -1.0],
+    ]
+) / (1 + GOLDEN**2) ** 0.5
 
 
 class Palette:
-    """Squared distance of the distributions of colours, on one scale of the texture.
+    """Squared distances of the distributions of colours, on one scale of the texture.
+
+    Texels are compared in units of their largest spread. A texel's hue is left to the network: where it would
+    count as much as brightness, the noise of the start would become coloured speckle. Of squares all
+    directions count alike, so that stones of different hues stay different.
 
     Args:
         levels: of the surface.
-        images: (P, H, W, 3) the exemplar's channel triples on that scale.
+        images: (P, H, H, 3) the exemplar's channel triples on that scale.
         scale: how often texels were pooled to be compared with pixels of the images.
     """
 
     def __init__(self, levels: Levels, images: torch.Tensor, scale: int = 0) -> None:
-        self.groups: list[tuple[torch.Tensor, torch.Tensor]] = []
-        self.targets: list[torch.Tensor] = []
-        self.axes: list[torch.Tensor] = []
         planes = images.permute(0, 3, 1, 2)
-        for pooled in POOLED:
-            parent, whole = _groups(levels, scale + pooled, 4.0 ** (scale + pooled))
-            side = 1 << pooled
-            if len(whole) < LEAST or side > images.shape[1]:
-                break
-            means = F.avg_pool2d(planes, side, max(side // 4, 1))
-            self.groups.append((parent, whole))
-            self.axes.append(torch.stack([_axes(colours) for colours in means.flatten(2)]))
-            self.targets.append(means.flatten(2).mT @ self.axes[-1])
+        depth = round(math.log2(max(images.shape[1] / SQUARES, 1)))
+        self.groups = [_groups(levels, scale)]
+        self.targets, self.axes = [planes.flatten(2).mT], []
+        spreads = [float(_components(colours)[0][-1]) for colours in planes.flatten(2)]
+        self.axes.append(torch.stack([DIRECTIONS / spread for spread in spreads]))
+        squares = _groups(levels, scale + depth)
+        if depth and len(squares[1]) >= LEAST:
+            means = F.avg_pool2d(planes, 1 << depth, max((1 << depth) // 4, 1)).flatten(2)
+            self.groups.append(squares)
+            self.targets.append(means.mT)
+            self.axes.append(torch.stack([_whitening(*pair) for pair in zip(means, spreads, strict=True)]))
 
     def distance(self, colours: torch.Tensor, k: int) -> torch.Tensor:
-        """The distance of the distributions, averaged over the sizes of the squares.
+        """The distance of the distributions of texels, and that of squares, added.
 
         Args:
             colours: (n, 3) the texels' channels of triple `k`, in the order of the levels.
             k: the triple.
 
         Returns:
-            Scalar: about 1 where all colours are alike.
+            Scalar: of the order of 1 where all colours are alike.
         """
         total = torch.zeros(())
-        for groups, axes, targets in zip(self.groups, self.axes, self.targets, strict=True):
-            parent, whole = groups
-            means = _means(colours, parent)[whole] if len(parent) else colours
-            total = total + sliced_distance(means @ axes[k], targets[k])
-        return total / max(len(self.groups), 1)
+        for (parent, whole), axes, targets in zip(self.groups, self.axes, self.targets, strict=True):
+            means = _means(colours, parent)[whole]
+            total = total + sliced_distance(means @ axes[k], targets[k] @ axes[k])
+        return total
 
 
 def sliced_distance(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
@@ -80,29 +81,34 @@ def sliced_distance(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
     return (ranked - quantiles).square().mean()
 
 
-def _axes(colours: torch.Tensor) -> torch.Tensor:
+def _components(colours: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Spreads (3,), ascending, and directions (3, 3), by columns, of the principal components of (3, n)."""
+    variance, directions = torch.linalg.eigh(torch.cov(colours))
+    return variance.clamp(min=1e-8).sqrt(), directions
+
+
+def _whitening(colours: torch.Tensor, largest: float) -> torch.Tensor:
     """(3, 6) what takes colours to coordinates in which (3, n) of them vary by 1 along all directions.
 
-    So a difference in hue counts as much as one in brightness, which varies far more in most exemplars.
+    Less where their spread is less than `FAINT` of `largest`.
     """
-    spread, components = torch.linalg.eigh(torch.cov(colours))
-    spread = spread.clamp(min=max(float(spread[-1]) * FAINT**2, 1e-6)).sqrt()
-    return components / spread @ DIRECTIONS
+    spread, directions = _components(colours)
+    return directions / spread.clamp(min=FAINT * largest) @ DIRECTIONS
 
 
-def _groups(levels: Levels, depth: int, full: float) -> tuple[torch.Tensor, torch.Tensor]:
-    """(n,) the group of each texel after `depth` poolings, none if 0, and the groups that are whole."""
-    if depth == 0:
-        return torch.empty(0, dtype=torch.int64), torch.arange(len(levels.order))
-    sizes = torch.from_numpy(levels.levels[0].sizes.astype("int64"))
-    parent = torch.repeat_interleave(sizes)
-    for level in levels.levels[1:depth]:
+def _groups(levels: Levels, depth: int) -> tuple[torch.Tensor, torch.Tensor]:
+    """(n,) the group of each texel after `depth` poolings, and the groups that are whole."""
+    parent = torch.arange(len(levels.order))
+    for level in levels.levels[:depth]:
         parent = torch.repeat_interleave(torch.from_numpy(level.sizes.astype("int64")))[parent]
-    count = torch.bincount(parent)
+    count, full = torch.bincount(parent), 4.0**depth
     return parent, torch.nonzero((count >= WHOLE[0] * full) & (count <= WHOLE[1] * full))[:, 0]
 
 
 def _means(values: torch.Tensor, parent: torch.Tensor) -> torch.Tensor:
+    """(m, C) means of the values (n, C) of each group."""
     count = int(parent[-1]) + 1
+    if count == len(values):
+        return values
     total = values.new_zeros(count, values.shape[1]).index_add(0, parent, values)
     return total / torch.bincount(parent, minlength=count)[:, None]

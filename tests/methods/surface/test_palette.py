@@ -1,4 +1,4 @@
-"""Distributions of colours, from pixels to whole stones."""
+"""Distributions of colours, of pixels and of whole stones."""
 
 import pytest
 import torch
@@ -6,7 +6,7 @@ import torch
 from mitex.methods.surface.palette import DIRECTIONS, Palette, sliced_distance
 from mitex.methods.surface.tile import tile_levels
 
-SIDE, STONE = 256, 16
+SIDE, STONE = 256, 40  # [px]; a sixteenth of the side is compared, wherever it lies
 
 
 @pytest.fixture(scope="module")
@@ -17,10 +17,10 @@ def levels():
 def stones(seed=0, hue=0.02):
     """(SIDE, SIDE, 3) squares of one colour each, which differ most in brightness, with a little noise."""
     generator = torch.Generator().manual_seed(seed)
-    count = SIDE // STONE
+    count = -(-SIDE // STONE)
     brightness = 0.3 + 0.4 * torch.rand(count, count, 1, generator=generator)
     colours = brightness + hue * (torch.rand(count, count, 3, generator=generator) - 0.5)
-    image = colours.repeat_interleave(STONE, 0).repeat_interleave(STONE, 1)
+    image = colours.repeat_interleave(STONE, 0).repeat_interleave(STONE, 1)[:SIDE, :SIDE]
     return image + 0.02 * (torch.rand(image.shape, generator=generator) - 0.5)
 
 
@@ -51,21 +51,21 @@ def test_stones_in_another_order_are_the_same_but_their_mean_is_not(levels):
     """Shuffled pixels have the right colours one by one, but only their mean is left of squares."""
     image = stones(hue=0.2)
     palette = Palette(levels, image[None])
-    moved = torch.roll(image.flip(0), (STONE, 2 * STONE), (0, 1))
+    moved = torch.roll(image.flip(0), (16, 32), (0, 1))
     shuffled = image.reshape(-1, 3)[torch.randperm(SIDE**2, generator=torch.Generator().manual_seed(0))]
     distances = [
         float(palette.distance(on_texels(x, levels), 0)) for x in (image, moved, shuffled.view(image.shape))
     ]
-    assert distances[0] < 0.03 and distances[1] < 0.03 and 0.4 < distances[2] < 0.7
+    assert distances[0] < 0.03 and distances[1] < 0.03 and 0.4 < distances[2] < 0.9
 
 
-def test_hue_counts_as_much_as_brightness(levels):
-    """Where both are spread independently, each is a part of the distance that its dimensions are."""
+def test_of_squares_hue_counts_as_much_as_brightness(levels):
+    """It is two of three dimensions; of texels it counts as much as it is spread."""
     image = stones(hue=0.1)
     palette = Palette(levels, image[None])
     grey = image.mean(2, keepdim=True).expand(-1, -1, 3)
     lost = float(palette.distance(on_texels(grey, levels), 0))
-    assert 0.3 < lost < 0.8  # two of three dimensions, along the axes nearest to them
+    assert 0.2 < lost < 0.8
 
 
 def test_its_gradient_leads_to_the_colours(levels):
