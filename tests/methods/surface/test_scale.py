@@ -45,6 +45,7 @@ def test_the_exemplar_is_as_wide_on_the_mesh_at_every_resolution():
 def square_levels(steps):
     """Texels and levels of a flat square of 64 x 64 texels, whose taps are `steps` of the texels apart."""
     mesh = flat_square(8)
+    assert mesh.uv is not None
     texels = Texels.rasterize(mesh, mesh.uv, SIDE)
     frames = tangent_frames(mesh, texels.face, texels.barycentric, "fixed")
     widths = steps(texels.position)
@@ -123,6 +124,7 @@ def test_a_picture_lies_on_the_mesh_s_own_uvs(tmp_path):
     mapped = SurfaceDomain.of(
         mesh, config(["resolution=64"]), scale_map=ScaleMap.of(tmp_path / "ramp.npy", mesh)
     )
+    assert mapped.steps is not None
     assert np.isclose(np.log(mapped.steps).mean(), 0, atol=1e-9)
     assert np.allclose(mapped.steps * mapped.mean_scale, expected)
 
