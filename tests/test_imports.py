@@ -69,6 +69,7 @@ LAZY = {
 COMPARED = {
     "displacement": {"geometric"},
     "multi_view_gram": {"surface"},
+    "style_mesh": {"surface", "multi_view_gram"},
     "quilted": {"nerf"},
     "plain_field": {"nerf"},
 }

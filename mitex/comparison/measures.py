@@ -63,8 +63,8 @@ LOOKS = (
         "gram",
         "Gram",
         LOWER,
-        "Squared distance of the Gram matrices of five layers of VGG-16. surface, gatys, multi_view_gram and "
-        "reaction_diffusion train with it.",
+        "Squared distance of the Gram matrices of five layers of VGG-16. surface, gatys, multi_view_gram, "
+        "reaction_diffusion, solid_texture and style_mesh train with it.",
     ),
     Measure(
         "seams",
