@@ -59,7 +59,7 @@ class SurfaceConfig(TrainingConfig):
     )
     colours: float = key(
         0.2,
-        "loss=gram: weight of the distributions of colours, from pixels to whole stones; the paper: 0",
+        "loss=gram: weight of the distributions of colours, of texels and of whole stones; the paper: 0",
         0,
     )
     layers: tuple[str, ...] = key((), "compared: VGG's convolutions and poolings; none stands for all")
@@ -129,7 +129,7 @@ class SurfaceConfig(TrainingConfig):
             return side
         raise ConfigError(
             f"the exemplar would be {side} texels wide with a scale of {self.scale * factor:g}",
-            f"change scale or resolution so that it is {least} to {most}",
+            f"change scale, resolution or exemplar_size so that it is {least} to {most}",
         )
 
     @property

@@ -96,9 +96,9 @@ class SurfaceDomain:
     @cached_property
     def factors(self) -> np.ndarray | None:
         """(N,) factors of the pattern's size at the texels; None where it is the same everywhere."""
-        texels = self.texels
         if self.scale_map is None:
             return None
+        texels = self.texels
         return self.scale_map.at(self.mesh, texels.face, texels.barycentric)
 
     @property

@@ -21,13 +21,16 @@ LEAST = 32  # squares on a surface; of fewer only texels are compared
 FAINT = 0.1  # of the texels' largest spread: smaller ones of squares count less
 GOLDEN = (1 + 5**0.5) / 2
 # (3, 6) the axes of an icosahedron: unit vectors, spread evenly.
-DIRECTIONS = torch.tensor(
-    [
-        [0.0, 0.0, 1.0, -1.0, GOLDEN, GOLDEN],
-        [1.0, -1.0, GOLDEN, GOLDEN, 0.0, 0.0],
-        [GOLDEN, GOLDEN, 0.0, 0.0, 1.0, -1.0],
-    ]
-) / (1 + GOLDEN**2) ** 0.5
+DIRECTIONS = (
+    torch.tensor(
+        [
+            [0.0, 0.0, 1.0, -1.0, GOLDEN, GOLDEN],
+            [1.0, -1.0, GOLDEN, GOLDEN, 0.0, 0.0],
+            [GOLDEN, GOLDEN, 0.0, 0.0, 1.0, -1.0],
+        ]
+    )
+    / (1 + GOLDEN**2) ** 0.5
+)
 
 
 class Palette:

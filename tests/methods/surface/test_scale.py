@@ -38,7 +38,7 @@ def test_the_exemplar_is_as_wide_on_the_mesh_at_every_resolution():
         assert config(words).exemplar_side() == side
     assert config([]).exemplar_side(0.5) == 128
     for words in (["scale=0.05"], ["scale=20"], ["resolution=16"]):
-        with pytest.raises(ConfigError, match=r"texels wide with a scale of .*; change scale or resolution"):
+        with pytest.raises(ConfigError, match=r"texels wide with a scale of .*; change scale, resolution or"):
             config(words)
 
 
