@@ -76,7 +76,7 @@ class SurfaceConfig(TrainingConfig):
     diffusion: float = key(
         0.03,
         "part of each texel replaced in every step by the mean of what its taps read, which wears down what "
-        "the first convolution cannot see; the paper: 0",
+        "the first convolution cannot see; it falls with the learning rate; the paper: 0",
         0,
         1,
     )

@@ -249,6 +249,19 @@ def test_the_loss_changes_nothing(mesh, exemplar, setting):
     assert_loss_is_pure(small_task(mesh, exemplar, setting), 1)
 
 
+def test_diffusion_falls_with_the_learning_rate(mesh, exemplar):
+    task = small_task(mesh, exemplar, DIFFUSION, "milestones=2,4", "layers=relu1_1")
+    start, moved = task.coordinates.detach().mul(0.1), {}
+    for step in (0, 1, 2, 5):
+        with torch.no_grad():
+            task.coordinates.copy_(start)
+        task.loss(step, torch.Generator()).commit()
+        moved[step] = task.coordinates.detach() - start
+    assert moved[0].abs().max() > 1e-4 and torch.equal(moved[0], moved[1])
+    for step, share in ((2, 0.5), (5, 0.25)):
+        assert torch.allclose(moved[step], share * moved[0], atol=1e-6)
+
+
 def test_previews_show_the_mesh_beside_the_exemplar(mesh, exemplar):
     task = small_task(mesh, exemplar)
     values = torch.zeros(len(task.coordinates), task.channels)
