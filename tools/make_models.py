@@ -42,19 +42,20 @@ class Recipe:
     settings: tuple[str, ...] = LONG
 
 
+QUICK = ("steps=200", "milestones=120,170")  # without order
 FINE = (*LONG[:2], "density=64")  # patterns that are small in their exemplar
 SMALL = ("view_count=8",)  # exemplars of 128 pixels have one zoom, so more views of it
 RECIPES = {
     PARENT: Recipe("scales", None, ()),
     "bricks": Recipe("bricks"),
     "cobblestone": Recipe("cobblestone"),
-    "fur": Recipe("Stylized_Fur_001", settings=(*LONG, *SMALL)),
+    "fur": Recipe("Stylized_Fur_001", settings=(*QUICK, "density=48", *SMALL)),
     "hexagons": Recipe("hexagons"),
     "honeycomb": Recipe("Honeycomb_002", settings=(*FINE, *SMALL)),
     "knit": Recipe("knit", settings=FINE),
     "lava": Recipe("lava"),
-    "leather": Recipe("leather", settings=FINE),
-    "mosaic": Recipe("Abstract_008", settings=(*LONG, *SMALL)),
+    "leather": Recipe("leather", settings=(*QUICK, "density=64")),
+    "mosaic": Recipe("Abstract_008", settings=(*QUICK, *SMALL)),
     "pebbles": Recipe("Pebbles_025", settings=(*FINE, *SMALL)),
     "planks": Recipe("planks"),
     "rust": Recipe("rust"),
