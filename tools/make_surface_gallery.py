@@ -106,14 +106,14 @@ def texture(exemplar: Exemplar, mesh: Mesh, run: Path, settings: dict[str, str])
     if (run / NAME).is_file():
         return surface.SurfaceTexture.load(run)
     overrides = {key: value for key, value in settings.items() if key not in INPUTS}
-    inputs = {key: settings[key] for key in INPUTS & settings.keys()}
-    if "scale_map" in inputs:
+    content, ends, scale_map = settings.get("content"), settings.get("scale_map"), None
+    if ends is not None:
         height = mesh.vertices[:, 1]
-        inputs["scale_map"] = np.interp(
-            height, (height.min(), height.max()), [float(end) for end in inputs["scale_map"].split(":")]
-        )
+        scale_map = np.interp(height, (height.min(), height.max()), [float(end) for end in ends.split(":")])
     resume = (run / checkpoint.NAME).is_file()
-    return surface.fit(exemplar, mesh, run, set=overrides, resume=resume, **inputs)
+    return surface.fit(
+        exemplar, mesh, run, set=overrides, content=content, scale_map=scale_map, resume=resume
+    )
 
 
 def pictures(result: surface.SurfaceTexture, count: int, side: int) -> list[np.ndarray]:
