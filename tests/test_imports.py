@@ -70,6 +70,7 @@ COMPARED = {
     "displacement": {"geometric"},
     "multi_view_gram": {"surface"},
     "style_mesh": {"surface", "multi_view_gram"},
+    "text2mesh": {"surface"},
     "quilted": {"nerf"},
     "plain_field": {"nerf"},
 }

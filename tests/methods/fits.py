@@ -88,7 +88,12 @@ FITS = {
     ),
     "style_mesh": TinyFit(
         "--exemplar photo.png --mesh cube.obj --steps 2 --set resolution=32 exemplar_size=64 view=64 "
-        f"views=2 layers=relu1_1 small_layers=relu1_1 {SMALL_RUN}",
+        f"views=2 layers=relu1_1 weights=1 small_layers=relu1_1 {SMALL_RUN}",
+        "--mesh cube.obj",
+    ),
+    "text2mesh": TinyFit(
+        "--exemplar photo.png --mesh cube.obj --steps 2 --set resolution=32 exemplar_size=32 view=32 "
+        f"width=8 layers=relu1_1 {SMALL_RUN}",
         "--mesh cube.obj",
     ),
     "displacement": TinyFit("--reference spikes --set resolution=16", "--mesh cube.obj", resume=""),

@@ -32,6 +32,7 @@ CONFIG = StyleMeshConfig(
     view=64,
     antialias=1,
     layers=("relu1_1", "relu2_1"),
+    weights=(1.0, 1.0),
     small_layers=("relu2_1",),
     preview_every=0,
     milestones=(),
@@ -42,6 +43,7 @@ SMALL = {
     "views": 2,
     "view": 64,
     "layers": ("relu1_1",),
+    "weights": (1.0,),
     "small_layers": ("relu1_1",),
     "checkpoint_every": 2,
     "preview_every": 0,
@@ -176,7 +178,12 @@ class TestTask:
                 {"exemplar_size": 80},
                 {"coarse_first": 9.0},
             ),
-            *({"layers": ("relu2_1",)}, {"small_layers": ()}, {"textures": 2}),
+            *(
+                {"layers": ("relu2_1",), "weights": (1.0,)},
+                {"weights": (1.0, 3.0)},
+                {"small_layers": ()},
+                {"textures": 2},
+            ),
         ):
             assert not torch.equal(gradients(**options), plain), options
 
@@ -208,6 +215,7 @@ class TestRefused:
         [
             ("layers=relu9_1", "relu9_1; use some of"),
             ("small_layers=relu2_2", "small_layers holds relu2_2"),
+            ("weights=1,2", "2 weights for 5 layers"),
             ("resolution=100", "use a multiple of 8"),
             ("view=8", "out of range"),
         ],

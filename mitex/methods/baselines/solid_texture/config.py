@@ -14,7 +14,7 @@ class SolidConfig(TrainingConfig):
     """Everything that shapes a training; every key can be set from a TOML file or with `--set`."""
 
     steps: int = 600
-    exemplar_size: int = key(128, "side of the exemplar [voxels]", 32, 1024)
+    exemplar_size: int = key(256, "side of the exemplar [voxels]", 32, 1024)
     width: float = key(
         EXEMPLAR_WIDTH, "side of the exemplar on a mesh, of that of a layout's square", 0.01, 10
     )

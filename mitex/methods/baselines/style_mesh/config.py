@@ -33,11 +33,12 @@ class StyleMeshConfig(TrainingConfig):
     layers: tuple[str, ...] = key(
         ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "VGG-16's that are compared"
     )
+    weights: tuple[float, ...] = key((0.1, 0.1, 0.001, 0.001, 0.1), "of the layers", 0)
     small_layers: tuple[str, ...] = key(
         ("relu4_1", "relu5_1"), "layers that are compared with the exemplar at half its size, too"
     )
     coarse_first: float = key(
-        0.01, "how much finer textures are held near zero, so that coarse ones take what they can", 0
+        3.25e8, "how much finer textures are held near zero, so that coarse ones take what they can", 0
     )
     lr: float = key(0.01, "learning rate of Adam [of the colours' range]; the paper: a level of 8 bits", 0)
     milestones: tuple[int, ...] = key((206, 411), "steps at which the learning rate falls", 0)
@@ -47,6 +48,10 @@ class StyleMeshConfig(TrainingConfig):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_layers(self.layers)
+        if len(self.weights) != len(self.layers):
+            raise ConfigError(
+                f"{len(self.weights)} weights for {len(self.layers)} layers", "give one for each"
+            )
         if unknown := set(self.small_layers) - set(self.layers):
             raise ConfigError(
                 f"small_layers holds {', '.join(sorted(unknown))}", f"use some of {', '.join(self.layers)}"

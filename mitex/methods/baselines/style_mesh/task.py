@@ -55,7 +55,8 @@ class StyleMeshTask(ParameterTask):
             TextureViews(self.box, charts, self._camera(0, k), config.antialias)
             for k in range(config.heights)
         ]
-        self.network = Vgg16("max")
+        self.network = Vgg16("max", normalised=False)
+        self.weights = dict(zip(config.layers, config.weights, strict=True))
         self.targets = self._grams(config.exemplar_size, config.layers)
         self.small_targets = self._grams(config.exemplar_size // 2, config.small_layers)
 
@@ -103,12 +104,12 @@ class StyleMeshTask(ParameterTask):
             picture.register_hook(lambda gradient: gradient * weight[..., None])
         features = self.network.features(picture[None], self.config.layers)
         grams = {layer: covered_gram(features[layer][0], coverage) for layer in self.config.layers}
-        total = gram_distance(grams, self.targets)
+        total = gram_distance(grams, self.targets, self.weights)
         if self.config.by_angle and self.small_targets:
             frontal = coverage * torch.from_numpy(visible.cosine > self._frontal).float()
             if frontal.mean() > LEAST:
                 small = {n: covered_gram(features[n][0], frontal) for n in self.small_targets}
-                total = total + gram_distance(small, self.small_targets)
+                total = total + gram_distance(small, self.small_targets, self.weights)
         return total
 
     def _weight(self, visible: Visible, k: int) -> torch.Tensor:
