@@ -78,11 +78,11 @@ def _trimap(site: Site, view: int, guess: Guess, volume: Hull, size: tuple[int, 
     trimap = np.where(region, cv2.GC_PR_FGD, cv2.GC_BGD).astype(np.uint8)
     seen = site.seen(view)
     scale = size[1] / camera.mask.shape[1]
-    for points, label in ((guess.off, cv2.GC_BGD), (guess.on, cv2.GC_FGD)):
+    for points, label, radius in ((guess.off, cv2.GC_BGD, 2), (guess.on, cv2.GC_FGD, 1)):
         chosen = site.points[seen[points[seen]]]
         pixels, _ = project(chosen, camera.pose, camera.intrinsics, camera.distortion)
         for column, row in np.round(scale * pixels - 0.5).astype(int):
-            cv2.circle(trimap, (int(column), int(row)), 2, int(label), -1)
+            cv2.circle(trimap, (int(column), int(row)), radius, int(label), -1)
     return trimap
 
 
@@ -95,7 +95,12 @@ def _grab_cut(picture: np.ndarray, trimap: np.ndarray) -> np.ndarray:
     models = np.zeros((1, 65)), np.zeros((1, 65))
     cv2.setRNGSeed(0)
     cv2.grabCut(
-        np.ascontiguousarray(picture[rows, columns]), labels, None, *models, ITERATIONS, cv2.GC_INIT_WITH_MASK
+        np.ascontiguousarray(picture[rows, columns]),
+        labels,
+        (0, 0, 1, 1),
+        *models,
+        ITERATIONS,
+        cv2.GC_INIT_WITH_MASK,
     )
     mask = np.zeros(trimap.shape, bool)
     mask[rows, columns] = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)

@@ -18,7 +18,8 @@ CLEAR = 0.02  # height above a table from which a point is on the object [distan
 AROUND = 0.6  # farthest point of the object from the middle [distances]
 GAP = 0.08  # between points of one thing, at most [distances]
 MARGIN = 1.15  # radius of the ball around the object's points to what they need
-CORE = 0.3  # radius of what all pictures have in their middle [their narrowest half field]
+WIDE = 1.5  # the same where only its middle is known
+CORE = 0.15  # radius of the middle of a picture [its shorter side]
 LEAST = 20  # points of an object
 
 
@@ -50,21 +51,24 @@ def on_table(site: Site) -> Guess:
     candidates = np.flatnonzero(near & (height > CLEAR * site.distance))
     on = np.zeros(len(site.points), bool)
     on[candidates[_largest_group(site.points[candidates], GAP * site.distance)]] = True
-    return _around(site, on, table)
+    return _around(site, on, table=table)
 
 
 def in_middle(site: Site) -> Guess:
-    """What all pictures have in their middle, with nothing known about what is below it.
+    """What is in the middle of the pictures, and nearer than where the cameras' axes meet.
 
     Raises:
         CaptureError: no points are there.
     """
-    fields = [
-        np.linalg.norm(view.pose[:, 3] - site.middle) * 0.5 * min(view.mask.shape) / view.intrinsics[0]
-        for view in site.views
-    ]
-    on = np.linalg.norm(site.points - site.middle, axis=1) < CORE * min(fields)
-    return _around(site, on, None)
+    on = np.zeros(len(site.points), bool)
+    for k, view in enumerate(site.views):
+        seen = site.seen(k)
+        pixels, depth = project(site.points[seen], view.pose, view.intrinsics, view.distortion)
+        height, width = view.mask.shape
+        off_centre = np.linalg.norm(pixels - (0.5 * width, 0.5 * height), axis=1)
+        far = np.linalg.norm(view.pose[:, 3] - site.middle)
+        on[seen[(off_centre < CORE * min(height, width)) & (depth < far)]] = True
+    return _around(site, on, margin=WIDE)
 
 
 def in_box(site: Site, mask: np.ndarray) -> Guess:
@@ -82,11 +86,13 @@ def in_box(site: Site, mask: np.ndarray) -> Guess:
     shown = inside & mask[row.clip(0, height - 1), column.clip(0, width - 1)]
     on = np.zeros(len(site.points), bool)
     on[seen[shown]] = True
-    return _around(site, on, None, front=view)
+    return _around(site, on, front=view)
 
 
-def _around(site: Site, on: np.ndarray, table: Plane | None, front: View | None = None) -> Guess:
-    """A ball around points, above the table; points of the front only are on the ball's near half."""
+def _around(
+    site: Site, on: np.ndarray, margin: float = MARGIN, table: Plane | None = None, front: View | None = None
+) -> Guess:
+    """A ball around points, above the table; points that one view shows are on the ball's near half."""
     if on.sum() < LEAST:
         raise CaptureError(
             f"only {on.sum()} points of an object were found",
@@ -95,7 +101,7 @@ def _around(site: Site, on: np.ndarray, table: Plane | None, front: View | None 
     points = site.points[on]
     low, high = np.quantile(points, (0.01, 0.99), axis=0)
     centre = 0.5 * (low + high)
-    radius = MARGIN * float(np.quantile(np.linalg.norm(points - centre, axis=1), 0.99))
+    radius = margin * float(np.quantile(np.linalg.norm(points - centre, axis=1), 0.99))
     if front is not None:
         away = centre - front.pose[:, 3]
         centre = centre + 0.4 * radius * away / np.linalg.norm(away)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import BinaryIO
+from typing import IO
 
 import numpy as np
 from PIL import Image
@@ -130,7 +130,7 @@ def _frames(path: Path, size: int) -> Iterator[Picture]:
             decoder.kill()
 
 
-def _portable_pixmaps(stream: BinaryIO) -> Iterator[np.ndarray]:
+def _portable_pixmaps(stream: IO[bytes]) -> Iterator[np.ndarray]:
     """Pictures (H, W, 3) uint8 of a stream of PPM files, up to the last whole one."""
     while stream.readline() == b"P6\n":
         width, height = map(int, stream.readline().split())

@@ -25,7 +25,7 @@ class Look:
     """What a frame is judged by.
 
     Attributes:
-        sharpness: mean squared gradient of the luma (Tenengrad) over its squared mean: exposure does not matter.
+        sharpness: mean squared gradient of the luma (Tenengrad) over its squared mean, whatever the exposure.
         brightness: mean luma in [0, 1].
         thumbnail: (32, 32) float32, mean 0 and standard deviation 1.
     """
