@@ -129,7 +129,7 @@ BAD = {
 def test_what_cannot_be_captured(cameras, name, files, capsys):
     make, source, words, message = BAD[name]
     make(files)
-    out = [] if "--out" in words else ["--out", "out/capture"]
+    out = [] if "--out" in words else ["--out", "out/new/capture"]
     check_refused(files, ["capture", source, *out, *words.split(), "--quiet"], message, capsys)
 
 

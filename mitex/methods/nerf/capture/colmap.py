@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 MIN_PHOTOS = 8
 PLACED = 0.5  # part of the photos that must get a pose
+FIRST_PAIR = 50, 8.0  # matches, and angle [degrees], that the first two photos need
+FURTHER = 20  # matches that a further photo needs
 LONGER_SIDE = 1600  # of what COLMAP sees [pixels]
 VERSION = 1  # of the cached poses
 
@@ -138,6 +140,9 @@ def _largest(work: Path, one_camera: bool) -> pycolmap.Reconstruction | None:
     verification.ransac.random_seed = 0
     mapping = colmap.IncrementalPipelineOptions()
     mapping.random_seed, mapping.min_model_size = 0, MIN_PHOTOS
+    # COLMAP's own limits are for large photos: small, noisy frames of a video have fewer matches.
+    mapping.mapper.init_min_num_inliers, mapping.mapper.init_min_tri_angle = FIRST_PAIR
+    mapping.mapper.abs_pose_min_num_inliers = FURTHER
     mode = colmap.CameraMode.SINGLE if one_camera else colmap.CameraMode.PER_IMAGE
     database, images, models = work / "database.db", work / "images", work / "models"
     models.mkdir()

@@ -18,8 +18,7 @@ from mitex.methods.nerf.footage.site import Site
 from mitex.methods.nerf.footage.ways import Way
 from mitex.progress import counted
 
-WORKING = 480  # longer side of the pictures that are cut [pixels]
-ROUNDS = 2  # of cutting, each within what the masks before agree on
+ROUNDS = (400, 800)  # longer side of the pictures [pixels]; each within what the masks before agree on
 ITERATIONS = 3  # of GrabCut in a round
 SLACK = 0.03  # how far beyond the hull's silhouette a mask may reach [pictures]
 DIFFERENT = (12.0, 40.0)  # distance in CIELAB from which a colour is not the background's: least, most
@@ -32,11 +31,10 @@ def cut_out(site: Site, pictures: Sequence[np.ndarray], way: Way) -> list[np.nda
     Raises:
         CaptureError: there is no object to be found in that way.
     """
-    small = [_shrunk(picture) for picture in pictures]
     if way.kind == "colour":
-        masks = _by_colour(small, way.colour)
+        masks = _by_colour([_shrunk(picture, ROUNDS[-1]) for picture in pictures], way.colour)
     else:
-        masks = _by_points(site, small, _guess(site, small, way))
+        masks = _by_points(site, pictures, _guess(site, _shrunk(pictures[0], ROUNDS[0]), way))
     hull = _agreed(site, masks)
     shown = [silhouette(hull, view, mask.shape) for view, mask in zip(site.views, masks, strict=True)]
     masks = [_cleaned(mask & _grown(region)) for mask, region in zip(masks, shown, strict=True)]
@@ -44,30 +42,31 @@ def cut_out(site: Site, pictures: Sequence[np.ndarray], way: Way) -> list[np.nda
     return [_enlarged(mask, view.mask.shape) for mask, view in zip(kept, site.views, strict=True)]
 
 
-def _guess(site: Site, pictures: Sequence[np.ndarray], way: Way) -> Guess:
+def _guess(site: Site, first: np.ndarray, way: Way) -> Guess:
     if way.kind == "plane":
         return on_table(site)
     if way.kind == "hull":
         return in_middle(site)
-    height, width = pictures[0].shape[:2]
+    height, width = first.shape[:2]
     left, top, wide, tall = np.round(np.array(way.box) * (width, height, width, height)).astype(int)
     trimap = np.full((height, width), cv2.GC_BGD, np.uint8)
     trimap[top : top + tall, left : left + wide] = cv2.GC_PR_FGD
-    mask = _grab_cut(pictures[0], trimap)
+    mask = _grab_cut(first, trimap)
     return in_box(site, _enlarged(mask, site.views[0].mask.shape))
 
 
 def _by_points(site: Site, pictures: Sequence[np.ndarray], guess: Guess) -> list[np.ndarray]:
     """GrabCut of all pictures, started from sparse points and, from round to round, a tighter volume."""
     volume, masks = guess.volume, []
-    for number in range(ROUNDS):
-        work = f"cutting the object out, round {number + 1} of {ROUNDS}"
+    for number, side in enumerate(ROUNDS):
+        if masks:
+            volume = _agreed(site, masks)
+        small = [_shrunk(picture, side) for picture in pictures]
+        work = f"cutting the object out, round {number + 1} of {len(ROUNDS)}"
         masks = [
             _grab_cut(picture, _trimap(site, view, guess, volume, picture.shape[:2]))
-            for view, picture in counted(work, enumerate(pictures), len(pictures))
+            for view, picture in counted(work, enumerate(small), len(small))
         ]
-        if number + 1 < ROUNDS:
-            volume = _agreed(site, masks)
     return masks
 
 
@@ -146,8 +145,8 @@ def _agreed(site: Site, masks: Sequence[np.ndarray]) -> Hull:
     return hull
 
 
-def _shrunk(picture: np.ndarray) -> np.ndarray:
-    scale = min(WORKING / max(picture.shape[:2]), 1.0)
+def _shrunk(picture: np.ndarray, side: int) -> np.ndarray:
+    scale = min(side / max(picture.shape[:2]), 1.0)
     size = round(picture.shape[1] * scale), round(picture.shape[0] * scale)
     return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
 

@@ -7,7 +7,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -25,7 +25,7 @@ from mitex.methods.nerf.footage.pictures import Footage, footage
 from mitex.methods.nerf.footage.sharpest import faults, reasons, sharpest
 from mitex.methods.nerf.footage.site import Site, find_site
 from mitex.methods.nerf.footage.ways import way_of
-from mitex.paths import check_writable, expanded, writing
+from mitex.paths import atomic_write, check_writable, expanded, missing_folders, writing
 from mitex.progress import counted
 
 FRAMES, SIZE = 80, 1600
@@ -136,7 +136,8 @@ def _write(folder: Path, site: Site, masks: Sequence[np.ndarray], kept: Sequence
     for k in kept:
         write_image(folder / "masks" / f"{site.frames[k].image.stem}.png", masks[k].astype(np.float32))
     tree = {"camera_model": "OPENCV", "frames": [_entry(frame) for frame in frames]}
-    (folder / ONE_FILE).write_text(json.dumps(tree, indent=1) + "\n")
+    with atomic_write(folder / ONE_FILE) as temporary:
+        temporary.write_text(json.dumps(tree, indent=1) + "\n")
     images = {frame.image.name for frame in frames}
     for path in (folder / "images").iterdir():
         if path.name not in images:
@@ -161,16 +162,21 @@ def _new_folder(out: Path, source: Path) -> Iterator[Path]:
     if out.resolve().is_relative_to(source.resolve()):
         raise OutputError(f"'{out}' is among the photos", "name a folder elsewhere")
     check_writable(out)
+    created = missing_folders(out.parent)
     with writing(out):
         out.parent.mkdir(parents=True, exist_ok=True)
         filling = Path(tempfile.mkdtemp(prefix=".filling-", dir=out.parent))
     try:
+        yield filling
         with writing(out):
-            yield filling
             filling.chmod(0o777 & ~_umask())
             os.replace(filling, out)
-    finally:
+    except BaseException:
         shutil.rmtree(filling, ignore_errors=True)
+        for folder in reversed(created):
+            with suppress(OSError):
+                folder.rmdir()
+        raise
 
 
 def _umask() -> int:
