@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from mitex.mesh import icosphere
 from mitex.methods.nerf.footage.pictures import footage
 from tests.methods.nerf.footage.stage import POSES
 
@@ -21,8 +22,15 @@ def tools():
         yield import_module("film_capture"), import_module("capture_errors")
 
 
+def ball(rng):
+    mesh = icosphere(8)
+    grey = np.full(mesh.vertices.shape, 0.5)
+    return None, import_module("capture_kit").Part(mesh, grey, grey[:, 0])
+
+
 def test_a_film_shows_the_object_where_the_truth_says(tools, tmp_path, monkeypatch):
     film, _ = tools
+    monkeypatch.setitem(film.KINDS, "woven", ball)
     words = ["--out", str(tmp_path), "--frames", "3", "--width", "64", "--spp", "1", "woven"]
     monkeypatch.setattr(sys, "argv", ["film_capture.py", *words])
     film.main()
