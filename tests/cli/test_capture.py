@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -140,3 +141,11 @@ def test_photos_that_do_not_overlap(monkeypatch, files, capsys):
     monkeypatch.setattr(site, "reconstruct", lost)
     write_photos(files / "photos", PICTURES[::-1])
     check_refused(files, ["capture", "photos", "--out", "out/c", "--quiet"], "only 0 of 10 photos", capsys)
+
+
+def test_without_opencv(cameras, monkeypatch, files, capsys):
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    for module in ("cutting", "silhouette"):
+        monkeypatch.delitem(sys.modules, f"mitex.methods.nerf.footage.{module}", raising=False)
+    shots(files)
+    check_refused(files, ["capture", "photos", "--out", "out/c", "--quiet"], "needs cv2; install it", capsys)

@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,15 +16,13 @@ import numpy as np
 from mitex.errors import CaptureError, OutputError
 from mitex.images import read_bytes, write_image
 from mitex.methods.checks import in_range
-from mitex.methods.nerf.capture.capture import MIN_VIEWS
+from mitex.methods.nerf.capture.capture import MIN_VIEWS, load_capture
 from mitex.methods.nerf.capture.transforms import ONE_FILE, Frame
-from mitex.methods.nerf.capture.visual_hull import visual_hull
 from mitex.methods.nerf.footage.coverage import advice
-from mitex.methods.nerf.footage.cutting import cut_out
 from mitex.methods.nerf.footage.pictures import Footage, footage
 from mitex.methods.nerf.footage.sharpest import faults, reasons, sharpest
 from mitex.methods.nerf.footage.site import Site, find_site
-from mitex.methods.nerf.footage.ways import way_of
+from mitex.methods.nerf.footage.ways import Way, way_of
 from mitex.paths import atomic_write, check_writable, expanded, missing_folders, writing
 from mitex.progress import counted
 
@@ -85,16 +83,10 @@ def make_capture(
     """
     in_range("`frames`", frames, MIN_VIEWS, 1000)
     in_range("`size`", size, 128, 8192)
-    way = way_of(mask)
+    way, cut_out = way_of(mask), _cut_out()
     with _new_folder(expanded(out), expanded(source)) as folder:
         taken = footage(source, size)
-        names, verdicts = _picked(taken, frames, folder)
-        if len(names) < MIN_VIEWS:
-            why = reasons(verdicts)
-            raise CaptureError(
-                f"{source} has {len(names)} pictures to work with{f' ({why})' if why else ''}",
-                "film for half a minute, slowly, all around the object, with the exposure locked",
-            )
+        names, why = _picked(taken, frames, folder)
         site = find_site(folder, names)
         if way.kind == "box" and site.frames[0].name != names[0]:
             raise CaptureError("the first picture, which the box is in, got no camera", "mask in another way")
@@ -106,15 +98,22 @@ def make_capture(
             )
         _write(folder, site, masks, kept)
         views = [replace(site.views[k], mask=masks[k]) for k in kept]
-        hull = visual_hull(views)
-        middle = site.middle if hull is None else np.mean(hull.bounds(), axis=0)
-        return Report(
-            taken.count, len(names), reasons(verdicts), len(masks), len(kept), advice(views, middle)
-        )
+        middle = load_capture(folder).similarity.inverse(np.zeros((1, 3)))[0]  # and so it is sure to load
+        return Report(taken.count, len(names), why, len(masks), len(kept), advice(views, middle))
 
 
-def _picked(taken: Footage, frames: int, folder: Path) -> tuple[list[str], list[str]]:
-    """Writes the pictures to work with; their names, and why others were left out."""
+def _cut_out() -> Callable[[Site, Sequence[np.ndarray], Way], list[np.ndarray]]:
+    try:
+        from mitex.methods.nerf.footage.cutting import cut_out
+    except ImportError as error:
+        raise CaptureError(
+            f"cutting an object out needs {error.name}", "install it with `pip install 'mitex[nerf]'`"
+        ) from error
+    return cut_out
+
+
+def _picked(taken: Footage, frames: int, folder: Path) -> tuple[list[str], str]:
+    """Writes the pictures to work with; their names, and why others were left out, in words."""
     images, looks = [], []
     parts = min(frames, taken.count)
     work = counted("picking sharp pictures", sharpest(taken.read(), taken.count, parts), parts)
@@ -124,10 +123,16 @@ def _picked(taken: Footage, frames: int, folder: Path) -> tuple[list[str], list[
         images.append(name)
         looks.append(look)
     verdicts = faults(looks) if taken.video else [""] * len(looks)
-    for name, verdict in zip(images, verdicts, strict=True):
-        if verdict:
-            (folder / name).unlink()
-    return [name for name, verdict in zip(images, verdicts, strict=True) if not verdict], verdicts
+    names = [name for name, verdict in zip(images, verdicts, strict=True) if not verdict]
+    why = reasons(verdicts)
+    if len(names) < MIN_VIEWS:
+        raise CaptureError(
+            f"{taken.source} has {len(names)} pictures to work with{f' ({why})' if why else ''}",
+            "film for half a minute, slowly, all around the object, with the exposure locked",
+        )
+    for name in set(images) - set(names):
+        (folder / name).unlink()
+    return names, why
 
 
 def _write(folder: Path, site: Site, masks: Sequence[np.ndarray], kept: Sequence[int]) -> None:
