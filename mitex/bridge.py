@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
+import numpy as np
 import torch
 from torch.autograd.function import once_differentiable
 
@@ -52,41 +53,52 @@ def render(
     sensor: mi.Sensor | int = 0,
     integrator: mi.Integrator | None = None,
     spp: int = 0,
+    seed: int = 0,
 ) -> torch.Tensor:
-    """An image of a scene by its `feature` integrator, attached to the parameters that are given as tensors.
+    """An image of a scene, attached to the parameters that are given as tensors.
 
-    The general way, for any sensor and any scene that the integrator can image; for a field on one mesh,
-    `lookup` is several times faster. The scene keeps the values, detached.
+    The general way, for any sensor and any scene: by the `feature` integrator, without light, or by one of
+    Mitsuba's that traces it, best one that computes gradients by replaying its paths (`prb`). For a field on
+    one mesh without light, `lookup` is several times faster. The scene keeps the values, detached.
 
     Args:
         scene: an `mi.Scene`.
         values: float32 CPU tensors by parameter name as in `mi.traverse(scene)` (the integrator's own are
             called `integrator.*` there, also when it is passed here), or one tensor, the `data` of the field,
-            if the integrator images exactly one of Mitex.
+            if the `feature` integrator images exactly one of Mitex.
         sensor: index of a sensor of the scene, or an `mi.Sensor`; `batch` sensors put their views side by
             side.
-        integrator: a `feature` integrator, if not the scene's.
-        spp: samples per pixel, a square number; 0 for the integrator's own setting.
+        integrator: if not the scene's.
+        spp: samples per pixel, a square number for `feature`; 0 for the scene's own setting.
+        seed: of the paths; another one, another noise. `feature` has none.
 
     Returns:
-        (H, W, C) float32. Gradients to every tensor are exact, including those of images that were rendered
-        before the scene changed again; there are none to geometry and cameras, and no second derivatives
-        (torch says so).
+        (H, W, C) float32; linear radiance where light is traced. Gradients to every tensor are exact for
+        `feature`, and estimates without bias, from as many other paths, where light is traced. They are those
+        of the image even if the scene has changed since in other tensors than these. There are none to
+        geometry and cameras, and no second derivatives (torch says so).
 
     Raises:
         ConfigError: for an unknown parameter, one of the wrong size, and a tensor that is not float32 on the
             CPU.
     """
     renderer: Any = integrator or scene.integrator()
-    if not hasattr(renderer, "fields"):
-        raise ConfigError("the scene's integrator is not a `feature`", "give one as `integrator`")
+    by_feature = hasattr(renderer, "fields")
     if isinstance(values, torch.Tensor):
+        if not by_feature:
+            raise ConfigError(
+                "one tensor for a scene whose light is traced", "give tensors by parameter name"
+            )
         targets, tensors = [_only_field(scene, renderer)], [values]
     else:
         table = _parameters(scene, renderer)
         targets, tensors = [_parameter(table, name) for name in values], list(values.values())
     for target, tensor in zip(targets, tensors, strict=True):
         target.check(tensor)
+
+    if not by_feature:
+        image = _Image(scene, mi.traverse(scene), targets, sensor, renderer, spp, seed)
+        return cast(torch.Tensor, _Traced.apply(image, *tensors))
 
     def attached(*arrays: mi.TensorXf) -> mi.TensorXf:
         try:
@@ -149,6 +161,12 @@ class _Target:
                 f"'{self.name}' has shape {tuple(tensor.shape)}", f"give a tensor of shape {shape}"
             )
 
+    @property
+    def value(self) -> mi.TensorXf:
+        """The parameter, detached, in the shape of the tensors that may become its value."""
+        current: Any = dr.detach(self.params[self.key])
+        return current if dr.is_tensor_v(current) else mi.TensorXf(dr.ravel(current))
+
     def assign(self, array: mi.TensorXf) -> None:
         """Sets the parameter from an `mi.TensorXf`."""
         array_type: Any = type(self.params[self.key])
@@ -158,6 +176,62 @@ class _Target:
             array = array_type(array.array)
         self.params[self.key] = array
         self.params.update()
+
+
+@dataclass(frozen=True)
+class _Image:
+    """What is rendered: parameters of a scene whose light is traced, and how."""
+
+    scene: mi.Scene
+    params: mi.SceneParameters
+    targets: Sequence[_Target]
+    sensor: mi.Sensor | int
+    integrator: mi.Integrator
+    spp: int
+    seed: int
+
+    def assign(self, tensors: Sequence[torch.Tensor], attached: bool = False) -> list[mi.TensorXf]:
+        """Sets the parameters, and returns what their gradients are collected in."""
+        arrays = [mi.TensorXf(tensor.detach().numpy()) for tensor in tensors]
+        for target, array in zip(self.targets, arrays, strict=True):
+            if attached:
+                dr.enable_grad(array)
+            target.assign(array)
+        return arrays
+
+
+class _Traced(torch.autograd.Function):
+    """An image of traced light. Its integrator computes gradients itself, when they are asked for.
+
+    Dr.Jit's graph of an image would refer to the scene as it is then, and not as it was.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, image: _Image, *tensors: torch.Tensor) -> torch.Tensor:
+        ctx.image = image
+        ctx.save_for_backward(*tensors)
+        image.assign(tensors)
+        with dr.suspend_grad(), raise_causes():
+            traced = image.integrator.render(image.scene, image.sensor, seed=image.seed, spp=image.spp)
+            return torch.from_numpy(np.array(traced))
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, grad: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        image: _Image = ctx.image
+        other = mi.sample_tea_32(image.seed, 1)[0]
+        now = [torch.from_numpy(np.array(target.value)) for target in image.targets]
+        try:
+            with raise_causes():
+                arrays = image.assign(ctx.saved_tensors, attached=True)
+                upstream = mi.TensorXf(grad.contiguous().numpy())
+                image.integrator.render_backward(
+                    image.scene, image.params, upstream, image.sensor, seed=other, spp=image.spp
+                )
+                gradients = [torch.from_numpy(np.array(dr.grad(array))) for array in arrays]
+        finally:
+            image.assign(now)
+        return (None, *gradients)
 
 
 def _parameters(scene: mi.Scene, integrator: mi.Integrator) -> dict[str, _Target]:

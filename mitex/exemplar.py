@@ -12,7 +12,7 @@ import numpy as np
 
 from mitex.cache import content_key
 from mitex.errors import ImageError
-from mitex.geometry.normal_maps import is_normal_map
+from mitex.geometry.normal_maps import is_normal_map, slope_agreement
 from mitex.geometry.vectors import unit
 from mitex.images import SUFFIXES, read_image, resize
 from mitex.paths import expanded
@@ -82,14 +82,15 @@ class Exemplar:
         Args:
             path: an image file (taken as the albedo), a folder that holds any subset of the maps, or the name
                 of an embedded exemplar (see `names`). In a folder, files are recognised by the end of their
-                name (`albedo.png`, `Bricks_1K_Color.jpg`, `wall_nor_gl_2k.png`, ...); DirectX normals are
-                turned into OpenGL ones; other files are ignored.
+                name (`albedo.png`, `Bricks_1K_Color.jpg`, `wall_nor_gl_2k.png`, ...); DirectX normals, by
+                name or by their slopes, are turned into OpenGL ones; other files are ignored.
 
         Returns:
             All maps at the albedo's size (without an albedo: the first map's).
 
         Raises:
-            ImageError: nothing there, no known map, a map twice, aspect ratios that differ, unreadable image.
+            ImageError: nothing there, no known map, a map twice, aspect ratios that differ, unreadable image,
+                normals of exchanged channels.
         """
         source = expanded(path)
         announce(f"reading exemplar {source.name}")
@@ -148,14 +149,29 @@ def _from_folder(folder: Path) -> Exemplar:
     for name, file in sorted(files.items()):
         array = _check_side(read_image(file, "L" if MAPS.get(name) == 1 else "RGB"), file)
         if name == "normal_dx":
-            array[:, :, 1] = 1.0 - array[:, :, 1]
-            name = "normal"
-        if name == "normal" and not is_normal_map(array):
-            raise ImageError(
-                f"{file} is not a tangent-space normal map", "export one (mostly blue) or remove the file"
-            )
-        arrays[name] = array
+            array, name = _turned(array), "normal"
+        arrays[name] = _upright(array, file) if name == "normal" else array
     return Exemplar(_one_size(arrays, folder), folder.resolve().name)
+
+
+def _upright(normals: np.ndarray, file: Path) -> np.ndarray:
+    """A normal map whose green points up, as far as its slopes tell."""
+    if not is_normal_map(normals):
+        raise ImageError(
+            f"{file} is not a tangent-space normal map", "export one (mostly blue) or remove the file"
+        )
+    agreement = slope_agreement(normals)
+    if agreement.exchanged:
+        raise ImageError(f"red and green of {file} are exchanged", "exchange them, or remove the file")
+    if agreement.downward:
+        announce(f"green points down in {file.name}, as in DirectX: turned over")
+        return _turned(normals)
+    return normals
+
+
+def _turned(normals: np.ndarray) -> np.ndarray:
+    red, green, blue = np.moveaxis(normals, 2, 0)
+    return np.dstack([red, 1.0 - green, blue])
 
 
 def _find_maps(folder: Path) -> dict[str, Path]:

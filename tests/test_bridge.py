@@ -1,5 +1,6 @@
 """The bridge: values and gradients against slow references, and clear errors at its limits."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,9 @@ import torch
 
 from mitex.bridge import lookup, render
 from mitex.errors import ConfigError
+from mitex.features import Vgg16
+from mitex.features.flow import lucas_kanade
+from mitex.losses import gram_loss, gram_matrix, motion_loss, relaxed_transport
 from mitex.mesh import Mesh, icosphere
 from mitex.scenes import Cameras, random_views
 from mitex.scenes.stage import Stage
@@ -190,7 +194,7 @@ def test_render_refuses(mi, stage, field, change, problem: str):
 def test_render_needs_one_field_and_a_feature_integrator(mi, field):
     view = {"sensor": cameras(count=1).sensors()[0]}
     empty = mi.load_dict({"type": "scene", "integrator": {"type": "path"}} | view)
-    with pytest.raises(ConfigError, match="not a `feature`"):
+    with pytest.raises(ConfigError, match="by parameter name"):
         render(empty, field)
     checks = {"type": "feature", "field": {"type": "checkerboard"}}
     with pytest.raises(ConfigError, match="0 fields"):
@@ -207,3 +211,102 @@ def test_render_a_hundred_times_does_not_grow(mi, stage, field):
 
     counts = [use() for _ in range(100)]
     assert counts[-1] <= max(counts[2:10])
+
+
+@pytest.fixture
+def lit(mi):
+    """A textured square under a lamp and a sky, beside a ball whose colour it reflects."""
+    look = mi.ScalarTransform4f().look_at
+    texture = {
+        "type": "texel_field",
+        "data": mi.TensorXf(np.full((8, 8, 3), 0.5, np.float32)),
+        "charts": mi.TensorXf(np.zeros((8, 8), np.float32)),
+    }
+    ball = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.7, 0.2, 0.1]}}
+    lamp = look([0, 0, 4], [0, 0, 0], [0, 1, 0])
+    scene = {
+        "type": "scene",
+        "integrator": {"type": "prb", "max_depth": 3},
+        "square": {"type": "rectangle", "bsdf": {"type": "diffuse", "reflectance": texture}},
+        "ball": {"type": "sphere", "radius": 0.4, "center": [0.5, 0.5, 0.5], "bsdf": ball},
+        "lamp": {"type": "rectangle", "to_world": lamp, "emitter": {"type": "area", "radiance": 3.0}},
+        "sky": {"type": "constant", "radiance": 0.3},
+        "sensor": {
+            "type": "perspective",
+            "fov": 40,
+            "to_world": look([0.5, -1, 3], [0, 0, 0], [0, 1, 0]),
+            "film": {"type": "hdrfilm", "width": 32, "height": 32, "rfilter": {"type": "box"}},
+        },
+    }
+    return mi.load_dict(scene)
+
+
+BALL = "ball.bsdf.reflectance.value"
+
+
+def picture_loss(name: str, before: torch.Tensor):
+    """A loss of pictures (32, 32, 3) of linear radiance; the motion is that since `before`, moved a bit."""
+    network = Vgg16(precision="float32")
+    target = torch.rand(32, 32, 3, generator=torch.Generator().manual_seed(1))
+
+    def features(picture: torch.Tensor) -> torch.Tensor:
+        return network.features(picture[None], ["relu2_1"])["relu2_1"].flatten(1, 2)
+
+    def motion(picture: torch.Tensor) -> torch.Tensor:
+        flow = lucas_kanade(before.roll(1, 1).mean(2)[None, None], picture.mean(2)[None, None])
+        wanted = torch.tensor([0.4, 0.1]).view(1, 2, 1, 1).expand_as(flow)
+        return motion_loss(flow, wanted, steps=1, period=1, gamma=0.2).total
+
+    return {
+        "gram": lambda picture: gram_loss({"a": features(picture)}, {"a": gram_matrix(features(target)[0])}),
+        "transport": lambda picture: relaxed_transport(features(picture), features(target)).sum(),
+        "motion": motion,
+        "mean": lambda picture: picture.square().mean(),
+    }[name]
+
+
+@pytest.mark.parametrize("name", ["gram", "transport", "motion", "mean"])
+def test_gradients_through_traced_light(mi, lit, rng, name: str):
+    """Differences of pictures of the same paths, and gradients of other ones."""
+    names = [key for key in mi.traverse(lit).keys() if key.endswith(".data")]  # noqa: SIM118
+    texture = torch.from_numpy(rng.uniform(0.3, 0.7, (8, 8, 3)).astype(np.float32)).requires_grad_()
+    colour = torch.tensor([0.7, 0.2, 0.1], requires_grad=True)
+    with torch.no_grad():
+        loss = picture_loss(name, render(lit, {names[0]: texture, BALL: colour}, spp=256, seed=3))
+
+    def value(shift: float, along: Sequence[torch.Tensor]) -> torch.Tensor:
+        moved = {names[0]: texture + shift * along[0], BALL: colour + shift * along[1]}
+        return loss(render(lit, moved, spp=256, seed=3))
+
+    value(0.0, [torch.zeros(8, 8, 3), torch.zeros(3)]).backward()
+    slopes = gradient(texture), gradient(colour)
+    along = [torch.from_numpy(np.sign(slope)) for slope in slopes]
+    with torch.no_grad():
+        difference = float(value(4e-3, along) - value(-4e-3, along)) / 8e-3
+    expected = sum(float(np.abs(slope).sum()) for slope in slopes)
+    assert expected > 0 and difference == pytest.approx(expected, rel=0.1)
+
+
+def test_gradients_of_an_earlier_picture_of_traced_light(mi, lit):
+    """They are those of its own values, and the scene keeps the later ones."""
+    first = torch.tensor([0.2, 0.2, 0.2], requires_grad=True)
+    early = render(lit, {BALL: first}, spp=16)
+    kept = torch.tensor([0.9, 0.5, 0.1])
+    late = render(lit, {BALL: kept}, spp=16)
+    assert late[..., 0].sum() > early[..., 0].sum()
+    early.sum().backward()
+    fresh = torch.tensor([0.2, 0.2, 0.2], requires_grad=True)
+    render(lit, {BALL: fresh}, spp=16).sum().backward()
+    np.testing.assert_allclose(gradient(first), gradient(fresh), rtol=1e-4)
+    render(lit, {BALL: kept}, spp=16)
+    early = render(lit, {BALL: first}, spp=16)
+    render(lit, {BALL: kept}, spp=16)
+    early.sum().backward()
+    np.testing.assert_allclose(np.ravel(mi.traverse(lit)[BALL]), kept, rtol=1e-6)
+
+
+def test_seeds_are_other_noise(lit):
+    colour = torch.tensor([0.7, 0.2, 0.1])
+    one, same, other = (render(lit, {BALL: colour}, spp=4, seed=seed) for seed in (1, 1, 2))
+    assert torch.equal(one, same) and not torch.equal(one, other)
+    assert float(one.mean()) == pytest.approx(float(other.mean()), rel=0.1)

@@ -8,7 +8,10 @@ from PIL import Image
 
 from mitex import exemplar
 from mitex.errors import ImageError
-from mitex.exemplar import MAPS, Exemplar, map_of
+from mitex.exemplar import DATA, MAPS, Exemplar, map_of
+from mitex.images import read_image, write_image
+
+EMBEDDED = DATA / "cobblestone" / "normal.png"
 
 
 def save(path: Path, value: int | tuple[int, ...] = 128, size=(32, 32), mode="RGB"):
@@ -140,6 +143,17 @@ class TestRefuses:
     def test_too_small(self, tmp_path):
         save(tmp_path / "dot.png", size=(300, 15))
         assert_refused(tmp_path / "dot.png", "300 x 15", "at least 16")
+
+    @pytest.mark.parametrize("name", ["normal", "normal_gl", "normal_dx"])
+    def test_green_points_up_whatever_the_name_says(self, tmp_path, name):
+        true = read_image(EMBEDDED)
+        for array in (true, true * np.array([1, -1, 1]) + np.array([0, 1, 0])):
+            write_image(tmp_path / f"{name}.png", array)
+            np.testing.assert_allclose(Exemplar.load(tmp_path).maps["normal"], true, atol=2 / 255)
+
+    def test_red_and_green_exchanged(self, tmp_path):
+        write_image(tmp_path / "normal.png", read_image(EMBEDDED)[..., [1, 0, 2]])
+        assert_refused(tmp_path, "red and green", "are exchanged")
 
     def test_a_normal_map_that_is_none(self, tmp_path):
         save(tmp_path / "normal.png", (200, 100, 20))

@@ -69,6 +69,8 @@ LAZY = {
 COMPARED = {
     "displacement": {"geometric"},
     "multi_view_gram": {"surface"},
+    "style_mesh": {"surface", "multi_view_gram"},
+    "text2mesh": {"surface"},
     "quilted": {"nerf"},
     "plain_field": {"nerf"},
 }

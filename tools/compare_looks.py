@@ -3,27 +3,26 @@
 usage: python tools/compare_looks.py EXEMPLARS EXEMPLAR=MODEL[,MODEL ...] ... [--meshes M ...]
 
 EXEMPLARS is a folder; names of embedded exemplars work too. A MODEL is a bundled one, a file or a run folder.
-Six patches of a sphere, at the exemplar's scale, are compared with the exemplar: the Frechet distances of
-VGG-16's features at relu2_2 and relu4_1, the relaxed transport over five layers, and the regularity beside
-the exemplar's. On other meshes, patches are half as wide. Prints a Markdown table.
+Six patches of a sphere, at the exemplar's scale, are compared with the exemplar by their features
+(`mitex.evaluation.likeness`) and their regularity. On other meshes, patches are half as wide.
+Prints a Markdown table.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
-from dataclasses import replace
+from dataclasses import astuple, replace
 from pathlib import Path
 
 import numpy as np
 import torch
 
-from mitex.evaluation.metrics import single_image_frechet, whole_cells
+from mitex.evaluation.likeness import Likeness, exemplar_patches, likeness, patch_features
+from mitex.evaluation.patches import filled
 from mitex.evaluation.regularity import regularity
 from mitex.exemplar import Exemplar
 from mitex.exemplar import names as exemplar_names
-from mitex.features import Vgg16
-from mitex.losses import relaxed_transport
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.cells import Cells
@@ -34,8 +33,6 @@ SPHERE = "sphere"
 PATCHES, WIDEST, SIDE = 6, 0.65, 256
 TRIES = 8  # places on a mesh for each patch that is compared: some look past thin parts
 FREQUENCIES = {True: 32, False: 48}  # of the training spheres, with a decoder and without
-FRECHET = ("relu2_2", "relu4_1")
-LAYERS = ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1")
 
 
 def main() -> None:
@@ -44,8 +41,8 @@ def main() -> None:
     parser.add_argument("looks", nargs="+", metavar="EXEMPLAR=MODEL")
     parser.add_argument("--meshes", nargs="+", default=[SPHERE])
     arguments = parser.parse_args()
-    titles = "exemplar | map | model | surface | relu2_2 | relu4_1 | transport | regularity"
-    print(f"| {titles} |\n" + "| --- " * 8 + "|")
+    titles = "exemplar | map | model | surface | relu2_2 | relu4_1 | transport | Gram | regularity"
+    print(f"| {titles} |\n" + "| --- " * 9 + "|")
     for word in arguments.looks:
         name, models = word.split("=")
         source = Exemplar.load(name if name in exemplar_names() else arguments.exemplars / name)
@@ -54,7 +51,7 @@ def main() -> None:
             maps, masks = patches(NcaTexture.load(model), exemplar.size[0], mesh)
             for map_name, views in maps.items():
                 target = rgb(exemplar.maps[map_name])
-                numbers = " | ".join(f"{value:.3g}" for value in distances(target, views, masks))
+                numbers = " | ".join(f"{value:.3g}" for value in astuple(distances(target, views, masks)))
                 orders = [regularity(view, mask) for view, mask in zip(views, masks, strict=True)]
                 order = f"{np.mean(orders):.2f} of {regularity(target):.2f}"
                 surface = Path(mesh).stem
@@ -97,36 +94,10 @@ def rgb(image: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(np.repeat(image, 3 // image.shape[-1], axis=-1), np.float32)
 
 
-def distances(target: np.ndarray, views: np.ndarray, masks: np.ndarray) -> list[float]:
-    """Means over the views: Frechet distances of `FRECHET`, then the transport."""
-    pairs = list(zip(views, masks, strict=True))
-    frechet = [
-        [single_image_frechet(target, view, layer=layer, mask_b=mask) for view, mask in pairs]
-        for layer in FRECHET
-    ]
-    return [*(float(np.mean(values)) for values in frechet), transport(target, views, masks)]
-
-
-@torch.no_grad()
-def transport(target: np.ndarray, views: np.ndarray, masks: np.ndarray) -> float:
-    """Relaxed transport (MeshNCA, equation 4), summed over layers, of up to 2,048 random features each."""
-    network, generator = Vgg16("max", precision="float32"), torch.Generator().manual_seed(0)
-    total = 0.0
-    for layer in LAYERS:
-        theirs = some(
-            network.features(torch.from_numpy(target)[None], [layer])[layer].flatten(1, 2), generator
-        )
-        for view, mask in zip(views, masks, strict=True):
-            (features,) = network.features(torch.from_numpy(view)[None], [layer])[layer]
-            whole = whole_cells(view, mask, layer)
-            ours = some(features[torch.from_numpy(whole)][None], generator)
-            total += float(relaxed_transport(ours, theirs)) / len(views)
-    return total
-
-
-def some(vectors: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
-    """(1, n, C) random ones of (1, N, C)."""
-    return vectors[:, torch.randperm(vectors.shape[1], generator=generator)[:2048]]
+def distances(target: np.ndarray, views: np.ndarray, masks: np.ndarray) -> Likeness:
+    """Of the patches, as a set, from as many of the exemplar."""
+    ours, theirs = (filled(views, masks), masks), exemplar_patches(target, masks)
+    return likeness(patch_features(ours), patch_features(theirs))
 
 
 if __name__ == "__main__":

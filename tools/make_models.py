@@ -5,7 +5,7 @@ The settings are those of the models that ship, as far as their files tell, whic
 usage: python tools/make_models.py EXEMPLARS [NAME ...]
 
 EXEMPLARS is a folder with one folder of maps per exemplar. The parent takes 15 minutes on two cores, each
-other model five; its run folder under runs/models/ can be resumed by calling the script again.
+other model ten to twelve; its run folder under runs/models/ can be resumed by calling the script again.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from mitex.training import checkpoint, resolve
 RUNS = Path("runs/models")
 MODELS = Path(__file__).parents[1] / "mitex" / "data" / "models"
 PARENT = "ceramic"
-SHORT = ("steps=300", "milestones=180,250")  # enough from the parent
+LONG = ("steps=700", "milestones=450,600", "density=48")  # from the parent
 
 
 @dataclass(frozen=True)
@@ -39,30 +39,29 @@ class Recipe:
 
     exemplar: str
     parent: str | None = PARENT
-    settings: tuple[str, ...] = SHORT
+    settings: tuple[str, ...] = LONG
 
 
-FINE = (*SHORT, "density=48")  # patterns that are small in their exemplar
-LONG = ("steps=700", "milestones=450,600")  # strict order
 QUICK = ("steps=200", "milestones=120,170")  # without order
+FINE = (*LONG[:2], "density=64")  # patterns that are small in their exemplar
 SMALL = ("view_count=8",)  # exemplars of 128 pixels have one zoom, so more views of it
 RECIPES = {
     PARENT: Recipe("scales", None, ()),
-    "bricks": Recipe("bricks", settings=(*LONG, "density=48")),
+    "bricks": Recipe("bricks"),
     "cobblestone": Recipe("cobblestone"),
     "fur": Recipe("Stylized_Fur_001", settings=(*QUICK, "density=48", *SMALL)),
-    "hexagons": Recipe("hexagons", settings=(*LONG, "density=48")),
-    "honeycomb": Recipe("Honeycomb_002", settings=(*LONG, "density=64", *SMALL)),
-    "knit": Recipe("knit", settings=(*LONG, "density=64")),
+    "hexagons": Recipe("hexagons"),
+    "honeycomb": Recipe("Honeycomb_002", settings=(*FINE, *SMALL)),
+    "knit": Recipe("knit", settings=FINE),
     "lava": Recipe("lava"),
     "leather": Recipe("leather", settings=(*QUICK, "density=64")),
     "mosaic": Recipe("Abstract_008", settings=(*QUICK, *SMALL)),
-    "pebbles": Recipe("Pebbles_025", settings=(*QUICK, "density=64", *SMALL)),
-    "planks": Recipe("planks", settings=(*LONG, "density=48")),
-    "rust": Recipe("rust", settings=QUICK),
-    "shells": Recipe("Wall_Shells_001", settings=(*FINE, *SMALL)),
-    "waffle": Recipe("Waffle_001", settings=(*LONG, "density=48", *SMALL)),
-    "wicker": Recipe("wicker", settings=(*LONG, "density=48")),
+    "pebbles": Recipe("Pebbles_025", settings=(*FINE, *SMALL)),
+    "planks": Recipe("planks"),
+    "rust": Recipe("rust"),
+    "shells": Recipe("Wall_Shells_001", settings=(*LONG, *SMALL)),
+    "waffle": Recipe("Waffle_001", settings=(*LONG, *SMALL)),
+    "wicker": Recipe("wicker"),
 }
 
 

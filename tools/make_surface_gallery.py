@@ -5,12 +5,13 @@ usage: python tools/make_surface_gallery.py EXEMPLARS MESHES RUNS SHEET MESH=EXE
 
 EXEMPLARS and MESHES are folders; names of embedded ones work too, and the exemplar `letters` is drawn. MESH^N
 is MESH with all faces split in four N times, MESH~N a remeshed copy with N faces (MESH~N^M: then split),
-and `scene` and `torus` are made up. RUNS is where the run folders go: finished ones are used again, begun
-ones go on. The sheet is docs/gallery/SHEET.jpg, a row for each exemplar: itself, and the mesh from two sides,
-or one side of each of its meshes or variants, in the order that they are given; the ratio across seams is
-printed.
+and `scene`, `torus` and `nut` are made up. RUNS is where the run folders go: finished ones are used again,
+begun ones go on. The sheet is docs/gallery/SHEET.jpg, a row for each exemplar: itself, and the mesh from two
+sides, or one side of each of its meshes or variants, in the order that they are given; the ratio across seams
+is printed.
 Settings change the synthesis, of one MESH=EXEMPLAR or of all (`resolution=512`, `triples=1`, ...);
-`maps=albedo` leaves out other maps, `content=ao` transfers the style.
+`maps=albedo` leaves out other maps, `content=ao` transfers the style, `scale_map=LOW:HIGH` lets the pattern's
+size grow evenly from the mesh's lowest point to its highest.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
+from machine_part import flanged_nut
 from PIL import Image, ImageDraw, ImageFont
 
 from mitex.evaluation.seams import seam_ratio
@@ -38,7 +40,8 @@ GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 SIDES = {"scene": (25, 65)}  # azimuths [degrees]
 OTHER_SIDES = (20, 200)
 CELL, SMALL = 272, 200  # sides of pictures [px], in rows of three and longer ones
-KEYS = {field.name for field in fields(surface.SurfaceConfig)} | {"maps", "content"}
+INPUTS = {"content", "scale_map"}
+KEYS = {field.name for field in fields(surface.SurfaceConfig)} | {"maps"} | INPUTS
 
 
 def letters(size: int = 256) -> Exemplar:
@@ -77,8 +80,8 @@ def find_mesh(name: str, meshes: Path) -> Mesh:
     if name == "scene":
         return scene(meshes)
     base = re.split(r"[~^]", name)[0]
-    if base == "torus":
-        mesh = torus()
+    if base in ("torus", "nut"):
+        mesh = torus() if base == "torus" else flanged_nut()
     else:
         mesh = Mesh.load(base if base in embedded_names() else meshes / f"{base}.obj")
     if coarse := re.search(r"~(\d+)", name):
@@ -102,9 +105,15 @@ def texture(exemplar: Exemplar, mesh: Mesh, run: Path, settings: dict[str, str])
     """The texture in a run folder, synthesized if it is not there yet."""
     if (run / NAME).is_file():
         return surface.SurfaceTexture.load(run)
-    overrides = [f"{key}={value}" for key, value in settings.items() if key != "content"]
+    overrides = {key: value for key, value in settings.items() if key not in INPUTS}
+    content, ends, scale_map = settings.get("content"), settings.get("scale_map"), None
+    if ends is not None:
+        height = mesh.vertices[:, 1]
+        scale_map = np.interp(height, (height.min(), height.max()), [float(end) for end in ends.split(":")])
     resume = (run / checkpoint.NAME).is_file()
-    return surface.fit(exemplar, mesh, run, set=overrides, content=settings.get("content"), resume=resume)
+    return surface.fit(
+        exemplar, mesh, run, set=overrides, content=content, scale_map=scale_map, resume=resume
+    )
 
 
 def pictures(result: surface.SurfaceTexture, count: int, side: int) -> list[np.ndarray]:

@@ -24,6 +24,7 @@ extensions = [
     "links",
     "lazy_names",
     "plugin_reference",
+    "living",
 ]
 root_doc = "README"
 include_patterns = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/**"]

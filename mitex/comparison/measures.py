@@ -57,14 +57,14 @@ LOOKS = (
         "Transport",
         LOWER,
         "Relaxed optimal transport (MeshNCA, equation 4) between the features of five layers of VGG-16: "
-        "whether each detail of one has its like in the other. nca trains with it.",
+        "whether each detail of one has its like in the other. nca and text2mesh train with it.",
     ),
     Measure(
         "gram",
         "Gram",
         LOWER,
-        "Squared distance of the Gram matrices of five layers of VGG-16. surface, gatys, multi_view_gram and "
-        "reaction_diffusion train with it.",
+        "Squared distance of the Gram matrices of five layers of VGG-16. surface, gatys, multi_view_gram, "
+        "reaction_diffusion, solid_texture and style_mesh train with it.",
     ),
     Measure(
         "seams",

@@ -12,6 +12,7 @@ from mitex.asset import Asset
 from mitex.atlas import unwrap
 from mitex.cli import main
 from mitex.export import write_asset
+from mitex.images import write_image
 from mitex.mesh import Mesh
 from mitex.training import checkpoint
 from tests.cli import bad_files as bad
@@ -75,6 +76,18 @@ BAD_FITS = {
     "resolution 0": (fit("--resolution 0"), "resolution = 0"),
     "resolution out of range": (fit("--resolution 100000"), "resolution = 100000"),
     "no orientation": (fit(f"{QUICK} --orientation no.npy"), "no.npy"),
+    "scale 0": (fit("--scale 0"), "--scale 0 is out of range"),
+    "scale NaN": (fit("--scale nan"), "--scale nan"),
+    "a scale for no exemplar": (fit(f"{QUICK} --scale 0.1"), "exemplar would be 3 texels wide"),
+    "no scale map": (fit(f"{QUICK} --scale-map no.npy"), "no.npy"),
+    "no picture": (fit(f"{QUICK} --scale-map good.obj", mesh="own.obj"), "good.obj"),
+    "a scale map without UVs": (fit(f"{QUICK} --scale-map good.png"), "no UVs for the scale map"),
+    "a black scale map": (fit(f"{QUICK} --scale-map black.png", mesh="own.obj"), "goes from 0 to 0"),
+    "a scale map of another mesh": (fit(f"{QUICK} --scale-map ones.npy"), "one for each vertex"),
+    "a scale map of a tile": (
+        ["fit", "surface", "--exemplar=good.png", "--tile=32", "--scale-map=ones.npy"],
+        "--tile and --scale-map contradict",
+    ),
     "no VGG-19": (fit(f"{QUICK} --set weights=vgg19"), "VGG-19"),
     "resolution twice": (fit("--resolution 64 --set resolution=32"), "resolution"),
     "steps 0": (fit("--steps 0"), "--steps 0"),
@@ -99,6 +112,9 @@ def test_bad_fits(files, name, capsys):
     corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\n"
     bad.text(files / "overlap.obj", corners + "vt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\nf 2/1 4/2 3/3\n")
     bad.text(files / "outside.obj", corners + "vt 0 0\nvt 3 0\nvt 0 2\nf 1/1 2/2 3/3\n")
+    bad.text(files / "own.obj", corners + "vt 0 0\nvt 1 0\nvt 0 1\nvt 1 1\nf 1/1 2/2 3/3\nf 2/2 4/4 3/3\n")
+    write_image(files / "black.png", np.zeros((4, 4)))
+    np.save(files / "ones.npy", np.ones(3))
     words, message = BAD_FITS[name]
     check_refused(files, words, message, capsys)
 
@@ -167,7 +183,7 @@ def test_hard_meshes_get_a_texture(files, name, capsys):
 
 def test_one_texel(files):
     bad.image(files / "good.png")
-    assert main(fit("--quiet --resolution 1 --steps 2 --set scales=0")) == 0
+    assert main(fit("--quiet --resolution 1 --steps 2 --set scales=0 exemplar_size=32")) == 0
 
 
 def test_a_moebius_strip(files, capsys):

@@ -48,6 +48,16 @@ TINY: dict[str, dict[str, Any]] = {
     "multi_view_gram": {"resolution": 32, "exemplar_size": 32, "view": 32, "layers": ("relu1_1",)},
     "reaction_diffusion": {"hidden": 8, "channels": 4, "grid": 32, "exemplar_size": 32, "pool": 1}
     | {"min_steps": 2, "max_steps": 2, "layers": ("relu1_1",)},
+    "text2mesh": {"resolution": 32, "exemplar_size": 32, "view": 32, "width": 8, "layers": ("relu1_1",)},
+    "style_mesh": {
+        "resolution": 32,
+        "exemplar_size": 64,
+        "view": 64,
+        "layers": ("relu1_1",),
+        "weights": (1.0,),
+    }
+    | {"small_layers": ("relu1_1",), "views": 2},
+    "solid_texture": {"exemplar_size": 32, "slice_size": 32, "layers": ("relu1_1",)},
     "nerf": {
         "base_steps": 2,
         "rays": 64,

@@ -1,6 +1,5 @@
 """GLB: what other programs read, by the specification, by trimesh and by the Khronos validator."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -16,23 +15,12 @@ from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh, icosphere
 from tests.export.common import Glb, wavy
 from tests.geometry.reference import mikktspace
-from tests.node import run_node
-
-VALIDATE = """
-const validator = require('gltf-validator'), fs = require('fs');
-Promise.all(process.argv.slice(1).map(path => validator.validateBytes(new Uint8Array(fs.readFileSync(path)))))
-  .then(reports => console.log(JSON.stringify(reports)));
-"""
+from tests.node import khronos_reports
 
 
 @pytest.fixture(scope="module")
 def baked() -> Any:
     return wavy().baked(resolution=256)
-
-
-def reports(paths: list[Path]) -> list[dict]:
-    """The Khronos validator's reports."""
-    return json.loads(run_node("gltf-validator", VALIDATE, *paths))
 
 
 def test_khronos_validator_finds_nothing(baked, tmp_path):
@@ -46,7 +34,7 @@ def test_khronos_validator_finds_nothing(baked, tmp_path):
         "degenerate": wavy(flawed).baked(64),
     }
     paths = [asset.export(tmp_path / f"{name}.glb") for name, asset in assets.items()]
-    issues = {name: r["issues"]["messages"] for name, r in zip(assets, reports(paths), strict=True)}
+    issues = {name: r["issues"]["messages"] for name, r in zip(assets, khronos_reports(paths), strict=True)}
     assert issues["baked"] == [] and issues["vertices"] == []
     # Severity 2 is information: an unused UV, a degenerate triangle that the mesh had before.
     serious = {name: [m for m in messages if m["severity"] < 2] for name, messages in issues.items()}

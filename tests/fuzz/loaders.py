@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import torch
@@ -25,13 +26,25 @@ from mitex.mesh.fields import read_vectors
 from mitex.methods.baselines.displacement.texture import DisplacementMap
 from mitex.methods.baselines.gatys.texture import GatysTexture
 from mitex.methods.baselines.multi_view_gram.texture import MultiViewTexture
+from mitex.methods.baselines.plain_field.config import PlainFieldConfig
+from mitex.methods.baselines.plain_field.texture import SETTINGS, PlainFieldTexture
 from mitex.methods.baselines.quilted.texture import QuiltedTexture
+from mitex.methods.baselines.reaction_diffusion.reaction import Reaction
+from mitex.methods.baselines.reaction_diffusion.texture import ReactionDiffusionTexture
+from mitex.methods.baselines.solid_texture.generator import Generator
+from mitex.methods.baselines.solid_texture.texture import SolidTexture
+from mitex.methods.baselines.style_mesh.texture import StyleMeshTexture
+from mitex.methods.baselines.text2mesh.texture import Text2MeshTexture
 from mitex.methods.nca.config import PRESETS, NcaConfig
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.weights import graft_weights
+from mitex.methods.nerf.capture import visual_hull
+from mitex.methods.nerf.capture.capture import load_capture
 from mitex.methods.nerf.capture.transforms import read_frames
+from mitex.methods.nerf.training.plain import hash_grid, parameter_shapes
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.texture import SurfaceTexture
+from mitex.runtime import init
 from mitex.training import checkpoint, resolve
 from mitex.training.config import of_record
 from mitex.training.locate import bundled_files
@@ -46,6 +59,7 @@ from tests.mesh.examples import (
     obj_text,
     ply_bytes,
 )
+from tests.methods.nerf.capture.test_capture import write as write_capture
 
 BALL = icosphere(2)
 
@@ -150,10 +164,44 @@ def _multi_view(path: Path) -> None:
     MultiViewTexture(grid(1, 1), np.full((8, 8, 3), 0.5, np.float32), {"name": "a"}).save(path)
 
 
+def _style_mesh(path: Path) -> None:
+    StyleMeshTexture(grid(1, 1), np.full((8, 8, 3), 0.5, np.float32), {"name": "a"}).save(path)
+
+
+def _text2mesh(path: Path) -> None:
+    Text2MeshTexture(grid(1, 1), np.full((8, 8, 3), 0.5, np.float32), {"name": "a"}).save(path)
+
+
 def _nerf(path: Path) -> None:
     from tests.methods.nerf.small import small_texture
 
     small_texture().save(path)
+
+
+def _plain_field(path: Path) -> None:
+    init()
+    config = PlainFieldConfig(table=8, occupancy=16)
+    about = {key: getattr(config, key) for key in SETTINGS} | {"name": "a", "centre": [0.0] * 3, "scale": 1.0}
+    parameters = {name: torch.zeros(shape) for name, shape in parameter_shapes(hash_grid(config)).items()}
+    PlainFieldTexture(parameters, np.ones((16, 16, 16), np.uint8), about).save(path)
+
+
+def _reaction_diffusion(path: Path) -> None:
+    reaction = Reaction.random(3, 4, torch.full((3,), 0.1), torch.Generator().manual_seed(0))
+    ReactionDiffusionTexture(reaction, 16, 0.5, {"name": "a"}).save(path)
+
+
+def _solid(path: Path) -> None:
+    SolidTexture(Generator.random(torch.Generator().manual_seed(0)), 16, 0.5, {"name": "a"}).save(path)
+
+
+def _photos(path: Path) -> None:
+    write_capture(path.parents[1], 8)
+
+
+def _read_photos(path: Path) -> None:
+    with mock.patch.object(visual_hull, "RESOLUTION", 16):  # most of the time is spent on it
+        load_capture(path.parents[1])
 
 
 CONFIG = 'preset = "patch"\nsteps = 20\nhidden = 8\nlr = 1e-3\nmilestones = [5, 9]\n[run]\nmethod = "nca"\n'
@@ -195,6 +243,11 @@ LOADERS = {
     ),
     "gatys": Loader("a.safetensors", _picture_texture, mitex.load),
     "quilted": Loader("a.safetensors", _quilted, mitex.load),
+    "plain_field": Loader("a.safetensors", _plain_field, mitex.load),
+    "reaction_diffusion": Loader("a.safetensors", _reaction_diffusion, mitex.load),
+    "solid_texture": Loader("a.safetensors", _solid, mitex.load),
+    "style_mesh": Loader("a.safetensors", _style_mesh, mitex.load),
+    "text2mesh": Loader("a.safetensors", _text2mesh, mitex.load),
     "multi_view_gram": Loader("a.safetensors", _multi_view, mitex.load),
     "checkpoint": Loader("checkpoint.safetensors", _checkpoint, lambda path: checkpoint.load(path.parent)),
     "checkpoint as a texture": Loader(
@@ -203,6 +256,7 @@ LOADERS = {
     "config": Loader("c.toml", _data(CONFIG), partial(resolve, PRESETS, None)),
     "plan": Loader("plan.toml", _data(PLAN), Plan.read),
     "capture": Loader("transforms.json", _capture, _read_capture),
+    "photo": Loader("photos/images/000.png", _photos, _read_photos),
     "cache": Loader("0" * 32 + "/values.npy", _cached, _cached),
     "manifest": Loader("0" * 32 + "/manifest.json", _cached, _cached),
     "asset glb": Loader("a.glb", SMALL.export, Asset.load),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mitex.geometry.normal_maps import MIN_Z, decode, decode_at_vertices, encode
+from mitex.geometry.normal_maps import MIN_Z, decode, decode_at_vertices, encode, slope_agreement
 from mitex.geometry.vectors import orthonormal, unit
 
 
@@ -48,3 +48,19 @@ def test_detail_at_vertices_leans_where_the_map_says():
     encoded = 0.5 + 0.5 * np.array([[0.6, 0.0, 0.8], [0.0, 0.6, 0.8]])
     detail = decode_at_vertices(encoded, east, normals)
     np.testing.assert_allclose(detail, [[0.6, 0, 0.8], [0, 0.6, 0.8]], atol=1e-6)
+
+
+def test_slopes_of_a_height_agree(rng):
+    height = np.zeros((64, 64))
+    x, y = np.meshgrid(np.arange(64), -np.arange(64))  # y is up
+    for k, m, phase in rng.integers(1, 6, (6, 3)):
+        height += np.sin(2 * np.pi * (k * x + m * y) / 64 + phase) + np.sin(2 * np.pi * (k * x - m * y) / 64)
+    normal = unit(np.dstack([-np.gradient(height, axis=1), np.gradient(height, axis=0), np.ones((64, 64))]))
+    encoded = 0.5 + 0.5 * normal
+    agreement = slope_agreement(encoded)
+    assert agreement.upward > 0.95 and abs(agreement.across) < 0.6
+    flipped, exchanged = encoded * [1, -1, 1] + [0, 1, 0], encoded[..., [1, 0, 2]]
+    assert slope_agreement(flipped).upward == -agreement.upward and slope_agreement(flipped).downward
+    assert slope_agreement(exchanged).across == agreement.upward and slope_agreement(exchanged).exchanged
+    flat = slope_agreement(np.full((16, 16, 3), 0.5))
+    assert not flat.downward and not flat.exchanged

@@ -82,6 +82,20 @@ FITS = {
         f"min_steps=1 max_steps=2 layers=relu1_1 {SMALL_RUN}",
         "--mesh cube.obj --resolution 64 --steps 2 --scale 4",
     ),
+    "solid_texture": TinyFit(
+        f"--exemplar photo.png --steps 2 --set exemplar_size=32 slice_size=32 layers=relu1_1 {SMALL_RUN}",
+        "--mesh cube.obj --resolution 64 --scale 8",
+    ),
+    "style_mesh": TinyFit(
+        "--exemplar photo.png --mesh cube.obj --steps 2 --set resolution=32 exemplar_size=64 view=64 "
+        f"views=2 layers=relu1_1 weights=1 small_layers=relu1_1 {SMALL_RUN}",
+        "--mesh cube.obj",
+    ),
+    "text2mesh": TinyFit(
+        "--exemplar photo.png --mesh cube.obj --steps 2 --set resolution=32 exemplar_size=32 view=32 "
+        f"width=8 layers=relu1_1 {SMALL_RUN}",
+        "--mesh cube.obj",
+    ),
     "displacement": TinyFit("--reference spikes --set resolution=16", "--mesh cube.obj", resume=""),
 }
 

@@ -39,6 +39,14 @@ def command(method: str, out: Path) -> list[str]:
     return words + ["--resume"] * (checkpoint_step(out) is not None)
 
 
+def start(method: str, out: Path) -> int:
+    """The number of the process that fits."""
+    process = os.fork()
+    if process == 0:
+        os._exit(main(command(method, out)))
+    return process
+
+
 def checkpoint_step(out: Path) -> int | None:
     """The step of the newest checkpoint that can be read; None if none was written."""
     begun = any((out / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
@@ -79,13 +87,13 @@ def run(method: str, count: int, folder: Path) -> dict[str, int]:
     prepare(folder)
     os.chdir(folder)
     torch.set_num_threads(1)
+    if source := FITS[method].source:
+        assert os.waitpid(start(source, folder / "runs" / source), 0)[1] == 0
     rng, kills, number, step = random.Random(0), Counter(), 0, 0
     while sum(kills.values()) < count:
         out = folder / f"run{number}"
         aim = rng.choice(["start", "checkpoint", "checkpoint", "result"])
-        process = os.fork()
-        if process == 0:
-            os._exit(main(command(method, out)))
+        process = start(method, out)
         if strike(process, out, aim, rng):
             kills[aim] += 1
             step = check(method, out, step)

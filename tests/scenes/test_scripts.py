@@ -136,3 +136,15 @@ def test_relief_and_colour(tmp_path: Path):
     middle = np.s_[half // 3 : 2 * half // 3, half // 3 : 2 * half // 3]
     chroma = [float(np.ptp(side[middle], axis=2).mean()) for side in (grey, coloured)]
     assert chroma[0] < 0.015 and chroma[1] > 2 * chroma[0]
+
+
+@pytest.mark.parametrize("loss", ["transport", "gram", "motion"])
+def test_lit_texture_script(mi, tmp_path: Path, loss: str):
+    """The exemplar, and the vase before and after: what is seen of it has changed, the floor has not."""
+    script = load("lit_texture")
+    script.main(str(tmp_path / "a.png"), loss, steps=2, side=64, resolution=64, spp=4)
+    picture = read_image(tmp_path / "a.png")
+    assert picture.shape == (64, 192, 3)
+    before, after = picture[:, 64:128], picture[:, 128:]
+    change = np.abs(after - before).mean(2)
+    assert change[24:40, 24:40].mean() > 10 * change[-8:, :8].mean()  # the floor in front

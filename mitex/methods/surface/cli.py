@@ -28,7 +28,7 @@ class Fit(ExemplarOptions):
 
     examples:
       mitex fit surface --exemplar pebbles.png --mesh bunny.obj --out runs/bunny
-      mitex fit surface --exemplar scales --mesh octopus --resolution 1024
+      mitex fit surface --exemplar scales --mesh octopus --resolution 1024 --scale 0.5
       mitex fit surface --exemplar maps/ --mesh bunny.obj --preset paper --out runs/paper
       mitex fit surface --exemplar painting.png --mesh bunny.obj --content ao --out runs/painted
       mitex fit surface --exemplar bark.png --mesh tree.obj --orientation along.npy --out runs/tree
@@ -60,12 +60,19 @@ class Fit(ExemplarOptions):
     """Where the exemplar's right shall point: a vector for each vertex of the mesh (.npy, .ply), or strokes
     drawn on it (.json)."""
 
+    scale: Annotated[float | None, arg(metavar="X", help_behavior_hint="(default: the preset's)")] = None
+    """Size of the pattern."""
+
+    scale_map: Annotated[Path | None, arg(metavar="IMAGE|FILE", help_behavior_hint="")] = None
+    """Where the pattern's size varies: a picture over the mesh's own UVs, white as large as --scale says and
+    middle grey half as large; or a factor for each vertex (.npy)."""
+
     keep_uvs: Annotated[bool, arg(help_behavior_hint="")] = False
     """Use the mesh's own UVs, which must not overlap."""
 
     def run(self) -> None:
         self._check_tile()
-        options = self.run_options(resolution=self.tile or self.resolution)
+        options = self.run_options(resolution=self.tile or self.resolution, scale=self.scale)
         from mitex.exemplar import Exemplar
         from mitex.mesh import Mesh
 
@@ -81,6 +88,7 @@ class Fit(ExemplarOptions):
                 keep_uvs=self.keep_uvs,
                 content=self.content,
                 orientation=self.orientation,
+                scale_map=self.scale_map,
                 on_step=on_step,
                 **options,
             )
@@ -88,6 +96,7 @@ class Fit(ExemplarOptions):
 
     def _check_tile(self) -> None:
         in_range("--tile", self.tile, *TILE_SIDES)
+        in_range("--scale", self.scale, 0.05, 20.0)
         if self.mesh is None and self.tile is None:
             raise ConfigError("--mesh is missing", "give --mesh MESH, or --tile N for a texture that repeats")
         others = {
@@ -95,6 +104,7 @@ class Fit(ExemplarOptions):
             "--resolution": self.resolution is not None,
             "--content": self.content is not None,
             "--orientation": self.orientation is not None,
+            "--scale-map": self.scale_map is not None,
             "--keep-uvs": self.keep_uvs,
         }
         for option, used in others.items():

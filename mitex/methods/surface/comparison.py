@@ -11,6 +11,7 @@ from mitex.features import Vgg16, normalise_colours
 from mitex.features.frozen import GramTap, Tap
 from mitex.losses import gram_distance, gram_matrix, moment_distance, relaxed_transport
 from mitex.methods.surface.network import SurfaceVgg
+from mitex.methods.surface.palette import Palette
 from mitex.methods.surface.statistics import exemplar_features
 
 MIN_VECTORS = 256  # feature vectors of a region
@@ -52,16 +53,25 @@ class GramComparison:
         layers: that are compared.
         region: texels of a region at the images' scale; None compares the whole surface, as the paper does.
             Regions of deep layers are larger where that is needed for `MIN_VECTORS` feature vectors in each.
+        palette: the distribution of colours that is compared as well, if any.
+        weight: of that, beside Gram matrices: 1 where colours that are all alike cost as much as no features.
     """
 
     def __init__(
-        self, network: Vgg16, images: torch.Tensor, layers: tuple[str, ...], region: int | None = None
+        self,
+        network: Vgg16,
+        images: torch.Tensor,
+        layers: tuple[str, ...],
+        region: int | None = None,
+        palette: Palette | None = None,
+        weight: float = 0.0,
     ) -> None:
-        self.layers, self.region = layers, region
+        self.layers, self.region, self.palette, self.weight = layers, region, palette, weight
         self.targets = []
         for image in images:
             features = exemplar_features(network, image, layers)
             self.targets.append({layer: gram_matrix(f) for layer, f in features.items()})
+        self.sizes = [sum(g.square().mean() for g in grams.values()) / len(layers) for grams in self.targets]
 
     def taps(self, network: SurfaceVgg, generator: torch.Generator) -> dict[str, GramTap]:
         return {layer: GramTap(network.place(layer), self._regions(network, layer)) for layer in self.layers}
@@ -76,7 +86,10 @@ class GramComparison:
     def cost(
         self, features: Mapping[str, torch.Tensor], colours: torch.Tensor, k: int, generator: torch.Generator
     ) -> torch.Tensor:
-        return gram_distance(features, self.targets[k]) / len(self.layers)
+        cost = gram_distance(features, self.targets[k]) / len(self.layers)
+        if self.palette is None:
+            return cost
+        return cost + self.weight * self.sizes[k] * self.palette.distance(colours, k)
 
 
 class TransportComparison:

@@ -7,7 +7,10 @@ from typing import Literal
 
 from mitex.errors import ConfigError
 from mitex.features.layers import LAYERS, LAYERS_19, with_poolings
+from mitex.methods.layout import EXEMPLAR_WIDTH
 from mitex.training.settings import TrainingConfig, key
+
+SIDES = (16, 2048)  # of the exemplar [px]
 
 
 @dataclass(frozen=True)
@@ -17,8 +20,15 @@ class SurfaceConfig(TrainingConfig):
     preset: str = "fast"
     steps: int = 200
     resolution: int = key(512, "side of the texture [texels]", 1, 4096)
+    scale: float = key(
+        1.0, "size of the pattern, beside that at which exemplar_size is the exemplar's side", 0.05, 20
+    )
     exemplar_size: int = key(
-        256, "side that the exemplar's central square is resized to [px]; a pixel becomes a texel", 32, 2048
+        0,
+        "side of the exemplar's central square at scale 1 [texels]; it is resized so that a pixel becomes a "
+        "texel. 0: half of the resolution, so that more texels make the pattern sharper, not smaller",
+        0,
+        2048,
     )
     frames: Literal["smooth", "fixed"] = key(
         "smooth", "tangent frames that turn least, or Gram-Schmidt with a fixed vector (the paper)"
@@ -47,6 +57,11 @@ class SurfaceConfig(TrainingConfig):
         0,
         10,
     )
+    colours: float = key(
+        0.2,
+        "loss=gram: weight of the distributions of colours, of texels and of whole stones; the paper: 0",
+        0,
+    )
     layers: tuple[str, ...] = key((), "compared: VGG's convolutions and poolings; none stands for all")
     content_layer: str = key("relu4_2", "style transfer: the layer whose features stay the content's")
     content_weight: float = key(1000.0, "style transfer: how much that counts", 0)
@@ -61,7 +76,7 @@ class SurfaceConfig(TrainingConfig):
     diffusion: float = key(
         0.03,
         "part of each texel replaced in every step by the mean of what its taps read, which wears down what "
-        "the first convolution cannot see; the paper: 0",
+        "the first convolution cannot see; it falls with the learning rate; the paper: 0",
         0,
         1,
     )
@@ -97,6 +112,25 @@ class SurfaceConfig(TrainingConfig):
         if self.optimizer == "lbfgs" and (self.loss != "gram" or self.scales):
             problem = "lbfgs needs a loss without randomness, the same throughout"
             raise ConfigError(problem, "set loss=gram and scales=0, or optimizer=adam")
+        self.exemplar_side()
+
+    def exemplar_side(self, factor: float = 1.0) -> int:
+        """Side that the exemplar's central square is resized to [px]; a pixel becomes a texel.
+
+        Args:
+            factor: of the pattern's size, beside `scale`.
+
+        Raises:
+            ConfigError: it is not from 16 to 2048.
+        """
+        side = round(self.scale * factor * (self.exemplar_size or EXEMPLAR_WIDTH * self.resolution))
+        least, most = SIDES
+        if least <= side <= most:
+            return side
+        raise ConfigError(
+            f"the exemplar would be {side} texels wide with a scale of {self.scale * factor:g}",
+            f"change scale, resolution or exemplar_size so that it is {least} to {most}",
+        )
 
     @property
     def compared(self) -> tuple[str, ...]:
@@ -118,6 +152,7 @@ PRESETS = {
         exemplar_size=512,
         whitened=False,
         region=0.0,
+        colours=0.0,
         diffusion=0.0,
         noise=0.2,
         lr=0.1,
@@ -126,6 +161,7 @@ PRESETS = {
     "style": replace(
         DEFAULT,
         preset="style",
+        colours=0.0,
         steps=300,
         scales=0,
         layers=("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"),

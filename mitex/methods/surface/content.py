@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from scipy.ndimage import map_coordinates
 
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import unit
 from mitex.images import read_image
 from mitex.methods.surface.domain import SurfaceDomain
+from mitex.methods.surface.pictures import picture_at
 
 AO = "ao"
 
@@ -32,8 +32,5 @@ def content_colours(content: str | Path, domain: SurfaceDomain) -> np.ndarray:
         corners = mesh.normals[mesh.faces[texels.face]].astype(np.float64)
         normals = unit(interpolate(texels.barycentric, corners))
         return np.repeat(ambient_occlusion(mesh, texels.position, normals)[:, None], 3, axis=1)
-    image = read_image(Path(content))
     uv = interpolate(texels.barycentric, texels.uv[texels.face].astype(np.float64))
-    row, column = (1 - uv[:, 1]) * image.shape[0] - 0.5, uv[:, 0] * image.shape[1] - 0.5
-    channels = [map_coordinates(image[..., k], [row, column], order=1, mode="nearest") for k in range(3)]
-    return np.stack(channels, axis=1).astype(np.float32)
+    return picture_at(read_image(Path(content)), uv)

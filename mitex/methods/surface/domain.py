@@ -16,6 +16,7 @@ from mitex.methods.surface.config import SurfaceConfig
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.frames import interpolate_frames, vertex_directions
 from mitex.methods.surface.levels import POOLS, Levels
+from mitex.methods.surface.scale_map import ScaleMap
 from mitex.methods.surface.taps import Surroundings, build
 from mitex.methods.surface.texels import Texels
 from mitex.progress import announce
@@ -32,6 +33,7 @@ class SurfaceDomain:
         angle: turns the frames counter-clockwise, seen from outside [degrees].
         orientation: (V, 3) where the exemplar's right shall point, in place of `frames`.
         correct, continued: how levels are computed, see `SurfaceConfig`.
+        scale_map: where the pattern's size varies, its factors.
         depth: number of levels.
         keep: whether levels that had to be computed are kept in the cache on disk.
     """
@@ -43,12 +45,17 @@ class SurfaceDomain:
     orientation: np.ndarray | None = None
     correct: bool = True
     continued: bool = True
+    scale_map: ScaleMap | None = None
     depth: int = POOLS
     keep: bool = True
 
     @staticmethod
     def of(
-        mesh: Mesh, config: SurfaceConfig, orientation: np.ndarray | None = None, keep: bool = True
+        mesh: Mesh,
+        config: SurfaceConfig,
+        orientation: np.ndarray | None = None,
+        scale_map: ScaleMap | None = None,
+        keep: bool = True,
     ) -> SurfaceDomain:
         """The domain that a synthesis with these settings works on."""
         return SurfaceDomain(
@@ -59,6 +66,7 @@ class SurfaceDomain:
             orientation,
             config.correct,
             config.continued,
+            scale_map,
             POOLS + config.scales,
             keep,
         )
@@ -86,6 +94,24 @@ class SurfaceDomain:
         return interpolate_frames(self.mesh, texels.face, texels.barycentric, self.directions, angle)
 
     @cached_property
+    def factors(self) -> np.ndarray | None:
+        """(N,) factors of the pattern's size at the texels; None where it is the same everywhere."""
+        if self.scale_map is None:
+            return None
+        texels = self.texels
+        return self.scale_map.at(self.mesh, texels.face, texels.barycentric)
+
+    @property
+    def mean_scale(self) -> float:
+        """The geometric mean of `factors`, at which the exemplar is read: a pixel of it is a texel there."""
+        return 1.0 if self.factors is None else float(np.exp(np.log(self.factors).mean()))
+
+    @property
+    def steps(self) -> np.ndarray | None:
+        """(N,) steps of the taps at the texels, 1 in the mean [texels]; None where all are 1."""
+        return None if self.factors is None else self.factors / self.mean_scale
+
+    @cached_property
     def tracer(self) -> GeodesicTracer:
         """Geodesics of the mesh."""
         return GeodesicTracer(self.mesh)
@@ -95,7 +121,7 @@ class SurfaceDomain:
         """The levels of the network, from the cache on disk if they were computed before."""
         options = (
             *(self.resolution, self.frames, math.radians(self.angle), self.correct, self.continued),
-            *(self.depth, self.orientation),
+            *(self.depth, self.orientation, self.steps),
         )
         key = content_key(VERSION, self.mesh.vertices, self.mesh.faces, self.uv, *options)
         return cached_levels(key, self.compute_levels, keep=self.keep)
@@ -104,5 +130,7 @@ class SurfaceDomain:
         """The levels, computed anew."""
         announce("following geodesics from every texel")
         border = Border.continued(self.mesh, self.texels, self.tracer) if self.continued else None
-        around = Surroundings(self.texels, self.tracer, *self.tangent_frames, self.correct, border)
+        around = Surroundings(
+            self.texels, self.tracer, *self.tangent_frames, self.correct, border, self.steps
+        )
         return build(around, self.depth)

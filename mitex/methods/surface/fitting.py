@@ -19,6 +19,7 @@ from mitex.methods.layout import with_layout
 from mitex.methods.surface.config import PRESETS, SurfaceConfig
 from mitex.methods.surface.content import AO, content_colours
 from mitex.methods.surface.domain import SurfaceDomain
+from mitex.methods.surface.scale_map import ScaleMap
 from mitex.methods.surface.task import SurfaceTask
 from mitex.methods.surface.texture import SurfaceTexture
 from mitex.methods.surface.tile import TileDomain
@@ -30,6 +31,7 @@ from mitex.training.settings import RunOptions
 
 # Peak over precomputation and steps, measured at 512^2 and 1024^2 with bfloat16 features.
 BYTES_PER_TEXEL, BYTES_PER_TRIPLE = 3600, 900
+VALUES = np.array([128, 256, 768, 1536, 1536])  # that VGG-16 has of each element, block by block
 
 
 def fit(
@@ -40,6 +42,7 @@ def fit(
     keep_uvs: bool = False,
     content: str | Path | None = None,
     orientation: np.ndarray | str | Path | None = None,
+    scale_map: np.ndarray | str | Path | None = None,
     **options: Unpack[RunOptions],
 ) -> SurfaceTexture:
     """Synthesizes the look of an exemplar on a mesh; writes a run folder with the texture in it.
@@ -53,6 +56,7 @@ def fit(
             for the mesh's ambient occlusion.
         orientation: (V, 3) where the exemplar's right shall point, or a file of it, see
             `mitex.mesh.fields.read_vectors`; else the frames follow the config.
+        scale_map: where the pattern's size varies: factors of it, see `ScaleMap.of`.
         options: preset ("fast", "paper", or "style", the default with `content`), and those of `RunOptions`.
 
     Returns:
@@ -70,8 +74,8 @@ def fit(
     image = content is not None and str(content) != AO
     field = None
     if mesh is None:
-        if keep_uvs or content is not None or orientation is not None:
-            raise ConfigError("a tile takes no UVs, content or orientation", "leave them out")
+        if keep_uvs or any(option is not None for option in (content, orientation, scale_map)):
+            raise ConfigError("a tile takes no UVs, content, orientation or scale map", "leave them out")
         domain: SurfaceDomain = TileDomain.flat(settings)
     else:
         given = mesh if isinstance(mesh, Mesh) else Mesh.load(mesh)
@@ -80,11 +84,15 @@ def fit(
             field = read_vectors(surface, orientation).astype(np.float32)
         else:
             field = orientation
-        domain = SurfaceDomain.of(surface, settings, field, keep=run.folder is not None)
+        sizes = None if scale_map is None else ScaleMap.of(scale_map, given)
+        domain = SurfaceDomain.of(surface, settings, field, sizes, keep=run.folder is not None)
     run.control.check()
-    check_memory(domain.mesh, settings, len(target.maps))
+    settings.exemplar_side(domain.mean_scale)
+    check_memory(domain.mesh, settings, len(target.maps), domain.steps)
     start = None if content is None else content_colours(content, domain)
     inputs = {"content_key": content_key(start), "orientation_key": content_key(field)}
+    if domain.factors is not None:
+        inputs["scale_map_key"] = content_key(domain.factors)
     task = SurfaceTask(settings, target, domain, start, inputs)
     origin: dict[str, Any] = {key: getattr(settings, key) for key in ("resolution", "frames", "angle")}
     return run.train(
@@ -98,8 +106,14 @@ def fit(
     )
 
 
-def check_memory(mesh: Mesh, config: SurfaceConfig, maps: int = 1) -> None:
+def check_memory(mesh: Mesh, config: SurfaceConfig, maps: int = 1, steps: np.ndarray | None = None) -> None:
     """Refuses a resolution whose synthesis does not fit into the memory that is free.
+
+    Args:
+        mesh: with the texture's UVs.
+        config: settings.
+        maps: of the exemplar.
+        steps: (N,) how far apart the taps of the texels are, if that varies.
 
     Raises:
         ConfigError: with the estimate.
@@ -107,7 +121,7 @@ def check_memory(mesh: Mesh, config: SurfaceConfig, maps: int = 1) -> None:
     assert mesh.uv is not None
     share = 0.5 * np.abs(twice_area(mesh.uv)).sum()
     each = BYTES_PER_TEXEL + BYTES_PER_TRIPLE * (min(config.triples, maps) - 1)
-    memory = each * share * config.resolution**2
+    memory = each * share * config.resolution**2 * (1.0 if steps is None else _crowding(steps))
     free = available_memory()
     if free is not None and memory > free:
         fits = int(config.resolution * math.sqrt(free / memory))
@@ -116,3 +130,13 @@ def check_memory(mesh: Mesh, config: SurfaceConfig, maps: int = 1) -> None:
             f"and {free / 1e9:.1f} GB are free",
             f"set resolution to {max(fits, 1)} or less",
         )
+
+
+def _crowding(steps: np.ndarray) -> float:
+    """How many times as many values the network has where taps of texels are `steps` (N,) of them apart.
+
+    Pooling joins texels that are nearer to each other than the taps, so that small steps leave more elements.
+    """
+    pooled = 2.0 ** np.arange(len(VALUES))
+    elements = np.minimum(1.0, (pooled * steps[:, None]) ** -2).mean(axis=0)
+    return float(elements @ VALUES / (pooled**-2 @ VALUES))

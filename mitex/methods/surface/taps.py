@@ -22,6 +22,7 @@ from mitex.methods.surface.texels import Texels
 from mitex.progress import announce
 
 BACKWARD = 8  # samples along a geodesic that is walked back
+ROUNDING = 1e-6  # of steps that are meant to be 1
 CENTRE = 4  # the tap on the element itself
 OUTER = (0, 1, 2, 3, 5, 6, 7, 8)
 
@@ -36,6 +37,7 @@ class Surroundings:
         right, up: (N, 3) tangent frames of the texels.
         correct: walk a geodesic back that overshoots (figure 3).
         border: which texels have values of their own; all if None.
+        steps: (N,) how far apart the taps of each texel are [texels], where the pattern's size varies.
     """
 
     texels: Texels
@@ -44,16 +46,23 @@ class Surroundings:
     up: np.ndarray
     correct: bool = True
     border: Border | None = None
+    steps: np.ndarray | None = None
+
+    @property
+    def widening(self) -> np.ndarray:
+        """(N,) `steps`, 1 everywhere if they are not given."""
+        return np.ones(len(self.texels.index)) if self.steps is None else self.steps
 
     def arrivals(
-        self, start: np.ndarray, tap: int, length: float
+        self, start: np.ndarray, tap: int, length: float | np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The exponential map of a tap.
 
         Args:
             start: (M,) texels.
             tap: 0 to 8, row by row.
-            length: of a tap to the side or up and down [mesh units] (equation 3); diagonal ones are longer.
+            length: of a tap to the side or up and down [mesh units] (equation 3), one or (M,); diagonal ones
+                are longer.
 
         Returns:
             The texels and weights of a bilinear lookup where the geodesics end, (M, 4) each, and (M,) whether
@@ -75,10 +84,13 @@ def build(around: Surroundings, count: int = POOLS) -> Levels:
     texels = around.texels
     border = around.border or Border.none(len(texels.index))
     elements, leader = border.elements, _largest(border.spread)
-    index, weight = _bilinear_taps(around, elements)
+    step = texels.size * around.widening
+    index, weight = _bilinear_taps(around, elements, step[elements])
     lookup: Any = _lookup(index, weight, len(texels.index)) @ border.spread
+    if (around.widening > 1.0 + ROUNDING).any():
+        lookup = lookup @ _footprints(around, border)
     edges = _texel_graph(lookup)
-    labels = _groups(texels.position[elements], texels.size, edges, count)
+    labels = _groups(texels.position[elements], texels.size, edges, count, around.widening[elements])
     order = np.lexsort(labels).astype(np.int32)
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order), dtype=np.int32)
@@ -98,9 +110,12 @@ def build(around: Surroundings, count: int = POOLS) -> Levels:
     return Levels(own, position, lookup, _renamed(border.spread, rank), tuple(levels))
 
 
-def _bilinear_taps(around: Surroundings, elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 9, 4) texels and weights of texels `elements` (n,); a tap that does not arrive is the opposite one,
-    else the centre.
+def _bilinear_taps(
+    around: Surroundings, elements: np.ndarray, step: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 9, 4) texels and weights of texels `elements` (n,) whose taps are `step` (n,) apart [mesh units].
+
+    A tap that does not arrive is the opposite one, else the centre.
     """
     count = len(elements)
     index = np.empty((count, 9, 4), np.int32)
@@ -108,9 +123,22 @@ def _bilinear_taps(around: Surroundings, elements: np.ndarray) -> tuple[np.ndarr
     arrived = np.ones((count, 9), bool)
     index[:, CENTRE], weight[:, CENTRE, 0] = elements[:, None], 1.0
     for tap in OUTER:
-        index[:, tap], weight[:, tap], arrived[:, tap] = around.arrivals(elements, tap, around.texels.size)
+        index[:, tap], weight[:, tap], arrived[:, tap] = around.arrivals(elements, tap, step)
     rows, source = np.arange(count)[:, None], _replacements(arrived)
     return index[rows, source], weight[rows, source]
+
+
+def _footprints(around: Surroundings, border: Border) -> Any:
+    """(n, n) CSR: what taps read in place of each element, so that they pass over no texel where they are
+    more than one apart: the mean of a square whose side is the root of their squared step less a texel's.
+    """
+    step, elements = around.widening, border.elements
+    width = np.sqrt(np.maximum(step[elements] ** 2 - 1.0, 0.0))
+    index, weight = _bilinear_taps(around, elements, around.texels.size * width / 3)
+    count = len(elements)
+    ones = np.full(9 * count, 1 / 9, np.float32), np.arange(9 * count), 9 * np.arange(count + 1)
+    mean: Any = scipy.sparse.csr_array(ones, shape=(count, 9 * count))
+    return mean @ _lookup(index, weight, len(step)) @ border.spread
 
 
 def _lookup(index: np.ndarray, weight: np.ndarray, texels: int) -> scipy.sparse.csr_array:
@@ -150,17 +178,23 @@ def _texel_graph(lookup: Any) -> np.ndarray:
     return np.stack([first, second], 1)[first != second]
 
 
-def _groups(position: np.ndarray, size: float, edges: np.ndarray, depth: int) -> list[np.ndarray]:
+def _groups(
+    position: np.ndarray, size: float, edges: np.ndarray, depth: int, steps: np.ndarray
+) -> list[np.ndarray]:
     """Labels (n,) of the groups of texels at (n, 3) in levels 0 to `depth` (section 3.2).
 
-    A group holds the texels of a voxel of side 2^n s that are connected within it.
+    A group holds the texels of a voxel of side 2^n s that are connected within it. Where taps are `steps`
+    (n,) texels apart, the side is as many times larger, to the next half of an octave: only texels with the
+    same side join, and every group lies in one of the next level.
     """
     count = len(position)
     # The lowest texel centres are half a texel inside; the rest keeps rounding away from the voxels' walls.
     offset = (position - position.min(0)) / size + (0.5 - 1e-3)
+    octave = np.round(2 * np.log2(steps))[:, None]
+    offset = offset / 2 ** (octave / 2)
     labels = [np.arange(count)]
     for n in range(1, depth + 1):
-        voxel = np.floor(offset / 2**n).astype(np.int64)
+        voxel = np.hstack([np.floor(offset / 2**n), octave - octave.min()]).astype(np.int64)
         key = np.asarray(np.ravel_multi_index(tuple(voxel.T), tuple(voxel.max(0) + 1)))
         inside = edges[key[edges[:, 0]] == key[edges[:, 1]]]
         graph = scipy.sparse.coo_array((np.ones(len(inside), bool), tuple(inside.T)), shape=(count, count))
@@ -209,10 +243,11 @@ def _group_taps(
     texels = around.texels
     start = own[representatives(texels.position[own], labels, texels.size)]
     related = _related(labels, edges) if around.correct else None
+    length = texels.size * 2**level * around.widening[start]
     taps = np.empty((len(start), 9), np.int32)
     taps[:, CENTRE] = np.arange(len(start))
     for tap in OUTER:
-        taps[:, tap] = _reached(around, start, tap, texels.size * 2**level, labels[leader], related)
+        taps[:, tap] = _reached(around, start, tap, length, labels[leader], related)
     return np.take_along_axis(taps, _replacements(taps >= 0), 1)
 
 
@@ -220,7 +255,7 @@ def _reached(
     around: Surroundings,
     start: np.ndarray,
     tap: int,
-    length: float,
+    length: np.ndarray,
     group: np.ndarray,
     related: Callable[[np.ndarray, np.ndarray], np.ndarray] | None,
 ) -> np.ndarray:
@@ -231,7 +266,7 @@ def _reached(
     reached = np.full(len(start), -1, np.int32)
     searching = np.arange(len(start))
     for part in range(BACKWARD, 0, -1):
-        index, weight, arrived = around.arrivals(start[searching], tap, length * part / BACKWARD)
+        index, weight, arrived = around.arrivals(start[searching], tap, length[searching] * part / BACKWARD)
         read = group[index]
         if related is not None:
             weight = np.where(related(searching[:, None], read), weight, 0.0)

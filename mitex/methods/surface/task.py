@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -23,12 +23,14 @@ from mitex.methods.surface.comparison import Comparison, GramComparison, Transpo
 from mitex.methods.surface.config import SurfaceConfig
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.network import SurfaceVgg
+from mitex.methods.surface.palette import Palette
 from mitex.methods.surface.texture import texel_layout
 from mitex.methods.surface.views import Views
 from mitex.progress import announce
 from mitex.runtime import keep_freed_memory
 from mitex.sparse import csr_tensor
 from mitex.training import ParameterTask, Step
+from mitex.training.optim import multistep
 from mitex.triples import CYCLE, channel_triples, triple_images
 
 VIEW = 384  # side of a preview's images [px]
@@ -95,9 +97,10 @@ class SurfaceTask(ParameterTask):
                 self.levels, config.pooling, bilinear=config.bilinear, scale=scale, weights=weights
             )
             self.networks.append(network)
-            size = max(config.exemplar_size >> scale, 16)
+            size = max(config.exemplar_side(domain.mean_scale) >> scale, 16)
             images = torch.from_numpy(triple_images(exemplar.resized(size), self.triples, self.layout))
-            self.comparisons.append(_comparison(config, image_network, images))
+            palette = Palette(self.levels, images, scale) if config.colours else None
+            self.comparisons.append(_comparison(config, image_network, images, palette))
         self.content: torch.Tensor | None = None
         if content is not None:
             start = torch.from_numpy(content[self.levels.order].astype(np.float32))
@@ -131,7 +134,7 @@ class SurfaceTask(ParameterTask):
                 difference = features.pop(CONTENT) - self.content
                 total = total + self.config.content_weight * difference.square().mean()
             total = total + comparison.cost(features, colours, k, generator)
-        return Step(total / len(triples), {"scale": float(scale)}, self._diffuse_and_clamp)
+        return Step(total / len(triples), {"scale": float(scale)}, partial(self._diffuse_and_clamp, step))
 
     def scale(self, step: int) -> int:
         """How often the texels are pooled before they enter the network in a step."""
@@ -142,11 +145,15 @@ class SurfaceTask(ParameterTask):
         """Of a step: what the network reads, a quarter for each pooling, and what is done with all texels."""
         return 0.25 ** self.scale(step) + ALL_TEXELS
 
-    def _diffuse_and_clamp(self) -> None:
-        """Wears down what is finer than the taps, and brings values back to [0, 1]."""
+    def _diffuse_and_clamp(self, step: int) -> None:
+        """Wears down what is finer than the taps, and brings values back to [0, 1].
+
+        As much less as the learning rate falls: else it would blur more than the last steps sharpen.
+        """
+        share = multistep(self.config.diffusion, self.config.milestones, self.config.decay)(step)
         with torch.no_grad():
-            if self.config.diffusion:
-                self.coordinates.lerp_(self._mean_of_taps @ self.coordinates, self.config.diffusion)
+            if share:
+                self.coordinates.lerp_(self._mean_of_taps @ self.coordinates, share)
             values = self.values
             inside = values.clamp(0.0, 1.0)
             if not torch.equal(values, inside):
@@ -204,10 +211,12 @@ def _weights(config: SurfaceConfig, generator: torch.Generator) -> Weights:
     return convolutions(config.pooling, normalised=config.loss == "transport")
 
 
-def _comparison(config: SurfaceConfig, network: Vgg16, images: torch.Tensor) -> Comparison:
+def _comparison(
+    config: SurfaceConfig, network: Vgg16, images: torch.Tensor, palette: Palette | None
+) -> Comparison:
     if config.loss == "gram":
         region = round((config.region * images.shape[1]) ** 2) or None
-        return GramComparison(network, images, config.compared, region)
+        return GramComparison(network, images, config.compared, region, palette, config.colours)
     return TransportComparison(network, images, config.compared, config.samples, config.moment_weight)
 
 

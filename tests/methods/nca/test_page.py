@@ -19,6 +19,7 @@ from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.graft import GraftedGrowth
 from mitex.methods.nca.perception import perception
 from mitex.page import quantised
+from tests.node import khronos_reports
 from tests.page.hashes import mask
 
 SEED, TURN = 3, 40.0
@@ -198,6 +199,13 @@ def test_a_downloaded_asset_shows_what_the_page_shows(tab, texture, cells, tmp_p
     uv = geometry.visual.uv.reshape(-1, 3, 2).mean(axis=1)  # trimesh has v upwards
     baked = bilinear(image, uv)
     assert np.abs(baked - expected).mean() < 0.02 < expected.std()
+
+
+def test_a_downloaded_asset_is_valid(tab, tmp_path):
+    path = tmp_path / "torus.glb"
+    path.write_bytes(tab.array("await page.glb(128)").tobytes())
+    (report,) = khronos_reports([path])
+    assert [issue for issue in report["issues"]["messages"] if issue["severity"] < 2] == []
 
 
 HOSTILE = "<img src=x onerror=window.attacked=1></script><script>window.attacked=1</script>"

@@ -199,6 +199,10 @@ def test_more_than_the_memory_is_refused_with_the_estimate(mesh, monkeypatch):
         match=r"2000\^2 needs about 7.2 GB of memory, and 1.8 GB are free; set resolution to 1000",
     ):
         room.check_memory(half, config)
+    monkeypatch.setattr(room, "available_memory", lambda: 2_000_000 * room.BYTES_PER_TEXEL + 1)
+    room.check_memory(half, config, steps=np.ones(3))
+    with pytest.raises(ConfigError, match="needs about 4[0-9]"):  # its pattern hardly pools
+        room.check_memory(half, config, steps=np.full(3, 0.25))
     monkeypatch.setattr(room, "available_memory", lambda: None)
     room.check_memory(half, config)
 
@@ -243,6 +247,19 @@ def test_a_skipped_step_leaves_every_byte(mesh, exemplar, fault):
 def test_the_loss_changes_nothing(mesh, exemplar, setting):
     threads(1)
     assert_loss_is_pure(small_task(mesh, exemplar, setting), 1)
+
+
+def test_diffusion_falls_with_the_learning_rate(mesh, exemplar):
+    task = small_task(mesh, exemplar, DIFFUSION, "milestones=2,4", "layers=relu1_1")
+    start, moved = task.coordinates.detach().mul(0.1), {}
+    for step in (0, 1, 2, 5):
+        with torch.no_grad():
+            task.coordinates.copy_(start)
+        task.loss(step, torch.Generator()).commit()
+        moved[step] = task.coordinates.detach() - start
+    assert moved[0].abs().max() > 1e-4 and torch.equal(moved[0], moved[1])
+    for step, share in ((2, 0.5), (5, 0.25)):
+        assert torch.allclose(moved[step], share * moved[0], atol=1e-6)
 
 
 def test_previews_show_the_mesh_beside_the_exemplar(mesh, exemplar):

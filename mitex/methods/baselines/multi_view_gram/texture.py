@@ -1,87 +1,10 @@
-"""`MultiViewTexture`: a texture that was optimized through views, and the mesh that it belongs to."""
+"""`MultiViewTexture`: the texture that was optimized."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
-
-import numpy as np
-import torch
-
-from mitex.asset import Asset
-from mitex.atlas import spread
-from mitex.errors import ConfigError
-from mitex.export.common import asset_from_textures
-from mitex.geometry.conservative import cover
-from mitex.geometry.raster import texel_space
-from mitex.mesh import Mesh
-from mitex.mesh.arrays import mesh_arrays, mesh_of_arrays
 from mitex.methods.baselines.multi_view_gram import METHOD
-from mitex.methods.layout import same_surface
-from mitex.training import model_file
-
-PADDING = 8  # texels by which charts are continued outwards
+from mitex.methods.mesh_texture import MeshTexture
 
 
-@dataclass(frozen=True, eq=False)
-class MultiViewTexture:
-    """A texture and its mesh.
+class MultiViewTexture(MeshTexture):
+    """A texture that was optimized through views, and its mesh."""
 
-    Attributes:
-        mesh: with the UVs of the texture.
-        image: (R, R, 3) float32 sRGB in [0, 1], row 0 on top; anything where no face is.
-        about: how it was made.
-    """
-
-    mesh: Mesh
-    image: np.ndarray
-    about: Mapping[str, Any] = field(default_factory=dict)
-
-    @classmethod
-    def load(cls, source: str | Path) -> MultiViewTexture:
-        """Reads a run folder or a model file.
-
-        Raises:
-            CheckpointError: there is none, or it is damaged.
-        """
-        with model_file.opened(source, METHOD.name) as (tensors, about):
-            arrays = {key: tensor.numpy() for key, tensor in tensors.items()}
-            mesh, image = mesh_of_arrays(arrays, str(about["mesh"])), arrays["image"].astype(np.float32)
-            if image.ndim != 3 or image.shape[0] != image.shape[1] or image.shape[2] != 3:
-                raise ValueError(f"an image of shape {image.shape}")
-            if mesh.uv is None or not np.isfinite(image).all():
-                raise ValueError("a mesh without UVs, or values that are not finite")
-            return cls(mesh, image, about)
-
-    def save(self, path: str | Path) -> Path:
-        """Writes mesh, texture and `about` as one safetensors file.
-
-        Raises:
-            OutputError: the place is not writable.
-        """
-        tensors = {name: torch.tensor(a) for name, a in mesh_arrays(self.mesh).items()}
-        tensors["image"] = torch.from_numpy(self.image.astype(np.float16))
-        return model_file.save(path, tensors, METHOD.name, {**self.about, "mesh": self.mesh.name})
-
-    def apply(self, mesh: Mesh | None = None) -> Asset:
-        """The mesh with its albedo texture.
-
-        Args:
-            mesh: the mesh that the texture was made for, if the caller wants that checked.
-
-        Raises:
-            ConfigError: it is another mesh: the texture belongs to the mesh it was optimized on.
-        """
-        if mesh is not None and not same_surface(mesh, self.mesh):
-            raise ConfigError(
-                f"this texture belongs to mesh '{self.mesh.name}', not to '{mesh.name}'",
-                "synthesize it there, with the config.toml of its run folder",
-            )
-        assert self.mesh.uv is not None
-        resolution = len(self.image)
-        face, _ = cover(texel_space(self.mesh.uv, resolution), resolution)
-        used = (face >= 0).reshape(resolution, resolution)
-        albedo = spread(self.image, used, PADDING)
-        return asset_from_textures(self.mesh, self.mesh.uv, {"albedo": albedo}, self.mesh.name)
+    method = METHOD.name

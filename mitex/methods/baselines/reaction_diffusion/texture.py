@@ -11,9 +11,8 @@ import numpy as np
 import torch
 
 from mitex.asset import Asset
-from mitex.atlas import MAX_RESOLUTION, Atlas
+from mitex.atlas import MAX_RESOLUTION
 from mitex.errors import ConfigError
-from mitex.export.common import asset_from_textures
 from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh, remesh
 from mitex.mesh.nearest import surface_points
@@ -21,6 +20,7 @@ from mitex.methods.baselines.reaction_diffusion import METHOD
 from mitex.methods.baselines.reaction_diffusion.laplacian import mesh_laplacian
 from mitex.methods.baselines.reaction_diffusion.reaction import BOUND, Reaction, colours
 from mitex.methods.layout import RESOLUTION, layout_side, with_layout
+from mitex.methods.point_colours import with_colours
 from mitex.progress import announce
 from mitex.runtime import keep_freed_memory
 from mitex.sparse import LinearMap
@@ -30,7 +30,6 @@ STEPS = 500  # of time, after which patterns are in order
 MOST_STEPS = 10_000
 PERIOD = 16  # steps after which states are held within their bounds
 MOST_CELLS = 500_000
-PADDING = 8  # texels by which charts are continued outwards
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,14 +116,12 @@ class ReactionDiffusionTexture:
         keep_freed_memory()
         announce("letting the chemicals react")
         at_cells = self.grown(cells, seed, steps)
-        assert unwrapped.uv is not None
-        atlas = Atlas.from_uv(unwrapped.uv, resolution, PADDING)
-        points = atlas.interpolate(unwrapped.vertices[unwrapped.faces])[atlas.face >= 0]
-        face, barycentric = surface_points(cells, points)
-        albedo = np.empty((resolution, resolution, 3), np.float32)
-        albedo[:] = at_cells.mean(0)
-        albedo[atlas.face >= 0] = interpolate(barycentric, at_cells[cells.faces[face]])
-        return asset_from_textures(unwrapped, unwrapped.uv, {"albedo": albedo}, mesh.name)
+
+        def at(points: np.ndarray) -> np.ndarray:
+            face, barycentric = surface_points(cells, points)
+            return interpolate(barycentric, at_cells[cells.faces[face]])
+
+        return with_colours(unwrapped, resolution, at, mesh.name)
 
     @torch.no_grad()
     def grown(self, cells: Mesh, seed: int, steps: int) -> np.ndarray:

@@ -1,0 +1,70 @@
+"""The command-line options of solid textures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import arg
+
+from mitex.methods.checks import SEEDS, in_range
+from mitex.methods.options import ExemplarOptions
+from mitex.methods.planar_options import PlanarOptions
+
+if TYPE_CHECKING:
+    from mitex.asset import Asset
+
+
+@dataclass(kw_only=True)
+class Fit(ExemplarOptions):
+    """Learn a solid, like marble or wood, whose slices look like an exemplar's albedo, as Gutierrez et al.
+    (2020) do.
+
+    `mitex apply RUN --mesh MESH --out ASSET` cuts a mesh out of it. Ctrl-C saves, and --resume goes on.
+
+    examples:
+      mitex fit solid_texture --exemplar lava --out runs/solid-lava
+      mitex fit solid_texture --exemplar pebbles.png --preset paper
+      mitex fit solid_texture --exemplar lava --out runs/solid-lava --resume
+    """
+
+    def run(self) -> None:
+        options = self.run_options()
+        from mitex.exemplar import Exemplar
+        from mitex.methods.baselines import solid_texture
+
+        exemplar = Exemplar.load(self.exemplar)
+        out = self.folder(f"{exemplar.name}-solid_texture")
+        with self.progress() as on_step:
+            solid_texture.fit(exemplar, out, on_step=on_step, **options)
+        print(out)
+
+
+@dataclass(kw_only=True)
+class Apply(PlanarOptions):
+    """Cut a mesh out of the solid.
+
+    examples:
+      mitex apply runs/solid-lava --mesh vase --out vase.glb
+      mitex apply runs/solid-lava --mesh bunny.obj --out bunny.png --seed 7 --scale 2
+    """
+
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Random seed: another seed, another solid."""
+
+    def check(self) -> None:
+        super().check()
+        in_range("--seed", self.seed, *SEEDS)
+
+    def applied(self, out: Path) -> Asset:
+        from mitex.mesh import Mesh
+        from mitex.methods.baselines.solid_texture import SolidTexture
+
+        return SolidTexture.load(self.model).apply(
+            Mesh.load(self.mesh),
+            seed=self.seed,
+            scale=self.scale,
+            resolution=self.resolution,
+            keep_uvs=self.keep_uvs,
+        )

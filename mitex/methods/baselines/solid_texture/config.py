@@ -1,0 +1,40 @@
+"""Settings of solid textures, and their presets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from mitex.features.layers import check_layers
+from mitex.methods.layout import EXEMPLAR_WIDTH
+from mitex.training.settings import TrainingConfig, key
+
+
+@dataclass(frozen=True)
+class SolidConfig(TrainingConfig):
+    """Everything that shapes a training; every key can be set from a TOML file or with `--set`."""
+
+    steps: int = 600
+    exemplar_size: int = key(256, "side of the exemplar [voxels]", 32, 1024)
+    width: float = key(
+        EXEMPLAR_WIDTH, "side of the exemplar on a mesh, of that of a layout's square", 0.01, 10
+    )
+    slice_size: int = key(128, "side of the slices that are compared [voxels]", 32, 512)
+    slices: int = key(1, "slices across each axis in a step; the paper: 8", 1, 64)
+    layers: tuple[str, ...] = key(
+        ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "VGG-16's whose Gram matrices are compared"
+    )
+    lr: float = key(0.1, "learning rate of Adam", 0)
+    milestones: tuple[int, ...] = key((400, 500), "steps at which the learning rate falls", 0)
+    decay: float = key(0.3, "factor of the learning rate at a milestone; the paper: 1", 0)
+    preview_every: int = 50
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_layers(self.layers)
+
+
+DEFAULT = SolidConfig()
+PRESETS = {
+    DEFAULT.preset: DEFAULT,
+    "paper": replace(DEFAULT, preset="paper", steps=3000, slices=8, milestones=()),
+}

@@ -1,0 +1,106 @@
+"""The training of a solid texture, on slices through it, as a task (Gutierrez et al. 2020, section 4)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import torch
+
+from mitex.exemplar import Exemplar
+from mitex.features import Vgg16
+from mitex.losses.gram import gram_loss, gram_matrix
+from mitex.methods.baselines.solid_texture.boxes import Box
+from mitex.methods.baselines.solid_texture.config import SolidConfig
+from mitex.methods.baselines.solid_texture.generator import NOISE, SCALES, Generator, noise_boxes
+from mitex.runtime import keep_freed_memory
+from mitex.training import ParameterTask, Step
+
+SETTLING = 10  # slices across each axis, by which statistics come from the last weights
+SHIFTS = 1 << (SCALES - 1)  # places of a slice among the voxels of the coarsest scale
+
+
+class SolidTask(ParameterTask):
+    """A generator whose slices across the three axes shall have the Gram matrices of an exemplar.
+
+    The authors take VGG-19, here VGG-16 stands in its place, whose weights come with Mitex.
+
+    Args:
+        config: settings.
+        exemplar: whose albedo all slices shall look like.
+    """
+
+    def __init__(self, config: SolidConfig, exemplar: Exemplar) -> None:
+        keep_freed_memory()
+        self.config, self.exemplar = config, exemplar
+        self.generator = Generator.random(torch.Generator().manual_seed(config.seed))
+        super().__init__(self.generator.tensors)
+        self.network = Vgg16()
+        features = self.network.features(self._picture[None], config.layers)
+        self.targets = {layer: gram_matrix(values.flatten(1, 2)[0]) for layer, values in features.items()}
+
+    @property
+    def _picture(self) -> torch.Tensor:
+        return torch.from_numpy(self.exemplar.resized(self.config.exemplar_size).maps["albedo"])
+
+    def loss(self, step: int, generator: torch.Generator) -> Step:
+        """Gram matrices of slices across x, y and z; `commit` keeps the statistics of the channels."""
+        updated = {name: value.clone() for name, value in self.generator.statistics.items()}
+        total = torch.zeros(())
+        for axis in range(3):
+            pictures = self._slices(axis, self.config.slice_size, generator, updated)
+            features = self.network.features(pictures, self.targets)
+            vectors = {layer: values.flatten(1, 2) for layer, values in features.items()}
+            total = total + gram_loss(vectors, self.targets) / 3
+        return Step(total, {}, partial(self._keep, updated))
+
+    def state(self) -> dict[str, torch.Tensor]:
+        return super().state() | {f"statistics/{k}": v for k, v in self.generator.statistics.items()}
+
+    def load_state(self, state: dict[str, torch.Tensor]) -> None:
+        super().load_state(state)
+        self._keep({name: state[f"statistics/{name}"] for name in self.generator.statistics})
+
+    @torch.no_grad()
+    def preview(self, step: int) -> np.ndarray:
+        """The exemplar, and slices across x, y and z."""
+        side, generator = self.config.slice_size, torch.Generator().manual_seed(step)
+        beside = np.zeros((side, side, 3), np.float32)
+        picture = self._picture.numpy()[:side, :side]
+        beside[: len(picture), : picture.shape[1]] = picture
+        updated = {name: value.clone() for name, value in self.generator.statistics.items()}
+        slices = [self._slices(axis, side, generator, updated)[0].clamp(0, 1).numpy() for axis in range(3)]
+        return np.hstack([beside, *slices])
+
+    @torch.no_grad()
+    def settled(self) -> Generator:
+        """The generator with statistics of its present weights; those of the training lag behind."""
+        generator = torch.Generator().manual_seed(self.config.seed)
+        updated = {name: value.clone() for name, value in self.generator.statistics.items()}
+        for _ in range(SETTLING):
+            for axis in range(3):
+                self._slices(axis, self.config.slice_size, generator, updated)
+        return replace(self.generator, statistics=updated)
+
+    def metadata(self) -> dict[str, str]:
+        return {
+            "method": "solid_texture",
+            "exemplar": self.exemplar.name,
+            "exemplar_key": self.exemplar.key,
+        }
+
+    def _slices(
+        self, axis: int, side: int, generator: torch.Generator, updated: dict[str, torch.Tensor]
+    ) -> torch.Tensor:
+        """(K, N, N, 3) sRGB slices of one voxel across an axis, at a random place; moves the statistics."""
+        start = torch.randint(0, SHIFTS, (3,), generator=generator).tolist()
+        box = Box(tuple(start), tuple(1 if k == axis else side for k in range(3)))
+        shapes = [(self.config.slices, NOISE, *b.size) for b in noise_boxes(box)]
+        noise = [torch.rand(shape, generator=generator) for shape in shapes]
+        colours = self.generator.colours(box, noise, updated)
+        return colours.squeeze(2 + axis).movedim(1, -1).contiguous()
+
+    def _keep(self, statistics: dict[str, torch.Tensor]) -> None:
+        for name, value in self.generator.statistics.items():
+            value.copy_(statistics[name])

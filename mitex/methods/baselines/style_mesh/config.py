@@ -1,0 +1,81 @@
+"""Settings of StyleMesh, and its presets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from mitex.errors import ConfigError
+from mitex.features.layers import check_layers
+from mitex.training.settings import TrainingConfig, key
+
+
+@dataclass(frozen=True)
+class StyleMeshConfig(TrainingConfig):
+    """Everything that shapes a synthesis; every key can be set from a TOML file or with `--set`."""
+
+    steps: int = 480
+    resolution: int = key(512, "side of the texture [texels]", 32, 4096)
+    textures: int = key(4, "textures whose sum is the result, each half as fine as the one before", 1, 6)
+    exemplar_size: int = key(
+        256, "side of the exemplar's central square on the mesh [texels], as of surface", 64, 2048
+    )
+    views: int = key(24, "cameras, evenly around the mesh", 1, 10_000)
+    view: int = key(256, "height of the lowest pictures [px]", 64, 2048)
+    heights: int = key(2, "heights of pictures, each twice as high as the one before; the paper: 4", 1, 5)
+    distance: float = key(2.5, "of the cameras [half extents of the mesh]", 1.01, 1000)
+    fov: float = key(60.0, "field of view [degrees]", 1, 120)
+    antialias: int = key(2, "n for n x n rays per pixel; the paper: 1", 1, 8)
+    by_depth: bool = key(True, "a pixel counts in the pictures in which it is as large as a texel")
+    by_angle: bool = key(
+        True, "pixels count by the cosine of the angle they are seen at, and small details where it is small"
+    )
+    frontal: float = key(30.0, "angle up to which small details of the exemplar are added [degrees]", 0, 90)
+    layers: tuple[str, ...] = key(
+        ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "VGG-16's that are compared"
+    )
+    weights: tuple[float, ...] = key((0.1, 0.1, 0.001, 0.001, 0.1), "of the layers", 0)
+    small_layers: tuple[str, ...] = key(
+        ("relu4_1", "relu5_1"), "layers that are compared with the exemplar at half its size, too"
+    )
+    coarse_first: float = key(
+        3.25e8, "how much finer textures are held near zero, so that coarse ones take what they can", 0
+    )
+    lr: float = key(0.01, "learning rate of Adam [of the colours' range]; the paper: a level of 8 bits", 0)
+    milestones: tuple[int, ...] = key((206, 411), "steps at which the learning rate falls", 0)
+    decay: float = key(0.1, "factor of the learning rate at a milestone", 0)
+    preview_every: int = 60
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_layers(self.layers)
+        if len(self.weights) != len(self.layers):
+            raise ConfigError(
+                f"{len(self.weights)} weights for {len(self.layers)} layers", "give one for each"
+            )
+        if unknown := set(self.small_layers) - set(self.layers):
+            raise ConfigError(
+                f"small_layers holds {', '.join(sorted(unknown))}", f"use some of {', '.join(self.layers)}"
+            )
+        if self.resolution % 2 ** (self.textures - 1):
+            raise ConfigError(
+                f"{self.textures} textures of {self.resolution} texels",
+                f"use a multiple of {2 ** (self.textures - 1)}",
+            )
+
+
+DEFAULT = StyleMeshConfig()
+PRESETS = {
+    DEFAULT.preset: DEFAULT,
+    "paper": replace(
+        DEFAULT,
+        preset="paper",
+        steps=14_000,
+        resolution=4096,
+        exemplar_size=2048,
+        views=100,
+        heights=4,
+        antialias=1,
+        lr=1 / 255,
+        milestones=(6000, 12_000),
+    ),
+}

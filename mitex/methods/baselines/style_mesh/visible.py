@@ -1,0 +1,73 @@
+"""What each pixel of a view counts for, by its depth and the angle at which it sees the surface."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from mitex.geometry.vectors import unit
+from mitex.mesh import Mesh
+from mitex.scenes.cameras import Cameras
+from mitex.scenes.stage import Stage
+
+
+@dataclass(frozen=True, eq=False)
+class Visible:
+    """What a camera sees of a mesh.
+
+    Attributes:
+        depth: (H, W) along the optical axis [mesh units]; infinite where there is no surface.
+        cosine: (H, W) of the angle between the surface's normal and the way to the camera, 0 where there is
+            no surface or it is seen from behind.
+    """
+
+    depth: np.ndarray
+    cosine: np.ndarray
+
+    @staticmethod
+    def of(stage: Stage, mesh: Mesh, camera: Cameras) -> Visible:
+        """From one camera; `stage` is the mesh's."""
+        hits = stage.hits(camera)
+        hit, face = hits.hit.numpy(), hits.face.numpy()
+        points = (hits.barycentric.numpy()[:, :, None] * mesh.vertices[mesh.faces[face]]).sum(1)
+        to_camera = camera.origin[0] - points
+        depth, cosine = np.full(len(hit), np.inf), np.zeros(len(hit))
+        depth[hit] = -to_camera @ unit(camera.target[0] - camera.origin[0])
+        normals = unit(mesh.face_crosses[face])
+        cosine[hit] = (normals * unit(to_camera)).sum(1).clip(0)
+        size = camera.height, camera.width
+        return Visible(depth.reshape(size), cosine.reshape(size))
+
+    def height(self, fov: float, texel: float) -> np.ndarray:
+        """(H, W) how high a picture [px] must be for a pixel there to be as large as a texel [mesh units]."""
+        return 2 * math.tan(0.5 * math.radians(fov)) * self.depth / texel
+
+
+def shares(wanted: np.ndarray, heights: list[int], index: int) -> np.ndarray:
+    """How much pixels count in the picture of `heights[index]`.
+
+    They are split between the two pictures whose heights are next to the wanted one; below the lowest and
+    above the highest they count there alone. Shares of all pictures add up to 1.
+    """
+    own = float(heights[index])
+    result = np.ones_like(wanted)
+    if index > 0:
+        below = heights[index - 1]
+        result = np.where(wanted < own, np.clip((wanted - below) / (own - below), 0, 1), result)
+    if index < len(heights) - 1:
+        above = heights[index + 1]
+        result = np.where(wanted > own, np.clip((above - wanted) / (above - own), 0, 1), result)
+    return result
+
+
+def cameras_around(count: int, distance: float, fov: float, side: int) -> Cameras:
+    """Evenly spread over a sphere around the origin, which they look at, by the golden angle."""
+    k = np.arange(count)
+    y, angle = 1 - (2 * k + 1) / count, k * math.pi * (3 - math.sqrt(5))
+    ring = np.sqrt(1 - y * y)
+    origin = distance * np.stack([ring * np.cos(angle), y, ring * np.sin(angle)], 1)
+    steep = np.abs(y) > 0.999
+    up = np.where(steep[:, None], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    return Cameras("perspective", origin, np.zeros((count, 3)), up, fov=fov, width=side, height=side)

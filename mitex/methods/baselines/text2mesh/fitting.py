@@ -1,0 +1,57 @@
+"""Learning colours with Text2Mesh: from exemplar and mesh to texture file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Unpack
+
+from mitex.exemplar import Exemplar
+from mitex.mesh import Mesh
+from mitex.methods.baselines.text2mesh.config import PRESETS
+from mitex.methods.baselines.text2mesh.task import Text2MeshTask
+from mitex.methods.baselines.text2mesh.texture import Text2MeshTexture
+from mitex.methods.layout import with_layout
+from mitex.training.fit import Run
+from mitex.training.settings import RunOptions
+
+
+def fit(
+    exemplar: Exemplar | str | Path,
+    mesh: Mesh | str | Path,
+    out: str | Path | None = None,
+    *,
+    keep_uvs: bool = False,
+    **options: Unpack[RunOptions],
+) -> Text2MeshTexture:
+    """Learns colours of a mesh whose views look like an exemplar; writes a run folder with the texture in it.
+
+    Args:
+        exemplar: maps, of which the albedo is matched, or what `Exemplar.load` takes.
+        mesh: or what `Mesh.load` takes.
+        out: run folder; must be new or empty, or hold a run to resume; None writes no file.
+        keep_uvs: use the mesh's own UVs.
+        options: preset ("default" or "paper"), and those of `RunOptions`.
+
+    Returns:
+        The texture, also saved as `texture.safetensors` in `out` if that is given.
+
+    Raises:
+        MitexError: bad input of any kind; nothing has been written then.
+        Cancelled: by `cancel`; a checkpoint has been saved if there is a folder.
+        Interrupted: by Ctrl-C, likewise.
+    """
+    run = Run.of(PRESETS, out, **options)
+    config = run.config
+    target = (exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)).of_albedo()
+    given = mesh if isinstance(mesh, Mesh) else Mesh.load(mesh)
+    surface = with_layout(given, config.resolution, keep_uvs)
+    run.control.check()
+    task = Text2MeshTask(config, target, surface)
+    return run.train(
+        task,
+        target.name,
+        lambda about: Text2MeshTexture(surface, task.baked(), about),
+        lr=config.lr,
+        milestones=config.milestones,
+        decay=config.decay,
+    )

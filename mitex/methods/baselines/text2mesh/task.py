@@ -1,0 +1,121 @@
+"""The training of a network of colours through views of a mesh, as a task (Michel et al. 2022)."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from mitex.cache import content_key
+from mitex.exemplar import Exemplar
+from mitex.features import Vgg16
+from mitex.losses import moment_distance, relaxed_transport
+from mitex.mesh import Mesh
+from mitex.methods.baselines.text2mesh.cameras import cameras_of, frame_height
+from mitex.methods.baselines.text2mesh.config import Text2MeshConfig
+from mitex.methods.baselines.text2mesh.field import colours, random_weights
+from mitex.methods.surface.texels import Texels
+from mitex.runtime import keep_freed_memory
+from mitex.scenes.cameras import Cameras, orbit
+from mitex.scenes.stage import Stage
+from mitex.training import ParameterTask, Step
+
+LEAST = 32  # side of the exemplar beside a view [px], which five layers need
+FULL = 0.999  # coverage from which on a feature shows the mesh alone
+CHUNK = 1 << 16  # places at a time
+BACKGROUND = 1.0  # white
+
+
+class Text2MeshTask(ParameterTask):
+    """A network whose colours shall make views of a mesh look like an exemplar.
+
+    As MeshNCA compares with it: the target is an image, the loss relaxed transport (MeshNCA, equation 6), and
+    the geometry stays. Colours are those of the places that pixels see, where the authors interpolate them
+    from the vertices: so they are as fine on coarse meshes.
+
+    Args:
+        config: settings.
+        exemplar: whose albedo is matched.
+        mesh: with the UVs of the texture that the network is baked into.
+    """
+
+    def __init__(self, config: Text2MeshConfig, exemplar: Exemplar, mesh: Mesh) -> None:
+        keep_freed_memory()
+        self.config, self.exemplar, self.mesh = config, exemplar, mesh
+        generator = torch.Generator().manual_seed(config.seed)
+        self.waves = config.sigma * torch.randn(config.frequencies, 3, generator=generator)
+        super().__init__(random_weights(config.frequencies, config.width, generator))
+        self.ball = mesh.normalised()[0]
+        assert mesh.uv is not None
+        self.texels = Texels.rasterize(self.ball, mesh.uv, config.resolution)
+        self.stage = Stage(self.ball)
+        self.network = Vgg16()
+        picture = torch.from_numpy(exemplar.resized(self.exemplar_side).maps["albedo"])
+        self.picture = picture.flatten(0, 1)
+        features = self.network.features(picture[None], config.layers)
+        self.targets = {layer: values[0].flatten(0, 1) for layer, values in features.items()}
+
+    @property
+    def exemplar_side(self) -> int:
+        """Of the exemplar, so that a texel of it is as large as one on the mesh at the mean distance [px]."""
+        config = self.config
+        side = config.exemplar_size * self.texels.size * config.view / frame_height(config)
+        return min(max(round(side), LEAST), 4 * config.view)
+
+    def loss(self, step: int, generator: torch.Generator) -> Step:
+        """Relaxed transport and moments of the features of some views, and of their colours."""
+        views, masks = self.views(cameras_of(self.config, generator))
+        total = torch.zeros(())
+        features = self.network.features(views, self.config.layers)
+        for k in range(len(views)):
+            for layer, values in features.items():
+                inside = torch.nn.functional.adaptive_avg_pool2d(
+                    masks[k][None].float(), (values.shape[1], values.shape[2])
+                )
+                total = total + self._distance(
+                    values[k][inside[0] > FULL], self.targets[layer], generator, False
+                )
+            total = total + self._distance(views[k][masks[k]], self.picture, generator, True)
+        return Step(total / len(views), {})
+
+    def views(self, cameras: Cameras) -> tuple[torch.Tensor, torch.Tensor]:
+        """Pictures (K, S, S, 3) sRGB on white, and (K, S, S) bool, which pixels show the mesh."""
+        hits = self.stage.hits(cameras)
+        corners = torch.from_numpy(self.ball.vertices[self.ball.faces[hits.face.numpy()]])
+        points = (hits.barycentric[..., None] * corners).sum(1)
+        pixels = torch.full((len(hits.hit), 3), BACKGROUND)
+        pixels[hits.hit] = colours(self.named, points, self.waves)
+        shape = len(cameras), cameras.height, cameras.width
+        return pixels.view(*shape, 3), hits.hit.view(*shape)
+
+    @torch.no_grad()
+    def baked(self) -> np.ndarray:
+        """(R, R, 3) float32 sRGB: the network's colours at the texels of the mesh, grey elsewhere."""
+        places = torch.from_numpy(self.texels.position.astype(np.float32))
+        parts = [colours(self.named, part, self.waves) for part in places.split(CHUNK)]
+        return self.texels.image(torch.cat(parts).numpy(), 0.5)
+
+    @torch.no_grad()
+    def preview(self, step: int) -> np.ndarray:
+        """The exemplar as large as it shall look on the mesh, and the mesh from two sides, unlit."""
+        config = self.config
+        around = orbit(2, distance=config.distance, fov=config.fov, resolution=config.view)
+        views = self.views(around)[0].numpy()
+        beside = np.zeros_like(views[0])
+        picture = self.exemplar.resized(self.exemplar_side).maps["albedo"][: config.view, : config.view]
+        beside[: len(picture), : picture.shape[1]] = picture
+        return np.hstack([beside, *views])
+
+    def metadata(self) -> dict[str, str]:
+        exemplar = {"exemplar": self.exemplar.name, "exemplar_key": self.exemplar.key}
+        key = content_key(self.mesh.vertices, self.mesh.faces, self.mesh.uv)
+        return {"method": "text2mesh", "mesh": self.mesh.name, "mesh_key": key} | exemplar
+
+    def _distance(
+        self, ours: torch.Tensor, theirs: torch.Tensor, generator: torch.Generator, euclidean: bool
+    ) -> torch.Tensor:
+        """Of random vectors (n, C) and (m, C), as many of both."""
+        count = min(len(ours), len(theirs), self.config.samples)
+        if count < 2:
+            return torch.zeros(())
+        a, b = (rows[torch.randperm(len(rows), generator=generator)[:count]][None] for rows in (ours, theirs))
+        return (relaxed_transport(a, b, euclidean) + self.config.moment_weight * moment_distance(a, b)).sum()

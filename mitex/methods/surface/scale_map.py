@@ -1,0 +1,88 @@
+"""The size of the pattern where it varies over a mesh: a painted picture, or a number for each vertex."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mitex.errors import ConfigError
+from mitex.geometry.triangles import interpolate
+from mitex.images import read_image
+from mitex.mesh import Mesh
+from mitex.mesh.vertex_files import read_array
+from mitex.methods.surface.pictures import picture_at
+from mitex.paths import expanded
+
+SMALLEST, LARGEST = 0.25, 4.0  # factors of the pattern's size
+
+
+@dataclass(frozen=True, eq=False)
+class ScaleMap:
+    """Factors of the pattern's size on a mesh.
+
+    Attributes:
+        values: (V,) at the vertices, or (H, W, 1) a picture.
+        uv: (F, 3, 2) what the picture lies on, v upwards; None for numbers at the vertices.
+    """
+
+    values: np.ndarray
+    uv: np.ndarray | None = None
+
+    @staticmethod
+    def of(source: np.ndarray | str | Path, mesh: Mesh) -> ScaleMap:
+        """Reads a scale map for a mesh.
+
+        Args:
+            source: (V,) a factor for each vertex, or a .npy file of them; or a picture over the mesh's own
+                UVs, whose grey is the factor: white 1, middle grey 0.5.
+            mesh: V vertices.
+
+        Raises:
+            ConfigError: not one finite number for each vertex, or a picture for a mesh without UVs.
+            ImageError: the picture cannot be read.
+        """
+        if isinstance(source, str | Path):
+            place = expanded(source)
+            if place.suffix.lower() != ".npy":
+                if mesh.uv is None:
+                    raise ConfigError(
+                        f"mesh '{mesh.name}' has no UVs for the scale map '{place}'",
+                        "give a mesh with UVs, or a .npy file with a number for each vertex",
+                    )
+                return ScaleMap(read_image(place, "L"), mesh.uv)
+            source = read_array(place, "a scale map")
+        shape = (len(mesh.vertices),)
+        if source.dtype.kind not in "fiu" or source.shape != shape:
+            raise ConfigError(
+                f"the scale map is {source.dtype} {source.shape}",
+                f"give numbers of shape {shape}, one for each vertex of '{mesh.name}'",
+            )
+        if not np.isfinite(source).all():
+            raise ConfigError("the scale map has numbers that are NaN or infinite", "give finite ones")
+        return ScaleMap(np.array(source, np.float64))
+
+    def at(self, mesh: Mesh, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """The factors (M,) float64 at points of the mesh that the map was read for.
+
+        Args:
+            mesh: with its faces.
+            face: (M,) where the points lie.
+            barycentric: (M, 3) where on the faces.
+
+        Raises:
+            ConfigError: one of them is not from 0.25 to 4.
+        """
+        if self.uv is None:
+            factors = interpolate(barycentric, self.values[mesh.faces[face]][..., None])[:, 0]
+        else:
+            factors = picture_at(self.values, interpolate(barycentric, self.uv[face].astype(np.float64)))[
+                :, 0
+            ]
+        if factors.min() < SMALLEST - 1e-6 or factors.max() > LARGEST + 1e-6:
+            raise ConfigError(
+                f"the scale map goes from {factors.min():.3g} to {factors.max():.3g} on '{mesh.name}'",
+                f"use factors from {SMALLEST:g} to {LARGEST:g} (in a picture: greys of 64 to 255)",
+            )
+        return factors.astype(np.float64)

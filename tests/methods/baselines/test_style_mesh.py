@@ -1,0 +1,230 @@
+"""StyleMesh: sums of textures, what pixels count for, gradients weighted by it, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from mitex.errors import CheckpointError, ConfigError, ImageError
+from mitex.exemplar import Exemplar
+from mitex.mesh import Mesh, icosphere
+from mitex.methods.baselines import style_mesh
+from mitex.methods.baselines.style_mesh import StyleMeshConfig, StyleMeshTexture
+from mitex.methods.baselines.style_mesh.layered import fine_energy, sum_of, zero_textures
+from mitex.methods.baselines.style_mesh.task import StyleMeshTask
+from mitex.methods.baselines.style_mesh.visible import Visible, cameras_around, shares
+from mitex.methods.layout import with_layout
+from mitex.runtime import threads
+from mitex.scenes.stage import Stage
+from tests.training.contract import (
+    FAULTS,
+    assert_loss_is_pure,
+    assert_same_checkpoint,
+    assert_third_step_leaves_no_trace,
+)
+
+CONFIG = StyleMeshConfig(
+    steps=4,
+    resolution=64,
+    exemplar_size=64,
+    views=3,
+    view=64,
+    antialias=1,
+    layers=("relu1_1", "relu2_1"),
+    weights=(1.0, 1.0),
+    small_layers=("relu2_1",),
+    preview_every=0,
+    milestones=(),
+)
+SMALL = {
+    "resolution": 32,
+    "exemplar_size": 64,
+    "views": 2,
+    "view": 64,
+    "layers": ("relu1_1",),
+    "weights": (1.0,),
+    "small_layers": ("relu1_1",),
+    "checkpoint_every": 2,
+    "preview_every": 0,
+}
+
+
+@pytest.fixture(scope="module")
+def exemplar() -> Exemplar:
+    return Exemplar.load("lava").resized(64).of_albedo()
+
+
+@pytest.fixture(scope="module")
+def ball() -> Mesh:
+    return with_layout(icosphere(8), 64)
+
+
+class TestTextures:
+    def test_the_start_is_grey(self):
+        texture = sum_of(list(zero_textures(16, 3).values()))
+        assert torch.equal(texture, torch.tensor([0.485, 0.456, 0.406]).expand(16, 16, 3))
+
+    def test_each_is_interpolated(self):
+        """A texture of half the side whose left half is brighter: a ramp of two texels between the halves."""
+        fine, coarse = zero_textures(8, 2).values()
+        coarse[:, :, :2], fine[:, 0, 0] = 0.2, 0.1
+        texture = sum_of([fine, coarse]) - torch.tensor([0.485, 0.456, 0.406])
+        expected = torch.tensor([0.2, 0.2, 0.2, 0.15, 0.05, 0, 0, 0])
+        assert torch.allclose(texture[3, :, 1], expected, atol=1e-6)
+        assert torch.allclose(texture[0, 0], torch.tensor(0.3), atol=1e-6)
+
+    def test_colours_stay_in_range(self):
+        assert (
+            sum_of([torch.full((3, 4, 4), 9.0)]).max() == 1
+            and sum_of([torch.full((3, 4, 4), -9.0)]).max() == 0
+        )
+
+    def test_finer_textures_cost_more(self):
+        values = [torch.full((3, 2, 2), 0.5) for _ in range(5)]
+        assert float(fine_energy(values)) == pytest.approx(0.25 * (8 + 4 + 2))
+
+
+class TestVisible:
+    def test_depth_and_angle_on_a_sphere(self):
+        """Rays from 3 units that meet the unit sphere, in closed form."""
+        ball = icosphere(40)
+        camera = cameras_around(1, 3.0, 45.0, 33)
+        visible = Visible.of(Stage(ball), ball, camera)
+        direction = camera.rays()[1][0].astype(np.float64)
+        origin = camera.origin[0].astype(np.float64)
+        b = direction @ origin
+        discriminant = b * b - (origin @ origin - 1)
+        hit = discriminant > 0.05
+        distance = -b - np.sqrt(discriminant.clip(0))
+        axis = -origin / np.linalg.norm(origin)
+        points = origin + distance[..., None] * direction
+        np.testing.assert_allclose(visible.depth[hit], (distance * (direction @ axis))[hit], atol=5e-3)
+        np.testing.assert_allclose(visible.cosine[hit], -(points * direction).sum(-1)[hit], atol=0.03)
+        outside = discriminant < -0.05
+        assert outside.any() and not visible.cosine[outside].any() and np.isinf(visible.depth[outside]).all()
+
+    def test_a_picture_in_which_a_pixel_is_a_texel(self):
+        """At depth 2 and 90 degrees a picture is 4 units high, which are 40 texels of 0.1."""
+        visible = Visible(np.full((1, 1), 2.0), np.ones((1, 1)))
+        assert visible.height(90.0, 0.1)[0, 0] == pytest.approx(40)
+
+    def test_shares_add_up(self, rng):
+        heights, wanted = [64, 128, 256], rng.uniform(10, 500, 200)
+        parts = np.stack([shares(wanted, heights, k) for k in range(3)])
+        np.testing.assert_allclose(parts.sum(0), 1)
+        expected = {32: (1, 0, 0), 64: (1, 0, 0), 96: (0.5, 0.5, 0), 128: (0, 1, 0), 224: (0, 0.25, 0.75)}
+        for height, share in (expected | {256: (0, 0, 1), np.inf: (0, 0, 1)}).items():
+            assert [float(shares(np.array(height), heights, k)) for k in range(3)] == pytest.approx(share)
+
+    def test_cameras_are_evenly_around(self):
+        cameras = cameras_around(100, 2.5, 60.0, 8)
+        np.testing.assert_allclose(np.linalg.norm(cameras.origin, axis=1), 2.5, rtol=1e-6)
+        assert np.abs(cameras.origin.mean(0)).max() < 0.02
+        gaps = np.linalg.norm(cameras.origin[:, None] - cameras.origin[None], axis=2) + 9 * np.eye(100)
+        assert gaps.min(1).min() > 0.6 * gaps.min(1).max()
+
+
+class TestTask:
+    def test_gradients_are_weighted_by_what_pixels_count_for(self, ball, exemplar, monkeypatch):
+        """Where no pixel counts there are none, and twice the weight gives twice the gradient."""
+        task = StyleMeshTask(CONFIG, exemplar, ball)
+        task.named["texture0"].data.normal_(0, 0.1, generator=torch.Generator().manual_seed(0))
+
+        def gradient(weight: torch.Tensor) -> torch.Tensor:
+            monkeypatch.setattr(task, "_weight", lambda visible, k: weight)
+            task.named["texture0"].grad = None
+            task._picture_loss(task.texture, 0, 0).backward()
+            result = task.named["texture0"].grad
+            assert result is not None
+            return result
+
+        half = torch.ones(64, 64)
+        half[:, :32] = 0
+        whole, once, twice = gradient(torch.ones(64, 64)), gradient(half), gradient(2 * half)
+        assert torch.allclose(twice, 2 * once, atol=1e-5 * float(once.abs().max()))
+        assert 0.2 < float(once.abs().sum() / whole.abs().sum()) < 0.8
+        monkeypatch.setattr(task, "_weight", lambda visible, k: torch.zeros(64, 64))
+        assert not task._picture_loss(task.texture, 0, 0).requires_grad
+
+    def test_the_contract(self, ball, exemplar):
+        threads(1)
+        assert_loss_is_pure(StyleMeshTask(CONFIG, exemplar, ball), 1)
+
+    @pytest.mark.parametrize("fault", FAULTS)
+    def test_a_skipped_step_leaves_no_trace(self, fault, ball, exemplar):
+        threads(1)
+        assert_third_step_leaves_no_trace(lambda: StyleMeshTask(CONFIG, exemplar, ball), CONFIG, fault)
+
+    def test_options_matter(self, ball, exemplar):
+        def gradients(**options) -> torch.Tensor:
+            config = replace(CONFIG, **({"resolution": 256} | options))
+            task = StyleMeshTask(config, exemplar, ball)
+            noise = torch.Generator().manual_seed(1)
+            for value in task.parameters:
+                value.data.normal_(0, 0.1, generator=noise)
+            task.loss(0, torch.Generator().manual_seed(5)).value.backward()
+            first = task.named["texture0"].grad
+            assert first is not None
+            return first
+
+        plain = gradients()
+        for options in (
+            *({"by_depth": False}, {"by_angle": False}, {"heights": 1}, {"frontal": 10.0}, {"views": 5}),
+            *(
+                {"distance": 4.0},
+                {"fov": 40.0},
+                {"antialias": 2},
+                {"exemplar_size": 80},
+                {"coarse_first": 9.0},
+            ),
+            *(
+                {"layers": ("relu2_1",), "weights": (1.0,)},
+                {"weights": (1.0, 3.0)},
+                {"small_layers": ()},
+                {"textures": 2},
+            ),
+        ):
+            assert not torch.equal(gradients(**options), plain), options
+
+
+def test_the_texture_comes_near(tmp_path):
+    """A flat exemplar's colour spreads over what cameras see, and previews are made."""
+    red = Exemplar({"albedo": np.full((64, 64, 3), (0.8, 0.3, 0.1), np.float32)}, "red")
+    settings = SMALL | {"preview_every": 25, "lr": 0.05}
+    texture = style_mesh.fit(red, icosphere(4), tmp_path / "run", set=settings, steps=25)
+    mean = texture.apply().maps["albedo"].mean((0, 1))
+    assert mean[0] > mean[1] + 0.1 > mean[2] + 0.2
+    assert (tmp_path / "run" / "previews" / "000025.png").is_file()
+    assert StyleMeshTexture.load(tmp_path / "run").about["mesh"] == "icosphere4"
+
+
+def test_resuming_changes_nothing(exemplar, tmp_path):
+    threads(1)
+    style_mesh.fit(exemplar, icosphere(4), tmp_path / "whole", set=SMALL, steps=4)
+    style_mesh.fit(exemplar, icosphere(4), tmp_path / "part", set=SMALL, steps=2)
+    style_mesh.fit(exemplar, icosphere(4), tmp_path / "part", steps=4, resume=True)
+    assert_same_checkpoint(tmp_path / "whole", tmp_path / "part")
+    with pytest.raises(CheckpointError, match="mesh"):
+        style_mesh.fit(exemplar, icosphere(5), tmp_path / "part", steps=6, resume=True)
+
+
+class TestRefused:
+    @pytest.mark.parametrize(
+        ("setting", "message"),
+        [
+            ("layers=relu9_1", "relu9_1; use some of"),
+            ("small_layers=relu2_2", "small_layers holds relu2_2"),
+            ("weights=1,2", "2 weights for 5 layers"),
+            ("resolution=100", "use a multiple of 8"),
+            ("view=8", "out of range"),
+        ],
+    )
+    def test_settings(self, setting, message, exemplar, ball):
+        with pytest.raises(ConfigError, match=message):
+            style_mesh.fit(exemplar, ball, set=[setting])
+
+    def test_no_colours(self, ball):
+        height = Exemplar({"height": np.zeros((32, 32, 1), np.float32)}, "hills")
+        with pytest.raises(ImageError, match="hills has no albedo"):
+            style_mesh.fit(height, ball)

@@ -1,0 +1,169 @@
+"""Text2Mesh with an image: the network against torch's layers, what views show, and what is refused."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+from mitex.errors import CheckpointError, ConfigError, ImageError
+from mitex.exemplar import Exemplar
+from mitex.mesh import Mesh, icosphere
+from mitex.methods.baselines import text2mesh
+from mitex.methods.baselines.text2mesh import Text2MeshConfig, Text2MeshTexture
+from mitex.methods.baselines.text2mesh.cameras import cameras_of
+from mitex.methods.baselines.text2mesh.field import HEAD, TRUNK, colours, encoded, random_weights
+from mitex.methods.baselines.text2mesh.task import Text2MeshTask
+from mitex.methods.layout import with_layout
+from mitex.runtime import threads
+from mitex.scenes.cameras import orbit
+from tests.training.contract import (
+    FAULTS,
+    assert_loss_is_pure,
+    assert_same_checkpoint,
+    assert_third_step_leaves_no_trace,
+)
+
+SMALL = {
+    "resolution": 32,
+    "exemplar_size": 32,
+    "frequencies": 8,
+    "width": 16,
+    "view": 48,
+    "layers": ("relu1_1", "relu2_1"),
+    "samples": 64,
+    "checkpoint_every": 2,
+    "preview_every": 0,
+}
+CONFIG = Text2MeshConfig(steps=4, milestones=(), **SMALL)
+
+
+@pytest.fixture(scope="module")
+def exemplar() -> Exemplar:
+    return Exemplar.load("lava").resized(48).of_albedo()
+
+
+@pytest.fixture(scope="module")
+def ball() -> Mesh:
+    return with_layout(icosphere(4), 32)
+
+
+class TestField:
+    def test_as_many_weights_as_published_but_for_the_head_of_offsets(self):
+        """659 thousand with a second head of two layers and one number."""
+        weights = random_weights(256, 256, torch.Generator())
+        offsets = HEAD * (256 * 256 + 256) + 257
+        assert sum(value.numel() for value in weights.values()) + offsets == 659_460
+
+    def test_it_equals_torch_s_layers(self):
+        weights = random_weights(4, 8, torch.Generator().manual_seed(0))
+        weights = {name: value.normal_() for name, value in weights.items()}
+        waves, points = torch.randn(4, 3), torch.randn(5, 3)
+        layers: list[nn.Module] = []
+        for k in range(TRUNK + HEAD + 1):
+            outputs, inputs = weights[f"weight{k}"].shape
+            layer = nn.Linear(inputs, outputs)
+            layer.weight.data, layer.bias.data = weights[f"weight{k}"], weights[f"bias{k}"]
+            layers += [layer, nn.ReLU() if k < TRUNK + HEAD else nn.Tanh()]
+        wave = [2 * math.pi * sum(p * w for p, w in zip(points[0], one, strict=True)) for one in waves]
+        row = torch.tensor([*points[0], *map(math.cos, wave), *map(math.sin, wave)])
+        assert torch.allclose(encoded(points, waves)[0], row, atol=1e-5)
+        expected = (1 + nn.Sequential(*layers)(encoded(points, waves))) / 2
+        assert torch.allclose(colours(weights, points, waves), expected, atol=1e-6)
+
+    def test_the_start_is_grey(self):
+        weights = random_weights(4, 8, torch.Generator().manual_seed(0))
+        assert torch.equal(colours(weights, torch.randn(9, 3), torch.randn(4, 3)), torch.full((9, 3), 0.5))
+
+
+class TestViews:
+    def test_they_show_the_colours_of_places(self, ball, exemplar, monkeypatch):
+        """A field that is the place itself: the middle of a view from +z is the pole of the ball."""
+        task = Text2MeshTask(CONFIG, exemplar, ball)
+        name = "mitex.methods.baselines.text2mesh.task.colours"
+        monkeypatch.setattr(name, lambda weights, points, waves: 0.5 + 0.5 * points)
+        views, masks = task.views(orbit(1, elevation=0, distance=2.0, fov=60.0, resolution=49, start=90))
+        assert torch.allclose(views[0, 24, 24], torch.tensor([0.5, 0.5, 1.0]), atol=0.02)
+        assert views[0, 24, 40, 0] > 0.7 and views[0, 8, 24, 1] > 0.7
+        assert masks[0, 24, 24] and not masks[0, 0, 0] and torch.equal(views[0, 0, 0], torch.ones(3))
+        baked = task.baked()
+        used = np.unravel_index(task.texels.index, baked.shape[:2])
+        np.testing.assert_allclose(baked[used], 0.5 + 0.5 * task.texels.position, atol=1e-5)
+
+    def test_cameras_around_the_front_and_around_all(self):
+        def origins(**options) -> np.ndarray:
+            config, generator = replace(CONFIG, views=64, **options), torch.Generator().manual_seed(0)
+            return cameras_of(config, generator).origin
+
+        front, around = origins(cameras="anchored"), origins()
+        for places in (front, around):
+            np.testing.assert_allclose(np.linalg.norm(places, axis=1), 2.0, rtol=1e-5)
+        np.testing.assert_allclose(front[0], [0, 0, 2], atol=1e-6)
+        assert front[:, 2].mean() > 0.3 and abs(around[:, 2].mean()) < 0.3
+
+
+class TestTask:
+    def test_the_contract(self, ball, exemplar):
+        threads(1)
+        assert_loss_is_pure(Text2MeshTask(CONFIG, exemplar, ball), 1)
+
+    @pytest.mark.parametrize("fault", FAULTS)
+    def test_a_skipped_step_leaves_no_trace(self, fault, ball, exemplar):
+        threads(1)
+        assert_third_step_leaves_no_trace(lambda: Text2MeshTask(CONFIG, exemplar, ball), CONFIG, fault)
+
+    def test_options_matter(self, ball, exemplar):
+        def value(**options) -> float:
+            task = Text2MeshTask(replace(CONFIG, **options), exemplar, ball)
+            for name in ("weight7", "bias7"):
+                task.named[name].data.normal_(generator=torch.Generator().manual_seed(0))
+            return float(task.loss(0, torch.Generator().manual_seed(5)).value.detach())
+
+        plain = value()
+        for options in (
+            *({"sigma": 2.0}, {"views": 3}, {"cameras": "anchored"}, {"fov": 40.0}, {"distance": 3.0}),
+            *({"layers": ("relu1_1",)}, {"samples": 32}, {"moment_weight": 1.0}, {"seed": 1}),
+            *({"frequencies": 9}, {"width": 17}, {"exemplar_size": 64}, {"view": 56}),
+        ):
+            assert value(**options) != plain, options
+
+
+def test_a_flat_colour_is_learned(tmp_path):
+    red = Exemplar({"albedo": np.full((32, 32, 3), (0.8, 0.3, 0.1), np.float32)}, "red")
+    settings = SMALL | {"preview_every": 40, "lr": 0.02, "layers": ("relu1_1",)}
+    texture = text2mesh.fit(red, icosphere(4), tmp_path / "run", set=settings, steps=40)
+    mean = texture.apply().maps["albedo"].mean((0, 1))
+    assert mean[0] > mean[1] + 0.1 > mean[2] + 0.2
+    assert (tmp_path / "run" / "previews" / "000040.png").is_file()
+    assert Text2MeshTexture.load(tmp_path / "run").about["mesh"] == "icosphere4"
+
+
+def test_resuming_changes_nothing(exemplar, tmp_path):
+    threads(1)
+    text2mesh.fit(exemplar, icosphere(4), tmp_path / "whole", set=SMALL, steps=4)
+    text2mesh.fit(exemplar, icosphere(4), tmp_path / "part", set=SMALL, steps=2)
+    text2mesh.fit(exemplar, icosphere(4), tmp_path / "part", steps=4, resume=True)
+    assert_same_checkpoint(tmp_path / "whole", tmp_path / "part")
+    with pytest.raises(CheckpointError, match="mesh"):
+        text2mesh.fit(exemplar, icosphere(5), tmp_path / "part", steps=6, resume=True)
+
+
+class TestRefused:
+    @pytest.mark.parametrize(
+        ("setting", "message"),
+        [
+            ("layers=relu9_1", "relu9_1; use some of"),
+            ("cameras=inside", "inside"),
+            ("view=8", "out of range"),
+        ],
+    )
+    def test_settings(self, setting, message, exemplar, ball):
+        with pytest.raises(ConfigError, match=message):
+            text2mesh.fit(exemplar, ball, set=[setting])
+
+    def test_no_colours(self, ball):
+        height = Exemplar({"height": np.zeros((32, 32, 1), np.float32)}, "hills")
+        with pytest.raises(ImageError, match="hills has no albedo"):
+            text2mesh.fit(height, ball)

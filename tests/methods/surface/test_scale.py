@@ -1,0 +1,161 @@
+"""The size of the pattern: the exemplar's side, and taps whose step varies over the surface."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from mitex.errors import ConfigError
+from mitex.exemplar import Exemplar
+from mitex.images import write_image
+from mitex.mesh import Mesh, icosphere
+from mitex.methods import surface
+from mitex.methods.surface.config import PRESETS
+from mitex.methods.surface.domain import SurfaceDomain
+from mitex.methods.surface.exponential import GeodesicTracer
+from mitex.methods.surface.frames import tangent_frames
+from mitex.methods.surface.scale_map import ScaleMap
+from mitex.methods.surface.taps import Surroundings, build
+from mitex.methods.surface.texels import Texels
+from mitex.training import resolve
+from tests.methods.surface.grids import flat_square
+
+pytestmark = pytest.mark.usefixtures("own_cache")
+SIDE = 64
+config = partial(resolve, PRESETS, None, None)
+
+
+def test_the_exemplar_is_as_wide_on_the_mesh_at_every_resolution():
+    for words, side in (
+        ([], 256),
+        (["resolution=1024"], 512),
+        (["scale=0.5"], 128),
+        (["scale=2", "resolution=256"], 256),
+        (["exemplar_size=200", "resolution=1024"], 200),
+        (["exemplar_size=200", "scale=0.5"], 100),
+        (["preset=paper", "resolution=1024"], 256 * 2),
+    ):
+        assert config(words).exemplar_side() == side
+    assert config([]).exemplar_side(0.5) == 128
+    for words in (["scale=0.05"], ["scale=20"], ["resolution=16"]):
+        with pytest.raises(ConfigError, match=r"texels wide with a scale of .*; change scale, resolution or"):
+            config(words)
+
+
+def square_levels(steps):
+    """Texels and levels of a flat square of 64 x 64 texels, whose taps are `steps` of the texels apart."""
+    mesh = flat_square(8)
+    assert mesh.uv is not None
+    texels = Texels.rasterize(mesh, mesh.uv, SIDE)
+    frames = tangent_frames(mesh, texels.face, texels.barycentric, "fixed")
+    widths = steps(texels.position)
+    levels = build(Surroundings(texels, GeodesicTracer(mesh), *frames, steps=widths))
+    return texels, widths[levels.order], levels
+
+
+def reach(levels):
+    """(n,) how far to the right of its element the tap to the right reads in the mean [texels]."""
+    x = levels.position[:, 0].astype(np.float64)
+    return SIDE * ((levels.lookup @ x).reshape(-1, 9)[:, 5] - x)
+
+
+def inner(levels, margin):
+    return (np.abs(levels.position[:, :2] - 0.5) < 0.5 - margin / SIDE).all(1)
+
+
+@pytest.mark.parametrize("step", [0.5, 2.0])
+def test_taps_and_groups_are_as_many_times_larger_on_every_level(step):
+    _, _, levels = square_levels(lambda position: np.full(len(position), step))
+    inside = inner(levels, 6)
+    assert np.allclose(reach(levels)[inside], step, atol=0.02)
+    for n in (1, 2, 3):
+        sides = np.bincount(groups(levels, n))
+        assert np.median(sides) == max(step * 2**n, 1) ** 2
+        here, there = levels.positions[n][:, 0], levels.positions[n][levels.levels[n].taps[:, 5], 0]
+        middle = (np.abs(levels.positions[n][:, :2] - 0.5) < 0.2).all(1)
+        assert np.allclose(SIDE * (there - here)[middle], step * 2**n, atol=0.6)
+
+
+def groups(levels, depth):
+    """(n,) the group of each element after so many poolings."""
+    label = np.arange(len(levels.order))
+    for level in levels.levels[:depth]:
+        label = np.repeat(np.arange(len(level.sizes)), level.sizes)[label]
+    return label
+
+
+def test_steps_follow_a_map_and_pass_over_no_texel():
+    """A step that grows from left to right; wide steps read all that is between them, evenly."""
+    _, widths, levels = square_levels(lambda position: 1 + 2 * position[:, 0])
+    inside = inner(levels, 10)
+    assert np.abs(reach(levels)[inside] / widths[inside] - 1).max() < 0.06
+    assert np.allclose(levels.lookup.sum(1), 1, atol=1e-5)
+    read = np.asarray(levels.lookup.sum(0))[inside]
+    assert read.min() > 3 and read.max() < 20  # each element by about nine taps, none by chance alone
+    for n in range(1, 5):  # groups of a level lie in one group of the next
+        fine, coarse = groups(levels, n), groups(levels, n + 1)
+        assert (np.diff(fine)[np.diff(coarse) != 0] == 1).all()
+
+
+def test_a_constant_map_is_a_scale():
+    mesh = flat_square(4)
+    halved = config(["resolution=64", "scale=0.5"])
+    half = config(["resolution=64", "scale=1"])
+    plain = SurfaceDomain.of(mesh, halved, keep=False)
+    mapped = SurfaceDomain.of(mesh, half, scale_map=ScaleMap.of(np.full(25, 0.5), mesh), keep=False)
+    assert half.exemplar_side(mapped.mean_scale) == halved.exemplar_side()
+    for ours, theirs in zip(mapped.levels.levels, plain.levels.levels, strict=True):
+        assert np.array_equal(ours.taps, theirs.taps) and np.array_equal(ours.sizes, theirs.sizes)
+    assert abs(mapped.levels.lookup - plain.levels.lookup).max() < 1e-5
+
+
+def test_a_picture_lies_on_the_mesh_s_own_uvs(tmp_path):
+    """A linear ramp over the UVs, 0.25 to 1 from left to right, as numbers at the vertices give it, too."""
+    mesh = flat_square(8)
+    ramp = 0.25 + 0.75 * (np.arange(200) + 0.5) / 200
+    write_image(tmp_path / "ramp.png", np.tile(ramp, (50, 1)))
+    domain = SurfaceDomain.of(mesh, config(["resolution=64"]))
+    at = domain.texels.face, domain.texels.barycentric
+    expected = 0.25 + 0.75 * domain.texels.position[:, 0]
+    np.save(tmp_path / "ramp.npy", 0.25 + 0.75 * mesh.vertices[:, 0])
+    for name in ("ramp.png", "ramp.npy"):
+        factors = ScaleMap.of(tmp_path / name, mesh).at(mesh, *at)
+        assert np.abs(factors - expected).max() < 0.005
+    mapped = SurfaceDomain.of(
+        mesh, config(["resolution=64"]), scale_map=ScaleMap.of(tmp_path / "ramp.npy", mesh)
+    )
+    assert mapped.steps is not None
+    assert np.isclose(np.log(mapped.steps).mean(), 0, atol=1e-9)
+    assert np.allclose(mapped.steps * mapped.mean_scale, expected)
+
+
+def test_the_map_changes_the_texture():
+    small = {"resolution": 32, "exemplar_size": 32, "steps": 1, "scales": 0, "layers": "relu1_1"}
+    mesh, exemplar = icosphere(3), Exemplar.load("cobblestone").of_albedo()
+    sizes = np.where(mesh.vertices[:, 1] > 0, 1.0, 0.5)
+    plain, mapped = (surface.fit(exemplar, mesh, set=small, scale_map=m).values for m in (None, sizes))
+    assert np.abs(plain - mapped).max() > 1e-2
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        (np.ones(5), r"float64 \(5,\); give numbers of shape \(25,\)"),
+        (np.full(25, np.nan), "NaN"),
+        (np.full(25, 5.0), "goes from 5 to 5 on 'square'; use factors from 0.25 to 4"),
+        (np.full(25, "a"), "give numbers"),
+        (np.zeros((4, 4)), "0.25 to 4"),
+    ],
+)
+def test_bad_maps(source, message, tmp_path):
+    mesh = flat_square(4)
+    if source.shape == (4, 4):
+        source = write_image(tmp_path / "black.png", source)
+    with pytest.raises(ConfigError, match=message):
+        ScaleMap.of(source, mesh).at(mesh, np.array([0]), np.full((1, 3), 1 / 3))
+
+
+def test_a_picture_needs_uvs(tmp_path):
+    bare = Mesh(flat_square(4).vertices, flat_square(4).faces)
+    with pytest.raises(ConfigError, match="has no UVs for the scale map"):
+        ScaleMap.of(write_image(tmp_path / "a.png", np.ones((4, 4))), bare)
