@@ -21,6 +21,7 @@ OPTIONAL = [name for name in EXTRAS if name not in ("test", "docs", "dev")]  # w
 MODULES = {
     "imageio-ffmpeg": "imageio_ffmpeg",
     "markdown-it-py": "markdown_it",
+    "opencv-python-headless": "cv2",
     "pillow": "PIL",
     "scikit-image": "skimage",
     "tomli-w": "tomli_w",

@@ -73,7 +73,7 @@ class Studio:
         self.scene = self.mi.load_dict(
             {
                 "type": "scene",
-                "object": _shape(self.mi, part),
+                "object": object_shape(self.mi, part),
                 "light": {"type": "envmap", "bitmap": self.mi.Bitmap(environment())},
                 "integrator": {"type": "path", "max_depth": DEPTH, "hide_emitters": True},
                 "sensor": _sensor(resolution),
@@ -172,7 +172,8 @@ def _write_base(path: Path, mesh: Mesh) -> None:
         np.savetxt(file, mesh.faces + 1, "f %d %d %d")
 
 
-def _shape(mi: Any, part: Part) -> Any:
+def object_shape(mi: Any, part: Part) -> Any:
+    """Mitsuba's shape of a part, shaded smoothly, with its colours."""
     mesh = part.mesh
     bsdf = {  # in a `twosided` it would take six times as long
         "type": "principled",

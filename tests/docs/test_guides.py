@@ -22,7 +22,7 @@ METHODS = [
     for name, method in methods().items()
     if method.presets.startswith(PACKAGES[0]) and not method.baseline
 ]
-FURTHER = ["moving", "flow", "living-page"]
+FURTHER = ["capture", "moving", "flow", "living-page"]
 PICTURE = re.compile(r"!\[(.*?)\]\((.*?)\)")
 NAMED_TEXTURE = re.compile(r"\b[A-Z][\w-]*_\d{3}\b")  # as 3dtextures.me names them
 PAGES = [DOCS.parent / "README.md", *sorted(DOCS.rglob("*.md"))]

@@ -12,9 +12,15 @@ METHOD = Method(
     fit="mitex.methods.nerf.cli:Fit",
     apply="mitex.methods.nerf.cli:Apply",
     texture="mitex.methods.nerf.texture:NerfTexture",
+    commands={
+        "capture": (
+            "mitex.methods.nerf.footage.cli:MakeCapture",
+            "turn a phone's video or photos into a capture",
+        )
+    },
 )
 
-__all__ = ["METHOD", "PRESETS", "Capture", "NerfConfig", "NerfTexture", "fit", "load_capture"]
+__all__ = ["METHOD", "PRESETS", "Capture", "NerfConfig", "NerfTexture", "fit", "load_capture", "make_capture"]
 
 __getattr__ = attributes(
     __name__,
@@ -25,6 +31,7 @@ __getattr__ = attributes(
         "NerfTexture": "mitex.methods.nerf.texture",
         "fit": "mitex.methods.nerf.fitting",
         "load_capture": "mitex.methods.nerf.capture.capture",
+        "make_capture": "mitex.methods.nerf.footage.making",
     },
 )
 
@@ -32,4 +39,5 @@ if TYPE_CHECKING:
     from mitex.methods.nerf.capture.capture import Capture, load_capture
     from mitex.methods.nerf.config import PRESETS, NerfConfig
     from mitex.methods.nerf.fitting import fit
+    from mitex.methods.nerf.footage.making import make_capture
     from mitex.methods.nerf.texture import NerfTexture

@@ -7,6 +7,7 @@ import json
 import tempfile
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -26,8 +27,25 @@ if TYPE_CHECKING:
 
 MIN_PHOTOS = 8
 PLACED = 0.5  # part of the photos that must get a pose
+FIRST_PAIR = 50, 8.0  # matches, and angle [degrees], that the first two photos need
+FURTHER = 20  # matches that a further photo needs
 LONGER_SIDE = 1600  # of what COLMAP sees [pixels]
 VERSION = 1  # of the cached poses
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """What structure from motion finds.
+
+    Attributes:
+        tree: content of a `transforms.json`, with the `V` photos that have a camera.
+        points: (P, 3) float64, of surfaces that photos show, in the cameras' world.
+        sightings: (S, 2) int64 indices of a photo and of a point that was matched in it.
+    """
+
+    tree: dict[str, Any]
+    points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    sightings: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
 
 
 def photo_frames(folder: Path) -> list[Frame]:
@@ -67,28 +85,45 @@ def _photos(folder: Path) -> list[Path]:
 
 def _reconstruct(folder: Path, names: Sequence[str]) -> dict[str, Any]:
     """The content of a `transforms.json` for those photos that COLMAP places in one world."""
+    return reconstruct(folder, names, masked=True).tree
+
+
+def reconstruct(folder: Path, names: Sequence[str], masked: bool = False) -> Structure:
+    """Cameras and points of the photos `names` in `folder`; takes minutes.
+
+    Args:
+        folder: of the photos.
+        names: paths relative to it.
+        masked: whether photos must have an alpha channel or a mask.
+
+    Raises:
+        CaptureError: too few of them could be placed, one has no mask, or pycolmap is not installed.
+        ImageError: a photo is damaged.
+    """
     announce("finding the cameras, some minutes")
     with tempfile.TemporaryDirectory(prefix="mitex-") as temporary:
         work = Path(temporary)
         (work / "images").mkdir()
         # COLMAP sees copies: upright as `read_bytes` gives them, and no larger than it needs.
         copies = {f"{k:05}.png": name for k, name in enumerate(names)}
-        sizes = {copy: _copy(folder, name, work / "images" / copy) for copy, name in copies.items()}
+        sizes = {copy: _copy(folder, name, work / "images" / copy, masked) for copy, name in copies.items()}
         model = _largest(work, one_camera=len(set(sizes.values())) == 1)
         placed = {} if model is None else {i.name: i for i in model.images.values() if i.has_pose}
-        if len(placed) < max(MIN_PHOTOS, PLACED * len(names)):
+        if model is None or len(placed) < max(MIN_PHOTOS, PLACED * len(names)):
             raise CaptureError(
-                f"only {len(placed)} of {len(names)} photos in {folder} could be placed",
+                f"only {len(placed)} of {len(names)} photos could be placed",
                 "take sharp, overlapping photos all around a textured object, before a still background",
             )
-        frames = [_frame(copies[name], placed[name], sizes[name]) for name in sorted(placed)]
-        return {"camera_model": "OPENCV", "frames": frames}
+        images = [placed[name] for name in sorted(placed)]
+        frames = [_frame(copies[image.name], image, sizes[image.name]) for image in images]
+        tree = {"camera_model": "OPENCV", "frames": frames}
+        return Structure(tree, *_points(model, images))
 
 
-def _copy(folder: Path, name: str, target: Path) -> tuple[int, int]:
+def _copy(folder: Path, name: str, target: Path, masked: bool) -> tuple[int, int]:
     """Writes a photo without alpha, scaled down where it is large; gives its own width and height."""
     pixels = read_bytes(folder / name)
-    if pixels.shape[2] == 3 and find_mask(folder, folder / name) is None:
+    if masked and pixels.shape[2] == 3 and find_mask(folder, folder / name) is None:
         raise no_mask(folder / name)  # before it takes minutes
     image = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
     size = image.size
@@ -105,6 +140,9 @@ def _largest(work: Path, one_camera: bool) -> pycolmap.Reconstruction | None:
     verification.ransac.random_seed = 0
     mapping = colmap.IncrementalPipelineOptions()
     mapping.random_seed, mapping.min_model_size = 0, MIN_PHOTOS
+    # COLMAP's own limits are for large photos: small, noisy frames of a video have fewer matches.
+    mapping.mapper.init_min_num_inliers, mapping.mapper.init_min_tri_angle = FIRST_PAIR
+    mapping.mapper.abs_pose_min_num_inliers = FURTHER
     mode = colmap.CameraMode.SINGLE if one_camera else colmap.CameraMode.PER_IMAGE
     database, images, models = work / "database.db", work / "images", work / "models"
     models.mkdir()
@@ -141,6 +179,20 @@ def _frame(name: str, image: pycolmap.Image, size: tuple[int, int]) -> dict[str,
         "k1": float(radial),
         "transform_matrix": [*pose.tolist(), [0.0, 0.0, 0.0, 1.0]],
     }
+
+
+def _points(
+    model: pycolmap.Reconstruction, images: Sequence[pycolmap.Image]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points of the model, (P, 3) float64, and which are seen in which of the images, (S, 2) int64."""
+    index = {identity: k for k, identity in enumerate(model.points3D)}
+    sightings = [
+        (view, index[place.point3D_id])
+        for view, image in enumerate(images)
+        for place in image.get_observation_points2D()
+    ]
+    points = np.array([point.xyz for point in model.points3D.values()], np.float64)
+    return points.reshape(-1, 3), np.array(sightings, np.int64).reshape(-1, 2)
 
 
 def _read(place: Path) -> dict[str, Any]:

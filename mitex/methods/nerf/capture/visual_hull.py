@@ -77,7 +77,7 @@ def visual_hull(views: Sequence[View]) -> Hull | None:
         The hull, which contains the object; None if nothing is left.
     """
     poses = np.stack([view.pose for view in views])
-    middle = _looked_at(poses)
+    middle = looked_at(poses)
     reach = float(np.linalg.norm(poses[:, :, 3] - middle, axis=1).max())
     low, high = middle - reach, middle + reach
     distances = [_distance(view.mask) for view in views]
@@ -110,7 +110,7 @@ def project(
     return distort(ideal, distortion) * intrinsics[:2] + intrinsics[2:], depth
 
 
-def _looked_at(poses: np.ndarray) -> np.ndarray:
+def looked_at(poses: np.ndarray) -> np.ndarray:
     """The point nearest to all optical axes, in least squares; among the cameras if the axes are parallel."""
     origin, axis = poses[:, :, 3], -poses[:, :, 2]
     across = np.eye(3) - axis[:, :, None] * axis[:, None, :]

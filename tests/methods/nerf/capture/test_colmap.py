@@ -62,7 +62,11 @@ def photos(tmp_path_factory):
     return folder
 
 
-def test_cameras_are_found_up_to_a_similarity(photos, monkeypatch):
+def test_cameras_and_points_are_found_up_to_a_similarity(photos, monkeypatch):
+    structures, reconstruct = [], colmap.reconstruct
+    monkeypatch.setattr(
+        colmap, "reconstruct", lambda *args, **k: structures.append(reconstruct(*args, **k)) or structures[0]
+    )
     capture = load_capture(photos)
     assert capture.names == tuple(f"p{k:02}.png" for k in range(COUNT))
     assert np.abs(capture.intrinsics[:, :2] / FOCAL - 1).max() < 0.03
@@ -73,6 +77,15 @@ def test_cameras_are_found_up_to_a_similarity(photos, monkeypatch):
     assert np.linalg.norm(placed - true[:, :, 3], axis=1).max() < 0.08
     turned = np.einsum("ij,njk,nlk->nil", rotation, capture.poses[:, :, :3], true[:, :, :3])
     assert np.arccos(np.clip((np.trace(turned, axis1=1, axis2=2) - 1) / 2, -1, 1)).max() < 0.03
+
+    (structure,) = structures
+    points = scale * capture.similarity.apply(structure.points) @ rotation.T + shift
+    assert len(points) > 200
+    assert np.quantile(np.abs(np.linalg.norm(points / RADII, axis=1) - 1), 0.9) < 0.05
+    view, point = structure.sightings.T
+    assert set(view) == set(range(COUNT)) and np.array_equal(np.unique(point), np.arange(len(points)))
+    towards = true[view, :, 3] - points[point]
+    assert (np.einsum("ij,ij->i", towards, points[point] / RADII**2) > 0).mean() > 0.95  # on the near side
 
     # The second time nothing is computed, and the folder was left as it was.
     monkeypatch.setattr(colmap, "_reconstruct", None)

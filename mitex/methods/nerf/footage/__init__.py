@@ -1,0 +1,1 @@
+"""From a phone video, or plain photos, to a capture."""

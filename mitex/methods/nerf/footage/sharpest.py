@@ -1,0 +1,88 @@
+"""Which frames of a video to keep: sharp ones, from different places, of one brightness."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from mitex.images import resize
+from mitex.methods.nerf.footage.pictures import Picture
+
+NEIGHBOURS = 5  # windows on either side that a frame is compared with
+BLURRED = 0.4  # part of its neighbours' sharpness below which a frame is blurred
+STOPS = 0.5  # of exposure that a frame may differ from its neighbours
+ALIKE = 0.12  # mean difference of two thumbnails from one place, in standard deviations
+THUMBNAIL = 32  # side [pixels]
+REASONS = {"blurred": "blurred", "exposure": "too dark or too bright", "alike": "like the one before"}
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What a frame is judged by.
+
+    Attributes:
+        sharpness: mean squared gradient of the luma (Tenengrad) over its squared mean, whatever the exposure.
+        brightness: mean luma in [0, 1].
+        thumbnail: (32, 32) float32, mean 0 and standard deviation 1.
+    """
+
+    sharpness: float
+    brightness: float
+    thumbnail: np.ndarray
+
+
+def look(pixels: np.ndarray) -> Look:
+    """Judges a picture (H, W, 3) uint8."""
+    luma = (pixels.astype(np.float32) @ np.array([0.299, 0.587, 0.114], np.float32)) / 255.0
+    smooth = ndimage.gaussian_filter(luma, 1.0)  # noise of the sensor is no sharpness
+    rows, columns = np.gradient(smooth)
+    brightness = float(luma.mean())
+    small = resize(luma[..., None], THUMBNAIL, THUMBNAIL)[..., 0]
+    thumbnail = (small - small.mean()) / max(float(small.std()), 1e-3)
+    sharpness = float((rows**2 + columns**2).mean()) / max(brightness, 1e-3) ** 2
+    return Look(sharpness, brightness, thumbnail)
+
+
+def sharpest(pictures: Iterable[Picture], count: int, frames: int) -> Iterator[tuple[Picture, Look]]:
+    """The sharpest picture of each of `frames` equal parts of `count` pictures, with how it looks."""
+    best: tuple[Picture, Look] | None = None
+    window = 0
+    for number, picture in enumerate(pictures):
+        if number * frames // count > window and best is not None:
+            yield best
+            best, window = None, number * frames // count
+        judged = look(picture.pixels)
+        if best is None or judged.sharpness > best[1].sharpness:
+            best = picture, judged
+    if best is not None:
+        yield best
+
+
+def faults(looks: Sequence[Look]) -> list[str]:
+    """What speaks against each frame of a video: a key of `REASONS`, or "" for those to keep."""
+    sharp = np.array([one.sharpness for one in looks])
+    stops = np.log2([max(one.brightness, 1e-3) for one in looks])
+    verdicts = []
+    last = None
+    for k, one in enumerate(looks):
+        around = slice(max(k - NEIGHBOURS, 0), k + NEIGHBOURS + 1)
+        if sharp[k] < BLURRED * np.median(sharp[around]):
+            verdict = "blurred"
+        elif abs(stops[k] - np.median(stops[around])) > STOPS:
+            verdict = "exposure"
+        elif last is not None and np.abs(one.thumbnail - last.thumbnail).mean() < ALIKE:
+            verdict = "alike"
+        else:
+            verdict, last = "", one
+        verdicts.append(verdict)
+    return verdicts
+
+
+def reasons(verdicts: Sequence[str]) -> str:
+    """Why frames were left out, in words: "6 blurred, 2 like the one before"; "" if none was."""
+    counts = Counter(verdicts)
+    return ", ".join(f"{counts[key]} {words}" for key, words in REASONS.items() if counts[key])

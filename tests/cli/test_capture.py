@@ -1,0 +1,151 @@
+"""`mitex capture`: a whole capture from a film, and captures that cannot be made."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+from mitex.cli import main
+from mitex.errors import CaptureError
+from mitex.methods.nerf import load_capture
+from mitex.methods.nerf.footage import site
+from tests.cli import bad_files as bad
+from tests.cli.refusals import check_refused, tree
+from tests.methods.nerf.footage import stage
+from tests.methods.nerf.footage.films import write_film, write_photos, write_sound
+
+pytestmark = pytest.mark.usefixtures("own_cache")
+SHOTS = [stage.shot(pose) for pose in stage.POSES]
+PICTURES = [picture for picture, _ in SHOTS]
+
+
+@pytest.fixture(autouse=True)
+def _coarse_volumes(monkeypatch):
+    stage.coarse_volumes(monkeypatch)
+
+
+@pytest.fixture
+def cameras(monkeypatch):
+    """Known cameras in the place of those that COLMAP would find, which takes long."""
+
+    monkeypatch.setattr(
+        site, "reconstruct", lambda folder, names: stage.structure(names, np.random.default_rng(0))
+    )
+
+
+def test_a_film_becomes_a_capture(cameras, tmp_path, capsys):
+    # Every second frame is a blurred one.
+    blurred = [(p.astype(float) + np.roll(p, 12, axis=1) + np.roll(p, 24, axis=1)) / 3 for p in PICTURES]
+    frames = [f for pair in zip(PICTURES, blurred, strict=True) for f in (pair[0], pair[1].astype(np.uint8))]
+    film = write_film(tmp_path / "a.mp4", frames)
+    out = tmp_path / "captures" / "a"
+    words = [
+        "capture",
+        str(film),
+        "--out",
+        str(out),
+        "--mask",
+        "plane",
+        "--frames",
+        str(stage.VIEWS),
+        "--quiet",
+    ]
+    assert main(words) == 0
+    printed = capsys.readouterr()
+    lines = printed.out.splitlines()
+    assert lines[0] == f"{stage.VIEWS} of {2 * stage.VIEWS} pictures picked"
+    assert lines[1] == f"{stage.VIEWS} of them got a camera" and lines[-1] == str(out)
+    assert any(line.startswith("film it all around from above") for line in lines[3:-1])
+
+    capture = load_capture(out)
+    assert capture.names == tuple(f"images/{2 * k:05}.jpg" for k in range(stage.VIEWS))
+    for image, (picture, mask) in zip(capture.images, SHOTS, strict=True):
+        assert stage.overlap(image[..., 3] > 127, mask) > 0.9
+        assert np.abs(image[..., :3].astype(int) - picture).mean() < 8
+    assert tree(tmp_path).keys() >= {"captures/a/transforms.json"}
+    assert [path.name for path in out.parent.iterdir()] == ["a"]  # nothing beside it
+    # Up is up: the cameras stand at their heights above the object.
+    backs = np.array(
+        [frame["transform_matrix"] for frame in json.loads((out / "transforms.json").read_text())["frames"]]
+    )
+    assert np.allclose(backs[:, 2, 2], [pose[2, 2] for pose in stage.POSES], atol=0.01)
+
+
+def shots(folder):
+    return write_photos(folder / "photos", PICTURES)
+
+
+# Name -> (what makes the files, the video or folder, further words, words of the message)
+BAD = {
+    "missing": (lambda d: None, "no.mp4", "", "does not exist"),
+    "text named mp4": (lambda d: bad.text(d / "a.mp4"), "a.mp4", "", "not a video that ffmpeg can read"),
+    "empty file": (lambda d: bad.text(d / "a.mov", ""), "a.mov", "", "not a video that ffmpeg can read"),
+    "cut mp4": (
+        lambda d: bad.cut(write_film(d / "a.mp4", PICTURES)),
+        "a.mp4",
+        "",
+        "not a video that ffmpeg can read",
+    ),
+    "sound alone": (lambda d: write_sound(d / "a.mp4"), "a.mp4", "", "not a video that ffmpeg can read"),
+    "a picture": (lambda d: bad.image(d / "a.png"), "a.png", "", "1 pictures to work with"),
+    "a camera that stands still": (
+        lambda d: write_film(d / "a.mp4", PICTURES[:1] * 30),
+        "a.mp4",
+        "",
+        "1 pictures to work with (29 like the one before)",
+    ),
+    "a short film": (lambda d: write_film(d / "a.mp4", PICTURES[:5]), "a.mp4", "", "5 pictures to work with"),
+    "a folder without photos": (lambda d: bad.text(d / "photos" / "a.txt"), "photos", "", "holds no photos"),
+    "few photos": (
+        lambda d: write_photos(d / "photos", PICTURES[:5]),
+        "photos",
+        "",
+        "5 pictures to work with",
+    ),
+    "a damaged photo": (
+        lambda d: bad.cut(shots(d) / "p03.jpg"),
+        "photos",
+        "",
+        "p03.jpg is damaged or cut short",
+    ),
+    "no such way": (shots, "photos", "--mask magic", "'magic' is no way to mask"),
+    "a box outside": (shots, "photos", "--mask box:80,0,40,10", "not inside the picture"),
+    "a colour that is nowhere": (shots, "photos", "--mask colour:#ff00ff", "have the background's colour"),
+    "few frames asked for": (shots, "photos", "--frames 3", "--frames 3 is out of range"),
+    "huge pictures asked for": (shots, "photos", "--size 99999", "--size 99999 is out of range"),
+    "into a folder that exists": (
+        lambda d: [shots(d), bad.text(d / "out" / "run" / "mine.txt")],
+        "photos",
+        "--out out/run",
+        "exists; name a new folder",
+    ),
+    "among the photos": (shots, "photos", "--out photos/capture", "is among the photos"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_what_cannot_be_captured(cameras, name, files, capsys):
+    make, source, words, message = BAD[name]
+    make(files)
+    out = [] if "--out" in words else ["--out", "out/new/capture"]
+    check_refused(files, ["capture", source, *out, *words.split(), "--quiet"], message, capsys)
+
+
+def test_photos_that_do_not_overlap(monkeypatch, files, capsys):
+    def lost(folder, names):
+        raise CaptureError("only 0 of 10 photos could be placed", "take overlapping ones")
+
+    monkeypatch.setattr(site, "reconstruct", lost)
+    write_photos(files / "photos", PICTURES[::-1])
+    check_refused(files, ["capture", "photos", "--out", "out/c", "--quiet"], "only 0 of 10 photos", capsys)
+
+
+def test_without_opencv(cameras, monkeypatch, files, capsys):
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    for module in ("cutting", "silhouette"):
+        monkeypatch.delitem(sys.modules, f"mitex.methods.nerf.footage.{module}", raising=False)
+    shots(files)
+    check_refused(files, ["capture", "photos", "--out", "out/c", "--quiet"], "needs cv2; install it", capsys)
