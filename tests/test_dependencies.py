@@ -29,6 +29,7 @@ MODULES = {
 # Distribution -> why it is needed though nothing imports it.
 WITHOUT_IMPORT = {
     "karellen-llvm-core": "Dr.Jit opens its shared library",
+    "pytest-xdist": "`make test` runs two tests at a time",
     "build": "test_packaging.py runs `python -m build`",
     "hatchling": "the build backend of that test's wheel",
     "myst-nb": "Sphinx reads Markdown and executes notebooks with it",

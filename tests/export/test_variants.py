@@ -12,7 +12,7 @@ from mitex.errors import ConfigError, OutputError
 from mitex.export import glb, write_variants
 from mitex.mesh import icosphere
 from tests.export.common import Glb, wavy
-from tests.export.test_glb import reports
+from tests.node import khronos_reports
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def looks() -> Any:
 
 def test_khronos_validator_finds_nothing(looks, tmp_path):
     paths = [write_variants(looks, tmp_path / "a.glb"), write_variants(looks[:1], tmp_path / "b.glb")]
-    for report in reports(paths):
+    for report in khronos_reports(paths):
         assert [m for m in report["issues"]["messages"] if m["severity"] < 2] == [], json.dumps(report)
 
 

@@ -55,7 +55,8 @@ def test_slopes_of_a_height_agree(rng):
     x, y = np.meshgrid(np.arange(64), -np.arange(64))  # y is up
     for k, m, phase in rng.integers(1, 6, (6, 3)):
         height += np.sin(2 * np.pi * (k * x + m * y) / 64 + phase) + np.sin(2 * np.pi * (k * x - m * y) / 64)
-    normal = unit(np.dstack([-np.gradient(height, axis=1), np.gradient(height, axis=0), np.ones((64, 64))]))
+    down, right = np.array(np.gradient(height))
+    normal = unit(np.dstack([-right, down, np.ones((64, 64))]))
     encoded = 0.5 + 0.5 * normal
     agreement = slope_agreement(encoded)
     assert agreement.upward > 0.95 and abs(agreement.across) < 0.6

@@ -8,8 +8,8 @@ from mitex.methods.nerf.footage.pictures import Picture
 from mitex.methods.nerf.footage.sharpest import faults, look, reasons, sharpest
 
 NOISE = np.random.default_rng(0).normal(size=(120, 700))
-PATTERN = sum(ndimage.gaussian_filter(NOISE, sigma) * sigma for sigma in (1.0, 8.0))
-PATTERN = 128 + 40 * PATTERN / PATTERN.std()
+WAVES = ndimage.gaussian_filter(NOISE, 1.0) + 8 * ndimage.gaussian_filter(NOISE, 8.0)
+PATTERN = 128 + 40 * WAVES / WAVES.std()
 
 
 def frame(shift=0, blur=0, gain=1.0, noise=2.0, seed=0):
