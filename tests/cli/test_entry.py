@@ -199,8 +199,8 @@ class TestUsage:
             (["modles"], "there is no command 'modles'; did you mean models?"),
             (
                 ["xyzzy"],
-                "there is no command 'xyzzy'; use one of doctor, demo, fit, apply, animate, graft, capture, cache, "
-                "models, gallery, view, batch, compare, evaluate, render, try",
+                "there is no command 'xyzzy'; use one of doctor, demo, fit, apply, animate, graft, capture, "
+                "cache, models, gallery, view, batch, compare, evaluate, render, try",
             ),
             (["fit"], "`mitex fit` needs a method; try `mitex fit geometric --help`"),
             (["fit", "nac"], "`mitex fit` knows no method 'nac'; did you mean nca?"),
