@@ -36,7 +36,7 @@ def directional_distance(
 
 
 def text_distance(pictures: torch.Tensor, text: torch.Tensor) -> torch.Tensor:
-    """1 - R T / |T|, from 0 to 2: one minus the mean cosine of the pictures with the text.
+    """1 - R T / norm(T), from 0 to 2: one minus the mean cosine of the pictures with the text.
 
     MeshNCA compares its equation 9 with the cosine of the mean (figure 17), to which it does not matter how
     much the pictures differ.
