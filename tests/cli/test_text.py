@@ -40,7 +40,6 @@ def test_from_words_to_a_file(files, capsys):
     [
         ("", "--exemplar is missing; give --exemplar IMAGE, or --text WORDS"),
         ("--text red --exemplar lava", "--text and --exemplar contradict each other"),
-        ("--text red --motion right", "--text and --motion contradict each other"),
         ("--exemplar lava --mesh vase", "--mesh means nothing without --text"),
         ("--exemplar lava --clip clip", "--clip means nothing without --text"),
         ("--text red --mesh nothing", "there is no mesh"),

@@ -108,7 +108,9 @@ class SurfaceTexture:
         with model_file.opened(source, METHOD.name) as (tensors, about):
             arrays = {key: tensor.numpy() for key, tensor in tensors.items()}
             mesh = mesh_of_arrays(arrays, str(about["mesh"]))
-            config = of_record(SurfaceConfig, {key: about[key] for key in ("resolution", "frames", "angle")})
+            kept = {key: about[key] for key in ("resolution", "frames", "angle")}
+            # The exemplar is not kept: any size of it will do.
+            config = of_record(SurfaceConfig, kept | {"exemplar_size": 256})
             orientation = arrays.get("orientation")
             domain = SurfaceDomain(mesh, config.resolution, config.frames, config.angle, orientation)
             values, maps = arrays["values"].astype(np.float32), tuple(about["maps"])

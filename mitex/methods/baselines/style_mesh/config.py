@@ -75,7 +75,7 @@ PRESETS = {
         views=100,
         heights=4,
         antialias=1,
-        lr=1 / 255,
+        lr=0.004,
         milestones=(6000, 12_000),
     ),
 }
