@@ -108,6 +108,8 @@ class SurfaceTexture:
         with model_file.opened(source, METHOD.name) as (tensors, about):
             arrays = {key: tensor.numpy() for key, tensor in tensors.items()}
             mesh = mesh_of_arrays(arrays, str(about["mesh"]))
+            if mesh.uv is None:
+                raise ValueError("a mesh without UVs")
             kept = {key: about[key] for key in ("resolution", "frames", "angle")}
             # The exemplar is not kept: any size of it will do.
             config = of_record(SurfaceConfig, kept | {"exemplar_size": 256})

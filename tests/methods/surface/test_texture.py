@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from safetensors import safe_open
+from safetensors.numpy import load_file, save_file
 
 from mitex.errors import CheckpointError
 from mitex.mesh import Mesh, grid
@@ -45,3 +47,14 @@ def test_hard_edges_and_polygons_are_kept(tmp_path):
     assert loaded.polygons is not None
     for name in ("sizes", "triangles", "vertices"):
         np.testing.assert_array_equal(getattr(loaded.polygons, name), getattr(polygons, name))
+
+
+def test_a_mesh_without_uvs(tmp_path):
+    domain = SurfaceDomain(grid(2, 2), 16, "fixed")
+    values = np.zeros((len(domain.texels.index), 3), np.float32)
+    path = SurfaceTexture(domain, values, ("albedo",), ABOUT).save(tmp_path / "a.safetensors")
+    tensors = {name: value for name, value in load_file(path).items() if name != "uv"}
+    with safe_open(path, "np") as file:
+        save_file(tensors, path, file.metadata())
+    with pytest.raises(CheckpointError, match="without UVs"):
+        SurfaceTexture.load(path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -139,9 +140,11 @@ def _find(folder: Path, relative: str, where: str) -> Path:
     """The file that a frame names, with or without its suffix."""
     for suffix in ("", *SUFFIXES):
         path = _inside(folder, relative + suffix, where)
-        if path.is_file():
+        if os.path.isfile(path):  # unlike Path.is_file, also answers for impossible names
             return path
-    raise CaptureError(f"{where} names '{relative}', which does not exist", "add the file or drop the frame")
+    raise CaptureError(
+        f"{where} names '{relative[:80]}', which does not exist", "add the file or drop the frame"
+    )
 
 
 def _inside(folder: Path, relative: str, where: str) -> Path:
