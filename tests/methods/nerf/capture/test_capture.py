@@ -268,6 +268,7 @@ def pose_times(matrix):
 
 
 REFUSED = {
+    "an image with an endless name": (frame_key("file_path", 5000 * "["), "which does not exist"),
     "missing image": (frame_key("file_path", "images/nine"), "names 'images/nine', which does not exist"),
     "no file_path": (frame_key("file_path", None), "transforms.json: frame 5 has no file_path"),
     "path outside": (frame_key("file_path", "../x.png"), "outside of"),
