@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 from tyro.conf import arg
 
-from mitex.methods.options import ExemplarOptions, OptionalMeshOptions
-
-if TYPE_CHECKING:
-    from mitex.asset import Asset
+from mitex.methods.mesh_texture_options import MeshTextureOptions
+from mitex.methods.options import ExemplarOptions
 
 
 @dataclass(kw_only=True)
@@ -53,7 +50,7 @@ class Fit(ExemplarOptions):
 
 
 @dataclass(kw_only=True)
-class Apply(OptionalMeshOptions):
+class Apply(MeshTextureOptions):
     """Write the texture on the mesh that it was learned on, which is kept with it.
 
     --mesh only checks that a mesh is that one.
@@ -61,10 +58,3 @@ class Apply(OptionalMeshOptions):
     examples:
       mitex apply runs/field --out vase.glb
     """
-
-    def applied(self, out: Path) -> Asset:
-        from mitex.mesh import Mesh
-        from mitex.methods.baselines.text2mesh import Text2MeshTexture
-
-        mesh = None if self.mesh is None else Mesh.load(self.mesh)
-        return Text2MeshTexture.load(self.model).apply(mesh)
