@@ -78,7 +78,7 @@ def _apart(points: np.ndarray, normals: np.ndarray, distance: float) -> np.ndarr
 
 
 def _frames(normals: np.ndarray, tilt: float, turn: bool, rng: np.random.Generator) -> np.ndarray:
-    first = np.broadcast_to(np.float32([1, 0, 0]), normals.shape)
+    first = np.broadcast_to(np.array([1, 0, 0], np.float32), normals.shape)
     x = orthonormal(first, normals)
     lean = rng.normal(0.0, tilt, (len(normals), 2)) if tilt else np.zeros((len(normals), 2))
     z = unit(normals + lean[:, :1] * x + lean[:, 1:] * np.cross(normals, x))

@@ -93,7 +93,7 @@ def _one_piece(texture: NerfTexture, squares: Patches, index: int) -> Quilt:
     size = squares.points.shape[1]
     points = squares.points[index]
     features = texture.features(points.reshape(-1, 3)).reshape(size, size, -1)
-    texel = np.stack(np.mgrid[:size, :size], -1).astype(np.int16)
+    texel = np.stack([*np.mgrid[:size, :size]], -1).astype(np.int16)
     which = np.full((size, size), index, np.int32)
     return Quilt(features, which, np.zeros((size, size), np.uint8), texel)
 
@@ -133,7 +133,7 @@ def picture_box(box: Box, count: int, size: int, seed: int) -> tuple[Capture, np
     capture = Capture(
         images=tuple(np.zeros((size, size, 4), np.uint8) for _ in range(count)),
         poses=np.stack([_pose(DISTANCE * place) for place in towards]),
-        intrinsics=np.tile(np.float32([focal, focal, 0.5 * size, 0.5 * size]), (count, 1)),
+        intrinsics=np.tile(np.array([focal, focal, 0.5 * size, 0.5 * size], np.float32), (count, 1)),
         distortion=np.zeros((count, 4), np.float32),
         names=tuple(f"{k:04}.png" for k in range(count)),
         similarity=Similarity(np.zeros(3), 1.0),

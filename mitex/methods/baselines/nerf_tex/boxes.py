@@ -29,7 +29,7 @@ class Boxes:
         self, anchors: Anchors, half: float, low: np.ndarray, high: np.ndarray, lift: float = 0.0
     ) -> None:
         self.frames, self.half = anchors.frames, half
-        self._low, self._high = (mi.Point3f(np.asarray(v, np.float32).tolist()) for v in (low, high))
+        self._low, self._high = (np.asarray(v, np.float32).tolist() for v in (low, high))
         centres = anchors.points + np.float32(lift) * anchors.frames[:, 2]
         self._centres = mi.Float(np.ascontiguousarray(centres, np.float32).ravel())
         self._axes = mi.Float(np.ascontiguousarray(anchors.frames, np.float32).ravel())
@@ -72,7 +72,7 @@ class Boxes:
         ) -> tuple[mi.UInt32, mi.Float, mi.UInt32, mi.UInt32]:
             other = dr.gather(mi.UInt32, self._members, place)
             local = self._local(points, other)
-            within = dr.all((local >= self._low) & (local <= self._high))
+            within = dr.all((local >= mi.Point3f(self._low)) & (local <= mi.Point3f(self._high)))
             distance = dr.squared_norm(local)
             nearer = within & (distance < least)
             least, box = dr.select(nearer, distance, least), dr.select(nearer, other, box)

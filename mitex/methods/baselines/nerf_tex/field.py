@@ -20,12 +20,12 @@ class BoxField:
 
     def __init__(self, evaluator: Evaluator, mask: mi.TensorXu8, step: float, light: np.ndarray) -> None:
         self.evaluator, self.mask, self.step = evaluator, mask, step
-        self.light = mi.Vector3f(np.asarray(light, np.float32).tolist())
+        self.light = np.asarray(light, np.float32)
 
     def evaluate(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, mi.Float, mi.Color3f]:
         """As of `RadianceField`, with all points."""
         count = dr.width(points)
-        light = self.light + dr.zeros(mi.Vector3f, count)
+        light = mi.Vector3f(*(dr.full(mi.Float, value, count) for value in self.light.tolist()))
         density, colour = self.evaluator(Inputs(points, view, light))
         return dr.arange(mi.UInt32, count), density, colour
 

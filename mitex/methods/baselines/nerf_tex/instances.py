@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from mitex.methods.baselines.nerf_tex.boxes import CELLS, Boxes
+from mitex.methods.baselines.nerf_tex.boxes import Boxes
 from mitex.methods.baselines.nerf_tex.networks import Evaluator, Inputs
 from mitex.methods.nerf.field.occupancy import Occupancy
 from mitex.methods.nerf.field.tensors import channels
@@ -13,6 +13,7 @@ from mitex.progress import announce
 from mitex.runtime.jit import dr, mi
 from mitex.textures.march import cells_of
 
+FINER = 2  # cells of the occupancy grid along one of the grid that finds boxes
 REFRESHES = 6  # samples of the density in each cell, to find which ones are occupied
 
 
@@ -27,7 +28,6 @@ class InstancedField:
         occupied: (G, G, G) uint8, cells of a box's cube with matter.
         step: of rays [scene units].
         light: (3,) direction in the scene that most light comes from, of length 1.
-        cells: of the occupancy grid along a side of the scene cube, a multiple of 64.
     """
 
     def __init__(
@@ -37,18 +37,21 @@ class InstancedField:
         occupied: np.ndarray,
         step: float,
         light: np.ndarray,
-        cells: int = 2 * CELLS,
     ) -> None:
         self.boxes, self.evaluator, self.step = boxes, evaluator, step
         self._side, self._occupied = len(occupied), mi.UInt8(occupied.ravel())
-        self._light = mi.Vector3f(np.asarray(light, np.float32).tolist())
-        touched = np.kron(boxes.touched, np.ones((cells // CELLS,) * 3, bool))
-        occupancy = Occupancy(cells, touched)
+        self.turn_light(light)
+        touched = np.kron(boxes.touched, np.ones((FINER,) * 3, bool))
+        occupancy = Occupancy(len(touched), touched)
         generator = torch.Generator().manual_seed(0)
         for sample in range(REFRESHES):
             announce("looking for what is dense", sample, REFRESHES)
             occupancy.refresh(self.density_at, generator)
         self.mask = occupancy.mask
+
+    def turn_light(self, light: np.ndarray) -> None:
+        """Lets most light come from another direction (3,)."""
+        self._light = np.asarray(light, np.float32)
 
     def evaluate(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, mi.Float, mi.Color3f]:
         """As of `RadianceField`."""
@@ -60,7 +63,8 @@ class InstancedField:
             return mi.UInt32(), mi.Float(), mi.Color3f()
         box, overlaps = (dr.gather(mi.UInt32, values, index) for values in (box, overlaps))
         along = self.boxes.inside(box, dr.gather(mi.Vector3f, view, index))
-        light = self.boxes.inside(box, self._light)
+        # Anew each time: a zero in it can become as wide as what it was multiplied with.
+        light = self.boxes.inside(box, mi.Vector3f(self._light.tolist()))
         density, colour = self.evaluator(Inputs(dr.gather(mi.Point3f, local, index), along, light))
         return index, density / (self.boxes.half * mi.Float(overlaps)), colour
 

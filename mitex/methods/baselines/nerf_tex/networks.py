@@ -7,9 +7,10 @@ learns in minutes what takes the former days without a GPU.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import torch
 import torch.nn.functional as F
@@ -48,7 +49,12 @@ class Inputs:
     light: mi.Vector3f
 
 
-Evaluator = Callable[[Inputs], tuple[mi.Float, mi.Color3f]]
+class Evaluator(Protocol):
+    """A network with its parameters."""
+
+    def __call__(self, inputs: Inputs) -> tuple[mi.Float, mi.Color3f]:
+        """Density and colours of N places."""
+        ...
 
 
 class Network(ABC):

@@ -57,7 +57,8 @@ class BoxTask(RadianceTask[NerfTexConfig]):
             display = dr.unravel(mi.Color3f, colour.array)
             return tensor(sum_rays(display * weights, samples)), tensor(transmittance), tensor(weights)
 
-        return Rendered(*call(run, density, colour), samples)
+        colours, transmittance, weights = call(run, density, colour)
+        return Rendered(colours, transmittance, weights, samples)
 
     def error(self, rendered: Rendered, batch: Batch, background: torch.Tensor) -> torch.Tensor:
         """Relative difference of colours where there is something, and squared one of opacity

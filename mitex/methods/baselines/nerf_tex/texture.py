@@ -20,9 +20,11 @@ from mitex.methods.baselines.nerf_tex.boxes import Boxes
 from mitex.methods.baselines.nerf_tex.config import NerfTexConfig
 from mitex.methods.baselines.nerf_tex.instances import InstancedField
 from mitex.methods.baselines.nerf_tex.networks import Evaluator, network_of
+from mitex.methods.baselines.nerf_tex.on_plane import BoxesOnPlane
 from mitex.methods.baselines.plain_field.applied import AppliedField
 from mitex.methods.nerf.field.occupancy import packed_cells, unpacked_cells
 from mitex.methods.nerf.field.rendering import render_step
+from mitex.methods.nerf.use.on_plane import SCALE, plane
 from mitex.methods.nerf.use.placement import EXTENT, in_scene_cube
 from mitex.runtime import init
 from mitex.textures.march import DIAGONAL
@@ -91,6 +93,11 @@ class NerfTexTexture:
         return network_of(self.config).evaluator(self.parameters)
 
     @property
+    def light(self) -> np.ndarray:
+        """(3,) where most light of the capture came from, of length 1."""
+        return np.array(self.about["light"], np.float64)
+
+    @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Corners (3,) of the box in its cube: as high as its matter, as wide as the piece."""
         cells = np.argwhere(self.occupied)
@@ -147,6 +154,13 @@ class NerfTexTexture:
         low, high = self.bounds
         boxes = Boxes(anchors, half, low, high, raised)
         step = max(half * render_step(self.config), DIAGONAL / FINEST)
-        light = np.array(self.about["light"])
-        field = InstancedField(boxes, self.evaluator, self.occupied, step, light)
+        field = InstancedField(boxes, self.evaluator, self.occupied, step, self.light)
         return AppliedField(field, similarity, mesh.name, density)
+
+    def on_plane(self, along: np.ndarray) -> BoxesOnPlane:
+        """What shows boxes in the windows of photos of the capture, in its light.
+
+        Args:
+            along: (3,) direction in the scene that the planes' x follows.
+        """
+        return BoxesOnPlane(self.apply(plane(), scale=SCALE, lift=0.0), self.light, along)

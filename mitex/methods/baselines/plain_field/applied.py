@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from mitex.export import Format, prepare_export
 from mitex.mesh import Similarity
 from mitex.methods.nerf.field.tensors import channels, rows
 from mitex.methods.nerf.use.extract import CHUNK, solid_surface
-from mitex.runtime.jit import mi
+from mitex.runtime.jit import dr, mi
 from mitex.textures.march import RadianceField
 
 
@@ -27,7 +27,10 @@ class SolidField(RadianceField, Protocol):
         ...
 
 
-class AppliedField:
+Field = TypeVar("Field", bound=SolidField)
+
+
+class AppliedField(Generic[Field]):
     """A `RadianceField` in the scene cube, and what leaves it.
 
     Args:
@@ -37,14 +40,14 @@ class AppliedField:
         strength: factor of the density.
     """
 
-    def __init__(self, field: SolidField, similarity: Similarity, name: str, strength: float = 1.0) -> None:
+    def __init__(self, field: Field, similarity: Similarity, name: str, strength: float = 1.0) -> None:
         self.field, self.similarity, self.name, self.strength = field, similarity, name, strength
         self.mask, self.step = field.mask, field.step
 
     def evaluate(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, mi.Float, mi.Color3f]:
         """As of `RadianceField`."""
         index, density, colour = self.field.evaluate(points, view)
-        return index, density * self.strength, colour
+        return index, density * self.strength if dr.width(index) else density, colour
 
     def density(self, points: np.ndarray) -> np.ndarray:
         """Density [1 / scene units] of points (N, 3) of the scene cube, (N,)."""
