@@ -43,8 +43,8 @@ class MethodPlan:
         fit: options and settings of `mitex fit`, by name.
         apply: options of `mitex apply`, by name.
         source: option of `mitex fit` that the exemplars are given to, if not the method's usual one: "text".
-        of: label of the method whose run for the same exemplar and seed it learns from, in place of the
-            exemplar.
+        of: label of a method before it, whose run for the same exemplar and seed it learns from, in place of
+            the exemplar.
     """
 
     label: str
@@ -179,10 +179,10 @@ def _check_first(part: MethodPlan, parts: Sequence[MethodPlan]) -> None:
     if part.of is None:
         return
     place = f"methods.{part.label} learns from '{part.of}'"
-    first = next((one for one in parts if one.label == part.of and one is not part), None)
+    earlier = {one.label: one for one in parts[: parts.index(part)]}
+    first = earlier.get(part.of)
     if first is None:
-        labels = [one.label for one in parts if one is not part]
-        raise ConfigError(f"{place}, which is not in the plan", suggestion(part.of, labels))
+        raise ConfigError(f"{place}, which is not before it in the plan", suggestion(part.of, earlier))
     if first.of is not None or methods()[first.method].fits_to_mesh:
         raise ConfigError(f"{place}, which does not learn from exemplars alone", "name one that does")
     if part.source is not None or methods()[part.method].fits_to_mesh:
