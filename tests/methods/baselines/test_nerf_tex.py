@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import torch
 
+from mitex.cli import main
 from mitex.errors import CheckpointError, ConfigError, MeshError
 from mitex.mesh import Mesh, grid, icosphere
 from mitex.methods.baselines.nerf_tex import PRESETS, NerfTexConfig, NerfTexTexture, fit, instances
@@ -158,7 +159,7 @@ def test_empty_cells_of_a_box_are_empty():
 
 def test_anchors_are_spread():
     ball = icosphere(20)
-    anchors = place_anchors(ball, 0.2, 0.0, True, 0)
+    anchors = place_anchors(ball, 0.2, 0.0, False, 0)
     gaps = np.linalg.norm(anchors.points[:, None] - anchors.points, axis=2) + 9 * np.eye(len(anchors))
     assert gaps.min() > 0.2
     places = np.random.default_rng(1).normal(size=(3000, 3))
@@ -175,19 +176,19 @@ def test_both_sides_of_a_thin_plate_get_anchors():
     back = Mesh(sheet.vertices - [0, 0, 0.02], sheet.faces[:, ::-1], name="back")
     vertices = np.concatenate([sheet.vertices, back.vertices])
     plate = Mesh(vertices, np.concatenate([sheet.faces, back.faces + len(sheet.vertices)]), name="plate")
-    up = place_anchors(plate, 0.3, 0.0, True, 0).frames[:, 2, 2] > 0
+    up = place_anchors(plate, 0.3, 0.0, False, 0).frames[:, 2, 2] > 0
     assert 0.4 < up.mean() < 0.6 and up.sum() > 20
 
 
 def test_tilt_and_turn_change_the_axes():
     sheet = grid(4, 4)
-    straight = place_anchors(sheet, 0.1, 0.0, False, 0)
+    straight = place_anchors(sheet, 0.1, 0.0, True, 0)
     assert np.abs(straight.frames - np.eye(3)).max() < 1e-6
-    turned = place_anchors(sheet, 0.1, 0.0, True, 0)
+    turned = place_anchors(sheet, 0.1, 0.0, False, 0)
     assert np.abs(turned.frames[:, 2] - [0, 0, 1]).max() < 1e-6
     angles = np.arctan2(turned.frames[:, 0, 1], turned.frames[:, 0, 0])
     assert abs(np.exp(1j * angles).mean()) < 0.2
-    leaning = place_anchors(sheet, 0.1, 0.1, False, 0)
+    leaning = place_anchors(sheet, 0.1, 0.1, True, 0)
     angles = np.arccos(leaning.frames[:, 2, 2])
     assert angles.std() > 0.03 and np.sqrt(np.mean(angles**2) / 2) == pytest.approx(0.1, rel=0.15)
 
@@ -372,7 +373,7 @@ def test_a_texture_survives_saving(run_folder, tmp_path):
         {"scale": 1.5},
         {"spacing": 0.8},
         {"tilt": 20.0},
-        {"turn": False},
+        {"aligned": True},
         {"lift": 0.0},
         {"density": 2.0},
         {"seed": 1},
@@ -462,3 +463,32 @@ def test_on_a_plane_light_keeps_its_direction(run_folder):
     turn = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
     renderer.turn_light(turn)
     assert renderer.field.field._light == pytest.approx(turn @ renderer.light, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "out"),
+    [
+        ("--scale", "0.01", "a.png"),
+        ("--spacing", "3", "a.png"),
+        ("--tilt", "60", "a.png"),
+        ("--lift", "2", "a.png"),
+        ("--density", "0", "a.png"),
+        ("--seed", "-1", "a.png"),
+        ("--resolution", "10", "a.png"),
+        ("--resolution", "64", "a.glb"),
+    ],
+)
+def test_the_command_refuses_them_too(run_folder, tmp_path, monkeypatch, capsys, option, value, out):
+    monkeypatch.chdir(tmp_path)
+    assert main(["apply", str(run_folder), "--mesh", "vase", "--out", out, f"{option}={value}"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert option in line
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "setting", [{"patch": 0}, {"views": 8}, {"view": 4}, {"network": "grid"}, {"table": 3}]
+)
+def test_settings_out_of_range_are_refused(setting):
+    with pytest.raises(ConfigError, match=next(iter(setting))):
+        NerfTexConfig(**setting)

@@ -33,7 +33,7 @@ class Anchors:
         return len(self.points)
 
 
-def place_anchors(mesh: Mesh, distance: float, tilt: float, turn: bool, seed: int) -> Anchors:
+def place_anchors(mesh: Mesh, distance: float, tilt: float, aligned: bool, seed: int) -> Anchors:
     """Anchors all over a mesh, by throwing darts.
 
     Those whose normals agree are at least `distance` apart, so that both sides of a thin part get theirs; and
@@ -43,7 +43,7 @@ def place_anchors(mesh: Mesh, distance: float, tilt: float, turn: bool, seed: in
         mesh: the target.
         distance: between anchors [mesh units].
         tilt: standard deviation by which the z axes lean from the normals, in both directions [rad].
-        turn: the x axes point anywhere, else along the mesh's first axis as far as they can.
+        aligned: the x axes point along the mesh's first axis as far as they can, else anywhere.
         seed: of all choices.
 
     Raises:
@@ -63,7 +63,7 @@ def place_anchors(mesh: Mesh, distance: float, tilt: float, turn: bool, seed: in
     points = interpolate(weights, mesh.vertices[mesh.faces[faces]])
     normals = unit(interpolate(weights, mesh.normals[mesh.faces[faces]]))
     kept = _apart(points, mesh.face_normals[faces], distance)
-    return Anchors(points[kept].astype(np.float32), _frames(normals[kept], tilt, turn, rng))
+    return Anchors(points[kept].astype(np.float32), _frames(normals[kept], tilt, aligned, rng))
 
 
 def _apart(points: np.ndarray, normals: np.ndarray, distance: float) -> np.ndarray:
@@ -77,12 +77,12 @@ def _apart(points: np.ndarray, normals: np.ndarray, distance: float) -> np.ndarr
     return np.array(kept)
 
 
-def _frames(normals: np.ndarray, tilt: float, turn: bool, rng: np.random.Generator) -> np.ndarray:
+def _frames(normals: np.ndarray, tilt: float, aligned: bool, rng: np.random.Generator) -> np.ndarray:
     first = np.broadcast_to(np.array([1, 0, 0], np.float32), normals.shape)
     x = orthonormal(first, normals)
     lean = rng.normal(0.0, tilt, (len(normals), 2)) if tilt else np.zeros((len(normals), 2))
     z = unit(normals + lean[:, :1] * x + lean[:, 1:] * np.cross(normals, x))
     x = orthonormal(first, z)
-    angle = rng.uniform(0, 2 * np.pi, (len(normals), 1)) if turn else np.zeros((len(normals), 1))
+    angle = np.zeros((len(normals), 1)) if aligned else rng.uniform(0, 2 * np.pi, (len(normals), 1))
     x = np.cos(angle) * x + np.sin(angle) * np.cross(z, x)
     return np.stack([x, np.cross(z, x), z], 1).astype(np.float32)

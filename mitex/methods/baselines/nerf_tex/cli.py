@@ -71,8 +71,8 @@ class Apply(MeshOptions):
     tilt: Annotated[float, arg(metavar="DEG")] = 0.0
     """Standard deviation by which boxes lean from the normals [degrees]."""
 
-    turn: bool = True
-    """Whether boxes are turned at random."""
+    aligned: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Boxes point in one direction as far as they can, instead of being turned at random."""
 
     lift: Annotated[float, arg(metavar="X")] = 1.0
     """1 stands the texture on the mesh, 0 carves it in, as it was captured."""
@@ -112,7 +112,7 @@ class Apply(MeshOptions):
             scale=self.scale,
             spacing=self.spacing,
             tilt=self.tilt,
-            turn=self.turn,
+            aligned=self.aligned,
             lift=self.lift,
             density=self.density,
             seed=self.seed,

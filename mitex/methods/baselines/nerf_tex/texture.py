@@ -113,7 +113,7 @@ class NerfTexTexture:
         scale: float = 1.0,
         spacing: float = 0.5,
         tilt: float = 0.0,
-        turn: bool = True,
+        aligned: bool = False,
         lift: float = 1.0,
         density: float = 1.0,
         seed: int = 0,
@@ -125,7 +125,8 @@ class NerfTexTexture:
             scale: size of the texture's elements beside the whole mesh, against that on the captured object.
             spacing: between anchors [sides of a box]; up to 0.5 no place is left bare.
             tilt: standard deviation by which boxes lean from the normals, in both directions [degrees].
-            turn: boxes are turned about their normals at random, as published.
+            aligned: boxes point along the mesh's first axis as far as they can, instead of being turned about
+                their normals at random, as published.
             lift: 1 puts the mesh under the texture's ground, 0 where the captured base shape was.
             density: factor of the density.
             seed: of the places and turns.
@@ -149,7 +150,7 @@ class NerfTexTexture:
         placed, similarity = in_scene_cube(mesh)
         half = float(self.about["half"]) * scale
         apart = spacing * 2 * EXTENT * half
-        anchors = place_anchors(placed, apart, math.radians(tilt), turn, seed)
+        anchors = place_anchors(placed, apart, math.radians(tilt), aligned, seed)
         raised = lift * scale * max(-float(self.about["ground"]), 0.0)
         low, high = self.bounds
         boxes = Boxes(anchors, half, low, high, raised)
