@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mitex.errors import ConfigError
+from mitex.integrators.sources import sampled_light, source_met
 from mitex.runtime.jit import dr, mi
 from mitex.textures.shell_field import ShellField, works_in_variant
 from mitex.textures.variant import for_variant, init_base, option, require_variant
@@ -84,7 +85,7 @@ class ShellIntegrator:
             radiance += throughput * _linear(segment_light.colour, 1 - segment_light.transmittance)
             throughput *= segment_light.transmittance
             valid |= alive & (si.is_valid() | (segment_light.transmittance < 0.5))
-            emitted = self._emitted(scene, si, start, pdf, delta, alive & mi.Bool(depth or not self.hidden))
+            emitted = source_met(scene, si, start, pdf, delta, alive & mi.Bool(depth or not self.hidden))
             radiance += throughput * emitted
             alive &= si.is_valid() & (dr.max(dr.detach(throughput)) > 0)
             if depth + 1 == self.max_depth or dr.none(alive):
@@ -113,34 +114,14 @@ class ShellIntegrator:
     ) -> mi.Spectrum:
         """Light from a sampled source, weighted against the BSDF's own sampling; the field casts shadows."""
         smooth = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        ds, weight = scene.sample_emitter_direction(si, sampler.next_2d(smooth), True, smooth)
-        smooth &= ds.pdf > 0
-        local = si.to_local(ds.d)
-        value, density = bsdf.eval_pdf(context, si, local, smooth)
-        share = dr.select(ds.delta, 1, _heuristic(ds.pdf, density))
-        transmittance = self.field.march(si.spawn_ray_to(ds.p), sampler.next_1d(smooth), smooth).transmittance
-        return dr.select(smooth, value * weight * share * transmittance, 0)
 
-    def _emitted(
-        self,
-        scene: mi.Scene,
-        si: mi.SurfaceInteraction3f,
-        start: mi.Interaction3f,
-        pdf: mi.Float,
-        delta: mi.Bool,
-        active: mi.Bool,
-    ) -> mi.Spectrum:
-        """What a light source that was hit adds."""
-        emitter = si.emitter(scene)
-        ds = mi.DirectionSample3f(scene, si, start)
-        other = scene.pdf_emitter_direction(start, ds, active & ~delta)
-        share = dr.select(delta, 1, _heuristic(pdf, other))
-        return dr.select(active, emitter.eval(si, active) * share, 0)
+        def reflected(direction: mi.Vector3f) -> tuple[mi.Spectrum, mi.Float]:
+            return bsdf.eval_pdf(context, si, si.to_local(direction), smooth)
 
+        def passing(ray: mi.Ray3f, active: mi.Bool) -> mi.Float:
+            return self.field.march(ray, sampler.next_1d(active), active).transmittance
 
-def _heuristic(a: mi.Float, b: mi.Float) -> mi.Float:
-    """The power heuristic of multiple importance sampling (Veach 1997)."""
-    return dr.select(a > 0, a * a / (a * a + b * b), 0)
+        return sampled_light(scene, si, sampler.next_2d(smooth), reflected, passing, smooth)
 
 
 def _linear(display: mi.Color3f, opacity: mi.Float) -> mi.Spectrum:
