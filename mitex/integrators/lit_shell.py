@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from mitex.errors import ConfigError
+from mitex.integrators.field_paths import FieldPaths
 from mitex.integrators.sources import sampled_light, source_met
 from mitex.runtime.jit import dr, mi
 from mitex.textures.scattering import ReflectingField
-from mitex.textures.shell_field import ShellField, works_in_variant
-from mitex.textures.variant import for_variant, init_base, option, require_variant
+from mitex.textures.variant import for_variant
 
 # A path goes on so many of the field's steps above the place where it met matter, along the normal: what the
 # captured photos show as a surface is a layer of matter, which would shade itself.
@@ -39,7 +38,7 @@ class Vertex:
     delta: mi.Bool
 
 
-class LitShellIntegrator:
+class LitShellIntegrator(FieldPaths):
     """Path tracing of ordinary geometry and of a radiance field that reflects the scene's own light.
 
     Each ray draws one place among those that it sees in the field, with the weights of compositing. There
@@ -66,46 +65,25 @@ class LitShellIntegrator:
     Images are not differentiable in the field's parameters; those of `shell` are.
     """
 
-    def __init__(self, props: mi.Properties) -> None:
-        init_base(mi.SamplingIntegrator, self, props)
-        require_variant("lit_shell", works_in_variant(), "llvm_ad_rgb or cuda_ad_rgb")
-        field: Any = props.get("field")
+    plugin = "lit_shell"
+    differentiable = False
+
+    def _check_field(self, field: object) -> None:
         if not isinstance(getattr(field, "field", None), ReflectingField):
             raise ConfigError(
                 "lit_shell: 'field' is not a shell_field that reflects light",
                 "give a texture of `mitex fit nerf`, or use `shell`, which renders it in its own light",
             )
-        self.field: ShellField = field
-        self.max_depth = option(props, "max_depth", 6)
-        if self.max_depth < 1:
-            raise ConfigError(f"lit_shell: 'max_depth' is {self.max_depth}", "use 1 or more")
-        self.hidden = option(props, "hide_emitters", False)
-
-    def traverse(self, callback: mi.TraversalCallback) -> None:
-        callback.put("field", self.field, mi.ParamFlags.NonDifferentiable)
-
-    def aov_names(self) -> list[str]:
-        return []
-
-    def to_string(self) -> str:
-        nested = str(self.field).replace("\n", "\n  ")
-        return f"LitShellIntegrator[\n  field = {nested},\n  max_depth = {self.max_depth}\n]"
-
-    def sample(
-        self,
-        scene: mi.Scene,
-        sampler: mi.Sampler,
-        ray: mi.Ray3f,
-        medium: mi.Medium | None = None,
-        active: mi.Bool | bool = True,
-    ) -> tuple[mi.Spectrum, mi.Bool, list[mi.Float]]:
-        """Radiance along rays, as one wavefront: the march cannot be recorded into a symbolic loop."""
-        with dr.suspend_grad():
-            return self._radiance(scene, sampler, mi.Ray3f(ray), mi.Bool(active))
 
     def _radiance(
         self, scene: mi.Scene, sampler: mi.Sampler, ray: mi.Ray3f, active: mi.Bool
-    ) -> tuple[mi.Spectrum, mi.Bool, list[mi.Float]]:
+    ) -> tuple[mi.Spectrum, mi.Bool]:
+        with dr.suspend_grad():
+            return self._scattered(scene, sampler, ray, active)
+
+    def _scattered(
+        self, scene: mi.Scene, sampler: mi.Sampler, ray: mi.Ray3f, active: mi.Bool
+    ) -> tuple[mi.Spectrum, mi.Bool]:
         count = dr.width(ray.o)
         alive = mi.Bool(active & dr.full(mi.Bool, True, count))
         radiance, throughput = dr.zeros(mi.Spectrum, count), dr.ones(mi.Spectrum, count)
@@ -133,7 +111,7 @@ class LitShellIntegrator:
             ray = start.spawn_ray(vertex.direction)
             alive = mi.Bool(dr.max(throughput) > 0)
             dr.eval(ray, radiance, throughput, alive, start, pdf, delta, valid)
-        return radiance, valid, []
+        return radiance, valid
 
     def _on_surface(
         self,

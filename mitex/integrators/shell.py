@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from mitex.errors import ConfigError
+from mitex.integrators.field_paths import FieldPaths
 from mitex.integrators.sources import sampled_light, source_met
 from mitex.runtime.jit import dr, mi
-from mitex.textures.shell_field import ShellField, works_in_variant
-from mitex.textures.variant import for_variant, init_base, option, require_variant
+from mitex.textures.variant import for_variant
 
 TOE, SLOPE = 0.04045, 12.92  # of the sRGB curve
 
 
-class ShellIntegrator:
+class ShellIntegrator(FieldPaths):
     """Ordinary geometry by path tracing, with a radiance field composited by depth on every segment.
 
     A field gives what it emits towards the viewer under its own light and hides what is behind: paths that
@@ -38,40 +36,18 @@ class ShellIntegrator:
     Images are differentiable in the field's parameters.
     """
 
-    def __init__(self, props: mi.Properties) -> None:
-        init_base(mi.SamplingIntegrator, self, props)
-        require_variant("shell", works_in_variant(), "llvm_ad_rgb or cuda_ad_rgb")
-        field: Any = props.get("field")
+    plugin = "shell"
+    differentiable = True
+
+    def _check_field(self, field: object) -> None:
         if not hasattr(field, "march"):
             raise ConfigError("shell: 'field' is not a shell_field", "see mitex.textures.shell_field")
-        self.field: ShellField = field
-        self.max_depth = option(props, "max_depth", 6)
-        if self.max_depth < 1:
-            raise ConfigError(f"shell: 'max_depth' is {self.max_depth}", "use 1 or more")
-        self.hidden = option(props, "hide_emitters", False)
 
-    def traverse(self, callback: mi.TraversalCallback) -> None:
-        callback.put("field", self.field, mi.ParamFlags.Differentiable)
-
-    def aov_names(self) -> list[str]:
-        return []
-
-    def to_string(self) -> str:
-        nested = str(self.field).replace("\n", "\n  ")
-        return f"ShellIntegrator[\n  field = {nested},\n  max_depth = {self.max_depth}\n]"
-
-    def sample(
-        self,
-        scene: mi.Scene,
-        sampler: mi.Sampler,
-        ray: mi.Ray3f,
-        medium: mi.Medium | None = None,
-        active: mi.Bool | bool = True,
-    ) -> tuple[mi.Spectrum, mi.Bool, list[mi.Float]]:
-        """Radiance along rays, as one wavefront: the march cannot be recorded into a symbolic loop."""
+    def _radiance(
+        self, scene: mi.Scene, sampler: mi.Sampler, ray: mi.Ray3f, active: mi.Bool
+    ) -> tuple[mi.Spectrum, mi.Bool]:
         count = dr.width(ray.o)
-        ray = mi.Ray3f(ray)
-        alive = mi.Bool(active) & dr.full(mi.Bool, True, count)
+        alive = active & dr.full(mi.Bool, True, count)
         radiance, throughput = dr.zeros(mi.Spectrum, count), dr.ones(mi.Spectrum, count)
         valid = dr.zeros(mi.Bool, count)
         context = mi.BSDFContext()
@@ -101,7 +77,7 @@ class ShellIntegrator:
             ray = si.spawn_ray(si.to_world(scattered.wo))
             alive &= dr.max(dr.detach(throughput)) > 0
             dr.eval(ray, radiance, throughput, alive, start, pdf, delta, valid)
-        return radiance, valid, []
+        return radiance, valid
 
     def _direct(
         self,
