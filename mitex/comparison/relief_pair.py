@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -52,7 +53,7 @@ class ReliefPair:
         """The reference in light."""
         return lit(clay(self.reference))
 
-    def numbers(self, asset: Asset) -> dict[str, float]:
+    def numbers(self, asset: Asset, run: Path) -> dict[str, float]:
         """Distances of the statistics of edges and vertices, and of shaded pictures."""
         pairs = zip(views(asset.mesh), self._views, strict=True)
         shading = [
