@@ -1,0 +1,47 @@
+// One step of the automaton, as step.frag has it. A group of threads is a tile of cells, which update together
+// or not at all.
+const WIDTH = 256u;
+//: CONSTANTS
+struct Step { phase: u32, count: u32, regular: f32 }
+@group(1) @binding(0) var<uniform> now: Step;
+//: BOUNDS
+//: BINDINGS
+
+fn pcg(value: u32) -> u32 {
+  let state = value * 747796405u + 2891336453u;
+  let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
+  return (word >> 22u) ^ word;
+}
+
+fn held(state: vec4f, low: vec4f, high: vec4f) -> vec4f {
+  return min(max(state, low), high);
+}
+
+@compute @workgroup_size(32)
+fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) thread: u32) {
+  let tile = group.x;
+  let across = WIDTH >> 3u; // tiles in a row
+  let at = ((tile / across) * 4u + (thread >> 3u)) * WIDTH + (tile % across) * 8u + (thread & 7u);
+  //: OWN
+  //: SHARE
+  if (at >= now.count || pcg(tile + now.phase) >= 0x80000000u) {
+    //: KEEP
+    return;
+  }
+  let row = rows[at].xy;
+  //: ZERO
+  for (var k = row.x; k < row.x + row.y; k++) {
+    let link = links[k];
+    let place = link.x;
+    let d = bitcast<vec3f>(link.yzw);
+    //: NEIGHBOUR
+  }
+  if (now.regular > 0.0) {
+    let share = now.regular / max(f32(row.y), 1.0);
+    //: MEAN
+  }
+  //: CONDITION
+  //: CHANGES
+  //: RULES
+  //: NEXT
+}
