@@ -110,24 +110,11 @@ def test_webgpu_takes_the_same_steps(compute, tab, texture, cells, grown):
     assert np.abs(compute.picture() - tab.picture()).mean() < 2e-3
 
 
-# All that changes what a step does, and a seed and a brush while steps are on their way.
-SCRIPT = """page.setGraft(1); page._shares(page.shares.map((_, k) => (k % 7) / 6)); page.orient(1);
-const late = page.step(20); page.reset(5); await late; await page.step(20);
+# The orientation of the steps, and a seed and a brush while steps are on their way.
+SCRIPT = """page.orient(1); const late = page.step(20); page.reset(5); await late; await page.step(20);
 const more = page.step(5); const erased = page.erase({ face: 7, barycentric: [0.3, 0.3, 0.4] }, 0.5);
 await more; const wiped = page.automaton.read(); await page.step(3);
 return erased.every((v) => wiped.subarray(16 * v, 16 * v + 16).every((x) => x === 0))"""
-
-
-def test_a_device_that_is_lost_is_not_missed(compute, cells):
-    assert compute.run(SCRIPT)
-    before = state(compute, cells)
-    compute.run("page.device.destroy(); await page.device.lost")
-    assert compute.run("return [page.device, page.automaton.steps]") == [None, 28]
-    assert torch.equal(state(compute, cells), before)
-    compute.run("page.setShare(0); page.orient(0)")
-    assert compute.run(SCRIPT)  # now in WebGL2
-    assert (state(compute, cells) - before).abs().max() < 1e-3 < before.abs().max()
-    assert compute.errors == []
 
 
 def test_pixels_are_those_of_python(tab, texture, cells, grown):
@@ -205,7 +192,7 @@ def test_erased_cells_are_the_seed_and_grow_again(tab, cells):
 
 
 @torch.no_grad()
-def test_grafted_looks_share_their_steps_and_their_pictures(tab, texture, cells):
+def test_grafted_looks_share_their_steps_and_their_pictures(tab, compute, texture, cells):
     tab.run("page.setGraft(1); page.reset(); await page.step(30)")
     before = state(tab, cells)
     weights = np.clip(0.5 + cells.vertices[:, 0], 0, 1)
@@ -218,6 +205,11 @@ def test_grafted_looks_share_their_steps_and_their_pictures(tab, texture, cells)
         expected = graft._step(before[None], torch.Generator())[0]
     after = state(tab, cells)
     assert (after - expected).abs().max() < 1e-4
+    script = """const { automaton, looks } = page; const [shares, states] = argument;
+    automaton.setLooks(...looks); page._shares(Float32Array.from(shares));
+    automaton.write(Float32Array.from(states)); automaton.steps = 30; await page.step(1)"""
+    compute.run(script, [weights.tolist(), before.ravel().tolist()])
+    assert (state(compute, cells) - expected).abs().max() < 1e-4
     colour, *_, ids = tab.maps()
     hit = ids[..., 0] > 0
     face, bits = ids[hit][:, 0].astype(np.int32) - 1, ids[hit][:, 1:3].copy().view(np.float32)
@@ -249,6 +241,19 @@ def test_a_downloaded_asset_is_valid(tab, tmp_path):
     path.write_bytes(tab.array("await page.glb(128)").tobytes())
     (report,) = khronos_reports([path])
     assert [issue for issue in report["issues"]["messages"] if issue["severity"] < 2] == []
+
+
+def test_a_device_that_is_lost_is_not_missed(compute, cells):
+    compute.run("page.automaton.setLooks(page.look)")
+    assert compute.run(SCRIPT)
+    before = state(compute, cells)
+    compute.run("page.device.destroy(); await page.device.lost")
+    assert compute.run("return [page.device, page.automaton.steps]") == [None, 28]
+    assert torch.equal(state(compute, cells), before)
+    compute.run("page.orient(0)")
+    assert compute.run(SCRIPT)  # now in WebGL2
+    assert (state(compute, cells) - before).abs().max() < 1e-3 < before.abs().max()
+    assert compute.errors == []
 
 
 HOSTILE = "<img src=x onerror=window.attacked=1></script><script>window.attacked=1</script>"
