@@ -24,10 +24,10 @@ async function open() {
   listenToKeys(page, panel);
   listenToDrops(panel);
   page.panel = panel;
+  if (data.live) follow(page, panel);
   if (still) return page;
   clock.start();
   new ResizeObserver(fit).observe(canvas);
-  if (data.live) follow(page, panel);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     page.studio.paper = paperOf(canvas);
     page.changed = true;
