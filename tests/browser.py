@@ -35,7 +35,7 @@ class Browser:
     def open(self, page: Path | str, side: int = 128, steps: str = "webgl") -> "Tab":
         """A page, by its file or address, which stands still, with a square picture of `side` pixels.
 
-        Its steps are taken by webgl or webgpu.
+        Its steps are taken by webgl, webgpu or, with auto, what the page itself takes.
         """
         if self._chromium is None:
             self._start()

@@ -11,11 +11,12 @@ class ComputeAutomaton extends Automaton {
     const plane = 16 * WIDTH * surface.height;
     this.size = this.shape.vectors * plane;
     this.buffers = {
-      rows: filledBuffer(device, surface.rowValues), links: filledBuffer(device, surface.linkValues),
+      rows: storageBuffer(device, plane), links: filledBuffer(device, surface.linkValues),
       shares: storageBuffer(device, plane / 4), condition: storageBuffer(device, plane),
       numbers: emptyBuffer(device, APART * BATCH, "UNIFORM", "COPY_DST"),
       arrival: emptyBuffer(device, this.size, "MAP_READ", "COPY_DST"),
     };
+    device.queue.writeBuffer(this.buffers.rows, 0, surface.rowValues);
     this.pair = [storageBuffer(device, this.size), storageBuffer(device, this.size)]; // states before and after a step
     Object.assign(this, { device, pipelines: {}, turn: surface.turn, waiting: 0, version: 0, erased: [] });
     this.setLooks(look);
@@ -33,7 +34,7 @@ class ComputeAutomaton extends Automaton {
       [`${rule}0`, filledBuffer(device, shape.weights(one)[0])]));
     const bounds = rules.flatMap(([rule, one]) => Object.values(shape.bounds(one, rule)).flatMap((x) => [...x]));
     this.weights.bounds = filledBuffer(device, Float32Array.from(bounds), "UNIFORM");
-    this.pipelines[names.length] ??= computePipeline(device, shape.shader(names, WGSL, this._plane));
+    this.pipelines[names.length] ??= computePipeline(device, computeStep(shape, names, this._plane, device.cellsPerThread));
     this._bind(this.pipelines[names.length], names);
   }
 
@@ -44,7 +45,7 @@ class ComputeAutomaton extends Automaton {
       return bindGroup(device, pipeline, 0, bindings(shape, names).map(([name]) => given[name]));
     });
     const numbers = Array.from({ length: BATCH }, (_, k) =>
-      bindGroup(device, pipeline, 1, [{ buffer: buffers.numbers, offset: APART * k, size: 16 }]));
+      bindGroup(device, pipeline, 1, [{ buffer: buffers.numbers, offset: APART * k, size: 8 }]));
     Object.assign(this, { pipeline, directions, numbers });
   }
 
@@ -105,8 +106,8 @@ class ComputeAutomaton extends Automaton {
     const words = new Uint32Array((APART / 4) * count);
     const numbers = new Float32Array(words.buffer);
     for (let k = 0; k < count; k++) {
-      words.set([phaseOf(this.steps + k, this.seed), this.surface.mesh.count], (APART / 4) * k);
-      numbers[(APART / 4) * k + 2] = this.look.mean ? 6 : 0;
+      words[(APART / 4) * k] = phaseOf(this.steps + k, this.seed);
+      numbers[(APART / 4) * k + 1] = this.look.mean ? 6 : 0;
     }
     return words;
   }

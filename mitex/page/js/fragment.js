@@ -22,7 +22,7 @@ class FragmentAutomaton extends Automaton {
       Object.assign(this.uniforms, this.shape.bounds(one, rule));
     }
     const names = Object.keys(rules);
-    this.programs[names.length] ??= this.graphics.program(SHADERS["fill.vert"], this.shape.shader(names, GLSL));
+    this.programs[names.length] ??= this.graphics.program(SHADERS["fill.vert"], fragmentStep(this.shape, names));
     this.program = this.programs[names.length];
   }
 

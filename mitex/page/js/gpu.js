@@ -1,13 +1,14 @@
 // WebGPU in few words: a device, buffers, pipelines and what they are given.
 
-// The device that steps are computed on; null for WebGL2. `wanted` is webgl or webgpu; else it is what is faster:
-// a processor that plays a graphics card is so in WebGL2.
-async function computeDevice(wanted) {
+// The device that steps are computed on; null for WebGL2. `wanted` is webgl or webgpu; else it is WebGPU, unless
+// that is a processor where WebGL2 has a graphics card.
+async function computeDevice(wanted, graphics) {
   if (wanted === "webgl") return null;
   const adapter = await navigator.gpu?.requestAdapter();
   if (wanted === "webgpu" && !adapter) throw new Error("this browser has no WebGPU");
-  if (!adapter || (wanted !== "webgpu" && adapter.info.isFallbackAdapter)) return null;
-  return adapter.requestDevice();
+  if (!adapter || (wanted !== "webgpu" && adapter.info.isFallbackAdapter && !graphics.software)) return null;
+  // On a processor reading the weights costs most, and cells of one thread share it; a graphics card wants threads.
+  return Object.assign(await adapter.requestDevice(), { cellsPerThread: adapter.info.isFallbackAdapter ? 8 : 1 });
 }
 
 function emptyBuffer(device, size, ...uses) {

@@ -2,8 +2,8 @@
 
 class Page extends View {
   // Steps are taken on `device`, or in WebGL2 if it is null.
-  constructor(data, canvas, device = null) {
-    super(data, canvas);
+  constructor(data, graphics, device = null) {
+    super(data, graphics);
     this.device = device;
     Object.assign(this, { looks: data.looks, seed: data.seed, field: data.field, speed: data.speed });
     Object.assign(this, { chosen: 0, grafted: null });

@@ -45,50 +45,54 @@ class RuleShape {
       [`${rule}Bias`]: four(look.bias2, vectors) };
   }
 
-  // One step, in one of the languages.
-  shader(rules, language, ...extra) {
-    const n = this.vectors;
-    const z = (k, c) => `z${k}_${c}`;
+  // What one cell perceives of its neighbours, in one of the languages: texts for its template.
+  perception({ vector, number, state, zero }) {
+    const { vectors: n } = this;
     const kinds = Array.from({ length: this.harmonics }, (_, k) => k);
-    const all = (line) => kinds.map((k) => each(n, (c) => line(k, c))).join("\n");
-    const { vector, number, state, next, zero, bound } = language;
-    const held = (c, change) => this._held(rules, c, change, bound);
-    return written(SHADERS[language.template], {
-      ...language.declarations(this, rules, ...extra),
+    const all = (line) => kinds.map((k) => each(n, (c) => line(`z${k}_${c}`, k, c))).join("\n");
+    return {
       OWN: each(n, (c) => vector(`s${c}`, state(c, "at"))),
-      KEEP: each(n, (c) => next(c, held(c, ""))),
-      ZERO: all((k, c) => vector(z(k, c), zero)),
+      ZERO: all((z) => vector(z, zero)),
       NEIGHBOUR: `${each(n, (c) => vector(`o${c}`, `${state(c, "place")} - s${c}`))}\n`
         + `${kinds.map((k) => number(`w${k}`, HARMONICS[k])).join("\n")}\n`
-        + all((k, c) => `${z(k, c)} += w${k} * o${c};`),
-      MEAN: all((k, c) => `${z(k, c)} *= share;`),
-      CHANGES: rules.map((rule) => each(n, (c) => vector(`${rule}u${c}`, bound(`${rule}Bias`, c)))).join("\n"),
-      RULES: rules.map((rule, r) => this._network(rule, ["share0 < 1.0", "share0 > 0.0"][r], language)).join("\n"),
-      NEXT: each(n, (c) => next(c, held(c,
-        rules.length > 1 ? ` + mix(ruleu${c}, otheru${c}, share0)` : ` + ruleu${c}`))),
-    });
+        + all((z, k, c) => `${z} += w${k} * o${c};`),
+      MEAN: all((z) => `${z} *= share;`),
+    };
   }
 
-  // A state and its change, within the bounds of the training.
-  _held(rules, c, change, bound) {
-    const mixed = (kind) => (rules.length > 1
-      ? `mix(${rules.map((rule) => bound(`${rule}${kind}`, c)).join(", ")}, share0)` : bound(`rule${kind}`, c));
-    return `held(s${c}${change}, ${mixed("Low")}, ${mixed("High")})`;
-  }
-
-  _network(rule, needed, { vector, zero, loop, index }) {
-    const inputs = Array.from({ length: this.harmonics * this.vectors }, (_, i) =>
+  // The names of the vectors that the network reads.
+  get inputNames() {
+    const perceived = Array.from({ length: this.harmonics * this.vectors }, (_, i) =>
       `z${Math.floor(i / this.vectors)}_${i % this.vectors}`);
-    for (let c = 0; c < this.vectors; c++) inputs.push(`s${c}`);
-    if (this.condition) inputs.push("told");
-    const block = (b) => `${loop(this.perBlock)} {
-      ${index(this.stride)}
-      ${vector("h", `${rule}${b}[k + ${this.stride - 1}][0]`)}
-      ${inputs.map((x, i) => `h += ${rule}${b}[k + ${i}] * ${x};`).join("\n")}
-      h = max(h, ${zero});
-      ${each(this.vectors, (c) => `${rule}u${c} += ${rule}${b}[k + ${this.inputs + c}] * h;`)}
+    const own = Array.from({ length: this.vectors }, (_, c) => `s${c}`);
+    return [...perceived, ...own, ...(this.condition ? ["told"] : [])];
+  }
+
+  // The network on some cells at a time, whose variables end in `cells`; `input` names what it reads.
+  changes(rules, { vector, matrix, zero, bound, loop, index }, cells, input) {
+    const { vectors: n, stride } = this;
+    const on = (line) => cells.map(line).join(" ");
+    const block = (rule, b) => `${loop(this.perBlock)} {
+      ${index(stride)}
+      ${on((m) => vector(`h${m}`, `${rule}${b}[k + ${stride - 1}][0]`))}
+      ${each(this.inputs, (i) => `{ ${matrix("w", `${rule}${b}[k + ${i}]`)} ${on((m) => `h${m} += w * ${input(i, m)};`)} }`)}
+      ${on((m) => `h${m} = max(h${m}, ${zero});`)}
+      ${each(n, (c) => `{ ${matrix("w", `${rule}${b}[k + ${this.inputs + c}]`)} ${on((m) => `${rule}u${c}${m} += w * h${m};`)} }`)}
     }`;
-    return `if (${needed}) {\n${each(this.blocks, block)}\n}`;
+    const needed = ["share0 < 1.0", "share0 > 0.0"];
+    return {
+      CHANGES: rules.map((rule) => each(n, (c) => on((m) => vector(`${rule}u${c}${m}`, bound(`${rule}Bias`, c))))).join("\n"),
+      RULES: rules.map((rule, r) => `if (${cells.map((m) => needed[r].replace("share0", `share0${m}`)).join(" || ")}) {
+        ${each(this.blocks, (b) => block(rule, b))}\n}`).join("\n"),
+    };
+  }
+
+  // A cell's next state: its own one and the change, within the bounds of the training.
+  held(rules, { bound }, c, own, cell = "", changing = true) {
+    const mixed = (values) => (rules.length > 1 ? `mix(${values.join(", ")}, share0${cell})` : values[0]);
+    const bounds = ["Low", "High"].map((kind) => mixed(rules.map((rule) => bound(`${rule}${kind}`, c))));
+    const change = changing ? ` + ${mixed(rules.map((rule) => `${rule}u${c}${cell}`))}` : "";
+    return `held(${own}${change}, ${bounds.join(", ")})`;
   }
 }
 

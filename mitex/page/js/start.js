@@ -6,8 +6,9 @@ async function open() {
   const data = await unpacked(JSON.parse(by("data").textContent));
   const canvas = by("picture");
   const options = new URLSearchParams(location.hash.slice(1));
-  const page = data.looks ? new Page(data, canvas, await computeDevice(options.get("steps")))
-    : await StillPage.of(data, canvas);
+  const graphics = new Graphics(canvas);
+  const page = data.looks ? new Page(data, graphics, await computeDevice(options.get("steps"), graphics))
+    : await StillPage.of(data, graphics);
   page.studio.paper = paperOf(canvas);
   const still = Number(options.get("still"));
   const fit = () => {

@@ -2,7 +2,7 @@
 // or not at all.
 const WIDTH = 256u;
 //: CONSTANTS
-struct Step { phase: u32, count: u32, regular: f32 }
+struct Step { phase: u32, regular: f32 }
 @group(1) @binding(0) var<uniform> now: Step;
 //: BOUNDS
 //: BINDINGS
@@ -17,17 +17,15 @@ fn held(state: vec4f, low: vec4f, high: vec4f) -> vec4f {
   return min(max(state, low), high);
 }
 
-@compute @workgroup_size(32)
-fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) thread: u32) {
-  let tile = group.x;
+// Where a cell of a tile of 8 x 4 is.
+fn placed(tile: u32, cell: u32) -> u32 {
   let across = WIDTH >> 3u; // tiles in a row
-  let at = ((tile / across) * 4u + (thread >> 3u)) * WIDTH + (tile % across) * 8u + (thread & 7u);
+  return ((tile / across) * 4u + (cell >> 3u)) * WIDTH + (tile % across) * 8u + (cell & 7u);
+}
+
+// What the network reads of a cell: sums over its neighbours, its state, what it is told.
+fn perceived(at: u32) -> array<vec4f, INPUTS> {
   //: OWN
-  //: SHARE
-  if (at >= now.count || pcg(tile + now.phase) >= 0x80000000u) {
-    //: KEEP
-    return;
-  }
   let row = rows[at].xy;
   //: ZERO
   for (var k = row.x; k < row.x + row.y; k++) {
@@ -41,6 +39,19 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) th
     //: MEAN
   }
   //: CONDITION
+  //: PERCEIVED
+}
+
+@compute @workgroup_size(32u / CELLS)
+fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) thread: u32) {
+  let tile = group.x;
+  //: PLACES
+  //: SHARES
+  if (pcg(tile + now.phase) >= 0x80000000u) {
+    //: KEEP
+    return;
+  }
+  //: CELLS
   //: CHANGES
   //: RULES
   //: NEXT

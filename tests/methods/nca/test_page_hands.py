@@ -92,8 +92,11 @@ def test_a_moving_texture_is_led(browser, tmp_path, steps):
         for step in range(4):
             fires = torch.from_numpy(mask(len(mesh.vertices), step, 0))
             state = look.bounded(look.rule.step(state, operator, fires, told))
-    ours = tab.array("page.automaton.read()").reshape(state[0].shape)
-    assert np.abs(ours - state[0].numpy()).max() < 1e-3 < state.abs().max()
+    ours = [tab.array("page.automaton.read()").reshape(state[0].shape)]
+    if steps == "webgpu":  # as graphics cards are asked, where a thread has one cell
+        tab.run("page.device.cellsPerThread = 1; page._settle(); page.reset(); await page.step(4)")
+        ours.append(tab.array("page.automaton.read()").reshape(state[0].shape))
+    assert np.abs(ours - state.numpy()).max() < 1e-3 < state.abs().max()
     assert tab.errors == []
 
 

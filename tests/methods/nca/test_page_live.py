@@ -25,7 +25,8 @@ def test_a_page_follows_a_training(browser, tmp_path):
     with PageServer(lambda: content().html(), news) as server:
         thread = Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
         thread.start()
-        tab = browser.open(server.url, 64)
+        tab = browser.open(server.url, 64, steps="auto")
+        assert tab.run("return page.device instanceof GPUDevice")  # the faster one where a processor draws
         names = tab.run("return [page.surface.mesh.name, ...page.data.meshes.map(({ name }) => name)]")
         assert names == ["ball", "ball", "icosphere32"]
         assert tab.page.locator(".chart p").inner_text().startswith("step 2, ")
