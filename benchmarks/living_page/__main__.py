@@ -4,8 +4,8 @@ usage: python -m benchmarks.living_page [--quick]
 
 Steps of the automaton in four ways on the same mesh, in turns: four passes as on MeshNCA's own page, the
 page's one pass in WebGL2, and its compute shader in WebGPU, with the states brought to WebGL2 once at the end
-or, as while it is drawn, after each step. Pictures of 512 x 512 pixels. Times are those that processors worked
-for the browser, so that other work on the machine counts little; the least of several.
+or, as while it is drawn, after each step. Pictures of 512 x 512 pixels. Times are those that processors
+worked for the browser, so that other work on the machine counts little; the least of several.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="a small mesh: shows that it runs")
     quick = parser.parse_args().quick
     browser = Browser()
-    frequencies, rounds, count = ((8,), 1, 4) if quick else ((32, 64), 5, 20)
+    frequencies, rounds, count = ((8,), 1, 4) if quick else ((32, 64), 3, 10)
     console = Console()
     with tempfile.TemporaryDirectory() as folder:
         for frequency in frequencies:

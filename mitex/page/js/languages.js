@@ -14,9 +14,10 @@ const GLSL = {
 
 function fragmentStep(shape, rules) {
   const { vectors } = shape;
-  const inputs = shape.inputNames;
+  const [inputs, needed] = [shape.inputNames, ["share0 < 1.0", "share0 > 0.0"]];
+  const network = (rule) => shape.network(rule, GLSL, 1, (i) => inputs[i], (c) => `${rule}u${c}`);
   return written(SHADERS["step.frag"], {
-    ...shape.perception(GLSL), ...shape.changes(rules, GLSL, [""], (i) => inputs[i]),
+    ...shape.perception(GLSL),
     CONSTANTS: `const int VECTORS = ${vectors};\n#define GRAFT ${rules.length - 1}\n`
       + `#define CONDITION ${shape.condition ? 1 : 0}`,
     SAMPLERS: each(vectors, (c) => `uniform sampler2D state${c};`),
@@ -25,8 +26,10 @@ function fragmentStep(shape, rules) {
       blockText(`${rule}${b}`, shape.perBlock * shape.stride))).join(""),
     BOUNDS: rules.map((rule) =>
       `uniform vec4 ${rule}Low[VECTORS], ${rule}High[VECTORS], ${rule}Bias[VECTORS];`).join("\n"),
-    KEEP: each(vectors, (c) => `next${c} = ${shape.held(rules, GLSL, c, `s${c}`, "", false)};`),
-    NEXT: each(vectors, (c) => `next${c} = ${shape.held(rules, GLSL, c, `s${c}`)};`),
+    KEEP: each(vectors, (c) => `next${c} = ${shape.held(rules, GLSL, c, `s${c}`)};`),
+    CHANGES: rules.map((rule) => each(vectors, (c) => `vec4 ${rule}u${c} = ${rule}Bias[${c}];`)).join("\n"),
+    RULES: rules.map((rule, r) => `if (${needed[r]}) {\n${network(rule)}\n}`).join("\n"),
+    NEXT: each(vectors, (c) => `next${c} = ${shape.held(rules, GLSL, c, `s${c}`, rules.map((rule) => `${rule}u${c}`))};`),
   });
 }
 
@@ -43,25 +46,26 @@ const WGSL = {
 
 // Each thread computes so many cells of a tile.
 function computeStep(shape, rules, plane, cellsPerThread) {
-  const cells = Array.from({ length: cellsPerThread }, (_, m) => `_${m}`);
-  const own = (c, m) => `x${m}[${shape.harmonics * shape.vectors + c}]`;
-  const lines = (line) => cells.map((m, k) => line(m, k)).join("\n");
-  const next = (value) => lines((m) => each(shape.vectors, (c) =>
-    `following[${c}u * PLANE + at${m}] = ${value(c, m)};`));
+  const { vectors } = shape;
+  const needed = ["least < 1.0", "most > 0.0"];
+  const network = (rule) => shape.network(rule, WGSL, cellsPerThread, (i, m) => `x[${m}][${i}]`, (c, m) => `${rule}u[${m}][${c}]`);
+  const next = (value) => each(vectors, (c) => `following[${c}u * PLANE + at] = ${value(c)};`);
+  const own = (c) => WGSL.state(c, "at");
   return written(SHADERS["step.wgsl"], {
-    ...shape.perception(WGSL), ...shape.changes(rules, WGSL, cells, (i, m) => `x${m}[${i}]`),
+    ...shape.perception(WGSL),
     CONSTANTS: `${planes(shape, plane)}\nconst CELLS = ${cellsPerThread}u;\nconst INPUTS = ${shape.inputs};`,
     BOUNDS: `struct Bounds { ${rules.flatMap((rule) => ["Low", "High", "Bias"].map((kind) =>
-      `${rule}${kind}: array<vec4f, ${shape.vectors}>`)).join(", ")} }`,
+      `${rule}${kind}: array<vec4f, ${vectors}>`)).join(", ")} }`,
     BINDINGS: bindings(shape, rules).map(([name, space, kind], k) =>
       `@group(0) @binding(${k}) var<${space}> ${name}: ${kind};`).join("\n"),
+    SHARE: `return ${rules.length > 1 ? "shares[at]" : "0.0"};`,
     CONDITION: shape.condition ? "let told = condition[at];" : "",
     PERCEIVED: `return array<vec4f, INPUTS>(${shape.inputNames.join(", ")});`,
-    PLACES: lines((m, k) => `let at${m} = placed(tile, thread * CELLS + ${k}u);`),
-    SHARES: lines((m) => `let share0${m} = ${rules.length > 1 ? `shares[at${m}]` : "0.0"};`),
-    KEEP: next((c, m) => shape.held(rules, WGSL, c, WGSL.state(c, `at${m}`), m, false)),
-    CELLS: lines((m) => `var x${m} = perceived(at${m});`),
-    NEXT: next((c, m) => shape.held(rules, WGSL, c, own(c, m), m)),
+    KEEP: next((c) => shape.held(rules, WGSL, c, own(c))),
+    CHANGES: rules.map((rule) => `var ${rule}u: array<array<vec4f, VECTORS>, CELLS>;`).join("\n"),
+    BIAS: rules.map((rule) => `${rule}u[m] = bounds.${rule}Bias;`).join("\n"),
+    RULES: rules.map((rule, r) => `if (${needed[r]}) {\n${network(rule)}\n}`).join("\n"),
+    NEXT: next((c) => shape.held(rules, WGSL, c, own(c), rules.map((rule) => `${rule}u[m][${c}]`))),
   });
 }
 

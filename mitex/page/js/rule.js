@@ -68,31 +68,27 @@ class RuleShape {
     return [...perceived, ...own, ...(this.condition ? ["told"] : [])];
   }
 
-  // The network on some cells at a time, whose variables end in `cells`; `input` names what it reads.
-  changes(rules, { vector, matrix, zero, bound, loop, index }, cells, input) {
-    const { vectors: n, stride } = this;
+  // The network of a rule, on so many cells at a time: what is read of its weights serves all of them. `input` and
+  // `change` name what it reads and adds to.
+  network(rule, { vector, matrix, zero, loop, index }, cellCount, input, change) {
+    const { stride } = this;
+    const cells = Array.from({ length: cellCount }, (_, m) => m);
     const on = (line) => cells.map(line).join(" ");
-    const block = (rule, b) => `${loop(this.perBlock)} {
+    const product = (b, k, line) => `{ ${matrix("w", `${rule}${b}[k + ${k}]`)} ${on(line)} }`;
+    return each(this.blocks, (b) => `${loop(this.perBlock)} {
       ${index(stride)}
       ${on((m) => vector(`h${m}`, `${rule}${b}[k + ${stride - 1}][0]`))}
-      ${each(this.inputs, (i) => `{ ${matrix("w", `${rule}${b}[k + ${i}]`)} ${on((m) => `h${m} += w * ${input(i, m)};`)} }`)}
+      ${each(this.inputs, (i) => product(b, i, (m) => `h${m} += w * ${input(i, m)};`))}
       ${on((m) => `h${m} = max(h${m}, ${zero});`)}
-      ${each(n, (c) => `{ ${matrix("w", `${rule}${b}[k + ${this.inputs + c}]`)} ${on((m) => `${rule}u${c}${m} += w * h${m};`)} }`)}
-    }`;
-    const needed = ["share0 < 1.0", "share0 > 0.0"];
-    return {
-      CHANGES: rules.map((rule) => each(n, (c) => on((m) => vector(`${rule}u${c}${m}`, bound(`${rule}Bias`, c))))).join("\n"),
-      RULES: rules.map((rule, r) => `if (${cells.map((m) => needed[r].replace("share0", `share0${m}`)).join(" || ")}) {
-        ${each(this.blocks, (b) => block(rule, b))}\n}`).join("\n"),
-    };
+      ${each(this.vectors, (c) => product(b, this.inputs + c, (m) => `${change(c, m)} += w * h${m};`))}
+    }`);
   }
 
-  // A cell's next state: its own one and the change, within the bounds of the training.
-  held(rules, { bound }, c, own, cell = "", changing = true) {
-    const mixed = (values) => (rules.length > 1 ? `mix(${values.join(", ")}, share0${cell})` : values[0]);
+  // A cell's next state: its own one and the changes by the rules, if there are any, within the bounds of the training.
+  held(rules, { bound }, c, own, changes = []) {
+    const mixed = (values) => (rules.length > 1 ? `mix(${values.join(", ")}, share0)` : values[0]);
     const bounds = ["Low", "High"].map((kind) => mixed(rules.map((rule) => bound(`${rule}${kind}`, c))));
-    const change = changing ? ` + ${mixed(rules.map((rule) => `${rule}u${c}${cell}`))}` : "";
-    return `held(${own}${change}, ${bounds.join(", ")})`;
+    return `held(${own}${changes.length ? ` + ${mixed(changes)}` : ""}, ${bounds.join(", ")})`;
   }
 }
 

@@ -42,17 +42,38 @@ fn perceived(at: u32) -> array<vec4f, INPUTS> {
   //: PERCEIVED
 }
 
+// The share of the second rule.
+fn shareOf(at: u32) -> f32 {
+  //: SHARE
+}
+
 @compute @workgroup_size(32u / CELLS)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) thread: u32) {
   let tile = group.x;
-  //: PLACES
-  //: SHARES
+  let first = thread * CELLS;
   if (pcg(tile + now.phase) >= 0x80000000u) {
-    //: KEEP
+    for (var m = 0u; m < CELLS; m++) {
+      let at = placed(tile, first + m);
+      let share0 = shareOf(at);
+      //: KEEP
+    }
     return;
   }
-  //: CELLS
+  var x: array<array<vec4f, INPUTS>, CELLS>;
   //: CHANGES
+  var least = 1.0;
+  var most = 0.0;
+  for (var m = 0u; m < CELLS; m++) {
+    let at = placed(tile, first + m);
+    x[m] = perceived(at);
+    least = min(least, shareOf(at));
+    most = max(most, shareOf(at));
+    //: BIAS
+  }
   //: RULES
-  //: NEXT
+  for (var m = 0u; m < CELLS; m++) {
+    let at = placed(tile, first + m);
+    let share0 = shareOf(at);
+    //: NEXT
+  }
 }
