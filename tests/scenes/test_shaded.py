@@ -1,7 +1,7 @@
 import numpy as np
 import torch
 
-from mitex.methods.nca.text.light import AMBIENT, lamps, shading
+from mitex.scenes.shaded import AMBIENT, lamps, shading
 from mitex.scenes.cameras import orbit
 
 
