@@ -34,6 +34,10 @@ class StyleConfig(TrainingConfig):
     text_model: str | None = key(None, "CLIP folder, or words for the small embedded model")
     text_vertices: int = key(10_000, "that a mesh has at least, else its faces are split", 1, 1_000_000)
     text_relief: float = key(0.1, "that a vertex is moved by at most [radii]", 0, 1)
+    text_background: float = key(1.0, "around the mesh [sRGB]; the paper: white", 0, 1)
+    text_each: bool = key(
+        False, "compare the text with each picture; false: with their mean embedding (the paper)"
+    )
     text_crops: int = key(4, "close-ups that are cut out of a view", 1, 64)
     text_crop_area: float = key(0.1, "of a close-up, as a share of the view", 1e-3, 1)
     text_tilt: float = key(0.5, "of what the model sees: the corners' way outwards [half sides]", 0, 2)

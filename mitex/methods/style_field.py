@@ -1,4 +1,4 @@
-"""Neural style fields: networks from a place on a mesh to its colour and offset (Michel et al. 2022, section 3.1)."""
+"""Neural style fields: from a place on a mesh to its colour and offset (Michel et al. 2022, section 3.1)."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ import torch.nn.functional as F
 from mitex.bridge import lookup
 from mitex.mesh import Mesh
 from mitex.scenes.cameras import Cameras
-from mitex.scenes.shaded import GREY, lamps_of_pixels, on_white, shading
+from mitex.scenes.shaded import BACKGROUND, GREY, lamps_of_pixels, pictured, shading
 from mitex.scenes.stage import Stage
 
 
@@ -20,9 +20,11 @@ class Figure:
 
     Args:
         mesh: whose faces stay.
+        background: sRGB around it; white by default.
     """
 
-    def __init__(self, mesh: Mesh) -> None:
+    def __init__(self, mesh: Mesh, background: float = BACKGROUND) -> None:
+        self._background = background
         self.stage, self._faces = Stage(mesh), torch.tensor(mesh.faces, dtype=torch.int64)
 
     def pictures(
@@ -41,7 +43,8 @@ class Figure:
         hit = visibility.coverage.flatten() > 0
         values = lookup(field, visibility).flatten(0, 2)[hit]
         shade = shading(F.normalize(values[:, 3:], dim=1), lamps_of_pixels(cameras, hit))
-        return on_white(shade * values[:, :3], hit, cameras), on_white(GREY * shade, hit, cameras)
+        coloured = pictured(shade * values[:, :3], hit, cameras, self._background)
+        return coloured, pictured(GREY * shade, hit, cameras, self._background)
 
 
 def smooth_normals(vertices: torch.Tensor, faces: torch.Tensor) -> torch.Tensor:

@@ -11,7 +11,7 @@ import torch
 from mitex.atlas import Atlas
 from mitex.cache import content_key
 from mitex.features.text_image import TextImageModel, object_prompt
-from mitex.losses import Augmentation, embedding_distance
+from mitex.losses import Augmentation, embedding_distance, mean_direction, text_distance
 from mitex.mesh import Mesh, subdivide_midpoint
 from mitex.methods.style_cameras import cameras_of
 from mitex.methods.style_config import StyleConfig
@@ -52,7 +52,7 @@ class StyleTask(ParameterTask):
         self.fine = _with_vertices(mesh, config.text_vertices)
         self.ball, self._similarity = self.fine.normalised()
         self.points, self.normals = torch.tensor(self.ball.vertices), torch.tensor(self.ball.normals)
-        self.figure = Figure(self.ball)
+        self.figure = Figure(self.ball, config.text_background)
         super().__init__(self.initial(torch.Generator().manual_seed(config.seed)))
 
     @abstractmethod
@@ -87,14 +87,21 @@ class StyleTask(ParameterTask):
     ) -> dict[str, torch.Tensor]:
         """The weighted distance of each part that has a weight; all are encoded at once."""
         parts = {name: part for name, part in parts.items() if part[0]}
-        groups = [augmentation(pictures, self.model.resolution) for _, augmentation, pictures in parts.values()]
+        size, fill = self.model.resolution, self.config.text_background
+        groups = [augmentation(pictures, size, fill) for _, augmentation, pictures in parts.values()]
         if not groups:
             return {}
         embeddings = self.model.encode_images(torch.cat(groups)).split([len(group) for group in groups])
         return {
-            name: weight * embedding_distance(values, self.text[0])
+            name: weight * self._distance(values)
             for (name, (weight, _, _)), values in zip(parts.items(), embeddings, strict=True)
         }
+
+    def _distance(self, embeddings: torch.Tensor) -> torch.Tensor:
+        """Of the pictures with these embeddings (N, D) from the text."""
+        if self.config.text_each:
+            return text_distance(mean_direction(embeddings), self.text[0])
+        return embedding_distance(embeddings, self.text[0])
 
     @torch.no_grad()
     def shape(self) -> Mesh:

@@ -1,4 +1,4 @@
-"""Surfaces as models of texts and images see them: on white, with a lamp beside each camera."""
+"""Surfaces as models of texts and images see them: on one colour, with a lamp beside each camera."""
 
 from __future__ import annotations
 
@@ -36,20 +36,23 @@ def shading(normals: torch.Tensor, lamp: torch.Tensor) -> torch.Tensor:
     return AMBIENT + (1 - AMBIENT) / BRIGHTEST * _irradiance(x)
 
 
-def on_white(colours: torch.Tensor, hit: torch.Tensor, cameras: Cameras) -> torch.Tensor:
+def pictured(
+    colours: torch.Tensor, hit: torch.Tensor, cameras: Cameras, background: float = BACKGROUND
+) -> torch.Tensor:
     """Pictures (K, H, W, 3) sRGB.
 
     Args:
         colours: (P, 1 or 3) where pixels meet the surface.
         hit: (K H W,) bool, which pixels do.
         cameras: K views.
+        background: sRGB of the other pixels; white by default.
     """
-    picture = colours.new_full((len(hit), 3), BACKGROUND)
+    picture = colours.new_full((len(hit), 3), background)
     return picture.index_put((hit,), colours.expand(-1, 3)).view(*cameras.shape, 3)
 
 
 def lamps_of_pixels(cameras: Cameras, hit: torch.Tensor) -> torch.Tensor:
-    """(P, 3) towards the lamp of each pixel that meets the surface, `hit` as of `on_white`."""
+    """(P, 3) towards the lamp of each pixel that meets the surface, `hit` as of `pictured`."""
     return lamps(cameras).to(hit.device).repeat_interleave(cameras.width * cameras.height, 0)[hit]
 
 

@@ -1,22 +1,19 @@
-"""Text2Mesh with an image: the network against torch's layers, what views show, and what is refused."""
+"""Text2Mesh with an image: what views show, and what is refused."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
-from torch import nn
 
 from mitex.errors import CheckpointError, ConfigError, ImageError
 from mitex.exemplar import Exemplar
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.baselines import text2mesh
 from mitex.methods.baselines.text2mesh import Text2MeshConfig, Text2MeshTexture
-from mitex.methods.baselines.text2mesh.cameras import cameras_of
-from mitex.methods.baselines.text2mesh.field import HEAD, TRUNK, colours, encoded, random_weights
 from mitex.methods.baselines.text2mesh.task import Text2MeshTask
 from mitex.methods.layout import with_layout
+from mitex.methods.style_cameras import cameras_of
 from mitex.runtime import threads
 from mitex.scenes.cameras import orbit
 from tests.training.contract import (
@@ -50,40 +47,11 @@ def ball() -> Mesh:
     return with_layout(icosphere(4), 32)
 
 
-class TestField:
-    def test_as_many_weights_as_published_but_for_the_head_of_offsets(self):
-        """659 thousand with a second head of two layers and one number."""
-        weights = random_weights(256, 256, torch.Generator())
-        offsets = HEAD * (256 * 256 + 256) + 257
-        assert sum(value.numel() for value in weights.values()) + offsets == 659_460
-
-    def test_it_equals_torch_s_layers(self):
-        weights = random_weights(4, 8, torch.Generator().manual_seed(0))
-        weights = {name: value.normal_() for name, value in weights.items()}
-        waves, points = torch.randn(4, 3), torch.randn(5, 3)
-        layers: list[nn.Module] = []
-        for k in range(TRUNK + HEAD + 1):
-            outputs, inputs = weights[f"weight{k}"].shape
-            layer = nn.Linear(inputs, outputs)
-            layer.weight.data, layer.bias.data = weights[f"weight{k}"], weights[f"bias{k}"]
-            layers += [layer, nn.ReLU() if k < TRUNK + HEAD else nn.Tanh()]
-        wave = [2 * math.pi * sum(p * w for p, w in zip(points[0], one, strict=True)) for one in waves]
-        row = torch.tensor([*points[0], *map(math.cos, wave), *map(math.sin, wave)])
-        assert torch.allclose(encoded(points, waves)[0], row, atol=1e-5)
-        expected = (1 + nn.Sequential(*layers)(encoded(points, waves))) / 2
-        assert torch.allclose(colours(weights, points, waves), expected, atol=1e-6)
-
-    def test_the_start_is_grey(self):
-        weights = random_weights(4, 8, torch.Generator().manual_seed(0))
-        assert torch.equal(colours(weights, torch.randn(9, 3), torch.randn(4, 3)), torch.full((9, 3), 0.5))
-
-
 class TestViews:
     def test_they_show_the_colours_of_places(self, ball, exemplar, monkeypatch):
         """A field that is the place itself: the middle of a view from +z is the pole of the ball."""
         task = Text2MeshTask(CONFIG, exemplar, ball)
-        name = "mitex.methods.baselines.text2mesh.task.colours"
-        monkeypatch.setattr(name, lambda weights, points, waves: 0.5 + 0.5 * points)
+        monkeypatch.setattr(task, "colours", lambda points: 0.5 + 0.5 * points)
         views, masks = task.views(orbit(1, elevation=0, distance=2.0, fov=60.0, resolution=49, start=90))
         assert torch.allclose(views[0, 24, 24], torch.tensor([0.5, 0.5, 1.0]), atol=0.02)
         assert views[0, 24, 40, 0] > 0.7 and views[0, 8, 24, 1] > 0.7
@@ -117,7 +85,7 @@ class TestTask:
     def test_options_matter(self, ball, exemplar):
         def value(**options) -> float:
             task = Text2MeshTask(replace(CONFIG, **options), exemplar, ball)
-            for name in ("weight7", "bias7"):
+            for name in ("colours.2.weight", "colours.2.bias"):
                 task.named[name].data.normal_(generator=torch.Generator().manual_seed(0))
             return float(task.loss(0, torch.Generator().manual_seed(5)).value.detach())
 

@@ -14,7 +14,7 @@ from mitex.methods.nca.displacement import Displacement
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.surfaces import CloseUps, TrainingSphere
 from mitex.scenes.cameras import Cameras, random_views
-from mitex.scenes.shaded import GREY, lamps_of_pixels, on_white, shading
+from mitex.scenes.shaded import GREY, lamps_of_pixels, pictured, shading
 from mitex.sparse import Weights
 
 
@@ -86,7 +86,7 @@ class Figure:
     def bare(self, cameras: Cameras) -> torch.Tensor:
         """Pictures (K, H, W, 3) without any texture, grey and even."""
         hit, points = self._visible(cameras)
-        return on_white(GREY * self._shade(self.relief.plain, points, hit, cameras), hit, cameras)
+        return pictured(GREY * self._shade(self.relief.plain, points, hit, cameras), hit, cameras)
 
     def textured(self, look: Look, state: torch.Tensor, cameras: Cameras) -> Views:
         """With what a state (V, C) shows; differentiable in the state and the look's decoder."""
@@ -98,7 +98,7 @@ class Figure:
         shade = self._shade(self.relief.normals(height), points, hit, cameras)
         coloured = shade * values[:, list(layout["albedo"])].clamp(0, 1)
         plain = shade * GREY
-        return Views(on_white(coloured, hit, cameras), on_white(plain, hit, cameras), values, height)
+        return Views(pictured(coloured, hit, cameras), pictured(plain, hit, cameras), values, height)
 
     def _visible(self, cameras: Cameras) -> tuple[torch.Tensor, Points]:
         """Which pixels meet the surface, (K H W,) bool, and where."""
