@@ -47,7 +47,7 @@ class StyleTask(ParameterTask):
     def __init__(self, config: StyleConfig, model: TextImageModel, mesh: Mesh) -> None:
         keep_freed_memory()
         self.config, self.model, self.mesh = config, model, mesh
-        self.prompt = object_prompt(config.text or "", config.text_object or mesh.name, config.text_prompt)
+        self.prompt = prompt(config, mesh.name)
         self.text = model.encode_texts([self.prompt])
         self.fine = _with_vertices(mesh, config.text_vertices)
         self.ball, self._similarity = self.fine.normalised()
@@ -130,6 +130,11 @@ class StyleTask(ParameterTask):
         known |= {"text_model": self.model.name, "text_model_key": self.model.name}
         key = content_key(self.mesh.vertices, self.mesh.faces, self.mesh.uv)
         return {"method": self.method, "mesh": self.mesh.name, "mesh_key": key} | known
+
+
+def prompt(config: StyleConfig, name: str) -> str:
+    """What the model of texts and images reads of the mesh of that name."""
+    return object_prompt(config.text or "", config.text_object or name, config.text_prompt)
 
 
 def _with_vertices(mesh: Mesh, fewest: int) -> Mesh:

@@ -175,10 +175,3 @@ class TestRefused:
     def test_a_prompt_without_the_text(self, name):
         with pytest.raises(ConfigError, match="leaves out the text"):
             tiny(name, text_prompt="a stone")
-
-
-def test_presets_of_text2mesh_that_are_for_the_other_kind_of_target():
-    with pytest.raises(ConfigError, match="the preset paper is for exemplars"):
-        text2mesh.fit_text("red", BALL, preset="paper")
-    with pytest.raises(ConfigError, match="the preset text-paper is for words"):
-        text2mesh.fit("lava", BALL, preset="text-paper")

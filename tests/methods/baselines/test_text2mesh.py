@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from mitex.cli import main
 from mitex.errors import CheckpointError, ConfigError, ImageError
 from mitex.exemplar import Exemplar
 from mitex.mesh import Mesh, icosphere
@@ -130,6 +131,24 @@ class TestRefused:
     def test_settings(self, setting, message, exemplar, ball):
         with pytest.raises(ConfigError, match=message):
             text2mesh.fit(exemplar, ball, set=[setting])
+
+    @pytest.mark.parametrize(
+        ("words", "message"),
+        [
+            ("", "--exemplar is missing; give --exemplar IMAGE, or --text WORDS"),
+            ("--exemplar lava --text red", "--text and --exemplar contradict each other"),
+            ("--exemplar lava --clip words", "--clip means nothing without --text"),
+            ("--exemplar lava --preset text", "the preset text is for words, not for exemplars"),
+            ("--text red --preset paper", "the preset paper is for exemplars, not for words"),
+            ("--text frobs --clip words", "does not know the word 'frobs'"),
+            ("--text red --clip no/folder", "no/folder"),
+        ],
+    )
+    def test_command_lines(self, words, message, tmp_path, monkeypatch, capsys):
+        monkeypatch.chdir(tmp_path)
+        assert main(f"fit text2mesh --mesh vase --quiet {words}".split()) == 2
+        error = capsys.readouterr().err
+        assert message in error and error.count("\n") == 1 and not list(tmp_path.iterdir())
 
     def test_no_colours(self, ball):
         height = Exemplar({"height": np.zeros((32, 32, 1), np.float32)}, "hills")
