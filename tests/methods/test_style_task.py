@@ -13,6 +13,7 @@ from mitex.mesh import icosphere
 from mitex.methods.baselines import text2mesh, x_mesh
 from mitex.methods.registry import load
 from mitex.methods.style_cameras import cameras_of
+from mitex.methods.styled_mesh import StyledMesh
 from mitex.runtime import threads
 from mitex.training import train
 from tests.methods.nca.text.tiny_text import MeanColour
@@ -89,7 +90,8 @@ def test_the_loss_by_hand():
     coloured, plain = task.figure.pictures(cameras, task.points + offsets, colours)
 
     def distance(pictures, augmentation) -> float:
-        total = sum(task.model.encode_images(one[None])[0] for one in augmentation(pictures, 16))
+        squares = augmentation(pictures, 16)
+        total = torch.stack([task.model.encode_images(one[None])[0] for one in squares]).sum(0)
         return 1 - (total @ task.text[0] / total.norm() / task.text[0].norm()).item()
 
     terms = {"whole": 3 * distance(coloured, whole), "close": distance(coloured, close)}
@@ -127,6 +129,7 @@ def test_the_exported_mesh_is_the_one_that_was_trained(name, tmp_path, monkeypat
     colours, offsets = task.style()
     expected = 3 * (task.points + offsets).detach().numpy() + np.array([5, 0, -2])
     texture = load(tmp_path / "run")
+    assert isinstance(texture, StyledMesh)
     assert texture.about["text"] == "red" and texture.about["mesh"] == mesh.name
     assert texture.image.shape == (32, 32, 3)
     asset = texture.apply(mesh)

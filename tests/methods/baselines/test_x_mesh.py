@@ -106,7 +106,8 @@ def test_both_gates_lie_between_trunk_and_heads():
     for name in ("channels", "vertices"):
         bias = task.named[f"{name}.1.bias"].data
         factor = task.named[f"{name}.1.factor"].data
-        bias.fill_(1.0), factor.fill_(-50.0)
+        bias.fill_(1.0)
+        factor.fill_(-50.0)
         assert not torch.equal(task.style()[0], plain), name
         factor.zero_()
     assert torch.equal(task.style()[0], plain)
