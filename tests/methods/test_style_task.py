@@ -133,6 +133,7 @@ def test_the_exported_mesh_is_the_one_that_was_trained(name, tmp_path, monkeypat
     assert texture.about["text"] == "red" and texture.about["mesh"] == mesh.name
     assert texture.image.shape == (32, 32, 3)
     asset = texture.apply(mesh)
+    assert isinstance(asset, Asset)
     np.testing.assert_allclose(asset.mesh.vertices, expected, atol=1e-4)
     assert np.abs(expected - task.fine.vertices).max() > 0.01 and len(expected) == 162
     again = Asset.load(asset.export(tmp_path / "ball.glb")).mesh

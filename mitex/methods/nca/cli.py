@@ -12,7 +12,7 @@ from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
 from mitex.methods.nca.arguments import RESOLUTION, field_files, levels, oriented
 from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS, TILE_CELLS, TILE_SIDES
-from mitex.methods.options import EXPORTS, PICTURES, OptionalMeshOptions
+from mitex.methods.options import EXPORTS, PICTURES, ReliefOptions
 from mitex.methods.words_options import WordsOptions
 from mitex.training.settings import RunSettings
 
@@ -119,7 +119,7 @@ class Fit(WordsOptions):
 
 
 @dataclass(kw_only=True)
-class Apply(OptionalMeshOptions):
+class Apply(ReliefOptions):
     """Grow a cellular automaton's texture on a mesh, or on a square that repeats (--tile).
 
     examples:
@@ -184,6 +184,7 @@ class Apply(OptionalMeshOptions):
     """Cells along a side of the tile; more make the pattern finer."""
 
     def check(self) -> None:
+        super().check()
         levels(self.subdivide)
         in_range("--variants", self.variants, 1, MOST_VARIANTS)
         in_range("--seed", self.seed, *SEEDS)
@@ -199,6 +200,8 @@ class Apply(OptionalMeshOptions):
             "--resolution", "--vertex-colors", self.resolution is not None and self.vertex_colors
         )
         mutually_exclusive("--variants", "--vertex-colors", self.variants > 1 and self.vertex_colors)
+        for option, used in {"--variants": self.variants > 1, "--vertex-colors": self.vertex_colors}.items():
+            mutually_exclusive("--relief", option, self.relief is not None and used)
         self._check_tile()
 
     def _check_tile(self) -> None:
@@ -220,6 +223,7 @@ class Apply(OptionalMeshOptions):
             "--vertex-colors": self.vertex_colors,
             "--keep-dense": self.keep_dense,
             "--displace": self.displace,
+            "--relief": self.relief is not None,
             "--variants": self.variants > 1,
             "--looks": self.looks is not None,
         }
@@ -251,6 +255,7 @@ class Apply(OptionalMeshOptions):
             reject_unused("--resolution", out, page and self.resolution is not None)
             reject_unused("--keep-dense", out, page and self.keep_dense)
             reject_unused("--displace", out, page and self.displace)
+            reject_unused("--relief", out, page and self.relief is not None)
 
     def write(self, out: Path) -> None:
         from mitex.runtime import let_idle_threads_sleep
