@@ -54,3 +54,24 @@ class StyleConfig(TrainingConfig):
     def schedule(self) -> dict[str, Any]:
         """How the loop takes its steps."""
         return {"lr": self.lr, "milestones": self.milestones, "decay": self.decay}
+
+
+# For the model that ships with the package: it knows patterns that fill small pictures, but no reliefs.
+# White around the mesh would count as a colour of the text.
+EMBEDDED: dict[str, Any] = {
+    "steps": 200,
+    "frequencies": 64,
+    "width": 128,
+    "views": 4,
+    "cameras": "around",
+    "lr": 1e-3,
+    "milestones": (100,),
+    "text_prompt": "{text}",
+    "text_background": 0.5,
+    "text_each": True,
+    "text_crops": 4,
+    "text_crop_area": 0.3,
+    "text_tilt": 0.0,
+    "text_whole_weight": 0.0,
+    "text_relief_weight": 0.0,
+}

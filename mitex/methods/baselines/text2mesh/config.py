@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from mitex.features.layers import check_layers
-from mitex.methods.style_config import StyleConfig
+from mitex.methods.style_config import EMBEDDED, StyleConfig
 from mitex.training.settings import key
 
 
@@ -53,19 +53,6 @@ PRESETS = {
         milestones=tuple(range(100, 600, 100)),
         text_crops=2,
     ),
-    "text-words": replace(
-        WORDS,
-        preset="text-words",
-        steps=300,
-        frequencies=64,
-        sigma=3.0,
-        width=128,
-        views=4,
-        text_prompt="{text}",
-        text_tilt=0.0,
-        text_crop_area=0.15,
-        text_whole_weight=0.0,
-        text_relief_weight=0.0,
-    ),
+    "text-words": replace(WORDS, preset="text-words", sigma=3.0, **EMBEDDED),
     "text-paper": replace(PAPER, preset="text-paper", text=WORDS.text),
 }
