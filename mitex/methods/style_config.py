@@ -49,6 +49,8 @@ class StyleConfig(TrainingConfig):
         super().__post_init__()
         if "{text}" not in self.text_prompt:
             raise ConfigError(f"text_prompt = '{self.text_prompt}' leaves out the text", "put {text} in it")
+        if not (self.text_whole_weight or self.text_close_weight or self.text_relief_weight):
+            raise ConfigError("text_whole_, text_close_ and text_relief_weight are all 0", "let one count")
 
     @property
     def schedule(self) -> dict[str, Any]:

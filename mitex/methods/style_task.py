@@ -79,8 +79,10 @@ class StyleTask(ParameterTask):
                 "relief": (config.text_relief_weight, close, plain),
             }
         )
-        total = torch.stack(list(terms.values())).sum() if terms else 0 * colours.sum()
-        return Step(total, {name: float(value.detach()) for name, value in terms.items()})
+        return Step(
+            torch.stack(list(terms.values())).sum(),
+            {name: float(value.detach()) for name, value in terms.items()},
+        )
 
     def _distances(
         self, parts: dict[str, tuple[float, Augmentation, torch.Tensor]]
@@ -89,8 +91,6 @@ class StyleTask(ParameterTask):
         parts = {name: part for name, part in parts.items() if part[0]}
         size, fill = self.model.resolution, self.config.text_background
         groups = [augmentation(pictures, size, fill) for _, augmentation, pictures in parts.values()]
-        if not groups:
-            return {}
         embeddings = self.model.encode_images(torch.cat(groups)).split([len(group) for group in groups])
         return {
             name: weight * self._distance(values)

@@ -79,9 +79,10 @@ class TestTask:
         assert torch.equal(colours, torch.full_like(colours, 0.5)) and not offsets.any()
 
 
-def test_the_loss_by_hand():
+@pytest.mark.parametrize("each", [False, True])
+def test_the_loss_by_hand(each):
     """Each term from the pictures one by one, with the squares that the generator draws."""
-    task = shaken(tiny("text2mesh", text_whole_weight=3.0))
+    task = shaken(tiny("text2mesh", text_whole_weight=3.0, text_each=each))
     step, generator = task.loss(0, torch.Generator().manual_seed(2)), torch.Generator().manual_seed(2)
     cameras = cameras_of(task.config, generator)
     whole = Augmentation.draw(generator, 2, tilt=0.0)
@@ -91,8 +92,10 @@ def test_the_loss_by_hand():
 
     def distance(pictures, augmentation) -> float:
         squares = augmentation(pictures, 16)
-        total = torch.stack([task.model.encode_images(one[None])[0] for one in squares]).sum(0)
-        return 1 - (total @ task.text[0] / total.norm() / task.text[0].norm()).item()
+        rows = [task.model.encode_images(one[None])[0] for one in squares]
+        rows = rows if each else [torch.stack(rows).sum(0)]
+        cosines = [row @ task.text[0] / row.norm() / task.text[0].norm() for row in rows]
+        return 1 - torch.stack(cosines).mean().item()
 
     terms = {"whole": 3 * distance(coloured, whole), "close": distance(coloured, close)}
     terms["relief"] = 0.5 * distance(plain, close)
@@ -179,3 +182,7 @@ class TestRefused:
     def test_a_prompt_without_the_text(self, name):
         with pytest.raises(ConfigError, match="leaves out the text"):
             tiny(name, text_prompt="a stone")
+
+    def test_a_loss_of_nothing(self, name):
+        with pytest.raises(ConfigError, match="are all 0; let one count"):
+            tiny(name, text_whole_weight=0.0, text_close_weight=0.0, text_relief_weight=0.0)

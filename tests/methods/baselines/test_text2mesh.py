@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from mitex.asset import Asset
 from mitex.cli import main
 from mitex.errors import CheckpointError, ConfigError, ImageError
 from mitex.exemplar import Exemplar
@@ -17,6 +18,7 @@ from mitex.methods.layout import with_layout
 from mitex.methods.style_cameras import cameras_of
 from mitex.runtime import threads
 from mitex.scenes.cameras import orbit
+from tests.cli import bad_files
 from tests.training.contract import (
     FAULTS,
     assert_loss_is_pure,
@@ -117,6 +119,21 @@ def test_resuming_changes_nothing(exemplar, tmp_path):
     assert_same_checkpoint(tmp_path / "whole", tmp_path / "part")
     with pytest.raises(CheckpointError, match="mesh"):
         text2mesh.fit(exemplar, icosphere(5), tmp_path / "part", steps=6, resume=True)
+
+
+def test_from_words_to_a_file(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    bad_files.text(tmp_path / "cube.obj", bad_files.CUBE)
+    settings = "resolution=32 view=32 width=8 frequencies=4 views=1 text_vertices=50 preview_every=2"
+    words = f"fit text2mesh --text dots --clip words --mesh cube.obj --quiet --steps 2 --set {settings}"
+    assert main(words.split()) == 0
+    run = tmp_path / capsys.readouterr().out.strip()
+    assert run.name == "dots-cube-text2mesh" and (run / "previews" / "000002.png").is_file()
+    assert main(["apply", str(run), "--mesh", "cube.obj", "--out", "cube.glb", "--quiet"]) == 0
+    written, learned = Asset.load(tmp_path / "cube.glb"), Text2MeshTexture.load(run)
+    assert learned.shape is not None and len(learned.shape.vertices) >= 50
+    np.testing.assert_allclose(written.mesh.vertices.max(0), learned.shape.vertices.max(0), atol=1e-5)
+    assert np.abs(written.mesh.vertices.max(0) - learned.mesh.vertices.max(0)).max() > 1e-5
 
 
 class TestRefused:
