@@ -106,8 +106,8 @@ def test_the_loss_by_hand(each):
 @names
 def test_a_colour_is_learned(name):
     for text, channel in (("red", 0), ("green", 1)):
-        task = tiny(name, text=text, steps=40, text_relief_weight=0.0)
-        train(task, task.config, None, lr=0.01)
+        task = tiny(name, text=text, steps=25, text_relief_weight=0.0)
+        train(task, task.config, None, lr=task.config.lr)
         change = (task.style()[0].mean(0) - 0.5).tolist()
         assert change[channel] > 0.05 + max(change[k] for k in range(3) if k != channel), (text, change)
 
