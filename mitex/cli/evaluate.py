@@ -18,10 +18,10 @@ class Evaluate:
     """Measure an asset: how near its texture comes to an exemplar or a relief, or how well it fits words.
 
     With --exemplar, patches of the surface are compared with the picture: Frechet distances, transport, Gram
-    matrices, seams and repetition, as in the reports of `mitex compare`. With --reference, so are the form and
-    the local statistics of its relief with those of a mesh. With --text, a model of texts and
-    images looks at it from 24 sides: MES and MES-dir of the MeshNCA paper, in which more is better. Take
-    another model than the one that it was trained with.
+    matrices, seams and repetition, as in the reports of `mitex compare`. With --reference, the form and the
+    local statistics of its relief are compared with those of a mesh. With --text, a model of texts and images
+    looks at it from 24 sides: MES and MES-dir of the MeshNCA paper, in which more is better. Take another
+    model than the one that it was trained with.
 
     examples:
       mitex evaluate vase.glb --exemplar lava

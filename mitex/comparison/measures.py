@@ -106,9 +106,9 @@ RELIEFS = (
         "form",
         "Form",
         LOWER,
-        "How a relief looks: Fréchet distance of features of VGG-16 between patches of the surface and of the "
-        "reference, pictures of normals and of curvature, straight on and aslant, at the size at which they are "
-        "most alike. 0: the reference; 1: as far as a plane.",
+        "How a relief looks: Fréchet distance of features of VGG-16 between patches of the surface and of "
+        "the reference, pictures of normals and of curvature, straight on and aslant, at the size at which "
+        "they are most alike. 0: the reference; 1: as far as a plane.",
     ),
     Measure(
         "relief_size",
@@ -116,6 +116,12 @@ RELIEFS = (
         "",
         "That size: how large the relief is beside the mesh, over how large it is beside the reference.",
         None,
+    ),
+    Measure(
+        "piercing",
+        "Piercing faces",
+        LOWER,
+        "Pairs of faces of the surface that pierce each other. The mesh itself may have some.",
     ),
     Measure(
         "dihedral",

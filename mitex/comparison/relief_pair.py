@@ -15,6 +15,7 @@ from mitex.evaluation.form import ReliefForm
 from mitex.evaluation.metrics import single_image_frechet
 from mitex.evaluation.surface_statistics import statistic_distances
 from mitex.mesh import Mesh
+from mitex.mesh.self_intersections import piercing_pairs
 from mitex.methods.geometric.references import find_reference
 from mitex.render.preview import PreviewRenderer
 
@@ -66,6 +67,7 @@ class ReliefPair:
         ]
         return {
             **self._form_of(asset.mesh),
+            "piercing": len(piercing_pairs(asset.mesh)),
             **statistic_distances(asset.mesh, self.reference),
             "shading": float(np.mean(shading)),
         }

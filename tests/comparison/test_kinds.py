@@ -26,6 +26,7 @@ def test_a_surface_beside_itself_is_nearer_than_a_rough_one(place, monkeypatch):
     same, rough = (pair.numbers(clay(mesh)) for mesh in (ball, ball.with_vertices(noise * ball.vertices)))
     assert same.keys() == {measure.key for measure in RELIEFS}
     assert same.pop("relief_size") == rough.pop("relief_size") == 1
+    assert same["piercing"] == 0 == rough.pop("piercing")
     assert 0 < pair.floor()["form"] < rough["form"]
     assert same == pytest.approx(dict.fromkeys(same, 0.0), abs=1e-6)
     assert all(value > 0.01 for value in rough.values())

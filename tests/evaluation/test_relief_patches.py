@@ -32,7 +32,7 @@ def test_spikes_do_not_turn_the_view(ball):
 
 
 def test_normals_and_curvature_of_a_ball(ball):
-    """Its normal (x, y, z) is at (x, y) of the picture; it bends by 2 / radius everywhere but for the blur."""
+    """Its normal (x, y, z) is at (x, y) of the picture; it bends by 2 / radius everywhere."""
     views = relief_views(ball, relief_cameras(ball, 1, 0.4, SIDE))
     (normals,), (mask,) = views["normals"]
     assert mask.all()
