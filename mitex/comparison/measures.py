@@ -105,6 +105,27 @@ TEXTS = (
 )
 RELIEFS = (
     Measure(
+        "form",
+        "Form",
+        LOWER,
+        "How a relief looks: Fréchet distance of features of VGG-16 between patches of the surface and of "
+        "the reference, pictures of normals and of curvature, straight on and aslant, at the size at which "
+        "they are most alike. 0: the reference; 1: as far as a plane.",
+    ),
+    Measure(
+        "relief_size",
+        "Relief size",
+        "",
+        "That size: how large the relief is beside the mesh, over how large it is beside the reference.",
+        None,
+    ),
+    Measure(
+        "piercing",
+        "Piercing faces",
+        LOWER,
+        "Pairs of faces of the surface that pierce each other. The mesh itself may have some.",
+    ),
+    Measure(
         "dihedral",
         "Dihedral angles",
         LOWER,

@@ -48,7 +48,9 @@ TINY: dict[str, dict[str, Any]] = {
     "multi_view_gram": {"resolution": 32, "exemplar_size": 32, "view": 32, "layers": ("relu1_1",)},
     "reaction_diffusion": {"hidden": 8, "channels": 4, "grid": 32, "exemplar_size": 32, "pool": 1}
     | {"min_steps": 2, "max_steps": 2, "layers": ("relu1_1",)},
-    "text2mesh": {"resolution": 32, "exemplar_size": 32, "view": 32, "width": 8, "layers": ("relu1_1",)},
+    "text2mesh": {"resolution": 32, "exemplar_size": 32, "view": 32, "width": 8, "layers": ("relu1_1",)}
+    | {"text_vertices": 100},
+    "x_mesh": {"resolution": 32, "view": 32, "width": 8, "frequencies": 4, "views": 1, "text_vertices": 100},
     "style_mesh": {
         "resolution": 32,
         "exemplar_size": 64,

@@ -39,6 +39,7 @@ from mitex.methods.baselines.solid_texture.generator import Generator
 from mitex.methods.baselines.solid_texture.texture import SolidTexture
 from mitex.methods.baselines.style_mesh.texture import StyleMeshTexture
 from mitex.methods.baselines.text2mesh.texture import Text2MeshTexture
+from mitex.methods.baselines.x_mesh.texture import XMeshTexture
 from mitex.methods.nca.config import PRESETS, NcaConfig
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.weights import graft_weights
@@ -176,6 +177,11 @@ def _text2mesh(path: Path) -> None:
     Text2MeshTexture(grid(1, 1), np.full((8, 8, 3), 0.5, np.float32), {"name": "a"}).save(path)
 
 
+def _x_mesh(path: Path) -> None:
+    image = np.full((8, 8, 3), 0.5, np.float32)
+    XMeshTexture(grid(1, 1), image, {"name": "a"}, grid(2, 2)).save(path)
+
+
 def _nerf(path: Path) -> None:
     from tests.methods.nerf.small import small_texture
 
@@ -262,6 +268,7 @@ LOADERS = {
     "solid_texture": Loader("a.safetensors", _solid, mitex.load),
     "style_mesh": Loader("a.safetensors", _style_mesh, mitex.load),
     "text2mesh": Loader("a.safetensors", _text2mesh, mitex.load),
+    "x_mesh": Loader("a.safetensors", _x_mesh, mitex.load),
     "multi_view_gram": Loader("a.safetensors", _multi_view, mitex.load),
     "checkpoint": Loader("checkpoint.safetensors", _checkpoint, lambda path: checkpoint.load(path.parent)),
     "checkpoint as a texture": Loader(

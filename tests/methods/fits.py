@@ -101,6 +101,11 @@ FITS = {
         f"width=8 layers=relu1_1 {SMALL_RUN}",
         "--mesh cube.obj",
     ),
+    "x_mesh": TinyFit(
+        "--text dots --clip words --mesh cube.obj --steps 2 --set resolution=32 view=32 width=8 "
+        f"frequencies=4 views=1 text_vertices=50 {SMALL_RUN}",
+        "--mesh cube.obj",
+    ),
     "displacement": TinyFit("--reference spikes --set resolution=16", "--mesh cube.obj", resume=""),
 }
 
