@@ -69,6 +69,15 @@ TINY: dict[str, dict[str, Any]] = {
         "finest": 8,
         "occupancy": 16,
     },
+    "nerf_tex": {
+        "patch": 128,
+        "views": 16,
+        "view": 16,
+        "rays": 64,
+        "ray_steps": 64,
+        "table": 10,
+        "occupancy": 16,
+    },
     "geometric": {"level_steps": 2, "fit_steps": 10, "fit_samples": 100},
 }
 

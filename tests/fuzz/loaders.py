@@ -26,6 +26,10 @@ from mitex.mesh.fields import read_vectors
 from mitex.methods.baselines.displacement.texture import DisplacementMap
 from mitex.methods.baselines.gatys.texture import GatysTexture
 from mitex.methods.baselines.multi_view_gram.texture import MultiViewTexture
+from mitex.methods.baselines.nerf_tex.config import NerfTexConfig
+from mitex.methods.baselines.nerf_tex.networks import network_of
+from mitex.methods.baselines.nerf_tex.texture import SETTINGS as BOX_SETTINGS
+from mitex.methods.baselines.nerf_tex.texture import NerfTexTexture
 from mitex.methods.baselines.plain_field.config import PlainFieldConfig
 from mitex.methods.baselines.plain_field.texture import SETTINGS, PlainFieldTexture
 from mitex.methods.baselines.quilted.texture import QuiltedTexture
@@ -192,6 +196,15 @@ def _plain_field(path: Path) -> None:
     PlainFieldTexture(parameters, np.ones((16, 16, 16), np.uint8), about).save(path)
 
 
+def _nerf_tex(path: Path) -> None:
+    init()
+    config = NerfTexConfig(table=8, occupancy=16)
+    about = {key: getattr(config, key) for key in BOX_SETTINGS}
+    about |= {"name": "a", "half": 0.2, "ground": -0.1, "light": [0.0, 0.0, 1.0]}
+    parameters = {name: torch.zeros(shape) for name, shape in network_of(config).shapes.items()}
+    NerfTexTexture(parameters, np.ones((16, 16, 16), np.uint8), about).save(path)
+
+
 def _reaction_diffusion(path: Path) -> None:
     reaction = Reaction.random(3, 4, torch.full((3,), 0.1), torch.Generator().manual_seed(0))
     ReactionDiffusionTexture(reaction, 16, 0.5, {"name": "a"}).save(path)
@@ -249,6 +262,7 @@ LOADERS = {
     ),
     "gatys": Loader("a.safetensors", _picture_texture, mitex.load),
     "quilted": Loader("a.safetensors", _quilted, mitex.load),
+    "nerf_tex": Loader("a.safetensors", _nerf_tex, mitex.load),
     "plain_field": Loader("a.safetensors", _plain_field, mitex.load),
     "reaction_diffusion": Loader("a.safetensors", _reaction_diffusion, mitex.load),
     "solid_texture": Loader("a.safetensors", _solid, mitex.load),

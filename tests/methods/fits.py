@@ -62,6 +62,11 @@ FITS = {
         resume="",
         source="nerf",
     ),
+    "nerf_tex": TinyFit(
+        f"--texture runs/nerf --steps 2 --set patch=192 views=16 view=16 network=hash {RADIANCE} {SMALL_RUN}",
+        "--mesh cube.obj --density 200 --scale 0.25 --spacing 2",
+        source="nerf",
+    ),
     "multi_view_gram": TinyFit(
         "--exemplar photo.png --mesh cube.obj --steps 2 --set resolution=32 exemplar_size=32 view=32 "
         f"layers=relu1_1 {SMALL_RUN}",
