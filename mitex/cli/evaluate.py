@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -14,15 +15,17 @@ from mitex.errors import ConfigError
 
 @dataclass
 class Evaluate:
-    """Measure an asset: how near its texture comes to an exemplar, or how well it fits words.
+    """Measure an asset: how near its texture comes to an exemplar or a relief, or how well it fits words.
 
     With --exemplar, patches of the surface are compared with the picture: Frechet distances, transport, Gram
-    matrices, seams and repetition, as in the reports of `mitex compare`. With --text, a model of texts and
-    images looks at it from 24 sides: MES and MES-dir of the MeshNCA paper, in which more is better. Take
-    another model than the one that it was trained with.
+    matrices, seams and repetition, as in the reports of `mitex compare`. With --reference, the form and the
+    local statistics of its relief are compared with those of a mesh. With --text, a model of texts and images
+    looks at it from 24 sides: MES and MES-dir of the MeshNCA paper, in which more is better. Take another
+    model than the one that it was trained with.
 
     examples:
       mitex evaluate vase.glb --exemplar lava
+      mitex evaluate spiky.glb --reference spikes
       mitex evaluate dots.glb --text "red dots on white" --object vase --clip models/clip-b16
     """
 
@@ -31,6 +34,9 @@ class Evaluate:
 
     exemplar: Annotated[str | None, arg(metavar="IMAGE|DIR|NAME")] = None
     """Picture that the texture was made from."""
+
+    reference: Annotated[str | None, arg(metavar="MESH|NAME")] = None
+    """Mesh, or reference by formula, that its relief was made from."""
 
     text: Annotated[str | None, arg(metavar="WORDS")] = None
     """What it shall be made of."""
@@ -48,15 +54,15 @@ class Evaluate:
     """Show no progress."""
 
     def run(self) -> None:
-        if self.exemplar is None and self.text is None:
-            raise ConfigError("nothing to compare the asset with", "give --exemplar, --text or both")
+        if self.exemplar is None and self.reference is None and self.text is None:
+            raise ConfigError("nothing to compare it with", "give --exemplar, --reference or --text")
         for option, value in (("--object", self.object), ("--clip", self.clip)):
             if value is not None and self.text is None:
                 raise ConfigError(f"{option} belongs to --text", "give both, or none")
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()
-        numbers = {**self._likeness(), **self._fit_of_words()}
+        numbers = {**self._likeness(), **self._relief(), **self._fit_of_words()}
         if self.json:
             print(json.dumps({label: value for label, (value, _) in numbers.items()}, indent=2))
             return
@@ -69,10 +75,17 @@ class Evaluate:
             return {}
         from mitex.asset import Asset
         from mitex.comparison.look_pair import LookPair
-        from mitex.comparison.measures import BY_KEY
 
-        numbers = LookPair(self.exemplar, str(self.asset)).numbers(Asset.load(self.asset))
-        return {BY_KEY[key].label: (value, BY_KEY[key].better) for key, value in numbers.items()}
+        return _labelled(LookPair(self.exemplar, str(self.asset)).numbers(Asset.load(self.asset)))
+
+    def _relief(self) -> dict[str, tuple[float, str]]:
+        """Numbers beside the reference, as `_likeness`."""
+        if self.reference is None:
+            return {}
+        from mitex.asset import Asset
+        from mitex.comparison.relief_pair import ReliefPair
+
+        return _labelled(ReliefPair(self.reference, str(self.asset)).numbers(Asset.load(self.asset)))
 
     def _fit_of_words(self) -> dict[str, tuple[float, str]]:
         """Scores beside the words, as `_likeness`."""
@@ -95,3 +108,10 @@ class Evaluate:
         )
         scores = text_scores(model, textured, bare, prompt, thing)
         return {"MES": (scores.score, "high is better"), "MES-dir": (scores.direction, "high is better")}
+
+
+def _labelled(numbers: Mapping[str, float]) -> dict[str, tuple[float, str]]:
+    """The numbers of a comparison by their labels, with which way better lies."""
+    from mitex.comparison.measures import BY_KEY
+
+    return {BY_KEY[key].label: (value, BY_KEY[key].better) for key, value in numbers.items()}

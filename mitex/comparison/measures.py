@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from mitex.evaluation.windows import ELEVATIONS
+
 
 @dataclass(frozen=True)
 class Measure:
@@ -103,6 +105,27 @@ TEXTS = (
 )
 RELIEFS = (
     Measure(
+        "form",
+        "Form",
+        LOWER,
+        "How a relief looks: Fréchet distance of features of VGG-16 between patches of the surface and of "
+        "the reference, pictures of normals and of curvature, straight on and aslant, at the size at which "
+        "they are most alike. 0: the reference; 1: as far as a plane.",
+    ),
+    Measure(
+        "relief_size",
+        "Relief size",
+        "",
+        "That size: how large the relief is beside the mesh, over how large it is beside the reference.",
+        None,
+    ),
+    Measure(
+        "piercing",
+        "Piercing faces",
+        LOWER,
+        "Pairs of faces of the surface that pierce each other. The mesh itself may have some.",
+    ),
+    Measure(
         "dihedral",
         "Dihedral angles",
         LOWER,
@@ -129,6 +152,29 @@ RELIEFS = (
         "the reference, both grey: in the place of SIFID, whose network is another.",
     ),
 )
+CAPTURES = (
+    *(
+        Measure(
+            f"plane_{angle}",
+            f"{angle}°",
+            LOWER,
+            "Single-image Fréchet distance of features of VGG-16 between photos that see the surface "
+            f"{angle} degrees from its normal and pictures of a plane that wears the texture, by the same "
+            "cameras.",
+        )
+        for angle in ELEVATIONS
+    ),
+    Measure("planes", "Mean of the angles", LOWER, "The mean of these five."),
+    Measure(
+        "psnr",
+        "PSNR [dB]",
+        HIGHER,
+        "Peak signal-to-noise ratio of the captured object in photos that were held out. Only of textures "
+        "that can be seen on it.",
+        _negative,
+    ),
+    Measure("ssim", "SSIM", TO_ONE, "Structural similarity of the same.", _off_one),
+)
 COSTS = (
     Measure(
         "parameters",
@@ -137,7 +183,13 @@ COSTS = (
         "Numbers that the fit optimizes: weights of a network, or texels. 0 where nothing is optimized.",
         None,
     ),
-    Measure("fit_seconds", "Fit [s]", LOWER, "Wall time of the fit, with the start of its process."),
+    Measure(
+        "fit_seconds",
+        "Fit [s]",
+        LOWER,
+        "Wall time of the fit, with the start of its process; of a method that learns from another's run, "
+        "that of both.",
+    ),
     Measure(
         "apply_seconds",
         "Synthesis [s]",
@@ -153,4 +205,4 @@ COSTS = (
         scale=1e-9,
     ),
 )
-BY_KEY = {measure.key: measure for measure in (*LOOKS, *TEXTS, *RELIEFS, *COSTS)}
+BY_KEY = {measure.key: measure for measure in (*LOOKS, *TEXTS, *RELIEFS, *CAPTURES, *COSTS)}

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import logging
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
 from mitex.asset import CLAY, Asset, clay
 from mitex.cache import content_key
 from mitex.comparison.inputs import lit, mesh_of, read_once
+from mitex.errors import ImageError
+from mitex.evaluation.form import ReliefForm
 from mitex.evaluation.metrics import single_image_frechet
 from mitex.evaluation.surface_statistics import statistic_distances
 from mitex.mesh import Mesh
+from mitex.mesh.self_intersections import piercing_pairs
 from mitex.methods.geometric.references import find_reference
 from mitex.render.preview import PreviewRenderer
+
+log = logging.getLogger(__name__)
 
 VIEWS, SIDE = 4, 192  # pictures from around, and their side [px]
 ELEVATION = 15.0  # of the camera [degrees]
@@ -52,22 +59,43 @@ class ReliefPair:
         """The reference in light."""
         return lit(clay(self.reference))
 
-    def numbers(self, asset: Asset) -> dict[str, float]:
-        """Distances of the statistics of edges and vertices, and of shaded pictures."""
+    def numbers(self, asset: Asset, run: Path) -> dict[str, float]:
+        """Distances of form, of the statistics of edges and vertices, and of shaded pictures."""
         pairs = zip(views(asset.mesh), self._views, strict=True)
         shading = [
             single_image_frechet(ours, theirs, mask_a=mask, mask_b=other)
             for (ours, mask), (theirs, other) in pairs
         ]
-        return {**statistic_distances(asset.mesh, self.reference), "shading": float(np.mean(shading))}
+        return {
+            **self._form_of(asset.mesh),
+            "piercing": len(piercing_pairs(asset.mesh)),
+            **statistic_distances(asset.mesh, self.reference),
+            "shading": float(np.mean(shading)),
+        }
 
     def floor(self) -> dict[str, float]:
-        """The reference is the mesh that others are beside: all is 0."""
-        return {}
+        """The form of other patches of the reference; all else is 0, since it is compared as a whole."""
+        try:
+            return {"form": self._form.distance(self.reference, seed=1)}
+        except ImageError:
+            return {}
 
     def picture(self, asset: Asset) -> np.ndarray:
         """As of `mitex.comparison.inputs.lit`."""
         return lit(asset)
+
+    def _form_of(self, mesh: Mesh) -> dict[str, float]:
+        """Distance and size; nothing for meshes so thin that patches show too little of them."""
+        try:
+            form = self._form.of(mesh)
+        except ImageError as e:
+            log.info("%s: %s", mesh.name, e)
+            return {}
+        return {"form": form.distance, "relief_size": form.size}
+
+    @cached_property
+    def _form(self) -> ReliefForm:
+        return ReliefForm(self.reference)
 
     @cached_property
     def _views(self) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,13 +56,13 @@ def exemplar_patches(image: np.ndarray, masks: np.ndarray, seed: int = 0) -> Vie
     return filled(patches, masks), masks
 
 
-def patch_features(views: Views) -> Vectors:
-    """Feature vectors at all places of patches that count, layer by layer.
+def patch_features(views: Views, layers: Sequence[str] = (*LAYERS, FINE)) -> Vectors:
+    """Feature vectors (n, C) at all places of patches that count, layer by layer.
 
     Raises:
         ConfigError: patches too small for the deepest layer.
     """
-    network, parts = evaluation_network(), {layer: [] for layer in (*LAYERS, FINE)}
+    network, parts = evaluation_network(), {layer: [] for layer in layers}
     for image, mask in zip(*views, strict=True):
         with torch.no_grad():
             maps = network.features(torch.from_numpy(image)[None], parts)

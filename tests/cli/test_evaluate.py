@@ -49,6 +49,18 @@ def test_the_object_is_named_in_the_text(one_side, red, capsys):
     assert plain != ball
 
 
+def test_beside_a_reference(red, monkeypatch, capsys):
+    """The ball is as smooth as itself, and not as a ball with spikes; the old options stay apart."""
+    monkeypatch.setattr("mitex.evaluation.form.PATCHES", 2)
+    monkeypatch.setattr("mitex.evaluation.form.SIZES", (1.0,))
+    monkeypatch.setattr("mitex.comparison.relief_pair.VIEWS", 1)
+    near, far = (numbers(capsys, str(red), "--reference", name) for name in (str(red), "spikes"))
+    assert near["Form"] < 0.01 and far["Form"] > 0.5
+    assert near["Dihedral angles"] < far["Dihedral angles"]
+    assert main(["evaluate", str(red), "--reference", "spikse"]) == 2
+    assert "there is no mesh spikse" in capsys.readouterr().err
+
+
 def test_beside_an_exemplar(red, tmp_path, capsys):
     from mitex.images import write_image
 
@@ -68,7 +80,7 @@ def test_the_table_says_which_way_better_lies(one_side, red, capsys):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ((), "give --exemplar, --text or both"),
+        ((), "give --exemplar, --reference or --text"),
         (("--clip", "words", "--exemplar", "lava"), "--clip belongs to --text"),
         (("--object", "vase", "--exemplar", "lava"), "--object belongs to --text"),
         (("--text", "plain graay", "--clip", "words"), "did you mean gray?"),

@@ -19,10 +19,17 @@ from tests.methods.nca.text.tiny_text import MeanColour
 def test_a_surface_beside_itself_is_nearer_than_a_rough_one(place, monkeypatch):
     monkeypatch.setattr(relief_pair, "VIEWS", 1)
     monkeypatch.setattr(relief_pair, "SIDE", 48)
+    monkeypatch.setattr("mitex.evaluation.form.PATCHES", 2)
+    monkeypatch.setattr("mitex.evaluation.form.SIZES", (1.0,))
     pair, ball = ReliefPair("ball.obj", "ball.obj"), Mesh.load("ball.obj")
     noise = np.random.default_rng(0).normal(1, 0.05, (len(ball.vertices), 1))
-    same, rough = (pair.numbers(clay(mesh)) for mesh in (ball, ball.with_vertices(noise * ball.vertices)))
+    same, rough = (
+        pair.numbers(clay(mesh), place) for mesh in (ball, ball.with_vertices(noise * ball.vertices))
+    )
     assert same.keys() == {measure.key for measure in RELIEFS}
+    assert same.pop("relief_size") == rough.pop("relief_size") == 1
+    assert same["piercing"] == 0 == rough.pop("piercing")
+    assert 0 < pair.floor()["form"] < rough["form"]
     assert same == pytest.approx(dict.fromkeys(same, 0.0), abs=1e-6)
     assert all(value > 0.01 for value in rough.values())
 
@@ -36,7 +43,7 @@ def test_what_the_words_say_scores_high(place, monkeypatch):
 
     def scores(*rgb):
         albedo = np.tile(np.array(rgb, np.float32), (len(ball.vertices), 1))
-        return pair.numbers(Asset(ball, {"albedo": albedo}))
+        return pair.numbers(Asset(ball, {"albedo": albedo}), place)
 
     red, blue = scores(1, 0.1, 0.1), scores(0.1, 0.1, 1)
     assert red.keys() == {measure.key for measure in TEXTS}

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
+from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range
 from mitex.methods.options import MeshOptions, TrainingOptions
 
@@ -103,9 +104,16 @@ class Apply(GrowthOptions, MeshOptions):
     seed: Annotated[int, arg(metavar="N")] = 0
     """Random seed: another seed, another variant of the texture."""
 
+    untangle: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Draw the relief back where the surface would pierce itself, as on thin limbs."""
+
     def check(self) -> None:
         self.check_growth()
         in_range("--seed", self.seed, *SEEDS)
+        if self.untangle and self.mesh == TEMPLATE:
+            raise ConfigError(
+                "--untangle draws back towards the mesh, and a template lies too deep", "leave it out"
+            )
 
     def applied(self, out: Path) -> Asset:
         from mitex.asset import clay
@@ -115,6 +123,7 @@ class Apply(GrowthOptions, MeshOptions):
         if self.mesh == TEMPLATE:
             return clay(texture.generate(self.seed, self.start_level or 0, self.end_level))
         mesh = self.even_mesh(self.mesh)
-        asset = texture.apply(mesh, seed=self.seed, start_level=self.start_level, end_level=self.end_level)
+        levels = {"start_level": self.start_level, "end_level": self.end_level}
+        asset = texture.apply(mesh, seed=self.seed, untangle=self.untangle, **levels)
         self.advise(texture, mesh)
         return asset

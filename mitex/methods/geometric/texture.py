@@ -17,6 +17,7 @@ from mitex.methods.geometric import files
 from mitex.methods.geometric.hierarchy import Hierarchy, mean_edge
 from mitex.methods.geometric.model import grow
 from mitex.methods.geometric.network import FaceNetwork
+from mitex.methods.geometric.untangling import untangled
 from mitex.progress import counted
 from mitex.runtime import keep_freed_memory
 
@@ -60,7 +61,13 @@ class GeometricTexture:
         return files.save(Path(path), list(self.generators), self.template, self.fixed, self.about)
 
     def apply(
-        self, mesh: Mesh, *, seed: int = 0, start_level: int | None = None, end_level: int | None = None
+        self,
+        mesh: Mesh,
+        *,
+        seed: int = 0,
+        start_level: int | None = None,
+        end_level: int | None = None,
+        untangle: bool = False,
     ) -> Asset:
         """Grows the texture on a mesh; every level after the first splits each face in four.
 
@@ -72,6 +79,7 @@ class GeometricTexture:
             start_level: generator to begin with; 2, or `end_level` if that is lower, if None. Low levels
                 change the shape.
             end_level: the last generator; the last one trained if None.
+            untangle: draw the relief back where the surface pierces itself; see `untangled`.
 
         Returns:
             The displaced mesh in light grey, in the mesh's own units and place; UVs are interpolated.
@@ -82,7 +90,7 @@ class GeometricTexture:
         """
         rollout = self.rollout(mesh, start_level, end_level)
         *_, last = rollout.run(rollout.noise(seed))
-        return clay(last)
+        return clay(untangled(rollout.hierarchy.meshes[-1], last) if untangle else last)
 
     def interpolate(
         self,

@@ -10,8 +10,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from mitex.errors import ConfigError, OutputError
-from mitex.export.common import bilinear
 from mitex.geometry.vectors import unit
+from mitex.images import bilinear
 from mitex.mesh import Mesh, icosphere, subdivide_midpoint, torus
 from mitex.methods.nca import NcaTexture, living_page
 from mitex.methods.nca.bake import Grown

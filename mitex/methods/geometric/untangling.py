@@ -1,0 +1,63 @@
+"""Drawing a displacement back where it makes the surface pierce itself."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from mitex.mesh import Mesh
+from mitex.mesh.self_intersections import piercing_pairs
+from mitex.progress import announce
+
+ROUNDS = 24
+RINGS = 2  # of vertices around piercing faces that are drawn back less and less
+BACK = 0.25  # part of the displacement that a round takes away at a piercing face
+ALLOWED = 2  # pairs that may stay for each one of the mesh itself
+
+log = logging.getLogger(__name__)
+
+
+def untangled(before: Mesh, after: Mesh) -> Mesh:
+    """A displaced mesh that pierces itself at most twice as often as the mesh without the displacement.
+
+    Each round takes a part of the displacement of piercing faces, and less of that of the vertices around.
+    How many pairs of faces pierce each other before and after is logged.
+
+    Args:
+        before: the mesh without the displacement, with the faces of `after`.
+        after: the displaced mesh.
+
+    Returns:
+        `after` with other vertices; what `ROUNDS` rounds leave, if that is more.
+    """
+    ring, move = _ring_means(after), after.vertices.astype(np.float64) - before.vertices
+    share, mesh = np.ones(len(move)), after
+    own, pairs = len(piercing_pairs(before)), piercing_pairs(after)
+    first = len(pairs)
+    for k in range(ROUNDS):
+        if len(pairs) <= ALLOWED * own:
+            break
+        announce("drawing back piercing faces", k, ROUNDS)
+        weight = np.zeros(len(move))
+        weight[after.faces[pairs]] = 1.0
+        for _ in range(RINGS):
+            weight = np.maximum(weight, ring @ weight)
+        share *= 1 - BACK * weight
+        mesh = after.with_vertices(before.vertices + share[:, None] * move)
+        pairs = piercing_pairs(mesh)
+    log.info(
+        "pairs of faces that pierce each other: %d, without --untangle %d, on the mesh itself %d",
+        len(pairs),
+        first,
+        own,
+    )
+    return mesh
+
+
+def _ring_means(mesh: Mesh) -> csr_array:
+    """(V, V): the mean over each vertex's neighbours."""
+    edges = mesh.edges
+    weights = np.repeat(1.0 / np.maximum(edges.valence, 1), edges.valence)
+    return csr_array((weights, edges.indices, edges.indptr), shape=(len(edges.valence),) * 2)
