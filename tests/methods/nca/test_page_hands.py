@@ -7,6 +7,8 @@ import pytest
 import torch
 import trimesh
 from imageio_ffmpeg import read_frames
+from trimesh.exchange.gltf import export_glb
+from trimesh.exchange.ply import export_ply
 
 from mitex.evaluation.metrics import single_image_frechet
 from mitex.exemplar import Exemplar
@@ -119,8 +121,8 @@ def dropped(tab, name, content):
 
 def test_files_are_dropped(tab):
     box = trimesh.creation.box()
-    ascii_ply = trimesh.exchange.ply.export_ply(box, encoding="ascii")
-    glb = trimesh.exchange.gltf.export_glb(box)
+    ascii_ply = export_ply(box, encoding="ascii")
+    glb = export_glb(box)
     for name, content in (
         ("d.glb", glb[:300]),
         ("d.ply", b"ply\n"),
