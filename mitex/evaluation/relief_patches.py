@@ -111,7 +111,7 @@ def _seen(mesh: Mesh, cameras: Cameras, antialias: int) -> tuple[np.ndarray, np.
     values[hit] = np.einsum("pad,pd->pa", axes, unit(normals))
     counts[hit] = facing & (height > -2 * DEEP * cameras.half_width)
     shape = (*cameras.shape, antialias**2)
-    return unit(values.reshape(*shape, 3).mean(3)), counts.reshape(shape).all(3)
+    return unit(values.reshape(*shape, 3).mean(3)), np.asarray(counts.reshape(shape).all(3))
 
 
 def _curvature(normals: np.ndarray, blur: float) -> np.ndarray:
