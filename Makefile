@@ -21,9 +21,11 @@ $(STAMP): pyproject.toml constraints.txt
 demo: $(STAMP)
 	$(VENV)/bin/mitex demo --out out/demo
 
-# Two at a time, a thread each: most tests have no use for two.
+# Two at a time, a thread each: most tests have no use for two. A process that dies is not replaced: with
+# `loadfile` its tests are dealt out once more, and the run may wait for ever (pytest-xdist 1323).
 test: $(STAMP)
-	OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -m "not slow" --numprocesses 2 --dist loadfile
+	OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -m "not slow" --numprocesses 2 --dist loadfile \
+		--max-worker-restart 0
 
 lint: $(STAMP)
 	$(VENV)/bin/ruff check .

@@ -117,6 +117,25 @@ def resize(array: np.ndarray, height: int, width: int) -> np.ndarray:
     return np.clip(np.stack(channels, axis=2), 0.0, 1.0)
 
 
+def bilinear(image: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """Values of an image at points, interpolated linearly between the centres of its pixels.
+
+    Args:
+        image: (H, W, C), row 0 on top.
+        uv: (P, 2), u to the right and v upwards; outside of [0, 1] the border counts.
+
+    Returns:
+        (P, C).
+    """
+    size = np.array([image.shape[1], image.shape[0]])
+    place = (np.stack([uv[:, 0], 1 - uv[:, 1]], axis=1) * size - 0.5).clip(0, size - 1)
+    corner = np.minimum(place.astype(np.int64), np.maximum(size - 2, 0))
+    (column, row), (x, y) = corner.T, (place - corner).T[:, :, None]
+    right, below = np.minimum(column + 1, size[0] - 1), np.minimum(row + 1, size[1] - 1)
+    upper = (1 - x) * image[row, column] + x * image[row, right]
+    return (1 - y) * upper + y * ((1 - x) * image[below, column] + x * image[below, right])
+
+
 def _open(path: Path, max_pixels: int) -> Image.Image:
     """Open lazily: Pillow reads the header only."""
     _check_file(path)

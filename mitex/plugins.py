@@ -11,7 +11,7 @@ Importing this module registers them; it sets no variant::
 Code that needs them takes `init` from here; that of `mitex.runtime` knows no plugin.
 """
 
-from mitex.integrators import feature, motion, shell
+from mitex.integrators import feature, lit_shell, motion, shell
 from mitex.runtime import init
 from mitex.runtime.jit import mi
 from mitex.textures import decoded_field, texel_field, vertex_field
@@ -19,7 +19,7 @@ from mitex.textures import decoded_field, texel_field, vertex_field
 __all__ = ["PLUGINS", "init", "register"]
 
 # Each has a function register(), which builds its class for the current variant and registers it.
-PLUGINS = (vertex_field, texel_field, decoded_field, feature, motion, shell)
+PLUGINS = (vertex_field, texel_field, decoded_field, feature, motion, shell, lit_shell)
 
 
 def register() -> None:

@@ -1,5 +1,7 @@
 """A radiance field, a mesh with a grown texture, and a ball of glass, in one path-traced picture.
 
+The lamp and the sky light all of them, and each casts its shadow on the others.
+
 usage: python scenes/shell_texture.py [OUT.png [RUN]]
 
 RUN is a finished run of `mitex fit nerf`: its captured texture is then shown on a vase. Without one, the
@@ -20,6 +22,7 @@ from mitex.methods.nca import NcaTexture
 from mitex.render import tone
 from mitex.runtime.jit import dr, mi
 from mitex.scenes import mesh_shape
+from mitex.textures.phong import Phong
 from mitex.textures.shell_field import shell_field
 
 mitex.init()
@@ -35,15 +38,37 @@ class Sponge:
     def __init__(self) -> None:
         self.mask = mi.TensorXu8(np.ones((8, 8, 8), np.uint8))  # all cells of the cube may have matter
 
+    def extinction(self, points: mi.Point3f) -> tuple[mi.UInt32, mi.Float]:
+        """Which points have matter, and its density."""
+        value, _ = gyroid(points)
+        index = mi.UInt32(dr.compress((value > 0.3) & (dr.norm(points) < 0.9)))
+        return index, dr.full(mi.Float, 200.0, dr.width(index))
+
+    def reflection(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, Phong]:
+        """Which points have matter, and how it reflects: a matt colour, darker towards the middle."""
+        index, _ = self.extinction(points)
+        points = dr.gather(mi.Point3f, points, index)
+        _, slope = gyroid(points)
+        colour = mi.Color3f(0.95, 0.62, 0.3) * dr.square(dr.norm(points))
+        zero = dr.zeros(mi.Float, dr.width(index))
+        # On its outside the ball was cut out of the gyroid.
+        outside = dr.norm(points) > 0.88
+        normal = dr.normalize(dr.select(outside, mi.Vector3f(points), -slope))
+        return index, Phong(normal, colour, zero, zero + 1)
+
     def evaluate(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, mi.Float, mi.Color3f]:
-        """Which points have matter, their density, and their colour, darker towards the middle."""
-        x, y, z = (9 * p for p in points)
-        gyroid = dr.sin(x) * dr.cos(y) + dr.sin(y) * dr.cos(z) + dr.sin(z) * dr.cos(x)
-        index = mi.UInt32(dr.compress((gyroid > 0.3) & (dr.norm(points) < 0.9)))
-        if not dr.width(index):
-            return index, mi.Float(), mi.Color3f()
-        light = dr.square(dr.norm(dr.gather(mi.Point3f, points, index)))
-        return index, dr.full(mi.Float, 60.0, dr.width(index)), mi.Color3f(0.95, 0.62, 0.3) * light
+        """Density and colour in a light of its own, for the integrator `shell`."""
+        index, density = self.extinction(points)
+        return index, density, self.reflection(points, view)[1].diffuse
+
+
+def gyroid(points: mi.Point3f) -> tuple[mi.Float, mi.Vector3f]:
+    """A function that is positive on one side of the surface, and its gradient but for a factor."""
+    (sin_x, cos_x), (sin_y, cos_y), (sin_z, cos_z) = (dr.sincos(9 * p) for p in points)
+    slope = mi.Vector3f(
+        cos_x * cos_y - sin_z * sin_x, cos_y * cos_z - sin_x * sin_y, cos_z * cos_x - sin_y * sin_z
+    )
+    return sin_x * cos_y + sin_y * cos_z + sin_z * cos_x, slope
 
 
 def load_field(run: str | None, size: int) -> Any:
@@ -64,7 +89,8 @@ def main(
     grown = NcaTexture.load("pebbles").apply(embedded("octopus"), resolution=None, keep_dense=True)
     scene = {
         "type": "scene",
-        "integrator": {"type": "shell", "field": field, "max_depth": 8},
+        # `shell` would show the field in its own light.
+        "integrator": {"type": "lit_shell", "field": field, "max_depth": 8},
         "sensor": {
             "type": "perspective",
             "fov": 46,

@@ -32,13 +32,17 @@ class Browser:
     def __init__(self) -> None:
         self._chromium = self._driver = None
 
-    def open(self, path: Path, side: int = 128) -> "Tab":
-        """A page from a file, which stands still; its picture is a square of `side` pixels."""
+    def open(self, page: Path | str, side: int = 128, steps: str = "webgl") -> "Tab":
+        """A page, by its file or address, which stands still, with a square picture of `side` pixels.
+
+        Its steps are taken by webgl, webgpu or, with auto, what the page itself takes.
+        """
         if self._chromium is None:
             self._start()
         assert self._chromium is not None
-        page = self._chromium.new_page(viewport={"width": 640, "height": 480})
-        return Tab(page, f"{path.as_uri()}#still={side}")
+        address = page.as_uri() if isinstance(page, Path) else page
+        tab = self._chromium.new_page(viewport={"width": 640, "height": 480})
+        return Tab(tab, f"{address}#still={side}&steps={steps}")
 
     def close(self) -> None:
         if self._chromium is not None and self._driver is not None:

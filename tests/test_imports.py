@@ -73,6 +73,7 @@ COMPARED = {
     "text2mesh": {"surface"},
     "quilted": {"nerf"},
     "plain_field": {"nerf"},
+    "nerf_tex": {"nerf", "plain_field"},
 }
 SHARED = {"baselines", *(file.stem for file in (ROOT / "mitex" / "methods").glob("*.py"))}
 

@@ -78,7 +78,7 @@ def jobs_of(plan: Plan) -> list[Job]:
 
 def _jobs(part: MethodPlan, plan: Plan) -> Iterator[Job]:
     method = methods()[part.method]
-    exemplars = _exemplars(part, plan)
+    exemplars = _exemplars(plan.first(part), plan)
     meshes = find(part.meshes, plan.folder, "mesh", _mesh_names())
     for exemplar in exemplars:
         for seed in part.seeds or (None,):
@@ -94,7 +94,10 @@ def _fit(
 ) -> Job:
     source = Input(f"--{part.learns_from.replace('_', '-')}", None)
     words = ["fit", method.name, "--quiet"]
-    inputs = [source, exemplar, *_option("mesh", mesh), *([] if seed is None else _pair("seed", seed))]
+    first = plan.first(part)
+    before = None if first is part else _fit(first, methods()[first.method], plan, exemplar, seed, None)
+    learned = exemplar if before is None else Input(before.result, None)
+    inputs = [source, learned, *_option("mesh", mesh), *([] if seed is None else _pair("seed", seed))]
     given = options.fit_words(method, part.fit, plan.folder)
     about = {"method": part.label, "exemplar": exemplar.label, "seed": seed}
     about |= {"mesh": mesh.label} if mesh else {}
@@ -104,7 +107,8 @@ def _fit(
     later = {key: value for key, value in part.fit.items() if key not in method.load_fit().only_at_start}
     again = options.fit_words(method, later, plan.folder)
     resumed = (*words, *(one.text for one in [*inputs, *again]), *out, "--resume")
-    return Job(id, command, resumed if method.resumes else (), out[1], None, about)
+    needs = None if before is None else before.id
+    return Job(id, command, resumed if method.resumes else (), out[1], needs, about)
 
 
 def _apply(part: MethodPlan, plan: Plan, fit: Job, mesh: Input | None) -> Job:

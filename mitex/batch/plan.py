@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -25,6 +25,7 @@ OWN_KEYS = {
     "output": Output,
     "method": str,
     "source": str,
+    "of": str,
 }  # of a method's table, besides its options
 TABLES = {"methods": "tables such as [methods.NAME]", "apply": "a table such as [methods.NAME.apply]"}
 
@@ -42,6 +43,8 @@ class MethodPlan:
         fit: options and settings of `mitex fit`, by name.
         apply: options of `mitex apply`, by name.
         source: option of `mitex fit` that the exemplars are given to, if not the method's usual one: "text".
+        of: label of a method before it, whose run for the same exemplar and seed it learns from, in place of
+            the exemplar.
     """
 
     label: str
@@ -53,10 +56,11 @@ class MethodPlan:
     fit: Mapping[str, Any] = field(default_factory=dict)
     apply: Mapping[str, Any] = field(default_factory=dict)
     source: str | None = None
+    of: str | None = None
 
     @property
     def learns_from(self) -> str:
-        """The option of `mitex fit` that the exemplars are given to."""
+        """The option of `mitex fit` that the exemplars, or the runs of another method, are given to."""
         return self.source or methods()[self.method].learns_from
 
 
@@ -71,6 +75,10 @@ class Plan:
 
     methods: tuple[MethodPlan, ...]
     folder: Path
+
+    def first(self, part: MethodPlan) -> MethodPlan:
+        """The method that is given the exemplars which a method learns from: mostly itself."""
+        return part if part.of is None else next(one for one in self.methods if one.label == part.of)
 
     @staticmethod
     def read(path: str | Path) -> Plan:
@@ -101,7 +109,10 @@ class Plan:
         if not tables:
             raise ConfigError("the plan has no methods", "add a table such as [methods.nca]")
         place = Path(folder).absolute()
-        return Plan(tuple(_method(label, table, common, place) for label, table in tables.items()), place)
+        parts = tuple(_method(label, table, common, place) for label, table in tables.items())
+        for part in parts:
+            _check_first(part, parts)
+        return Plan(parts, place)
 
 
 def _content(file: Path) -> dict[str, Any]:
@@ -161,3 +172,20 @@ def _check_lists(plan: MethodPlan) -> None:
     for seed in plan.seeds:
         if not 0 <= seed <= LARGEST_SEED:
             raise ConfigError(f"seed {seed} is out of range", f"choose from 0 to {LARGEST_SEED}")
+
+
+def _check_first(part: MethodPlan, parts: Sequence[MethodPlan]) -> None:
+    """Refuses to learn from runs that will not be there."""
+    if part.of is None:
+        return
+    place = f"methods.{part.label} learns from '{part.of}'"
+    earlier = {one.label: one for one in parts[: parts.index(part)]}
+    first = earlier.get(part.of)
+    if first is None:
+        raise ConfigError(f"{place}, which is not before it in the plan", suggestion(part.of, earlier))
+    if first.of is not None or methods()[first.method].fits_to_mesh:
+        raise ConfigError(f"{place}, which does not learn from exemplars alone", "name one that does")
+    if part.source is not None or methods()[part.method].fits_to_mesh:
+        raise ConfigError(f"{place} and from something else", "leave out `of`")
+    if (part.exemplars, part.seeds) != (first.exemplars, first.seeds):
+        raise ConfigError(f"{place}, with other exemplars or seeds", "give both the same")

@@ -39,7 +39,7 @@ class Kept:
             MitexError: The asset cannot be read or measured, or the disk is full.
         """
         asset = Asset.load(result.asset)
-        numbers = pair.numbers(asset) | {"parameters": optimized_numbers(result.run)}
+        numbers = pair.numbers(asset, result.run) | {"parameters": optimized_numbers(result.run)}
         known = {key: value for key, value in numbers.items() if math.isfinite(value)}
         picture = write_image(self._file(result, ".jpg"), pair.picture(asset))
         _write(self._file(result, ".json"), known)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
 from mitex.asset import Asset
-from mitex.comparison.measures import COSTS, LOOKS, RELIEFS, TEXTS, Measure
+from mitex.comparison.measures import CAPTURES, COSTS, LOOKS, RELIEFS, TEXTS, Measure
 from mitex.lazy import load
 
 
@@ -26,8 +27,9 @@ class Pair(Protocol):
         """(S, S, 3) sRGB in [0, 1]: what is learned from; None if that has no picture."""
         ...
 
-    def numbers(self, asset: Asset) -> dict[str, float]:
-        """What is measured of an asset; NaN, or nothing, where that is not possible."""
+    def numbers(self, asset: Asset, run: Path) -> dict[str, float]:
+        """What is measured of an asset and the run that it is from; NaN, or nothing, where that is not
+        possible."""
         ...
 
     def floor(self) -> dict[str, float]:
@@ -89,6 +91,17 @@ KINDS: Mapping[str, Kind] = {
         (
             "What is measured: the surface that mitex apply wrote, and four views of it in grey, in the same "
             "light as the reference.",
+        ),
+    ),
+    "capture": Kind(
+        (*CAPTURES, *COSTS),
+        "mitex.comparison.capture_pair:CapturePair",
+        (
+            "What is measured: the texture itself, not the file that mitex apply wrote. Cameras of photos "
+            "look at planes that wear it, in the capture's light as the method knows it. The same pixels "
+            "count in both. The distance is not the paper's SIFID, whose network is another.",
+            "The mesh is for the pictures alone: what is solid on it, in the light of the studio. There haze "
+            "is left out, and what shines keeps the colour that it has from the front.",
         ),
     ),
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from dataclasses import asdict
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -66,7 +67,7 @@ class LookPair:
         """A hash of both."""
         return content_key(self.image, self.mesh.vertices, self.mesh.faces)
 
-    def numbers(self, asset: Asset) -> dict[str, float]:
+    def numbers(self, asset: Asset, run: Path | None = None) -> dict[str, float]:
         """What is measured of an asset; NaN, or nothing, where that is not possible."""
         return {
             **self._likeness(asset),

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from mitex.evaluation.windows import ELEVATIONS
+
 
 @dataclass(frozen=True)
 class Measure:
@@ -150,6 +152,29 @@ RELIEFS = (
         "the reference, both grey: in the place of SIFID, whose network is another.",
     ),
 )
+CAPTURES = (
+    *(
+        Measure(
+            f"plane_{angle}",
+            f"{angle}°",
+            LOWER,
+            "Single-image Fréchet distance of features of VGG-16 between photos that see the surface "
+            f"{angle} degrees from its normal and pictures of a plane that wears the texture, by the same "
+            "cameras.",
+        )
+        for angle in ELEVATIONS
+    ),
+    Measure("planes", "Mean of the angles", LOWER, "The mean of these five."),
+    Measure(
+        "psnr",
+        "PSNR [dB]",
+        HIGHER,
+        "Peak signal-to-noise ratio of the captured object in photos that were held out. Only of textures "
+        "that can be seen on it.",
+        _negative,
+    ),
+    Measure("ssim", "SSIM", TO_ONE, "Structural similarity of the same.", _off_one),
+)
 COSTS = (
     Measure(
         "parameters",
@@ -158,7 +183,13 @@ COSTS = (
         "Numbers that the fit optimizes: weights of a network, or texels. 0 where nothing is optimized.",
         None,
     ),
-    Measure("fit_seconds", "Fit [s]", LOWER, "Wall time of the fit, with the start of its process."),
+    Measure(
+        "fit_seconds",
+        "Fit [s]",
+        LOWER,
+        "Wall time of the fit, with the start of its process; of a method that learns from another's run, "
+        "that of both.",
+    ),
     Measure(
         "apply_seconds",
         "Synthesis [s]",
@@ -174,4 +205,4 @@ COSTS = (
         scale=1e-9,
     ),
 )
-BY_KEY = {measure.key: measure for measure in (*LOOKS, *TEXTS, *RELIEFS, *COSTS)}
+BY_KEY = {measure.key: measure for measure in (*LOOKS, *TEXTS, *RELIEFS, *CAPTURES, *COSTS)}

@@ -86,7 +86,7 @@ def source_of(plan: Plan) -> str:
     Raises:
         ConfigError: They learn from different things, or from what is not compared.
     """
-    first, *others = plan.methods
+    first, *others = map(plan.first, plan.methods)
     for part in others:
         if part.learns_from != first.learns_from:
             problem = (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -58,7 +59,7 @@ class ReliefPair:
         """The reference in light."""
         return lit(clay(self.reference))
 
-    def numbers(self, asset: Asset) -> dict[str, float]:
+    def numbers(self, asset: Asset, run: Path | None = None) -> dict[str, float]:
         """Distances of form, of the statistics of edges and vertices, and of shaded pictures."""
         pairs = zip(views(asset.mesh), self._views, strict=True)
         shading = [

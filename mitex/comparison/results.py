@@ -51,31 +51,40 @@ def results_of(report: Report, source: str) -> list[Result]:
     """
     rows = {row.job.id: row for row in report.rows}
     return [
-        _result(report.folder, row, rows[row.job.needs], source)
+        _result(report.folder, row, _needed(row, rows), source)
         for row in report.rows
-        if row.state == "done" and row.job.needs is not None
+        if row.state == "done" and row.job.words[0] == "apply"
     ]
 
 
-def _result(folder: Path, row: Row, fit: Row, source: str) -> Result:
+def _needed(row: Row, rows: Mapping[str, Row]) -> list[Row]:
+    """The fits that a result follows from, the last one first."""
+    fits: list[Row] = []
+    while row.job.needs is not None:
+        row = rows[row.job.needs]
+        fits.append(row)
+    return fits
+
+
+def _result(folder: Path, row: Row, fits: Sequence[Row], source: str) -> Result:
     job = row.job
     return Result(
         id=job.id,
-        exemplar=_argument(fit.job, source),
+        exemplar=_argument(fits[-1].job, source),
         mesh=_argument(job, "mesh"),
         method=str(job.about["method"]),
         seed=job.about["seed"],
         asset=folder / _argument(job, "out"),
-        run=folder / fit.job.result,
-        numbers=_costs(row.record, fit.record),
+        run=folder / fits[0].job.result,
+        numbers=_costs(row.record, [fit.record for fit in fits]),
     )
 
 
-def _costs(applied: Mapping[str, Any], fitted: Mapping[str, Any]) -> dict[str, float]:
+def _costs(applied: Mapping[str, Any], fitted: Sequence[Mapping[str, Any]]) -> dict[str, float]:
     return {
-        "fit_seconds": float(fitted["seconds"]),
+        "fit_seconds": float(sum(fit["seconds"] for fit in fitted)),
         "apply_seconds": float(applied["seconds"]),
-        "memory": float(max(fitted["memory"], applied["memory"])),
+        "memory": float(max(record["memory"] for record in (applied, *fitted))),
     }
 
 

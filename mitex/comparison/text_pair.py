@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache, cached_property
+from pathlib import Path
 
 import numpy as np
 import torch
@@ -40,7 +41,7 @@ class TextPair:
         """A hash of both, and of the model."""
         return content_key(self.words, model().name, self.mesh.vertices, self.mesh.faces)
 
-    def numbers(self, asset: Asset) -> dict[str, float]:
+    def numbers(self, asset: Asset, run: Path) -> dict[str, float]:
         """The scores of MeshNCA, section G.1."""
         prompt = object_prompt(self.words, self.mesh.name)
         scores = text_scores(model(), _seen(asset), self._bare, prompt, self.mesh.name)

@@ -135,23 +135,48 @@ def elevation_table(
     return [_mean(rows) for rows in zip(*tables, strict=True)]
 
 
+def plane_distances(windows: Mapping[float, list[Window]], render: Renderer) -> dict[float, float]:
+    """How far a texture is from photos, by angle: `single_image_frechet` of the first half of the windows.
+
+    Args:
+        windows: of `select_windows`.
+        render: shows the texture.
+    """
+    halves = {angle: _halves(group)[0] for angle, group in windows.items()}
+    return {angle: _distance(_strip(list(map(render, half))), half) for angle, half in halves.items()}
+
+
+def photo_distances(windows: Mapping[float, list[Window]]) -> dict[float, float]:
+    """The same of the photos of the second half: what is the least to be expected."""
+    halves = {angle: _halves(group) for angle, group in windows.items()}
+    return {angle: _distance(_photos(others), first) for angle, (first, others) in halves.items()}
+
+
 def _compare(
     windows: list[Window], angle: float, captured: Renderer, ours: Renderer, flat: Mapping[str, Renderer]
 ) -> Elevation:
     """The first half of the windows is rendered, the other one tells how much photos differ."""
-    half = (len(windows) + 1) // 2
-    first, others = windows[:half], windows[half:]
-    photo, mask = _strip([(window.photo, window.mask) for window in first])
-
-    def distance(strip: Rendering) -> float:
-        return single_image_frechet(strip[0], photo, mask_a=strip[1], mask_b=mask)
-
+    first, others = _halves(windows)
     strips = [_strip(list(map(render, first))) for render in (captured, ours, *flat.values())]
-    of_captured, of_ours, *of_flat = map(distance, strips)
-    of_photos = distance(_strip([(window.photo, window.mask) for window in others]))
-    picture = np.concatenate([photo, strips[0][0], strips[1][0], strips[-1][0]])
+    of_captured, of_ours, *of_flat = (_distance(strip, first) for strip in strips)
+    of_photos = _distance(_photos(others), first)
+    picture = np.concatenate([_photos(first)[0], strips[0][0], strips[1][0], strips[-1][0]])
     by_name = dict(zip(flat, of_flat, strict=True))
     return Elevation(angle, of_captured, of_ours, by_name, of_photos, picture)
+
+
+def _halves(windows: list[Window]) -> tuple[list[Window], list[Window]]:
+    half = (len(windows) + 1) // 2
+    return windows[:half], windows[half:]
+
+
+def _photos(windows: list[Window]) -> Rendering:
+    return _strip([(window.photo, window.mask) for window in windows])
+
+
+def _distance(strip: Rendering, windows: list[Window]) -> float:
+    photo, mask = _photos(windows)
+    return single_image_frechet(strip[0], photo, mask_a=strip[1], mask_b=mask)
 
 
 def _mean(rows: Sequence[Elevation]) -> Elevation:

@@ -11,6 +11,7 @@ from mitex.asset import CLAY, Asset
 from mitex.colour import linear_to_srgb, srgb_to_linear
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import unit
+from mitex.images import bilinear
 from mitex.mesh import Mesh
 from mitex.scenes.cameras import Cameras, patch_views
 from mitex.scenes.stage import Hits, Stage
@@ -87,14 +88,3 @@ def _colours(asset: Asset, face: np.ndarray, barycentric: np.ndarray) -> np.ndar
         )
     albedo = asset.vertex_maps.get("albedo", np.full((len(asset.mesh.vertices), 3), CLAY, np.float32))
     return interpolate(barycentric, srgb_to_linear(albedo)[asset.mesh.faces[face]])
-
-
-def bilinear(image: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """(P, C) values of an image (N, N, C), row 0 on top, at UVs (P, 2) in [0, 1], v upwards."""
-    side = len(image)
-    place = (np.stack([uv[:, 0], 1 - uv[:, 1]], axis=1) * side - 0.5).clip(0, side - 1)
-    corner = np.minimum(place.astype(np.int64), max(side - 2, 0))
-    (column, row), (x, y) = corner.T, (place - corner).T[:, :, None]
-    right, below = np.minimum(column + 1, side - 1), np.minimum(row + 1, side - 1)
-    upper = (1 - x) * image[row, column] + x * image[row, right]
-    return (1 - y) * upper + y * ((1 - x) * image[below, column] + x * image[below, right])

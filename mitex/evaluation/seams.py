@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from mitex.asset import Asset
-from mitex.evaluation.patches import bilinear
 from mitex.geometry.triangles import interpolate
+from mitex.images import bilinear
 from mitex.mesh.topology import face_edges
 
 POINTS = 20_000  # on each kind of edge, at most

@@ -14,6 +14,7 @@ from mitex.export.folder import Format, check_folder, write_folder, write_maps
 from mitex.export.glb import read_glb, write_glb, write_variants
 from mitex.export.obj import check_side_files, read_obj, write_obj
 from mitex.export.ply import read_ply, write_ply
+from mitex.export.relief import embossed
 from mitex.export.together import Inputs
 from mitex.page import write_still
 from mitex.paths import expanded, prepare_output
@@ -24,6 +25,7 @@ __all__ = [
     "Format",
     "SUFFIXES",
     "check_folder",
+    "embossed",
     "is_folder",
     "prepare_export",
     "read_asset",

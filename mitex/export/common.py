@@ -18,6 +18,7 @@ from mitex.errors import MeshError
 from mitex.geometry.normal_maps import decode, encode
 from mitex.geometry.tangents import split_at_seams
 from mitex.geometry.vectors import orthonormal, scatter_add
+from mitex.images import bilinear
 from mitex.mesh import Mesh
 
 GENERATOR = "Mitex"
@@ -82,16 +83,3 @@ def asset_from_textures(mesh: Mesh, uv: np.ndarray, textures: Mapping[str, np.nd
 def default_tangents(mesh: Mesh) -> np.ndarray:
     """(V, 3) unit tangents across the normals; any will do where normals are encoded anew."""
     return orthonormal(np.broadcast_to(np.array([1, 0, 0], np.float32), mesh.normals.shape), mesh.normals)
-
-
-def bilinear(image: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """Bilinear lookup of (H, W, C) at (N, 2) uv, v upwards, clamped at the border: (N, C)."""
-    height, width = image.shape[:2]
-    x = np.clip(uv[:, 0] * width - 0.5, 0.0, width - 1.0)
-    y = np.clip((1.0 - uv[:, 1]) * height - 0.5, 0.0, height - 1.0)
-    x0 = np.minimum(x.astype(np.int64), width - 2)
-    y0 = np.minimum(y.astype(np.int64), height - 2)
-    a, b = (x - x0)[:, None], (y - y0)[:, None]
-    top = image[y0, x0] * (1 - a) + image[y0, x0 + 1] * a
-    bottom = image[y0 + 1, x0] * (1 - a) + image[y0 + 1, x0 + 1] * a
-    return top * (1 - b) + bottom * b

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from mitex.errors import ConfigError
+from mitex.integrators.field_paths import FieldPaths
+from mitex.integrators.sources import sampled_light, source_met
 from mitex.runtime.jit import dr, mi
-from mitex.textures.shell_field import ShellField, works_in_variant
-from mitex.textures.variant import for_variant, init_base, option, require_variant
+from mitex.textures.variant import for_variant
 
 TOE, SLOPE = 0.04045, 12.92  # of the sRGB curve
 
 
-class ShellIntegrator:
+class ShellIntegrator(FieldPaths):
     """Ordinary geometry by path tracing, with a radiance field composited by depth on every segment.
 
     A field gives what it emits towards the viewer under its own light and hides what is behind: paths that
@@ -37,40 +36,18 @@ class ShellIntegrator:
     Images are differentiable in the field's parameters.
     """
 
-    def __init__(self, props: mi.Properties) -> None:
-        init_base(mi.SamplingIntegrator, self, props)
-        require_variant("shell", works_in_variant(), "llvm_ad_rgb or cuda_ad_rgb")
-        field: Any = props.get("field")
+    plugin = "shell"
+    differentiable = True
+
+    def _check_field(self, field: object) -> None:
         if not hasattr(field, "march"):
             raise ConfigError("shell: 'field' is not a shell_field", "see mitex.textures.shell_field")
-        self.field: ShellField = field
-        self.max_depth = option(props, "max_depth", 6)
-        if self.max_depth < 1:
-            raise ConfigError(f"shell: 'max_depth' is {self.max_depth}", "use 1 or more")
-        self.hidden = option(props, "hide_emitters", False)
 
-    def traverse(self, callback: mi.TraversalCallback) -> None:
-        callback.put("field", self.field, mi.ParamFlags.Differentiable)
-
-    def aov_names(self) -> list[str]:
-        return []
-
-    def to_string(self) -> str:
-        nested = str(self.field).replace("\n", "\n  ")
-        return f"ShellIntegrator[\n  field = {nested},\n  max_depth = {self.max_depth}\n]"
-
-    def sample(
-        self,
-        scene: mi.Scene,
-        sampler: mi.Sampler,
-        ray: mi.Ray3f,
-        medium: mi.Medium | None = None,
-        active: mi.Bool | bool = True,
-    ) -> tuple[mi.Spectrum, mi.Bool, list[mi.Float]]:
-        """Radiance along rays, as one wavefront: the march cannot be recorded into a symbolic loop."""
+    def _radiance(
+        self, scene: mi.Scene, sampler: mi.Sampler, ray: mi.Ray3f, active: mi.Bool
+    ) -> tuple[mi.Spectrum, mi.Bool]:
         count = dr.width(ray.o)
-        ray = mi.Ray3f(ray)
-        alive = mi.Bool(active) & dr.full(mi.Bool, True, count)
+        alive = active & dr.full(mi.Bool, True, count)
         radiance, throughput = dr.zeros(mi.Spectrum, count), dr.ones(mi.Spectrum, count)
         valid = dr.zeros(mi.Bool, count)
         context = mi.BSDFContext()
@@ -84,7 +61,7 @@ class ShellIntegrator:
             radiance += throughput * _linear(segment_light.colour, 1 - segment_light.transmittance)
             throughput *= segment_light.transmittance
             valid |= alive & (si.is_valid() | (segment_light.transmittance < 0.5))
-            emitted = self._emitted(scene, si, start, pdf, delta, alive & mi.Bool(depth or not self.hidden))
+            emitted = source_met(scene, si, start, pdf, delta, alive & mi.Bool(depth or not self.hidden))
             radiance += throughput * emitted
             alive &= si.is_valid() & (dr.max(dr.detach(throughput)) > 0)
             if depth + 1 == self.max_depth or dr.none(alive):
@@ -100,7 +77,7 @@ class ShellIntegrator:
             ray = si.spawn_ray(si.to_world(scattered.wo))
             alive &= dr.max(dr.detach(throughput)) > 0
             dr.eval(ray, radiance, throughput, alive, start, pdf, delta, valid)
-        return radiance, valid, []
+        return radiance, valid
 
     def _direct(
         self,
@@ -113,34 +90,14 @@ class ShellIntegrator:
     ) -> mi.Spectrum:
         """Light from a sampled source, weighted against the BSDF's own sampling; the field casts shadows."""
         smooth = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        ds, weight = scene.sample_emitter_direction(si, sampler.next_2d(smooth), True, smooth)
-        smooth &= ds.pdf > 0
-        local = si.to_local(ds.d)
-        value, density = bsdf.eval_pdf(context, si, local, smooth)
-        share = dr.select(ds.delta, 1, _heuristic(ds.pdf, density))
-        transmittance = self.field.march(si.spawn_ray_to(ds.p), sampler.next_1d(smooth), smooth).transmittance
-        return dr.select(smooth, value * weight * share * transmittance, 0)
 
-    def _emitted(
-        self,
-        scene: mi.Scene,
-        si: mi.SurfaceInteraction3f,
-        start: mi.Interaction3f,
-        pdf: mi.Float,
-        delta: mi.Bool,
-        active: mi.Bool,
-    ) -> mi.Spectrum:
-        """What a light source that was hit adds."""
-        emitter = si.emitter(scene)
-        ds = mi.DirectionSample3f(scene, si, start)
-        other = scene.pdf_emitter_direction(start, ds, active & ~delta)
-        share = dr.select(delta, 1, _heuristic(pdf, other))
-        return dr.select(active, emitter.eval(si, active) * share, 0)
+        def reflected(direction: mi.Vector3f) -> tuple[mi.Spectrum, mi.Float]:
+            return bsdf.eval_pdf(context, si, si.to_local(direction), smooth)
 
+        def passing(ray: mi.Ray3f, active: mi.Bool) -> mi.Float:
+            return self.field.march(ray, sampler.next_1d(active), active).transmittance
 
-def _heuristic(a: mi.Float, b: mi.Float) -> mi.Float:
-    """The power heuristic of multiple importance sampling (Veach 1997)."""
-    return dr.select(a > 0, a * a / (a * a + b * b), 0)
+        return sampled_light(scene, si, sampler.next_2d(smooth), reflected, passing, smooth)
 
 
 def _linear(display: mi.Color3f, opacity: mi.Float) -> mi.Spectrum:

@@ -8,7 +8,7 @@ from mitex.losses.laplacian import laplacian_excess
 from mitex.losses.motion import MotionLoss, motion_loss
 from mitex.losses.overflow import overflow_loss
 from mitex.losses.slopes import slope_correlation
-from mitex.losses.text import directional_distance, mean_direction, text_distance
+from mitex.losses.text import directional_distance, embedding_distance, mean_direction, text_distance
 from mitex.losses.transport import channel_transport, moment_distance, relaxed_transport
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "autocorrelation_distance",
     "channel_transport",
     "directional_distance",
+    "embedding_distance",
     "gram_distance",
     "gram_loss",
     "gram_matrix",

@@ -46,3 +46,15 @@ def text_distance(pictures: torch.Tensor, text: torch.Tensor) -> torch.Tensor:
         text: (D,) embedding of what is wanted.
     """
     return 1 - pictures @ F.normalize(text, dim=0)
+
+
+def embedding_distance(pictures: torch.Tensor, text: torch.Tensor) -> torch.Tensor:
+    """1 - cosine of the pictures' mean embedding with the text, from 0 to 2 (Text2Mesh, section 3.2).
+
+    Embeddings are not normalised before their mean: longer ones count more.
+
+    Args:
+        pictures: (K, D) embeddings.
+        text: (D,) embedding of what is wanted.
+    """
+    return 1 - F.cosine_similarity(pictures.mean(0), text, dim=0)

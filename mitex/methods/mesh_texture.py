@@ -48,13 +48,7 @@ class MeshTexture:
             CheckpointError: there is none, or it is damaged.
         """
         with model_file.opened(source, cls.method) as (tensors, about):
-            arrays = {key: tensor.numpy() for key, tensor in tensors.items()}
-            mesh, image = mesh_of_arrays(arrays, str(about["mesh"])), arrays["image"].astype(np.float32)
-            if image.ndim != 3 or image.shape[0] != image.shape[1] or image.shape[2] != 3:
-                raise ValueError(f"an image of shape {image.shape}")
-            if mesh.uv is None or not np.isfinite(image).all():
-                raise ValueError("a mesh without UVs, or values that are not finite")
-            return cls(mesh, image, about)
+            return cls._of({key: tensor.numpy() for key, tensor in tensors.items()}, about)
 
     def save(self, path: str | Path) -> Path:
         """Writes mesh, texture and `about` as one safetensors file.
@@ -62,8 +56,7 @@ class MeshTexture:
         Raises:
             OutputError: the place is not writable.
         """
-        tensors = {name: torch.tensor(a) for name, a in mesh_arrays(self.mesh).items()}
-        tensors["image"] = torch.from_numpy(self.image.astype(np.float16))
+        tensors = {name: torch.tensor(array) for name, array in self._arrays().items()}
         return model_file.save(path, tensors, self.method, {**self.about, "mesh": self.mesh.name})
 
     def apply(self, mesh: Mesh | None = None) -> Asset:
@@ -80,9 +73,29 @@ class MeshTexture:
                 f"this texture belongs to mesh '{self.mesh.name}', not to '{mesh.name}'",
                 "synthesize it there, with the config.toml of its run folder",
             )
-        assert self.mesh.uv is not None
+        surface = self.surface
+        assert surface.uv is not None
         resolution = len(self.image)
-        face, _ = cover(texel_space(self.mesh.uv, resolution), resolution)
+        face, _ = cover(texel_space(surface.uv, resolution), resolution)
         used = (face >= 0).reshape(resolution, resolution)
         albedo = spread(self.image, used, PADDING)
-        return asset_from_textures(self.mesh, self.mesh.uv, {"albedo": albedo}, self.mesh.name)
+        return asset_from_textures(surface, surface.uv, {"albedo": albedo}, surface.name)
+
+    @property
+    def surface(self) -> Mesh:
+        """What the texture is put on."""
+        return self.mesh
+
+    @classmethod
+    def _of(cls, arrays: Mapping[str, np.ndarray], about: Mapping[str, Any]) -> Self:
+        """From the arrays of a model file."""
+        mesh, image = mesh_of_arrays(arrays, str(about["mesh"])), arrays["image"].astype(np.float32)
+        if image.ndim != 3 or image.shape[0] != image.shape[1] or image.shape[2] != 3:
+            raise ValueError(f"an image of shape {image.shape}")
+        if mesh.uv is None or not np.isfinite(image).all():
+            raise ValueError("a mesh without UVs, or values that are not finite")
+        return cls(mesh, image, about)
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        """What a model file holds."""
+        return mesh_arrays(self.mesh) | {"image": self.image.astype(np.float16)}

@@ -146,11 +146,15 @@ class ApplyOptions:
 
     def write(self, out: Path) -> None:
         """Applies the texture and writes it to `out`, which has been checked."""
-        applied = self.applied(out)
+        applied = self.finished(self.applied(out))
         if out.suffix.lower() in PICTURES:
             applied.render(out, **self.picture_options())
         else:
             applied.export(self.out, self.maps_format)
+
+    def finished(self, applied: Applied) -> Applied:
+        """What is done to the textured mesh before it is written."""
+        return applied
 
     def check(self) -> None:
         """Refuses values out of range, before anything is read."""
@@ -196,3 +200,24 @@ class MeshOptions(ApplyOptions):
         from mitex.mesh.files import mesh_files
 
         return [*super().inputs(), *mesh_files(self.mesh)]
+
+
+@dataclass(kw_only=True)
+class ReliefOptions(OptionalMeshOptions):
+    """Options of the methods that may make a height map."""
+
+    relief: Annotated[float | None, arg(metavar="X", help_behavior_hint="")] = None
+    """Depth of the relief that the height map becomes on the mesh itself, which is made finer [radii of the
+    mesh]; 0.05 is much."""
+
+    def check(self) -> None:
+        in_range("--relief", self.relief, -0.5, 0.5)
+
+    def finished(self, applied: Applied) -> Applied:
+        if self.relief is None:
+            return applied
+        from mitex.asset import Asset
+        from mitex.export import embossed
+
+        assert isinstance(applied, Asset)
+        return embossed(applied, self.relief)

@@ -19,11 +19,15 @@ SCRIPTS = (
     "mesh",
     "program",
     "gl",
+    "gpu",
     "weights",
+    "languages",
     "rule",
     "decoder",
     "surface",
     "automaton",
+    "fragment",
+    "compute",
     "camera",
     "occlusion",
     "studio",
@@ -81,7 +85,8 @@ def document(title: str, data: Mapping[str, Any], picture: bytes) -> str:
 
 
 def _script() -> str:
-    shaders = {file.name: file.read_text(encoding="utf-8") for file in sorted((PARTS / "glsl").iterdir())}
+    files = [file for folder in ("glsl", "wgsl") for file in sorted((PARTS / folder).iterdir())]
+    shaders = {file.name: file.read_text(encoding="utf-8") for file in files}
     code = "\n".join(_read(f"js/{name}.js") for name in SCRIPTS)
     return f'"use strict";\n(() => {{\nconst SHADERS = {_json(shaders)};\n{code}\n}})();'
 

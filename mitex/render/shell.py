@@ -21,6 +21,7 @@ from mitex.render.studio import lights
 from mitex.runtime.jit import mi
 from mitex.textures.march import RadianceField
 
+INTEGRATORS = {"own": "shell", "scene": "lit_shell"}  # by whose light falls on the field
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
@@ -34,6 +35,7 @@ def shell_still(
     azimuth: float = AZIMUTH,
     elevation: float = ELEVATION,
     floating: bool = False,
+    light: str = "own",
     seed: int = 0,
 ) -> np.ndarray:
     """A path-traced picture of a radiance field; what is not named here is as in `still`.
@@ -43,6 +45,8 @@ def shell_still(
         similarity: world -> cube.
         outline: (N, 3) points of the world that the camera is set for; the lowest is on the backdrop.
         resolution: side of the square picture [px], 16 to 8192.
+        light: "own" is the light that the field was captured in, "scene" that of the studio, which casts
+            shadows on it; the field is then a `ReflectingField`.
 
     Returns:
         (H, W, 3) float32 linear radiance.
@@ -52,9 +56,18 @@ def shell_still(
     """
     if not 16 <= resolution <= 8192:
         raise ConfigError(f"a picture of {resolution} pixels is not possible", "use 16 to 8192")
+    if light not in INTEGRATORS:
+        raise ConfigError(f"a light called '{light}'", "use own or scene")
     check_elevation(elevation, floating)
     init(needs="ad_rgb")
+    from mitex.textures.scattering import ReflectingField
     from mitex.textures.shell_field import shell_field
+
+    if light == "scene" and not isinstance(field, ReflectingField):
+        raise ConfigError(
+            "this field has no reflection apart from its light",
+            "give a texture of `mitex fit nerf`, or render it in its own light",
+        )
 
     centre = outline.mean(0)
     radius = float(np.linalg.norm(outline - centre, axis=1).max())
@@ -66,7 +79,7 @@ def shell_still(
     scene = {
         "type": "scene",
         "integrator": {
-            "type": "shell",
+            "type": INTEGRATORS[light],
             "field": shell_field(field, place, turn),
             "max_depth": MAX_DEPTH,
             "hide_emitters": True,

@@ -6,6 +6,7 @@ from typing import Any
 
 from mitex.errors import ConfigError, RuntimeUnavailable
 from mitex.runtime import llvm, workers
+from mitex.runtime.collection import collect_between_kernels
 
 DEFAULT_VARIANT = "llvm_ad_rgb"
 
@@ -85,6 +86,7 @@ def load_mitsuba(needs_llvm: bool = True) -> Any:
     if needs_llvm:
         _check_loaded_llvm(dr)
     workers.apply_thread_count()
+    collect_between_kernels()
     return mi
 
 

@@ -108,7 +108,7 @@ def composite(
     """
     count = dr.width(origin)
     result = Composite(dr.zeros(mi.Color3f, count), dr.ones(mi.Float, count), dr.zeros(mi.Float, count))
-    near, leave = _box(origin, direction)
+    near, leave = scene_box(origin, direction)
     leave = dr.minimum(leave, far)
     alive = mi.UInt32(dr.compress(near < leave))
     while dr.width(alive):
@@ -169,7 +169,7 @@ def march(
         near, far: the part of the rays that counts, numbers or (R,) [scene units].
     """
     count, side = dr.width(origin), grid.shape[0]
-    enter, leave = _box(origin, direction)
+    enter, leave = scene_box(origin, direction)
     enter, leave = dr.maximum(enter, near), dr.minimum(leave, far)
     longest = dr.max(leave - enter)[0] if count else 0.0
     if not longest > 0:
@@ -212,7 +212,7 @@ def visible(
         if dr.width(index):
             points = samples.subset(index).points(origin, direction)
             dr.scatter(depth, density(points) * samples.step, index)
-    before = _sum_before(mi.Float64(depth), samples)
+    before = sum_before(mi.Float64(depth), samples)
     return samples.subset(mi.UInt32(dr.compress(dr.exp(-before) > OPAQUE)))
 
 
@@ -242,18 +242,19 @@ class _Before(dr.CustomOp):
 
     def eval(self, values: mi.Float64, samples: Samples) -> mi.Float64:
         self.samples = samples
-        return _sum_before(values, samples)
+        return sum_before(values, samples)
 
     def forward(self) -> None:
-        self.set_grad_out(_sum_before(mi.Float64(self.grad_in("values")), self.samples))
+        self.set_grad_out(sum_before(mi.Float64(self.grad_in("values")), self.samples))
 
     def backward(self) -> None:
         grad = mi.Float64(self.grad_out())
         total = dr.gather(mi.Float64, sum_rays(grad, self.samples), self.samples.ray)
-        self.set_grad_in("values", total - _sum_before(grad, self.samples) - grad)
+        self.set_grad_in("values", total - sum_before(grad, self.samples) - grad)
 
 
-def _sum_before(values: mi.Float64, samples: Samples) -> mi.Float64:
+def sum_before(values: mi.Float64, samples: Samples) -> mi.Float64:
+    """For each sample (M,) the sum of `values` over those before it on its ray."""
     # In double precision: the sum runs over all rays, and differences of it must keep their digits.
     sums = dr.prefix_sum(values)
     return sums - dr.gather(mi.Float64, sums, _first(samples))
@@ -274,8 +275,8 @@ def sum_rays(values: A, samples: Samples) -> A:
     return total
 
 
-def _box(origin: mi.Point3f, direction: mi.Vector3f) -> tuple[mi.Float, mi.Float]:
-    """Where rays enter and leave the scene cube; the entry is behind the exit where they miss it."""
+def scene_box(origin: mi.Point3f, direction: mi.Vector3f) -> tuple[mi.Float, mi.Float]:
+    """Where rays (R,) enter and leave the scene cube; the entry is behind the exit where they miss it."""
     inverse = 1 / dr.select(direction == 0, 1e-12, direction)
     start = mi.Vector3f(origin)
     a, b = (-1 - start) * inverse, (1 - start) * inverse

@@ -7,13 +7,16 @@ are then those of the scene: `mi.traverse` lists them, and images have derivativ
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
 from mitex.mesh import Similarity
 from mitex.runtime.jit import dr, mi
 from mitex.textures.march import Composite, DifferentiableField, RadianceField, composite
+from mitex.textures.phong import Phong
+from mitex.textures.scattering import first_event
 from mitex.textures.variant import for_variant, init_base, require_variant
 
 CHUNK = 1 << 16  # rays that are marched at a time
@@ -43,7 +46,8 @@ class ShellField:
 
     def __init__(self, field: RadianceField, similarity: Similarity, turn: np.ndarray | None = None) -> None:
         init_base(mi.Volume, self, mi.Properties("shell_field"))
-        self.field, self.similarity = field, similarity
+        self.field: Any = field
+        self.similarity = similarity
         self.turn = np.eye(3) if turn is None else turn
 
     def bbox(self) -> mi.ScalarBoundingBox3f:
@@ -56,6 +60,11 @@ class ShellField:
         """No bound is known."""
         return float("inf")
 
+    @property
+    def world_step(self) -> float:
+        """Of rays through the field [world units]."""
+        return self.field.step * float(self.similarity.scale)
+
     def march(self, ray: mi.Ray3f, jitter: mi.Float, active: mi.Bool) -> Composite:
         """What rays gather up to their `maxt`, where `active`: as of `composite`, with depths in world
         units.
@@ -66,10 +75,66 @@ class ShellField:
             active: which rays are marched, one value for each or for all; what is not marched passes freely.
         """
         scale = float(self.similarity.scale)
-        centre = mi.Vector3f(np.asarray(self.similarity.center, np.float32).tolist())
         count = max(dr.width(ray.o), dr.width(active), dr.width(jitter))
-        rays = mi.UInt32(dr.compress(active & dr.full(mi.Bool, True, count)))
         total = Composite(dr.zeros(mi.Color3f, count), dr.ones(mi.Float, count), dr.zeros(mi.Float, count))
+        for index, origin, direction, far in self._parts(ray, active, count):
+            pixels = composite(self.field, origin, direction, dr.gather(mi.Float, jitter, index), far)
+            dr.scatter(total.colour, pixels.colour, index)
+            dr.scatter(total.transmittance, pixels.transmittance, index)
+            dr.scatter(total.depth, pixels.depth * scale, index)
+        return total
+
+    def flight(self, ray: mi.Ray3f, jitter: mi.Float, threshold: mi.Float, active: mi.Bool) -> mi.Float:
+        """How far rays come before they are scattered, up to their `maxt`.
+
+        Args:
+            ray, jitter, active: as of `march`. The field is a `ReflectingField`.
+            threshold: (R,) in [0, 1), see `first_event`.
+
+        Returns:
+            (R,) in world units; infinite where a ray passes or is not active.
+        """
+        count = max(dr.width(ray.o), dr.width(active), dr.width(jitter))
+        distance = dr.full(mi.Float, dr.inf, count)
+        for index, origin, direction, far in self._parts(ray, active, count):
+            j, least = dr.gather(mi.Float, jitter, index), dr.gather(mi.Float, threshold, index)
+            event = first_event(self.field, origin, direction, j, least, far)
+            dr.scatter(distance, event * float(self.similarity.scale), index)
+        return distance
+
+    def reflection(self, points: mi.Point3f, view: mi.Vector3f, active: mi.Bool) -> tuple[mi.Bool, Phong]:
+        """What N points in the world reflect, seen along unit directions.
+
+        Returns:
+            Which have matter and are active (N,), and their reflection with normals in the world; zeros for
+            the others.
+        """
+        count = dr.width(points)
+        solid = dr.zeros(mi.Bool, count)
+        total = Phong(
+            dr.zeros(mi.Vector3f, count),
+            dr.zeros(mi.Color3f, count),
+            dr.zeros(mi.Float, count),
+            dr.zeros(mi.Float, count),
+        )
+        rays = mi.Ray3f(points, view)
+        for index, place, direction, _ in self._parts(rays, active, count):
+            part, phong = self.field.reflection(place, direction)
+            index = dr.gather(mi.UInt32, index, part)
+            phong.normal = mi.Vector3f(mi.Matrix3f(self.turn.tolist()) @ phong.normal)
+            dr.scatter(solid, True, index)
+            for name, values in vars(total).items():
+                dr.scatter(values, getattr(phong, name), index)
+        return solid, total
+
+    def _parts(
+        self, ray: mi.Ray3f, active: mi.Bool, count: int
+    ) -> Iterator[tuple[mi.UInt32, mi.Point3f, mi.Vector3f, mi.Float]]:
+        """Indices of active rays, at most `CHUNK` at a time, and the rays in the field's cube: their origins,
+        directions and ends."""
+        scale = float(self.similarity.scale)
+        centre = mi.Vector3f(np.asarray(self.similarity.center, np.float32).tolist())
+        rays = mi.UInt32(dr.compress(active & dr.full(mi.Bool, True, count)))
         for start in range(0, dr.width(rays), CHUNK):
             part = dr.arange(mi.UInt32, start, min(start + CHUNK, dr.width(rays)))
             index = dr.gather(mi.UInt32, rays, part)
@@ -77,12 +142,7 @@ class ShellField:
             back = mi.Matrix3f(self.turn.T.tolist())
             origin = mi.Point3f((back @ dr.gather(mi.Point3f, ray.o, index) - centre) / scale)
             direction = mi.Vector3f(back @ dr.gather(mi.Vector3f, ray.d, index))
-            far = dr.gather(mi.Float, ray.maxt, index) / scale
-            pixels = composite(self.field, origin, direction, dr.gather(mi.Float, jitter, index), far)
-            dr.scatter(total.colour, pixels.colour, index)
-            dr.scatter(total.transmittance, pixels.transmittance, index)
-            dr.scatter(total.depth, pixels.depth * scale, index)
-        return total
+            yield index, origin, direction, dr.gather(mi.Float, ray.maxt, index) / scale
 
     def traverse(self, callback: mi.TraversalCallback) -> None:
         if isinstance(self.field, DifferentiableField):

@@ -57,11 +57,7 @@ def nested(thing: mi.Object) -> dict[str, mi.Object]:
 
 @cache
 def _collector(_variant: str) -> Callable[[], Any]:
-    """The class of callbacks that keep objects.
-
-    One for each variant, not for each call: classes leave work to the garbage collector, and if that frees a
-    scene while a kernel is traced, the process ends.
-    """
+    """The class of callbacks that keep objects: one for each variant, not for each call."""
 
     class Collector(mi.TraversalCallback):
         def __init__(self) -> None:

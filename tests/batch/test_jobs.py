@@ -33,6 +33,21 @@ class TestExpansion:
         assert fit.needs is None and [job.needs for job in applies] == [fit.id] * 2
         assert all(job.words[1] == fit.result for job in applies)
 
+    def test_a_fit_of_another_fit_waits_for_it(self, jobs):
+        """For the same exemplar and seed; with other settings of the one, the other is another job."""
+        methods = {"stripes": {}, "b": {"method": "stripes", "of": "stripes"}}
+        every = jobs(methods, seeds=[0, 1])
+        fits = {job.name: job for job in every if job.words[0] == "fit"}
+        for seed in (0, 1):
+            first, second = fits[f"fit-stripes-a-s{seed}"], fits[f"fit-b-a-s{seed}"]
+            assert first.needs is None and second.needs == first.id
+            assert second.words[second.words.index("--exemplar") + 1] == first.result
+            assert second.resumed[second.resumed.index("--exemplar") + 1] == first.result
+        (apply,) = (job for job in every if job.name == "apply-b-a-s1-m")
+        assert apply.needs == fits["fit-b-a-s1"].id
+        others = jobs({**methods, "stripes": {"steps": 3}}, seeds=[0, 1])
+        assert not {job.id for job in others} & {job.id for job in every}
+
     def test_a_fit_that_needs_its_mesh_is_made_for_each(self, jobs, workshop):
         (workshop.folder / "n.obj").write_text("n")
         every = jobs({"inlay": {}}, meshes=["*.obj"])

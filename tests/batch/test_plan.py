@@ -50,6 +50,17 @@ PLANS = {
     "pattern without a match": (GOOD.replace("a.png", "*.jpg"), "no exemplar is called '*.jpg'"),
     "device": (GOOD.replace("a.png", "/dev/zero"), "'/dev/zero' is neither a file nor a folder"),
     "duplicate jobs": (GOOD.replace('"a.png"', '"a.png", "a.png"'), "the job fit-stripes-a twice"),
+    "of an unknown one": (GOOD + 'of = "strypes"', "which is not before it in the plan"),
+    "of itself": (GOOD + 'of = "stripes"', "'stripes', which is not before it in the plan"),
+    "of one that learns from a mesh": (
+        GOOD + '[methods.inlay]\n[methods.b]\nmethod = "stripes"\nof = "inlay"',
+        "'inlay', which does not learn from exemplars alone",
+    ),
+    "of one and of a mesh": (GOOD + '[methods.inlay]\nof = "stripes"', "'stripes' and from something else"),
+    "of one with other seeds": (
+        GOOD + '[methods.b]\nmethod = "stripes"\nof = "stripes"\nseeds = [3]',
+        "'stripes', with other exemplars or seeds",
+    ),
     "null byte": (GOOD.replace("a.png", "a\\u0000.png"), "there is no exemplar"),
 }
 

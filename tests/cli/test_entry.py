@@ -207,8 +207,8 @@ class TestUsage:
             (
                 ["fit", "--exemplar", "a.png"],
                 "`mitex fit` knows no method '--exemplar'; use one of geometric, nca, nerf, surface, "
-                "displacement, gatys, image_quilting, multi_view_gram, plain_field, quilted, "
-                "reaction_diffusion, solid_texture, style_mesh, text2mesh",
+                "displacement, gatys, image_quilting, multi_view_gram, nerf_tex, plain_field, quilted, "
+                "reaction_diffusion, solid_texture, style_mesh, text2mesh, x_mesh",
             ),
             (["fit", "surface"], "--exemplar is missing; see `mitex fit surface --help`"),
             (["apply"], "RUN|MODEL is missing; see `mitex apply --help`"),

@@ -74,6 +74,11 @@ def test_fit_apply_render(folder, capsys):
     dense = Asset.load("d.glb")
     assert len(dense.mesh.faces) == 12 * 16 and dense.atlas is not None
 
+    assert run(*apply, "--out", "e.glb", "--resolution", "64", "--relief", "0.1") == "e.glb"
+    raised = Asset.load("e.glb")
+    assert len(raised.mesh.faces) > 12 * 64 and not {"height", "normal"} & set(raised.maps)
+    assert not np.isin(np.abs(raised.mesh.vertices).max(axis=1).round(4), [1.0]).all()
+
     render = ["render", "a.glb", "--resolution", "16", "--spp", "1"]
     assert run(*render, "--out", "a.png", "--azimuth", "-30", "--elevation", "40") == "a.png"
     assert read_image("a.png").shape == (16, 16, 3)

@@ -153,14 +153,17 @@ def test_bad_fits(files, photos, capsys, name):
     check_refused(files, fit(**{key: value}), message, capsys)
 
 
-def test_a_guide_and_a_lift(files, run, monkeypatch):
+def test_a_guide_a_lift_and_a_light(files, run, monkeypatch):
     few_patches(monkeypatch)
     bad.image(files / "guide.png")
     words = "--scale 16 --guide guide.png --lift 0.5 --density 1000 --seed 2"
     assert main(apply(words)) == 0
     assert len(Mesh.load(files / "out" / "a.ply").faces) > 100
     assert main(apply(f"{words} --resolution 64", out="out/a.png")) == 0
-    assert read_image(files / "out" / "a.png").shape == (64, 64, 3)
+    own = read_image(files / "out" / "a.png")
+    assert own.shape == (64, 64, 3)
+    assert main(apply(f"{words} --resolution 64 --light scene", out="out/lit.png")) == 0
+    assert np.abs(read_image(files / "out" / "lit.png") - own).max() > 0.1
 
 
 APPLIED = {
@@ -171,6 +174,7 @@ APPLIED = {
     "density": ("--density 0", "--density"),
     "guide": ("--guide no.png", "no.png"),
     "resolution": ("--resolution 64", "--resolution means nothing for .ply"),
+    "light": ("--light scene", "--light means nothing for .ply"),
     "steps": ("--steps 10", "--steps is no option"),
 }
 

@@ -24,7 +24,9 @@ def test_a_surface_beside_itself_is_nearer_than_a_rough_one(place, monkeypatch):
     monkeypatch.setattr("mitex.evaluation.form.LAYERS", ("relu2_2",))
     pair, ball = ReliefPair("ball.obj", "ball.obj"), Mesh.load("ball.obj")
     noise = np.random.default_rng(0).normal(1, 0.05, (len(ball.vertices), 1))
-    same, rough = (pair.numbers(clay(mesh)) for mesh in (ball, ball.with_vertices(noise * ball.vertices)))
+    same, rough = (
+        pair.numbers(clay(mesh), place) for mesh in (ball, ball.with_vertices(noise * ball.vertices))
+    )
     assert same.keys() == {measure.key for measure in RELIEFS}
     assert same.pop("relief_size") == rough.pop("relief_size") == 1
     assert same["piercing"] == 0 == rough.pop("piercing")
@@ -42,7 +44,7 @@ def test_what_the_words_say_scores_high(place, monkeypatch):
 
     def scores(*rgb):
         albedo = np.tile(np.array(rgb, np.float32), (len(ball.vertices), 1))
-        return pair.numbers(Asset(ball, {"albedo": albedo}))
+        return pair.numbers(Asset(ball, {"albedo": albedo}), place)
 
     red, blue = scores(1, 0.1, 0.1), scores(0.1, 0.1, 1)
     assert red.keys() == {measure.key for measure in TEXTS}

@@ -22,8 +22,8 @@ BROKEN = {
         "gatys learns from exemplar, and geometric from reference",
     ),
     "methods of a kind without measures": (
-        {"--methods": "nerf"},
-        "that learn from a capture are not compared",
+        {"--methods": "quilted"},
+        "that learn from a texture are not compared",
     ),
     "an exemplar that does not exist": ({"--exemplar": "no.png"}, "there is no exemplar 'no.png'"),
     "a mesh that does not exist": ({"--mesh": "no.obj"}, "there is no mesh 'no.obj'"),

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mitex.integrators import FeatureIntegrator, MotionIntegrator, ShellIntegrator
+from mitex.integrators import FeatureIntegrator, LitShellIntegrator, MotionIntegrator, ShellIntegrator
 from mitex.mesh import Similarity, icosphere
 from mitex.runtime.jit import mi
 from mitex.textures import DecodedField, TexelField, VertexField
@@ -41,6 +41,10 @@ class Fog:
 
     def evaluate(self, points: Any, view: Any) -> Any: ...
 
+    def extinction(self, points: Any) -> Any: ...
+
+    def reflection(self, points: Any, view: Any) -> Any: ...
+
 
 def fog() -> Any:
     """A `shell_field`."""
@@ -72,4 +76,5 @@ PLUGINS = {
         MotionIntegrator, "CppADIntegrator", lambda: {"field": mi.load_dict({"type": "checkerboard"})}
     ),
     "shell": Plugin(ShellIntegrator, "SamplingIntegrator", lambda: {"field": fog()}),
+    "lit_shell": Plugin(LitShellIntegrator, "SamplingIntegrator", lambda: {"field": fog()}),
 }

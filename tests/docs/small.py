@@ -48,7 +48,9 @@ TINY: dict[str, dict[str, Any]] = {
     "multi_view_gram": {"resolution": 32, "exemplar_size": 32, "view": 32, "layers": ("relu1_1",)},
     "reaction_diffusion": {"hidden": 8, "channels": 4, "grid": 32, "exemplar_size": 32, "pool": 1}
     | {"min_steps": 2, "max_steps": 2, "layers": ("relu1_1",)},
-    "text2mesh": {"resolution": 32, "exemplar_size": 32, "view": 32, "width": 8, "layers": ("relu1_1",)},
+    "text2mesh": {"resolution": 32, "exemplar_size": 32, "view": 32, "width": 8, "layers": ("relu1_1",)}
+    | {"text_vertices": 100},
+    "x_mesh": {"resolution": 32, "view": 32, "width": 8, "frequencies": 4, "views": 1, "text_vertices": 100},
     "style_mesh": {
         "resolution": 32,
         "exemplar_size": 64,
@@ -65,6 +67,15 @@ TINY: dict[str, dict[str, Any]] = {
         "table": 10,
         "coarsest": 4,
         "finest": 8,
+        "occupancy": 16,
+    },
+    "nerf_tex": {
+        "patch": 128,
+        "views": 16,
+        "view": 16,
+        "rays": 64,
+        "ray_steps": 64,
+        "table": 10,
         "occupancy": 16,
     },
     "geometric": {"level_steps": 2, "fit_steps": 10, "fit_samples": 100},

@@ -62,12 +62,12 @@ def feature(_: str) -> str:
     return "yes"
 
 
-def shell(_: str) -> str:
-    mi.load_dict({"type": "shell", "field": fog()})
+def shell(name: str) -> str:
+    mi.load_dict({"type": name.removesuffix("_field"), "field": fog()})
     return "yes"
 
 
-LOOK = {"feature": feature, "motion": motion, "shell": shell, "shell_field": shell}
+LOOK = {"feature": feature, "motion": motion, "shell": shell, "lit_shell": shell, "shell_field": shell}
 
 
 @pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_mono", "llvm_ad_spectral", "scalar_rgb"])

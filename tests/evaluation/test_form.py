@@ -58,7 +58,7 @@ def of_reference(reference):
 
 def test_the_reference_itself_and_a_plane(of_reference, reference):
     itself = of_reference.of(reference)
-    assert itself.size == 1 and itself.distance == pytest.approx(0, abs=1e-3)
+    assert itself.distance == pytest.approx(0, abs=1e-3) and itself.size == 1.0
     assert of_reference.distance(grid(4, 4), 0.25) == pytest.approx(1, abs=0.05)
 
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from mitex.asset import Asset
-from mitex.evaluation.patches import albedo_views, bilinear, patch_cameras
+from mitex.evaluation.patches import albedo_views, patch_cameras
 from mitex.export.common import asset_from_textures
 from mitex.geometry.vectors import unit
+from mitex.images import bilinear
 from mitex.mesh import icosphere
 from mitex.methods.layout import with_layout
 

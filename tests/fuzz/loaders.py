@@ -26,6 +26,10 @@ from mitex.mesh.fields import read_vectors
 from mitex.methods.baselines.displacement.texture import DisplacementMap
 from mitex.methods.baselines.gatys.texture import GatysTexture
 from mitex.methods.baselines.multi_view_gram.texture import MultiViewTexture
+from mitex.methods.baselines.nerf_tex.config import NerfTexConfig
+from mitex.methods.baselines.nerf_tex.networks import network_of
+from mitex.methods.baselines.nerf_tex.texture import SETTINGS as BOX_SETTINGS
+from mitex.methods.baselines.nerf_tex.texture import NerfTexTexture
 from mitex.methods.baselines.plain_field.config import PlainFieldConfig
 from mitex.methods.baselines.plain_field.texture import SETTINGS, PlainFieldTexture
 from mitex.methods.baselines.quilted.texture import QuiltedTexture
@@ -35,6 +39,7 @@ from mitex.methods.baselines.solid_texture.generator import Generator
 from mitex.methods.baselines.solid_texture.texture import SolidTexture
 from mitex.methods.baselines.style_mesh.texture import StyleMeshTexture
 from mitex.methods.baselines.text2mesh.texture import Text2MeshTexture
+from mitex.methods.baselines.x_mesh.texture import XMeshTexture
 from mitex.methods.nca.config import PRESETS, NcaConfig
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.weights import graft_weights
@@ -172,6 +177,11 @@ def _text2mesh(path: Path) -> None:
     Text2MeshTexture(grid(1, 1), np.full((8, 8, 3), 0.5, np.float32), {"name": "a"}).save(path)
 
 
+def _x_mesh(path: Path) -> None:
+    image = np.full((8, 8, 3), 0.5, np.float32)
+    XMeshTexture(grid(1, 1), image, {"name": "a"}, grid(2, 2)).save(path)
+
+
 def _nerf(path: Path) -> None:
     from tests.methods.nerf.small import small_texture
 
@@ -184,6 +194,15 @@ def _plain_field(path: Path) -> None:
     about = {key: getattr(config, key) for key in SETTINGS} | {"name": "a", "centre": [0.0] * 3, "scale": 1.0}
     parameters = {name: torch.zeros(shape) for name, shape in parameter_shapes(hash_grid(config)).items()}
     PlainFieldTexture(parameters, np.ones((16, 16, 16), np.uint8), about).save(path)
+
+
+def _nerf_tex(path: Path) -> None:
+    init()
+    config = NerfTexConfig(table=8, occupancy=16)
+    about = {key: getattr(config, key) for key in BOX_SETTINGS}
+    about |= {"name": "a", "half": 0.2, "ground": -0.1, "light": [0.0, 0.0, 1.0]}
+    parameters = {name: torch.zeros(shape) for name, shape in network_of(config).shapes.items()}
+    NerfTexTexture(parameters, np.ones((16, 16, 16), np.uint8), about).save(path)
 
 
 def _reaction_diffusion(path: Path) -> None:
@@ -243,11 +262,13 @@ LOADERS = {
     ),
     "gatys": Loader("a.safetensors", _picture_texture, mitex.load),
     "quilted": Loader("a.safetensors", _quilted, mitex.load),
+    "nerf_tex": Loader("a.safetensors", _nerf_tex, mitex.load),
     "plain_field": Loader("a.safetensors", _plain_field, mitex.load),
     "reaction_diffusion": Loader("a.safetensors", _reaction_diffusion, mitex.load),
     "solid_texture": Loader("a.safetensors", _solid, mitex.load),
     "style_mesh": Loader("a.safetensors", _style_mesh, mitex.load),
     "text2mesh": Loader("a.safetensors", _text2mesh, mitex.load),
+    "x_mesh": Loader("a.safetensors", _x_mesh, mitex.load),
     "multi_view_gram": Loader("a.safetensors", _multi_view, mitex.load),
     "checkpoint": Loader("checkpoint.safetensors", _checkpoint, lambda path: checkpoint.load(path.parent)),
     "checkpoint as a texture": Loader(

@@ -62,6 +62,11 @@ FITS = {
         resume="",
         source="nerf",
     ),
+    "nerf_tex": TinyFit(
+        f"--texture runs/nerf --steps 2 --set patch=192 views=16 view=16 network=hash {RADIANCE} {SMALL_RUN}",
+        "--mesh cube.obj --density 200 --scale 0.25 --spacing 2",
+        source="nerf",
+    ),
     "multi_view_gram": TinyFit(
         "--exemplar photo.png --mesh cube.obj --steps 2 --set resolution=32 exemplar_size=32 view=32 "
         f"layers=relu1_1 {SMALL_RUN}",
@@ -94,6 +99,11 @@ FITS = {
     "text2mesh": TinyFit(
         "--exemplar photo.png --mesh cube.obj --steps 2 --set resolution=32 exemplar_size=32 view=32 "
         f"width=8 layers=relu1_1 {SMALL_RUN}",
+        "--mesh cube.obj",
+    ),
+    "x_mesh": TinyFit(
+        "--text dots --clip words --mesh cube.obj --steps 2 --set resolution=32 view=32 width=8 "
+        f"frequencies=4 views=1 text_vertices=50 {SMALL_RUN}",
         "--mesh cube.obj",
     ),
     "displacement": TinyFit("--reference spikes --set resolution=16", "--mesh cube.obj", resume=""),

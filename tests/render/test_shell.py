@@ -37,6 +37,8 @@ class Nothing:
         ({"elevation": math.nan}, "elevation"),
         ({"spp": 0}, "samples per pixel"),
         ({"spp": 70_000}, "samples per pixel"),
+        ({"light": "lamp"}, "a light called 'lamp'; use own or scene"),
+        ({"light": "scene"}, "no reflection apart from its light"),
     ],
 )
 def test_wrong_options(options, message):

@@ -68,6 +68,7 @@ def words_model() -> WordsModel:
 
     path = weights.shipped(weights.WORDS_FILE)
     weights.verify(path, weights.WORDS_SHA256)
-    network = WordsNetwork()
+    with torch.random.fork_rng(devices=()):  # first weights are drawn, and replaced
+        network = WordsNetwork()
     network.load_state_dict(load_file(path))
     return WordsModel(network)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
@@ -13,19 +12,19 @@ from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
 from mitex.methods.nca.arguments import RESOLUTION, field_files, levels, oriented
 from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS, TILE_CELLS, TILE_SIDES
-from mitex.methods.options import EXPORTS, PICTURES, OptionalMeshOptions, TrainingOptions
+from mitex.methods.options import EXPORTS, PICTURES, ReliefOptions
+from mitex.methods.words_options import WordsOptions
 from mitex.training.settings import RunSettings
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
 
 MOST_VARIANTS = 32
-LONGEST = 60  # name of a run folder from words [characters]
 PAGE = ".html"
 
 
 @dataclass(kw_only=True)
-class Fit(TrainingOptions):
+class Fit(WordsOptions):
     """Learn a texture from an image, a set of PBR maps, or words with a neural cellular automaton (MeshNCA).
 
     The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the texture; Ctrl-C
@@ -53,10 +52,6 @@ class Fit(TrainingOptions):
 
     mesh: Annotated[str | None, arg(metavar="MESH|NAME", help_behavior_hint="(default: spheres)")] = None
     """With --text: train on this mesh."""
-
-    clip: Annotated[str | None, arg(metavar="DIR|NAME", help_behavior_hint="")] = None
-    """With --text: folder of a CLIP model, name of one in Hugging Face's cache, or `words` for the small
-    embedded model. By default $MITEX_CLIP, else the cache, else the embedded one."""
 
     preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: patch)")] = None
     """Settings to start from: `patch` is fast, `paper` follows the publication; `motion` (the default with
@@ -107,7 +102,7 @@ class Fit(TrainingOptions):
         from mitex.mesh import Mesh
         from mitex.methods import nca
 
-        out = self.folder("-".join(re.findall(r"[a-z0-9]+", text.lower()))[:LONGEST] or "text")
+        out = self.words_folder(text)
         mesh = None if self.mesh is None else Mesh.load(self.mesh)
         with self.progress() as on_step:
             nca.fit_text(
@@ -124,7 +119,7 @@ class Fit(TrainingOptions):
 
 
 @dataclass(kw_only=True)
-class Apply(OptionalMeshOptions):
+class Apply(ReliefOptions):
     """Grow a cellular automaton's texture on a mesh, or on a square that repeats (--tile).
 
     examples:
@@ -189,6 +184,7 @@ class Apply(OptionalMeshOptions):
     """Cells along a side of the tile; more make the pattern finer."""
 
     def check(self) -> None:
+        super().check()
         levels(self.subdivide)
         in_range("--variants", self.variants, 1, MOST_VARIANTS)
         in_range("--seed", self.seed, *SEEDS)
@@ -204,6 +200,8 @@ class Apply(OptionalMeshOptions):
             "--resolution", "--vertex-colors", self.resolution is not None and self.vertex_colors
         )
         mutually_exclusive("--variants", "--vertex-colors", self.variants > 1 and self.vertex_colors)
+        for option, used in {"--variants": self.variants > 1, "--vertex-colors": self.vertex_colors}.items():
+            mutually_exclusive("--relief", option, self.relief is not None and used)
         self._check_tile()
 
     def _check_tile(self) -> None:
@@ -225,6 +223,7 @@ class Apply(OptionalMeshOptions):
             "--vertex-colors": self.vertex_colors,
             "--keep-dense": self.keep_dense,
             "--displace": self.displace,
+            "--relief": self.relief is not None,
             "--variants": self.variants > 1,
             "--looks": self.looks is not None,
         }
@@ -256,6 +255,7 @@ class Apply(OptionalMeshOptions):
             reject_unused("--resolution", out, page and self.resolution is not None)
             reject_unused("--keep-dense", out, page and self.keep_dense)
             reject_unused("--displace", out, page and self.displace)
+            reject_unused("--relief", out, page and self.relief is not None)
 
     def write(self, out: Path) -> None:
         from mitex.runtime import let_idle_threads_sleep

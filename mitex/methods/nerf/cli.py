@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import arg
 
@@ -60,6 +60,7 @@ class Apply(MeshOptions):
 
     examples:
       mitex apply runs/durian --mesh bunny.obj --out bunny.png
+      mitex apply runs/durian --mesh bunny.obj --out lit.png --light scene
       mitex apply runs/durian --mesh bunny.obj --out bunny.glb --scale 0.5
       mitex apply runs/grass --mesh hill.obj --out hill.png --guide path.png --scale 0.1
     """
@@ -86,6 +87,9 @@ class Apply(MeshOptions):
     resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {RESOLUTION})")] = None
     """Side of a picture [pixels]."""
 
+    light: Annotated[Literal["own", "scene"] | None, arg(help_behavior_hint="(default: own)")] = None
+    """Light in a picture: that of the photos, or that of the scene, in which the texture is shaded anew."""
+
     def check(self) -> None:
         in_range("--seed", self.seed, *SEEDS)
         in_range("--scale", self.scale, 0.05, 20.0)
@@ -98,9 +102,10 @@ class Apply(MeshOptions):
     def check_output(self, out: Path) -> None:
         picture = out.suffix.lower() in PICTURES
         reject_unused("--resolution", out, self.resolution is not None and not picture)
+        reject_unused("--light", out, self.light is not None and not picture)
 
     def picture_options(self) -> dict[str, object]:
-        return {"resolution": self.resolution or RESOLUTION}
+        return {"resolution": self.resolution or RESOLUTION, "light": self.light or "own"}
 
     def applied(self, out: Path) -> AppliedTexture:
         from mitex.images import read_image

@@ -34,6 +34,7 @@ from mitex.methods.nerf.synthesis.patches import (
 from mitex.methods.nerf.synthesis.patches import SIZE as PATCH
 from mitex.methods.nerf.synthesis.quilting import Quilt, quilt
 from mitex.methods.nerf.use.applied import AppliedTexture, check_ranges
+from mitex.methods.nerf.use.on_plane import SCALE, TextureOnPlane, plane
 from mitex.methods.nerf.use.placement import EXTENT, UNWRAP_SIZE, in_scene_cube, uv_unit_length
 from mitex.methods.nerf.use.self_maps import self_maps
 from mitex.progress import announce
@@ -217,6 +218,16 @@ class NerfTexture:
             frames.astype(np.float32),
             patches.gap,
         )
+
+    def on_plane(self, along: np.ndarray, size: int = 1024, seed: int = 0) -> TextureOnPlane:
+        """What shows a synthesized texture in the windows of photos of the capture, under its light.
+
+        Args:
+            along: (3,) direction in the scene that the planes' x follows.
+            size, seed: as of `synthesize`.
+        """
+        field = self.apply(plane(), self.synthesize(size, seed, tileable=True), scale=SCALE, lift=0.0)
+        return TextureOnPlane(field, np.array(self.light), along)
 
     def on_base_shape(self, size: int = SIZE) -> AppliedTexture:
         """The captured texture as maps of `size` texels on its own base shape, in the scene cube."""

@@ -10,7 +10,7 @@ from tyro.conf import arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import in_range, mutually_exclusive
-from mitex.methods.options import ExemplarOptions, OptionalMeshOptions
+from mitex.methods.options import ExemplarOptions, ReliefOptions
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
@@ -112,13 +112,14 @@ class Fit(ExemplarOptions):
 
 
 @dataclass(kw_only=True)
-class Apply(OptionalMeshOptions):
+class Apply(ReliefOptions):
     """Write a surface texture on the mesh that it was synthesized on, which is kept with it.
 
     --mesh only checks that a mesh is that one.
 
     examples:
       mitex apply runs/bunny --out bunny.glb
+      mitex apply runs/bunny --out print.glb --relief 0.05
       mitex apply runs/tile --out tile/
     """
 

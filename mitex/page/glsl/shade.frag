@@ -14,6 +14,7 @@ layout(location = 0) out vec4 shown;
 const vec3 GROUND = vec3(0.22, 0.21, 0.20), SKY = vec3(1.05, 1.11, 1.18);
 const vec3 KEY = vec3(2.865, 2.722, 2.507);  // irradiance of the key light
 const float SPREAD = 0.2;                     // its angular radius [rad]
+const float SOFTEST = 0.1;                    // half width of its softest shadow, in its picture
 const vec3 BOUNCE = vec3(0.55, 0.545, 0.54);  // radiance of the floor
 const float PI = 3.14159265359, TURN = 6.28318530718;
 
@@ -27,30 +28,34 @@ vec3 domeDiffuse(float y) {
   return free + (BOUNCE - GROUND) * 0.5 * (1.0 - y);
 }
 
-// How much of the key light arrives: the farther what is in the way, the softer its shadow.
+// A place of `count` on a disk of radius 1. They turn from pixel to pixel (Jimenez 2014), so that there is grain in
+// place of bands.
+vec2 onDisk(int k, int count) {
+  float first = TURN * fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
+  float turn = first + float(k) * 2.39996;
+  return sqrt((float(k) + 0.5) / float(count)) * vec2(cos(turn), sin(turn));
+}
+
+// How much of the key light arrives: the farther what is in the way, the softer its shadow. What is in the way is
+// looked for as far around as the softest shadow reaches; else shadows would end at an edge.
 float lit(vec3 position, vec3 normal) {
   vec4 seen = light * vec4(position + normal * 0.012 * radius, 1.0);
   vec3 at = seen.xyz * 0.5 + 0.5;
-  if (any(greaterThan(abs(seen.xy), vec2(1.0)))) return 1.0;
-  float sum = 0.0, blockers = 0.0, depths = 0.0;
-  // The taps turn from pixel to pixel (Jimenez 2014), so that there is grain in place of bands.
-  float first = TURN * fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
-  for (int k = 0; k < 12; k++) {
-    float r = sqrt((float(k) + 0.5) / 12.0), turn = first + float(k) * 2.39996;
-    float depth = texture(shadows, at.xy + 0.05 * r * vec2(cos(turn), sin(turn))).r;
-    if (depth < min(at.z - 0.004, 0.9999)) {
+  if (any(greaterThan(abs(seen.xy), vec2(1.0 + 2.0 * SOFTEST)))) return 1.0;
+  float sum = 0.0, blockers = 0.0, depths = 0.0, limit = min(at.z - 0.004, 0.9999);
+  for (int k = 0; k < 16; k++) {
+    float depth = texture(shadows, at.xy + SOFTEST * onDisk(k, 16)).r;
+    if (depth < limit) {
       blockers += 1.0;
       depths += depth;
     }
   }
   if (blockers == 0.0) return 1.0;
-  float softness = clamp(SPREAD * 1.1 * (min(at.z, 2.0) - depths / blockers), 0.002, 0.1);
-  for (int k = 0; k < 16; k++) {
-    float r = sqrt((float(k) + 0.5) / 16.0), turn = first + float(k) * 2.39996;
-    vec2 place = at.xy + softness * r * vec2(cos(turn), sin(turn));
-    sum += texture(shadows, place).r < min(at.z - 0.004, 0.9999) ? 0.0 : 1.0;
+  float softness = clamp(SPREAD * 1.1 * (min(at.z, 2.0) - depths / blockers), 0.002, SOFTEST);
+  for (int k = 0; k < 32; k++) {
+    sum += texture(shadows, at.xy + softness * onDisk(k, 32)).r < limit ? 0.0 : 1.0;
   }
-  return sum / 16.0;
+  return sum / 32.0;
 }
 
 vec3 toLinear(vec3 srgb) {
@@ -106,6 +111,13 @@ vec3 surface(ivec2 at, vec4 here) {
   return direct + ambient;
 }
 
+// What of the dome reaches the floor: softer away from the object, where its shadows of single directions would show.
+float groundLight(vec2 at, float apart) {
+  float sum = 0.0;
+  for (int k = 0; k < 12; k++) sum += texture(ground, at + (0.01 + 0.12 * apart) * onDisk(k, 12)).r;
+  return sum / 12.0;
+}
+
 // Paper, with the shadow of the object where it is the floor.
 vec3 backdrop(vec3 way) {
   float down = (floor - eye.y) / min(way.y, -1e-4);
@@ -113,7 +125,7 @@ vec3 backdrop(vec3 way) {
   vec3 place = eye + down * way;
   vec2 at = place.xz / extent * 0.5 + 0.5;
   float apart = length(place.xz) / extent;
-  float open = apart < 1.0 ? mix(texture(ground, at).r, 1.0, smoothstep(0.5, 1.0, apart)) : 1.0;
+  float open = apart < 1.0 ? mix(groundLight(at, apart), 1.0, smoothstep(0.5, 1.0, apart)) : 1.0;
   float shade = (0.54 * lit(place, vec3(0.0, 1.0, 0.0)) + 0.80 * min(open, 1.0)) / 1.34;
   return paper * mix(shade, 1.0, smoothstep(2.0, 6.0, length(place.xz) / radius));
 }

@@ -50,7 +50,7 @@ void main() {
   //: ZERO
   for (uint k = row.x; k < row.x + row.y; k++) {
     uvec4 link = texelFetch(links, ivec2(int(k) & (LIST - 1), int(k) / LIST), 0);
-    ivec2 other = ivec2(int(link.x) & (WIDTH - 1), int(link.x) / WIDTH);
+    ivec2 place = ivec2(int(link.x) & (WIDTH - 1), int(link.x) / WIDTH);
     vec3 d = uintBitsToFloat(link.yzw);
     //: NEIGHBOUR
   }

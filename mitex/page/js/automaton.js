@@ -1,11 +1,12 @@
-// The cells of a surface: their states, the steps that they take, and the derivatives that pixels read.
+// The cells of a surface: their states, and the derivatives that pixels read. How they take steps is for
+// FragmentAutomaton and ComputeAutomaton.
 
 class Automaton {
-  constructor(graphics, surface, look, other = null) {
-    const shape = new RuleShape(look, graphics.blockSize);
-    Object.assign(this, { graphics, surface, shape, look });
+  constructor(graphics, surface, look, blockSize) {
+    const shape = new RuleShape(look, blockSize);
+    Object.assign(this, { graphics, surface, shape, look, steps: 0 });
     if (shape.vectors > graphics.targets) throw new Error("the rule has too many channels for this device");
-    this.states = [0, 1].map(() => this._target());
+    this.states = [this._target()];
     this.table = this._target(4); // the states, then their derivatives along x, y and z
     this.shares = surface.cells("R32F");
     this.condition = surface.cells("RGBA32F");
@@ -16,12 +17,19 @@ class Automaton {
       COPY: each(shape.vectors, (c) => `slope${c} = texelFetch(state${c}, at, 0);`),
       OWN: each(shape.vectors, (c) => `slope${c} = own * texelFetch(state${c}, at, 0);`),
       ADD: each(shape.vectors, (c) => `slope${c} += weight * texelFetch(state${c}, other, 0);`) }));
-    this.setLooks(look, other);
-    this.reset(0);
+  }
+
+  // Whether steps are on their way.
+  get busy() {
+    return false;
   }
 
   // Sets cells back to the seed.
   clear(vertices) {
+    this._clear(Uint32Array.from(vertices, (v) => this.surface.slots.slotOf[v]));
+  }
+
+  _clear(slots) {
     const { graphics, shape, surface } = this;
     const { gl } = graphics;
     this.clearing ??= graphics.program(SHADERS["clear.vert"], written(SHADERS["clear.frag"], {
@@ -29,34 +37,16 @@ class Automaton {
       ZERO: each(shape.vectors, (c) => `seed${c} = vec4(0.0);`) }));
     const points = gl.createBuffer();
     gl.bindBuffer(gl.ARRAY_BUFFER, points);
-    gl.bufferData(gl.ARRAY_BUFFER, Uint32Array.from(vertices, (v) => surface.slots.slotOf[v]), gl.STREAM_DRAW);
+    gl.bufferData(gl.ARRAY_BUFFER, slots, gl.STREAM_DRAW);
     gl.enableVertexAttribArray(0);
     gl.vertexAttribIPointer(0, 1, gl.UNSIGNED_INT, 0, 0);
     graphics.into(this.states[0]);
     this.clearing.use({ height: surface.height });
     gl.disable(gl.DEPTH_TEST);
-    gl.drawArrays(gl.POINTS, 0, vertices.length);
+    gl.drawArrays(gl.POINTS, 0, slots.length);
     gl.disableVertexAttribArray(0);
     gl.deleteBuffer(points);
     this.fresh = false;
-  }
-
-  // The look whose rule the cells follow, and another one that may be grafted onto it.
-  setLooks(look, other = null) {
-    const rules = other ? { rule: look, other } : { rule: look };
-    this._dropWeights();
-    this.look = look;
-    this.uniforms = {};
-    for (const [name, one] of Object.entries(rules)) {
-      Object.assign(this.uniforms, this.shape.buffers(this.graphics, one, name));
-      this.uniforms[`${name}Low`] = four(one.low, this.shape.vectors);
-      this.uniforms[`${name}High`] = four(one.high, this.shape.vectors);
-      this.uniforms[`${name}Bias`] = four(one.bias2, this.shape.vectors);
-    }
-    this.programs ??= {};
-    const key = Object.keys(rules).length;
-    this.programs[key] ??= this.graphics.program(SHADERS["fill.vert"], this.shape.shader(Object.keys(rules)));
-    this.program = this.programs[key];
   }
 
   reset(seed) {
@@ -65,16 +55,14 @@ class Automaton {
     this.write(new Float32Array(this.surface.mesh.count * this.shape.channels));
   }
 
-  step() {
-    const { surface, uniforms, condition, shares } = this;
-    const [from, to] = this.states;
-    this.graphics.fill(to, this.program, {
-      ...uniforms, ...textures(from, "state"), rows: surface.rows, links: surface.links, shares, condition,
-      phase: phaseOf(this.steps, this.seed), count: surface.mesh.count, regular: this.look.mean ? 6 : 0,
-    });
-    this.states = [to, from];
-    this.steps++;
-    this.fresh = false;
+  // Shares of the look that is grafted on, by cell.
+  share(values) {
+    this.graphics.refill(this.shares, values);
+  }
+
+  // What a moving texture is told: four numbers by cell.
+  tell(values) {
+    this.graphics.refill(this.condition, values);
   }
 
   // What pixels read: the states and their derivatives, as of now.
@@ -103,17 +91,26 @@ class Automaton {
   }
 
   write(values) {
+    this._show(this._planes(values));
+  }
+
+  // States as the textures have them, one after the other.
+  _planes(values) {
     const { channels, vectors } = this.shape;
-    const { slots, mesh } = this.surface;
-    for (let c = 0; c < vectors; c++) {
-      const rows = new Float32Array(4 * mesh.count);
-      for (let v = 0; v < mesh.count; v++) {
-        for (let k = 0; k < 4 && 4 * c + k < channels; k++) {
-          rows[4 * slots.slotOf[v] + k] = values[v * channels + 4 * c + k];
-        }
+    const { slots, mesh, height } = this.surface;
+    const planes = new Float32Array(vectors * 4 * WIDTH * height);
+    for (let v = 0; v < mesh.count; v++) {
+      for (let c = 0; c < channels; c++) {
+        planes[4 * ((c >> 2) * WIDTH * height + slots.slotOf[v]) + (c & 3)] = values[v * channels + c];
       }
-      this.graphics.refill(this.states[0].textures[c], rows);
     }
+    return planes;
+  }
+
+  _show(planes) {
+    const size = planes.length / this.shape.vectors;
+    this.states[0].textures.forEach((texture, c) =>
+      this.graphics.refill(texture, planes.subarray(c * size, (c + 1) * size)));
     this.fresh = false;
   }
 
@@ -123,14 +120,7 @@ class Automaton {
       graphics.texture("RGBA32F", WIDTH, parts * surface.height)));
   }
 
-  _dropWeights() {
-    for (const value of Object.values(this.uniforms ?? {})) {
-      if (value instanceof WebGLBuffer) this.graphics.gl.deleteBuffer(value);
-    }
-  }
-
   drop() {
-    this._dropWeights();
     [...this.states, this.table].forEach((target) => this.graphics.drop(target));
     this.graphics.gl.deleteTexture(this.shares);
     this.graphics.gl.deleteTexture(this.condition);
@@ -139,9 +129,3 @@ class Automaton {
 
 const textures = (target, name) =>
   Object.fromEntries(target.textures.map((texture, c) => [`${name}${c}`, texture]));
-
-function four(values, vectors) {
-  const padded = new Float32Array(4 * vectors);
-  padded.set(values);
-  return padded;
-}

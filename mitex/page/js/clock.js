@@ -18,14 +18,13 @@ class Clock {
     const passed = Math.min((now - (this.last ?? now)) / 1000, 0.25);
     this.last = now;
     const { page } = this;
-    if (this.playing) {
+    if (this.playing && !page.automaton.busy) {
       this.due = Math.min(this.due + this.rate * passed, MOST_STEPS);
       // A device that is slow at drawing shall not be asked for many steps, too.
       const steps = Math.min(Math.floor(this.due), passed > 0.1 ? 2 : MOST_STEPS);
       this.due = passed > 0.1 ? 0 : this.due - steps;
-      page.step(steps);
+      if (steps) page.step(steps);
       this.taken += steps;
-      page.changed = page.changed || steps > 0;
     }
     if (page.changed) this._draw(1, now);
     else if (page.samples < FINEST && now - this.stopped > 200 && this.cost < 300) this._draw(FINEST, now);

@@ -25,6 +25,13 @@ class Graphics {
     this.targets = Math.min(gl.getParameter(gl.MAX_DRAW_BUFFERS), gl.getParameter(gl.MAX_COLOR_ATTACHMENTS));
   }
 
+  // Whether a processor draws.
+  get software() {
+    const names = this.gl.getExtension("WEBGL_debug_renderer_info");
+    const name = this.gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : this.gl.RENDERER);
+    return /swiftshader|llvmpipe|software|basic render/i.test(name);
+  }
+
   program(vertex, fragment) {
     const sizes = `#version 300 es\n#define WIDTH ${WIDTH}\n#define LIST ${LIST}`;
     return new Program(this.gl, ...[vertex, fragment].map((text) => text.replace("#version 300 es", sizes)));

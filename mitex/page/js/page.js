@@ -1,11 +1,14 @@
 // A look that grows on a mesh. Everything that can be done with it is a method; the panel and tests call them.
 
 class Page extends View {
-  constructor(data, canvas) {
-    super(data, canvas);
+  // Steps are taken on `device`, or in WebGL2 if it is null.
+  constructor(data, graphics, device = null) {
+    super(data, graphics);
+    this.device = device;
     Object.assign(this, { looks: data.looks, seed: data.seed, field: data.field, speed: data.speed });
     Object.assign(this, { chosen: 0, grafted: null });
     this.setMesh(meshOf(data.meshes[0]), data.meshes[0].levels);
+    device?.lost.then(() => this._withoutDevice());
   }
 
   // Grows it on another one of the page's own meshes.
@@ -33,13 +36,30 @@ class Page extends View {
 
   // Cells on the surface, from the seed.
   _grow() {
-    this.automaton?.drop();
-    this.automaton = new Automaton(this.graphics, this.surface, this.look);
-    this.decoder ??= new Decoder(this.graphics, this.look);
-    this._weights();
+    this._settle();
     this.setShare(0);
-    this.move(this.field, this.speed);
     this.reset();
+  }
+
+  _settle() {
+    this.automaton?.drop();
+    const { graphics, surface, look, device } = this;
+    this.automaton = device ? new ComputeAutomaton(graphics, surface, look, device)
+      : new FragmentAutomaton(graphics, surface, look);
+    this.decoder ??= new Decoder(graphics, look);
+    this._weights();
+    this.move(this.field, this.speed);
+  }
+
+  // Goes on in WebGL2 with the states that have arrived: browsers may take a device away.
+  _withoutDevice() {
+    const { steps, seed } = this.automaton;
+    const states = this.automaton.read();
+    this.device = null;
+    this._settle();
+    this._shares(this.shares);
+    this.automaton.write(states);
+    Object.assign(this.automaton, { steps, seed });
   }
 
   reset(seed = this.seed) {
@@ -48,8 +68,9 @@ class Page extends View {
     this.changed = true;
   }
 
-  step(count = 1) {
-    for (let k = 0; k < count; k++) this.automaton.step();
+  // Takes steps; pictures show them when the promise is kept.
+  async step(count = 1) {
+    await this.automaton.advance(count);
     this.changed = true;
   }
 
@@ -66,7 +87,7 @@ class Page extends View {
     if (!this.look.condition) return;
     const { mesh, slots } = this.surface;
     const told = conditionOf(mesh, field, speed, this.look.fastest ?? Infinity, this.turn);
-    this.graphics.refill(this.automaton.condition, slots.spread(told, 3));
+    this.automaton.tell(slots.spread(told, 3));
   }
 
   // Another look on the mesh; one of the same family goes on from the state that is there.
@@ -102,7 +123,7 @@ class Page extends View {
 
   _shares(shares) {
     this.shares = shares;
-    this.graphics.refill(this.automaton.shares, this.surface.slots.order(shares));
+    this.automaton.share(this.surface.slots.order(shares));
     this.changed = true;
   }
 

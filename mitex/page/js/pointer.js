@@ -78,8 +78,8 @@ class Pointer {
   _point(event) {
     const { canvas } = this.page;
     const box = canvas.getBoundingClientRect();
-    const scale = canvas.width / box.width;
-    return this.page.pick((event.clientX - box.left) * scale, (event.clientY - box.top) * scale);
+    const [x, y] = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
+    return this.page.pick(x * canvas.width, y * canvas.height);
   }
 
   // A circle of the brush's size where the pointer is.

@@ -9,12 +9,20 @@ function readMesh(bytes, name) {
   const suffix = name.toLowerCase().split(".").pop();
   const reader = { obj: readObj, ply: readPly, glb: readGlb }[suffix];
   if (!reader) throw new Error(`${name} is no OBJ, PLY or GLB file`);
-  const { positions, faces } = welded(reader(bytes));
+  const { positions, faces } = welded(given(reader, bytes, name));
   const count = positions.length / 3;
   if (!faces.length || !positions.every(Number.isFinite)) throw new Error(`${name} has no faces that can be shown`);
   if (count > MOST_VERTICES) throw new Error(`${name} has more than ${MOST_VERTICES.toLocaleString()} vertices`);
   if (faces.some((index) => !(index < count))) throw new Error(`${name} is damaged: a face has no such vertex`);
   return new Mesh(positions, faces, name.replace(/\.\w+$/, ""));
+}
+
+function given(reader, bytes, name) {
+  try {
+    return reader(bytes);
+  } catch (error) {
+    throw new Error(`${name} is damaged, or no such file: ${error.message}`);
+  }
 }
 
 const autoLevels = (count) => {

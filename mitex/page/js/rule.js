@@ -6,7 +6,7 @@ const HARMONICS = [
 ];
 const COUNTS = { 0: 1, 1: 4, 2: 9 }; // highest degree -> harmonics
 
-// What the shaders of two looks must have in common to be grafted.
+// What the shaders of two looks must have in common to be grafted; weights are in blocks of so many bytes.
 class RuleShape {
   constructor(look, blockSize) {
     this.channels = look.channels;
@@ -21,8 +21,8 @@ class RuleShape {
     if (!this.perBlock) throw new Error("the rule is too wide for this device");
   }
 
-  // The buffers of a look's weights, by block; `name` is that of the rule in the shader.
-  buffers(graphics, look, name) {
+  // A look's weights, by block.
+  weights(look) {
     const inputs = (this.harmonics + 1) * this.channels + this.condition;
     const place = (i) => {
       const block = Math.min(Math.floor(i / this.channels), this.harmonics + 1);
@@ -31,59 +31,69 @@ class RuleShape {
     const first = pieces(look.weight1, look.hidden, inputs, place);
     const second = pieces(look.weight2, look.channels, look.hidden);
     const parts = first.flatMap((row, g) => [...row, ...second.map((out) => out[g]), column(look.bias1, g)]);
-    return Object.fromEntries(Array.from({ length: this.blocks }, (_, b) => {
+    return Array.from({ length: this.blocks }, (_, b) => {
       const block = parts.slice(b * this.perBlock * this.stride, (b + 1) * this.perBlock * this.stride);
       while (block.length < this.perBlock * this.stride) block.push(new Float32Array(16));
-      return [`${name}${b}Block`, graphics.block(joined(block))];
-    }));
-  }
-
-  shader(rules) {
-    const n = this.vectors;
-    const z = (k, c) => `z${k}_${c}`;
-    const kinds = Array.from({ length: this.harmonics }, (_, k) => k);
-    const all = (line) => kinds.map((k) => each(n, (c) => line(k, c))).join("\n");
-    return written(SHADERS["step.frag"], {
-      SAMPLERS: each(n, (c) => `uniform sampler2D state${c};`),
-      CONSTANTS: `const int VECTORS = ${n};\n#define GRAFT ${rules.length > 1 ? 1 : 0}\n`
-        + `#define CONDITION ${this.condition ? 1 : 0}`,
-      OUTPUTS: each(n, (c) => `layout(location = ${c}) out vec4 next${c};`),
-      BLOCKS: rules.map((rule) => each(this.blocks, (b) =>
-        blockText(`${rule}${b}`, this.perBlock * this.stride))).join(""),
-      OWN: each(n, (c) => `vec4 s${c} = texelFetch(state${c}, at, 0);`),
-      KEEP: each(n, (c) => `next${c} = ${this._held(rules, c, "")};`),
-      ZERO: all((k, c) => `vec4 ${z(k, c)} = vec4(0.0);`),
-      NEIGHBOUR: each(n, (c) => `vec4 o${c} = texelFetch(state${c}, other, 0) - s${c};`) + "\n"
-        + kinds.map((k) => `float w${k} = ${HARMONICS[k]};`).join("\n") + "\n"
-        + all((k, c) => `${z(k, c)} += w${k} * o${c};`),
-      MEAN: all((k, c) => `${z(k, c)} *= share;`),
-      CHANGES: rules.map((rule) => each(n, (c) => `vec4 ${rule}u${c} = ${rule}Bias[${c}];`)).join("\n"),
-      RULES: rules.map((rule, r) => this._network(rule, ["share0 < 1.0", "share0 > 0.0"][r])).join("\n"),
-      NEXT: each(n, (c) => `next${c} = ${this._held(rules, c,
-        rules.length > 1 ? ` + mix(ruleu${c}, otheru${c}, share0)` : ` + ruleu${c}`)};`),
-      BOUNDS: rules.map((rule) =>
-        `uniform vec4 ${rule}Low[VECTORS], ${rule}High[VECTORS], ${rule}Bias[VECTORS];`).join("\n"),
+      return joined(block);
     });
   }
 
-  // A state and its change, within the bounds of the training.
-  _held(rules, c, change) {
-    const bound = (name) => (rules.length > 1 ? `mix(rule${name}[${c}], other${name}[${c}], share0)` : `rule${name}[${c}]`);
-    return `held(s${c}${change}, ${bound("Low")}, ${bound("High")})`;
+  // The bounds of a look's states and the bias of their changes, by name; `rule` is that of the rule in the shader.
+  bounds(look, rule) {
+    const { vectors } = this;
+    return { [`${rule}Low`]: four(look.low, vectors), [`${rule}High`]: four(look.high, vectors),
+      [`${rule}Bias`]: four(look.bias2, vectors) };
   }
 
-  _network(rule, needed) {
-    const inputs = Array.from({ length: this.harmonics * this.vectors }, (_, i) =>
-      `z${Math.floor(i / this.vectors)}_${i % this.vectors}`);
-    for (let c = 0; c < this.vectors; c++) inputs.push(`s${c}`);
-    if (this.condition) inputs.push("told");
-    const loop = (b) => `for (int g = 0; g < ${this.perBlock}; g++) {
-      int k = g * ${this.stride};
-      vec4 h = ${rule}${b}[k + ${this.stride - 1}][0];
-      ${inputs.map((x, i) => `h += ${rule}${b}[k + ${i}] * ${x};`).join("\n")}
-      h = max(h, 0.0);
-      ${each(this.vectors, (c) => `${rule}u${c} += ${rule}${b}[k + ${this.inputs + c}] * h;`)}
-    }`;
-    return `if (${needed}) {\n${each(this.blocks, loop)}\n}`;
+  // What one cell perceives of its neighbours, in one of the languages: texts for its template.
+  perception({ vector, number, state, zero }) {
+    const { vectors: n } = this;
+    const kinds = Array.from({ length: this.harmonics }, (_, k) => k);
+    const all = (line) => kinds.map((k) => each(n, (c) => line(`z${k}_${c}`, k, c))).join("\n");
+    return {
+      OWN: each(n, (c) => vector(`s${c}`, state(c, "at"))),
+      ZERO: all((z) => vector(z, zero)),
+      NEIGHBOUR: `${each(n, (c) => vector(`o${c}`, `${state(c, "place")} - s${c}`))}\n`
+        + `${kinds.map((k) => number(`w${k}`, HARMONICS[k])).join("\n")}\n`
+        + all((z, k, c) => `${z} += w${k} * o${c};`),
+      MEAN: all((z) => `${z} *= share;`),
+    };
   }
+
+  // The names of the vectors that the network reads.
+  get inputNames() {
+    const perceived = Array.from({ length: this.harmonics * this.vectors }, (_, i) =>
+      `z${Math.floor(i / this.vectors)}_${i % this.vectors}`);
+    const own = Array.from({ length: this.vectors }, (_, c) => `s${c}`);
+    return [...perceived, ...own, ...(this.condition ? ["told"] : [])];
+  }
+
+  // The network of a rule, on so many cells at a time: what is read of its weights serves all of them. `input` and
+  // `change` name what it reads and adds to.
+  network(rule, { vector, matrix, zero, loop, index }, cellCount, input, change) {
+    const { stride } = this;
+    const cells = Array.from({ length: cellCount }, (_, m) => m);
+    const on = (line) => cells.map(line).join(" ");
+    const product = (b, k, line) => `{ ${matrix("w", `${rule}${b}[k + ${k}]`)} ${on(line)} }`;
+    return each(this.blocks, (b) => `${loop(this.perBlock)} {
+      ${index(stride)}
+      ${on((m) => vector(`h${m}`, `${rule}${b}[k + ${stride - 1}][0]`))}
+      ${each(this.inputs, (i) => product(b, i, (m) => `h${m} += w * ${input(i, m)};`))}
+      ${on((m) => `h${m} = max(h${m}, ${zero});`)}
+      ${each(this.vectors, (c) => product(b, this.inputs + c, (m) => `${change(c, m)} += w * h${m};`))}
+    }`);
+  }
+
+  // A cell's next state: its own one and the changes by the rules, if there are any, within the bounds of the training.
+  held(rules, { bound }, c, own, changes = []) {
+    const mixed = (values) => (rules.length > 1 ? `mix(${values.join(", ")}, share0)` : values[0]);
+    const bounds = ["Low", "High"].map((kind) => mixed(rules.map((rule) => bound(`${rule}${kind}`, c))));
+    return `held(${own}${changes.length ? ` + ${mixed(changes)}` : ""}, ${bounds.join(", ")})`;
+  }
+}
+
+function four(values, vectors) {
+  const padded = new Float32Array(4 * vectors);
+  padded.set(values);
+  return padded;
 }

@@ -1,13 +1,16 @@
 // Opens the page. With #still=SIDE nothing moves by itself, and pictures are squares of so many pixels: for
-// those who drive it from outside.
+// those who drive it from outside. #steps=webgl and #steps=webgpu say what takes the steps.
 
 async function open() {
   const by = (id) => document.getElementById(id);
   const data = await unpacked(JSON.parse(by("data").textContent));
   const canvas = by("picture");
-  const page = data.looks ? new Page(data, canvas) : await StillPage.of(data, canvas);
+  const options = new URLSearchParams(location.hash.slice(1));
+  const graphics = new Graphics(canvas);
+  const page = data.looks ? new Page(data, graphics, await computeDevice(options.get("steps"), graphics))
+    : await StillPage.of(data, graphics);
   page.studio.paper = paperOf(canvas);
-  const still = Number(/^#still=(\d+)$/.exec(location.hash)?.[1]);
+  const still = Number(options.get("still"));
   const fit = () => {
     const scale = Math.min(window.devicePixelRatio || 1, 2);
     canvas.width = still || Math.max(Math.round(canvas.clientWidth * scale), 1);
@@ -22,10 +25,10 @@ async function open() {
   listenToKeys(page, panel);
   listenToDrops(panel);
   page.panel = panel;
+  if (data.live) follow(page, panel);
   if (still) return page;
   clock.start();
   new ResizeObserver(fit).observe(canvas);
-  if (data.live) follow(page, panel);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     page.studio.paper = paperOf(canvas);
     page.changed = true;

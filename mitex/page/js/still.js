@@ -1,14 +1,14 @@
 // An asset that does not grow: its maps are textures, or values at the vertices.
 
 class StillPage extends View {
-  static async of(data, canvas) {
-    const page = new StillPage(data, canvas);
+  static async of(data, graphics) {
+    const page = new StillPage(data, graphics);
     await page._read();
     return page;
   }
 
-  constructor(data, canvas) {
-    super(data, canvas);
+  constructor(data, graphics) {
+    super(data, graphics);
     this.show(meshOf(data.mesh));
     this.baked = Boolean(data.uv);
     const program = written(SHADERS["still.frag"], { SURFACE: SHADERS["surface.glsl"],

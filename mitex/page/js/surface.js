@@ -13,8 +13,10 @@ class Surface {
     this.normals = this._cells("RGBA32F", slots.spread(mesh.normals, 3));
     this.faceCount = mesh.faces.length / 3;
     this.corners = graphics.list("RGBA32UI", this._corners());
-    this.rows = this._cells("RGBA32UI", this._rows());
-    this.links = graphics.list("RGBA32UI", this._links(turn));
+    this.rowValues = this._rows();
+    this.linkValues = this._links(turn);
+    this.rows = this._cells("RGBA32UI", this.rowValues);
+    this.links = graphics.list("RGBA32UI", this.linkValues);
     const { links, own } = gradients(this.points, mesh);
     this.slopes = graphics.list("RGBA32F", links);
     this.ownSlopes = this._cells("RGBA32F", slots.spread(own, 3));
@@ -23,7 +25,8 @@ class Surface {
   // Turns the texture about the normals by this angle [rad].
   orient(turn) {
     this.turn = turn;
-    this.graphics.refill(this.links, this._links(turn));
+    this.linkValues = this._links(turn);
+    this.graphics.refill(this.links, this.linkValues);
   }
 
   // A texture with a texel for each cell.

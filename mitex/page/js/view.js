@@ -1,9 +1,8 @@
 // A mesh in the studio's light, whatever it wears: what pages have in common.
 
 class View {
-  constructor(data, canvas) {
-    this.graphics = new Graphics(canvas);
-    Object.assign(this, { data, canvas, turn: data.turn ?? 0, samples: 1 });
+  constructor(data, graphics) {
+    Object.assign(this, { data, graphics, canvas: graphics.canvas, turn: data.turn ?? 0, samples: 1 });
     this.studio = new Studio(this.graphics);
   }
 

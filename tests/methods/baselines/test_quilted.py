@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mitex.errors import CheckpointError, ConfigError, MeshError
-from mitex.export.common import bilinear
+from mitex.images import bilinear
 from mitex.mesh import Mesh, grid, icosphere
 from mitex.methods.baselines.quilted import QuiltedTexture, fit, fitting
 from mitex.methods.baselines.quilted.albedo import in_even_light, quilted_albedo

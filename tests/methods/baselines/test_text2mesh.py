@@ -1,24 +1,24 @@
-"""Text2Mesh with an image: the network against torch's layers, what views show, and what is refused."""
+"""Text2Mesh with an image: what views show, and what is refused."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
-from torch import nn
 
+from mitex.asset import Asset
+from mitex.cli import main
 from mitex.errors import CheckpointError, ConfigError, ImageError
 from mitex.exemplar import Exemplar
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.baselines import text2mesh
 from mitex.methods.baselines.text2mesh import Text2MeshConfig, Text2MeshTexture
-from mitex.methods.baselines.text2mesh.cameras import cameras_of
-from mitex.methods.baselines.text2mesh.field import HEAD, TRUNK, colours, encoded, random_weights
 from mitex.methods.baselines.text2mesh.task import Text2MeshTask
 from mitex.methods.layout import with_layout
+from mitex.methods.style_cameras import cameras_of
 from mitex.runtime import threads
 from mitex.scenes.cameras import orbit
+from tests.cli import bad_files
 from tests.training.contract import (
     FAULTS,
     assert_loss_is_pure,
@@ -50,40 +50,11 @@ def ball() -> Mesh:
     return with_layout(icosphere(4), 32)
 
 
-class TestField:
-    def test_as_many_weights_as_published_but_for_the_head_of_offsets(self):
-        """659 thousand with a second head of two layers and one number."""
-        weights = random_weights(256, 256, torch.Generator())
-        offsets = HEAD * (256 * 256 + 256) + 257
-        assert sum(value.numel() for value in weights.values()) + offsets == 659_460
-
-    def test_it_equals_torch_s_layers(self):
-        weights = random_weights(4, 8, torch.Generator().manual_seed(0))
-        weights = {name: value.normal_() for name, value in weights.items()}
-        waves, points = torch.randn(4, 3), torch.randn(5, 3)
-        layers: list[nn.Module] = []
-        for k in range(TRUNK + HEAD + 1):
-            outputs, inputs = weights[f"weight{k}"].shape
-            layer = nn.Linear(inputs, outputs)
-            layer.weight.data, layer.bias.data = weights[f"weight{k}"], weights[f"bias{k}"]
-            layers += [layer, nn.ReLU() if k < TRUNK + HEAD else nn.Tanh()]
-        wave = [2 * math.pi * sum(p * w for p, w in zip(points[0], one, strict=True)) for one in waves]
-        row = torch.tensor([*points[0], *map(math.cos, wave), *map(math.sin, wave)])
-        assert torch.allclose(encoded(points, waves)[0], row, atol=1e-5)
-        expected = (1 + nn.Sequential(*layers)(encoded(points, waves))) / 2
-        assert torch.allclose(colours(weights, points, waves), expected, atol=1e-6)
-
-    def test_the_start_is_grey(self):
-        weights = random_weights(4, 8, torch.Generator().manual_seed(0))
-        assert torch.equal(colours(weights, torch.randn(9, 3), torch.randn(4, 3)), torch.full((9, 3), 0.5))
-
-
 class TestViews:
     def test_they_show_the_colours_of_places(self, ball, exemplar, monkeypatch):
         """A field that is the place itself: the middle of a view from +z is the pole of the ball."""
         task = Text2MeshTask(CONFIG, exemplar, ball)
-        name = "mitex.methods.baselines.text2mesh.task.colours"
-        monkeypatch.setattr(name, lambda weights, points, waves: 0.5 + 0.5 * points)
+        monkeypatch.setattr(task, "colours", lambda points: 0.5 + 0.5 * points)
         views, masks = task.views(orbit(1, elevation=0, distance=2.0, fov=60.0, resolution=49, start=90))
         assert torch.allclose(views[0, 24, 24], torch.tensor([0.5, 0.5, 1.0]), atol=0.02)
         assert views[0, 24, 40, 0] > 0.7 and views[0, 8, 24, 1] > 0.7
@@ -117,7 +88,7 @@ class TestTask:
     def test_options_matter(self, ball, exemplar):
         def value(**options) -> float:
             task = Text2MeshTask(replace(CONFIG, **options), exemplar, ball)
-            for name in ("weight7", "bias7"):
+            for name in ("colours.2.weight", "colours.2.bias"):
                 task.named[name].data.normal_(generator=torch.Generator().manual_seed(0))
             return float(task.loss(0, torch.Generator().manual_seed(5)).value.detach())
 
@@ -150,6 +121,21 @@ def test_resuming_changes_nothing(exemplar, tmp_path):
         text2mesh.fit(exemplar, icosphere(5), tmp_path / "part", steps=6, resume=True)
 
 
+def test_from_words_to_a_file(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    bad_files.text(tmp_path / "cube.obj", bad_files.CUBE)
+    settings = "resolution=32 view=32 width=8 frequencies=4 views=1 text_vertices=50 preview_every=2"
+    words = f"fit text2mesh --text dots --clip words --mesh cube.obj --quiet --steps 2 --set {settings}"
+    assert main(words.split()) == 0
+    run = tmp_path / capsys.readouterr().out.strip()
+    assert run.name == "dots-cube-text2mesh" and (run / "previews" / "000002.png").is_file()
+    assert main(["apply", str(run), "--mesh", "cube.obj", "--out", "cube.glb", "--quiet"]) == 0
+    written, learned = Asset.load(tmp_path / "cube.glb"), Text2MeshTexture.load(run)
+    assert learned.shape is not None and len(learned.shape.vertices) >= 50
+    np.testing.assert_allclose(written.mesh.vertices.max(0), learned.shape.vertices.max(0), atol=1e-5)
+    assert np.abs(written.mesh.vertices.max(0) - learned.mesh.vertices.max(0)).max() > 1e-5
+
+
 class TestRefused:
     @pytest.mark.parametrize(
         ("setting", "message"),
@@ -162,6 +148,24 @@ class TestRefused:
     def test_settings(self, setting, message, exemplar, ball):
         with pytest.raises(ConfigError, match=message):
             text2mesh.fit(exemplar, ball, set=[setting])
+
+    @pytest.mark.parametrize(
+        ("words", "message"),
+        [
+            ("", "--exemplar is missing; give --exemplar IMAGE, or --text WORDS"),
+            ("--exemplar lava --text red", "--text and --exemplar contradict each other"),
+            ("--exemplar lava --clip words", "--clip means nothing without --text"),
+            ("--exemplar lava --preset text", "the preset text is for words, not for exemplars"),
+            ("--text red --preset paper", "the preset paper is for exemplars, not for words"),
+            ("--text frobs --clip words", "does not know the word 'frobs'"),
+            ("--text red --clip no/folder", "no/folder"),
+        ],
+    )
+    def test_command_lines(self, words, message, tmp_path, monkeypatch, capsys):
+        monkeypatch.chdir(tmp_path)
+        assert main(f"fit text2mesh --mesh vase --quiet {words}".split()) == 2
+        error = capsys.readouterr().err
+        assert message in error and error.count("\n") == 1 and not list(tmp_path.iterdir())
 
     def test_no_colours(self, ball):
         height = Exemplar({"height": np.zeros((32, 32, 1), np.float32)}, "hills")

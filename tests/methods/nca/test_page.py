@@ -10,8 +10,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from mitex.errors import ConfigError, OutputError
-from mitex.export.common import bilinear
 from mitex.geometry.vectors import unit
+from mitex.images import bilinear
 from mitex.mesh import Mesh, icosphere, subdivide_midpoint, torus
 from mitex.methods.nca import NcaTexture, living_page
 from mitex.methods.nca.bake import Grown
@@ -37,10 +37,16 @@ def cells():
 
 
 @pytest.fixture(scope="module")
-def tab(browser, texture, tmp_path_factory):
+def path(texture, tmp_path_factory):
     path = tmp_path_factory.mktemp("page") / "torus.html"
     looks = [NcaTexture.load("lava")]
-    living_page(texture, torus(12, 6), path, looks=looks, seed=SEED, steps=1, subdivide=1, orientation=TURN)
+    return living_page(
+        texture, torus(12, 6), path, looks=looks, seed=SEED, steps=1, subdivide=1, orientation=TURN
+    )
+
+
+@pytest.fixture(scope="module")
+def tab(browser, path):
     return browser.open(path)
 
 
@@ -49,30 +55,34 @@ def states(texture, mesh):
     """The states after each step, (V, C), with the page's masks."""
     look = texture.look
     operator = perception(mesh, look.rule.degree, np.radians(TURN), mean=look.mean)
-    state = look.rule.seed(operator)
+    values = look.rule.seed(operator)
     for step in range(200):
         fires = torch.from_numpy(mask(len(mesh.vertices), step, SEED))
-        state = look.bounded(look.rule.step(state, operator, fires))
-        yield state[0]
+        values = look.bounded(look.rule.step(values, operator, fires))
+        yield values[0]
 
 
 @pytest.fixture(scope="module")
 def grown(tab, texture, cells):
     """The page's state after 200 steps, and Python's; those after 16 are compared on the way."""
     every = list(states(texture, cells))
-    tab.run("page.reset(); page.step(16)")
-    early = tab.array("page.automaton.read()").reshape(len(cells.vertices), -1)
-    assert np.abs(early - every[15].numpy()).max() < 1e-3
     assert every[15].abs().max() > 0.3
-    tab.run("page.step(184)")
-    return torch.from_numpy(tab.array("page.automaton.read()").reshape(early.shape).copy()), every[-1]
+    tab.run("page.reset(); await page.step(16)")
+    assert (state(tab, cells) - every[15]).abs().max() < 1e-3
+    tab.run("await page.step(184)")
+    return state(tab, cells), every[-1]
 
 
-def shown(texture, state, cells, ids):
+def state(tab, cells):
+    """The page's states, (V, C)."""
+    return torch.from_numpy(tab.array("page.automaton.read()").copy()).reshape(len(cells.vertices), -1)
+
+
+def shown(texture, states, cells, ids):
     """What Python shows at the pixels that see the surface: maps and normals."""
     face, bits = ids[:, 0].astype(np.int64) - 1, ids[:, 1:3].copy().view(np.float32)
     barycentric = np.column_stack([bits, 1 - bits.sum(1)])
-    grown = Grown(texture.look, state, Cells(cells, 0, cells), np.radians(TURN), texture._palette)
+    grown = Grown(texture.look, states, Cells(cells, 0, cells), np.radians(TURN), texture._palette)
     maps = grown.maps(grown.values(face.astype(np.int32), barycentric))
     return maps, unit(grown.object_normals(maps["normal"], face, barycentric))
 
@@ -81,6 +91,30 @@ def test_states_are_those_of_python(grown):
     ours, theirs = grown
     # Rounding grows where a pattern can tip over; a cell in a hundred may show it after so many steps.
     assert ((ours - theirs).abs().amax(1) < 0.05).float().mean() > 0.99
+
+
+@pytest.fixture(scope="module")
+def compute(browser, path):
+    """The page with WebGPU."""
+    tab = browser.open(path, steps="webgpu")
+    assert tab.run("return page.automaton.device === page.device && page.device instanceof GPUDevice")
+    return tab
+
+
+def test_webgpu_takes_the_same_steps(compute, tab, texture, cells, grown):
+    every = states(texture, cells)
+    early = [next(every) for _ in range(16)][-1]
+    compute.run("await page.step(16)")
+    assert (state(compute, cells) - early).abs().max() < 1e-3
+    compute.run("await page.step(184)")
+    assert np.abs(compute.picture() - tab.picture()).mean() < 2e-3
+
+
+# The orientation of the steps, and a seed and a brush while steps are on their way.
+SCRIPT = """page.orient(1); const late = page.step(20); page.reset(5); await late; await page.step(20);
+const more = page.step(5); const erased = page.erase({ face: 7, barycentric: [0.3, 0.3, 0.4] }, 0.5);
+await more; const wiped = page.automaton.read(); await page.step(3);
+return erased.every((v) => wiped.subarray(16 * v, 16 * v + 16).every((x) => x === 0))"""
 
 
 def test_pixels_are_those_of_python(tab, texture, cells, grown):
@@ -147,37 +181,39 @@ def test_erased_cells_are_the_seed_and_grow_again(tab, cells):
     middle = [int(columns[len(rows) // 3]), int(127 - rows[len(rows) // 3])]
     # A ball as wide as the tube would reach its other side, which no path of this length does.
     erased = tab.run("return page.erase(page.pick(...argument), 0.85)", middle)
-    state = tab.array("page.automaton.read()").reshape(len(cells.vertices), -1)
-    assert (state[erased] == 0).all() and (np.delete(state, erased, 0) != 0).any(1).all()
+    wiped = state(tab, cells).numpy()
+    assert (wiped[erased] == 0).all() and (np.delete(wiped, erased, 0) != 0).any(1).all()
     graph, points = cells.edges, cells.vertices[cells.edges.indices] - cells.vertices[cells.edges.rows]
     lengths = csr_array((np.linalg.norm(points, axis=1), graph.indices, graph.indptr))
     paths = dijkstra(lengths, indices=erased)[:, erased]
     assert len(erased) > 10 and paths.max() < 2.2 * 0.85 * 1.15
-    tab.run("page.step(40)")
-    grown = tab.array("page.automaton.read()").reshape(state.shape)
-    assert (grown[erased] != 0).any(1).all()
+    tab.run("await page.step(40)")
+    assert (state(tab, cells)[erased] != 0).any(1).all()
 
 
 @torch.no_grad()
-def test_grafted_looks_share_their_steps_and_their_pictures(tab, texture, cells):
-    tab.run("page.setGraft(1); page.reset(); page.step(30)")
-    before = torch.from_numpy(tab.array("page.automaton.read()").reshape(len(cells.vertices), -1).copy())
+def test_grafted_looks_share_their_steps_and_their_pictures(tab, compute, texture, cells):
+    tab.run("page.setGraft(1); page.reset(); await page.step(30)")
+    before = state(tab, cells)
     weights = np.clip(0.5 + cells.vertices[:, 0], 0, 1)
     cells_ = Cells(cells, 0, cells)
     first, second = (look.growth(cells_, np.radians(TURN)) for look in (texture, NcaTexture.load("lava")))
     graft = GraftedGrowth(first, second, weights)
-    tab.run("page._shares(Float32Array.from(argument)); page.step(1)", weights.tolist())
+    tab.run("page._shares(Float32Array.from(argument)); await page.step(1)", weights.tolist())
     fires = torch.from_numpy(mask(len(weights), 30, SEED))[None]
     with patch("torch.rand", lambda *_, **__: 1 - fires.float()):
         expected = graft._step(before[None], torch.Generator())[0]
-    after = tab.array("page.automaton.read()").reshape(before.shape)
-    assert np.abs(after - expected.numpy()).max() < 1e-4
+    after = state(tab, cells)
+    assert (after - expected).abs().max() < 1e-4
+    script = """const { automaton, looks } = page; const [shares, states] = argument;
+    automaton.setLooks(...looks); page._shares(Float32Array.from(shares));
+    automaton.write(Float32Array.from(states)); automaton.steps = 30; await page.step(1)"""
+    compute.run(script, [weights.tolist(), before.ravel().tolist()])
+    assert (state(compute, cells) - expected).abs().max() < 1e-4
     colour, *_, ids = tab.maps()
     hit = ids[..., 0] > 0
     face, bits = ids[hit][:, 0].astype(np.int32) - 1, ids[hit][:, 1:3].copy().view(np.float32)
-    values = graft.shown(torch.from_numpy(after.copy())).values(
-        face, np.column_stack([bits, 1 - bits.sum(1)])
-    )
+    values = graft.shown(after).values(face, np.column_stack([bits, 1 - bits.sum(1)]))
     assert np.abs(colour[hit][:, :3] - values[:, :3]).max() < 4e-3
     tab.run("page.setGraft(null); page.setShare(0)")
 
@@ -191,10 +227,9 @@ def test_a_downloaded_asset_shows_what_the_page_shows(tab, texture, cells, tmp_p
     scene = trimesh.load_scene(path, process=False)
     (geometry,) = scene.geometry.values()
     image = np.asarray(geometry.visual.material.baseColorTexture.convert("RGB")) / 255
-    state = torch.from_numpy(tab.array("page.automaton.read()").reshape(len(cells.vertices), -1).copy())
     faces = np.arange(len(cells.faces), dtype=np.int32)
     middles = np.full((len(faces), 3), 1 / 3, np.float32)
-    grown = Grown(texture.look, state, Cells(cells, 0, cells), np.radians(TURN), texture._palette)
+    grown = Grown(texture.look, state(tab, cells), Cells(cells, 0, cells), np.radians(TURN), texture._palette)
     expected = grown.maps(grown.values(faces, middles))["albedo"]
     uv = geometry.visual.uv.reshape(-1, 3, 2).mean(axis=1)  # trimesh has v upwards
     baked = bilinear(image, uv)
@@ -206,6 +241,19 @@ def test_a_downloaded_asset_is_valid(tab, tmp_path):
     path.write_bytes(tab.array("await page.glb(128)").tobytes())
     (report,) = khronos_reports([path])
     assert [issue for issue in report["issues"]["messages"] if issue["severity"] < 2] == []
+
+
+def test_a_device_that_is_lost_is_not_missed(compute, cells):
+    compute.run("page.automaton.setLooks(page.look)")
+    assert compute.run(SCRIPT)
+    before = state(compute, cells)
+    compute.run("page.device.destroy(); await page.device.lost")
+    assert compute.run("return [page.device, page.automaton.steps]") == [None, 28]
+    assert torch.equal(state(compute, cells), before)
+    compute.run("page.orient(0)")
+    assert compute.run(SCRIPT)  # now in WebGL2
+    assert (state(compute, cells) - before).abs().max() < 1e-3 < before.abs().max()
+    assert compute.errors == []
 
 
 HOSTILE = "<img src=x onerror=window.attacked=1></script><script>window.attacked=1</script>"

@@ -1,4 +1,4 @@
-"""`AppliedField`: a plain field as a picture or as a mesh, in the world of its capture."""
+"""`AppliedField`: a field as a picture or as a mesh, in the world that its cube lies in."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -14,29 +14,40 @@ from mitex.asset import Asset
 from mitex.export import Format, prepare_export
 from mitex.mesh import Similarity
 from mitex.methods.nerf.field.tensors import channels, rows
-from mitex.methods.nerf.training.plain import PlainField
 from mitex.methods.nerf.use.extract import CHUNK, solid_surface
-from mitex.runtime.jit import mi
+from mitex.runtime.jit import dr, mi
+from mitex.textures.march import RadianceField
 
 
-class AppliedField:
-    """The object of a capture: a `RadianceField` in the scene cube, and what leaves it.
+class SolidField(RadianceField, Protocol):
+    """A field whose density can be asked for."""
+
+    def density_at(self, points: np.ndarray) -> np.ndarray:
+        """Density [1 / scene units] of points (N, 3) of the scene cube, (N,)."""
+        ...
+
+
+Field = TypeVar("Field", bound=SolidField)
+
+
+class AppliedField(Generic[Field]):
+    """A `RadianceField` in the scene cube, and what leaves it.
 
     Args:
-        field: as it was learned.
-        similarity: the capture's world -> scene cube.
+        field: of an object, as it was learned, or around a mesh.
+        similarity: the object's world -> scene cube.
         name: of the object.
         strength: factor of the density.
     """
 
-    def __init__(self, field: PlainField, similarity: Similarity, name: str, strength: float = 1.0) -> None:
+    def __init__(self, field: Field, similarity: Similarity, name: str, strength: float = 1.0) -> None:
         self.field, self.similarity, self.name, self.strength = field, similarity, name, strength
         self.mask, self.step = field.mask, field.step
 
     def evaluate(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, mi.Float, mi.Color3f]:
         """As of `RadianceField`."""
         index, density, colour = self.field.evaluate(points, view)
-        return index, density * self.strength, colour
+        return index, density * self.strength if dr.width(index) else density, colour
 
     def density(self, points: np.ndarray) -> np.ndarray:
         """Density [1 / scene units] of points (N, 3) of the scene cube, (N,)."""
@@ -70,19 +81,20 @@ class AppliedField:
 
     @cached_property
     def surface(self) -> Asset:
-        """A mesh of what is solid in the capture's world, see `solid_surface`; its colours are those that are
-        seen along the normals."""
+        """A mesh of what is solid in the object's world, see `solid_surface`; its colours are those that are
+        seen along the normals, grey where there is no matter."""
         mesh = solid_surface(self.density, np.array(self.mask).astype(bool), self.name)
-        colours = np.empty((len(mesh.vertices), 3), np.float32)
+        colours = np.full((len(mesh.vertices), 3), 0.5, np.float32)
         for start in range(0, len(colours), CHUNK):
             part = slice(start, start + CHUNK)
             view = channels(mi.Vector3f, -mesh.normals[part])
-            colours[part] = rows(self.field.evaluate(channels(mi.Point3f, mesh.vertices[part]), view)[2])
+            index, _, colour = self.field.evaluate(channels(mi.Point3f, mesh.vertices[part]), view)
+            colours[start + np.array(index)] = rows(colour)
         placed = mesh.with_vertices(self.similarity.inverse(mesh.vertices))
         return Asset(placed, {"albedo": colours.clip(0, 1)}, name=self.name)
 
     @property
     def outline(self) -> np.ndarray:
-        """(N, 3) middles of the occupied cells, in the capture's world."""
+        """(N, 3) middles of the occupied cells, in the object's world."""
         cells = np.argwhere(np.array(self.mask))
         return self.similarity.inverse((cells + 0.5) * (2 / self.mask.shape[0]) - 1)

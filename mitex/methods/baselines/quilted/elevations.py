@@ -16,7 +16,7 @@ from mitex.methods.nerf.synthesis.patch_images import render_patches
 from mitex.methods.nerf.synthesis.patches import principal_direction
 from mitex.methods.nerf.texture import NerfTexture
 from mitex.methods.nerf.training.light_estimate import brightness
-from mitex.methods.nerf.use.on_plane import SCALE, CapturedRenderer, PlaneRenderer, plane
+from mitex.methods.nerf.use.on_plane import SCALE, CapturedRenderer, TextureOnPlane, plane
 
 SYNTHESES = 3
 
@@ -82,7 +82,7 @@ def compare_elevations(
         """How bright the light makes a plane with this normal (3,)."""
         return float(brightness(light, normal[None])[0])
 
-    def renderers(number: int) -> tuple[PlaneRenderer, dict[str, FlatTexture]]:
+    def renderers(number: int) -> tuple[TextureOnPlane, dict[str, FlatTexture]]:
         maps = texture.synthesize(size, number, patches=patches, tileable=True)
         field = texture.apply(plane(), maps, scale=SCALE, lift=0.0)
 
@@ -96,7 +96,7 @@ def compare_elevations(
         for name, options in FLAT.items():
             image, shade = quilted(options.relit, options.even), shine if options.relit else None
             flat[name] = FlatTexture(image, maps.gap, along, options.filtered, shade)
-        return PlaneRenderer(field, light, along), flat
+        return TextureOnPlane(field, light, along), flat
 
     return elevation_table(
         capture,

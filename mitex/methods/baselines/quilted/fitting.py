@@ -43,6 +43,7 @@ def fit(
         pictures = render_patches(captured.shell, patches)
         if config.relit:
             base, light = captured.model.base.mesh, np.array(captured.light)
+            about = {**about, "light": light.tolist()}
             pictures = in_even_light(patches, pictures, base, light)
         size, evenness = (config.size, config.size), None if config.even else 0.0
         image = quilted_albedo(patches, pictures, size, rng, tileable=True, evenness=evenness)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,11 @@ import torch
 from mitex.asset import Asset
 from mitex.atlas import MAX_RESOLUTION, laid_out
 from mitex.errors import ConfigError
+from mitex.evaluation.elevations import FlatTexture
 from mitex.export.common import asset_from_textures
 from mitex.mesh import Mesh
 from mitex.methods.baselines.quilted import METHOD
+from mitex.methods.nerf.training.light_estimate import brightness
 from mitex.methods.nerf.use.placement import UNWRAP_SIZE, in_scene_cube, uv_unit_length
 from mitex.methods.planar import repeated
 from mitex.training import model_file
@@ -28,7 +31,7 @@ class QuiltedTexture:
     Attributes:
         image: (T, T, 3) float32 sRGB in [0, 1], row 0 on top.
         gap: between texels [scene units of the capture].
-        about: how it was made.
+        about: how it was made; where the light of the capture was taken off, `light` is that.
     """
 
     image: np.ndarray
@@ -48,6 +51,8 @@ class QuiltedTexture:
                 raise ValueError(f"an image of shape {image.shape}")
             if not np.isfinite(image).all() or not 0 < gap < np.inf:
                 raise ValueError("values that are not finite, or texels without a size")
+            if "light" in about and not np.isfinite(np.array(about["light"], np.float64).reshape(16)).all():
+                raise ValueError("a light that is not finite")
             return cls(image, gap, about)
 
     def save(self, path: str | Path) -> Path:
@@ -61,6 +66,16 @@ class QuiltedTexture:
             "gap": torch.tensor(self.gap, dtype=torch.float64),
         }
         return model_file.save(path, tensors, METHOD.name, self.about)
+
+    def on_plane(self, along: np.ndarray) -> FlatTexture:
+        """What shows the picture in the windows of photos of the capture, in its light.
+
+        Args:
+            along: (3,) direction in the scene that the planes' x follows.
+        """
+        light = self.about.get("light")
+        shine = None if light is None else partial(_brightness, np.array(light, np.float64))
+        return FlatTexture(self.image, self.gap, along, brightness=shine)
 
     def apply(self, mesh: Mesh, *, scale: float = 1.0, resolution: int = 1024) -> Asset:
         """Puts the picture on any mesh, repeated over its UVs.
@@ -88,3 +103,8 @@ class QuiltedTexture:
         unit_length = uv_unit_length(in_scene_cube(mesh)[0])
         albedo = repeated(self.image, unit_length / (self.gap * scale), resolution)
         return asset_from_textures(mesh, mesh.uv, {"albedo": albedo}, mesh.name)
+
+
+def _brightness(light: np.ndarray, normal: np.ndarray) -> float:
+    """How bright a light (16,) makes a plane with this normal (3,)."""
+    return float(brightness(light, normal[None])[0])

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, ClassVar
 
 from tyro.conf import arg
 
+from mitex.errors import ConfigError
+from mitex.methods.checks import mutually_exclusive
 from mitex.methods.mesh_texture_options import MeshTextureOptions
-from mitex.methods.options import ExemplarOptions
+from mitex.methods.words_options import WordsOptions
+from mitex.training.settings import RunSettings
 
 
 @dataclass(kw_only=True)
-class Fit(ExemplarOptions):
-    """Learn a network that colours one mesh by the place until views of it look like an exemplar's albedo, as
-    Text2Mesh (Michel et al. 2022) does; the target is an image, not a text.
+class Fit(WordsOptions):
+    """Learn a network that colours one mesh by the place, as Text2Mesh (Michel et al. 2022) does: until views
+    of it look like an exemplar's albedo, or are what words say. Words also move its vertices.
 
     The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the texture;
     `mitex apply RUN --out ASSET` writes it. Ctrl-C saves, and --resume goes on.
@@ -22,10 +26,18 @@ class Fit(ExemplarOptions):
     examples:
       mitex fit text2mesh --exemplar lava --mesh vase --out runs/field
       mitex fit text2mesh --exemplar lava --mesh bunny.obj --preset paper
+      mitex fit text2mesh --text "red dots on white" --mesh vase --out runs/dots
       mitex fit text2mesh --exemplar lava --mesh vase --out runs/field --resume
     """
 
+    source: ClassVar[str | None] = "exemplar"
     fits_to_mesh: ClassVar[bool] = True
+
+    exemplar: Annotated[str | None, arg(metavar="IMAGE|DIR|NAME", help_behavior_hint="")] = None
+    """PNG or JPEG, a folder with any of albedo, height, normal, roughness, ambient_occlusion, or a name."""
+
+    text: Annotated[str | None, arg(metavar="WORDS", help_behavior_hint="")] = None
+    """In place of an exemplar: what the mesh is made of. It gets colours, and a shape."""
 
     mesh: Annotated[str, arg(metavar="MESH|NAME")]
     """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
@@ -34,19 +46,42 @@ class Fit(ExemplarOptions):
     """Use the mesh's own UVs, which must not overlap."""
 
     def run(self) -> None:
+        self._check_source()
         options = self.run_options()
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()
+        print(self._fit_exemplar(options) if self.text is None else self._fit_text(self.text, options))
+
+    def _check_source(self) -> None:
+        if self.exemplar is None and self.text is None:
+            raise ConfigError("--exemplar is missing", "give --exemplar IMAGE, or --text WORDS")
+        mutually_exclusive("--text", "--exemplar", self.text is not None and self.exemplar is not None)
+        if self.clip is not None and self.text is None:
+            raise ConfigError("--clip means nothing without --text", "leave it out")
+
+    def _fit_exemplar(self, options: RunSettings) -> Path:
         from mitex.exemplar import Exemplar
         from mitex.mesh import Mesh
         from mitex.methods.baselines import text2mesh
 
-        exemplar, mesh = Exemplar.load(self.exemplar), Mesh.load(self.mesh)
+        exemplar, mesh = Exemplar.load(str(self.exemplar)), Mesh.load(self.mesh)
         out = self.folder(f"{exemplar.name}-{mesh.name}-text2mesh")
         with self.progress() as on_step:
             text2mesh.fit(exemplar, mesh, out, keep_uvs=self.keep_uvs, on_step=on_step, **options)
-        print(out)
+        return out
+
+    def _fit_text(self, text: str, options: RunSettings) -> Path:
+        from mitex.mesh import Mesh
+        from mitex.methods.baselines import text2mesh
+
+        mesh = Mesh.load(self.mesh)
+        out = self.words_folder(text, mesh.name, "text2mesh")
+        with self.progress() as on_step:
+            text2mesh.fit_text(
+                text, mesh, out, clip=self.clip, keep_uvs=self.keep_uvs, on_step=on_step, **options
+            )
+        return out
 
 
 @dataclass(kw_only=True)

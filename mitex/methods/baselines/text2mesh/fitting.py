@@ -1,16 +1,20 @@
-"""Learning colours with Text2Mesh: from exemplar and mesh to texture file."""
+"""Learning with Text2Mesh: from exemplar or words, and a mesh, to a texture file."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Unpack
 
+from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.mesh import Mesh
 from mitex.methods.baselines.text2mesh.config import PRESETS
 from mitex.methods.baselines.text2mesh.task import Text2MeshTask
+from mitex.methods.baselines.text2mesh.text_task import Text2MeshTextTask
 from mitex.methods.baselines.text2mesh.texture import Text2MeshTexture
 from mitex.methods.layout import with_layout
+from mitex.methods.style_fitting import fit_style
 from mitex.training.fit import Run
 from mitex.training.settings import RunOptions
 
@@ -42,6 +46,10 @@ def fit(
     """
     run = Run.of(PRESETS, out, **options)
     config = run.config
+    if config.text is not None:
+        raise ConfigError(
+            f"the preset {config.preset} is for words, not for exemplars", "use default or paper"
+        )
     target = (exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)).of_albedo()
     given = mesh if isinstance(mesh, Mesh) else Mesh.load(mesh)
     surface = with_layout(given, config.resolution, keep_uvs)
@@ -51,7 +59,33 @@ def fit(
         task,
         target.name,
         lambda about: Text2MeshTexture(surface, task.baked(), about),
-        lr=config.lr,
-        milestones=config.milestones,
-        decay=config.decay,
+        **config.schedule,
     )
+
+
+def fit_text(
+    text: str,
+    mesh: Mesh | str | Path,
+    out: str | Path | None = None,
+    *,
+    clip: str | os.PathLike[str] | None = None,
+    keep_uvs: bool = False,
+    **options: Unpack[RunOptions],
+) -> Text2MeshTexture:
+    """Learns colours and offsets along the normals of a mesh from words; writes a run folder as `fit`.
+
+    Args:
+        text: what the mesh is made of, such as "red bricks".
+        mesh, out, keep_uvs: as of `fit`.
+        clip: CLIP folder, or "words" for the model that ships with Mitex; None for the first that there is.
+        options: preset ("text", "text-words" or "text-paper"), and those of `RunOptions`; by default
+            "text-words" for the model that ships with Mitex, else "text".
+
+    Returns:
+        The texture with the moved mesh, also saved as `texture.safetensors` in `out` if that is given.
+
+    Raises:
+        MitexError, Cancelled, Interrupted: as `fit`.
+    """
+    kind = Text2MeshTextTask, Text2MeshTexture
+    return fit_style(PRESETS, kind, text, mesh, out, clip, keep_uvs, **options)

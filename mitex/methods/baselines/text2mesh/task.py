@@ -10,9 +10,9 @@ from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
 from mitex.losses import moment_distance, relaxed_transport
 from mitex.mesh import Mesh
-from mitex.methods.baselines.text2mesh.cameras import cameras_of, frame_height
 from mitex.methods.baselines.text2mesh.config import Text2MeshConfig
-from mitex.methods.baselines.text2mesh.field import colours, random_weights
+from mitex.methods.style_cameras import cameras_of, frame_height
+from mitex.methods.style_field import colours, encoded, head, random_waves, trunk
 from mitex.methods.surface.texels import Texels
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, orbit
@@ -42,8 +42,9 @@ class Text2MeshTask(ParameterTask):
         keep_freed_memory()
         self.config, self.exemplar, self.mesh = config, exemplar, mesh
         generator = torch.Generator().manual_seed(config.seed)
-        self.waves = config.sigma * torch.randn(config.frequencies, 3, generator=generator)
-        super().__init__(random_weights(config.frequencies, config.width, generator))
+        self.waves = random_waves(config.frequencies, config.sigma, generator)
+        self._layers = trunk(config.frequencies, config.width), head("colours", config.width, 3)
+        super().__init__({k: v for part in self._layers for k, v in part.weights(generator).items()})
         self.ball = mesh.normalised()[0]
         assert mesh.uv is not None
         self.texels = Texels.rasterize(self.ball, mesh.uv, config.resolution)
@@ -83,15 +84,22 @@ class Text2MeshTask(ParameterTask):
         corners = torch.from_numpy(self.ball.vertices[self.ball.faces[hits.face.numpy()]])
         points = (hits.barycentric[..., None] * corners).sum(1)
         pixels = torch.full((len(hits.hit), 3), BACKGROUND)
-        pixels[hits.hit] = colours(self.named, points, self.waves)
+        pixels[hits.hit] = self.colours(points)
         shape = len(cameras), cameras.height, cameras.width
         return pixels.view(*shape, 3), hits.hit.view(*shape)
+
+    def colours(self, points: torch.Tensor) -> torch.Tensor:
+        """(N, 3) sRGB in (0, 1) at places (N, 3) [radii]."""
+        values = encoded(points, self.waves)
+        for part in self._layers:
+            values = part(self.named, values)
+        return colours(values)
 
     @torch.no_grad()
     def baked(self) -> np.ndarray:
         """(R, R, 3) float32 sRGB: the network's colours at the texels of the mesh, grey elsewhere."""
         places = torch.from_numpy(self.texels.position.astype(np.float32))
-        parts = [colours(self.named, part, self.waves) for part in places.split(CHUNK)]
+        parts = [self.colours(part) for part in places.split(CHUNK)]
         return self.texels.image(torch.cat(parts).numpy(), 0.5)
 
     @torch.no_grad()

@@ -15,8 +15,9 @@ from mitex.methods.nca.motion.start import learner, motion_record
 from mitex.methods.nca.parents import fitting_lineage, resumed_lineage
 from mitex.methods.nca.text.moving import MovingTextTask
 from mitex.methods.nca.text.task import TextTask
-from mitex.methods.nca.text.wording import MAPS, check, with_maps, worded
+from mitex.methods.nca.text.wording import MAPS, check, with_maps
 from mitex.methods.nca.texture import NcaTexture
+from mitex.methods.wording import worded
 from mitex.training.fit import Run
 from mitex.training.settings import RunOptions
 
@@ -55,7 +56,8 @@ def fit_text(
         Cancelled: by `cancel`; a checkpoint has been saved if there is a folder.
         Interrupted: by Ctrl-C, likewise.
     """
-    run = Run.of(PRESETS, out, **worded(options, text, None if clip is None else os.fspath(clip), motion))
+    inputs = {"text": text, "text_model": clip and os.fspath(clip), "motion": motion}
+    run = Run.of(PRESETS, out, **worded(options, inputs))
     config = run.config
     check(config)
     look, lineage = _start(init, run)

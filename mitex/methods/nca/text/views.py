@@ -13,12 +13,9 @@ from mitex.methods.nca.decoder.surface import Points
 from mitex.methods.nca.displacement import Displacement
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.surfaces import CloseUps, TrainingSphere
-from mitex.methods.nca.text.light import lamps, shading
 from mitex.scenes.cameras import Cameras, random_views
+from mitex.scenes.shaded import GREY, lamps_of_pixels, pictured, shading
 from mitex.sparse import Weights
-
-GREY = 0.5  # sRGB, of a surface without colours
-BACKGROUND = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +86,7 @@ class Figure:
     def bare(self, cameras: Cameras) -> torch.Tensor:
         """Pictures (K, H, W, 3) without any texture, grey and even."""
         hit, points = self._visible(cameras)
-        return _picture(GREY * self._shade(self.relief.plain, points, hit, cameras), hit, cameras)
+        return pictured(GREY * self._shade(self.relief.plain, points, hit, cameras), hit, cameras)
 
     def textured(self, look: Look, state: torch.Tensor, cameras: Cameras) -> Views:
         """With what a state (V, C) shows; differentiable in the state and the look's decoder."""
@@ -101,7 +98,7 @@ class Figure:
         shade = self._shade(self.relief.normals(height), points, hit, cameras)
         coloured = shade * values[:, list(layout["albedo"])].clamp(0, 1)
         plain = shade * GREY
-        return Views(_picture(coloured, hit, cameras), _picture(plain, hit, cameras), values, height)
+        return Views(pictured(coloured, hit, cameras), pictured(plain, hit, cameras), values, height)
 
     def _visible(self, cameras: Cameras) -> tuple[torch.Tensor, Points]:
         """Which pixels meet the surface, (K H W,) bool, and where."""
@@ -115,11 +112,4 @@ class Figure:
         device = self._faces.device
         corners, weights = self._faces[points.face.long().to(device)], points.barycentric.to(device)
         between = F.normalize(Weights(corners, weights, len(normals))(normals), dim=1)
-        lamp = lamps(cameras).to(device).repeat_interleave(cameras.width * cameras.height, 0)[hit]
-        return shading(between, lamp)
-
-
-def _picture(colours: torch.Tensor, hit: torch.Tensor, cameras: Cameras) -> torch.Tensor:
-    """(K, H, W, 3) of colours (P, 1 or 3) where pixels meet the surface."""
-    picture = colours.new_full((len(hit), 3), BACKGROUND)
-    return picture.index_put((hit,), colours.expand(-1, 3)).view(*cameras.shape, 3)
+        return shading(between, lamps_of_pixels(cameras, hit))

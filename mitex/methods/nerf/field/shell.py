@@ -17,6 +17,7 @@ from mitex.methods.nerf.field.occupancy import sample_grid
 from mitex.methods.nerf.field.projection import Projection, Projections
 from mitex.methods.nerf.field.tensors import channels, rows
 from mitex.runtime.jit import dr, mi
+from mitex.textures.phong import Phong
 
 
 @dataclass
@@ -189,13 +190,32 @@ class Shell:
 
     def density(self, points: np.ndarray) -> np.ndarray:
         """Density [1 / scene units] of points (N, 3), (N,); 0 outside of the shell."""
-        index, projections = within(self.projection(points), self.thickness, self.lift)
+        index, density = self.extinction(channels(mi.Point3f, points))
         result = np.zeros(len(points), np.float32)
-        if len(index):
-            coords = ShellCoords.of(projections, self.scale)
-            exponent = self.decoder.exponent(self.latents.features(coords), coords.distance)
-            result[index] = np.array(dr.exp(dr.minimum(exponent, HIGHEST))) * (self.strength / self.scale)
+        result[np.array(index)] = np.array(density)
         return result
+
+    def extinction(self, points: mi.Point3f) -> tuple[mi.UInt32, mi.Float]:
+        """Ascending indices of those of N points that are in the shell, their density [1 / scene units]."""
+        index, coords = self.locate(points)
+        if not dr.width(index):
+            return mi.UInt32(), mi.Float()
+        exponent = self.decoder.exponent(self.latents.features(coords), coords.distance)
+        return index, dr.exp(dr.minimum(exponent, HIGHEST)) * (self.strength / self.scale)
+
+    def reflection(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, Phong]:
+        """Ascending indices of those of N points that are in the shell, and their reflection.
+
+        Args:
+            points, view: as of `evaluate`.
+        """
+        index, coords = self.locate(points)
+        f, phase = self.latents(coords)
+        values = self.decoder(f, phase, coords.distance)
+        normal = values.normal(*self.latents.frame(coords))
+        along = dr.gather(mi.Vector3f, view, index)
+        specular = values.specular_at(dr.clip(-dr.dot(normal, along), 0, 1))
+        return index, Phong(normal, values.diffuse, specular, values.glossiness)
 
     def evaluate(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, mi.Float, mi.Color3f]:
         """Density and colour of those of N points that are in the shell.

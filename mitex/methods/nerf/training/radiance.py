@@ -91,19 +91,17 @@ class RadianceTask(ABC, Generic[Config]):
         return Change(undo, {"density": self.occupancy.refresh(self.density, generator)})
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
-        """L1 of colours before a random background, and the field's own terms."""
+        """The error of rays before a random background, and the field's own terms."""
         batch = self.with_cameras(self.pixels.draw(self.config.rays, self.config.one_view, generator))
         jitter = torch.rand(len(batch.view), generator=generator)
         rays = batch_rays(batch)
         samples = march(*rays, self.occupancy.mask, self.step_length, mi.Float(jitter.numpy()))
         background = torch.rand(batch.colours.shape, generator=generator)
-        target = batch.colours * batch.alpha + background * (1 - batch.alpha)
         if not len(samples):
             raise ValueError("no ray meets an occupied cell")
         samples = visible(samples, *rays, lambda points: mi.Float(self.density(rows(points))))
         rendered = self.render(step, batch, samples, generator)
-        colour = rendered.colour + rendered.transmittance[:, None] * background
-        error = (colour - target).abs().mean()
+        error = self.error(rendered, batch, background)
         total = error + sum(rendered.terms.values())
         if self.config.distortion:
             widths = torch.full_like(rendered.t, self.step_length)
@@ -116,6 +114,12 @@ class RadianceTask(ABC, Generic[Config]):
         }
         metrics |= {name: value.item() for name, value in rendered.terms.items()}
         return Step(total, metrics, self._average)
+
+    def error(self, rendered: Rendered, batch: Batch, background: torch.Tensor) -> torch.Tensor:
+        """How far rays are from their pixels: L1 of colours before a background (R, 3)."""
+        colour = rendered.colour + rendered.transmittance[:, None] * background
+        target = batch.colours * batch.alpha + background * (1 - batch.alpha)
+        return (colour - target).abs().mean()
 
     def _average(self) -> None:
         """Every `REFRESH` updates the mean parameters move towards the current ones."""

@@ -1,7 +1,8 @@
 import pytest
 import torch
 
-from mitex.methods.nca.text.views import GREY, Figure, Sight
+from mitex.methods.nca.text.views import Figure, Sight
+from mitex.scenes.shaded import GREY
 from tests.methods.nca.text.tiny_text import config, grown, task
 
 

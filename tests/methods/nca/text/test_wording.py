@@ -4,8 +4,7 @@ import torch
 from mitex.errors import ConfigError
 from mitex.mesh import icosphere
 from mitex.methods.nca import NcaTexture
-from mitex.methods.nca.text.wording import check, prompts, with_maps, worded
-from tests.features.clip.folders import write_folder
+from mitex.methods.nca.text.wording import check, prompts, with_maps
 from tests.methods.nca.text.tiny_text import config
 from tests.methods.nca.tiny import texture
 
@@ -59,29 +58,3 @@ def test_an_empty_text_and_presets_for_exemplars():
         check(config("order_weight=0", preset="patch"))
     with pytest.raises(ConfigError, match="text_prompt = 'a stone' leaves out the text"):
         config("text_prompt=a stone")
-
-
-def test_a_text_that_is_given_twice():
-    given = {"set": {"text": "red", "motion": "up"}, "preset": "text"}
-    assert worded({"preset": "text"}, "red", None, "up") == given
-    paper = worded({"set": ["text=red"], "preset": "text-paper"}, "red", "words")
-    assert paper == {"set": {"text": "red", "text_model": "words"}, "preset": "text-paper"}
-    assert worded({"resume": True}, "red", None).get("preset", "") is None
-    with pytest.raises(ConfigError, match="text is set to green and to red; give it once"):
-        worded({"set": ["text=green"]}, "red", None)
-    with pytest.raises(ConfigError, match="text_model is set to a and to b"):
-        worded({"set": {"text_model": "a"}}, "red", "b")
-    with pytest.raises(ConfigError, match="motion is set to up and to right"):
-        worded({"set": ["motion=up"]}, "red", None, "right")
-
-
-def test_the_preset_is_the_one_for_the_model(tmp_path, monkeypatch):
-    """The embedded one where no CLIP model is named or cached."""
-    monkeypatch.setenv("HF_HUB_CACHE", str(tmp_path / "hub"))
-    monkeypatch.delenv("MITEX_CLIP", raising=False)
-    clip = str(write_folder(tmp_path / "clip"))
-    presets = {name: worded({}, "red", name).get("preset") for name in (None, "words", clip)}
-    assert presets == {None: "text-words", "words": "text-words", clip: "text"}
-    monkeypatch.setenv("MITEX_CLIP", clip)
-    assert worded({}, "red", None).get("preset") == "text"
-    assert worded({"set": ["text_model=words"]}, "red", None).get("preset") == "text-words"

@@ -1,4 +1,4 @@
-"""The light of text-guided trainings: one lamp beside each camera, in spherical harmonics."""
+"""Surfaces as models of texts and images see them: on one colour, with a lamp beside each camera."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import torch.nn.functional as F
 
 from mitex.scenes.cameras import Cameras
 
+GREY = 0.5  # sRGB, of a surface without colours
+BACKGROUND = 1.0
 AMBIENT = 0.4
 BESIDE = (-0.6, 0.6)  # of the camera, right and up, where it is 1 away: slopes of all directions show
 
@@ -32,6 +34,26 @@ def shading(normals: torch.Tensor, lamp: torch.Tensor) -> torch.Tensor:
     """
     x = (normals * lamp).sum(1, keepdim=True)
     return AMBIENT + (1 - AMBIENT) / BRIGHTEST * _irradiance(x)
+
+
+def pictured(
+    colours: torch.Tensor, hit: torch.Tensor, cameras: Cameras, background: float = BACKGROUND
+) -> torch.Tensor:
+    """Pictures (K, H, W, 3) sRGB.
+
+    Args:
+        colours: (P, 1 or 3) where pixels meet the surface.
+        hit: (K H W,) bool, which pixels do.
+        cameras: K views.
+        background: sRGB of the other pixels; white by default.
+    """
+    picture = colours.new_full((len(hit), 3), background)
+    return picture.index_put((hit,), colours.expand(-1, 3)).view(*cameras.shape, 3)
+
+
+def lamps_of_pixels(cameras: Cameras, hit: torch.Tensor) -> torch.Tensor:
+    """(P, 3) towards the lamp of each pixel that meets the surface, `hit` as of `pictured`."""
+    return lamps(cameras).to(hit.device).repeat_interleave(cameras.width * cameras.height, 0)[hit]
 
 
 def _irradiance(x):

@@ -1,4 +1,4 @@
-"""Where Text2Mesh looks at the mesh from."""
+"""Where the trainings of neural style fields look at the mesh from."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 import torch
 
-from mitex.methods.baselines.text2mesh.config import Text2MeshConfig
+from mitex.methods.style_config import StyleConfig
 from mitex.scenes.cameras import Cameras, random_views
 
 FRONT = (90.0, 0.0)  # azimuth and elevation of the anchor [degrees]: +z
@@ -14,7 +14,7 @@ SPREAD = (90.0, 45.0)  # standard deviations around it [degrees]
 STEEPEST = 80.0  # elevation [degrees]
 
 
-def cameras_of(config: Text2MeshConfig, generator: torch.Generator) -> Cameras:
+def cameras_of(config: StyleConfig, generator: torch.Generator) -> Cameras:
     """The cameras of a step, uniformly around the mesh or, the first one at the front, around that."""
     if config.cameras == "around":
         return random_views(generator, config.views, config.distance, config.fov, config.view)
@@ -31,6 +31,6 @@ def cameras_of(config: Text2MeshConfig, generator: torch.Generator) -> Cameras:
     )
 
 
-def frame_height(config: Text2MeshConfig) -> float:
+def frame_height(config: StyleConfig) -> float:
     """Of what a camera sees at the distance of the mesh's middle [radii]."""
     return 2 * config.distance * math.tan(0.5 * math.radians(config.fov))

@@ -1,8 +1,8 @@
 import numpy as np
 import torch
 
-from mitex.methods.nca.text.light import AMBIENT, lamps, shading
 from mitex.scenes.cameras import orbit
+from mitex.scenes.shaded import AMBIENT, lamps, shading
 
 
 def _along(cosines):

@@ -1,0 +1,1 @@
+"""The living page beside the way of MeshNCA's own page, in one browser."""

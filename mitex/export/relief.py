@@ -1,0 +1,81 @@
+"""The relief that a height map tells, as geometry: for programs and printers that displace nothing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from scipy import ndimage
+
+from mitex.asset import Asset, clay
+from mitex.errors import ConfigError
+from mitex.export.common import asset_from_textures
+from mitex.geometry.triangles import twice_area
+from mitex.images import bilinear
+from mitex.mesh import Mesh, subdivide_midpoint
+
+DEEPEST = 0.5  # relief [radii of the mesh]
+FACES = 400_000  # that the mesh is split into, about, where its texels are as fine
+
+
+def embossed(asset: Asset, depth: float, faces: int = FACES) -> Asset:
+    """The asset with its height map as geometry.
+
+    The mesh's faces are split in four until there are about as many as asked for, or until they are as fine
+    as the texels. Each vertex moves along its normal; mean heights stay where they are. UVs and the other
+    maps are kept, but for the normal map: its bumps are on the mesh now.
+
+    Args:
+        asset: with a height map; it is baked first if it has no textures.
+        depth: from the lowest to the highest value of a height map [radii of the mesh]; negative turns the
+            relief inside out.
+        faces: how many there shall be, about, at most twice as many.
+
+    Raises:
+        ConfigError: there is no height map, or the depth is out of range.
+    """
+    if "height" not in asset.maps:
+        raise ConfigError(
+            f"the texture has no height map; it has {', '.join(asset.maps)}",
+            "learn it from an exemplar that has one",
+        )
+    if not abs(depth) <= DEEPEST:
+        raise ConfigError(f"a relief of {depth:g} radii", f"use {-DEEPEST:g} to {DEEPEST:g}")
+    asset = asset if asset.texture_maps is not None else asset.baked()
+    assert asset.atlas is not None and asset.texture_maps is not None
+    heights, side = asset.texture_maps["height"], asset.atlas.resolution
+    mesh = _split(replace(asset.mesh, uv=asset.atlas.uv), side, faces)
+    assert mesh.uv is not None
+    # Vertices closer than texels would see each of them, others what lies around them on average.
+    blurred = ndimage.gaussian_filter(heights[..., 0], 0.5 * _texels_per_edge(mesh, side))[..., None]
+    at_corners = bilinear(blurred, mesh.uv.reshape(-1, 2))[:, 0]
+    # The same on all sides of a seam, so that the surface stays closed.
+    corners = mesh.faces.ravel()
+    count = np.maximum(np.bincount(corners, minlength=len(mesh.vertices)), 1)
+    height = np.bincount(corners, at_corners, minlength=len(mesh.vertices)) / count
+    offset = depth * asset.mesh.normalised()[1].scale * (height - _mean(height, mesh))
+    moved = mesh.with_vertices(mesh.vertices + offset[:, None].astype(np.float32) * mesh.normals)
+    maps = {name: values for name, values in asset.texture_maps.items() if name not in ("height", "normal")}
+    return asset_from_textures(moved, mesh.uv, maps, asset.name) if maps else clay(moved)
+
+
+def _split(mesh: Mesh, side: int, faces: int) -> Mesh:
+    """The mesh with faces as fine as texels, or as many as there may be."""
+    allowed = math.floor(math.log(max(2 * faces / max(len(mesh.faces), 1), 1), 4))
+    useful = math.ceil(math.log2(max(_texels_per_edge(mesh, side), 1)))
+    return subdivide_midpoint(mesh, min(allowed, useful))
+
+
+def _texels_per_edge(mesh: Mesh, side: int) -> float:
+    """Of a face of median size, if it were equilateral."""
+    assert mesh.uv is not None
+    area = float(np.median(np.abs(twice_area(mesh.uv)))) if len(mesh.faces) else 0.0
+    return side * math.sqrt(2 * area / math.sqrt(3))
+
+
+def _mean(height: np.ndarray, mesh: Mesh) -> float:
+    """Over the surface, of values (V,) at the vertices; 0 if it has no area."""
+    weights = mesh.face_areas.astype(np.float64)
+    total = float(weights.sum())
+    return float(height[mesh.faces].mean(axis=1) @ weights) / total if total > 0 else 0.0

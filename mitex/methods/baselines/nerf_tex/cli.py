@@ -1,0 +1,119 @@
+"""The command-line options of boxes with a captured texture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import arg
+
+from mitex.methods.checks import SEEDS, in_range, reject_unused
+from mitex.methods.options import PICTURES, MeshOptions, TrainingOptions
+
+if TYPE_CHECKING:
+    from mitex.methods.baselines.plain_field.applied import AppliedField
+
+RESOLUTION = 512  # of a picture [pixels]
+
+
+@dataclass(kw_only=True)
+class Fit(TrainingOptions):
+    """Learn a piece of a captured texture, laid flat in a box, to compare the texture with (NeRF-Tex).
+
+    The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the box;
+    `mitex apply RUN --mesh MESH --out ASSET` puts it all over a mesh. Ctrl-C saves, and --resume goes on.
+
+    examples:
+      mitex fit nerf_tex --texture runs/durian --out runs/boxed-durian
+      mitex fit nerf_tex --texture runs/durian --set patch=384 views=240
+      mitex fit nerf_tex --texture runs/durian --out runs/boxed-durian --resume
+    """
+
+    texture: Annotated[str, arg(metavar="RUN|MODEL")]
+    """Run folder or model file of `mitex fit nerf`."""
+
+    preset: Annotated[str | None, arg(metavar="default|paper", help_behavior_hint="(default: default)")] = (
+        None
+    )
+    """Settings to start from: `default`, or `paper`, which follows the publication."""
+
+    def run(self) -> None:
+        options = self.run_options()
+        from mitex.runtime import let_idle_threads_sleep
+
+        let_idle_threads_sleep()
+        from mitex.methods.baselines import nerf_tex
+        from mitex.methods.nerf import NerfTexture
+
+        texture = NerfTexture.load(self.texture)
+        out = self.folder(f"{texture.about['name']}-nerf_tex")
+        with self.progress() as on_step:
+            nerf_tex.fit(texture, out, on_step=on_step, **options)
+        print(out)
+
+
+@dataclass(kw_only=True)
+class Apply(MeshOptions):
+    """Put boxes all over a mesh: a picture (.png .jpg), or what is solid as a mesh.
+
+    examples:
+      mitex apply runs/boxed-durian --mesh bunny.obj --out bunny.png
+      mitex apply runs/boxed-durian --mesh bunny.obj --out bunny.glb --scale 0.5 --tilt 10
+    """
+
+    scale: Annotated[float, arg(metavar="X")] = 1.0
+    """Size of the texture's elements."""
+
+    spacing: Annotated[float, arg(metavar="X")] = 0.5
+    """Between boxes [sides of a box]; more leaves places bare."""
+
+    tilt: Annotated[float, arg(metavar="DEG")] = 0.0
+    """Standard deviation by which boxes lean from the normals [degrees]."""
+
+    aligned: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Boxes point in one direction as far as they can, instead of being turned at random."""
+
+    lift: Annotated[float, arg(metavar="X")] = 1.0
+    """1 stands the texture on the mesh, 0 carves it in, as it was captured."""
+
+    density: Annotated[float, arg(metavar="X")] = 1.0
+    """Factor of the density; more makes thin parts solid."""
+
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Random seed: another seed, other places."""
+
+    resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {RESOLUTION})")] = None
+    """Side of a picture [pixels]."""
+
+    def check(self) -> None:
+        in_range("--scale", self.scale, 0.05, 20.0)
+        in_range("--spacing", self.spacing, 0.1, 2.0)
+        in_range("--tilt", self.tilt, 0.0, 45.0)
+        in_range("--lift", self.lift, 0.0, 1.0)
+        in_range("--density", self.density, 0.001, 1000.0)
+        in_range("--seed", self.seed, *SEEDS)
+        in_range("--resolution", self.resolution, 64, 8192)
+
+    def check_output(self, out: Path) -> None:
+        picture = out.suffix.lower() in PICTURES
+        reject_unused("--resolution", out, self.resolution is not None and not picture)
+
+    def picture_options(self) -> dict[str, object]:
+        return {"resolution": self.resolution or RESOLUTION}
+
+    def applied(self, out: Path) -> AppliedField:
+        from mitex.mesh import Mesh
+        from mitex.methods.baselines.nerf_tex import NerfTexTexture
+
+        texture = NerfTexTexture.load(self.model)
+        return texture.apply(
+            Mesh.load(self.mesh),
+            scale=self.scale,
+            spacing=self.spacing,
+            tilt=self.tilt,
+            aligned=self.aligned,
+            lift=self.lift,
+            density=self.density,
+            seed=self.seed,
+        )

@@ -1,0 +1,51 @@
+"""The training of X-Mesh, as a task (Ma et al. 2023)."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+
+from mitex.methods.baselines.x_mesh import METHOD
+from mitex.methods.baselines.x_mesh.config import XMeshConfig
+from mitex.methods.baselines.x_mesh.gates import Gate
+from mitex.methods.style_field import colours, encoded, head, random_waves, trunk
+from mitex.methods.style_task import StyleTask
+
+
+class XMeshTask(StyleTask):
+    """A network whose colours and free offsets shall make views of a mesh be what words say.
+
+    Between the trunk and the heads, words open gates: first of the channels, then of the vertices.
+    """
+
+    method = METHOD.name
+    config: XMeshConfig
+
+    def initial(self, generator: torch.Generator) -> dict[str, torch.Tensor]:
+        config = self.config
+        size, shape = self.text.shape[1], (config.width, config.gate_width, config.rank)
+        self.waves = random_waves(config.frequencies, config.sigma, generator)
+        self.trunk = trunk(config.frequencies, config.width, normalised=True)
+        self.gates = Gate.of("channels", size, *shape, axis=0), Gate.of("vertices", size, *shape, axis=1)
+        self.heads = (
+            head("colours", config.width, 3, normalised=True),
+            head("offsets", config.width, 3, normalised=True),
+        )
+        self.places = places(self.points, config.mirror)
+        layers = [part.weights(generator) for part in (self.trunk, *self.heads)]
+        gates = [gate.weights(generator, config.gate_start) for gate in self.gates]
+        return {name: value for part in (*layers, *gates) for name, value in part.items()}
+
+    def style(self) -> tuple[torch.Tensor, torch.Tensor]:
+        features = self.trunk(self.named, encoded(self.places, self.waves))
+        for gate in self.gates:
+            features = gate(self.named, features, self.text[0])
+        colour, offset = (part(self.named, features) for part in self.heads)
+        return colours(colour), self.config.text_relief / math.sqrt(3) * offset.tanh()
+
+
+def places(points: torch.Tensor, mirror: bool) -> torch.Tensor:
+    """(V, 3) points less their mean, divided by their standard deviation; z without its sign if mirrored."""
+    scores = (points - points.mean(0)) / points.std(0).clamp_min(1e-6)
+    return torch.cat([scores[:, :2], scores[:, 2:].abs()], 1) if mirror else scores
