@@ -4,8 +4,8 @@ usage: python tools/make_form_sheet.py RUNS SHEET REFERENCE[:map] ... MESH~FACES
 
 RUNS holds runs of `mitex fit geometric`, by the reference; models that ship with Mitex need none. Meshes are
 named as for make_surface_gallery.py, in the folder RUNS/meshes. docs/gallery/SHEET.jpg has a row for each
-reference: itself, itself on other triangles, turned and smaller, what grows on the two meshes (with `:map`, its
-displacement map), lumps, and a ball. What it prints has the distances of all of them.
+reference: itself, itself on other triangles, turned and smaller, what grows on the two meshes (with `:map`,
+its displacement map), lumps, and a ball. What it prints has the distances of all of them.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def main() -> None:
         measure = ReliefForm(original)
         print(f"{reference}, other patches: {measure.distance(original, seed=1):.2f}", flush=True)
         reliefs = [grown(runs, reference, mesh, kind == "map") for mesh in meshes]
-        names = ["other cut", *(f"on {mesh.name}" for mesh in meshes), "lumps", "ball"]
+        names = ["other cut", *(f"on {word.split('~')[0]}" for word in (first, second)), "lumps", "ball"]
         cells.append(original)
         labels.append(reference)
         for label, mesh in zip(names, [cut(original), *reliefs, lumps(), icosphere(FREQUENCY)], strict=True):
