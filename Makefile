@@ -47,6 +47,7 @@ bench: $(STAMP)
 	$(VENV)/bin/python -m benchmarks.geometric
 	$(VENV)/bin/python -m benchmarks.busy
 	$(VENV)/bin/python -m benchmarks.flow
+	$(VENV)/bin/python -m benchmarks.living_page
 	OMP_WAIT_POLICY=PASSIVE $(VENV)/bin/python -m benchmarks.nerf
 
 clean:

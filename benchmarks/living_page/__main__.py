@@ -32,7 +32,7 @@ WAYS = {
     "one pass (WebGL2)": "await page.step(argument); wait()",
     "compute (WebGPU)": "await page.step(argument); wait()",
     "compute, brought each step": "for (let k = 0; k < argument; k++) await page.step(1); wait()",
-    "picture": "page.draw(); page.pixels()",
+    "picture": "page.pixels()",
 }
 
 

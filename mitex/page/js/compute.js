@@ -18,7 +18,7 @@ class ComputeAutomaton extends Automaton {
     };
     device.queue.writeBuffer(this.buffers.rows, 0, surface.rowValues);
     this.pair = [storageBuffer(device, this.size), storageBuffer(device, this.size)]; // states before and after a step
-    Object.assign(this, { device, pipelines: {}, turn: surface.turn, waiting: 0, version: 0, erased: [] });
+    Object.assign(this, { device, turn: surface.turn, waiting: 0, version: 0, erased: [] });
     this.setLooks(look);
     this.reset(0);
   }
@@ -34,8 +34,7 @@ class ComputeAutomaton extends Automaton {
       [`${rule}0`, filledBuffer(device, shape.weights(one)[0])]));
     const bounds = rules.flatMap(([rule, one]) => Object.values(shape.bounds(one, rule)).flatMap((x) => [...x]));
     this.weights.bounds = filledBuffer(device, Float32Array.from(bounds), "UNIFORM");
-    this.pipelines[names.length] ??= computePipeline(device, computeStep(shape, names, this._plane, device.cellsPerThread));
-    this._bind(this.pipelines[names.length], names);
+    this._bind(computePipeline(device, computeStep(shape, names, device.cellsPerThread)), names);
   }
 
   _bind(pipeline, names) {
@@ -45,7 +44,7 @@ class ComputeAutomaton extends Automaton {
       return bindGroup(device, pipeline, 0, bindings(shape, names).map(([name]) => given[name]));
     });
     const numbers = Array.from({ length: BATCH }, (_, k) =>
-      bindGroup(device, pipeline, 1, [{ buffer: buffers.numbers, offset: APART * k, size: 8 }]));
+      bindGroup(device, pipeline, 1, [{ buffer: buffers.numbers, offset: APART * k, size: 12 }]));
     Object.assign(this, { pipeline, directions, numbers });
   }
 
@@ -106,8 +105,8 @@ class ComputeAutomaton extends Automaton {
     const words = new Uint32Array((APART / 4) * count);
     const numbers = new Float32Array(words.buffer);
     for (let k = 0; k < count; k++) {
-      words[(APART / 4) * k] = phaseOf(this.steps + k, this.seed);
-      numbers[(APART / 4) * k + 1] = this.look.mean ? 6 : 0;
+      words.set([phaseOf(this.steps + k, this.seed), this._plane], (APART / 4) * k);
+      numbers[(APART / 4) * k + 2] = this.look.mean ? 6 : 0;
     }
     return words;
   }
@@ -132,13 +131,13 @@ class ComputeAutomaton extends Automaton {
   _clear(slots) {
     super._clear(slots);
     this.erased.push(slots);
-    this.clearingPipeline ??= computePipeline(this.device,
-      written(SHADERS["clear.wgsl"], { CONSTANTS: planes(this.shape, this._plane) }));
+    const clearing = computePipeline(this.device, written(SHADERS["clear.wgsl"],
+      { CONSTANTS: `const VECTORS = ${this.shape.vectors}u;` }));
     const list = filledBuffer(this.device, slots);
     const commands = this.device.createCommandEncoder();
     const pass = commands.beginComputePass();
-    pass.setPipeline(this.clearingPipeline);
-    pass.setBindGroup(0, bindGroup(this.device, this.clearingPipeline, 0, [this.pair[0], list]));
+    pass.setPipeline(clearing);
+    pass.setBindGroup(0, bindGroup(this.device, clearing, 0, [this.pair[0], list]));
     pass.dispatchWorkgroups(Math.ceil(slots.length / TILE));
     pass.end();
     this.device.queue.submit([commands.finish()]);

@@ -122,7 +122,7 @@ class DecoderShape {
 // The maps that a pixel shows: pictures of ids become pictures of values.
 class Decoder {
   constructor(graphics, look, other = null) {
-    Object.assign(this, { graphics, shape: new DecoderShape(look), programs: {} });
+    Object.assign(this, { graphics, shape: new DecoderShape(look) });
     this.setLooks(look, other);
   }
 
@@ -131,8 +131,7 @@ class Decoder {
     const looks = other ? [look, other] : [look];
     for (const value of Object.values(this.buffers ?? {})) this.graphics.gl.deleteBuffer(value);
     this.buffers = Object.assign({}, ...looks.map((one, k) => this.shape.buffers(this.graphics, one, names[k])));
-    this.programs[names.length] ??= this.graphics.program(SHADERS["fill.vert"], this.shape.shader(names));
-    this.program = this.programs[names.length];
+    this.program = this.graphics.program(SHADERS["fill.vert"], this.shape.shader(names));
     this.uniforms = {
       waves: look.decoder.waves, amplitude: look.decoder.amplitude,
       palette: colours(look), otherPalette: colours(other ?? look),

@@ -4,7 +4,6 @@ class FragmentAutomaton extends Automaton {
   constructor(graphics, surface, look) {
     super(graphics, surface, look, graphics.blockSize);
     this.states.push(this._target());
-    this.programs = {};
     this.setLooks(look);
     this.reset(0);
   }
@@ -21,9 +20,7 @@ class FragmentAutomaton extends Automaton {
       });
       Object.assign(this.uniforms, this.shape.bounds(one, rule));
     }
-    const names = Object.keys(rules);
-    this.programs[names.length] ??= this.graphics.program(SHADERS["fill.vert"], fragmentStep(this.shape, names));
-    this.program = this.programs[names.length];
+    this.program = this.graphics.program(SHADERS["fill.vert"], fragmentStep(this.shape, Object.keys(rules)));
   }
 
   // Takes steps; the states can be drawn when the promise is kept, which here is at once.

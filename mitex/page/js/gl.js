@@ -21,6 +21,7 @@ class Graphics {
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     this.gl = gl;
     this.canvas = canvas;
+    this.programs = new Map();
     this.blockSize = gl.getParameter(gl.MAX_UNIFORM_BLOCK_SIZE);
     this.targets = Math.min(gl.getParameter(gl.MAX_DRAW_BUFFERS), gl.getParameter(gl.MAX_COLOR_ATTACHMENTS));
   }
@@ -32,7 +33,14 @@ class Graphics {
     return /swiftshader|llvmpipe|software|basic render/i.test(name);
   }
 
+  // Programs are kept: meshes come and go, and compiling takes long.
   program(vertex, fragment) {
+    const text = vertex + fragment;
+    if (!this.programs.has(text)) this.programs.set(text, this._compiled(vertex, fragment));
+    return this.programs.get(text);
+  }
+
+  _compiled(vertex, fragment) {
     const sizes = `#version 300 es\n#define WIDTH ${WIDTH}\n#define LIST ${LIST}`;
     return new Program(this.gl, ...[vertex, fragment].map((text) => text.replace("#version 300 es", sizes)));
   }

@@ -24,9 +24,14 @@ function filledBuffer(device, values, use = "STORAGE") {
   return buffer;
 }
 
+// Pipelines are kept, as programs are.
 function computePipeline(device, code) {
-  const module = device.createShaderModule({ code });
-  return device.createComputePipeline({ layout: "auto", compute: { module } });
+  device.pipelines ??= new Map();
+  if (!device.pipelines.has(code)) {
+    const compute = { module: device.createShaderModule({ code }) };
+    device.pipelines.set(code, device.createComputePipeline({ layout: "auto", compute }));
+  }
+  return device.pipelines.get(code);
 }
 
 // Buffers, or parts of them, in the order of their bindings.

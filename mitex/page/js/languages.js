@@ -38,22 +38,22 @@ const WGSL = {
   vector: (name, value) => `var ${name} = ${value};`,
   matrix: (name, value) => `let ${name} = ${value};`,
   number: (name, value) => `let ${name} = ${value};`,
-  state: (c, place) => `states[${c}u * PLANE + ${place}]`,
+  state: (c, place) => `states[${c}u * now.plane + ${place}]`,
   bound: (name, c) => `bounds.${name}[${c}]`,
   loop: (count) => `for (var g = 0u; g < ${count}u; g++)`,
   index: (stride) => `let k = g * ${stride}u;`,
 };
 
 // Each thread computes so many cells of a tile.
-function computeStep(shape, rules, plane, cellsPerThread) {
+function computeStep(shape, rules, cellsPerThread) {
   const { vectors } = shape;
   const needed = ["least < 1.0", "most > 0.0"];
   const network = (rule) => shape.network(rule, WGSL, cellsPerThread, (i, m) => `x[${m}][${i}]`, (c, m) => `${rule}u[${m}][${c}]`);
-  const next = (value) => each(vectors, (c) => `following[${c}u * PLANE + at] = ${value(c)};`);
+  const next = (value) => each(vectors, (c) => `following[${c}u * now.plane + at] = ${value(c)};`);
   const own = (c) => WGSL.state(c, "at");
   return written(SHADERS["step.wgsl"], {
     ...shape.perception(WGSL),
-    CONSTANTS: `${planes(shape, plane)}\nconst CELLS = ${cellsPerThread}u;\nconst INPUTS = ${shape.inputs};`,
+    CONSTANTS: `const VECTORS = ${vectors}u;\nconst CELLS = ${cellsPerThread}u;\nconst INPUTS = ${shape.inputs};`,
     BOUNDS: `struct Bounds { ${rules.flatMap((rule) => ["Low", "High", "Bias"].map((kind) =>
       `${rule}${kind}: array<vec4f, ${vectors}>`)).join(", ")} }`,
     BINDINGS: bindings(shape, rules).map(([name, space, kind], k) =>
@@ -68,9 +68,6 @@ function computeStep(shape, rules, plane, cellsPerThread) {
     NEXT: next((c) => shape.held(rules, WGSL, c, own(c), rules.map((rule) => `${rule}u[m][${c}]`))),
   });
 }
-
-// Where the vectors of the states are in WebGPU's buffers: one after the other, each with `plane` cells.
-const planes = (shape, plane) => `const VECTORS = ${shape.vectors}u;\nconst PLANE = ${plane}u;`;
 
 // What the compute shader reads and writes: names, spaces and kinds.
 function bindings(shape, rules) {

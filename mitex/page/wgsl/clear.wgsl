@@ -8,7 +8,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
   if (id.x >= arrayLength(&slots)) {
     return;
   }
+  let plane = arrayLength(&states) / VECTORS;
   for (var c = 0u; c < VECTORS; c++) {
-    states[c * PLANE + slots[id.x]] = vec4f(0.0);
+    states[c * plane + slots[id.x]] = vec4f(0.0);
   }
 }

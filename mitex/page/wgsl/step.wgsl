@@ -2,7 +2,8 @@
 // or not at all.
 const WIDTH = 256u;
 //: CONSTANTS
-struct Step { phase: u32, regular: f32 }
+// States are vectors of four channels, those of all cells one after the other: `plane` of each.
+struct Step { phase: u32, plane: u32, regular: f32 }
 @group(1) @binding(0) var<uniform> now: Step;
 //: BOUNDS
 //: BINDINGS

@@ -31,12 +31,12 @@ def tab(browser, tmp_path_factory):
 
 
 def test_wiped_cells_grow_again_as_good_as_before(tab):
-    tab.run("page.setMode('albedo'); await page.step(80)")
+    tab.run("page.setMode('albedo'); await page.step(60)")
     before = tab.picture()
     tab.run("page.erase(page.pick(64, 64), 0.8 * page.studio.radius * page.surface.scale)")
     wiped = tab.picture()
     hurt = np.abs(wiped - before).max(2) > 0.02
-    tab.run("await page.step(80)")
+    tab.run("await page.step(60)")
     exemplar = Exemplar.load("leather").maps["albedo"]
     still, scar, healed = (
         single_image_frechet(exemplar, picture, mask_b=hurt) for picture in (before, wiped, tab.picture())
