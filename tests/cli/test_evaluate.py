@@ -53,6 +53,7 @@ def test_beside_a_reference(red, monkeypatch, capsys):
     """The ball is as smooth as itself, and not as a ball with spikes; the old options stay apart."""
     monkeypatch.setattr("mitex.evaluation.form.PATCHES", 2)
     monkeypatch.setattr("mitex.evaluation.form.SIZES", (1.0,))
+    monkeypatch.setattr("mitex.evaluation.form.LAYERS", ("relu2_2",))
     monkeypatch.setattr("mitex.comparison.relief_pair.VIEWS", 1)
     near, far = (numbers(capsys, str(red), "--reference", name) for name in (str(red), "spikes"))
     assert near["Form"] < 0.01 and far["Form"] > 0.5

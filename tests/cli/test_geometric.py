@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mitex.cli import main
-from mitex.mesh import Mesh, grid, icosphere, quality
+from mitex.mesh import Mesh, grid, icosphere, quality, subdivide_midpoint
 from tests.cli import bad_files as bad
 from tests.cli.refusals import check_refused
 from tests.shapes import collapsed, fan, pair, turned
@@ -76,6 +76,16 @@ def test_advice_on_the_size(files, run, capsys):
     """The cube has 12 faces, the template 80 on level 1, the last one here."""
     assert main(apply()) == 0
     assert "features are 2.6 times as large as on the reference" in capsys.readouterr().err
+
+
+def test_untangling_draws_back_towards_the_mesh(files, run, monkeypatch):
+    """As far as the split mesh, in place of which `untangled` would have a part of the relief."""
+    monkeypatch.setattr("mitex.methods.geometric.texture.untangled", lambda before, after: before)
+    split = subdivide_midpoint(Mesh.load("good.obj")).vertices
+    for words, bare in (("", False), (" --untangle", True)):
+        assert main(apply("--start-level 0 --end-level 1" + words)) == 0
+        vertices = Mesh.load(files / "out" / "a.ply").vertices
+        assert (np.abs(vertices - split).max() < 1e-5) == bare
 
 
 def animate(words="", mesh="good.obj", model="out/run", out="out/a.gif"):
@@ -199,6 +209,7 @@ def test_bad_fits(files, name, capsys):
 
 
 BAD_APPLIES = {
+    "an untangled template": ("--untangle --mesh template", "leave it out"),
     "level beyond": ("--end-level 5", "this texture has the levels 0 to 1"),
     "level below": ("--start-level -1", "--start-level"),
     "levels in reverse": ("--start-level 1 --end-level 0", "out of range"),

@@ -21,6 +21,7 @@ def test_a_surface_beside_itself_is_nearer_than_a_rough_one(place, monkeypatch):
     monkeypatch.setattr(relief_pair, "SIDE", 48)
     monkeypatch.setattr("mitex.evaluation.form.PATCHES", 2)
     monkeypatch.setattr("mitex.evaluation.form.SIZES", (1.0,))
+    monkeypatch.setattr("mitex.evaluation.form.LAYERS", ("relu2_2",))
     pair, ball = ReliefPair("ball.obj", "ball.obj"), Mesh.load("ball.obj")
     noise = np.random.default_rng(0).normal(1, 0.05, (len(ball.vertices), 1))
     same, rough = (
