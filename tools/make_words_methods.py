@@ -18,7 +18,7 @@ from mitex.methods.registry import load, method_of
 from mitex.render import sheet
 
 SHEET = Path(__file__).parents[1] / "docs" / "gallery" / "words-methods.jpg"
-COLUMNS, CELL, SPP = 3, 320, 64  # pictures in a row, side of a picture [px], and rays of each pixel
+COLUMNS, CELL, SPP = 3, 320, 32  # pictures in a row, side of a picture [px], and rays of each pixel
 
 
 def main() -> None:

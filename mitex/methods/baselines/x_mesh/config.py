@@ -34,7 +34,7 @@ class XMeshConfig(StyleConfig):
 DEFAULT = XMeshConfig()
 PRESETS = {
     DEFAULT.preset: DEFAULT,
-    "text-words": replace(DEFAULT, preset="text-words", sigma=1.5, gate_width=16, **EMBEDDED | {"lr": 2e-4}),
+    "text-words": replace(DEFAULT, preset="text-words", sigma=0.8, gate_width=16, **EMBEDDED | {"lr": 3e-4}),
     "text-paper": replace(
         DEFAULT,
         preset="text-paper",
