@@ -32,16 +32,18 @@ class Browser:
     def __init__(self) -> None:
         self._chromium = self._driver = None
 
-    def open(self, page: Path | str, side: int = 128, steps: str = "webgl") -> "Tab":
+    def open(self, page: Path | str, side: int = 128, steps: str = "webgl", before: str = "") -> "Tab":
         """A page, by its file or address, which stands still, with a square picture of `side` pixels.
 
-        Its steps are taken by webgl, webgpu or, with auto, what the page itself takes.
+        Its steps are taken by webgl, webgpu or, with auto, what the page itself takes; the script
+        `before` runs first.
         """
         if self._chromium is None:
             self._start()
         assert self._chromium is not None
         address = page.as_uri() if isinstance(page, Path) else page
         tab = self._chromium.new_page(viewport={"width": 640, "height": 480})
+        tab.add_init_script(before)
         return Tab(tab, f"{address}#still={side}&steps={steps}")
 
     def close(self) -> None:

@@ -4,9 +4,14 @@
 // that is a processor where WebGL2 has a graphics card.
 async function computeDevice(wanted, graphics) {
   if (wanted === "webgl") return null;
+  const device = await anyDevice(wanted === "webgpu" || graphics.software).catch(() => null);
+  if (wanted === "webgpu" && !device) throw new Error("this browser has no WebGPU");
+  return device;
+}
+
+async function anyDevice(evenProcessors) {
   const adapter = await navigator.gpu?.requestAdapter();
-  if (wanted === "webgpu" && !adapter) throw new Error("this browser has no WebGPU");
-  if (!adapter || (wanted !== "webgpu" && adapter.info.isFallbackAdapter && !graphics.software)) return null;
+  if (!adapter || (adapter.info.isFallbackAdapter && !evenProcessors)) return null;
   // On a processor reading the weights costs most, and cells of one thread share it; a graphics card wants threads.
   return Object.assign(await adapter.requestDevice(), { cellsPerThread: adapter.info.isFallbackAdapter ? 8 : 1 });
 }

@@ -14,6 +14,7 @@ from mitex.page.server import PageServer
 from tests.methods.nca.tiny import SETTINGS
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_settling")
 def test_a_page_follows_a_training(browser, tmp_path):
     exemplar = Exemplar({"albedo": Exemplar.load("lava").maps["albedo"]}, "lava")
