@@ -19,7 +19,7 @@ DEEPEST = 0.5  # relief [radii of the mesh]
 FACES = 400_000  # that the mesh is split into, about, where its texels are as fine
 
 
-def embossed(asset: Asset, depth: float, faces: int = FACES) -> Asset:
+def embossed(asset: Asset, relief: float, faces: int = FACES) -> Asset:
     """The asset with its height map as geometry.
 
     The mesh's faces are split in four until there are about as many as asked for, or until they are as fine
@@ -28,20 +28,20 @@ def embossed(asset: Asset, depth: float, faces: int = FACES) -> Asset:
 
     Args:
         asset: with a height map; it is baked first if it has no textures.
-        depth: from the lowest to the highest value of a height map [radii of the mesh]; negative turns the
-            relief inside out.
+        relief: its depth, from the lowest to the highest value of a height map [radii of the mesh];
+            negative turns it inside out.
         faces: how many there shall be, about, at most twice as many.
 
     Raises:
-        ConfigError: there is no height map, or the depth is out of range.
+        ConfigError: there is no height map, or the relief is too deep.
     """
     if "height" not in asset.maps:
         raise ConfigError(
             f"the texture has no height map; it has {', '.join(asset.maps)}",
             "learn it from an exemplar that has one",
         )
-    if not abs(depth) <= DEEPEST:
-        raise ConfigError(f"a relief of {depth:g} radii", f"use {-DEEPEST:g} to {DEEPEST:g}")
+    if not abs(relief) <= DEEPEST:
+        raise ConfigError(f"a relief of {relief:g} radii", f"use {-DEEPEST:g} to {DEEPEST:g}")
     asset = asset if asset.texture_maps is not None else asset.baked()
     assert asset.atlas is not None and asset.texture_maps is not None
     heights, side = asset.texture_maps["height"], asset.atlas.resolution
@@ -54,7 +54,7 @@ def embossed(asset: Asset, depth: float, faces: int = FACES) -> Asset:
     corners = mesh.faces.ravel()
     count = np.maximum(np.bincount(corners, minlength=len(mesh.vertices)), 1)
     height = np.bincount(corners, at_corners, minlength=len(mesh.vertices)) / count
-    offset = depth * asset.mesh.normalised()[1].scale * (height - _mean(height, mesh))
+    offset = relief * asset.mesh.normalised()[1].scale * (height - _mean(height, mesh))
     moved = mesh.with_vertices(mesh.vertices + offset[:, None].astype(np.float32) * mesh.normals)
     maps = {name: values for name, values in asset.texture_maps.items() if name not in ("height", "normal")}
     return asset_from_textures(moved, mesh.uv, maps, asset.name) if maps else clay(moved)

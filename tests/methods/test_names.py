@@ -7,6 +7,7 @@ from importlib import import_module
 import pytest
 
 from mitex.cli.render import Render
+from mitex.export import embossed
 from mitex.methods import nca
 from mitex.methods.geometric.animation import Animate
 from mitex.methods.registry import methods
@@ -54,19 +55,20 @@ def parameters(*functions) -> set[str]:
 class TestMethod:
     def test_fit(self, name):
         method = methods()[name]
-        fit = import_module(method.texture.partition(":")[0].rpartition(".")[0]).fit
+        package = import_module(method.texture.partition(":")[0].rpartition(".")[0])
+        fits = [getattr(package, call) for call in ("fit", "fit_text") if call in package.__all__]
+        fit = fits[0]
         assert "out" in parameters(fit) and inspect.signature(fit).parameters["out"].default is None
         settings = names(type(next(iter(method.load_presets().values()))))
-        # One command learns from an exemplar or from words, which are two calls in Python.
-        fits = (fit, nca.fit_text) if name == "nca" else (fit,)
+        # One command may learn from an exemplar or from words, which are two calls in Python.
         told = parameters(*fits) | RunOptions.__annotations__.keys() | settings
         assert names(method.load_fit()) - told <= FIT_ONLY
 
     def test_apply(self, name):
         method = methods()[name]
-        # An asset and a living page are two calls in Python.
+        # An asset, its relief as geometry and a living page are calls of their own in Python.
         pages = (nca.living_page,) if name == "nca" else ()
-        told = parameters(method.load_texture().apply, shell_still, *pages)
+        told = parameters(method.load_texture().apply, embossed, shell_still, *pages)
         assert names(method.load_apply()) - told <= APPLY_ONLY
 
 
