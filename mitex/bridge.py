@@ -14,6 +14,7 @@ from mitex.errors import ConfigError
 from mitex.integrators.feature import FeatureIntegrator
 from mitex.runtime import raise_causes
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 from mitex.scenes.stage import Visibility, background_values
 from mitex.sparse import transposed_product
 from mitex.suggestions import suggestion
@@ -192,7 +193,7 @@ class _Image:
 
     def assign(self, tensors: Sequence[torch.Tensor], attached: bool = False) -> list[mi.TensorXf]:
         """Sets the parameters, and returns what their gradients are collected in."""
-        arrays = [mi.TensorXf(tensor.detach().numpy()) for tensor in tensors]
+        arrays = [upload(mi.TensorXf, tensor.detach().numpy()) for tensor in tensors]
         for target, array in zip(self.targets, arrays, strict=True):
             if attached:
                 dr.enable_grad(array)
@@ -224,7 +225,7 @@ class _Traced(torch.autograd.Function):
         try:
             with raise_causes():
                 arrays = image.assign(ctx.saved_tensors, attached=True)
-                upstream = mi.TensorXf(grad.contiguous().numpy())
+                upstream = upload(mi.TensorXf, grad.contiguous().numpy())
                 image.integrator.render_backward(
                     image.scene, image.params, upstream, image.sensor, seed=other, spp=image.spp
                 )

@@ -23,6 +23,7 @@ from mitex.runtime import raise_causes
 
 if TYPE_CHECKING:
     from mitex.runtime.jit import mi
+from mitex.runtime.upload import upload
 
 MIN_ROUGHNESS = 0.05
 MAX_DEPTH = 4
@@ -130,7 +131,7 @@ class OrbitRenderer:
         for key in self._params.keys():  # noqa: SIM118
             for name, array in values.items():
                 if key.startswith("object.") and key.endswith(name):
-                    self._params[key] = mi.TensorXf(np.ascontiguousarray(array, np.float32))
+                    self._params[key] = upload(mi.TensorXf, np.ascontiguousarray(array, np.float32))
         self._params.update()
 
     def _build(self, shape: mi.Mesh) -> tuple[mi.Scene, mi.SceneParameters]:
@@ -156,8 +157,8 @@ class OrbitRenderer:
         positions, normals, detail = (a @ turn for a in (self._positions, self._normals, self._detail))
         shading = _facing(detail, normals, unit(view.origin - positions))
         # Both together: a change of positions alone makes Mitsuba recompute the normals.
-        self._params["object.vertex_positions"] = mi.Float(positions.astype(np.float32).ravel())
-        self._params["object.vertex_normals"] = mi.Float(shading.astype(np.float32).ravel())
+        self._params["object.vertex_positions"] = upload(mi.Float, positions.astype(np.float32).ravel())
+        self._params["object.vertex_normals"] = upload(mi.Float, shading.astype(np.float32).ravel())
         self._params["sensor.to_world"] = mi.Transform4f().look_at(
             origin=view.origin.tolist(), target=view.target.tolist(), up=[0.0, 1.0, 0.0]
         )

@@ -8,6 +8,7 @@ from mitex.mesh import Mesh
 from mitex.mesh.topology import mesh_edges
 from mitex.runtime import init
 from mitex.runtime.jit import mi
+from mitex.runtime.upload import upload
 from mitex.scenes.shapes import mesh_shape
 
 PAST = 1e-4  # part of an edge by which a ray goes on behind a face that it may touch
@@ -41,7 +42,7 @@ def _first(
     way = end - start
     origin = mi.Point3f(np.ascontiguousarray((start + offset[:, None] * way).T))
     ray = mi.Ray3f(origin, mi.Vector3f(np.ascontiguousarray(way.T)))
-    ray.maxt = mi.Float(np.maximum(1 - PAST - offset, 0))
+    ray.maxt = upload(mi.Float, np.maximum(1 - PAST - offset, 0))
     hits = scene.ray_intersect_preliminary(ray)
     hit, face, t = (np.asarray(a) for a in (hits.is_valid(), hits.prim_index, hits.t))
     return hit.astype(bool), face, offset + t

@@ -12,6 +12,7 @@ from mitex.errors import ConfigError
 from mitex.mesh import Mesh
 from mitex.runtime import init, raise_causes
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 from mitex.scenes.cameras import Cameras
 from mitex.scenes.lights import environment
 from mitex.scenes.shapes import mesh_shape
@@ -75,7 +76,7 @@ class GeometryRenderer:
 
     def images(self, vertices: np.ndarray, seed: int) -> np.ndarray:
         """(K, H, W, 3) float32 linear radiance of vertices (V, 3) float32, without derivatives."""
-        self._move(mi.Float(vertices.ravel()))
+        self._move(upload(mi.Float, vertices.ravel()))
         with raise_causes():
             images = [
                 mi.render(self.scene, sensor=sensor, seed=seed + k, spp=self.samples)
@@ -88,10 +89,10 @@ class GeometryRenderer:
         integrator, total = self.scene.integrator(), np.zeros(vertices.size, np.float32)
         for k, sensor in enumerate(self.sensors):
             # One leaf for each view: a backward pass clears the graph between positions and normals.
-            positions = mi.Float(vertices.ravel())
+            positions = upload(mi.Float, vertices.ravel())
             dr.enable_grad(positions)
             self._move(positions)
-            adjoint = mi.TensorXf(np.ascontiguousarray(gradient[k]))
+            adjoint = upload(mi.TensorXf, np.ascontiguousarray(gradient[k]))
             integrator.render_backward(
                 self.scene, self._params, adjoint, sensor, seed + k, self.gradient_samples
             )

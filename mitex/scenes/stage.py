@@ -14,6 +14,7 @@ from mitex.errors import ConfigError
 from mitex.mesh import Mesh
 from mitex.plugins import init
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 from mitex.scenes.cameras import Cameras
 from mitex.scenes.shapes import mesh_shape
 from mitex.sparse import csr
@@ -212,7 +213,7 @@ def _rays(cameras: Cameras, n: int) -> mi.Ray3f:
     y = 1 - (mi.Float(row) + (mi.Float(sample // side) + 0.5) / mi.Float(side)) * (2 / mi.Float(rows))
 
     def affine(terms: np.ndarray) -> mi.Vector3f:
-        flat = mi.Float(np.ascontiguousarray(terms).ravel())
+        flat = upload(mi.Float, np.ascontiguousarray(terms).ravel())
         constant, along_x, along_y = (dr.gather(mi.Vector3f, flat, 3 * camera + term) for term in range(3))
         return constant + x * along_x + y * along_y
 

@@ -11,6 +11,7 @@ from mitex.errors import ConfigError, MeshError, MitexError
 from mitex.mesh import Mesh
 from mitex.mesh.gradients import values_and_gradients
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 from mitex.textures.field import Located
 from mitex.textures.interpolation import Corners, linear, smooth
 from mitex.textures.local_coordinates import BARYCENTRIC, Waves
@@ -145,12 +146,13 @@ class DecodedField(VertexRows):
         except MeshError as e:
             raise _named(e) from e
         self._count = len(mesh.vertices)
-        self._positions, self._normals = mi.Float(mesh.vertices.ravel()), mi.Float(mesh.normals.ravel())
-        self._edges = mi.Float(mesh.edge_lengths.astype(np.float32))
+        self._positions = upload(mi.Float, mesh.vertices.ravel())
+        self._normals = upload(mi.Float, mesh.normals.ravel())
+        self._edges = upload(mi.Float, mesh.edge_lengths.astype(np.float32))
         if self.interpolation == "smooth":
             matrix = values_and_gradients(mesh).tocoo()
             self._entry_row, self._entry_column = mi.UInt32(matrix.row), mi.UInt32(matrix.col)
-            self._entry = mi.Float(matrix.data)
+            self._entry = upload(mi.Float, matrix.data)
 
     @property
     def channel_count(self) -> int:

@@ -20,6 +20,7 @@ import numpy as np
 
 from mitex.mesh import Mesh
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 
 if TYPE_CHECKING:
     import torch
@@ -128,9 +129,9 @@ class SurfaceLookup:
     def __init__(self, mesh: Mesh, kind: Kind = "smooth") -> None:
         self.mesh, self.kind = mesh, kind
         self._weigh = {"linear": linear, "smooth": smooth}[kind]
-        self._faces = mi.UInt32(mesh.faces.astype(np.uint32).ravel())
-        self._positions = mi.Float(mesh.vertices.ravel())
-        self._normals = mi.Float(mesh.normals.ravel())
+        self._faces = upload(mi.UInt32, mesh.faces.astype(np.uint32).ravel())
+        self._positions = upload(mi.Float, mesh.vertices.ravel())
+        self._normals = upload(mi.Float, mesh.normals.ravel())
 
     def weights(self, face: torch.Tensor, barycentric: torch.Tensor) -> Weights:
         """What the points on `face` (P,) int32 at `barycentric` (P, 3) float32 read."""

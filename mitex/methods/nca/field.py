@@ -15,6 +15,7 @@ from mitex.plugins import init
 
 if TYPE_CHECKING:
     from mitex.runtime.jit import mi
+from mitex.runtime.upload import upload
 
 
 def fields(look: Look, state: torch.Tensor, mesh: Mesh) -> dict[str, dict[str, Any]]:
@@ -63,4 +64,4 @@ def _decoder(decoder: Decoder) -> dict[str, Any]:
 def _tensor(values: torch.Tensor) -> mi.TensorXf:
     from mitex.runtime.jit import mi
 
-    return mi.TensorXf(values.detach().cpu().numpy())
+    return upload(mi.TensorXf, values.detach().cpu().numpy())

@@ -40,6 +40,7 @@ from mitex.methods.nerf.use.self_maps import self_maps
 from mitex.progress import announce
 from mitex.runtime import init
 from mitex.runtime.jit import mi
+from mitex.runtime.upload import upload
 
 SIZE = 2048  # side of a synthesized texture [texels]
 LARGEST = 8192  # side of a texture under a guide, at most [texels]
@@ -103,7 +104,7 @@ class NerfTexture:
     @cached_property
     def latents(self) -> CapturedLatents:
         """Features on the captured base shape."""
-        tables = [mi.Float(table.numpy()) for table in self.model.tables]
+        tables = [upload(mi.Float, table.numpy()) for table in self.model.tables]
         return CapturedLatents(Encoding(self.model.config), tables, self.model.frames)
 
     @cached_property
@@ -113,12 +114,12 @@ class NerfTexture:
 
     def _new_decoder(self) -> Decoder:
         """With matrices of its own, which may change."""
-        return Decoder([mi.TensorXf(weight.numpy()) for weight in self.model.weights], packed=True)
+        return Decoder([upload(mi.TensorXf, weight.numpy()) for weight in self.model.weights], packed=True)
 
     @property
     def light(self) -> mi.TensorXf:
         """`mi.TensorXf` (16,), the light of the capture: estimated from its photos, or learned."""
-        return mi.TensorXf(self.model.light.numpy())
+        return upload(mi.TensorXf, self.model.light.numpy())
 
     @property
     def similarity(self) -> Similarity:

@@ -16,6 +16,7 @@ from mitex.mesh import Mesh
 from mitex.methods.surface.unfolding import unfold
 from mitex.runtime import load_mitsuba
 from mitex.runtime.jit import dr
+from mitex.runtime.upload import upload
 
 # isort: split
 from drjit.llvm import Array2f64, Array3f64, Bool, Float64, Int32, UInt32  # after Mitex's choice of LLVM
@@ -66,7 +67,9 @@ class GeodesicTracer:
         plan = unfold(mesh)
         self._faces = len(mesh.faces)
         self._planes = _Planes(
-            Float64(plan.shape.ravel()), Float64(plan.axes.ravel()), Int32(plan.glued.ravel())
+            upload(Float64, plan.shape.ravel()),
+            upload(Float64, plan.axes.ravel()),
+            upload(Int32, plan.glued.ravel()),
         )
 
     def trace(
@@ -101,9 +104,9 @@ class GeodesicTracer:
         self, face: np.ndarray, barycentric: np.ndarray, direction: np.ndarray, length: np.ndarray
     ) -> Arrival:
         index = dr.arange(UInt32, len(face))
-        start = dr.gather(Array3f64, Float64(barycentric.ravel()), index)
-        towards = dr.gather(Array3f64, Float64(direction.ravel()), index)
-        walk = self._planes.start(Int32(face), start, towards, Float64(length))
+        start = dr.gather(Array3f64, upload(Float64, barycentric.ravel()), index)
+        towards = dr.gather(Array3f64, upload(Float64, direction.ravel()), index)
+        walk = self._planes.start(upload(Int32, face), start, towards, upload(Float64, length))
         started = Bool(walk.active)
         (walk,) = dr.while_loop((walk,), lambda w: w.active, self._planes.step)
         # Faces without an area cannot tell a point's coordinates, so a walk that never started keeps its own.

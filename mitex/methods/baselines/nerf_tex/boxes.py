@@ -6,6 +6,7 @@ import numpy as np
 
 from mitex.methods.baselines.nerf_tex.anchors import Anchors
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 from mitex.textures.march import cells_of
 
 CELLS = 64  # of the grid over the scene cube whose cells know their boxes
@@ -31,15 +32,15 @@ class Boxes:
         self.frames, self.half = anchors.frames, half
         self._low, self._high = (np.asarray(v, np.float32).tolist() for v in (low, high))
         centres = anchors.points + np.float32(lift) * anchors.frames[:, 2]
-        self._centres = mi.Float(np.ascontiguousarray(centres, np.float32).ravel())
-        self._axes = mi.Float(np.ascontiguousarray(anchors.frames, np.float32).ravel())
+        self._centres = upload(mi.Float, np.ascontiguousarray(centres, np.float32).ravel())
+        self._axes = upload(mi.Float, np.ascontiguousarray(anchors.frames, np.float32).ravel())
         lists = [_touched(c, f, half, low, high) for c, f in zip(centres, anchors.frames, strict=True)]
         cell = np.concatenate(lists)
         box = np.repeat(np.arange(len(lists)), [len(one) for one in lists])
         order = np.argsort(cell, kind="stable")
-        self._members = mi.UInt32(box[order].astype(np.uint32))
+        self._members = upload(mi.UInt32, box[order].astype(np.uint32))
         starts = np.searchsorted(cell[order], np.arange(CELLS**3 + 1))
-        self._starts = mi.UInt32(starts.astype(np.uint32))
+        self._starts = upload(mi.UInt32, starts.astype(np.uint32))
         self.touched = (np.diff(starts) > 0).reshape((CELLS,) * 3)
 
     def axes(self, box: mi.UInt32) -> list[mi.Vector3f]:

@@ -11,6 +11,7 @@ from mitex.methods.nerf.field.occupancy import Occupancy
 from mitex.methods.nerf.field.tensors import channels
 from mitex.progress import announce
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 from mitex.textures.march import cells_of
 
 FINER = 2  # cells of the occupancy grid along one of the grid that finds boxes
@@ -39,7 +40,7 @@ class InstancedField:
         light: np.ndarray,
     ) -> None:
         self.boxes, self.evaluator, self.step = boxes, evaluator, step
-        self._side, self._occupied = len(occupied), mi.UInt8(occupied.ravel())
+        self._side, self._occupied = len(occupied), upload(mi.UInt8, occupied.ravel())
         self.turn_light(light)
         touched = np.kron(boxes.touched, np.ones((FINER,) * 3, bool))
         occupancy = Occupancy(len(touched), touched)

@@ -22,6 +22,7 @@ from mitex.methods.nerf.field.hash_grid import HashGrid
 from mitex.methods.nerf.field.mlp import network_rows, packed_networks, weight_bound
 from mitex.methods.nerf.field.tensors import channels, rows, tensor
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 
 LEVELS, COARSEST, FINEST = 8, 16, 256  # of the hash grid
 CODE, HARMONICS = 15, 16  # channels handed to the network of the colour, and those of a direction
@@ -105,7 +106,7 @@ class HashNetwork(Network):
         return call(run, *parameters.values())
 
     def evaluator(self, parameters: Parameters) -> Evaluator:
-        table, *matrices = (mi.TensorXf(value.detach().numpy()) for value in parameters.values())
+        table, *matrices = (upload(mi.TensorXf, value.detach().numpy()) for value in parameters.values())
         count = len(DENSITY) - 1
         density, colour = packed_networks(matrices[:count], matrices[count:])
         return lambda inputs: self._values(table.array, density, colour, inputs)

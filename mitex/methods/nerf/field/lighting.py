@@ -17,6 +17,7 @@ from mitex.errors import ImageError
 from mitex.geometry.vectors import unit
 from mitex.methods.nerf.field.tensors import channels
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 
 A = TypeVar("A", bound=dr.ArrayBase)
 COEFFICIENTS = 16  # of a light: l = 0 to 3
@@ -146,4 +147,4 @@ def _expand(
 
 def _flat(values: np.ndarray) -> mi.Float:
     """All values in a row."""
-    return mi.Float(np.ascontiguousarray(values, np.float32).ravel())
+    return upload(mi.Float, np.ascontiguousarray(values, np.float32).ravel())

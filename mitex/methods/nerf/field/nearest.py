@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 
 CELL = 1.5  # side of a cell [spacings]
 EXTRA = 3  # vertices looked up at a cell's corners beyond the K nearest
@@ -40,7 +41,7 @@ class NearestVertices:
     def __init__(self, vertices: np.ndarray, count: int, spacing: float, limit: float = math.inf) -> None:
         self.count, self.limit = count, limit
         self._tree = KDTree(vertices)
-        self._vertices = mi.Float(vertices.ravel())
+        self._vertices = upload(mi.Float, vertices.ravel())
         margin = MARGIN * float(np.linalg.norm(np.ptp(vertices, axis=0)))
         self._low = vertices.min(axis=0) - np.float32(margin)
         extent = np.ptp(vertices, axis=0) + 2 * margin
@@ -100,8 +101,8 @@ class NearestVertices:
         if not len(points):
             return np.zeros((0, self.count), np.uint32)
         with dr.suspend_grad():
-            x = dr.unravel(mi.Point3f, mi.Float(points.ravel()))
-            index = dr.ravel(mi.ArrayXu(self._nearest(x, mi.UInt32(slots.astype(np.uint32)))))
+            x = dr.unravel(mi.Point3f, upload(mi.Float, points.ravel()))
+            index = dr.ravel(mi.ArrayXu(self._nearest(x, upload(mi.UInt32, slots.astype(np.uint32)))))
         return np.asarray(index).reshape(-1, self.count)
 
     @dr.syntax
@@ -152,4 +153,4 @@ class NearestVertices:
         lists[np.nonzero(different)[0], (different.cumsum(axis=1) - 1)[different]] = entries[different]
         self._lists = np.concatenate([self._lists, lists])
         self._lengths = np.concatenate([self._lengths, different.sum(axis=1, dtype=np.uint32)])
-        self._table, self._ends = mi.UInt32(self._lists.ravel()), mi.UInt32(self._lengths)
+        self._table, self._ends = upload(mi.UInt32, self._lists.ravel()), upload(mi.UInt32, self._lengths)

@@ -19,6 +19,7 @@ from mitex.mesh import Mesh
 from mitex.methods.nerf.field.nearest import NearestVertices
 from mitex.runtime import init
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 from mitex.scenes.shapes import mesh_shape
 
 MISSED = 10.0  # the distance of points without a foot
@@ -90,8 +91,8 @@ class Projection:
         used = np.unique(mesh.faces)
         self._count = min(neighbours, len(used))
         self._nearest = NearestVertices(mesh.vertices[used], self._count, float(edges.mean()), limit)
-        self._vertices = mi.Float(mesh.vertices[used].ravel())
-        self._normals = mi.Float(mesh.normals[used].ravel())
+        self._vertices = upload(mi.Float, mesh.vertices[used].ravel())
+        self._normals = upload(mi.Float, mesh.normals[used].ravel())
         self._back = BACK * float(np.ptp(mesh.vertices, axis=0).max())
         # Only these intersections are watertight: rays through a vertex would slip through otherwise.
         scene = {"type": "scene", "embree_use_robust_intersections": True, "mesh": mesh_shape(mesh)}
@@ -113,8 +114,8 @@ class Projection:
     def _cast(self, points: np.ndarray, index: np.ndarray) -> Projections:
         """Projections of points (M, 3) with their nearest vertices (M, K): one kernel, both ways."""
         with dr.suspend_grad():
-            x = dr.unravel(mi.Point3f, mi.Float(points.ravel()))
-            normal = self._coarse_normal(x, mi.UInt32(index.ravel()))
+            x = dr.unravel(mi.Point3f, upload(mi.Float, points.ravel()))
+            normal = self._coarse_normal(x, upload(mi.UInt32, index.ravel()))
             ahead, behind = self._first(x, normal), self._first(x, -normal)
             is_inside = dr.abs(ahead[1]) < dr.abs(behind[1])
             hits, t = dr.select(is_inside, ahead[0], behind[0]), dr.select(is_inside, ahead[1], behind[1])

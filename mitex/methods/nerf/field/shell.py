@@ -17,6 +17,7 @@ from mitex.methods.nerf.field.occupancy import sample_grid
 from mitex.methods.nerf.field.projection import Projection, Projections
 from mitex.methods.nerf.field.tensors import channels, rows
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 from mitex.textures.phong import Phong
 
 
@@ -44,7 +45,7 @@ class ShellCoords:
         return ShellCoords(
             channels(mi.Point3f, projections.point),
             mi.Float(projections.distance / np.float32(scale)),
-            mi.UInt32(projections.face.astype(np.uint32)),
+            upload(mi.UInt32, projections.face.astype(np.uint32)),
             channels(mi.Point2f, projections.barycentric),
             channels(mi.Vector3f, projections.normal),
         )
@@ -86,7 +87,7 @@ class CapturedLatents:
 
     def __init__(self, encoding: Encoding, tables: list[mi.Float], frames: np.ndarray) -> None:
         self.encoding, self.tables = encoding, tables
-        self.frames = mi.Float(np.ascontiguousarray(frames, np.float32).ravel())
+        self.frames = upload(mi.Float, np.ascontiguousarray(frames, np.float32).ravel())
 
     def __call__(self, coords: ShellCoords) -> tuple[list[mi.Float], list[mi.Float]]:
         return self.features(coords), self.encoding(1, coords.foot, self.tables[1])
@@ -186,7 +187,7 @@ class Shell:
     def locate(self, points: mi.Point3f) -> tuple[mi.UInt32, ShellCoords]:
         """Which of the points, `mi.Point3f`, are in the shell, as ascending `mi.UInt32`, and where."""
         index, projections = within(self.projection(rows(points)), self.thickness, self.lift)
-        return mi.UInt32(index.astype(np.uint32)), ShellCoords.of(projections, self.scale)
+        return upload(mi.UInt32, index.astype(np.uint32)), ShellCoords.of(projections, self.scale)
 
     def density(self, points: np.ndarray) -> np.ndarray:
         """Density [1 / scene units] of points (N, 3), (N,); 0 outside of the shell."""

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 
 A = TypeVar("A", bound=dr.ArrayBase)
 
@@ -23,7 +24,7 @@ def tensor(values: dr.ArrayBase) -> mi.TensorXf:
 
 def channels(kind: type[A], values: np.ndarray) -> A:
     """Values (N, C) as a Dr.Jit array of a kind such as `mi.Point3f`; another N needs no other kernel."""
-    return dr.unravel(kind, mi.Float(np.ascontiguousarray(values, np.float32).ravel()))
+    return dr.unravel(kind, upload(mi.Float, np.ascontiguousarray(values, np.float32).ravel()))
 
 
 def as_torch(values: mi.TensorXf) -> torch.Tensor:

@@ -12,6 +12,7 @@ from mitex.methods.nerf.base.base_shape import face_frames
 from mitex.methods.nerf.field.networks import FEATURES, PHASES
 from mitex.methods.nerf.field.shell import ShellCoords
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 
 CHANNELS = FEATURES + PHASES
 PACKET = 8  # channels that are gathered at once
@@ -55,10 +56,10 @@ class MappedLatents:
     def __init__(self, maps: LatentMaps, uv: np.ndarray, frames: np.ndarray) -> None:
         self.size = maps.size
         self.texels = mi.TensorXf(maps.features)
-        self._which = mi.UInt32(maps.frame.astype(np.uint32).ravel())
-        self._turns = mi.Float(np.ascontiguousarray(maps.frames, np.float32).ravel())
-        self._uv = mi.Float(np.ascontiguousarray(uv, np.float32).ravel())
-        self._frames = mi.Float(np.ascontiguousarray(frames, np.float32).ravel())
+        self._which = upload(mi.UInt32, maps.frame.astype(np.uint32).ravel())
+        self._turns = upload(mi.Float, np.ascontiguousarray(maps.frames, np.float32).ravel())
+        self._uv = upload(mi.Float, np.ascontiguousarray(uv, np.float32).ravel())
+        self._frames = upload(mi.Float, np.ascontiguousarray(frames, np.float32).ravel())
 
     def __call__(self, coords: ShellCoords) -> tuple[list[mi.Float], list[mi.Float]]:
         values = self._blended(coords, CHANNELS)

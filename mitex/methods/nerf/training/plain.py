@@ -21,6 +21,7 @@ from mitex.methods.nerf.field.rendering import batch_rays, render_step
 from mitex.methods.nerf.field.tensors import channels, tensor
 from mitex.methods.nerf.training.radiance import RadianceTask, Rendered, schedule
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 from mitex.textures.march import Samples, sum_rays, weights_of
 from mitex.training import checkpoint, train
 from mitex.training.control import ALONE, Control
@@ -61,7 +62,7 @@ class PlainField:
         parameters: Mapping[str, torch.Tensor], grid: HashGrid, mask: mi.TensorXu8, step: float
     ) -> PlainField:
         """The field of a table and matrices in the order of `parameter_shapes`, packed."""
-        table, *weights = (mi.TensorXf(value.detach().numpy()) for value in parameters.values())
+        table, *weights = (upload(mi.TensorXf, value.detach().numpy()) for value in parameters.values())
         return PlainField(grid, table.array, weights, mask, step, packed=True)
 
     def density(self, points: mi.Point3f) -> tuple[mi.Float, list[mi.Float]]:

@@ -19,6 +19,7 @@ from mitex.methods.nerf.field.tensors import rows
 from mitex.methods.nerf.training.losses import distortion
 from mitex.runtime import lower_worker_priority
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 from mitex.textures.march import DIAGONAL, RadianceField, Samples, march, visible
 from mitex.training import Change, Step
 from mitex.training.optim import Adam, Optimizer
@@ -95,7 +96,7 @@ class RadianceTask(ABC, Generic[Config]):
         batch = self.with_cameras(self.pixels.draw(self.config.rays, self.config.one_view, generator))
         jitter = torch.rand(len(batch.view), generator=generator)
         rays = batch_rays(batch)
-        samples = march(*rays, self.occupancy.mask, self.step_length, mi.Float(jitter.numpy()))
+        samples = march(*rays, self.occupancy.mask, self.step_length, upload(mi.Float, jitter.numpy()))
         background = torch.rand(batch.colours.shape, generator=generator)
         if not len(samples):
             raise ValueError("no ray meets an occupied cell")

@@ -36,6 +36,7 @@ from mitex.methods.nerf.training.losses import clustering, normal_agreement
 from mitex.methods.nerf.training.radiance import RadianceTask, Rendered
 from mitex.runtime import bfloat16_is_fast
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 from mitex.textures.march import Samples, sum_rays, weights_of
 
 CLUSTERS = 4  # centres in each level
@@ -91,7 +92,7 @@ class TextureTask(RadianceTask[NerfConfig]):
     def render(self, step: int, batch: Batch, samples: Samples, generator: torch.Generator) -> Rendered:
         origin, direction = batch_rays(batch)
         index, projections = within(self.projection(rows(samples.points(origin, direction))), self.thickness)
-        samples = samples.subset(mi.UInt32(index.astype(np.uint32)))
+        samples = samples.subset(upload(mi.UInt32, index.astype(np.uint32)))
         foot, distance, along = self._attached(batch, samples, projections)
         compared_rays = int(self.config.normal_rays * samples.rays) if self.config.normals else 0
         interior_rays = int(INTERIOR_RAYS * samples.rays) if self._uses_interior(step) else 0
@@ -113,7 +114,7 @@ class TextureTask(RadianceTask[NerfConfig]):
             weights, transmittance = weights_of(density, samples)
             rgb = sum_rays(colour * weights, samples)
             fine, target = self._normals(arrays, coords, normal, weights, samples, compared_rays)
-            interior = self._interior(arrays, coords, weights, samples, mi.Float(depths))
+            interior = self._interior(arrays, coords, weights, samples, upload(mi.Float, depths))
             results = rgb, transmittance, weights, fine, target, interior
             return tuple(tensor(result) for result in results)
 
@@ -142,9 +143,13 @@ class TextureTask(RadianceTask[NerfConfig]):
         self, parameters: dict[str, torch.Tensor], packed: bool
     ) -> tuple[CapturedLatents, Decoder, mi.TensorXf]:
         """Latents, networks and light with given parameters, constant."""
-        arrays = [mi.TensorXf(v.detach().numpy()) for k, v in parameters.items() if "/" in k and k[0] in "tw"]
+        arrays = [
+            upload(mi.TensorXf, v.detach().numpy())
+            for k, v in parameters.items()
+            if "/" in k and k[0] in "tw"
+        ]
         latents, decoder = self._model(arrays, packed)
-        return latents, decoder, mi.TensorXf(parameters["light"].detach().numpy())
+        return latents, decoder, upload(mi.TensorXf, parameters["light"].detach().numpy())
 
     def _model(self, arrays: Sequence[mi.TensorXf], packed: bool = False) -> tuple[CapturedLatents, Decoder]:
         tables, weights = [a.array for a in arrays[:2]], arrays[2:]

@@ -1,0 +1,42 @@
+"""NumPy's arrays as Dr.Jit's, with room behind them.
+
+Dr.Jit takes over the memory of an array as it is, and its LLVM kernels read packets of 16 elements: past the
+end of an array whose number of elements is no multiple of that. What is read there does not matter. But where
+the array ends at the end of a page and the next page is not mapped, as happens with large arrays once in a
+while, the process ends with a segmentation fault (Dr.Jit 1.5).
+"""
+
+from __future__ import annotations
+
+import mmap
+from collections.abc import Callable
+from typing import TypeVar
+
+import numpy as np
+
+A = TypeVar("A")
+PACKET = 16  # elements
+
+
+def upload(kind: Callable[..., A], array: np.ndarray) -> A:
+    """A Dr.Jit array or tensor of a kind such as `mi.Float`, of the values of a NumPy array.
+
+    The memory is shared where it can be, as Dr.Jit's own constructors do: leave the array as it is.
+
+    Args:
+        kind: one-dimensional for arrays (N,), a tensor for others.
+        array: of numbers, of a type that converts to that of the kind.
+    """
+    return kind(with_room(array))
+
+
+def with_room(array: np.ndarray) -> np.ndarray:
+    """The array, or a copy of it if a packet that begins in it may reach into the next page."""
+    array = np.ascontiguousarray(array)
+    beyond = -array.size % PACKET * array.itemsize
+    end = array.__array_interface__["data"][0] + array.nbytes
+    if not array.size or (end - 1) // mmap.PAGESIZE == (end + beyond - 1) // mmap.PAGESIZE:
+        return array
+    roomy = np.empty(array.size + PACKET, array.dtype)
+    roomy[: array.size] = array.ravel()
+    return roomy[: array.size].reshape(array.shape)

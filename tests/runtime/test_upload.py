@@ -1,0 +1,66 @@
+"""Arrays of NumPy as Dr.Jit's: right values, and nothing read that is not there."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from mitex.runtime import init
+
+init()
+
+from mitex.runtime.jit import mi  # noqa: E402
+from mitex.runtime.upload import PACKET, upload, with_room  # noqa: E402
+
+# An array whose last byte is the last one of a page, before a page that must not be read.
+GUARDED = """
+import ctypes, mmap, sys
+import numpy as np
+import mitex
+mitex.init()
+from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
+
+kind, count = getattr(mi, sys.argv[1]), int(sys.argv[2])
+dtype = np.float64 if kind is mi.Float64 else np.float32
+size = count * np.dtype(dtype).itemsize
+pages = -(-size // mmap.PAGESIZE)
+memory = mmap.mmap(-1, (pages + 1) * mmap.PAGESIZE)
+start = ctypes.addressof(ctypes.c_char.from_buffer(memory))
+end = start + pages * mmap.PAGESIZE
+assert ctypes.CDLL(None).mprotect(ctypes.c_void_p(end), mmap.PAGESIZE, 0) == 0
+array = np.frombuffer((ctypes.c_char * size).from_address(end - size), dtype)
+array[:] = np.arange(count)
+values = upload(kind, array) + 1
+dr.eval(values)
+assert (np.array(values) == np.arange(count) + 1).all()
+"""
+
+
+@pytest.mark.parametrize(("kind", "count"), [("Float", 1001), ("Float64", 1001), ("TensorXf", 3)])
+def test_nothing_is_read_past_the_last_page(kind, count):
+    assert subprocess.run([sys.executable, "-c", GUARDED, kind, str(count)]).returncode == 0
+
+
+@pytest.mark.parametrize("shape", [(0,), (1,), (15,), (16,), (17,), (5, 7), (3, 1, 2)])
+def test_values_and_shapes(shape):
+    array = np.random.default_rng(0).random(shape).astype(np.float32)
+    for values in (array, np.asfortranarray(array), array[::-1]):
+        tensor = np.array(upload(mi.TensorXf, values))
+        assert tensor.shape == shape and (tensor == values).all()
+    whole = np.arange(np.prod(shape), dtype=np.uint32)
+    assert (np.array(upload(mi.UInt32, whole)) == whole).all()
+
+
+def test_arrays_are_copied_only_where_a_packet_may_leave_the_page():
+    page = np.zeros(8192, np.uint8)
+    first = -page.__array_interface__["data"][0] % 4096
+    inside = page[first : first + 40].view(np.float32)
+    assert np.shares_memory(with_room(inside), inside)
+    last = page[first + 4096 - 40 : first + 4096].view(np.float32)
+    roomy = with_room(last)
+    assert not np.shares_memory(roomy, last) and (roomy == last).all()
+    assert roomy.base is not None and roomy.base.size == len(last) + PACKET
+    whole = page[first + 4096 - 64 : first + 4096].view(np.float32)
+    assert np.shares_memory(with_room(whole), whole)
