@@ -151,6 +151,8 @@ def test_a_film_shows_the_picture(tab, tmp_path):
               page.studio.camera.turn(0.2, 0); page.draw();
               await new Promise((done) => setTimeout(done, 60));
             }
+            page.draw();  // the last picture once more: a recorder may still hold it back
+            await new Promise((done) => setTimeout(done, 300));
             page.panel.record()"""
         )
     path = tmp_path / download.value.suggested_filename
