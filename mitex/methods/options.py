@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 EXPORTS = (".glb", ".obj", ".ply", ".exr", ".html")
 PICTURES = (".png", ".jpg", ".jpeg")
+PICTURE_RESOLUTION = 512  # of a radiance field [pixels]
 
 
 @dataclass(kw_only=True)
@@ -221,3 +222,23 @@ class ReliefOptions(OptionalMeshOptions):
 
         assert isinstance(applied, Asset)
         return embossed(applied, self.relief)
+
+
+@dataclass(kw_only=True)
+class FieldOptions(ApplyOptions):
+    """Options of the methods that make radiance fields, of which pictures are made without a mesh of them."""
+
+    resolution: Annotated[
+        int | None, arg(metavar="N", help_behavior_hint=f"(default: {PICTURE_RESOLUTION})")
+    ] = None
+    """Side of a picture [pixels]."""
+
+    def check(self) -> None:
+        in_range("--resolution", self.resolution, 64, 8192)
+
+    def check_output(self, out: Path) -> None:
+        picture = out.suffix.lower() in PICTURES
+        reject_unused("--resolution", out, self.resolution is not None and not picture)
+
+    def picture_options(self) -> dict[str, object]:
+        return {"resolution": self.resolution or PICTURE_RESOLUTION}

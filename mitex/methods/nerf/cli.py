@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tyro.conf import arg
 
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
-from mitex.methods.options import PICTURES, MeshOptions, TrainingOptions
+from mitex.methods.options import PICTURES, FieldOptions, MeshOptions, TrainingOptions
 from mitex.paths import expanded
 
 if TYPE_CHECKING:
     from mitex.methods.nerf.use.applied import AppliedTexture
 
 SIZE = 2048  # of the synthesized texture [texels]
-RESOLUTION = 512  # of a picture [pixels]
 
 
 @dataclass(kw_only=True)
@@ -55,7 +54,7 @@ class Fit(TrainingOptions):
 
 
 @dataclass(kw_only=True)
-class Apply(MeshOptions):
+class Apply(FieldOptions, MeshOptions):
     """Put a captured texture in the shell of a mesh: a picture (.png .jpg), or what is solid as a mesh.
 
     examples:
@@ -84,28 +83,25 @@ class Apply(MeshOptions):
     """A picture over the mesh's UVs that the texture resembles from afar; --scale says how small the
     texture's elements are, and so how fine the picture."""
 
-    resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {RESOLUTION})")] = None
-    """Side of a picture [pixels]."""
-
     light: Annotated[Literal["own", "scene"] | None, arg(help_behavior_hint="(default: own)")] = None
     """Light in a picture: that of the photos, or that of the scene, in which the texture is shaded anew."""
 
     def check(self) -> None:
+        super().check()
         in_range("--seed", self.seed, *SEEDS)
         in_range("--scale", self.scale, 0.05, 20.0)
-        in_range("--resolution", self.resolution, 64, 8192)
         in_range("--size", self.size, 128, 8192)
         in_range("--density", self.density, 0.001, 1000.0)
         in_range("--lift", self.lift, 0.0, 1.0)
         mutually_exclusive("--size", "--guide", self.size is not None and self.guide is not None)
 
     def check_output(self, out: Path) -> None:
+        super().check_output(out)
         picture = out.suffix.lower() in PICTURES
-        reject_unused("--resolution", out, self.resolution is not None and not picture)
         reject_unused("--light", out, self.light is not None and not picture)
 
     def picture_options(self) -> dict[str, object]:
-        return {"resolution": self.resolution or RESOLUTION, "light": self.light or "own"}
+        return super().picture_options() | {"light": self.light or "own"}
 
     def applied(self, out: Path) -> AppliedTexture:
         from mitex.images import read_image

@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from mitex.methods.checks import SEEDS, in_range, reject_unused
-from mitex.methods.options import PICTURES, MeshOptions, TrainingOptions
+from mitex.methods.checks import SEEDS, in_range
+from mitex.methods.options import FieldOptions, MeshOptions, TrainingOptions
 
 if TYPE_CHECKING:
     from mitex.methods.baselines.plain_field.applied import AppliedField
-
-RESOLUTION = 512  # of a picture [pixels]
 
 
 @dataclass(kw_only=True)
@@ -54,7 +52,7 @@ class Fit(TrainingOptions):
 
 
 @dataclass(kw_only=True)
-class Apply(MeshOptions):
+class Apply(FieldOptions, MeshOptions):
     """Put boxes all over a mesh: a picture (.png .jpg), or what is solid as a mesh.
 
     examples:
@@ -83,24 +81,14 @@ class Apply(MeshOptions):
     seed: Annotated[int, arg(metavar="N")] = 0
     """Random seed: another seed, other places."""
 
-    resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {RESOLUTION})")] = None
-    """Side of a picture [pixels]."""
-
     def check(self) -> None:
+        super().check()
         in_range("--scale", self.scale, 0.05, 20.0)
         in_range("--spacing", self.spacing, 0.1, 2.0)
         in_range("--tilt", self.tilt, 0.0, 45.0)
         in_range("--lift", self.lift, 0.0, 1.0)
         in_range("--density", self.density, 0.001, 1000.0)
         in_range("--seed", self.seed, *SEEDS)
-        in_range("--resolution", self.resolution, 64, 8192)
-
-    def check_output(self, out: Path) -> None:
-        picture = out.suffix.lower() in PICTURES
-        reject_unused("--resolution", out, self.resolution is not None and not picture)
-
-    def picture_options(self) -> dict[str, object]:
-        return {"resolution": self.resolution or RESOLUTION}
 
     def applied(self, out: Path) -> AppliedField:
         from mitex.mesh import Mesh

@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from mitex.methods.checks import in_range, reject_unused
-from mitex.methods.options import PICTURES, ApplyOptions, TrainingOptions
+from mitex.methods.checks import in_range
+from mitex.methods.options import FieldOptions, TrainingOptions
 from mitex.paths import expanded
 
 if TYPE_CHECKING:
     from mitex.methods.baselines.plain_field.applied import AppliedField
-
-RESOLUTION = 512  # of a picture [pixels]
 
 
 @dataclass(kw_only=True)
@@ -51,7 +49,7 @@ class Fit(TrainingOptions):
 
 
 @dataclass(kw_only=True)
-class Apply(ApplyOptions):
+class Apply(FieldOptions):
     """Write the object of a plain field: a picture (.png .jpg), or what is solid as a mesh.
 
     It takes no mesh: a plain field is of one object, which lies as in its photos' world.
@@ -64,19 +62,9 @@ class Apply(ApplyOptions):
     density: Annotated[float, arg(metavar="X")] = 1.0
     """Factor of the density; more makes thin parts solid."""
 
-    resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {RESOLUTION})")] = None
-    """Side of a picture [pixels]."""
-
     def check(self) -> None:
+        super().check()
         in_range("--density", self.density, 0.001, 1000.0)
-        in_range("--resolution", self.resolution, 64, 8192)
-
-    def check_output(self, out: Path) -> None:
-        picture = out.suffix.lower() in PICTURES
-        reject_unused("--resolution", out, self.resolution is not None and not picture)
-
-    def picture_options(self) -> dict[str, object]:
-        return {"resolution": self.resolution or RESOLUTION}
 
     def applied(self, out: Path) -> AppliedField:
         from mitex.methods.baselines.plain_field import PlainFieldTexture
