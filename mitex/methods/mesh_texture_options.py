@@ -1,15 +1,55 @@
-"""The options of `mitex apply` for textures that belong to the mesh they were made on."""
+"""The options of methods whose textures belong to the mesh that they were made on."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from mitex.methods.options import OptionalMeshOptions
+from tyro.conf import arg
+
+from mitex.lazy import load
+from mitex.methods.options import ExemplarOptions, OptionalMeshOptions
 
 if TYPE_CHECKING:
     from mitex.methods.interface import Applied
+
+
+@dataclass(kw_only=True)
+class MeshTextureFitOptions(ExemplarOptions):
+    """A fit of an exemplar on one mesh; a method's own class has the help and the examples.
+
+    Attributes:
+        method: the baseline that fits.
+    """
+
+    fits_to_mesh: ClassVar[bool] = True
+    method: ClassVar[str]
+
+    mesh: Annotated[str, arg(metavar="MESH|NAME")]
+    """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
+
+    keep_uvs: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Use the mesh's own UVs, which must not overlap."""
+
+    def further(self) -> dict[str, object]:
+        """What a method's `fit` takes beside that."""
+        return {}
+
+    def run(self) -> None:
+        options = self.run_options()
+        from mitex.runtime import let_idle_threads_sleep
+
+        let_idle_threads_sleep()
+        from mitex.exemplar import Exemplar
+        from mitex.mesh import Mesh
+
+        exemplar, mesh = Exemplar.load(self.exemplar), Mesh.load(self.mesh)
+        out = self.folder(f"{exemplar.name}-{mesh.name}-{self.method}")
+        fit = load(f"mitex.methods.baselines.{self.method}:fit")
+        with self.progress() as on_step:
+            fit(exemplar, mesh, out, keep_uvs=self.keep_uvs, on_step=on_step, **self.further(), **options)
+        print(out)
 
 
 @dataclass(kw_only=True)

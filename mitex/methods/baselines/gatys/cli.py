@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
-from mitex.methods.options import ExemplarOptions
-from mitex.methods.planar_options import PlanarOptions
+from mitex.methods.planar_options import PlanarFitOptions, PlanarOptions
 
 
 @dataclass(kw_only=True)
-class Fit(ExemplarOptions):
+class Fit(PlanarFitOptions):
     """Optimize a flat picture until its features have the Gram matrices of an exemplar's albedo, as Gatys et
     al. (2015) do.
 
@@ -22,16 +22,7 @@ class Fit(ExemplarOptions):
       mitex fit gatys --exemplar lava --out runs/flat-lava --resume
     """
 
-    def run(self) -> None:
-        options = self.run_options()
-        from mitex.exemplar import Exemplar
-        from mitex.methods.baselines import gatys
-
-        exemplar = Exemplar.load(self.exemplar)
-        out = self.folder(f"{exemplar.name}-gatys")
-        with self.progress() as on_step:
-            gatys.fit(exemplar, out, on_step=on_step, **options)
-        print(out)
+    method: ClassVar[str] = "gatys"
 
 
 @dataclass(kw_only=True)

@@ -8,12 +8,11 @@ from typing import Annotated, ClassVar
 
 from tyro.conf import arg
 
-from mitex.methods.mesh_texture_options import MeshTextureOptions
-from mitex.methods.options import ExemplarOptions
+from mitex.methods.mesh_texture_options import MeshTextureFitOptions, MeshTextureOptions
 
 
 @dataclass(kw_only=True)
-class Fit(ExemplarOptions):
+class Fit(MeshTextureFitOptions):
     """Optimize the texture of one mesh until random views of it look like an exemplar's albedo, as
     Mordvintsev et al. (2018) do.
 
@@ -27,39 +26,13 @@ class Fit(ExemplarOptions):
       mitex fit multi_view_gram --exemplar lava --mesh vase --out runs/views --resume
     """
 
-    fits_to_mesh: ClassVar[bool] = True
-
-    mesh: Annotated[str, arg(metavar="MESH|NAME")]
-    """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
+    method: ClassVar[str] = "multi_view_gram"
 
     content: Annotated[Path | None, arg(metavar="IMAGE", help_behavior_hint="")] = None
     """Style transfer: keep the structure of this texture, on the mesh's own UVs."""
 
-    keep_uvs: Annotated[bool, arg(help_behavior_hint="")] = False
-    """Use the mesh's own UVs, which must not overlap."""
-
-    def run(self) -> None:
-        options = self.run_options()
-        from mitex.runtime import let_idle_threads_sleep
-
-        let_idle_threads_sleep()
-        from mitex.exemplar import Exemplar
-        from mitex.mesh import Mesh
-        from mitex.methods.baselines import multi_view_gram
-
-        exemplar, mesh = Exemplar.load(self.exemplar), Mesh.load(self.mesh)
-        out = self.folder(f"{exemplar.name}-{mesh.name}-multi_view_gram")
-        with self.progress() as on_step:
-            multi_view_gram.fit(
-                exemplar,
-                mesh,
-                out,
-                keep_uvs=self.keep_uvs,
-                content=self.content,
-                on_step=on_step,
-                **options,
-            )
-        print(out)
+    def further(self) -> dict[str, object]:
+        return {"content": self.content}
 
 
 @dataclass(kw_only=True)

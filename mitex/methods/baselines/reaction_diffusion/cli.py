@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import arg
 
 from mitex.methods.checks import SEEDS, in_range
-from mitex.methods.options import ExemplarOptions
-from mitex.methods.planar_options import PlanarOptions
+from mitex.methods.planar_options import PlanarFitOptions, PlanarOptions
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
 
 
 @dataclass(kw_only=True)
-class Fit(ExemplarOptions):
+class Fit(PlanarFitOptions):
     """Learn chemicals that react and diffuse to a pattern like an exemplar's albedo, as Mordvintsev et al.
     (2021) do.
 
@@ -29,16 +28,7 @@ class Fit(ExemplarOptions):
       mitex fit reaction_diffusion --exemplar lava --out runs/chemical-lava --resume
     """
 
-    def run(self) -> None:
-        options = self.run_options()
-        from mitex.exemplar import Exemplar
-        from mitex.methods.baselines import reaction_diffusion
-
-        exemplar = Exemplar.load(self.exemplar)
-        out = self.folder(f"{exemplar.name}-reaction_diffusion")
-        with self.progress() as on_step:
-            reaction_diffusion.fit(exemplar, out, on_step=on_step, **options)
-        print(out)
+    method: ClassVar[str] = "reaction_diffusion"
 
 
 @dataclass(kw_only=True)
