@@ -127,6 +127,7 @@ def _about(metadata: dict[str, str], path: Path) -> dict[str, Any]:
         if "palette" in about:
             Palette.from_record(about["palette"])
             maps.index("albedo")  # which the palette is of
+        of_record(NcaConfig, {key: about[key] for key in ("density",) if key in about})
     except (LookupError, ValueError, TypeError, AttributeError, RecursionError) as e:
         raise CheckpointError(f"the description in '{path}' is damaged ({e})", "save the model again") from e
     return {"name": path.stem} | about | {"maps": maps}

@@ -8,9 +8,8 @@ from typing import Any, Unpack
 from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.methods.nca import files
-from mitex.methods.nca.config import PRESETS
 from mitex.methods.nca.look import Look, weights_key
-from mitex.methods.nca.motion.start import check_field, learner, motion_record, moving
+from mitex.methods.nca.motion.start import check_field, learner, motion_record, moving, presets_from
 from mitex.methods.nca.motion.task import MotionTask
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.parents import fitting_lineage, resumed_lineage
@@ -35,7 +34,7 @@ def fit(
         exemplar: maps, or what `Exemplar.load` takes.
         out: run folder; must be new or empty, or hold a run to resume; None writes no file.
         init: model to start from: the parent, if the two shall be graftable (section 4.4), or the still look
-            of a moving one.
+            of a moving one, which then has the still one's `density` unless the settings name another.
         motion: the vector field that the texture learns to move along, by name or direction (see
             `mitex.mesh.fields`); the preset is then "motion" unless another is named.
         options: preset ("patch", "paper", "motion" or "motion-paper"), and those of `RunOptions`.
@@ -48,7 +47,9 @@ def fit(
         Cancelled: by `cancel`; a checkpoint has been saved if there is a folder.
         Interrupted: by Ctrl-C, likewise.
     """
-    run = Run.of(PRESETS, out, **(options if motion is None else moving(options, motion)))
+    parent, about = (None, {}) if init is None else files.load(init)
+    settings = options if motion is None else moving(options, motion)
+    run = Run.of(presets_from(about, motion), out, **settings)
     config = run.config
     if config.text is not None:
         raise ConfigError(
@@ -60,9 +61,8 @@ def fit(
     origin: dict[str, Any] = {"exemplar": maps.name, "density": config.density}
     if "albedo" in maps.maps:
         origin["palette"] = Palette.of(maps.maps["albedo"]).record()
-    parent, lineage = None, resumed_lineage(run)
-    if init is not None:
-        parent, about = files.load(init)
+    lineage = resumed_lineage(run)
+    if parent is not None:
         parent = learner(config, parent)
         lineage = fitting_lineage(parent, about, Look.of(config, sorted(maps.maps)))
     origin |= motion_record(config)

@@ -311,6 +311,8 @@ def test_weights_that_are_not_finite(tmp_path, value):
         ({"maps": []}, "unknown maps"),
         ({"maps": 3}, "damaged"),
         ({"palette": 3}, "damaged"),
+        ({"density": "wide"}, "damaged"),
+        ({"density": 1e9}, "density"),
         ({"palette": {"colours": [[0, 0, 0]]}}, "damaged"),
         ({"palette": {"colours": [[0, 0]], "radius": 1}}, "damaged"),
         ({"palette": {"colours": [], "radius": 1}}, "damaged"),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import deepcopy
+from dataclasses import replace
 from typing import Any
 
 import torch
@@ -10,7 +12,7 @@ import torch
 from mitex.errors import ConfigError
 from mitex.mesh import icosphere
 from mitex.mesh.fields import vector_field
-from mitex.methods.nca.config import NcaConfig
+from mitex.methods.nca.config import PRESETS, NcaConfig
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.motion.condition import WIDTH
@@ -32,6 +34,15 @@ def moving(options: RunOptions, field: str) -> RunOptions:
     elsewhere = options.get("config") or options.get("resume") or "preset" in settings
     preset = options.get("preset") or (None if elsewhere else PRESET)
     return {**options, "set": settings, "preset": preset}
+
+
+def presets_from(about: Mapping[str, Any], field: str | None) -> Mapping[str, NcaConfig]:
+    """The presets for a training from a model, along a field if one is named.
+
+    A pattern that learns to move keeps its size: `density` is the model's.
+    """
+    own = {"density": about["density"]} if "density" in about else {}
+    return {name: replace(one, **own) if one.motion or field else one for name, one in PRESETS.items()}
 
 
 def check_field(field: str) -> None:
