@@ -42,7 +42,6 @@ class Recipe:
     settings: tuple[str, ...] = LONG
 
 
-QUICK = ("steps=200", "milestones=120,170")  # without order
 FINE = (*LONG[:2], "density=64")  # patterns that are small in their exemplar
 SMALL = ("view_count=8",)  # exemplars of 128 pixels have one zoom, so more views of it
 RECIPES = {
@@ -55,7 +54,7 @@ RECIPES = {
     "knit": Recipe("knit", settings=FINE),
     "lava": Recipe("lava"),
     "leather": Recipe("leather", settings=FINE),
-    "mosaic": Recipe("Abstract_008", settings=(*QUICK, *SMALL)),
+    "mosaic": Recipe("Abstract_008", settings=(*LONG, *SMALL)),
     "pebbles": Recipe("Pebbles_025", settings=(*FINE, *SMALL)),
     "planks": Recipe("planks"),
     "rust": Recipe("rust"),
