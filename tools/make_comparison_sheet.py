@@ -1,0 +1,90 @@
+"""Puts comparisons together: one table of all of them, and docs/gallery/comparison.jpg.
+
+    python tools/make_comparison_sheet.py --mesh vase --methods surface nca -- out/lava out/bricks ...
+
+The arguments are folders that `mitex compare` wrote, each with other exemplars. Prints a Markdown table: the
+means over all pairs, and those of each exemplar over its meshes, with the standard deviation over seeds
+where there are several. The sheet has a row for each exemplar: itself, and the mesh by each method.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from mitex.comparison.look_pair import picture_of
+from mitex.comparison.measures import LOOKS
+from mitex.comparison.results import label
+from mitex.images import read_image, write_image
+from mitex.render import sheet
+
+SHEET = Path(__file__).parents[1] / "docs" / "gallery" / "comparison.jpg"
+CELL = 240  # side of a picture [px]
+MEASURES = [*(measure.key for measure in LOOKS), "fit_seconds"]
+Row = dict[str, str]
+
+
+def rows_of(folder: Path) -> list[Row]:
+    """What a comparison's report.csv holds, with the picture of each result."""
+    with (folder / "report.csv").open(encoding="utf-8", newline="") as file:
+        return [row | {"picture": str(_picture(folder, row["asset"]))} for row in csv.DictReader(file)]
+
+
+def _picture(folder: Path, asset: str) -> Path:
+    return folder / "measured" / f"{Path(asset).parent.name}.jpg"
+
+
+def number(rows: Sequence[Row], key: str) -> str:
+    """The mean over pairs, and the standard deviation over seeds; a dash where nothing was measured."""
+    by_seed: dict[str, list[float]] = defaultdict(list)
+    for row in rows:
+        if row[key]:
+            by_seed[row["seed"]].append(float(row[key]))
+    means = [np.mean(values) for values in by_seed.values()]
+    if not means:
+        return "–"
+    spread = f" ± {np.std(means, ddof=1):.2g}" if len(means) > 1 else ""
+    return f"{np.mean(means):.3g}{spread}"
+
+
+def table(groups: Iterable[tuple[str, Sequence[Row]]], methods: Sequence[str]) -> str:
+    """Markdown: a line for each group and method."""
+    names = ["exemplar", "method", *MEASURES]
+    lines = [f"| {' | '.join(names)} |", "| --- " * len(names) + "|"]
+    for name, group in groups:
+        for method in methods:
+            own = [row for row in group if row["method"] == method]
+            cells = " | ".join(number(own, key) for key in MEASURES)
+            lines.append(f"| {name} | `{method}` | {cells} |")
+    return "\n".join(lines)
+
+
+def pictures(rows: Sequence[Row], exemplars: Sequence[str], methods: Sequence[str], mesh: str) -> np.ndarray:
+    """The sheet; each method's first seed."""
+    first = {(row["exemplar"], row["method"]): row for row in reversed(rows) if label(row["mesh"]) == mesh}
+    images = [read_image(Path(first[e, m]["picture"])) for e in exemplars for m in methods]
+    originals = [picture_of(exemplar) for exemplar in exemplars]
+    return sheet(images, len(methods), [*methods] * len(exemplars), exemplar=originals, cell=CELL)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--mesh", default="vase", help="that the sheet shows")
+    parser.add_argument("--methods", nargs="+", required=True, help="of tables and sheet, in this order")
+    parser.add_argument("folders", nargs="+", type=Path)
+    arguments = parser.parse_args()
+    rows = [row for folder in arguments.folders for row in rows_of(folder)]
+    exemplars = list(dict.fromkeys(row["exemplar"] for row in rows))
+    groups = [("all", rows), *((label(e), [r for r in rows if r["exemplar"] == e]) for e in exemplars)]
+    print(table(groups, arguments.methods))
+    write_image(SHEET, pictures(rows, exemplars, arguments.methods, arguments.mesh))
+    print(SHEET)
+
+
+if __name__ == "__main__":
+    main()
