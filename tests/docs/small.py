@@ -142,7 +142,8 @@ def _with_few_steps(resolve: Callable[..., Any]) -> Callable[..., Any]:
         config = resolve(presets, preset, file, settings)
         if not hasattr(config, "steps"):
             return config
-        name = next(name for name, method in methods().items() if method.load_presets() is presets)
+        defaults = {name: next(iter(method.load_presets().values())) for name, method in methods().items()}
+        name = next(name for name, default in defaults.items() if type(default) is type(config))
         steps = STEPS if file is None or file.name != CONFIG else RESUMED_STEPS
         return replace(config, steps=steps, **EVERY_FIT, **TINY.get(name, {}))
 
