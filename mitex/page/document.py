@@ -37,6 +37,7 @@ SCRIPTS = (
     "bake",
     "glb",
     "ply",
+    "npy",
     "readers",
     "view",
     "page",

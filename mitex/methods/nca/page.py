@@ -8,14 +8,13 @@ from math import radians
 from pathlib import Path
 from typing import Any
 
-from mitex.errors import ConfigError
 from mitex.mesh import Mesh
 from mitex.mesh.fields import NAMES
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.surface import EDGE
 from mitex.methods.nca.film import PreviewCamera, Shooting
 from mitex.methods.nca.look_data import look_data
-from mitex.methods.nca.motion.condition import Field, followed_field
+from mitex.methods.nca.motion.condition import Field, cell_vectors, followed_field
 from mitex.methods.nca.orientation import Orientation
 from mitex.methods.nca.texture import NcaTexture, grown_state
 from mitex.page import Content, jpeg, mesh_data, quantised
@@ -46,31 +45,36 @@ def living_page(
         mesh: any mesh.
         path: target, .html.
         looks: further textures that the page offers; those of one family can be grafted onto each other.
-        seed, subdivide, scale, speed: as of `NcaTexture.apply`.
+        seed, subdivide, orientation, scale, field, speed: as of `NcaTexture.apply`.
         steps: of the picture that browsers without WebGL2 show; None as of `NcaTexture.apply`.
-        orientation: an angle [degrees].
-        field: name of a vector field, or a direction.
 
     Returns:
         The path written.
 
     Raises:
         OutputError: another suffix, or an unwritable place.
-        ConfigError: an option out of range or, of orientation and field, one that a page cannot follow.
+        ConfigError: an option out of range, or a field as of `NcaTexture.apply`.
         MeshError: a mesh without faces, or one that cannot be remeshed.
     """
     target = prepare_output(path, (".html",))
-    turn = _angle(orientation)
-    followed = _field(texture, field, speed)
+    moved = _followed(texture, field, speed)
     announce("preparing the mesh")
     cells = Cells.of(mesh, subdivide, scale)
     base, levels = (cells.given, cells.levels) if cells.levels is not None else (cells.mesh, 0)
-    content = _content([texture, *looks], [mesh_data(base, levels)], followed)
+    turn, upwards = (orientation, None) if isinstance(orientation, int | float) else (0.0, orientation)
+    own = {
+        name: cell_vectors(mesh, base, source, 1.0)
+        for name, source in {"motion": moved, "upwards": upwards}.items()
+        if source is not None and _anywhere(source) is None
+    }
+    everywhere = _anywhere(moved) or _anywhere(texture.about.get("motion"))
+    content = _content([texture, *looks], [mesh_data(base, levels, own)], everywhere)
     shown = quantised(base)
-    growth = texture.growth_on(Cells.of(shown, levels), shown, turn, _source(followed), speed)
+    followed = own.get("upwards", orientation), own.get("motion", field)
+    growth = texture.growth_on(Cells.of(shown, levels), shown, *followed, speed)
     state = grown_state(growth, seed, texture.steps if steps is None else steps)
     picture = PreviewCamera(shown, Shooting(resolution=PICTURE)).picture(growth.shown(state))
-    options = {"seed": seed, "turn": radians(turn), "speed": speed}
+    options = {"seed": seed, "turn": radians(turn), "upwards": _anywhere(upwards), "speed": speed}
     return Content(content.title, {**content.data, **options}, jpeg(picture)).write(target)
 
 
@@ -84,37 +88,27 @@ def contents(sources: Sequence[str | Path], meshes: Sequence[Mesh]) -> Content:
     textures = [NcaTexture.load(source) for source in sources]
     levels = [Cells.of(mesh).levels or 0 for mesh in meshes]
     data = [mesh_data(mesh, level) for mesh, level in zip(meshes, levels, strict=True)]
-    return _content(textures, data, _field(textures[0], None, 1.0))
+    return _content(textures, data, _anywhere(_followed(textures[0], None, 1.0)))
 
 
 def _content(
     textures: Sequence[NcaTexture], meshes: Sequence[dict[str, Any]], field: str | list[float] | None
 ) -> Content:
     looks = [look_data(texture) for texture in textures]
-    data = {"edge": EDGE, "seed": 0, "turn": 0.0, "speed": 1.0, "field": field}
+    data = {"edge": EDGE, "seed": 0, "turn": 0.0, "upwards": None, "speed": 1.0, "field": field}
     return Content(f"{looks[0]['name']} on {meshes[0]['name']}", data | {"meshes": meshes, "looks": looks})
 
 
-def _angle(orientation: Orientation) -> float:
-    if not isinstance(orientation, int | float):
-        raise ConfigError("the texture of a page is turned by one angle", "give `orientation` in degrees")
-    return float(orientation)
+def _followed(texture: NcaTexture, field: Field | None, speed: float) -> Field | None:
+    return followed_field(texture.look, texture.about, field, speed, texture.about.get("motion"))
 
 
-def _field(texture: NcaTexture, field: Field | None, speed: float) -> str | list[float] | None:
-    """The vector field as the page names it: its name, or its direction; None for a texture that stays."""
-    followed = followed_field(texture.look, texture.about, field, speed, texture.about.get("motion"))
-    if followed is None or str(followed) in NAMES:
-        return None if followed is None else str(followed)
+def _anywhere(field: Field | None) -> str | list[float] | None:
+    """A vector field that every mesh has, by its name or as its direction; None for others."""
+    if not isinstance(field, str) or field in NAMES:
+        return field if isinstance(field, str) else None
     try:
-        direction = [float(word) for word in str(followed).split(",")]
+        direction = [float(word) for word in field.split(",")]
     except ValueError:
-        direction = []
-    if len(direction) != 3:
-        names = ", ".join(NAMES)
-        raise ConfigError("a page knows no vector field from a file", f"use one of {names}, or a direction")
-    return direction
-
-
-def _source(field: str | list[float] | None) -> str | None:
-    return ",".join(map(str, field)) if isinstance(field, list) else field
+        return None
+    return direction if len(direction) == 3 else None

@@ -44,7 +44,7 @@ function bakedImages(page, side) {
   const [colour, bent, plain] = maps.textures;
   const images = [0, 1, 2].map((image) => {
     graphics.fill(out, baking, { image, colour, bent, plain, ids: ids.textures[0], corners: surface.corners,
-      place: surface.place, normals: surface.normals, turn: surface.turn });
+      place: surface.place, normals: surface.normals, ...surface.orientation });
     return graphics.read(out);
   });
   [ids, maps, out].forEach((target) => graphics.drop(target));

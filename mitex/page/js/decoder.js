@@ -145,7 +145,7 @@ class Decoder {
     const states = this.shape.smooth ? automaton.readable() : textures(automaton.states[0], "state");
     this.graphics.fill(target, this.program, {
       ...this.buffers, ...this.uniforms, ...states, ids, occlusion, shares: automaton.shares,
-      corners: surface.corners, place: surface.place, normals: surface.normals, turn: surface.turn,
+      corners: surface.corners, place: surface.place, normals: surface.normals, ...surface.orientation,
       height: surface.height, shareShown: shown,
     });
   }

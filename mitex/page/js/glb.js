@@ -57,14 +57,6 @@ function attributesOf(mesh, side) {
   ];
 }
 
-// The unit vector across a normal that is nearest to another one.
-function across(vector, normal) {
-  const flat = plus(vector, normal, -dot(vector, normal));
-  if (norm(flat) > 1e-9 * norm(vector)) return unit(flat);
-  const axis = Math.abs(normal[0]) < 0.6 ? [1, 0, 0] : [0, 1, 0];
-  return unit(plus(axis, normal, -dot(axis, normal)));
-}
-
 // Parts of a binary buffer, each from a multiple of four on.
 class Chunks {
   constructor() {

@@ -23,7 +23,7 @@ function listenToKeys(page, panel) {
     " ": () => alive() && panel.pause(), r: () => alive() && page.reset(), n: () => alive() && panel.reseed(),
     t: () => panel.choose("turn"), e: () => panel.choose("erase"), g: () => panel.choose("graft"),
     "[": brush(-2), "]": brush(2), s: () => savePicture(page), f: () => panel.record(),
-    o: () => panel.place.querySelector("input[type=file]")?.click(),
+    o: () => alive() && panel.ask(),
     ArrowLeft: seen((view) => view.turn(TURN_STEP, 0)), ArrowRight: seen((view) => view.turn(-TURN_STEP, 0)),
     ArrowUp: seen((view) => view.turn(0, TURN_STEP)), ArrowDown: seen((view) => view.turn(0, -TURN_STEP)),
     "+": seen((view) => view.zoom(0.9)), "-": seen((view) => view.zoom(1 / 0.9)), Home: seen((view) => view.fit()),

@@ -1,10 +1,10 @@
 // A triangle mesh, and what follows from its positions and faces. Numbers are those of Mitex's own Mesh.
 
+// `fields` are vectors at the vertices, by name.
+
 class Mesh {
-  constructor(positions, faces, name = "mesh") {
-    this.positions = positions;
-    this.faces = faces;
-    this.name = name;
+  constructor(positions, faces, name = "mesh", fields = {}) {
+    Object.assign(this, { positions, faces, name, fields });
     this.count = positions.length / 3;
     this.neighbours = neighboursOf(faces, this.count);
     this.crosses = this._crosses();
@@ -13,7 +13,11 @@ class Mesh {
   }
 
   point(vertex) {
-    return this.positions.subarray(3 * vertex, 3 * vertex + 3);
+    return rowOf(this.positions, vertex);
+  }
+
+  normal(vertex) {
+    return rowOf(this.normals, vertex);
   }
 
   // The mean of the vertices, and the largest distance of one from it.
@@ -64,6 +68,8 @@ class Mesh {
   }
 }
 
+const rowOf = (rows, k) => rows.subarray(3 * k, 3 * k + 3);
+
 // For each vertex the others that it has an edge with, ascending: index[start[v]] to index[start[v + 1] - 1].
 function neighboursOf(faces, count) {
   const keys = new Float64Array(2 * faces.length);
@@ -85,19 +91,23 @@ function subdivided(mesh) {
   const edges = distinct(keys.sort(), () => true);
   const middle = new Map();
   edges.forEach((key, k) => middle.set(key, count + k));
-  const positions = new Float32Array(3 * (count + edges.length));
-  positions.set(mesh.positions);
-  edges.forEach((key, k) => {
-    const [a, b] = [mesh.point(Math.floor(key / count)), mesh.point(key % count)];
-    for (let c = 0; c < 3; c++) positions[3 * (count + k) + c] = 0.5 * (a[c] + b[c]);
-  });
+  const halved = (values) => {
+    const rows = new Float32Array(3 * (count + edges.length));
+    rows.set(values);
+    edges.forEach((key, k) => {
+      const [a, b] = [rowOf(values, Math.floor(key / count)), rowOf(values, key % count)];
+      for (let c = 0; c < 3; c++) rows[3 * (count + k) + c] = 0.5 * (a[c] + b[c]);
+    });
+    return rows;
+  };
   const children = new Uint32Array(4 * faces.length);
   for (let f = 0; f < faces.length; f += 3) {
     const [a, b, c] = faces.subarray(f, f + 3);
     const [ab, bc, ca] = [middle.get(keyOf(a, b)), middle.get(keyOf(b, c)), middle.get(keyOf(c, a))];
     children.set([a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca], 4 * f);
   }
-  return new Mesh(positions, children, mesh.name);
+  const fields = Object.entries(mesh.fields).map(([name, vectors]) => [name, halved(vectors)]);
+  return new Mesh(halved(mesh.positions), children, mesh.name, Object.fromEntries(fields));
 }
 
 // The mesh with about as many vertices as a texture was trained on, and how often it was subdivided for it.

@@ -5,7 +5,7 @@ class Page extends View {
   constructor(data, graphics, device = null) {
     super(data, graphics);
     this.device = device;
-    Object.assign(this, { looks: data.looks, seed: data.seed, field: data.field, speed: data.speed });
+    Object.assign(this, { looks: data.looks, seed: data.seed, turn: data.turn, speed: data.speed });
     Object.assign(this, { chosen: 0, grafted: null });
     this.setMesh(meshOf(data.meshes[0]), data.meshes[0].levels);
     device?.lost.then(() => this._withoutDevice());
@@ -26,8 +26,13 @@ class Page extends View {
     return this.looks[this.chosen];
   }
 
-  // Grows the look on a mesh that is subdivided so many times.
+  // Grows the look on a mesh that is subdivided so many times. It follows the mesh's own fields, if it has any.
   setMesh(base, levels) {
+    if (base !== this.base) {
+      const led = (own, now, otherwise) => (base.fields[own] ? own : now === own || now === undefined ? otherwise : now);
+      this.field = led(MOTION, this.field, this.data.field ?? FIELDS[0]);
+      this.upwards = led(UPWARDS, this.upwards, this.data.upwards);
+    }
     Object.assign(this, { base, levels });
     this.show(dense(base, levels));
     this.radius = 0.15 * this.studio.radius * this.surface.scale; // of the brush [mesh units]
@@ -74,11 +79,23 @@ class Page extends View {
     this.changed = true;
   }
 
-  // Turns the texture on the surface [rad].
-  orient(turn) {
-    this.turn = turn;
-    this.surface.orient(turn);
+  // Turns the texture on the surface [rad], from +y or from where a field leads its up.
+  orient(turn, upwards = this.upwards) {
+    Object.assign(this, { turn, upwards });
+    this.surface.orient(this.turnOn(this.surface.mesh));
     this.move(this.field, this.speed);
+  }
+
+  turnOn(mesh) {
+    return this.upwards ? turnsAlong(mesh, this.upwards, this.turn) : this.turn;
+  }
+
+  // Gives the mesh that is shown vectors at its vertices, for the texture's MOTION or what it takes for UPWARDS.
+  follow(own, vectors) {
+    this.base.fields[own] = vectors;
+    this.surface.mesh.fields = dense(this.base, this.levels).fields;
+    if (own === MOTION) this.move(own, this.speed);
+    else this.orient(this.turn, own);
   }
 
   // Lets a moving texture follow a field at some speed.
@@ -86,7 +103,7 @@ class Page extends View {
     Object.assign(this, { field, speed, changed: true });
     if (!this.look.condition) return;
     const { mesh, slots } = this.surface;
-    const told = conditionOf(mesh, field, speed, this.look.fastest ?? Infinity, this.turn);
+    const told = conditionOf(mesh, field, speed, this.look.fastest ?? Infinity, this.surface.turn);
     this.automaton.tell(slots.spread(told, 3));
   }
 

@@ -10,6 +10,7 @@ const TOOLS = [
   ["graft", "Graft", "Paint the other texture (G)"],
 ];
 const NONE = "none";
+const FIELD_FILES = "NPY, or PLY with vx vy vz; or drop one onto the page";
 
 class Panel {
   constructor(page, clock, pointer, { panel, status }) {
@@ -103,7 +104,18 @@ class Panel {
         text: (k) => `${SPEEDS[k]} steps/s` }, (k) => { clock.rate = SPEEDS[k]; }),
       slider("Orientation", { low: -180, high: 180, step: 1, value: Math.round((page.turn * 180) / Math.PI),
         text: (x) => `${x}°` }, (x) => page.orient((x * Math.PI) / 180)),
-      this._density());
+      this._upwards(), this._density());
+  }
+
+  // Orientation may be counted from a field instead of from +y.
+  _upwards() {
+    const { page } = this;
+    return element("div", { className: "row" }, page.upwards
+      ? button("Leave the field", "Count the orientation from +y again", () => {
+        page.orient(page.turn, null);
+        this.build();
+      })
+      : button("Along a field …", `Its up follows vectors at the mesh's vertices: ${FIELD_FILES}`, () => this.ask(UPWARDS)));
   }
 
   // Cells: each level of subdivision has four times as many, and patterns of half the size.
@@ -120,11 +132,15 @@ class Panel {
   _motion() {
     const { page } = this;
     if (!page.look.condition) return [];
-    const fields = choice("Direction", FIELDS.map((name) => [name, name.replace("-", " ")]), page.field, (name) => {
+    const given = Array.isArray(page.data.field) ? [[page.data.field, page.data.field.join(", ")]] : [];
+    const own = page.base.fields[MOTION] ? [[MOTION, "the file's"]] : [];
+    const names = FIELDS.map((name) => [name, name.replace("-", " ")]);
+    const fields = choice("Direction", [...names, ...given, ...own], page.field, (name) => {
       page.move(name, page.speed);
       fields.set(name);
     });
-    return [section("Motion", fields, slider("Pace", { low: 0, high: 3, step: 0.1, value: page.speed,
+    const file = button("From a file …", `Vectors at the mesh's vertices: ${FIELD_FILES}`, () => this.ask(MOTION));
+    return [section("Motion", fields, element("div", { className: "row" }, file), slider("Pace", { low: 0, high: 3, step: 0.1, value: page.speed,
       text: (x) => `${x.toFixed(1)} ×` }, (x) => page.move(page.field, x)))];
   }
 
@@ -139,11 +155,9 @@ class Panel {
 
   _keep() {
     const { page } = this;
-    const file = element("input", { type: "file", accept: ".obj,.ply,.glb", hidden: true,
-      onchange: () => this.open(file.files[0]) });
     this.film = button("Film", "Record until it is pressed again (F)", () => this.record());
     const another = page.automaton ? [button("Open a mesh …", "OBJ, PLY or GLB; or drop one onto the page (O)",
-      () => file.click()), file] : [];
+      () => this.ask())] : [];
     return section("Keep", element("div", { className: "row" },
       button("Picture", "Save what is shown (S)", () => savePicture(page)), this.film,
       button("GLB", "Save the mesh with the texture as it is now", () => this.attempt(() => saveAsset(page))),
@@ -203,14 +217,26 @@ class Panel {
     this.film.textContent = this.recorder ? "Stop" : "Film";
   }
 
-  // Grows the texture on a mesh of the user's.
-  open(file) {
-    if (!file || !this.page.automaton) return;
+  // Grows the texture on a mesh of the user's, or lets it follow vectors at the vertices of the one that is there.
+  open(file, led = this.page.look.condition ? MOTION : UPWARDS) {
+    const { page } = this;
+    if (!file || !page.automaton) return;
     this.attempt(async () => {
-      const mesh = readMesh(new Uint8Array(await file.arrayBuffer()), file.name);
-      this.page.setMesh(mesh, autoLevels(mesh.count));
+      const { mesh, vectors } = readFile(new Uint8Array(await file.arrayBuffer()), file.name);
+      if (vectors && (!mesh || fits(vectors, page.base))) page.follow(led, vectorsOf(page.base, vectors, file.name));
+      else {
+        if (vectors) mesh.fields[led] = vectorsOf(mesh, vectors, file.name);
+        page.setMesh(mesh, autoLevels(mesh.count));
+      }
       this.build();
     });
+  }
+
+  // Asks for a file of a mesh or, for what is led, of vectors.
+  ask(led) {
+    const accept = led ? ".npy,.ply" : ".obj,.ply,.glb";
+    const input = element("input", { type: "file", accept, onchange: () => this.open(input.files[0], led) });
+    input.click();
   }
 
   async attempt(act) {

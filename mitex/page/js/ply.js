@@ -1,4 +1,6 @@
-// PLY files, of text or binary.
+// PLY files, of text or binary: positions, faces and, if the vertices have such properties, vectors.
+
+const VECTORS = [["vx", "vy", "vz"], ["fx", "fy", "fz"], ["u", "v", "w"]];
 
 const NUMBERS = {
   char: [1, "getInt8"], int8: [1, "getInt8"], uchar: [1, "getUint8"], uint8: [1, "getUint8"],
@@ -14,17 +16,21 @@ function readPly(bytes) {
   const { format, elements } = headerOf(text.slice(0, end.index));
   const body = bytes.subarray(end.index + end[0].length);
   const next = format === "ascii" ? wordsOf(body) : valuesOf(body, format === "binary_little_endian");
-  const [positions, faces] = [[], []];
+  const [positions, faces, vectors] = [[], [], []];
   for (const { name, count, properties } of elements) {
-    const places = ["x", "y", "z"].map((axis) => properties.findIndex((property) => property.name === axis));
+    const columns = (names) => names.map((one) => properties.findIndex((property) => property.name === one));
+    const places = columns(["x", "y", "z"]);
+    const ways = VECTORS.map(columns).find((group) => !group.includes(-1)) ?? [];
     for (let k = 0; k < count; k++) {
       const values = properties.map(({ kind, length }) =>
         length ? Array.from({ length: next(length) }, () => next(kind)) : next(kind));
-      if (name === "vertex") positions.push(...places.map((place) => values[place]));
-      else if (name === "face") fan(values.find(Array.isArray) ?? [], faces);
+      if (name === "vertex") {
+        positions.push(...places.map((place) => values[place]));
+        vectors.push(...ways.map((way) => values[way]));
+      } else if (name === "face") fan(values.find(Array.isArray) ?? [], faces);
     }
   }
-  return { positions, faces };
+  return { positions, faces, vectors };
 }
 
 function headerOf(text) {

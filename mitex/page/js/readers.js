@@ -1,20 +1,48 @@
-// Meshes that are dropped into the page: OBJ, PLY and GLB, of which positions and faces are read.
+// Files that are dropped into the page: meshes (OBJ, PLY, GLB), of which positions and faces are read, and vectors
+// at the vertices of a mesh (NPY, PLY).
 
 const MOST_VERTICES = 300_000;
 const ENOUGH = 8_000; // vertices, as `--subdivide auto` has it
 const MOST_LEVELS = 6;
 
-// A mesh from a file's bytes; errors say what is wrong.
-function readMesh(bytes, name) {
-  const suffix = name.toLowerCase().split(".").pop();
-  const reader = { obj: readObj, ply: readPly, glb: readGlb }[suffix];
-  if (!reader) throw new Error(`${name} is no OBJ, PLY or GLB file`);
-  const { positions, faces } = welded(given(reader, bytes, name));
-  const count = positions.length / 3;
+// What is in a file: a mesh, and vectors at its vertices or at those of another one; null for what is not there.
+// Errors say what is wrong.
+function readFile(bytes, name) {
+  const reader = { obj: readObj, ply: readPly, glb: readGlb, npy: readNpy }[name.toLowerCase().split(".").pop()];
+  if (!reader) throw new Error(`${name} is no OBJ, PLY, GLB or NPY file`);
+  const { positions = [], faces = [], vectors = [] } = given(reader, bytes, name);
+  const alone = vectors.length && !faces.length;
+  return { mesh: alone ? null : meshOfFile(positions, faces, name), vectors: vectors.length ? vectors : null };
+}
+
+// `origin` has the file's number of each vertex, of `fileCount`.
+function meshOfFile(given, corners, name) {
+  const fileCount = given.length / 3;
+  if (corners.some((index) => !(index < fileCount))) throw new Error(`${name} is damaged: a face has no such vertex`);
+  const { positions, faces, origin } = welded(given, corners);
   if (!faces.length || !positions.every(Number.isFinite)) throw new Error(`${name} has no faces that can be shown`);
-  if (count > MOST_VERTICES) throw new Error(`${name} has more than ${MOST_VERTICES.toLocaleString()} vertices`);
-  if (faces.some((index) => !(index < count))) throw new Error(`${name} is damaged: a face has no such vertex`);
-  return new Mesh(positions, faces, name.replace(/\.\w+$/, ""));
+  if (origin.length > MOST_VERTICES) throw new Error(`${name} has more than ${MOST_VERTICES.toLocaleString()} vertices`);
+  return Object.assign(new Mesh(positions, faces, name.replace(/\.\w+$/, "")), { origin, fileCount });
+}
+
+// Whether there is one for each vertex of a mesh, or of the file that it was in.
+const fits = (vectors, mesh) => [mesh.count, mesh.fileCount].includes(vectors.length / 3);
+
+// The same as vectors of the mesh's vertices; errors say what is wrong.
+function vectorsOf(mesh, vectors, name) {
+  const count = vectors.length / 3;
+  if (!fits(vectors, mesh)) {
+    const [has, needs] = [count, mesh.count].map((number) => number.toLocaleString());
+    throw new Error(`${name} has ${has} vectors, but the mesh has ${needs} vertices`);
+  }
+  const bad = vectors.findIndex((x) => !Number.isFinite(x));
+  if (bad >= 0) throw new Error(`${name} is NaN or infinite at vertex ${Math.floor(bad / 3)}`);
+  const rows = Float32Array.from(count === mesh.count ? vectors : Array.from({ length: 3 * mesh.count }, (_, k) =>
+    vectors[3 * mesh.origin[Math.floor(k / 3)] + (k % 3)]));
+  if (!tangent(mesh, (v) => rowOf(rows, v)).some(Boolean)) {
+    throw new Error(`${name} has no vector with a part along the surface`);
+  }
+  return rows;
 }
 
 function given(reader, bytes, name) {
@@ -32,26 +60,23 @@ const autoLevels = (count) => {
 };
 
 // Vertices at the same place become one, those of no face are left out, and so are faces without three.
-function welded({ positions, faces }) {
-  const places = new Map();
-  const [kept, numbers] = [[], new Map()];
-  const numberOf = (vertex) => {
-    if (numbers.has(vertex)) return numbers.get(vertex);
-    const point = positions.slice(3 * vertex, 3 * vertex + 3);
-    const key = Array.from(point, Math.fround).join();
-    if (!places.has(key)) {
-      places.set(key, places.size);
-      kept.push(...point);
-    }
-    numbers.set(vertex, places.get(key));
-    return places.get(key);
-  };
+function welded(positions, faces) {
+  const used = new Uint8Array(positions.length / 3);
+  for (const vertex of faces) used[vertex] = 1;
+  const [places, origin, numbers] = [new Map(), [], new Uint32Array(used.length)];
+  used.forEach((one, vertex) => {
+    if (!one) return;
+    const key = Array.from(positions.slice(3 * vertex, 3 * vertex + 3), Math.fround).join();
+    if (!places.has(key)) places.set(key, origin.push(vertex) - 1);
+    numbers[vertex] = places.get(key);
+  });
   const triangles = [];
   for (let k = 0; k + 2 < faces.length; k += 3) {
-    const corners = [faces[k], faces[k + 1], faces[k + 2]].map(numberOf);
+    const corners = [0, 1, 2].map((c) => numbers[faces[k + c]]);
     if (new Set(corners).size === 3) triangles.push(...corners);
   }
-  return { positions: Float32Array.from(kept), faces: Uint32Array.from(triangles) };
+  const points = origin.flatMap((vertex) => positions.slice(3 * vertex, 3 * vertex + 3));
+  return { positions: Float32Array.from(points), faces: Uint32Array.from(triangles), origin };
 }
 
 function fan(polygon, faces) {

@@ -46,7 +46,7 @@ class StillPage extends View {
     this.graphics.fill(target, this.program, {
       colours, materials, details: details ?? colours, detailed: Boolean(details), coordinates, ids,
       level: Math.max(Math.log2(size * (this.texels ?? 1)) - 0.5, 0), occlusion: studio.occlusion.cells.textures[0],
-      corners: surface.corners, place: surface.place, normals: surface.normals, turn: 0,
+      corners: surface.corners, place: surface.place, normals: surface.normals, ...surface.orientation,
     });
   }
 }

@@ -11,6 +11,7 @@ class Surface {
     this.points = this._points();
     this.place = this._cells("RGBA32F", slots.spread(this._places(), 4));
     this.normals = this._cells("RGBA32F", slots.spread(mesh.normals, 3));
+    this.rights = this._cells("RGBA32F", this._rights(turn));
     this.faceCount = mesh.faces.length / 3;
     this.corners = graphics.list("RGBA32UI", this._corners());
     this.rowValues = this._rows();
@@ -22,11 +23,12 @@ class Surface {
     this.ownSlopes = this._cells("RGBA32F", slots.spread(own, 3));
   }
 
-  // Turns the texture about the normals by this angle [rad].
+  // Turns the texture about the normals by this angle [rad], one or those of the vertices.
   orient(turn) {
     this.turn = turn;
     this.linkValues = this._links(turn);
     this.graphics.refill(this.links, this.linkValues);
+    this.graphics.refill(this.rights, this._rights(turn));
   }
 
   // A texture with a texel for each cell.
@@ -42,6 +44,22 @@ class Surface {
     const padded = new Kind(WIDTH * this.height * (format.startsWith("RGBA") ? 4 : 1));
     padded.set(values);
     return this.graphics.list(format, padded, WIDTH);
+  }
+
+  // What shaders read of the texture's orientation.
+  get orientation() {
+    const follows = typeof this.turn !== "number";
+    return { follows, rights: this.rights, turn: follows ? 0 : this.turn };
+  }
+
+  // Where the exemplar's right points, if cells have turns of their own.
+  _rights(turn) {
+    const rows = new Float32Array(3 * this.mesh.count);
+    for (let v = 0; typeof turn !== "number" && v < this.mesh.count; v++) {
+      const normal = unit(this.mesh.normal(v));
+      rows.set(rotated(rightwards(normal), normal, turn[v]), 3 * v);
+    }
+    return this.slots.spread(rows, 3);
   }
 
   // Positions in decoder units.
@@ -79,10 +97,10 @@ class Surface {
     const links = new Uint32Array(4 * index.length);
     const directions = new Float32Array(links.buffer);
     for (let v = 0; v < mesh.count; v++) {
-      const normal = mesh.normals.subarray(3 * v, 3 * v + 3);
+      const [normal, angle] = [mesh.normal(v), turnAt(turn, v)];
       for (let k = start[v]; k < start[v + 1]; k++) {
         let way = unit(minus(mesh.point(index[k]), mesh.point(v)));
-        if (turn) way = rotated(way, normal, -turn);
+        if (angle) way = rotated(way, normal, -angle);
         links[4 * k] = slots.slotOf[index[k]];
         directions.set(way, 4 * k + 1);
       }
@@ -91,7 +109,7 @@ class Surface {
   }
 
   drop() {
-    for (const name of ["place", "normals", "corners", "rows", "links", "slopes", "ownSlopes"]) {
+    for (const name of ["place", "normals", "corners", "rights", "rows", "links", "slopes", "ownSlopes"]) {
       this.graphics.gl.deleteTexture(this[name]);
     }
   }

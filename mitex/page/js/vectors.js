@@ -13,6 +13,14 @@ function cross(a, b) {
   return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 }
 
+// The unit vector across a normal that is nearest to another one.
+function across(vector, normal) {
+  const flat = plus(vector, normal, -dot(vector, normal));
+  if (norm(flat) > 1e-9 * norm(vector)) return unit(flat);
+  const axis = Math.abs(normal[0]) < 0.6 ? [1, 0, 0] : [0, 1, 0];
+  return unit(plus(axis, normal, -dot(axis, normal)));
+}
+
 // A vector turned counter-clockwise about a unit axis (Rodrigues).
 function rotated(v, axis, angle) {
   const [c, s] = [Math.cos(angle), Math.sin(angle)];

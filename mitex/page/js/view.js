@@ -2,15 +2,20 @@
 
 class View {
   constructor(data, graphics) {
-    Object.assign(this, { data, graphics, canvas: graphics.canvas, turn: data.turn ?? 0, samples: 1 });
+    Object.assign(this, { data, graphics, canvas: graphics.canvas, samples: 1 });
     this.studio = new Studio(this.graphics);
   }
 
   show(mesh) {
     this.surface?.drop();
-    this.surface = new Surface(this.graphics, mesh, this.data.edge, this.turn);
+    this.surface = new Surface(this.graphics, mesh, this.data.edge, this.turnOn(mesh));
     this.studio.setSurface(this.surface);
     this.changed = true;
+  }
+
+  // The angle by which what it wears is turned on a mesh [rad]; one, or those of the vertices.
+  turnOn() {
+    return 0;
   }
 
   // What the picture shows: one of MODES.
@@ -56,8 +61,13 @@ class View {
   }
 }
 
-function meshOf({ low, step, positions, faces, name }) {
-  const quanta = summed(positions, 3, Uint16Array);
-  const places = Float32Array.from(quanta, (value, k) => low[k % 3] + step[k % 3] * value);
-  return new Mesh(places, Uint32Array.from(summed(faces, 3, faces.constructor)), name);
+function meshOf({ positions, faces, name, fields = {} }) {
+  const vectors = Object.entries(fields).map(([key, rows]) => [key, rowsOf(rows)]);
+  const corners = Uint32Array.from(summed(faces, 3, faces.constructor));
+  return new Mesh(rowsOf(positions), corners, name, Object.fromEntries(vectors));
+}
+
+// Rows of three numbers that are in steps from the lowest ones.
+function rowsOf({ low, step, steps }) {
+  return Float32Array.from(summed(steps, 3, Uint16Array), (count, k) => low[k % 3] + step[k % 3] * count);
 }

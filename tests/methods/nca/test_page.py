@@ -282,8 +282,10 @@ def test_nothing_is_fetched_and_nothing_goes_wrong(tab):
 
 
 def test_what_a_page_cannot_follow_is_refused(texture, tmp_path):
-    with pytest.raises(ConfigError, match="one angle"):
-        living_page(texture, torus(8, 6), tmp_path / "a.html", orientation="up")
+    with pytest.raises(ConfigError, match="there is no vector field 'sideways'"):
+        living_page(texture, torus(8, 6), tmp_path / "a.html", orientation="sideways")
+    with pytest.raises(ConfigError, match="for each vertex"):
+        living_page(texture, torus(8, 6), tmp_path / "a.html", orientation=np.ones((5, 3)))
     with pytest.raises(ConfigError, match="does not move"):
         living_page(texture, torus(8, 6), tmp_path / "a.html", field="up")
     with pytest.raises(OutputError):
