@@ -29,7 +29,6 @@ class StyleConfig(WordsConfig, TrainingConfig):
     decay: float = key(0.9, "factor of the learning rate at a milestone", 0)
     text_vertices: int = key(10_000, "that a mesh has at least, else its faces are split", 1, 1_000_000)
     text_relief: float = key(0.1, "that a vertex is moved by at most [radii]", 0, 1)
-    text_background: float = key(1.0, "around the mesh [sRGB]; the paper: white", 0, 1)
     text_each: bool = key(
         False, "compare the text with each picture; false: with their mean embedding (the paper)"
     )

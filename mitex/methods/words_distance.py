@@ -13,6 +13,7 @@ from mitex.errors import ConfigError
 from mitex.features.text_image import TextImageModel
 from mitex.losses import Augmentation, directional_distance, mean_direction, text_distance
 from mitex.scenes.cameras import Cameras
+from mitex.scenes.shaded import BACKGROUND
 
 SAME = 1e-4  # squared distance of the unit embeddings of texts that mean the same
 
@@ -71,13 +72,13 @@ class Part:
         weight: of its distance.
         cut: what of the pictures the model sees.
         pictures: (K, H, W, 3) sRGB.
-        negative: (D,) the same of a `Negative`.
+        negative: (D,) the same of a `Negative`; needed for directions alone.
     """
 
     weight: float
     cut: Augmentation
     pictures: torch.Tensor
-    negative: torch.Tensor
+    negative: torch.Tensor | None
 
 
 class WordsDistance:
@@ -89,6 +90,7 @@ class WordsDistance:
         thing: what the negatives show, in words.
         directional: compare the step from the negatives to the pictures with that from `thing` to the text
             (MeshNCA, equation 9); else the pictures with the text.
+        background: sRGB around the surface, and around the pictures.
 
     Attributes:
         text, negative: (D,) directions of the texts; the second one counts in steps from it alone.
@@ -97,8 +99,15 @@ class WordsDistance:
         ConfigError: the text says no more than `thing`, or what the model does not know.
     """
 
-    def __init__(self, model: TextImageModel, text: str, thing: str, directional: bool) -> None:
-        self.model, self.directional = model, directional
+    def __init__(
+        self,
+        model: TextImageModel,
+        text: str,
+        thing: str,
+        directional: bool,
+        background: float = BACKGROUND,
+    ) -> None:
+        self.model, self.directional, self._background = model, directional, background
         texts = model.encode_texts([text, thing if directional else text])
         self.text, self.negative = F.normalize(texts, dim=1)
         if directional and (self.text - self.negative).square().sum() < SAME:
@@ -107,13 +116,13 @@ class WordsDistance:
     @torch.no_grad()
     def bare(self, sight: Sight, pictures: torch.Tensor) -> Negative:
         """What the surface without its texture is, of which the pictures (K, H, W, 3) of a sight are."""
-        squares = [cut(pictures, self.model.resolution) for cut in (sight.whole, sight.close)]
+        squares = [self._squares(cut, pictures) for cut in (sight.whole, sight.close)]
         return Negative(*self.directions(squares))
 
     def __call__(self, parts: Mapping[str, Part]) -> dict[str, torch.Tensor]:
         """The weighted distance of each part that has a weight; all are encoded at once."""
         parts = {name: part for name, part in parts.items() if part.weight}
-        squares = [part.cut(part.pictures, self.model.resolution) for part in parts.values()]
+        squares = [self._squares(part.cut, part.pictures) for part in parts.values()]
         return {
             name: part.weight * self._distance(direction, part.negative)
             for (name, part), direction in zip(parts.items(), self.directions(squares), strict=True)
@@ -124,7 +133,11 @@ class WordsDistance:
         embeddings = self.model.encode_images(torch.cat(groups))
         return [mean_direction(part) for part in embeddings.split([len(group) for group in groups])]
 
-    def _distance(self, pictures: torch.Tensor, negative: torch.Tensor) -> torch.Tensor:
+    def _squares(self, cut: Augmentation, pictures: torch.Tensor) -> torch.Tensor:
+        return cut(pictures, self.model.resolution, self._background)
+
+    def _distance(self, pictures: torch.Tensor, negative: torch.Tensor | None) -> torch.Tensor:
         if self.directional:
+            assert negative is not None
             return directional_distance(pictures, negative, self.text, self.negative)
         return text_distance(pictures, self.text)
