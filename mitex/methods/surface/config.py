@@ -212,13 +212,12 @@ PRESETS[CLIP] = replace(
     milestones=(210, 270),
     coarse_share=0.5,
     noise=0.2,
-    diffusion=0.1,
+    diffusion=0.05,
 )
 PRESETS[EMBEDDED] = replace(
     PRESETS[CLIP],
     preset=EMBEDDED,
     resolution=256,
-    lr=0.02,
     text_prompt="{text}",
     text_directional=False,
     text_background=0.5,  # white would count as a colour of the text

@@ -1,5 +1,6 @@
 """Textures of one mesh from words: the loss by hand, what each setting does, and what is refused."""
 
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -196,27 +197,34 @@ def test_a_colour_is_learned():
         assert change[channel] > 0.1 + max(change[k] for k in range(3) if k != channel), (text, change)
 
 
-@pytest.mark.parametrize(
-    ("setting", "base"),
-    [
-        ("text_directional=false", ()),
-        ("text_prompt=red {text}", ("text=green",)),
-        ("text_object=torus", ()),
-        ("text_bank=1", ()),
-        ("text_views=3", ()),
-        ("text_view=40", ()),
-        ("text_distance=3", ()),
-        ("text_width=0.5", ()),
-        ("scale=0.5", ("text_width=0.5",)),
-        ("text_background=0.3", ()),
-        ("text_crops=3", ()),
-        ("text_crop_area=0.3", ()),
-        ("text_tilt=0", ()),
-        ("text_whole_weight=2", ()),
-        ("text_close_weight=0", ()),
-        ("seed=1", ()),
-    ],
+# another value of a setting, and what else both tasks are given
+CASES: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("text_directional=false", ()),
+    ("text_prompt=red {text}", ("text=green",)),
+    ("text_object=torus", ()),
+    ("text_bank=1", ()),
+    ("text_views=3", ()),
+    ("text_view=40", ()),
+    ("text_distance=3", ()),
+    ("text_width=0.5", ()),
+    ("scale=0.5", ("text_width=0.5",)),
+    ("text_background=0.3", ()),
+    ("text_crops=3", ()),
+    ("text_crop_area=0.3", ()),
+    ("text_tilt=0", ()),
+    ("text_whole_weight=2", ()),
+    ("text_close_weight=0", ()),
+    ("seed=1", ()),
 )
+
+
+def test_every_setting_has_a_case():
+    names = {field.name for field in fields(SurfaceConfig) if field.name.partition("_")[0] == "text"}
+    elsewhere = {"text", "text_weight", "text_model"}  # learned, beside an exemplar, and TestFit
+    assert names == elsewhere | {setting.partition("=")[0] for setting, _ in CASES} - {"scale", "seed"}
+
+
+@pytest.mark.parametrize(("setting", "base"), CASES)
 def test_settings_matter(setting, base):
     """Of a texture with a pattern, else a mean colour does not depend on the view."""
 
