@@ -1,8 +1,9 @@
 """Measures how textures of `nca` flow on meshes: where to, how fast, and what is left of the look.
 
-usage: python tools/compare_motion.py MOVING:STILL ... [--fields F ...] [--meshes M ...]
+usage: python tools/compare_motion.py MOVING[:STILL] ... [--fields F ...] [--meshes M ...]
 
 MOVING and STILL are models, run folders or bundled names; STILL is the texture that MOVING was trained from.
+Without it the look is not compared, as of textures from words, which have no exemplar.
 Close-ups of the albedo, four pixels an edge of the cells' mesh, are taken some steps apart. Lucas and
 Kanade's method estimates the motion between them, which is compared with that of the field. The look is
 compared with the exemplar, by the Frechet distance of VGG-16's features at relu2_2, some steps after the
@@ -95,8 +96,10 @@ class CloseUps:
         return image.reshape(*self.cameras.shape, -1)
 
 
-def motion_of(texture: NcaTexture, closeups: CloseUps, field: str) -> tuple[float, float, list[float]]:
-    """Direction error [degrees], speed ratio, and distances from the exemplar after `LATER`."""
+def motion_of(
+    texture: NcaTexture, closeups: CloseUps, field: str, later: tuple[int, ...]
+) -> tuple[float, float, list[float]]:
+    """Direction error [degrees], speed ratio, and distances from the exemplar after so many steps each."""
     if "motion" not in texture.about:
         raise ConfigError(f"{texture.about['name']} does not move", "train it with `motion`")
     encoded = texture.look.rule.condition > 0  # else it moves along the field of its training alone
@@ -114,7 +117,7 @@ def motion_of(texture: NcaTexture, closeups: CloseUps, field: str) -> tuple[floa
         if covered.mean() > 0.5
     ]
     looks = []
-    for before, after in zip((0, *LATER), LATER, strict=False):
+    for before, after in zip((0, *later), later, strict=False):
         state = growth.evolve(state, after - before, generator)
         looks.append(distance(texture, closeups, growth, state))
     direction, ratio = (
@@ -161,11 +164,11 @@ def main() -> None:
         mesh = icosphere(FREQUENCY) if mesh_name == SPHERE else Mesh.load(mesh_name)
         closeups = CloseUps.of(mesh)
         for pair in arguments.models:
-            moving, still = (NcaTexture.load(name) for name in pair.split(":"))
-            reference = still_distance(still, closeups)
+            moving, *still = (NcaTexture.load(name) for name in pair.split(":"))
+            reference = still_distance(still[0], closeups) if still else 1.0
             for field in arguments.fields:
-                direction, ratio, looks = motion_of(moving, closeups, field)
-                numbers = " | ".join(f"{look / reference:.2f}" for look in looks)
+                direction, ratio, looks = motion_of(moving, closeups, field, LATER if still else ())
+                numbers = " | ".join([f"{look / reference:.2f}" for look in looks] or [""] * len(LATER))
                 names = f"{moving.about['name']} | {Path(mesh_name).stem} | {field}"
                 print(f"| {names} | {direction:.0f}° | {ratio:.2f} | {numbers} |", flush=True)
 

@@ -1,13 +1,13 @@
 """Draws docs/gallery/nca-flow.jpg: textures that flow, some moments one after the other.
 
-    python tools/make_flow_sheet.py runs/lava runs/cobblestone
+usage: python tools/make_flow_sheet.py MODEL [MODEL ...] [--out FILE]
 
-The arguments are models that move, as of `mitex fit nca --motion`. Each has a row for each of the fields.
+A MODEL moves, as of `mitex fit nca --motion`. It has a row for each of the fields.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -39,15 +39,18 @@ def moments(texture: NcaTexture, field: str) -> list[np.ndarray]:
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("models", nargs="+")
+    parser.add_argument("--out", type=Path, default=SHEET)
+    options = parser.parse_args()
     pictures, labels = [], []
-    for model in sys.argv[1:]:
+    for model in options.models:
         texture = NcaTexture.load(model)
         for field in ROWS:
             pictures += moments(texture, field)
             name = f"{texture.about['name']}, {field}"
             labels += [name, *(f"{k * STEPS} steps later" for k in range(1, PICTURES))]
-    write_image(SHEET, sheet(pictures, columns=PICTURES, labels=labels, cell=CELL))
-    print(SHEET)
+    print(write_image(options.out, sheet(pictures, columns=PICTURES, labels=labels, cell=CELL)))
 
 
 if __name__ == "__main__":

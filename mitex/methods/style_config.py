@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from mitex.errors import ConfigError
-from mitex.features.text_image import PROMPT
+from mitex.methods.words_config import WordsConfig
 from mitex.training.settings import TrainingConfig, key
 
 
 @dataclass(frozen=True)
-class StyleConfig(TrainingConfig):
+class StyleConfig(WordsConfig, TrainingConfig):
     """What shapes the training of a network of colours, and from words of offsets too."""
 
     resolution: int = key(512, "side of the texture that the colours are baked into [texels]", 16, 4096)
@@ -28,29 +27,16 @@ class StyleConfig(TrainingConfig):
     lr: float = key(5e-4, "learning rate of Adam", 0)
     milestones: tuple[int, ...] = key((100, 200, 300), "steps at which the learning rate falls", 0)
     decay: float = key(0.9, "factor of the learning rate at a milestone", 0)
-    text: str | None = key(None, "what the mesh is made of, in words")
-    text_object: str | None = key(None, "what the mesh is; by default its name")
-    text_prompt: str = key(PROMPT, "that the model of texts and images reads")
-    text_model: str | None = key(None, "CLIP folder, or words for the small embedded model")
     text_vertices: int = key(10_000, "that a mesh has at least, else its faces are split", 1, 1_000_000)
     text_relief: float = key(0.1, "that a vertex is moved by at most [radii]", 0, 1)
-    text_background: float = key(1.0, "around the mesh [sRGB]; the paper: white", 0, 1)
     text_each: bool = key(
         False, "compare the text with each picture; false: with their mean embedding (the paper)"
     )
-    text_crops: int = key(4, "close-ups that are cut out of a view", 1, 64)
-    text_crop_area: float = key(0.1, "of a close-up, as a share of the view", 1e-3, 1)
-    text_tilt: float = key(0.5, "of what the model sees: the corners' way outwards [half sides]", 0, 2)
-    text_whole_weight: float = key(1.0, "of the distance of whole views from the text", 0)
-    text_close_weight: float = key(1.0, "of that of the close-ups", 0)
     text_relief_weight: float = key(1.0, "of that of the close-ups without colours", 0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if "{text}" not in self.text_prompt:
-            raise ConfigError(f"text_prompt = '{self.text_prompt}' leaves out the text", "put {text} in it")
-        if not (self.text_whole_weight or self.text_close_weight or self.text_relief_weight):
-            raise ConfigError("text_whole_, text_close_ and text_relief_weight are all 0", "let one count")
+        self.check_words("text_relief_weight")
 
     @property
     def schedule(self) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from mitex.features.text_model import text_image_model
 from mitex.mesh import Mesh
 from mitex.methods.layout import with_layout
 from mitex.methods.style_config import StyleConfig
-from mitex.methods.style_task import StyleTask, prompt
+from mitex.methods.style_task import StyleTask
 from mitex.methods.styled_mesh import StyledMesh
 from mitex.methods.wording import check_text, worded
 from mitex.training.fit import Run
@@ -51,7 +51,7 @@ def fit_style(
     check_text(config.text, config.preset)
     model = text_image_model(config.text_model)
     given = mesh if isinstance(mesh, Mesh) else Mesh.load(mesh)
-    model.encode_texts([prompt(config, given.name)])  # refuses unknown words before the mesh is unwrapped
+    model.encode_texts([config.prompt(given.name)])  # refuses unknown words before the mesh is unwrapped
     surface = with_layout(given, config.resolution, keep_uvs)
     run.control.check()
     task = kind[0](config, model, surface)

@@ -10,7 +10,7 @@ import torch
 
 from mitex.atlas import Atlas
 from mitex.cache import content_key
-from mitex.features.text_image import TextImageModel, object_prompt
+from mitex.features.text_image import TextImageModel
 from mitex.losses import Augmentation, embedding_distance, mean_direction, text_distance
 from mitex.mesh import Mesh, subdivide_midpoint
 from mitex.methods.style_cameras import cameras_of
@@ -47,7 +47,7 @@ class StyleTask(ParameterTask):
     def __init__(self, config: StyleConfig, model: TextImageModel, mesh: Mesh) -> None:
         keep_freed_memory()
         self.config, self.model, self.mesh = config, model, mesh
-        self.prompt = prompt(config, mesh.name)
+        self.prompt = config.prompt(mesh.name)
         self.text = model.encode_texts([self.prompt])
         self.fine = _with_vertices(mesh, config.text_vertices)
         self.ball, self._similarity = self.fine.normalised()
@@ -130,11 +130,6 @@ class StyleTask(ParameterTask):
         known |= {"text_model": self.model.name, "text_model_key": self.model.name}
         key = content_key(self.mesh.vertices, self.mesh.faces, self.mesh.uv)
         return {"method": self.method, "mesh": self.mesh.name, "mesh_key": key} | known
-
-
-def prompt(config: StyleConfig, name: str) -> str:
-    """What the model of texts and images reads of the mesh of that name."""
-    return object_prompt(config.text or "", config.text_object or name, config.text_prompt)
 
 
 def _with_vertices(mesh: Mesh, fewest: int) -> Mesh:

@@ -1,4 +1,8 @@
-"""`mitex fit nca --text` at the command line."""
+"""Fits from words at the command line, of all methods that take them."""
+
+import json
+import os
+from pathlib import Path
 
 import pytest
 
@@ -35,28 +39,102 @@ def test_from_words_to_a_file(files, capsys):
     assert (files / "ball.glb").stat().st_size > 10_000
 
 
+FITS = {
+    "nca": "fit nca",
+    "surface": "fit surface --mesh ball.ply",
+    "text2mesh": "fit text2mesh --mesh ball.ply",
+    "x_mesh": "fit x_mesh --mesh ball.ply",
+}
+every_method = pytest.mark.parametrize("method", FITS)
+
+
+def test_from_words_to_a_surface_texture(files, capsys):
+    """Also beside an exemplar, with the model that ships."""
+    small = "resolution=32 exemplar_size=32 scales=0 layers=relu1_1 text_views=1 text_view=24 preview_every=0"
+    words = ["fit", "surface", "--mesh", "ball.ply", "--clip", "words", "--quiet", "--set", *small.split()]
+    text = ["--text", "Red dots, on white!", "--steps", "2"]
+    assert main([*words, *text]) == 0
+    assert capsys.readouterr().out == "runs/red-dots-on-white-ball\n"
+    assert main([*words, *text, "--exemplar", "lava", "--out", "both"]) == 0
+    assert main([*words, *text[:-1], "3", "--exemplar", "lava", "--out", "both", "--resume"]) == 0
+    assert main(["apply", "both", "--out", "ball.glb", "--quiet"]) == 0
+    assert (files / "ball.glb").stat().st_size > 3000
+
+
+@every_method
+class TestRefused:
+    @pytest.mark.parametrize(
+        ("words", "message"),
+        [
+            ("--text red --clip hub", "'hub' is no CLIP model: missing is the folder itself"),
+            ("--text red --clip partial", "missing is model.safetensors"),
+            ("--text red --clip damaged", "model.safetensors cannot be read"),
+            ("--text red --clip other", "does not describe a CLIP model that Mitex can run"),
+            ("--text red --clip mixed", "is not that of its model"),
+            ("--text red --clip clip --out clip/config.json/run", "is a file"),
+            ("--text red --clip clip --out locked/run", "locked' is not writable"),
+            ("--text red --clip clip --mesh nothing", "there is no mesh"),
+            ("--text frobs --clip words --set text_prompt={text}", "does not know the word 'frobs'"),
+        ],
+    )
+    def test_bad_input(self, files, capsys, monkeypatch, method, words, message):
+        (write_folder(files / "damaged") / "model.safetensors").write_bytes(b"damaged")
+        (write_folder(files / "partial") / "model.safetensors").unlink()
+        _change(write_folder(files / "other"), lambda config: config.update(model_type="siglip"))
+        _change(write_folder(files / "mixed"), lambda config: config["text_config"].update(vocab_size=100))
+        (files / "locked").mkdir()
+        real, locked = os.access, files / "locked"  # the superuser may write everywhere
+        monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != locked and real(path, mode))
+        check_refused(files, [*FITS[method].split(), "--quiet", *words.split()], message, capsys)
+
+    @pytest.mark.parametrize(
+        ("text", "clip", "message"),
+        [
+            ("", "clip", "the text is empty"),
+            (" ", "words", "the text is empty"),
+            ("red " * 10_000, "clip", "tokens; give"),
+            ("red " * 10_000, "words", "words; say it in 16 at most"),
+        ],
+    )
+    def test_texts_of_no_use(self, files, capsys, method, text, clip, message):
+        words = [*FITS[method].split(), "--quiet", "--text", text, "--clip", clip]
+        check_refused(files, words, message, capsys)
+
+
+def _change(folder: Path, change) -> None:
+    config = json.loads((folder / "config.json").read_text())
+    change(config)
+    (folder / "config.json").write_text(json.dumps(config))
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("", "--exemplar is missing; give --exemplar IMAGE, or --text WORDS"),
-        ("--text red --exemplar lava", "--text and --exemplar contradict each other"),
-        ("--exemplar lava --mesh vase", "--mesh means nothing without --text"),
-        ("--exemplar lava --clip clip", "--clip means nothing without --text"),
-        ("--text red --mesh nothing", "there is no mesh"),
-        ("--text red --clip hub", "'hub' is no CLIP model: missing is the folder itself"),
-        ("--text red --clip damaged", "model.safetensors cannot be read"),
-        ("--text red --clip clip --out clip/config.json/run", "is a file"),
-        ("--text red --clip clip --preset paper", "the preset paper is for exemplars, not for words"),
+        ("nca", "--exemplar is missing; give --exemplar IMAGE, or --text WORDS"),
+        ("nca --text red --exemplar lava", "--text and --exemplar contradict each other"),
+        ("nca --exemplar lava --mesh vase", "--mesh means nothing without --text"),
+        ("nca --exemplar lava --clip clip", "--clip means nothing without --text"),
+        ("nca --text red --clip clip --preset paper", "the preset paper is for exemplars, not for words"),
+        ("surface --mesh vase", "--exemplar is missing; give --exemplar IMAGE, or --text WORDS"),
+        ("surface --mesh vase --exemplar lava --clip clip", "--clip means nothing without --text"),
+        ("surface --tile 64 --text red", "--tile and --text contradict each other"),
+        (
+            "surface --mesh vase --text red --orientation a.npy",
+            "--orientation means nothing without --exemplar",
+        ),
+        ("surface --mesh vase --text red --scale-map a.npy", "--scale-map means nothing without --exemplar"),
+        ("surface --mesh vase --text red --clip clip --preset fast", "the preset fast is for exemplars"),
+        (
+            "surface --mesh vase --exemplar lava --preset text",
+            "the settings are for words, not for an exemplar",
+        ),
+        ("text2mesh --mesh vase", "--exemplar is missing; give --exemplar IMAGE, or --text WORDS"),
+        ("text2mesh --mesh vase --text red --exemplar lava", "--text and --exemplar contradict each other"),
+        ("text2mesh --mesh vase --exemplar lava --clip clip", "--clip means nothing without --text"),
     ],
 )
-def test_bad_input(files, capsys, words, message):
-    (write_folder(files / "damaged") / "model.safetensors").write_bytes(b"damaged")
-    check_refused(files, f"fit nca --quiet {words}".split(), message, capsys)
-
-
-@pytest.mark.parametrize("text", ["", "red " * 10_000])
-def test_texts_of_no_use(files, capsys, text):
-    check_refused(files, ["fit", "nca", "--text", text, "--clip", "clip", "--quiet"], "the text", capsys)
+def test_options_that_do_not_go_together(files, capsys, words, message):
+    check_refused(files, ["fit", *words.split(), "--quiet"], message, capsys)
 
 
 def test_only_textures_with_a_relief_move_a_mesh(files, capsys):

@@ -43,7 +43,8 @@ TINY: dict[str, dict[str, Any]] = {
     # Nothing of the architecture, which must be that of the model after `--init`.
     "nca": {"frequency": 4, "pool": 1, "view_count": 1, "zooms": 1, "min_steps": 2, "max_steps": 2}
     | {"resolution": 32, "target_size": 32, "exemplar_size": 32, "layers": ("relu1_1",), "order_weight": 0.0},
-    "surface": {"resolution": 32, "exemplar_size": 32, "scales": 0, "layers": ("relu1_1",)},
+    "surface": {"resolution": 32, "exemplar_size": 32, "scales": 0, "layers": ("relu1_1",)}
+    | {"text_views": 1, "text_view": 24},
     "gatys": {"size": 32, "exemplar_size": 32, "layers": ("relu1_1",)},
     "multi_view_gram": {"resolution": 32, "exemplar_size": 32, "view": 32, "layers": ("relu1_1",)},
     "reaction_diffusion": {"hidden": 8, "channels": 4, "grid": 32, "exemplar_size": 32, "pool": 1}

@@ -242,6 +242,7 @@ PRESETS["text"] = replace(
     resolution=224,
     pool=32,
     text_parent="knit",
+    text_roughness=0.15,  # a soft relief of a few edges' width; at 0.01, as published, there is none
     text_distances=(2.0, 2.5),
     milestones=(600, 850),
 )

@@ -14,7 +14,7 @@ METHOD = Method(
     texture="mitex.methods.surface.texture:SurfaceTexture",
 )
 
-__all__ = ["METHOD", "PRESETS", "SurfaceConfig", "SurfaceTexture", "fit"]
+__all__ = ["METHOD", "PRESETS", "SurfaceConfig", "SurfaceTexture", "fit", "fit_text"]
 
 __getattr__ = attributes(
     __name__,
@@ -23,10 +23,11 @@ __getattr__ = attributes(
         "SurfaceConfig": "mitex.methods.surface.config",
         "SurfaceTexture": "mitex.methods.surface.texture",
         "fit": "mitex.methods.surface.fitting",
+        "fit_text": "mitex.methods.surface.fitting",
     },
 )
 
 if TYPE_CHECKING:
     from mitex.methods.surface.config import PRESETS, SurfaceConfig
-    from mitex.methods.surface.fitting import fit
+    from mitex.methods.surface.fitting import fit, fit_text
     from mitex.methods.surface.texture import SurfaceTexture

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from tyro.conf import arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import in_range, mutually_exclusive
-from mitex.methods.options import ExemplarOptions, ReliefOptions
+from mitex.methods.options import ReliefOptions
+from mitex.methods.words_options import WordsOptions
+from mitex.training.settings import RunSettings
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
@@ -19,9 +21,9 @@ TILE_SIDES = (32, 4096)  # of a tile [px]
 
 
 @dataclass(kw_only=True)
-class Fit(ExemplarOptions):
+class Fit(WordsOptions):
     """Synthesize a texture directly on one mesh, without views and without seams (tangent-space CNN), or on a
-    flat square that repeats (--tile).
+    flat square that repeats (--tile): from an exemplar, from words, or from both.
 
     The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the texture;
     `mitex apply RUN --out ASSET` writes it. Ctrl-C saves, and --resume goes on.
@@ -31,12 +33,20 @@ class Fit(ExemplarOptions):
       mitex fit surface --exemplar scales --mesh octopus --resolution 1024 --scale 0.5
       mitex fit surface --exemplar maps/ --mesh bunny.obj --preset paper --out runs/paper
       mitex fit surface --exemplar painting.png --mesh bunny.obj --content ao --out runs/painted
+      mitex fit surface --text "blue and white stripes" --mesh vase --out runs/stripes
       mitex fit surface --exemplar bark.png --mesh tree.obj --orientation along.npy --out runs/tree
       mitex fit surface --exemplar pebbles.png --mesh bunny.obj --out runs/bunny --resume
       mitex fit surface --exemplar maps/ --tile 1024 --out runs/tile
     """
 
+    source: ClassVar[str | None] = "exemplar"
     fits_to_mesh: ClassVar[bool] = True
+
+    exemplar: Annotated[str | None, arg(metavar="IMAGE|DIR|NAME", help_behavior_hint="")] = None
+    """PNG or JPEG, a folder with any of albedo, height, normal, roughness, ambient_occlusion, or a name."""
+
+    text: Annotated[str | None, arg(metavar="WORDS", help_behavior_hint="")] = None
+    """What the mesh is made of: in place of an exemplar, or beside one."""
 
     mesh: Annotated[str | None, arg(metavar="MESH|NAME", help_behavior_hint="")] = None
     """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
@@ -44,11 +54,9 @@ class Fit(ExemplarOptions):
     tile: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None
     """In place of a mesh: a texture of N x N pixels that repeats without a seam."""
 
-    preset: Annotated[str | None, arg(metavar="fast|paper|style", help_behavior_hint="(default: fast)")] = (
-        None
-    )
+    preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: fast)")] = None
     """Settings to start from: `fast` is quick and clean, `paper` follows the publication, `style` goes with
-    --content."""
+    --content; `text` and `text-words` (the default with the small embedded model) are for words."""
 
     resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the preset's)")] = None
     """Side of the texture [texels]."""
@@ -71,28 +79,62 @@ class Fit(ExemplarOptions):
     """Use the mesh's own UVs, which must not overlap."""
 
     def run(self) -> None:
+        self._check_source()
         self._check_tile()
         options = self.run_options(resolution=self.tile or self.resolution, scale=self.scale)
+        print(self._fit_exemplar(options) if self.text is None else self._fit_text(self.text, options))
+
+    def _fit_exemplar(self, options: RunSettings) -> Path:
         from mitex.exemplar import Exemplar
         from mitex.mesh import Mesh
 
-        exemplar, mesh = Exemplar.load(self.exemplar), Mesh.load(self.mesh) if self.mesh else None
+        exemplar, mesh = Exemplar.load(str(self.exemplar)), Mesh.load(self.mesh) if self.mesh else None
         out = self.folder(f"{exemplar.name}-{'tile' if mesh is None else mesh.name}")
         from mitex.methods import surface
 
         with self.progress() as on_step:
-            surface.fit(
-                exemplar,
+            surface.fit(exemplar, mesh, out, on_step=on_step, **self._on_mesh(), **options)
+        return out
+
+    def _fit_text(self, text: str, options: RunSettings) -> Path:
+        from mitex.exemplar import Exemplar
+        from mitex.mesh import Mesh
+
+        exemplar, mesh = Exemplar.load(self.exemplar) if self.exemplar else None, Mesh.load(str(self.mesh))
+        out = self.words_folder(text, mesh.name)
+        from mitex.methods import surface
+
+        with self.progress() as on_step:
+            surface.fit_text(
+                text,
                 mesh,
                 out,
-                keep_uvs=self.keep_uvs,
-                content=self.content,
-                orientation=self.orientation,
-                scale_map=self.scale_map,
+                exemplar=exemplar,
+                clip=self.clip,
                 on_step=on_step,
+                **self._on_mesh(),
                 **options,
             )
-        print(out)
+        return out
+
+    def _on_mesh(self) -> dict[str, Any]:
+        """How the texture lies on the mesh."""
+        return {
+            "keep_uvs": self.keep_uvs,
+            "content": self.content,
+            "orientation": self.orientation,
+            "scale_map": self.scale_map,
+        }
+
+    def _check_source(self) -> None:
+        if self.exemplar is None and self.text is None:
+            raise ConfigError("--exemplar is missing", "give --exemplar IMAGE, or --text WORDS")
+        mutually_exclusive("--tile", "--text", self.tile is not None and self.text is not None)
+        if self.clip is not None and self.text is None:
+            raise ConfigError("--clip means nothing without --text", "leave it out")
+        for option, value in (("--orientation", self.orientation), ("--scale-map", self.scale_map)):
+            if value is not None and self.exemplar is None:
+                raise ConfigError(f"{option} means nothing without --exemplar", "leave it out")
 
     def _check_tile(self) -> None:
         in_range("--tile", self.tile, *TILE_SIDES)

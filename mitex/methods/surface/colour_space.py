@@ -47,6 +47,11 @@ class ColourSpace:
         """The channels themselves."""
         return ColourSpace(torch.zeros(channels), torch.eye(channels))
 
+    @staticmethod
+    def around_grey(channels: int) -> ColourSpace:
+        """The channels, seen from the middle of their range."""
+        return ColourSpace(torch.full((channels,), 0.5), torch.eye(channels))
+
     def values(self, coordinates: torch.Tensor) -> torch.Tensor:
         """Channel values (..., C) of coordinates (..., C)."""
         return coordinates @ self.basis + self.mean

@@ -20,6 +20,11 @@ MIN_VECTORS = 256  # feature vectors of a region
 class Comparison(Protocol):
     """What a loss reads of the network, and what it makes of that."""
 
+    @property
+    def sizes(self) -> list[torch.Tensor]:
+        """About what a surface without any features costs, of each triple."""
+        ...
+
     def taps(self, network: SurfaceVgg, generator: torch.Generator) -> Mapping[str, Tap | GramTap]:
         """What `cost` needs of the network: layer -> tap."""
         ...
@@ -71,7 +76,10 @@ class GramComparison:
         for image in images:
             features = exemplar_features(network, image, layers)
             self.targets.append({layer: gram_matrix(f) for layer, f in features.items()})
-        self.sizes = [sum(g.square().mean() for g in grams.values()) / len(layers) for grams in self.targets]
+        self.sizes = [
+            torch.stack([g.square().mean() for g in grams.values()]).sum() / len(layers)
+            for grams in self.targets
+        ]
 
     def taps(self, network: SurfaceVgg, generator: torch.Generator) -> dict[str, GramTap]:
         return {layer: GramTap(network.place(layer), self._regions(network, layer)) for layer in self.layers}
@@ -115,6 +123,7 @@ class TransportComparison:
         self.low_precision = network.dtype == torch.bfloat16
         self.colours = [normalise_colours(image.flatten(0, 1)) for image in images]
         self.targets = [exemplar_features(network, image, layers) for image in images]
+        self.sizes = [torch.tensor(float(len(layers)))] * len(images)  # cosine distances, 1 at right angles
 
     def taps(self, network: SurfaceVgg, generator: torch.Generator) -> dict[str, Tap]:
         return {

@@ -8,14 +8,17 @@ from typing import Literal
 from mitex.errors import ConfigError
 from mitex.features.layers import LAYERS, LAYERS_19, with_poolings
 from mitex.methods.layout import EXEMPLAR_WIDTH
+from mitex.methods.wording import CLIP, EMBEDDED
+from mitex.methods.words_config import WordsConfig
 from mitex.training.settings import TrainingConfig, key
 
+WORDS = (CLIP, EMBEDDED)  # presets for words
 SIDES = (16, 2048)  # of the exemplar [px]
 
 
 @dataclass(frozen=True)
-class SurfaceConfig(TrainingConfig):
-    """Everything that shapes a synthesis; every key can be set from a TOML file or with `--set`."""
+class TexelConfig(TrainingConfig):
+    """What shapes a synthesis from an exemplar."""
 
     preset: str = "fast"
     steps: int = 200
@@ -114,6 +117,11 @@ class SurfaceConfig(TrainingConfig):
             raise ConfigError(problem, "set loss=gram and scales=0, or optimizer=adam")
         self.exemplar_side()
 
+    @property
+    def compared(self) -> tuple[str, ...]:
+        """The layers that are compared, by name."""
+        return self.layers or with_poolings(LAYERS_19 if self.weights == "vgg19" else LAYERS)
+
     def exemplar_side(self, factor: float = 1.0) -> int:
         """Side that the exemplar's central square is resized to [px]; a pixel becomes a texel.
 
@@ -132,10 +140,31 @@ class SurfaceConfig(TrainingConfig):
             f"change scale, resolution or exemplar_size so that it is {least} to {most}",
         )
 
-    @property
-    def compared(self) -> tuple[str, ...]:
-        """The layers that are compared, by name."""
-        return self.layers or with_poolings(LAYERS_19 if self.weights == "vgg19" else LAYERS)
+
+@dataclass(frozen=True)
+class SurfaceConfig(WordsConfig, TexelConfig):
+    """Everything that shapes a synthesis; every key can be set from a TOML file or with `--set`."""
+
+    text_weight: float = key(
+        1.0,
+        "of the words, beside an exemplar or a content: with 1, pictures that have nothing of the text cost "
+        "as much as a surface that has no features",
+        0,
+    )
+    text_directional: bool = key(
+        True, "compare the steps from the grey surface; false: pictures and text themselves"
+    )
+    text_bank: int = key(64, "sets of views, drawn once, of which a step sees one", 1, 65_536)
+    text_views: int = key(4, "views in a set", 1, 64)
+    text_view: int = key(224, "side of a view [px]", 16, 2048)
+    text_distance: float = key(2.0, "of the cameras of views of the whole mesh [radii]", 1.01, 100)
+    text_width: float = key(0.0, "of what a view shows at scale 1 [radii]; 0: views of the whole mesh", 0, 2)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.check_words()
+        if self.text is not None and self.optimizer == "lbfgs":
+            raise ConfigError("lbfgs needs a loss without randomness", "set optimizer=adam for words")
 
 
 DEFAULT = SurfaceConfig()
@@ -171,3 +200,33 @@ PRESETS = {
         milestones=(180, 250),
     ),
 }
+PRESETS[CLIP] = replace(
+    DEFAULT,
+    preset=CLIP,
+    text="red dots on white",
+    steps=300,
+    # Words may ask for colours that no exemplar has.
+    whitened=False,
+    colours=0.0,
+    lr=0.03,
+    milestones=(210, 270),
+    coarse_share=0.5,
+    noise=0.2,
+    diffusion=0.05,
+)
+PRESETS[EMBEDDED] = replace(
+    PRESETS[CLIP],
+    preset=EMBEDDED,
+    resolution=256,
+    text_prompt="{text}",
+    text_directional=False,
+    text_background=0.5,  # white would count as a colour of the text
+    text_bank=512,
+    text_views=8,
+    text_view=96,
+    text_width=0.8,
+    text_crops=2,
+    text_crop_area=0.6,
+    text_tilt=0.0,
+    text_whole_weight=0.0,
+)

@@ -1,8 +1,9 @@
-"""Synthesizing a texture on a mesh: from exemplar and mesh to texture file."""
+"""Synthesizing a texture on a mesh: from exemplar or words, and mesh, to texture file."""
 
 from __future__ import annotations
 
 import math
+import os
 from functools import partial
 from pathlib import Path
 from typing import Any, Unpack
@@ -12,17 +13,21 @@ import numpy as np
 from mitex.cache import content_key
 from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
+from mitex.features.text_image import TextImageModel
+from mitex.features.text_model import text_image_model
 from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh
 from mitex.mesh.fields import read_vectors
 from mitex.methods.layout import with_layout
-from mitex.methods.surface.config import PRESETS, SurfaceConfig
+from mitex.methods.surface.config import PRESETS, WORDS, SurfaceConfig
 from mitex.methods.surface.content import AO, content_colours
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.scale_map import ScaleMap
 from mitex.methods.surface.task import SurfaceTask
 from mitex.methods.surface.texture import SurfaceTexture
 from mitex.methods.surface.tile import TileDomain
+from mitex.methods.surface.words import Words
+from mitex.methods.wording import check_text, worded
 from mitex.runtime import available_memory
 from mitex.training.fit import Run
 from mitex.training.lbfgs import Lbfgs
@@ -69,40 +74,99 @@ def fit(
     """
     presets = PRESETS if content is None else {"style": PRESETS["style"], **PRESETS}
     run = Run.of(presets, out, **options)
-    settings = run.config
+    if run.config.text is not None:
+        raise ConfigError("the settings are for words, not for an exemplar", "call `fit_text` for words")
     target = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
-    image = content is not None and str(content) != AO
-    field = None
+    return _synthesized(run, target, mesh, None, keep_uvs, content, orientation, scale_map)
+
+
+def fit_text(
+    text: str,
+    mesh: Mesh | str | Path,
+    out: str | Path | None = None,
+    *,
+    exemplar: Exemplar | str | Path | None = None,
+    clip: str | os.PathLike[str] | None = None,
+    keep_uvs: bool = False,
+    content: str | Path | None = None,
+    orientation: np.ndarray | str | Path | None = None,
+    scale_map: np.ndarray | str | Path | None = None,
+    **options: Unpack[RunOptions],
+) -> SurfaceTexture:
+    """Synthesizes on a mesh what words say; writes a run folder as `fit`.
+
+    Args:
+        text: what the mesh is made of, such as "red bricks".
+        mesh, out, keep_uvs, content: as of `fit`.
+        exemplar: whose features the texture shall have as well; None for words alone.
+        clip: CLIP folder, or "words" for the model that ships with Mitex; None for the first that there is.
+        orientation, scale_map: as of `fit`, for an exemplar.
+        options: preset ("text" or "text-words"), and those of `RunOptions`; by default "text-words" for the
+            model that ships with Mitex, else "text".
+
+    Returns:
+        The texture, also saved as `texture.safetensors` in `out` if that is given.
+
+    Raises:
+        MitexError, Cancelled, Interrupted: as `fit`.
+    """
+    inputs = {"text": text, "text_model": clip and os.fspath(clip)}
+    run = Run.of(PRESETS, out, **worded(options, inputs))
+    config = run.config
+    check_text(config.text, config.preset, WORDS)
+    if exemplar is None and (orientation is not None or scale_map is not None):
+        raise ConfigError("an orientation or a scale map turns and scales an exemplar", "give `exemplar` too")
+    model = text_image_model(config.text_model)
+    given = mesh if isinstance(mesh, Mesh) else Mesh.load(mesh)
+    model.encode_texts([config.prompt(given.name)])  # refuses unknown words before the mesh is unwrapped
+    target = exemplar if exemplar is None or isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
+    return _synthesized(run, target, given, model, keep_uvs, content, orientation, scale_map)
+
+
+def _synthesized(
+    run: Run[SurfaceConfig],
+    exemplar: Exemplar | None,
+    mesh: Mesh | str | Path | None,
+    model: TextImageModel | None,
+    keep_uvs: bool,
+    content: str | Path | None,
+    orientation: np.ndarray | str | Path | None,
+    scale_map: np.ndarray | str | Path | None,
+) -> SurfaceTexture:
+    """The texture of a fit from an exemplar, from words in the eyes of a model, or from both."""
+    config = run.config
     if mesh is None:
         if keep_uvs or any(option is not None for option in (content, orientation, scale_map)):
             raise ConfigError("a tile takes no UVs, content, orientation or scale map", "leave them out")
-        domain: SurfaceDomain = TileDomain.flat(settings)
+        domain: SurfaceDomain = TileDomain.flat(config)
     else:
         given = mesh if isinstance(mesh, Mesh) else Mesh.load(mesh)
-        surface = with_layout(given, settings.resolution, keep_uvs or image)
+        image = content is not None and str(content) != AO
+        surface = with_layout(given, config.resolution, keep_uvs or image)
         if isinstance(orientation, str | Path):
-            field = read_vectors(surface, orientation).astype(np.float32)
-        else:
-            field = orientation
+            orientation = read_vectors(surface, orientation).astype(np.float32)
         sizes = None if scale_map is None else ScaleMap.of(scale_map, given)
-        domain = SurfaceDomain.of(surface, settings, field, sizes, keep=run.folder is not None)
+        domain = SurfaceDomain.of(surface, config, orientation, sizes, keep=run.folder is not None)
     run.control.check()
-    settings.exemplar_side(domain.mean_scale)
-    check_memory(domain.mesh, settings, len(target.maps), domain.steps)
+    config.exemplar_side(domain.mean_scale)
+    check_memory(domain.mesh, config, 1 if exemplar is None else len(exemplar.maps), domain.steps)
     start = None if content is None else content_colours(content, domain)
-    inputs = {"content_key": content_key(start), "orientation_key": content_key(field)}
+    inputs = {"content_key": content_key(start), "orientation_key": content_key(domain.orientation)}
     if domain.factors is not None:
         inputs["scale_map_key"] = content_key(domain.factors)
-    task = SurfaceTask(settings, target, domain, start, inputs)
-    origin: dict[str, Any] = {key: getattr(settings, key) for key in ("resolution", "frames", "angle")}
+    words = None if model is None else Words(config, model, domain)
+    task = SurfaceTask(config, exemplar, domain, start, inputs, words)
+    origin: dict[str, Any] = {key: getattr(config, key) for key in ("resolution", "frames", "angle")}
+    if words is not None:
+        origin |= {"text": config.text, "text_model": words.distance.model.name}
     return run.train(
         task,
-        target.name,
+        str(config.text) if exemplar is None else exemplar.name,
         lambda about: SurfaceTexture(domain, task.in_texel_order(), tuple(task.layout), about | origin),
-        lr=settings.lr,
-        milestones=settings.milestones,
-        decay=settings.decay,
-        optimizer=Lbfgs if settings.optimizer == "lbfgs" else partial(Adam, shared=settings.shared_moment),
+        lr=config.lr,
+        milestones=config.milestones,
+        decay=config.decay,
+        optimizer=Lbfgs if config.optimizer == "lbfgs" else partial(Adam, shared=config.shared_moment),
     )
 
 

@@ -62,6 +62,13 @@ class Levels:
     spread: csr_array
     levels: tuple[Level, ...]
 
+    def groups(self, scale: int) -> np.ndarray:
+        """(n,) int64, which element of level `scale` each element of level 0 is part of."""
+        group = np.arange(len(self.order))
+        for level in self.levels[:scale]:
+            group = np.repeat(np.arange(len(level.sizes)), level.sizes)[group]
+        return group
+
     @cached_property
     def positions(self) -> list[np.ndarray]:
         """(m, 3) positions of each level's elements, and of the last groups: means of those they join."""

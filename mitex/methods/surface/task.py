@@ -26,6 +26,7 @@ from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.palette import Palette
 from mitex.methods.surface.texture import texel_layout
 from mitex.methods.surface.views import Views
+from mitex.methods.surface.words import Words
 from mitex.progress import announce
 from mitex.runtime import keep_freed_memory
 from mitex.sparse import csr_tensor
@@ -39,7 +40,7 @@ ALL_TEXELS = 0.1  # what a step costs beside the network on the finest scale, of
 
 
 class SurfaceTask(ParameterTask):
-    """Texels whose features shall have the Gram matrices of the exemplar's.
+    """Texels whose features shall have the Gram matrices of the exemplar's, or which shall be what words say.
 
     With several maps, a step compares some channel triples in turn (see `mitex.triples`): the mixed ones
     tie the maps together.
@@ -50,63 +51,52 @@ class SurfaceTask(ParameterTask):
 
     Args:
         config: settings.
-        exemplar: maps to match.
+        exemplar: maps to match; None for words alone, which get an albedo.
         domain: the surface.
         content: (N, 3) sRGB in [0, 1] in the order of the texels, whose structure shall stay while the look
             becomes the exemplar's (style transfer). The synthesis starts from it.
         inputs: further metadata of inputs that a resumed run must share.
+        words: what the albedo shall be, beside the exemplar and the content if there are such.
 
     Raises:
-        ConfigError: a content for more than the albedo, or on several scales; L-BFGS for several maps.
+        ConfigError: a content for more than the albedo, or without words on several scales; L-BFGS for
+            several maps; words for maps without an albedo.
     """
 
     def __init__(
         self,
         config: SurfaceConfig,
-        exemplar: Exemplar,
+        exemplar: Exemplar | None,
         domain: SurfaceDomain,
         content: np.ndarray | None = None,
         inputs: Mapping[str, str] | None = None,
+        words: Words | None = None,
     ) -> None:
         keep_freed_memory()
         self.config, self.exemplar, self.domain, self.levels = config, exemplar, domain, domain.levels
-        self.inputs, self.views = dict(inputs or {}), Views(domain, VIEW)
-        if content is not None and (list(exemplar.maps) != ["albedo"] or config.scales):
-            raise ConfigError(
-                "style transfer takes one image and one scale",
-                "give an image as `exemplar`, and set scales=0",
-            )
-        self.layout = texel_layout(list(exemplar.maps))
-        if config.optimizer == "lbfgs" and len(self.layout) > 1:
-            raise ConfigError("lbfgs takes one map", "give an image as `exemplar`, or set optimizer=adam")
+        self.inputs, self.views, self.words = dict(inputs or {}), Views(domain, VIEW), words
+        maps = ["albedo"] if exemplar is None else list(exemplar.maps)
+        _check_maps(config, maps, content is not None, words is not None)
+        self.layout = texel_layout(maps)
         self.triples = channel_triples(self.layout, True, config.seed)
         generator = torch.Generator().manual_seed(config.seed)
-        self.space = (
-            ColourSpace.of(exemplar, self.layout) if config.whitened else ColourSpace.plain(self.channels)
-        )
+        self.space = self._space()
         super().__init__({"coordinates": self._start(generator)})
         self.coordinates = self.named["coordinates"]
-        weights = _weights(config, generator)
-        announce("comparing the exemplar with itself on every scale")
-        # The image network has the same weights: what differs is only where it looks.
-        image_network = Vgg16(config.pooling, weights=weights)
         self.networks: list[SurfaceVgg] = []
         self.comparisons: list[Comparison] = []
-        for scale in range(config.scales + 1):
-            network = SurfaceVgg(
-                self.levels, config.pooling, bilinear=config.bilinear, scale=scale, weights=weights
-            )
-            self.networks.append(network)
-            size = max(config.exemplar_side(domain.mean_scale) >> scale, 16)
-            images = torch.from_numpy(triple_images(exemplar.resized(size), self.triples, self.layout))
-            palette = Palette(self.levels, images, scale) if config.colours else None
-            self.comparisons.append(_comparison(config, image_network, images, palette))
-        self.content: torch.Tensor | None = None
+        self.content: list[torch.Tensor] = []
+        if exemplar is not None or content is not None:
+            weights = _weights(config, generator)
+            self.networks = [self._network(scale, weights) for scale in range(config.scales + 1)]
+            if exemplar is not None:
+                self.comparisons = self._comparisons(exemplar, weights)
         if content is not None:
             start = torch.from_numpy(content[self.levels.order].astype(np.float32))
+            layer = config.content_layer
+            self.content = [network.features(start, [layer])[layer] for network in self.networks]
             with torch.no_grad():
                 self.coordinates.copy_(self.space.coordinates(start))
-                self.content = self.networks[0].features(start, [config.content_layer])[config.content_layer]
 
     @property
     def channels(self) -> int:
@@ -119,22 +109,55 @@ class SurfaceTask(ParameterTask):
         return self.space.values(self.coordinates)
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
-        """Distance of features from the exemplar's, averaged over the triples of the step."""
-        scale = self.scale(step)
-        network, comparison = self.networks[scale], self.comparisons[scale]
+        """Distance of features from the exemplar's, averaged over the triples of the step, and that of views
+        from the words.
+        """
+        scale, values = self.scale(step), self.values
         triples = self._draw_triples(step, generator)
-        total, values = torch.zeros(()), self.values
-        for k in triples:
-            colours = values[:, self.triples[k].channels]
-            taps = dict(comparison.taps(network, generator))
-            if self.content is not None:
-                taps[CONTENT] = Tap(network.place(self.config.content_layer))
-            features = network.read(colours, taps)
-            if self.content is not None:
-                difference = features.pop(CONTENT) - self.content
-                total = total + self.config.content_weight * difference.square().mean()
-            total = total + comparison.cost(features, colours, k, generator)
-        return Step(total / len(triples), {"scale": float(scale)}, partial(self._diffuse_and_clamp, step))
+        total, metrics = torch.zeros(()), {"scale": float(scale)}
+        if self.networks:
+            total = sum((self._features_cost(values, scale, k, generator) for k in triples), total)
+            total = total / len(triples)
+        if self.words is not None:
+            albedo = self._pooled(values[:, list(self.layout["albedo"])], scale)
+            terms = self.words.terms(albedo, generator)
+            distance = torch.stack(list(terms.values())).sum()
+            total = total + self.config.text_weight * self._unit(scale) * distance
+            metrics |= {name: float(term.detach()) for name, term in terms.items()}
+        return Step(total, metrics, partial(self._diffuse_and_clamp, step))
+
+    def _features_cost(
+        self, values: torch.Tensor, scale: int, k: int, generator: torch.Generator
+    ) -> torch.Tensor:
+        """Distance of triple `k` from the exemplar, and from the content."""
+        network, colours = self.networks[scale], values[:, self.triples[k].channels]
+        comparison = self.comparisons[scale] if self.comparisons else None
+        taps = dict(comparison.taps(network, generator)) if comparison else {}
+        if self.content:
+            taps[CONTENT] = Tap(network.place(self.config.content_layer))
+        features, cost = network.read(colours, taps), torch.zeros(())
+        if self.content:
+            difference = features.pop(CONTENT) - self.content[scale]
+            cost = cost + self.config.content_weight * difference.square().mean()
+        return cost + comparison.cost(features, colours, k, generator) if comparison else cost
+
+    def _unit(self, scale: int) -> torch.Tensor:
+        """What words are weighed by: about the cost of a surface without any features."""
+        if self.comparisons:
+            kinds = [triple.kind for triple in self.triples]
+            return self.comparisons[scale].sizes[kinds.index("albedo")]
+        if self.content:
+            return self.config.content_weight * self.content[scale].square().mean()
+        return torch.ones(())
+
+    def _pooled(self, colours: torch.Tensor, scale: int) -> torch.Tensor:
+        """(n, 3) the mean colours of the groups that texels are in on a scale."""
+        if not scale:
+            return colours
+        group = torch.from_numpy(self.levels.groups(scale))
+        counts = torch.bincount(group)[:, None]
+        means = torch.zeros(len(counts), 3).index_add(0, group, colours) / counts
+        return means[group]
 
     def scale(self, step: int) -> int:
         """How often the texels are pooled before they enter the network in a step."""
@@ -142,8 +165,10 @@ class SurfaceTask(ParameterTask):
         return 0 if step >= coarse else self.config.scales - step * self.config.scales // coarse
 
     def cost(self, step: int) -> float:
-        """Of a step: what the network reads, a quarter for each pooling, and what is done with all texels."""
-        return 0.25 ** self.scale(step) + ALL_TEXELS
+        """Of a step: what the network reads, a quarter for each pooling, and what is done with all texels; of
+        words alone, always the same.
+        """
+        return 0.25 ** self.scale(step) + ALL_TEXELS if self.networks else 1.0
 
     def _diffuse_and_clamp(self, step: int) -> None:
         """Wears down what is finer than the taps, and brings values back to [0, 1].
@@ -164,18 +189,24 @@ class SurfaceTask(ParameterTask):
         return self.levels.spread @ self.values.detach().clamp(0, 1).numpy()
 
     def preview(self, step: int) -> np.ndarray:
-        """For each triple but the mixtures a row: the exemplar, and the mesh from two sides, unlit."""
+        """For each triple but the mixtures a row: an exemplar, if any, and the mesh from two sides, unlit."""
         views = self.views.images(self.in_texel_order())
+        if self.exemplar is None:
+            return np.hstack(list(views))
         unmixed = [p for p in self.triples if p.kind != "mix"]
         exemplars = triple_images(self.exemplar.resized(VIEW), unmixed, self.layout)
         pairs = zip(unmixed, exemplars, strict=True)
         return np.concatenate([np.hstack([e, *views[..., list(p.channels)]]) for p, e in pairs])
 
     def metadata(self) -> dict[str, str]:
-        exemplar = {"exemplar": self.exemplar.name, "exemplar_key": self.exemplar.key}
+        known = {} if self.words is None else self.words.metadata()
+        if self.exemplar is None:
+            known["exemplar"] = str(self.config.text)
+        else:
+            known |= {"exemplar": self.exemplar.name, "exemplar_key": self.exemplar.key}
         key = content_key(self.domain.mesh.vertices, self.domain.mesh.faces, self.domain.uv)
         mesh = {"mesh": self.domain.mesh.name, "mesh_key": key}
-        return {"method": "surface", "maps": ",".join(self.layout)} | exemplar | mesh | self.inputs
+        return {"method": "surface", "maps": ",".join(self.layout)} | known | mesh | self.inputs
 
     @cached_property
     def _mean_of_taps(self) -> torch.Tensor:
@@ -186,9 +217,34 @@ class SurfaceTask(ParameterTask):
         mean = csr_array((ones, rows[:-1], rows[::9]), shape=(count, lookup.shape[0]))
         return csr_tensor(mean @ lookup)
 
+    def _space(self) -> ColourSpace:
+        if self.exemplar is None:
+            return ColourSpace.around_grey(self.channels)
+        if self.config.whitened:
+            return ColourSpace.of(self.exemplar, self.layout)
+        return ColourSpace.plain(self.channels)
+
+    def _network(self, scale: int, weights: Weights) -> SurfaceVgg:
+        config = self.config
+        return SurfaceVgg(self.levels, config.pooling, bilinear=config.bilinear, scale=scale, weights=weights)
+
+    def _comparisons(self, exemplar: Exemplar, weights: Weights) -> list[Comparison]:
+        """With the exemplar, on each scale."""
+        announce("comparing the exemplar with itself on every scale")
+        # The image network has the same weights: what differs is only where it looks.
+        config, network = self.config, Vgg16(self.config.pooling, weights=weights)
+        comparisons = []
+        for scale in range(config.scales + 1):
+            size = max(config.exemplar_side(self.domain.mean_scale) >> scale, 16)
+            images = torch.from_numpy(triple_images(exemplar.resized(size), self.triples, self.layout))
+            palette = Palette(self.levels, images, scale) if config.colours else None
+            comparisons.append(_comparison(config, network, images, palette))
+        return comparisons
+
     def _start(self, generator: torch.Generator) -> torch.Tensor:
         noise = torch.rand(len(self.levels.order), self.channels, generator=generator)
-        noise = self.config.noise * (noise - 0.5 if self.config.whitened else noise)
+        centred = self.config.whitened or self.exemplar is None
+        noise = self.config.noise * (noise - 0.5 if centred else noise)
         return self.space.coordinates(self.space.values(noise).clamp(0, 1))
 
     def _draw_triples(self, step: int, generator: torch.Generator) -> list[int]:
@@ -200,6 +256,18 @@ class SurfaceTask(ParameterTask):
     def _draw(self, kind: str, generator: torch.Generator) -> int:
         of_kind = [k for k, p in enumerate(self.triples) if p.kind == kind]
         return of_kind[int(torch.randint(len(of_kind), (), generator=generator))]
+
+
+def _check_maps(config: SurfaceConfig, maps: list[str], content: bool, words: bool) -> None:
+    """Refuses maps that cannot be synthesized in this way."""
+    if content and (maps != ["albedo"] or config.scales and not words):
+        raise ConfigError(
+            "style transfer takes one image and one scale", "give an image as `exemplar`, and set scales=0"
+        )
+    if config.optimizer == "lbfgs" and len(maps) > 1:
+        raise ConfigError("lbfgs takes one map", "give an image as `exemplar`, or set optimizer=adam")
+    if words and "albedo" not in maps:
+        raise ConfigError("the exemplar has no albedo, which words are about", "give an image as `exemplar`")
 
 
 def _weights(config: SurfaceConfig, generator: torch.Generator) -> Weights:

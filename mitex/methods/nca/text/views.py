@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import torch
 import torch.nn.functional as F
 
-from mitex.losses import Augmentation
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.decoder.surface import Points
 from mitex.methods.nca.displacement import Displacement
@@ -16,31 +15,6 @@ from mitex.methods.nca.surfaces import CloseUps, TrainingSphere
 from mitex.scenes.cameras import Cameras, random_views
 from mitex.scenes.shaded import GREY, lamps_of_pixels, pictured, shading
 from mitex.sparse import Weights
-
-
-@dataclass(frozen=True, eq=False)
-class Sight:
-    """K views, and what of them the model sees; drawn once, the same for any state.
-
-    Attributes:
-        cameras: the views.
-        whole: all of each view, tilted.
-        close: close-ups cut out of the views, tilted.
-    """
-
-    cameras: Cameras
-    whole: Augmentation
-    close: Augmentation
-
-    @staticmethod
-    def draw(config: NcaConfig, sphere: TrainingSphere, generator: torch.Generator) -> Sight:
-        """With the numbers of a config."""
-        count, tilt = config.view_count, config.text_tilt
-        return Sight(
-            training_cameras(config, sphere, generator),
-            Augmentation.draw(generator, count, tilt=tilt),
-            Augmentation.draw(generator, count, config.text_crops, config.text_crop_area, tilt),
-        )
 
 
 def training_cameras(config: NcaConfig, sphere: TrainingSphere, generator: torch.Generator) -> Cameras:

@@ -51,7 +51,7 @@ def check(function):
 @check
 def text(build):
     red, green = build("text=red"), build("text=green")
-    assert red.text[0] > green.text[0] and red.text[1] < green.text[1]
+    assert red.words.text[0] > green.words.text[0] and red.words.text[1] < green.words.text[1]
 
 
 @check
@@ -61,8 +61,8 @@ def text_directional(build):
     surface, generator = one.spheres[0], torch.Generator().manual_seed(0)
     sight = one.sight(surface, int(torch.randint(one.config.text_bank, (), generator=generator)))
     views = one.figures[surface].textured(one.look, one.pool[0], sight.cameras)
-    (pictures,) = one._directions([sight.whole(views.coloured, one.model.resolution)])
-    assert _terms(one)["whole"] == pytest.approx(1 - (pictures @ one.text).item())
+    (pictures,) = one.words.directions([sight.whole(views.coloured, one.words.model.resolution)])
+    assert _terms(one)["whole"] == pytest.approx(1 - (pictures @ one.words.text).item())
     assert _terms(one)["whole"] != pytest.approx(_terms(build())["whole"])
 
 

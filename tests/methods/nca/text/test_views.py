@@ -1,9 +1,9 @@
 import pytest
 import torch
 
-from mitex.methods.nca.text.views import Figure, Sight
+from mitex.methods.nca.text.views import Figure
 from mitex.scenes.shaded import GREY
-from tests.methods.nca.text.tiny_text import config, grown, task
+from tests.methods.nca.text.tiny_text import grown, task
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def test_gradients_by_finite_differences(scene, picture):
 
 
 def test_a_sight_is_drawn_from_its_settings():
-    settings = config("text_distances=3", "text_crops=4", "view_count=3")
-    sight = Sight.draw(settings, task().spheres[0], torch.Generator().manual_seed(0))
+    one = task("text_distances=3", "text_crops=4", "view_count=3")
+    sight = one.sight(one.spheres[0], 0)
     assert len(sight.whole.picture) == 3 and len(sight.close.picture) == 12
     assert torch.tensor(sight.cameras.origin).norm(dim=1).sub(3).abs().max() < 1e-5

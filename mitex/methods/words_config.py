@@ -1,0 +1,44 @@
+"""Settings that fits of one mesh from words share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mitex.errors import ConfigError
+from mitex.features.text_image import PROMPT, object_prompt
+from mitex.training.settings import key
+
+
+@dataclass(frozen=True)
+class WordsConfig:
+    """What is said, and which parts of a view are compared with it."""
+
+    text: str | None = key(None, "what the mesh is made of, in words")
+    text_object: str | None = key(None, "what the mesh is; by default its name")
+    text_prompt: str = key(PROMPT, "that the model of texts and images reads")
+    text_model: str | None = key(None, "CLIP folder, or words for the small embedded model")
+    text_background: float = key(1.0, "around the mesh [sRGB]; the papers: white", 0, 1)
+    text_crops: int = key(4, "close-ups that are cut out of a view", 1, 64)
+    text_crop_area: float = key(0.1, "of a close-up, as a share of the view", 1e-3, 1)
+    text_tilt: float = key(0.5, "of what the model sees: the corners' way outwards [half sides]", 0, 2)
+    text_whole_weight: float = key(1.0, "of the distance of whole views from the text", 0)
+    text_close_weight: float = key(1.0, "of that of the close-ups", 0)
+
+    def prompt(self, name: str) -> str:
+        """What the model of texts and images reads of the mesh of that name."""
+        return object_prompt(self.text or "", self.text_object or name, self.text_prompt)
+
+    def check_words(self, *further: str) -> None:
+        """Refuses a prompt without the text, and a loss of nothing.
+
+        Args:
+            further: names of weights beside those of whole views and close-ups.
+
+        Raises:
+            ConfigError: it is one of these.
+        """
+        if "{text}" not in self.text_prompt:
+            raise ConfigError(f"text_prompt = '{self.text_prompt}' leaves out the text", "put {text} in it")
+        weights = ("text_whole_weight", "text_close_weight", *further)
+        if not any(getattr(self, name) for name in weights):
+            raise ConfigError(f"{', '.join(weights)} are all 0", "let one count")
