@@ -1,4 +1,4 @@
-"""Vector fields on meshes: which way, and how fast, something moves along the surface.
+"""Vector fields on meshes: which way, and how fast, something runs along the surface.
 
 `vector_field(mesh, source)` makes one, of mean length 1. At the point (x, y, z), sources with a name say
 

@@ -157,9 +157,7 @@ class GeometricTask:
         return np.hstack([portrait(self.reference.vertices, self.reference.faces), *portraits])
 
     def metadata(self) -> dict[str, str]:
-        return {"method": "geometric"} | inputs(
-            self.reference, self.hierarchy.meshes[0], self.field
-        )
+        return {"method": "geometric"} | inputs(self.reference, self.hierarchy.meshes[0], self.field)
 
     def _critic_turns(self, step: int) -> int:
         """How many steps of the critic come before a step of the generator: they are spread evenly."""

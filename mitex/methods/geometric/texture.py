@@ -63,7 +63,9 @@ class GeometricTexture:
 
     def save(self, path: str | Path) -> Path:
         """Writes the model file (safetensors)."""
-        return files.save(Path(path), list(self.generators), self.template, self.fixed, self.about, self.fields)
+        return files.save(
+            Path(path), list(self.generators), self.template, self.fixed, self.about, self.fields
+        )
 
     def apply(
         self,
@@ -197,9 +199,7 @@ class GeometricTexture:
         hierarchy = self._directed(Hierarchy.of(mesh, len(generators)), mesh, field)
         return Rollout(generators, hierarchy, float(self.about["noise"]), bool(self.about["remeasure"]))
 
-    def _directed(
-        self, hierarchy: Hierarchy, mesh: Mesh, field: str | Path | np.ndarray | None
-    ) -> Hierarchy:
+    def _directed(self, hierarchy: Hierarchy, mesh: Mesh, field: str | Path | np.ndarray | None) -> Hierarchy:
         """The hierarchy of a mesh with the directions that the relief follows, if it follows any."""
         kind = self.about.get("field")
         if kind is None:
