@@ -131,7 +131,7 @@ def moment_distance(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
 def face_network(net: FaceNetwork, features: torch.Tensor, graph: FaceGraph) -> torch.Tensor:
     """The network of Hertz et al. as the paper writes it: [neighbour, self] for each neighbour, the largest.
 
-    Features (..., F, 3, 4 or 6) to (..., F, outputs); the last two, if there are any, stand beside the neighbour.
+    Features (..., F, 3, 4 or 6) to (..., F, outputs); the last two, if there are any, stand by the neighbour.
     """
     side, *layers, bias = net.parameters
     guides = features[..., 4:]

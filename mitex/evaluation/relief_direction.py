@@ -1,9 +1,9 @@
 """Which way the ridges of a relief run along a surface, by the structure tensor of its normals.
 
-Where a relief is a height h over a surface, its normal leans by minus the gradient of h. Ridges run across the
-direction in which it leans most, whatever the sign: that of the smaller eigenvalue of the structure tensor,
-the mean of g g^T over a neighbourhood (Bigun and Granlund 1987). With g as a complex number whose real axis is
-the field, that mean is one of g^2, and half the angle of -g^2 is the ridges'.
+Where a relief is a height h over a surface, its normal leans by minus the gradient g of h. Ridges run across
+the direction in which it leans most, whatever the sign: along the eigenvector of the smaller eigenvalue of
+the structure tensor, the mean of g g^T over a neighbourhood (Bigun and Granlund 1987). With g as a complex
+number whose real axis is the field, that mean is one of g^2, and half the angle of -g^2 is the ridges'.
 """
 
 from __future__ import annotations
@@ -65,9 +65,8 @@ def _ridge(tensor: np.ndarray) -> np.ndarray:
 
 def _around(mesh: Mesh, values: np.ndarray) -> np.ndarray:
     """(F,) complex sums over the faces around, those nearer with larger weights."""
-    corners = mesh.faces.ravel()
+    rows = np.stack([np.real(values), np.imag(values)], 1)
     for _ in range(ROUNDS):
-        rows = np.repeat(np.stack([values.real, values.imag], 1), 3, axis=0)
-        sums = scatter_add(corners, rows, len(mesh.vertices))[mesh.faces].sum(1)
-        values = sums[:, 0] + 1j * sums[:, 1]
-    return values
+        corners = scatter_add(mesh.faces.ravel(), np.repeat(rows, 3, axis=0), len(mesh.vertices))
+        rows = corners[mesh.faces].sum(1)
+    return rows[:, 0] + 1j * rows[:, 1]

@@ -49,8 +49,8 @@ class FaceGraph:
         neighbours = partner // 3
         opposite = faces[neighbours, (partner + 2 - 3 * neighbours) % 3]
         incident = np.maximum(np.bincount(faces.ravel(), minlength=vertices), 1).astype(np.float32)
-        arrays = (faces, neighbours, opposite, ~closed, incident)
-        return FaceGraph(*(torch.tensor(a) for a in arrays))
+        neighbours, opposite, open_ = (torch.tensor(a) for a in (neighbours, opposite, ~closed))
+        return FaceGraph(torch.tensor(faces), neighbours, opposite, open_, torch.tensor(incident))
 
     def __len__(self) -> int:
         return len(self.faces)

@@ -1,8 +1,8 @@
 """Which way a relief runs: a vector field on the vertices of every level, and what each face has of it.
 
-The paper's features are blind to direction, which it names as its limit (Hertz et al. 2020, section 5). Here a
-unit vector in space is given at each vertex, zero where there is none. It stays as it is while the networks
-move the surface; each face projects it onto itself (`mitex.methods.geometric.features`).
+The paper's features are blind to direction, which it names as its limit (Hertz et al. 2020, figure 12). Here
+each vertex has a unit vector in space, zero where there is none. It stays as it is while the networks move
+the surface; each face projects it onto itself (`mitex.methods.geometric.features`).
 """
 
 from __future__ import annotations

@@ -22,9 +22,9 @@ class FaceNetwork:
     each face instead of three times (the same value, a third of the products). Biases before an instance norm
     would change nothing and are left out.
 
-    If the relief has a direction, every convolution is of [x_j, g_j, x], where g_j is the direction as the side
-    towards neighbour j sees it: so a network can tell neighbours along the direction from those across it,
-    which the paper's cannot.
+    If the relief has a direction, every convolution is of [x_j, g_j, x], where g_j is the direction as the
+    side towards neighbour j sees it: so a network can tell neighbours along the direction from those across
+    it, which the paper's cannot.
 
     Args:
         widths: channels of the hidden layers.
@@ -33,8 +33,8 @@ class FaceNetwork:
         directed: whether the faces have directions.
 
     Attributes:
-        parameters: [side (4 + G, C1); across (C + G, C'), own (C, C') for each further layer; bias (outputs,)],
-            where G is 2 if directed, else 0.
+        parameters: [side (4 + G, C1); across (C + G, C'), own (C, C') for each further layer; bias
+            (outputs,)], where G is 2 if directed, else 0.
     """
 
     def __init__(

@@ -35,7 +35,7 @@ class GeometricTask:
         template: (V, 3) its vertices, in units of their mean edge length.
         meshes: vertices of the training mesh of each level.
         reference: what they were fitted to; previews show it.
-        field: (V, 3) of its vertices, which the directions of the hierarchy's faces are from, if they have any.
+        field: (V, 3) of its vertices, from which the hierarchy's faces have their directions, if any.
 
     Attributes:
         generators, critics: a network for each possible level, so that a resumed run may go on to more.

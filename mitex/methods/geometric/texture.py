@@ -36,8 +36,8 @@ class GeometricTexture:
         generators: of levels 0 to `levels` - 1.
         template: the mesh that training started from, mean edge 1.
         fixed: (V, 3) the noise on it from which the reference comes.
-        about: how it was made; `levels`, `noise` and `remeasure` at least. `field` is "vector" or "line" if the
-            relief follows a field, whose vectors have, or have not, a front and a back.
+        about: how it was made; `levels`, `noise` and `remeasure` at least. `field` is "vector" if the relief
+            follows a field, "line" if a vector of it and its opposite are the same.
         fields: of such a relief, (V, 3) unit vectors or zero on the template of each level.
     """
 
@@ -95,7 +95,7 @@ class GeometricTexture:
             The displaced mesh in light grey, in the mesh's own units and place; UVs are interpolated.
 
         Raises:
-            ConfigError: levels out of range, too many faces, or a field that is missing, unknown or of no use.
+            ConfigError: levels out of range, too many faces, or a field that is missing, wrong or of no use.
             MeshError: a face names a vertex twice.
         """
         rollout = self.rollout(mesh, start_level, end_level, field)

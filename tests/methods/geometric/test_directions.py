@@ -44,6 +44,7 @@ def test_features_by_hand(symmetric):
     """The angle between each side and the field's part in the face's plane, one after the other."""
     mesh = bumpy()
     graph = directed(mesh, "0.3,1,0.2", symmetric)
+    assert graph.directions is not None
     features = face_features(torch.tensor(mesh.vertices), graph)[..., 4:]
     assert features.shape == (len(mesh.faces), 3, 2)
     for f in range(0, len(mesh.faces), 17):
