@@ -131,14 +131,18 @@ def moment_distance(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
 def face_network(net: FaceNetwork, features: torch.Tensor, graph: FaceGraph) -> torch.Tensor:
     """The network of Hertz et al. as the paper writes it: [neighbour, self] for each neighbour, the largest.
 
-    Features (..., F, 3, 4) to (..., F, outputs).
+    Features (..., F, 3, 4 or 6) to (..., F, outputs); the last two, if there are any, stand by the neighbour.
     """
     side, *layers, bias = net.parameters
+    guides = features[..., 4:]
     x = torch.stack([features[..., k, :] @ side for k in range(3)]).amax(0)
     for across, own in zip(layers[::2], layers[1::2], strict=True):
         x = (x - x.mean(-2, keepdim=True)) / (x.var(-2, correction=0, keepdim=True) + 1e-5).sqrt()
         x = F.leaky_relu(x, 0.2)
         weight = torch.cat([across, own])
-        pairs = [torch.cat([x[..., graph.neighbours[:, k], :], x], -1) @ weight for k in range(3)]
+        pairs = [
+            torch.cat([x[..., graph.neighbours[:, k], :], guides[..., k, :], x], -1) @ weight
+            for k in range(3)
+        ]
         x = torch.stack(pairs).amax(0)
     return x + bias

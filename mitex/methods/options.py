@@ -19,6 +19,12 @@ if TYPE_CHECKING:
 EXPORTS = (".glb", ".obj", ".ply", ".exr", ".html")
 PICTURES = (".png", ".jpg", ".jpeg")
 PICTURE_RESOLUTION = 512  # of a radiance field [pixels]
+FIELD_FILES = (".npy", ".ply", ".json")
+
+
+def field_files(*fields: str | None) -> list[str]:
+    """The files that options for vector fields name, if they do."""
+    return [field for field in fields if field and Path(field).suffix.lower() in FIELD_FILES]
 
 
 @dataclass(kw_only=True)

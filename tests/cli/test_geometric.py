@@ -88,6 +88,75 @@ def test_untangling_draws_back_towards_the_mesh(files, run, monkeypatch):
         assert (np.abs(vertices - split).max() < 1e-5) == bare
 
 
+@pytest.fixture(scope="module")
+def ribbed(tmp_path_factory, own_cache):
+    """A model that has learned to follow a field."""
+    folder = tmp_path_factory.mktemp("ribbed")
+    bad.text(folder / "good.obj", bad.CUBE)
+    assert main(fit(f"--field up {QUICK} symmetric=true", folder / "good.obj", folder / "run")) == 0
+    return folder / "run"
+
+
+def follow(ribbed, words="", mesh="good.obj", command="apply", out="out/a.ply"):
+    return f"{command} {ribbed} --mesh {mesh} --out {out} --start-level 0 {words}".split()
+
+
+def test_a_relief_follows_the_field(files, ribbed):
+    """Of a name or a file, either way round; another field, another relief."""
+    np.save("right.npy", np.tile([1.0, 0, 0], (8, 1)))
+    results = []
+    for field in ("up", "down", "right", "right.npy"):
+        assert main(follow(ribbed, f"--field {field}")) == 0
+        results.append(Mesh.load("out/a.ply").vertices)
+    up, down, right, told = results
+    assert np.allclose(up, down, atol=1e-5) and np.allclose(right, told, atol=1e-5)
+    assert np.abs(up - right).max() > 1e-3
+
+
+def test_the_field_of_a_file_is_carried_to_the_remeshed(files, ribbed):
+    pytest.importorskip("pymeshlab")
+    write(files / "ball.obj", BALL)
+    np.save("right.npy", np.tile([1.0, 0, 0], (len(BALL.vertices), 1)))
+    results = []
+    for field in ("right", "right.npy", "up"):
+        assert main(follow(ribbed, f"--remesh 60 --field {field}", "ball.obj")) == 0
+        results.append(Mesh.load("out/a.ply").vertices)
+    right, told, up = results
+    assert np.abs(right - told).mean() < 0.2 * np.abs(right - up).mean()
+
+
+def test_films_follow_the_field(files, ribbed):
+    for words, seed in (("", 0), ("--to-seed 1", 1)):
+        film = f"--frames 2 --resolution 32 --spp 1 --meshes out/to{seed} --field right {words}"
+        assert main(follow(ribbed, film, command="animate", out="out/a.gif")) == 0
+        last = sorted((files / "out" / f"to{seed}").iterdir())[-1]
+        assert main(follow(ribbed, f"--field right --seed {seed}")) == 0
+        assert np.allclose(Mesh.load(last).vertices, Mesh.load("out/a.ply").vertices, atol=1e-5)
+
+
+def test_bad_fields(files, ribbed, run, capsys):
+    np.save("nan.npy", np.full((8, 3), np.nan))
+    np.save("zero.npy", np.zeros((8, 3)))
+    np.save("short.npy", np.ones((7, 3)))
+    np.save("normal.npy", Mesh.load("good.obj").normals)
+    refusals = {
+        "": "follows a vector field; give a --field, such as up",
+        "--field upp": "did you mean up?",
+        "--field none.npy": "none.npy",
+        "--field nan.npy": "NaN",
+        "--field zero.npy": "zero everywhere",
+        "--field short.npy": "a vector for each vertex",
+        "--field normal.npy": "normal to the surface of 'good' everywhere",
+    }
+    for words, message in refusals.items():
+        check_refused(files, follow(ribbed, words), message, capsys)
+    contradiction = "--mesh template and --field contradict each other"
+    check_refused(files, follow(ribbed, "--field up", mesh="template"), contradiction, capsys)
+    check_refused(files, apply("--field up"), "follows no --field; leave it out", capsys)
+    over = follow(ribbed, "--field nan.npy", out="nan.npy")
+    check_refused(files, over, "nan.npy", capsys)
+
+
 def animate(words="", mesh="good.obj", model="out/run", out="out/a.gif"):
     return f"animate {model} --mesh {mesh} --out {out} --resolution 32 --spp 1 {words}".split()
 
@@ -193,6 +262,8 @@ BAD_FITS = {
     "too many levels": (fit("--quiet --steps 100 --set level_steps=1"), "levels"),
     "unknown key": (fit("--quiet --set level_step=1"), "level_steps"),
     "unknown preset": (fit("--quiet --preset quick"), "quick"),
+    "unknown field": (fit(f"--field upp {QUICK}"), "did you mean up?"),
+    "ends without a field": (fit(f"{QUICK} symmetric=true"), "leave `symmetric` out"),
     "negative noise": (fit("--quiet --set noise=-1"), "noise"),
     "an exemplar": (fit("--exemplar good.png"), "--exemplar"),
 }

@@ -1,4 +1,4 @@
-"""Vector fields on meshes: which way, and how fast, something moves along the surface.
+"""Vector fields on meshes: which way, and how fast, something runs along the surface.
 
 `vector_field(mesh, source)` makes one, of mean length 1. At the point (x, y, z), sources with a name say
 
@@ -22,9 +22,10 @@ Other sources are in the space of the mesh as it is given:
 - an array (V, 3).
 """
 
+from mitex.mesh.fields.carried import carried_field
 from mitex.mesh.fields.field import vector_field
 from mitex.mesh.fields.files import read_vectors
 from mitex.mesh.fields.named import NAMES
 from mitex.mesh.fields.strokes import stroke_vectors
 
-__all__ = ["NAMES", "read_vectors", "stroke_vectors", "vector_field"]
+__all__ = ["NAMES", "carried_field", "read_vectors", "stroke_vectors", "vector_field"]

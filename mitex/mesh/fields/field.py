@@ -38,14 +38,14 @@ def vector_field(mesh: Mesh, source: str | Path | np.ndarray) -> np.ndarray:
     vectors = checked_vectors(label, _vectors(mesh, source), mesh)
     largest = np.abs(vectors).max(initial=0.0)
     if largest == 0.0:
-        raise ConfigError(f"{label} is zero everywhere", "give one that moves something")
+        raise ConfigError(f"{label} is zero everywhere", "give one with a direction somewhere")
     vectors = vectors / largest  # first: squares may overflow
     tangent = across(vectors, unit(mesh.normals.astype(np.float64)))
     lengths = np.linalg.norm(tangent, axis=1)
     faint = lengths <= FAINT * np.linalg.norm(vectors, axis=1)
     if faint.all():
         raise ConfigError(
-            f"{label} is normal to the surface of '{mesh.name}' everywhere, so nothing moves along it",
+            f"{label} is normal to the surface of '{mesh.name}' everywhere",
             "give one with a part along the surface",
         )
     tangent[faint], lengths[faint] = 0.0, 0.0

@@ -11,8 +11,11 @@ from tyro.conf import Positional, arg
 
 from mitex.methods.checks import SEEDS, in_range
 from mitex.methods.geometric.cli import TEMPLATE, GrowthOptions
+from mitex.methods.options import field_files
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from mitex.mesh import Mesh
     from mitex.methods.geometric import GeometricTexture
 
@@ -61,7 +64,7 @@ class Animate(GrowthOptions):
     """Show no progress."""
 
     def run(self) -> None:
-        self.check_growth()
+        self.check_growth(self.mesh)
         in_range("--seed", self.seed, *SEEDS)
         in_range("--to-seed", self.to_seed, *SEEDS)
         in_range("--frames", self.frames, 2, 3600)
@@ -72,7 +75,7 @@ class Animate(GrowthOptions):
         from mitex.paths import check_writable, prepare_folder, prepare_output
         from mitex.render import VIDEO_SUFFIXES, check_video, film
 
-        inputs = [self.model, *mesh_files(self.mesh)]
+        inputs = [self.model, *mesh_files(self.mesh), *field_files(self.field)]
         out = prepare_output(self.out, VIDEO_SUFFIXES, inputs)
         check_video(out, self.frames, self.fps, self.resolution)
         if self.meshes is not None:
@@ -80,12 +83,12 @@ class Animate(GrowthOptions):
         from mitex.asset import clay
         from mitex.methods.geometric import GeometricTexture
 
-        texture, start = GeometricTexture.load(self.model), self.start_level
+        texture = GeometricTexture.load(self.model)
         if self.mesh == TEMPLATE:
-            mesh, start = texture.template, start or 0
+            mesh, field, start = texture.template, None, self.start_level or 0
         else:
-            mesh = self.even_mesh(self.mesh)
-        meshes = list(self._sequence(texture, mesh, start))
+            (mesh, field), start = self.even_mesh(self.mesh), self.start_level
+        meshes = list(self._sequence(texture, mesh, field, start))
         check_video(out, len(meshes), self.fps, self.resolution)
         if self.meshes is not None:
             folder = prepare_folder(self.meshes)
@@ -105,10 +108,10 @@ class Animate(GrowthOptions):
             self.advise(texture, mesh)
         print(self.out)
 
-    def _sequence(self, texture: GeometricTexture, mesh: Mesh, start: int | None) -> Iterator[Mesh]:
+    def _sequence(
+        self, texture: GeometricTexture, mesh: Mesh, field: np.ndarray | None, start: int | None
+    ) -> Iterator[Mesh]:
+        where = {"start_level": start, "end_level": self.end_level}
         if self.to_seed is None:
-            return texture.growth(
-                mesh, self.frames, seed=self.seed, start_level=start, end_level=self.end_level
-            )
-        seeds = self.seed, self.to_seed
-        return texture.interpolate(mesh, seeds, self.frames, start_level=start, end_level=self.end_level)
+            return texture.growth(mesh, self.frames, seed=self.seed, field=field, **where)
+        return texture.interpolate(mesh, (self.seed, self.to_seed), self.frames, field=field, **where)

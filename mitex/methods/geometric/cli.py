@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import arg
 
 from mitex.errors import ConfigError
-from mitex.methods.checks import SEEDS, in_range
-from mitex.methods.options import MeshOptions, TrainingOptions
+from mitex.methods.checks import SEEDS, in_range, mutually_exclusive
+from mitex.methods.options import MeshOptions, TrainingOptions, field_files
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from mitex.asset import Asset
     from mitex.mesh import Mesh
     from mitex.methods.geometric import GeometricTexture
@@ -31,19 +33,24 @@ class Fit(TrainingOptions):
     examples:
       mitex fit geometric --reference spikes
       mitex fit geometric --reference cactus.obj --out runs/cactus
+      mitex fit geometric --reference cactus --field up --set symmetric=true
       mitex fit geometric --reference ring.obj --template coarse-ring.obj --preset paper
       mitex fit geometric --reference cactus.obj --out runs/cactus --resume --steps 12000   (one more level)
     """
 
     reference: Annotated[str, arg(metavar="MESH|NAME")]
     """Mesh file (.obj .ply .stl .glb .gltf .off), or a reference by formula: spikes, scales, knobs, ridges,
-    craters, warts."""
+    craters, warts, cactus, shingles."""
 
     preset: Annotated[str | None, arg(metavar="fast|paper", help_behavior_hint="(default: fast)")] = None
     """Settings to start from: `fast`, or `paper`, which follows the publication."""
 
     template: Annotated[str | None, arg(metavar="MESH", help_behavior_hint="(default: by genus)")] = None
     """Coarse mesh of the reference's topology from which its training meshes are made."""
+
+    field: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="")] = None
+    """Vector field on the reference that its relief follows: a name (up, about-y ...), a direction, or a file
+    (.npy .ply .json)."""
 
     def run(self) -> None:
         options = self.run_options()
@@ -53,7 +60,9 @@ class Fit(TrainingOptions):
         reference = find_reference(self.reference)
         out = self.folder(reference.name)
         with self.progress() as on_step:
-            geometric.fit(reference, out, template=self.template, on_step=on_step, **options)
+            geometric.fit(
+                reference, out, template=self.template, field=self.field, on_step=on_step, **options
+            )
         print(out)
 
 
@@ -70,17 +79,24 @@ class GrowthOptions:
     remesh: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None
     """Give the mesh N even vertices first; fewer make the texture larger."""
 
-    def check_growth(self) -> None:
+    field: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="")] = None
+    """Vector field on the mesh that a relief with a direction follows: a name (up, about-y ...), a direction,
+    or a file (.npy .ply .json)."""
+
+    def check_growth(self, mesh: str) -> None:
         in_range("--start-level", self.start_level, 0, 6)
         in_range("--end-level", self.end_level, 0, 6)
         in_range("--remesh", self.remesh, 12, 2_000_000)
+        mutually_exclusive("--mesh template", "--field", mesh == TEMPLATE and self.field is not None)
 
-    def even_mesh(self, name: str) -> Mesh:
-        """The mesh to be displaced, remeshed if that is asked for."""
+    def even_mesh(self, name: str) -> tuple[Mesh, np.ndarray | None]:
+        """The mesh to be displaced, remeshed if that is asked for, and the field on it."""
         from mitex.mesh import Mesh, remesh
+        from mitex.mesh.fields import carried_field
 
-        mesh = Mesh.load(name)
-        return mesh if self.remesh is None else remesh(mesh, self.remesh)
+        given = Mesh.load(name)
+        mesh = given if self.remesh is None else remesh(given, self.remesh)
+        return mesh, None if self.field is None else carried_field(given, mesh, self.field)
 
     def advise(self, texture: GeometricTexture, mesh: Mesh) -> None:
         """Says, on stderr, how large the texture is on a mesh, and what would change that."""
@@ -98,6 +114,7 @@ class Apply(GrowthOptions, MeshOptions):
 
     examples:
       mitex apply runs/spikes --mesh bunny.obj --out bunny.glb --remesh 2000
+      mitex apply runs/cactus --mesh bunny.obj --out bunny.glb --remesh 2000 --field up
       mitex apply spikes --mesh template --out variation.glb --seed 7
     """
 
@@ -108,12 +125,15 @@ class Apply(GrowthOptions, MeshOptions):
     """Draw the relief back where the surface would pierce itself, as on thin limbs."""
 
     def check(self) -> None:
-        self.check_growth()
+        self.check_growth(self.mesh)
         in_range("--seed", self.seed, *SEEDS)
         if self.untangle and self.mesh == TEMPLATE:
             raise ConfigError(
                 "--untangle draws back towards the mesh, and a template lies too deep", "leave it out"
             )
+
+    def inputs(self) -> list[Path | str]:
+        return [*super().inputs(), *field_files(self.field)]
 
     def applied(self, out: Path) -> Asset:
         from mitex.asset import clay
@@ -122,8 +142,8 @@ class Apply(GrowthOptions, MeshOptions):
         texture = GeometricTexture.load(self.model)
         if self.mesh == TEMPLATE:
             return clay(texture.generate(self.seed, self.start_level or 0, self.end_level))
-        mesh = self.even_mesh(self.mesh)
+        mesh, field = self.even_mesh(self.mesh)
         levels = {"start_level": self.start_level, "end_level": self.end_level}
-        asset = texture.apply(mesh, seed=self.seed, untangle=self.untangle, **levels)
+        asset = texture.apply(mesh, seed=self.seed, untangle=self.untangle, field=field, **levels)
         self.advise(texture, mesh)
         return asset

@@ -26,6 +26,7 @@ class GeometricConfig(TrainingConfig):
     beta1: float = key(0.5, "Adam's decay of the first moment", 0, 0.9999)
     beta2: float = key(0.99, "Adam's decay of the second moment", 0, 0.9999)
     remeasure: bool = key(False, "measure the mean edge on each level, instead of carrying it from the first")
+    symmetric: bool = key(False, "whether the relief looks alike from both ends of its field")
     # Levels 0 to 2 have networks of different widths, see `model.WIDTHS`.
     carried: int = key(3, "first level whose networks start from those of the level before", 3, MAX_LEVELS)
     fit_steps: int = key(600, "of the optimisation of each training mesh", 1)

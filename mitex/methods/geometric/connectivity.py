@@ -25,6 +25,9 @@ class FaceGraph:
         opposite: (F, 3) int64, that face's vertex off the side; the own one across open ones.
         open: (F, 3) bool.
         incident: (V,) float32, number of faces around each vertex, at least 1.
+        directions: (F, 3) float32, which way the relief runs on each face, in space; None if it has no
+            direction. See `mitex.methods.geometric.directions`.
+        symmetric: whether a direction and its opposite are the same.
     """
 
     faces: torch.Tensor
@@ -32,6 +35,8 @@ class FaceGraph:
     opposite: torch.Tensor
     open: torch.Tensor
     incident: torch.Tensor
+    directions: torch.Tensor | None = None
+    symmetric: bool = False
 
     @staticmethod
     def of(faces: np.ndarray, vertices: int) -> FaceGraph:
@@ -44,8 +49,8 @@ class FaceGraph:
         neighbours = partner // 3
         opposite = faces[neighbours, (partner + 2 - 3 * neighbours) % 3]
         incident = np.maximum(np.bincount(faces.ravel(), minlength=vertices), 1).astype(np.float32)
-        arrays = (faces, neighbours, opposite, ~closed, incident)
-        return FaceGraph(*(torch.tensor(a) for a in arrays))
+        neighbours, opposite, open_ = (torch.tensor(a) for a in (neighbours, opposite, ~closed))
+        return FaceGraph(torch.tensor(faces), neighbours, opposite, open_, torch.tensor(incident))
 
     def __len__(self) -> int:
         return len(self.faces)

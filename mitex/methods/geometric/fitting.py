@@ -11,8 +11,12 @@ import numpy as np
 import torch
 
 from mitex.cache import cached, content_key
+from mitex.errors import ConfigError
 from mitex.mesh import Mesh
+from mitex.mesh.fields import vector_field
 from mitex.methods.geometric.config import PRESETS, GeometricConfig
+from mitex.methods.geometric.directions import level_fields
+from mitex.methods.geometric.files import LINE, VECTOR
 from mitex.methods.geometric.hierarchy import Hierarchy
 from mitex.methods.geometric.references import find_reference
 from mitex.methods.geometric.report import FitReport, report
@@ -36,6 +40,7 @@ def fit(
     out: str | Path | None = None,
     *,
     template: Mesh | str | Path | None = None,
+    field: str | Path | np.ndarray | None = None,
     **options: Unpack[RunOptions],
 ) -> GeometricTexture:
     """Learns the geometric texture of a reference mesh; writes a run folder with the model in it.
@@ -47,6 +52,9 @@ def fit(
         out: run folder; must be new or empty, or hold a run to resume (with more `steps`, to further levels).
             None writes no file.
         template: where the training meshes start from; None chooses by genus.
+        field: the vector field on the reference that its relief follows, see `mitex.mesh.fields`; the texture
+            then needs one wherever it is grown. With `symmetric` among the settings, a vector and its
+            opposite are the same. None for a relief without a direction.
         options: preset ("fast" or "paper"), and those of `RunOptions`.
 
     Returns:
@@ -61,21 +69,40 @@ def fit(
     config = run.config
     shape = reference if isinstance(reference, Mesh) else find_reference(reference)
     template = Mesh.load(template) if isinstance(template, str | Path) else template
+    if field is None and config.symmetric:
+        raise ConfigError("a relief without a `field` has no ends that look alike", "leave `symmetric` out")
+    vectors = None if field is None else vector_field(shape, field)
     shape, start = normalised(shape, find_template(shape, template))
-    run.check_inputs(inputs(shape, start))
+    run.check_inputs(inputs(shape, start, vectors))
     keep_freed_memory()
     meshes, reports = training_meshes(shape, start, config, run.control, keep=run.folder is not None)
-    hierarchy = Hierarchy.of(start, config.levels)
-    task = GeometricTask(config, hierarchy, torch.tensor(start.vertices), meshes, shape)
+    hierarchy, fields = Hierarchy.of(start, config.levels), []
+    if vectors is not None:
+        placed = [
+            mesh.with_vertices(vertices.numpy() / 2**level)
+            for level, (mesh, vertices) in enumerate(zip(hierarchy.meshes, meshes, strict=True))
+        ]
+        fields = level_fields(shape, vectors, placed)
+        hierarchy = hierarchy.directed(fields, config.symmetric)
+    task = GeometricTask(config, hierarchy, torch.tensor(start.vertices), meshes, shape, vectors)
     origin = {key: getattr(config, key) for key in ("levels", "noise", "remeasure")}
-    origin["fit"] = [vars(r) for r in reports]
+    origin |= {"field": field_kind(vectors, config.symmetric), "fit": [vars(r) for r in reports]}
     return run.train(
         task,
         shape.name,
-        lambda about: GeometricTexture(task.generators[: config.levels], start, task.fixed, about | origin),
+        lambda about: GeometricTexture(
+            task.generators[: config.levels], start, task.fixed, about | origin, fields
+        ),
         lr=partial(learning_rate, config),
         optimizer=partial(Adam, betas=betas(config)),
     )
+
+
+def field_kind(field: np.ndarray | None, symmetric: bool) -> str | None:
+    """What a model file says of the field: "vector", or "line" if a vector and its opposite are the same."""
+    if field is None:
+        return None
+    return LINE if symmetric else VECTOR
 
 
 def training_meshes(

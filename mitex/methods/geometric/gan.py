@@ -44,7 +44,7 @@ def critic_loss(
 
     Args:
         critic: of one output; its score of a mesh is the mean over the faces.
-        real, fake: (F, 3, 4) features of two meshes of one connectivity.
+        real, fake: (F, 3, 4 or 6) features of two meshes of one connectivity.
         graph: that connectivity.
         mix: scalar in [0, 1], where between the two the penalty is taken.
         penalty: its weight.
@@ -62,7 +62,7 @@ def critic_loss(
 def gradient_penalty(critic: FaceNetwork, features: torch.Tensor, graph: FaceGraph) -> torch.Tensor:
     """How far the gradient of the summed scores is from length 1 (Gulrajani et al. 2017, equation 3).
 
-    The length is taken for each face over its 12 features, and its squared difference from 1 averaged.
+    The length is taken for each face over all its features, and its squared difference from 1 averaged.
     """
     features = features.detach().requires_grad_()
     (gradient,) = torch.autograd.grad(critic(features, graph).sum(), features, create_graph=True)

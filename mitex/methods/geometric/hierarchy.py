@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import torch
 
 from mitex.mesh import Mesh, subdivide_midpoint
 from mitex.mesh.topology import face_edges
 from mitex.methods.geometric.connectivity import FaceGraph, check_corners
+from mitex.methods.geometric.directions import face_directions
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +45,19 @@ class Hierarchy:
         graphs = tuple(FaceGraph.of(m.faces, len(m.vertices)) for m in meshes)
         pairs = tuple(torch.from_numpy(face_edges(m.faces, len(m.vertices))[0]) for m in meshes[:-1])
         return Hierarchy(tuple(meshes), graphs, pairs)
+
+    def directed(self, fields: Sequence[torch.Tensor], symmetric: bool) -> Hierarchy:
+        """The same with directions on all faces.
+
+        Args:
+            fields: (V, 3) of each level, unit vectors or zero.
+            symmetric: whether a direction and its opposite are the same.
+        """
+        graphs = tuple(
+            replace(graph, directions=face_directions(field, graph.faces, symmetric), symmetric=symmetric)
+            for graph, field in zip(self.graphs, fields, strict=True)
+        )
+        return replace(self, graphs=graphs)
 
     def finer(self, vertices: torch.Tensor, level: int) -> torch.Tensor:
         """Vertices (..., V, 3) of a level, split and scaled by 2 for the next: edges keep their length."""

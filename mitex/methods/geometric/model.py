@@ -14,9 +14,9 @@ from mitex.methods.geometric.network import FaceNetwork
 WIDTHS = ((32, 32, 32, 32, 32), (64, 32, 32, 32, 32), (128, 64, 32, 32, 32))
 
 
-def network(level: int, outputs: int, generator: torch.Generator) -> FaceNetwork:
-    """A generator (3 outputs) or critic (1) of a level, with fresh weights."""
-    return FaceNetwork(WIDTHS[min(level, len(WIDTHS) - 1)], outputs, generator)
+def network(level: int, outputs: int, generator: torch.Generator, directed: bool = False) -> FaceNetwork:
+    """A generator (3 outputs) or critic (1) of a level, with fresh weights; see `FaceNetwork`."""
+    return FaceNetwork(WIDTHS[min(level, len(WIDTHS) - 1)], outputs, generator, directed)
 
 
 def grow(

@@ -79,6 +79,25 @@ def warts() -> Mesh:
     return Mesh(points + 0.11 * dome[:, None] * base.normals, base.faces, name="warts")
 
 
+def cactus() -> Mesh:
+    """A ball with 10 upright ribs, flatter towards the poles: they follow the field `up`."""
+    points = icosphere(FREQUENCY).vertices.astype(np.float64)
+    ring = np.hypot(points[:, 0], points[:, 2])
+    rib = np.sqrt(np.abs(np.cos(5 * np.arctan2(points[:, 0], points[:, 2]))))  # round, with sharp grooves
+    return _sphere(0.3 * ring * rib, "cactus")
+
+
+def shingles() -> Mesh:
+    """A ball with 9 rows of shingles, each thickest at its lower end: they follow the field `down`."""
+    points = icosphere(FREQUENCY).vertices.astype(np.float64)
+    down = 9 * np.arccos(np.clip(points[:, 1], -1, 1)) / np.pi
+    row = np.minimum(np.floor(down), 8)
+    count = np.round(18 * np.sin(np.pi * (row + 0.5) / 9))  # shingles of a row
+    along = np.arctan2(points[:, 0], points[:, 2]) / (2 * np.pi) * count + 0.5 * (row % 2)
+    gap = np.abs(along - np.round(along)) * 2  # 0 in the middle of a gap, 1 on that of a shingle
+    return _sphere(0.16 * (down - row) * np.clip(gap / 0.15, 0, 1), "shingles")
+
+
 REFERENCES: dict[str, Callable[[], Mesh]] = {
     "spikes": spikes,
     "scales": scales,
@@ -86,6 +105,8 @@ REFERENCES: dict[str, Callable[[], Mesh]] = {
     "ridges": ridges,
     "craters": craters,
     "warts": warts,
+    "cactus": cactus,
+    "shingles": shingles,
 }
 
 

@@ -35,6 +35,7 @@ class GeometricTask:
         template: (V, 3) its vertices, in units of their mean edge length.
         meshes: vertices of the training mesh of each level.
         reference: what they were fitted to; previews show it.
+        field: (V, 3) of its vertices, from which the hierarchy's faces have their directions, if any.
 
     Attributes:
         generators, critics: a network for each possible level, so that a resumed run may go on to more.
@@ -49,12 +50,14 @@ class GeometricTask:
         template: torch.Tensor,
         meshes: list[torch.Tensor],
         reference: Mesh,
+        field: np.ndarray | None = None,
     ) -> None:
         self.config, self.hierarchy, self.template = config, hierarchy, template
-        self.meshes, self.reference = meshes, reference
+        self.meshes, self.reference, self.field = meshes, reference, field
         rng = torch.Generator().manual_seed(config.seed)
-        self.generators = [network(level, 3, rng) for level in range(MAX_LEVELS)]
-        self.critics = [network(level, 1, rng) for level in range(MAX_LEVELS)]
+        directed = hierarchy.graphs[0].directions is not None
+        self.generators = [network(level, 3, rng, directed) for level in range(MAX_LEVELS)]
+        self.critics = [network(level, 1, rng, directed) for level in range(MAX_LEVELS)]
         self.fixed = config.noise * torch.randn(template.shape, generator=rng)
         self.optimizers = [Adam(critic.parameters, betas(config)) for critic in self.critics]
         with torch.no_grad():
@@ -154,7 +157,7 @@ class GeometricTask:
         return np.hstack([portrait(self.reference.vertices, self.reference.faces), *portraits])
 
     def metadata(self) -> dict[str, str]:
-        return {"method": "geometric"} | inputs(self.reference, self.hierarchy.meshes[0])
+        return {"method": "geometric"} | inputs(self.reference, self.hierarchy.meshes[0], self.field)
 
     def _critic_turns(self, step: int) -> int:
         """How many steps of the critic come before a step of the generator: they are spread evenly."""
@@ -210,12 +213,13 @@ class GeometricTask:
         return vertices
 
 
-def inputs(reference: Mesh, template: Mesh) -> dict[str, str]:
-    """The metadata of what a texture is learned from, both `normalised`."""
+def inputs(reference: Mesh, template: Mesh, field: np.ndarray | None) -> dict[str, str]:
+    """The metadata of what a texture is learned from: two `normalised` meshes, and the field of the first."""
     return {
         "reference": reference.name,
         "reference_key": content_key(reference.vertices, reference.faces),
         "template_key": content_key(template.vertices, template.faces),
+        "field_key": content_key(*([] if field is None else [field])),
     }
 
 

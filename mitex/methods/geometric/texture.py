@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,9 @@ import torch
 from mitex.asset import Asset, clay
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, subdivide_midpoint
+from mitex.mesh.fields import vector_field
 from mitex.methods.geometric import files
+from mitex.methods.geometric.directions import spread
 from mitex.methods.geometric.hierarchy import Hierarchy, mean_edge
 from mitex.methods.geometric.model import grow
 from mitex.methods.geometric.network import FaceNetwork
@@ -33,13 +36,16 @@ class GeometricTexture:
         generators: of levels 0 to `levels` - 1.
         template: the mesh that training started from, mean edge 1.
         fixed: (V, 3) the noise on it from which the reference comes.
-        about: how it was made; `levels`, `noise` and `remeasure` at least.
+        about: how it was made; `levels`, `noise` and `remeasure` at least. `field` is "vector" if the relief
+            follows a field, "line" if a vector of it and its opposite are the same.
+        fields: of such a relief, (V, 3) unit vectors or zero on the template of each level.
     """
 
     generators: Sequence[FaceNetwork]
     template: Mesh
     fixed: torch.Tensor
-    about: Mapping[str, Any] = field(default_factory=dict)
+    about: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    fields: Sequence[torch.Tensor] = ()
 
     @property
     def levels(self) -> int:
@@ -53,12 +59,13 @@ class GeometricTexture:
         Raises:
             CheckpointError: there is none, or it is damaged.
         """
-        generators, template, fixed, about = files.load(source)
-        return cls(generators, template, fixed, about)
+        return cls(*files.load(source))
 
     def save(self, path: str | Path) -> Path:
         """Writes the model file (safetensors)."""
-        return files.save(Path(path), list(self.generators), self.template, self.fixed, self.about)
+        return files.save(
+            Path(path), list(self.generators), self.template, self.fixed, self.about, self.fields
+        )
 
     def apply(
         self,
@@ -68,6 +75,7 @@ class GeometricTexture:
         start_level: int | None = None,
         end_level: int | None = None,
         untangle: bool = False,
+        field: str | Path | np.ndarray | None = None,
     ) -> Asset:
         """Grows the texture on a mesh; every level after the first splits each face in four.
 
@@ -80,15 +88,17 @@ class GeometricTexture:
                 change the shape.
             end_level: the last generator; the last one trained if None.
             untangle: draw the relief back where the surface pierces itself; see `untangled`.
+            field: the vector field on the mesh that the relief follows, if it has learned to follow one; see
+                `mitex.mesh.fields`.
 
         Returns:
             The displaced mesh in light grey, in the mesh's own units and place; UVs are interpolated.
 
         Raises:
-            ConfigError: levels out of range, or too many faces.
+            ConfigError: levels out of range, too many faces, or a field that is missing, wrong or of no use.
             MeshError: a face names a vertex twice.
         """
-        rollout = self.rollout(mesh, start_level, end_level)
+        rollout = self.rollout(mesh, start_level, end_level, field)
         *_, last = rollout.run(rollout.noise(seed))
         return clay(untangled(rollout.hierarchy.meshes[-1], last) if untangle else last)
 
@@ -100,15 +110,16 @@ class GeometricTexture:
         *,
         start_level: int | None = None,
         end_level: int | None = None,
+        field: str | Path | np.ndarray | None = None,
     ) -> Iterator[Mesh]:
         """Meshes between those of two seeds: the noise goes along a great circle, so that its variance stays.
 
         Args:
-            mesh, start_level, end_level: as in `apply`.
+            mesh, start_level, end_level, field: as in `apply`.
             seeds: of the first and the last mesh.
             frames: number of meshes, at least 2.
         """
-        rollout = self.rollout(mesh, start_level, end_level)
+        rollout = self.rollout(mesh, start_level, end_level, field)
         first, last = (rollout.noise(seed) for seed in seeds)
         for t in np.linspace(0, 1, frames):
             *_, result = rollout.run([slerp(a, b, float(t)) for a, b in zip(first, last, strict=True)])
@@ -136,12 +147,13 @@ class GeometricTexture:
         seed: int = 0,
         start_level: int | None = None,
         end_level: int | None = None,
+        field: str | Path | np.ndarray | None = None,
     ) -> Iterator[Mesh]:
         """The texture growing on a mesh: the mesh itself, then `frames` meshes for each level.
 
-        The last of a level's meshes is displaced by the whole of it.
+        Arguments as in `apply`. The last of a level's meshes is displaced by the whole of it.
         """
-        rollout = self.rollout(mesh, start_level, end_level)
+        rollout = self.rollout(mesh, start_level, end_level, field)
         before = mesh
         for level, after in enumerate(rollout.run(rollout.noise(seed))):
             start = subdivide_midpoint(before) if level else before
@@ -164,12 +176,16 @@ class GeometricTexture:
         faces = len(self.template.faces) * 4**start
         return (faces / len(mesh.faces)) ** 0.5, max(faces // 2, 12)
 
-    def rollout(self, mesh: Mesh, start_level: int | None, end_level: int | None) -> Rollout:
-        """The generators of a range of levels, ready to run on a mesh.
+    def rollout(
+        self,
+        mesh: Mesh,
+        start_level: int | None,
+        end_level: int | None,
+        field: str | Path | np.ndarray | None = None,
+    ) -> Rollout:
+        """The generators of a range of levels, ready to run on a mesh; arguments and errors as of `apply`.
 
-        Raises:
-            ConfigError: levels out of range, or too many faces.
-            MeshError: a face names a vertex twice.
+        The template has its own field.
         """
         start, end = self._range(start_level, end_level)
         faces = len(mesh.faces) * 4 ** (end - start)
@@ -180,8 +196,24 @@ class GeometricTexture:
             )
         keep_freed_memory()
         generators = self.generators[start : end + 1]
-        hierarchy = Hierarchy.of(mesh, len(generators))
+        hierarchy = self._directed(Hierarchy.of(mesh, len(generators)), mesh, field)
         return Rollout(generators, hierarchy, float(self.about["noise"]), bool(self.about["remeasure"]))
+
+    def _directed(self, hierarchy: Hierarchy, mesh: Mesh, field: str | Path | np.ndarray | None) -> Hierarchy:
+        """The hierarchy of a mesh with the directions that the relief follows, if it follows any."""
+        kind = self.about.get("field")
+        if kind is None:
+            if field is not None:
+                raise ConfigError("this relief has no direction and follows no `field`", "leave it out")
+            return hierarchy
+        symmetric = kind == files.LINE
+        if field is not None:
+            fields = spread(vector_field(mesh, field), hierarchy.pairs, symmetric)
+        elif mesh is self.template:
+            fields = self.fields[: len(hierarchy.meshes)]
+        else:
+            raise ConfigError("this relief follows a vector field", "give a `field`, such as up")
+        return hierarchy.directed(fields, symmetric)
 
     def _range(self, start_level: int | None, end_level: int | None) -> tuple[int, int]:
         """The first and the last level of a growth; see `apply` for what None stands for."""

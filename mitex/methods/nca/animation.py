@@ -9,8 +9,9 @@ from tyro.conf import Positional, arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range
-from mitex.methods.nca.arguments import field_files, levels, oriented
+from mitex.methods.nca.arguments import levels, oriented
 from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS
+from mitex.methods.options import field_files
 
 FADE = 12  # frames over which a loop fades
 SPP = 32  # of the path tracer

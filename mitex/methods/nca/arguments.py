@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from mitex.errors import ConfigError
 from mitex.methods.checks import in_range
 
 RESOLUTION = 1024  # of baked textures [texels]
-FIELD_FILES = (".npy", ".ply", ".json")
-
-
-def field_files(*fields: str | None) -> list[str]:
-    """The files that --field and --orientation name, if they do."""
-    return [field for field in fields if field and Path(field).suffix.lower() in FIELD_FILES]
 
 
 def oriented(orientation: str) -> float | str:

@@ -10,9 +10,9 @@ from tyro.conf import arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
-from mitex.methods.nca.arguments import RESOLUTION, field_files, levels, oriented
+from mitex.methods.nca.arguments import RESOLUTION, levels, oriented
 from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS, TILE_CELLS, TILE_SIDES
-from mitex.methods.options import EXPORTS, PICTURES, ReliefOptions
+from mitex.methods.options import EXPORTS, PICTURES, ReliefOptions, field_files
 from mitex.methods.words_options import WordsOptions
 from mitex.training.settings import RunSettings
 

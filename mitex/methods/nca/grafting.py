@@ -10,9 +10,9 @@ from tyro.conf import Positional, arg
 from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
 from mitex.methods.nca import METHOD
-from mitex.methods.nca.arguments import RESOLUTION, field_files, levels, oriented
+from mitex.methods.nca.arguments import RESOLUTION, levels, oriented
 from mitex.methods.nca.ranges import MOST_STEPS
-from mitex.methods.options import PICTURES, MeshOptions
+from mitex.methods.options import PICTURES, MeshOptions, field_files
 from mitex.methods.registry import method_of
 
 if TYPE_CHECKING:

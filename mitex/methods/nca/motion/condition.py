@@ -12,15 +12,12 @@ import numpy as np
 import torch
 
 from mitex.errors import ConfigError, TextureWarning
-from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import rotate_about
 from mitex.mesh import Lattice, Mesh
-from mitex.mesh.fields import vector_field
-from mitex.mesh.nearest import surface_points
+from mitex.mesh.fields import carried_field, vector_field
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.ranges import SPEEDS
 
-OF_VERTICES = (".npy", ".ply")  # files of vectors that belong to the vertices of one mesh
 WIDTH = 3  # of a vector, which is a cell's condition
 FEW = 0.1  # of the vectors, which may be too fast
 
@@ -94,12 +91,7 @@ def cell_vectors(
     Raises:
         ConfigError: as of `vector_field`.
     """
-    own = isinstance(field, np.ndarray) or Path(field).suffix.lower() in OF_VERTICES
-    if own and cells is not given:
-        vectors = vector_field(given, field).astype(np.float64)
-        face, weights = surface_points(given, cells.vertices.astype(np.float64))
-        field = interpolate(weights, vectors[given.faces[face]])
-    vectors = slowed(speed * vector_field(cells, field).astype(np.float64), longest)
+    vectors = slowed(speed * carried_field(given, cells, field).astype(np.float64), longest)
     return rotate_about(vectors, cells.normals.astype(np.float64), -orientation).astype(np.float32)
 
 
