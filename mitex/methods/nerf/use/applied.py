@@ -16,13 +16,14 @@ from mitex.export import Format, prepare_export
 from mitex.mesh import Mesh
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field.decoder import Decoder
+from mitex.methods.nerf.field.lighting import COEFFICIENTS
 from mitex.methods.nerf.field.occupancy import Occupancy
 from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.field.rendering import render_step
 from mitex.methods.nerf.field.shell import Shell, shell_cells, shell_reach
-from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents, uv_frames
+from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents
 from mitex.methods.nerf.use.extract import extract_mesh
-from mitex.methods.nerf.use.placement import in_scene_cube, uv_unit_length
+from mitex.methods.nerf.use.placement import in_scene_cube
 from mitex.progress import announce
 from mitex.runtime.jit import mi
 from mitex.textures.march import DIAGONAL
@@ -39,6 +40,26 @@ def check_ranges(scale: float, density: float, lift: float) -> None:
             f"a texture of {scale:g} times the size, {density:g} times the density and lifted by {lift:g}",
             "use sizes from 0.05 to 20, densities up to 1000 and lifts from 0 to 1",
         )
+
+
+def checked_light(light: np.ndarray) -> mi.TensorXf:
+    """Spherical harmonics of a user's light; raises a ConfigError if they are none."""
+    coefficients = np.asarray(light, np.float32)
+    if coefficients.shape not in ((COEFFICIENTS,), (COEFFICIENTS, 3)) or not np.isfinite(coefficients).all():
+        raise ConfigError(
+            f"a light of shape {coefficients.shape}",
+            f"give finite spherical harmonics, ({COEFFICIENTS},) or ({COEFFICIENTS}, 3)",
+        )
+    return mi.TensorXf(coefficients)
+
+
+def joined_on_surface(quilting: str | None, guide: np.ndarray | None) -> bool:
+    """Whether patches are joined on the mesh; raises a ConfigError if the two do not go together."""
+    if quilting not in (None, "surface", "plane"):
+        raise ConfigError(f"unknown quilting {quilting!r}", 'use "surface" or "plane"')
+    if quilting == "surface" and guide is not None:
+        raise ConfigError("a guide for quilting on the surface", 'use quilting="plane"')
+    return guide is None and quilting != "plane"
 
 
 class AppliedTexture(Shell):
@@ -74,10 +95,6 @@ class AppliedTexture(Shell):
     ) -> None:
         self.mesh, self._maps = mesh, maps
         placed, self.similarity = in_scene_cube(self.mesh)
-        # One unit of the UVs shows so many textures, across and up, that elements have the requested size.
-        height, width = maps.size
-        lengths = maps.gap * scale * np.array([width, height], np.float32)
-        uv = np.asarray(placed.uv) * (uv_unit_length(placed) / lengths)
         raised = lift * scale * max(-ground, 0.0)
         thickness = thickness * scale
         cells = config.occupancy
@@ -87,7 +104,7 @@ class AppliedTexture(Shell):
         occupancy = Occupancy(cells, possible)
         super().__init__(
             projection,
-            MappedLatents(maps, uv, uv_frames(placed)),
+            MappedLatents.over(placed, maps, scale),
             decoder,
             light,
             thickness,
