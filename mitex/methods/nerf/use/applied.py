@@ -13,6 +13,7 @@ import torch
 from mitex.asset import Asset
 from mitex.errors import ConfigError
 from mitex.export import Format, prepare_export
+from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field.decoder import Decoder
@@ -20,12 +21,14 @@ from mitex.methods.nerf.field.lighting import COEFFICIENTS
 from mitex.methods.nerf.field.occupancy import Occupancy
 from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.field.rendering import render_step
-from mitex.methods.nerf.field.shell import Shell, shell_cells, shell_reach
+from mitex.methods.nerf.field.shell import Shell, ShellCoords, shell_cells, shell_reach
+from mitex.methods.nerf.field.tensors import channels
 from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents
 from mitex.methods.nerf.use.extract import extract_mesh
 from mitex.methods.nerf.use.placement import in_scene_cube
 from mitex.progress import announce
 from mitex.runtime.jit import mi
+from mitex.runtime.upload import upload
 from mitex.textures.march import DIAGONAL
 
 NEIGHBOURS = 5  # vertices that make the coarse normal of a target
@@ -124,6 +127,23 @@ class AppliedTexture(Shell):
     def maps(self) -> Mapping[str, np.ndarray]:
         """The latent features on the mesh's UVs, (H, W, C)."""
         return {"features": self._maps.features}
+
+    def features_at(self, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """f at points of the mesh.
+
+        Args:
+            face: (P,) the faces that they lie on.
+            barycentric: (P, 3) where on them.
+
+        Returns:
+            (P, 16) float32.
+        """
+        at = channels(mi.Point2f, barycentric[:, 1:].astype(np.float32))
+        corners = self.projection.mesh.vertices[self.projection.mesh.faces[face]]
+        foot = channels(mi.Point3f, interpolate(barycentric, corners).astype(np.float32))
+        faces = upload(mi.UInt32, np.ascontiguousarray(face, np.uint32))
+        coords = ShellCoords(foot, mi.Float(0), faces, at, mi.Vector3f(0))
+        return np.stack([np.array(value) for value in self.latents.features(coords)], axis=1)
 
     def export(self, path: str | os.PathLike[str], maps_format: Format = "png") -> Path:
         """Writes what is solid as a coloured mesh, as of `Asset.export`.

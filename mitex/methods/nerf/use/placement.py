@@ -61,10 +61,13 @@ def own_layout(mesh: Mesh, gap: float, size: int) -> tuple[Mesh, int]:
         ConfigError: texels would be more than 4 times as far apart.
     """
     mesh = laid_out(replace(mesh, uv=None), UNWRAP_SIZE)
-    side = layout_side(in_scene_cube(mesh)[0]) / gap
-    if side > COARSEST * size:
+    needed = layout_side(in_scene_cube(mesh)[0]) / gap
+    if needed > COARSEST * size:
         raise ConfigError(
             f"elements so small on '{mesh.name}' that a map of {size} x {size} texels blurs them",
-            f'use larger scales, a size from {side / COARSEST:.0f} on, or quilting="plane"',
+            f'use larger scales, a size from {needed / COARSEST:.0f} on, or quilting="plane"',
         )
-    return mesh, int(np.clip(np.ceil(side), SMALLEST, size))
+    side = int(np.clip(np.ceil(needed), SMALLEST, size))
+    assert mesh.uv is not None
+    # A texel beside the square's border is left free, so that lookups never read what is on the other side.
+    return replace(mesh, uv=(mesh.uv * (side - 2) + 1) / side), side
