@@ -14,6 +14,7 @@ from scipy.ndimage import uniform_filter1d
 
 FEATHER = 5  # texels that a seam is averaged over
 NO_CUT = -1  # the path of a side without an overlap: all is new
+PRICES = 1000  # of the largest error, in units that flows are counted in
 
 
 def cheapest_path(error: np.ndarray, closed: bool = False) -> np.ndarray:
@@ -121,3 +122,38 @@ def _backtrack(costs: np.ndarray, column: int) -> np.ndarray:
         column = low + int(costs[row, low : column + 2].argmin())
         path[row] = column
     return path
+
+
+def cheapest_cut(error: np.ndarray, old: np.ndarray, new: np.ndarray) -> np.ndarray:
+    """The cheapest cut between cells that stay old and cells that become new (Kwatra et al. 2003).
+
+    Args:
+        error: (H, W) squared differences, finite and not negative; the cut pays the errors on both its sides.
+        old: (H, W) bool, cells that stay.
+        new: (H, W) bool, cells that do not; where both are true the cell becomes new.
+
+    Returns:
+        (H, W) bool, which cells become new.
+    """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import breadth_first_order, maximum_flow
+
+    cells = error.size
+    number = np.arange(cells).reshape(error.shape)
+    one = np.concatenate([number[:, :-1].ravel(), number[:-1].ravel()])
+    other = np.concatenate([number[:, 1:].ravel(), number[1:].ravel()])
+    price = error.ravel() / max(float(error.max()), np.finfo(np.float64).tiny)
+    # Flows are whole numbers. A cut that costs nothing still pays for its length.
+    capacity = np.rint(PRICES * (price[one] + price[other])).astype(np.int32) + 1
+    stays, becomes = number[old & ~new], number[new]
+    source, sink = np.full(len(stays), cells), np.full(len(becomes), cells + 1)
+    tail = np.concatenate([one, other, source, becomes])
+    head = np.concatenate([other, one, stays, sink])
+    fixed = np.full(len(stays) + len(becomes), np.iinfo(np.int32).max // 2, np.int32)
+    graph = csr_array((np.concatenate([capacity, capacity, fixed]), (tail, head)), shape=(cells + 2,) * 2)
+    left = graph - maximum_flow(graph, cells, cells + 1).flow
+    left.data[left.data < 0] = 0
+    left.eliminate_zeros()
+    reached = np.zeros(cells + 2, bool)
+    reached[breadth_first_order(left, cells, return_predecessors=False)] = True
+    return ~reached[:cells].reshape(error.shape)

@@ -10,6 +10,7 @@ from scipy.ndimage import label
 from mitex.cuts import (
     FEATHER,
     NO_CUT,
+    cheapest_cut,
     cheapest_path,
     corner_paths,
     feather,
@@ -124,3 +125,44 @@ def test_feather_is_a_ramp_across_the_seam():
     assert np.allclose(weights[:, 8:12], ramp, atol=1e-6)
     assert np.allclose(weights[:, :8], 0.0) and np.allclose(weights[:, 12:], 1.0)
     assert np.allclose(feather(new, wrapped=True)[:, [-2, -1, 0, 1]], ramp[::-1], atol=1e-6)
+
+
+def price(error: np.ndarray, new: np.ndarray) -> float:
+    """Of a cut: the errors on both sides of its length."""
+    total = 0.0
+    for axis in (0, 1):
+        pair = np.moveaxis(error, axis, 0)
+        total += (pair[1:] + pair[:-1])[np.diff(np.moveaxis(new, axis, 0), axis=0) != 0].sum()
+    return float(total)
+
+
+def test_cheapest_of_all_cuts(rng: np.random.Generator):
+    for _ in range(10):
+        error = rng.random((3, 4)) ** 3
+        old, new = np.zeros((2, 3, 4), bool)
+        old[:, 0] = new[1, 3] = True
+        result = cheapest_cut(error, old, new)
+        assert not result[old].any() and result[new].all()
+        free = np.flatnonzero(~(old | new))
+        prices = []
+        for choice in product((False, True), repeat=len(free)):
+            cells = new.copy()
+            cells.ravel()[free] = choice
+            prices.append(price(error, cells))
+        assert price(error, result) == pytest.approx(min(prices), abs=0.01 * error.max())
+
+
+def test_a_cut_goes_around_what_is_new_along_the_valley():
+    """What becomes new lies within a ring where both pictures agree."""
+    y, x = np.mgrid[-20:21, -20:21]
+    radius = np.hypot(x, y)
+    error = (radius - 12.0) ** 2
+    rim = np.maximum(np.abs(x), np.abs(y)) == 20
+    new = cheapest_cut(error, rim, radius < 2)
+    border = new ^ (radius < 12.5)
+    assert new.sum() > 350 and (np.abs(radius[border] - 12) < 1.5).all()
+
+
+def test_without_anything_old_all_is_new():
+    nothing = np.zeros((4, 4), bool)
+    assert cheapest_cut(np.zeros((4, 4)), nothing, nothing).all()

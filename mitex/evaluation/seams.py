@@ -1,40 +1,64 @@
-"""Whether a texture knows where the charts of its layout end, seen in the finished asset."""
+"""Whether a texture knows where the charts of a layout end."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
 from mitex.asset import Asset
 from mitex.geometry.triangles import interpolate
 from mitex.images import bilinear
+from mitex.mesh import Mesh
 from mitex.mesh.topology import face_edges
 
 POINTS = 20_000  # on each kind of edge, at most
 
 
+Values = Callable[[np.ndarray, np.ndarray], np.ndarray]  # faces (P,), barycentrics (P, 3) -> (P, C)
+
+
 def seam_ratio(asset: Asset, step: float, seed: int = 0) -> float:
     """How much more an asset's colours change across the seams of its layout than across other edges.
 
-    Random points on edges between two faces; the mean absolute difference of the albedo half a step to both
+    Args:
+        asset: with an albedo texture.
+        step, seed: as of `ratio_across`.
+
+    Returns:
+        As `ratio_across`, of the albedo in sRGB; NaN without textures.
+    """
+    if asset.atlas is None or asset.texture_maps is None or "albedo" not in asset.texture_maps:
+        return math.nan
+    albedo, uv = asset.texture_maps["albedo"], asset.atlas.uv
+
+    def colours(face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        return bilinear(albedo, interpolate(barycentric, uv[face]))
+
+    return ratio_across(asset.mesh, uv, colours, step, seed)
+
+
+def ratio_across(mesh: Mesh, uv: np.ndarray, values: Values, step: float, seed: int = 0) -> float:
+    """How much more values on a surface change across the seams of a layout than across other edges.
+
+    Random points on edges between two faces; the mean absolute difference of the values half a step to both
     sides, on edges where the UVs are cut over that on others.
 
     Args:
-        asset: with an albedo texture.
+        mesh: F faces.
+        uv: (F, 3, 2) the layout.
+        values: at points of the surface.
         step: between the two sides [mesh units], about a texel.
         seed: of the points.
 
     Returns:
-        1 where seams cannot be seen, more where they can; NaN without textures or seams, or if nothing
-        changes.
+        1 where seams cannot be seen, more where they can; NaN without seams, or if nothing changes.
     """
-    if asset.atlas is None or asset.texture_maps is None or "albedo" not in asset.texture_maps:
-        return math.nan
-    sides = _paired_sides(asset.mesh.faces, len(asset.mesh.vertices))
-    cut = _is_cut(asset.atlas.uv, asset.mesh.faces, sides)
+    sides = _paired_sides(mesh.faces, len(mesh.vertices))
+    cut = _is_cut(uv, mesh.faces, sides)
     generator = np.random.default_rng(seed)
-    across, within = (_change(asset, sides[kind], step, generator) for kind in (cut, ~cut))
+    across, within = (_change(mesh, values, sides[kind], step, generator) for kind in (cut, ~cut))
     return across / within if within > 0 else math.nan
 
 
@@ -62,33 +86,36 @@ def _ends(side: np.ndarray, faces: np.ndarray, uv: np.ndarray) -> np.ndarray:
     return uv[face[:, None], np.take_along_axis(corners, order, 1)]
 
 
-def _change(asset: Asset, sides: np.ndarray, step: float, generator: np.random.Generator) -> float:
+def _change(
+    mesh: Mesh, values: Values, sides: np.ndarray, step: float, generator: np.random.Generator
+) -> float:
     """Mean absolute difference across edges, whose points are drawn by length; NaN without edges."""
     if not len(sides):
         return math.nan
-    faces, points = asset.mesh.faces, asset.mesh.vertices.astype(np.float64)
+    faces, points = mesh.faces, mesh.vertices.astype(np.float64)
     face, corner = np.divmod(sides, 3)
     start, end = (points[faces[face[:, 0], (corner[:, 0] + k) % 3]] for k in (0, 1))
     length = np.linalg.norm(end - start, axis=1)
     edge = generator.choice(len(sides), min(POINTS, 20 * len(sides)), p=length / length.sum())
     along = generator.uniform(0, 1, len(edge))
     # The two faces run along their edge in opposite directions.
-    colours = [
-        _beside(asset, sides[edge, k], length[edge], along if k == 0 else 1 - along, 0.5 * step)
+    beside = [
+        values(*_beside(mesh, sides[edge, k], length[edge], along if k == 0 else 1 - along, 0.5 * step))
         for k in (0, 1)
     ]
-    return float(np.abs(colours[0] - colours[1]).mean())
+    return float(np.abs(beside[0] - beside[1]).mean())
 
 
-def _beside(asset: Asset, side: np.ndarray, length: np.ndarray, along: np.ndarray, step: float) -> np.ndarray:
-    """(P, 3) sRGB on the inner side of edges, a step away or at the opposite corner if that is nearer."""
-    assert asset.atlas is not None and asset.texture_maps is not None
+def _beside(
+    mesh: Mesh, side: np.ndarray, length: np.ndarray, along: np.ndarray, step: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Faces and barycentrics inwards of edges, a step away or at the opposite corner if that is nearer."""
     face, corner = np.divmod(side, 3)
-    height = 2 * asset.mesh.face_areas[face] / np.maximum(length, 1e-30)
+    height = 2 * mesh.face_areas[face] / np.maximum(length, 1e-30)
     inwards = np.minimum(step / np.maximum(height, 1e-30), 1.0)
     rows = np.arange(len(face))
     barycentric = np.zeros((len(face), 3))
     barycentric[rows, corner] = (1 - inwards) * (1 - along)
     barycentric[rows, (corner + 1) % 3] = (1 - inwards) * along
     barycentric[rows, (corner + 2) % 3] = inwards
-    return bilinear(asset.texture_maps["albedo"], interpolate(barycentric, asset.atlas.uv[face]))
+    return face, barycentric

@@ -71,7 +71,12 @@ class Apply(FieldOptions, MeshOptions):
     """Size of the texture's elements."""
 
     size: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {SIZE})")] = None
-    """Side of the synthesized texture [texels]."""
+    """Side of the synthesized texture [texels]; on the surface, at most."""
+
+    quilting: Annotated[
+        Literal["surface", "plane"] | None, arg(help_behavior_hint="(default: surface; with --guide: plane)")
+    ] = None
+    """Where patches are joined: on the mesh itself, or in the plane and laid over its UVs, as published."""
 
     density: Annotated[float, arg(metavar="X")] = 1.0
     """Factor of the density; more makes thin parts solid."""
@@ -93,6 +98,8 @@ class Apply(FieldOptions, MeshOptions):
         in_range("--size", self.size, 128, 8192)
         in_range("--density", self.density, 0.001, 1000.0)
         in_range("--lift", self.lift, 0.0, 1.0)
+        on_surface = self.quilting == "surface"
+        mutually_exclusive("--quilting surface", "--guide", on_surface and self.guide is not None)
         mutually_exclusive("--size", "--guide", self.size is not None and self.guide is not None)
 
     def check_output(self, out: Path) -> None:
@@ -117,4 +124,5 @@ class Apply(FieldOptions, MeshOptions):
             density=self.density,
             lift=self.lift,
             guide=None if self.guide is None else read_image(self.guide),
+            quilting=self.quilting,
         )

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,27 +16,34 @@ from mitex.mesh import Mesh, Similarity
 from mitex.methods.nerf import files
 from mitex.methods.nerf.field.decoder import Decoder
 from mitex.methods.nerf.field.encoding import Encoding
-from mitex.methods.nerf.field.lighting import COEFFICIENTS
 from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.field.rendering import render_step
 from mitex.methods.nerf.field.shell import CapturedLatents, Shell
 from mitex.methods.nerf.field.tensors import channels
 from mitex.methods.nerf.synthesis.guide import WEIGHT, Guide
-from mitex.methods.nerf.synthesis.maps import LatentMaps
+from mitex.methods.nerf.synthesis.maps import LatentMaps, latent_maps
 from mitex.methods.nerf.synthesis.patch_images import render_patches
 from mitex.methods.nerf.synthesis.patches import (
     PATTERN_RATE,
     FeatureSource,
     Patches,
     extract_patches,
-    mirror_frames,
     texel_gap,
 )
 from mitex.methods.nerf.synthesis.patches import SIZE as PATCH
 from mitex.methods.nerf.synthesis.quilting import Quilt, quilt
-from mitex.methods.nerf.use.applied import AppliedTexture, check_ranges
+from mitex.methods.nerf.synthesis.repetition import EVENNESS
+from mitex.methods.nerf.synthesis.surface_quilting import quilt_on
+from mitex.methods.nerf.synthesis.target import Target
+from mitex.methods.nerf.use.applied import AppliedTexture, check_ranges, checked_light, joined_on_surface
 from mitex.methods.nerf.use.on_plane import SCALE, TextureOnPlane, plane
-from mitex.methods.nerf.use.placement import EXTENT, UNWRAP_SIZE, in_scene_cube, uv_unit_length
+from mitex.methods.nerf.use.placement import (
+    EXTENT,
+    UNWRAP_SIZE,
+    in_scene_cube,
+    own_layout,
+    uv_unit_length,
+)
 from mitex.methods.nerf.use.self_maps import self_maps
 from mitex.progress import announce
 from mitex.runtime import init
@@ -158,14 +166,57 @@ class NerfTexture:
         announce("taking patches of the texture")
         rng = np.random.default_rng(seed)
         squares = self.patches(rng, patches, pattern_rate)
-        source = FeatureSource(squares, self.features, len(self.latents.encoding.levels(0)) * 2)
         shape = (size, size) if isinstance(size, int) else size
         if guide is not None:
             target = Guide(guide, render_patches(self.shell, squares, BLOCK), guide_weight)
         else:
             target = None
-        layout = quilt(source, shape, rng, flips=flips, tileable=tileable, guide=target, evenness=evenness)
+        layout = quilt(
+            self.source(squares), shape, rng, flips=flips, tileable=tileable, guide=target, evenness=evenness
+        )
         return self.maps(squares, layout)
+
+    def synthesize_on(
+        self,
+        mesh: Mesh,
+        size: int = SIZE,
+        seed: int = 0,
+        *,
+        scale: float = 1.0,
+        patches: int = 2000,
+        pattern_rate: float = PATTERN_RATE,
+        evenness: float = EVENNESS,
+    ) -> tuple[Mesh, LatentMaps]:
+        """More of the texture, on a mesh: patches lie on its surface, across the borders of charts.
+
+        Args:
+            mesh: any.
+            size: side of the maps, at most [texels]: where fewer texels are as fine as those of patches, they
+                do.
+            scale: as of `apply`.
+            seed, patches, pattern_rate, evenness: as of `synthesize`.
+
+        Returns:
+            The mesh with new UVs, and the maps on these, for `apply`.
+
+        Raises:
+            MeshError: the mesh has no area.
+            ConfigError: a number is out of range, no patch fits, or `size` is too small for the scale.
+        """
+        check_ranges(scale, density=1.0, lift=1.0)
+        gap = texel_gap(self.model.base.mesh, pattern_rate) * scale
+        mesh, side = own_layout(mesh, gap, size)
+        announce("taking patches of the texture")
+        rng = np.random.default_rng(seed)
+        squares = self.patches(rng, patches, pattern_rate)
+        announce("laying the mesh flat around its points")
+        target = Target(in_scene_cube(mesh)[0], side, PATCH, gap)
+        maps = self.maps(squares, quilt_on(self.source(squares), target, rng, evenness=evenness))
+        return mesh, replace(maps, angle=target.map(target.angles()))
+
+    def source(self, squares: Patches) -> FeatureSource:
+        """The features of patches, which are compared by f."""
+        return FeatureSource(squares, self.features, len(self.latents.encoding.levels(0)) * 2)
 
     def covering(self, mesh: Mesh, scale: float = 1.0, pattern_rate: float = PATTERN_RATE) -> int:
         """Side of the texture that the unit square of a mesh's UVs shows once, as a guide asks for [texels].
@@ -205,20 +256,8 @@ class NerfTexture:
         return np.stack([np.array(value) for value in values], axis=1)
 
     def maps(self, patches: Patches, layout: Quilt) -> LatentMaps:
-        """Latent maps of a quilt: the frames of equation 4 are computed once for each patch and face."""
-        face = layout.look_up(patches.faces).astype(np.int64)
-        faces = len(self.model.frames)
-        code = (layout.patch.astype(np.int64) * 4 + layout.flip) * faces + face
-        unique, frame = np.unique(code, return_inverse=True)
-        sampling, face = unique // faces, unique % faces
-        turned = mirror_frames(patches.frames[sampling // 4], (sampling % 4).astype(np.uint8))
-        frames = np.einsum("kij,klj->kil", turned, self.model.frames[face])
-        return LatentMaps(
-            layout.features,
-            frame.reshape(layout.patch.shape).astype(np.int32),
-            frames.astype(np.float32),
-            patches.gap,
-        )
+        """Latent maps of a quilt of these patches."""
+        return latent_maps(patches, layout, self.model.frames)
 
     def on_plane(self, along: np.ndarray, size: int = 1024, seed: int = 0) -> TextureOnPlane:
         """What shows a synthesized texture in the windows of photos of the capture, under its light.
@@ -255,13 +294,15 @@ class NerfTexture:
         lift: float = 1.0,
         light: np.ndarray | None = None,
         guide: np.ndarray | None = None,
+        quilting: Literal["surface", "plane"] | None = None,
     ) -> AppliedTexture:
         """Puts the texture on any mesh (section 3.2.4).
 
         Args:
-            mesh: with UVs in which nothing overlaps, or it is unwrapped.
-            maps: a synthesized texture; None synthesizes a tileable one of `size` texels with `seed`.
-            size, seed: as of `synthesize`.
+            mesh: any.
+            maps: a synthesized texture of the plane, laid over the mesh's UVs (if nothing overlaps in them,
+                else it is unwrapped), or what `synthesize_on` made for this mesh; None synthesizes one.
+            size, seed: as of `synthesize` or `synthesize_on`.
             scale: size of the texture's elements beside the whole mesh, against that on the captured object.
             density: factor of the density.
             lift: 1 puts the mesh under the texture's ground, 0 where the base shape was, as published: there
@@ -269,14 +310,22 @@ class NerfTexture:
             light: (16,) or (16, 3) spherical harmonics, see `lighting`, in place of the capture's light.
             guide: without `maps`, a picture that lies once over the unit square of the mesh's UVs, as of
                 `synthesize`; `size` is then as the mesh and `scale` ask.
+            quilting: without `maps`, "surface" joins patches on the mesh itself, "plane" in the plane, as
+                published: then they follow the UVs, and break where these are cut. None: on the surface, with
+                a guide in the plane.
 
         Raises:
             MeshError: the mesh has no area.
-            ConfigError: a number is out of range, or the light has another shape or is not finite.
+            ConfigError: a number is out of range, the light has another shape or is not finite, a guide is
+                given for the surface, or `synthesize_on` refuses.
         """
         check_ranges(scale, density, lift)
-        light_coefficients = self.light if light is None else _checked_light(light)
-        mesh = laid_out(mesh, UNWRAP_SIZE)
+        light_coefficients = self.light if light is None else checked_light(light)
+        on_surface = joined_on_surface(quilting, guide)
+        if maps is None and on_surface:
+            mesh, maps = self.synthesize_on(mesh, size, seed, scale=scale)
+        if maps is None or maps.angle is None:
+            mesh = laid_out(mesh, UNWRAP_SIZE)
         if maps is None:
             side = size if guide is None else self.covering(mesh, scale)
             maps = self.synthesize(side, seed, tileable=True, guide=guide)
@@ -296,13 +345,3 @@ class NerfTexture:
     def __repr__(self) -> str:
         about = self.model.about
         return f"NerfTexture({about['name']}, {about['steps']} steps)"
-
-
-def _checked_light(light: np.ndarray) -> mi.TensorXf:
-    coefficients = np.asarray(light, np.float32)
-    if coefficients.shape not in ((COEFFICIENTS,), (COEFFICIENTS, 3)) or not np.isfinite(coefficients).all():
-        raise ConfigError(
-            f"a light of shape {coefficients.shape}",
-            f"give finite spherical harmonics, ({COEFFICIENTS},) or ({COEFFICIENTS}, 3)",
-        )
-    return mi.TensorXf(coefficients)

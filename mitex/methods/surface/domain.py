@@ -10,11 +10,11 @@ import numpy as np
 
 from mitex.cache import content_key
 from mitex.mesh import Mesh
+from mitex.mesh.frames import interpolate_frames, vertex_directions
 from mitex.methods.surface.borders import Border
 from mitex.methods.surface.cache import VERSION, cached_levels
 from mitex.methods.surface.config import SurfaceConfig
 from mitex.methods.surface.exponential import GeodesicTracer
-from mitex.methods.surface.frames import interpolate_frames, vertex_directions
 from mitex.methods.surface.levels import POOLS, Levels
 from mitex.methods.surface.scale_map import ScaleMap
 from mitex.methods.surface.taps import Surroundings, build
@@ -89,7 +89,7 @@ class SurfaceDomain:
 
     @cached_property
     def tangent_frames(self) -> tuple[np.ndarray, np.ndarray]:
-        """Right and up of the texels, (N, 3) float64 each; see `frames.tangent_frames`."""
+        """Right and up of the texels, (N, 3) float64 each; see `mesh.frames`."""
         texels, angle = self.texels, math.radians(self.angle)
         return interpolate_frames(self.mesh, texels.face, texels.barycentric, self.directions, angle)
 

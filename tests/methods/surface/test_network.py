@@ -9,9 +9,9 @@ from mitex.features import Vgg16
 from mitex.features.frozen import GramTap
 from mitex.features.layers import LAYERS
 from mitex.features.vgg import convolutions
+from mitex.mesh.frames import tangent_frames
 from mitex.methods.surface import operations as room
 from mitex.methods.surface.exponential import GeodesicTracer
-from mitex.methods.surface.frames import tangent_frames
 from mitex.methods.surface.levels import Level
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.operations import Neighbourhood, SurfaceConv, SurfacePool

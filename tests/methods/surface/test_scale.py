@@ -9,11 +9,11 @@ from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.images import write_image
 from mitex.mesh import Mesh, icosphere
+from mitex.mesh.frames import tangent_frames
 from mitex.methods import surface
 from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.exponential import GeodesicTracer
-from mitex.methods.surface.frames import tangent_frames
 from mitex.methods.surface.scale_map import ScaleMap
 from mitex.methods.surface.taps import Surroundings, build
 from mitex.methods.surface.texels import Texels

@@ -10,8 +10,8 @@ from scipy.sparse.csgraph import connected_components
 
 from mitex.atlas import unwrap
 from mitex.mesh import Mesh, embedded
+from mitex.mesh.frames import tangent_frames
 from mitex.methods.surface.exponential import GeodesicTracer
-from mitex.methods.surface.frames import tangent_frames
 from mitex.methods.surface.levels import Levels
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.taps import Surroundings, build, representatives

@@ -11,6 +11,9 @@ from mitex.mesh import Mesh
 from mitex.methods.nerf.base.base_shape import face_frames
 from mitex.methods.nerf.field.networks import FEATURES, PHASES
 from mitex.methods.nerf.field.shell import ShellCoords
+from mitex.methods.nerf.synthesis.patches import Patches, mirror_frames
+from mitex.methods.nerf.synthesis.quilting import Quilt
+from mitex.methods.nerf.use.placement import uv_unit_length
 from mitex.runtime.jit import dr, mi
 from mitex.runtime.upload import upload
 
@@ -28,12 +31,15 @@ class LatentMaps:
         frames: (K, 3, 3) float32 T_s^-1 T_c of equation 4: from the frame of the captured face to the
             texture's x (right), y (up) and z (outwards).
         gap: between texels [scene units of the capture].
+        angle: (H, W) float32 of maps that were synthesized on a mesh, over whose UVs they lie once: from
+            dP/du to the texture's x, counter-clockwise seen from outside [rad]. None: 0 everywhere.
     """
 
     features: np.ndarray
     frame: np.ndarray
     frames: np.ndarray
     gap: float
+    angle: np.ndarray | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -60,6 +66,17 @@ class MappedLatents:
         self._turns = upload(mi.Float, np.ascontiguousarray(maps.frames, np.float32).ravel())
         self._uv = upload(mi.Float, np.ascontiguousarray(uv, np.float32).ravel())
         self._frames = upload(mi.Float, np.ascontiguousarray(frames, np.float32).ravel())
+        self._angle = None if maps.angle is None else upload(mi.Float, maps.angle.ravel())
+
+    @staticmethod
+    def over(mesh: Mesh, maps: LatentMaps, scale: float) -> MappedLatents:
+        """Of a mesh in the scene cube, with the texture's elements `scale` times as large as captured."""
+        if maps.angle is not None:
+            return MappedLatents(maps, np.asarray(mesh.uv), face_frames(mesh))
+        # One unit of the UVs shows so many textures, across and up, that elements have the requested size.
+        height, width = maps.size
+        lengths = maps.gap * scale * np.array([width, height], np.float32)
+        return MappedLatents(maps, np.asarray(mesh.uv) * (uv_unit_length(mesh) / lengths), uv_frames(mesh))
 
     def __call__(self, coords: ShellCoords) -> tuple[list[mi.Float], list[mi.Float]]:
         values = self._blended(coords, CHANNELS)
@@ -76,6 +93,9 @@ class MappedLatents:
         texel = self._index(mi.Int32(dr.floor(x + 0.5)), mi.Int32(dr.floor(y + 0.5)), height, width)
         turn = dr.gather(mi.UInt32, self._which, texel) * 9
         axes = [dr.gather(mi.Vector3f, self._frames, coords.face * 3 + k) for k in range(3)]
+        if self._angle is not None:
+            sine, cosine = dr.sincos(dr.gather(mi.Float, self._angle, texel))
+            axes[:2] = axes[0] * cosine + axes[1] * sine, axes[1] * cosine - axes[0] * sine
         captured = []
         for axis in range(3):
             parts = [dr.gather(mi.Float, self._turns, turn + 3 * row + axis) for row in range(3)]
@@ -117,6 +137,29 @@ class MappedLatents:
     def _index(column: mi.Int32, row: mi.Int32, height: int, width: int) -> mi.UInt32:
         """Of texels, repeated beyond the borders."""
         return mi.UInt32(_wrapped(row, height) * width + _wrapped(column, width))
+
+
+def latent_maps(patches: Patches, layout: Quilt, captured: np.ndarray) -> LatentMaps:
+    """Latent maps of a quilt: the frames of equation 4 are computed once for each patch and face.
+
+    Args:
+        patches: of the base shape.
+        layout: made of these.
+        captured: (F, 3, 3) T_c of the base shape's faces.
+    """
+    face = layout.look_up(patches.faces).astype(np.int64)
+    faces = len(captured)
+    code = (layout.patch.astype(np.int64) * 4 + layout.flip) * faces + face
+    unique, frame = np.unique(code, return_inverse=True)
+    sampling, face = unique // faces, unique % faces
+    turned = mirror_frames(patches.frames[sampling // 4], (sampling % 4).astype(np.uint8))
+    frames = np.einsum("kij,klj->kil", turned, captured[face])
+    return LatentMaps(
+        layout.features,
+        frame.reshape(layout.patch.shape).astype(np.int32),
+        frames.astype(np.float32),
+        patches.gap,
+    )
 
 
 def uv_frames(mesh: Mesh) -> np.ndarray:

@@ -88,46 +88,23 @@ def strip(square: np.ndarray, side: str) -> np.ndarray:
     return square[rows, columns]
 
 
-class Matcher:
-    """Compares places in a texture with all patches.
+class Candidates:
+    """The patches among which one is drawn for a place.
 
     Args:
         source: at least one patch.
-        flips: that candidates may have, of `FLIPS`.
-        sides: that places will be compared by.
+        flips: that they may have, of `FLIPS`.
 
     Raises:
-        ConfigError: there are no patches, they have an unfit shape, or a value is not finite.
+        ConfigError: there are no patches, or they have an unfit shape.
     """
 
-    def __init__(self, source: Source, flips: Iterable[int], sides: Iterable[str]) -> None:
-        count = len(source.centres)
-        if not count:
+    def __init__(self, source: Source, flips: Iterable[int] = (0,)) -> None:
+        if not len(source.centres):
             raise ConfigError("no patches to make a texture of", "extract some first")
         self.flips, self.centres = tuple(flips), np.asarray(source.centres, np.float64)
         self.apart = APART * source.length
         self.shape = _checked_shape(source)
-        source_sides = {_source_side(name, flip) for name in sides for flip in self.flips}
-        side = self.shape[0]
-        length = side // BLOCK * overlap(side) * source.matched
-        self._strips = {name: np.empty((count, length), np.float32) for name in source_sides}
-        for index in range(count):
-            square = source.patch(index)[..., : source.matched]
-            for name, rows in self._strips.items():
-                rows[index] = _block_sums(strip(square, name), name)
-        # |a - b|^2 = |a|^2 - 2 a b + |b|^2 loses the fewest digits around the mean.
-        self._means = {name: rows.mean(0) for name, rows in self._strips.items()}
-        self._squares = {name: _centre(rows, self._means[name]) for name, rows in self._strips.items()}
-
-    def distances(self, strips: Mapping[str, np.ndarray]) -> np.ndarray:
-        """(flips, P) L2 distances to the strips around a place; where two meet, texels count twice."""
-        total = np.zeros((len(self.flips), len(self.centres)), np.float32)
-        for row, flip in enumerate(self.flips):
-            for side, values in strips.items():
-                own = _source_side(side, flip)
-                target = _block_sums(mirror(values, flip), own) - self._means[own]
-                total[row] += self._squares[own] - 2.0 * (self._strips[own] @ target) + target @ target
-        return np.sqrt(np.maximum(total, 0.0))
 
     def allowed(self, neighbours: Iterable[int]) -> np.ndarray:
         """(P,) bool, the patches that do not repeat what is beside the place.
@@ -167,6 +144,44 @@ class Matcher:
         return index, self.flips[row]
 
 
+class Matcher(Candidates):
+    """Compares places in a texture with all patches.
+
+    Args:
+        source: at least one patch.
+        flips: that candidates may have, of `FLIPS`.
+        sides: that places will be compared by.
+
+    Raises:
+        ConfigError: there are no patches, they have an unfit shape, or a value is not finite.
+    """
+
+    def __init__(self, source: Source, flips: Iterable[int], sides: Iterable[str]) -> None:
+        super().__init__(source, flips)
+        count = len(source.centres)
+        source_sides = {_source_side(name, flip) for name in sides for flip in self.flips}
+        side = self.shape[0]
+        length = side // BLOCK * overlap(side) * source.matched
+        self._strips = {name: np.empty((count, length), np.float32) for name in source_sides}
+        for index in range(count):
+            square = source.patch(index)[..., : source.matched]
+            for name, rows in self._strips.items():
+                rows[index] = _block_sums(strip(square, name), name)
+        # |a - b|^2 = |a|^2 - 2 a b + |b|^2 loses the fewest digits around the mean.
+        self._means = {name: rows.mean(0) for name, rows in self._strips.items()}
+        self._squares = {name: centre(rows, self._means[name]) for name, rows in self._strips.items()}
+
+    def distances(self, strips: Mapping[str, np.ndarray]) -> np.ndarray:
+        """(flips, P) L2 distances to the strips around a place; where two meet, texels count twice."""
+        total = np.zeros((len(self.flips), len(self.centres)), np.float32)
+        for row, flip in enumerate(self.flips):
+            for side, values in strips.items():
+                own = _source_side(side, flip)
+                target = _block_sums(mirror(values, flip), own) - self._means[own]
+                total[row] += self._squares[own] - 2.0 * (self._strips[own] @ target) + target @ target
+        return np.sqrt(np.maximum(total, 0.0))
+
+
 def _source_side(side: str, flip: int) -> str:
     """Which side of an unmirrored patch lies at a side of its mirror image."""
     reversed_ = flip & (HORIZONTAL if side in ("left", "right") else VERTICAL)
@@ -179,7 +194,7 @@ def _block_sums(values: np.ndarray, side: str) -> np.ndarray:
     return along.reshape(-1, BLOCK, *along.shape[1:]).sum(1).ravel()
 
 
-def _centre(rows: np.ndarray, mean: np.ndarray) -> np.ndarray:
+def centre(rows: np.ndarray, mean: np.ndarray) -> np.ndarray:
     """(P,) squared lengths of the rows (P, K), from which the mean is taken off in place."""
     rows -= mean
     squares = np.einsum("pk,pk->p", rows, rows)

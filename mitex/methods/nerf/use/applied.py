@@ -13,18 +13,22 @@ import torch
 from mitex.asset import Asset
 from mitex.errors import ConfigError
 from mitex.export import Format, prepare_export
+from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field.decoder import Decoder
+from mitex.methods.nerf.field.lighting import COEFFICIENTS
 from mitex.methods.nerf.field.occupancy import Occupancy
 from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.field.rendering import render_step
-from mitex.methods.nerf.field.shell import Shell, shell_cells, shell_reach
-from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents, uv_frames
+from mitex.methods.nerf.field.shell import Shell, ShellCoords, shell_cells, shell_reach
+from mitex.methods.nerf.field.tensors import channels
+from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents
 from mitex.methods.nerf.use.extract import extract_mesh
-from mitex.methods.nerf.use.placement import in_scene_cube, uv_unit_length
+from mitex.methods.nerf.use.placement import in_scene_cube
 from mitex.progress import announce
 from mitex.runtime.jit import mi
+from mitex.runtime.upload import upload
 from mitex.textures.march import DIAGONAL
 
 NEIGHBOURS = 5  # vertices that make the coarse normal of a target
@@ -39,6 +43,26 @@ def check_ranges(scale: float, density: float, lift: float) -> None:
             f"a texture of {scale:g} times the size, {density:g} times the density and lifted by {lift:g}",
             "use sizes from 0.05 to 20, densities up to 1000 and lifts from 0 to 1",
         )
+
+
+def checked_light(light: np.ndarray) -> mi.TensorXf:
+    """Spherical harmonics of a user's light; raises a ConfigError if they are none."""
+    coefficients = np.asarray(light, np.float32)
+    if coefficients.shape not in ((COEFFICIENTS,), (COEFFICIENTS, 3)) or not np.isfinite(coefficients).all():
+        raise ConfigError(
+            f"a light of shape {coefficients.shape}",
+            f"give finite spherical harmonics, ({COEFFICIENTS},) or ({COEFFICIENTS}, 3)",
+        )
+    return mi.TensorXf(coefficients)
+
+
+def joined_on_surface(quilting: str | None, guide: np.ndarray | None) -> bool:
+    """Whether patches are joined on the mesh; raises a ConfigError if the two do not go together."""
+    if quilting not in (None, "surface", "plane"):
+        raise ConfigError(f"unknown quilting {quilting!r}", 'use "surface" or "plane"')
+    if quilting == "surface" and guide is not None:
+        raise ConfigError("a guide for quilting on the surface", 'use quilting="plane"')
+    return guide is None and quilting != "plane"
 
 
 class AppliedTexture(Shell):
@@ -74,10 +98,6 @@ class AppliedTexture(Shell):
     ) -> None:
         self.mesh, self._maps = mesh, maps
         placed, self.similarity = in_scene_cube(self.mesh)
-        # One unit of the UVs shows so many textures, across and up, that elements have the requested size.
-        height, width = maps.size
-        lengths = maps.gap * scale * np.array([width, height], np.float32)
-        uv = np.asarray(placed.uv) * (uv_unit_length(placed) / lengths)
         raised = lift * scale * max(-ground, 0.0)
         thickness = thickness * scale
         cells = config.occupancy
@@ -87,7 +107,7 @@ class AppliedTexture(Shell):
         occupancy = Occupancy(cells, possible)
         super().__init__(
             projection,
-            MappedLatents(maps, uv, uv_frames(placed)),
+            MappedLatents.over(placed, maps, scale),
             decoder,
             light,
             thickness,
@@ -107,6 +127,23 @@ class AppliedTexture(Shell):
     def maps(self) -> Mapping[str, np.ndarray]:
         """The latent features on the mesh's UVs, (H, W, C)."""
         return {"features": self._maps.features}
+
+    def features_at(self, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """f at points of the mesh.
+
+        Args:
+            face: (P,) the faces that they lie on.
+            barycentric: (P, 3) where on them.
+
+        Returns:
+            (P, 16) float32.
+        """
+        at = channels(mi.Point2f, barycentric[:, 1:].astype(np.float32))
+        corners = self.projection.mesh.vertices[self.projection.mesh.faces[face]]
+        foot = channels(mi.Point3f, interpolate(barycentric, corners).astype(np.float32))
+        faces = upload(mi.UInt32, np.ascontiguousarray(face, np.uint32))
+        coords = ShellCoords(foot, mi.Float(0), faces, at, mi.Vector3f(0))
+        return np.stack([np.array(value) for value in self.latents.features(coords)], axis=1)
 
     def export(self, path: str | os.PathLike[str], maps_format: Format = "png") -> Path:
         """Writes what is solid as a coloured mesh, as of `Asset.export`.

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from mitex.errors import MeshError
+from mitex.atlas import laid_out
+from mitex.errors import ConfigError, MeshError
 from mitex.mesh import Mesh, Similarity
+from mitex.methods.layout import layout_side
 
 EXTENT = 1 / 1.2  # largest half extent of the mesh in the scene cube
 UNWRAP_SIZE = 1024  # side of the map that charts are packed for [texels]
+COARSEST = 4.0  # side of a texel of a map on a mesh, at most [texels of patches]
+SMALLEST = 16  # side of such a map [texels]
 
 
 def in_scene_cube(mesh: Mesh) -> tuple[Mesh, Similarity]:
@@ -39,3 +45,29 @@ def uv_unit_length(mesh: Mesh) -> float:
     if flat == 0:
         raise MeshError(f"the UVs of {mesh.name} have no area", "unwrap it again, or leave them out")
     return mean_edge(mesh.vertices[mesh.faces]) / flat
+
+
+def own_layout(mesh: Mesh, gap: float, size: int) -> tuple[Mesh, int]:
+    """The mesh with UVs for a map on it, whatever UVs it has, and the side of the map [texels].
+
+    Args:
+        mesh: any.
+        gap: between texels of patches, on the mesh in the scene cube; those of the map are as far apart if
+            `size` suffices.
+        size: of the side, at most.
+
+    Raises:
+        MeshError: the mesh has no area.
+        ConfigError: texels would be more than 4 times as far apart.
+    """
+    mesh = laid_out(replace(mesh, uv=None), UNWRAP_SIZE)
+    needed = layout_side(in_scene_cube(mesh)[0]) / gap
+    if needed > COARSEST * size:
+        raise ConfigError(
+            f"elements so small on '{mesh.name}' that a map of {size} x {size} texels blurs them",
+            f'use larger scales, a size from {needed / COARSEST:.0f} on, or quilting="plane"',
+        )
+    side = int(np.clip(np.ceil(needed), SMALLEST, size))
+    assert mesh.uv is not None
+    # A texel beside the square's border is left free, so that lookups never read what is on the other side.
+    return replace(mesh, uv=(mesh.uv * (side - 2) + 1) / side), side

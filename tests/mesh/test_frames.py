@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from mitex.errors import ConfigError
 from mitex.geometry.vectors import unit_normals
 from mitex.mesh import Mesh, embedded, grid, icosphere, torus
+from mitex.mesh.frames import tangent_frames, vertex_directions
 from mitex.mesh.topology import mesh_edges, welded
-from mitex.methods.surface.frames import tangent_frames, vertex_directions
 
 X, Y, Z = np.eye(3)
 
@@ -122,7 +122,7 @@ def test_smooth_has_a_direction_on_rough_level_ground(rng):
 
 def test_smooth_solves_its_equations_like_a_dense_minimisation():
     """On a small sphere, the energy of the docstring, written down edge by edge, has its minimum there."""
-    from mitex.methods.surface import frames
+    from mitex.mesh import frames
 
     mesh = icosphere(2)
     normals = mesh.normals.astype(np.float64)

@@ -1,0 +1,219 @@
+"""The surroundings of a point laid flat along a direction field, so that a patch of a texture fits on them.
+
+Coordinates x and y are wanted whose gradients are the field's right and up. No surface with curvature has
+such, so the nearest in least squares are taken: Poisson's equation with the field as its guide, on the faces
+around the point. Patches at neighbouring points are then turned alike, whatever charts the mesh is cut into.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from mitex.geometry.triangles import triangle_crosses
+from mitex.geometry.vectors import orthonormal, unit_normals
+from mitex.mesh import Mesh
+from mitex.mesh.connection import solver
+from mitex.mesh.frames import interpolate_frames
+from mitex.mesh.topology import mesh_edges, welded
+
+STRETCH = 1.6  # the largest factor by which lengths may change, up or down
+TORN = 0.25  # sides of faces whose ends were reached on ways so far apart are cut [reach]
+ROUND = 0.3  # a map that fails so near to its point is made anew, along the point's own direction [reach]
+LEAST = 1e-12  # area of a face, at least, relative to the largest
+PIN = 1e-9  # holds the constant of a solution, relative to the mean diagonal
+
+
+class Flattening:
+    """Lays a surface flat around any of its points.
+
+    Faces are connected where corners are at one place. A side of several faces is passed to all of them.
+
+    Args:
+        mesh: F faces, small beside `reach`.
+        directions: (V, 3) where the texture's right shall point at the vertices.
+        reach: how far from the point faces are laid flat [mesh units].
+    """
+
+    def __init__(self, mesh: Mesh, directions: np.ndarray, reach: float) -> None:
+        self.reach = reach
+        self.points = mesh.vertices[mesh.faces].astype(np.float64)
+        place = welded(mesh.vertices)
+        self.corners, self.count = place[mesh.faces], int(place.max()) + 1
+        centre = np.full((len(mesh.faces), 3), 1 / 3)
+        self.right, self.up = interpolate_frames(mesh, np.arange(len(mesh.faces)), centre, directions)
+        crosses = triangle_crosses(self.points)
+        self.normals, twice = unit_normals(crosses), np.linalg.norm(crosses, axis=1)
+        solid = twice > LEAST * twice.max()
+        self.areas = np.where(solid, 0.5 * twice, 0.0)
+        sides = np.roll(self.points, 1, axis=1) - np.roll(self.points, -1, axis=1)
+        hats = np.cross(self.normals[:, None], sides) / np.where(solid, twice, 1.0)[:, None, None]
+        # (F, 3, 3) gradients of the functions that are 1 at one corner and 0 at the others.
+        self.hats = np.where(solid[:, None, None], hats, 0.0)
+        self.around = _vertex_faces(self.corners, self.count)
+        place_of = np.empty((self.count, 3))
+        place_of[place] = mesh.vertices
+        self.graph = _edge_lengths(self.corners, place_of)
+
+    def distances(self) -> np.ndarray:
+        """(F,) of the faces from the first face of their connected part, along edges [mesh units]."""
+        _, part = connected_components(self.graph, directed=False)
+        _, first = np.unique(part[self.corners[:, 0]], return_index=True)
+        away = dijkstra(self.graph, indices=self.corners[first, 0], min_only=True)
+        return away[self.corners].mean(axis=1)
+
+    def __call__(self, face: int, barycentric: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The faces around a point in the plane, without those that do not fit in.
+
+        Args:
+            face: that the point lies on.
+            barycentric: (3,) where on it.
+
+        Returns:
+            (K,) faces, among them `face`, and (K, 3, 2) where their corners are, x to the right and y up, the
+            point at 0 [mesh units].
+        """
+        away, previous = self._surroundings(face)
+        near = np.flatnonzero(np.isfinite(away))
+        faces = np.unique(np.concatenate([self.around[v] for v in near]))
+        faces = faces[np.isfinite(away[self.corners[faces]]).all(1)]
+        map_ = self._mapped(face, faces, away, previous, self.right[faces], self.up[faces])
+        close = faces[(away[self.corners[faces]] < ROUND * self.reach).all(1) & (self.areas[faces] > 0)]
+        if not np.isin(close, map_[0]).all():
+            right = orthonormal(np.broadcast_to(self.right[face], (len(faces), 3)), self.normals[faces])
+            other = self._mapped(face, faces, away, previous, right, np.cross(self.normals[faces], right))
+            map_ = max(map_, other, key=lambda m: np.isin(close, m[0]).sum())
+        return self._around_the_point(face, barycentric, *map_)
+
+    def _surroundings(self, face: int) -> tuple[np.ndarray, np.ndarray]:
+        """How far vertices are from a face's corners (V,), infinite beyond reach, and those before them."""
+        away, previous, _ = dijkstra(
+            self.graph,
+            indices=np.unique(self.corners[face]),
+            min_only=True,
+            limit=self.reach,
+            return_predecessors=True,
+        )
+        return away, previous
+
+    def _mapped(
+        self,
+        face: int,
+        faces: np.ndarray,
+        away: np.ndarray,
+        previous: np.ndarray,
+        right: np.ndarray,
+        up: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Those of the faces that fit into the plane, and their corners there (K, 3, 2)."""
+        axes = np.stack([right, up], axis=2)  # (N, 3, 2)
+        steps = (np.roll(self.points[faces], -1, axis=1) - self.points[faces]) @ axes
+        whole = ~self._torn(face, faces, steps, away, previous)
+        faces, axes = faces[whole], axes[whole]
+        used, corners = np.unique(self.corners[faces], return_inverse=True)
+        corners = corners.reshape(-1, 3)
+        hats, areas = self.hats[faces], self.areas[faces]
+        stiffness = areas[:, None, None] * (hats @ hats.swapaxes(1, 2))
+        load = areas[:, None, None] * (hats @ axes)
+        place = _solution(corners, stiffness, load, len(used))[corners]
+        fits = self._fits(np.einsum("fka,fkb->fab", place, hats @ axes)) & (areas > 0)
+        fits &= _connected(corners, fits, np.flatnonzero(faces == face))
+        return faces[fits], place[fits]
+
+    def _torn(
+        self, face: int, faces: np.ndarray, steps: np.ndarray, away: np.ndarray, previous: np.ndarray
+    ) -> np.ndarray:
+        """(N,) bool, which faces lie where ways around both sides of something meet.
+
+        The field is followed along the shortest way to each vertex; where the ends of a side come out
+        elsewhere than the field between them says, the surface is cut, as on the far side of a tube.
+        """
+        used, corners = np.unique(self.corners[faces], return_inverse=True)
+        start = corners.reshape(-1, 3)
+        end = np.roll(start, -1, axis=1)
+        begins = previous[used] < 0  # the corners of the face, and what was reached by none of the faces
+        before = np.searchsorted(used[:-1], np.where(begins, used, previous[used]))
+        begins |= used[before] != previous[used]
+        before = np.where(begins, np.arange(len(used)), before)
+        way = np.zeros((len(used), 2))
+        for tail, head, sign in ((start, end, 1.0), (end, start, -1.0)):
+            last = (before[head] == tail) & ~begins[head]
+            way[head[last]] = sign * steps[last]
+        while (
+            before[before] != before
+        ).any():  # each round makes the parts of ways that are known twice as long
+            way += way[before]
+            before = before[before]
+        first = faces.searchsorted(face)
+        origin = np.zeros((len(used), 2))
+        origin[start[first]] = np.concatenate([np.zeros((1, 2)), np.cumsum(steps[first, :2], axis=0)])
+        way += origin[before]
+        jumps = np.linalg.norm(way[end] - way[start] - steps, axis=2)
+        return (jumps > TORN * self.reach).any(1) & (faces != face)
+
+    @staticmethod
+    def _fits(jacobians: np.ndarray) -> np.ndarray:
+        """(N,) bool, which of (N, 2, 2) neither mirror nor stretch by more than `STRETCH`."""
+        sizes = np.linalg.svd(jacobians, compute_uv=False)
+        upright = np.linalg.det(jacobians) > 0
+        return upright & (sizes[:, 0] < STRETCH) & (sizes[:, 1] > 1 / STRETCH)
+
+    def _around_the_point(
+        self, face: int, barycentric: np.ndarray, faces: np.ndarray, place: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The map with the point at 0; the point's own face as it is, if it did not fit."""
+        own = np.flatnonzero(faces == face)
+        if not len(own):
+            axes = np.stack([self.right[face], self.up[face]], axis=1)
+            faces, place = np.array([face]), (self.points[face] @ axes)[None]
+            own = [0]
+        return faces, place - barycentric @ place[own[0]]
+
+
+def _vertex_faces(corners: np.ndarray, count: int) -> list[np.ndarray]:
+    """The faces around each vertex."""
+    order = np.argsort(corners.ravel(), kind="stable") // 3
+    ends = np.cumsum(np.bincount(corners.ravel(), minlength=count))
+    return np.split(order, ends[:-1])
+
+
+def _edge_lengths(corners: np.ndarray, places: np.ndarray) -> Any:
+    """(V, V) scipy CSR, symmetric, of the edges of faces (F, 3) between places (V, 3)."""
+    pairs, _ = mesh_edges(corners, len(places))
+    length = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1)
+    graph = coo_array((length, tuple(pairs.T)), shape=(len(places),) * 2).tocsr()
+    return graph + graph.T
+
+
+def _solution(corners: np.ndarray, stiffness: np.ndarray, load: np.ndarray, count: int) -> np.ndarray:
+    """(count, 2) values at the vertices whose gradients are nearest to the field.
+
+    Args:
+        corners: (N, 3) of the faces.
+        stiffness: (N, 3, 3), and
+        load: (N, 3, 2) of their corners.
+    """
+    rows = np.broadcast_to(corners[:, :, None], stiffness.shape).ravel()
+    columns = np.broadcast_to(corners[:, None], stiffness.shape).ravel()
+    own = np.arange(count)
+    pin = PIN * stiffness.trace(axis1=1, axis2=2).mean()
+    entries = np.concatenate([stiffness.ravel(), np.full(count, max(pin, np.finfo(np.float64).tiny))])
+    places = np.concatenate([rows, own]), np.concatenate([columns, own])
+    solve = solver(coo_array((entries, places), shape=(count,) * 2).tocsc())
+    sums = [np.bincount(corners.ravel(), load[..., k].ravel(), count) for k in (0, 1)]
+    return np.stack([solve(total) for total in sums], axis=1)
+
+
+def _connected(corners: np.ndarray, used: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """(N,) bool, which of the `used` faces are connected with the face `start`, (1,), by such faces."""
+    if not len(start) or not used[start[0]]:
+        return np.zeros(len(corners), bool)
+    links = corners[used]
+    pairs = np.concatenate([links[:, :2], links[:, 1:]])
+    count = int(corners.max()) + 1
+    graph = coo_array((np.ones(len(pairs), bool), tuple(pairs.T)), shape=(count,) * 2)
+    part = connected_components(graph, directed=False)[1]
+    return part[corners[:, 0]] == part[corners[start[0], 0]]

@@ -1,0 +1,190 @@
+"""Quilting on a surface: patches are laid around its points, so that charts play no part.
+
+The patch for a place is chosen as in the plane (section 3.2.2), by what it has to continue, here of any
+outline, in blocks of texels. It is joined along the cheapest cut of any form (Kwatra et al. 2003).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import binary_closing, binary_dilation, binary_erosion
+
+from mitex.cuts import cheapest_cut, feather
+from mitex.errors import ConfigError
+from mitex.geometry.vectors import scatter_add
+from mitex.methods.nerf.synthesis.block_matching import BlockMatcher, block_means
+from mitex.methods.nerf.synthesis.matching import BLOCK, Source
+from mitex.methods.nerf.synthesis.quilting import NEAREST, Quilt
+from mitex.methods.nerf.synthesis.repetition import EVENNESS, Repetition
+from mitex.methods.nerf.synthesis.target import Target
+from mitex.progress import announce
+
+FINE_CELL = 2  # side of the cells that a cut goes between, where texels are so fine [texels of a patch]
+FINE_TEXELS = 2.0  # area of a texel [texels of a patch] up to which nearly each such cell has one
+MARGIN = 2  # cells between a cut and what was empty, over which the seam is averaged
+
+
+def quilt_on(
+    source: Source,
+    target: Target,
+    rng: np.random.Generator,
+    *,
+    nearest: int = NEAREST,
+    evenness: float = EVENNESS,
+) -> Quilt:
+    """Synthesizes a texture on a surface.
+
+    Args:
+        source: the patches, of the target's size.
+        target: the surface.
+        rng: of all choices.
+        nearest: candidates for a place, among which chance decides; doubled until one is allowed.
+        evenness: how much repetition is avoided, see `Repetition`.
+
+    Returns:
+        The texture in the map (side, side); zeros between charts.
+
+    Raises:
+        ConfigError: a number is out of range, or the patches cannot be used.
+    """
+    if nearest < 1:
+        raise ConfigError(f"{nearest} candidates", "use 1 or more")
+    matcher = BlockMatcher(source)
+    repetition = Repetition(matcher.centres, source.length, evenness)
+    canvas = _Canvas(source, target, matcher.shape)
+    for texel in canvas.empty():
+        place = canvas.around(texel)
+        costs = matcher.distances(*place.blocks())
+        costs = costs + (costs.mean() or 1.0) * repetition.penalties()
+        allowed = matcher.allowed(canvas.neighbours(place))
+        among = nearest if place.known.any() else costs.size
+        index, _ = matcher.choose(costs[None], allowed, rng, among)
+        canvas.paste(place, index)
+        repetition.add(index)
+    return canvas.result()
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """What a patch is going to cover, M texels.
+
+    Attributes:
+        texels: (M,).
+        where: (M, 2) column and row in the patch.
+        known: (M,) bool, which have values already.
+        cell: side of the cells [texels of a patch].
+        counts: (G, G) texels in the cells; those that have values:
+        filled: (G, G), and
+        sums: (G, G, C) of their values, in the channels that are compared.
+    """
+
+    texels: np.ndarray
+    where: np.ndarray
+    known: np.ndarray
+    cell: int
+    counts: np.ndarray
+    filled: np.ndarray
+    sums: np.ndarray
+
+    def blocks(self) -> tuple[np.ndarray, np.ndarray]:
+        """How much of the blocks is there, and their means, for `BlockMatcher.distances`."""
+        size = BLOCK // self.cell
+        counts, filled = (block_means(n[..., None], size)[..., 0] for n in (self.counts, self.filled))
+        values = block_means(self.sums, size) / np.where(filled, filled, 1)[..., None]
+        return filled / np.where(counts, counts, 1), values
+
+    def new_cells(self, patch: np.ndarray) -> np.ndarray:
+        """(G, G) bool, where a patch (S, S, C) takes the place of what is there."""
+        old = self.sums / np.where(self.filled, self.filled, 1)[..., None]
+        new = block_means(patch[..., : old.shape[2]], self.cell)
+        error = np.where(self.filled, np.square(old - new).sum(-1), 0.0)
+        empty = self.counts > self.filled
+        there = np.asarray(binary_closing(np.pad(self.counts > 0, 1))[1:-1, 1:-1], bool)
+        inner: np.ndarray = np.asarray(binary_erosion(there), bool)
+        rim = there & ~inner & (self.filled > 0)
+        return cheapest_cut(
+            error, rim, empty | (np.asarray(binary_dilation(empty, iterations=MARGIN), bool) & ~rim)
+        )
+
+
+class _Canvas:
+    """A texture in the making on a surface of N texels."""
+
+    def __init__(self, source: Source, target: Target, shape: tuple[int, int, int]) -> None:
+        self.source, self.target, self.side = source, target, shape[0]
+        self.cell = FINE_CELL if target.area < FINE_TEXELS else BLOCK
+        count = len(target.texels.index)
+        self.features = np.zeros((count, shape[2]), np.float32)
+        self.patch = np.full(count, -1, np.int32)
+        self.texel = np.zeros((count, 2), np.int16)
+
+    def empty(self) -> Iterator[int]:
+        """Texels without a value, until there are none."""
+        order = self.target.in_order()
+        start = 0
+        while start < len(order):
+            missing = self.patch[order[start : start + 4096]] < 0
+            if not missing.any():
+                start += len(missing)
+                continue
+            start += int(missing.argmax())
+            announce("quilting the surface", int((self.patch >= 0).sum()), len(order))
+            yield int(order[start])
+
+    def around(self, texel: int) -> _Place:
+        """What a patch covers whose middle is there."""
+        texels, where = self.target.around(texel)
+        known = self.patch[texels] >= 0
+        cells = self.side // self.cell
+        column, row = np.clip(np.rint(where).astype(np.int64) // self.cell, 0, cells - 1).T
+        number = row * cells + column
+        values = self.features[texels[known], : self.source.matched]
+        counts, filled = (np.bincount(n, minlength=cells**2) for n in (number, number[known]))
+        sums = scatter_add(number[known], values, cells**2)
+        shape = (cells, cells)
+        return _Place(
+            texels,
+            where,
+            known,
+            self.cell,
+            counts.reshape(shape),
+            filled.reshape(shape),
+            sums.reshape(*shape, -1),
+        )
+
+    def neighbours(self, place: _Place) -> np.ndarray:
+        """The patches beside a place."""
+        return np.unique(self.patch[place.texels[place.known]])
+
+    def paste(self, place: _Place, index: int) -> None:
+        """Lays a patch there: all of it where nothing was, elsewhere up to the cheapest cut."""
+        patch = self.source.patch(index)
+        new = place.new_cells(patch)
+        share = feather(np.kron(new, np.ones((self.cell,) * 2, bool)))
+        column, row = np.clip(np.rint(place.where).astype(np.int16), 0, self.side - 1).T
+        weights = np.where(place.known, share[row, column], 1.0)[:, None]
+        values = self.features[place.texels]
+        self.features[place.texels] = values + weights * (_sampled(patch, place.where) - values)
+        shown = weights[:, 0] > 0.5
+        self.patch[place.texels[shown]] = index
+        self.texel[place.texels[shown]] = np.stack([row, column], axis=1)[shown]
+
+    def result(self) -> Quilt:
+        """The texture in the map."""
+        features, patch, texel = (self.target.map(v) for v in (self.features, self.patch, self.texel))
+        return Quilt(features, patch, np.zeros(patch.shape, np.uint8), texel)
+
+
+def _sampled(patch: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """(M, C) of a patch (S, S, C) at columns and rows (M, 2), bilinear; its border goes on beyond it."""
+    last = len(patch) - 1
+    where = np.clip(where, 0, last)
+    low = np.minimum(where.astype(np.int64), last - 1)
+    across, down = (where - low).astype(np.float32).T[..., None]
+    column, row = low.T
+    top = patch[row, column] + across * (patch[row, column + 1] - patch[row, column])
+    below = patch[row + 1, column] + across * (patch[row + 1, column + 1] - patch[row + 1, column])
+    return top + down * (below - top)
