@@ -15,7 +15,7 @@ import pytest
 from tests.browser import Tab
 
 PREFERENCES = {"marionette.port": 0, "webgl.force-enabled": True}
-PATIENCE = 120  # [s]
+PATIENCE = 600  # [s]
 
 
 class Firefox:

@@ -203,7 +203,11 @@ def test_a_downloaded_asset_shows_what_the_page_shows(tab, texture, cells, tmp_p
     assert np.abs(mesh.vertices[mesh.faces] - cells.vertices[cells.faces]).max() < 1e-6
     scene = trimesh.load_scene(path, process=False)
     (geometry,) = scene.geometry.values()
-    image = np.asarray(geometry.visual.material.baseColorTexture.convert("RGB")) / 255
+    material = geometry.visual.material
+    image, normals = (
+        np.asarray(one.convert("RGB")) / 255 for one in (material.baseColorTexture, material.normalTexture)
+    )
+    assert normals[..., 2].min() > 0.5  # none points inwards
     faces = np.arange(len(cells.faces), dtype=np.int32)
     middles = np.full((len(faces), 3), 1 / 3, np.float32)
     grown = Grown(texture.look, state(tab, cells), Cells(cells, 0, cells), np.radians(TURN), texture._palette)

@@ -22,7 +22,6 @@ def texture():
 def tab(firefox, texture, tmp_path_factory):
     path = tmp_path_factory.mktemp("page") / "torus.html"
     options = {
-        "looks": [NcaTexture.load("lava")],
         "seed": SEED,
         "orientation": TURN,
         "steps": 1,
