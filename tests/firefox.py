@@ -8,6 +8,7 @@ import subprocess
 import tempfile
 import time
 from pathlib import Path
+from subprocess import DEVNULL
 from typing import Any
 
 import pytest
@@ -67,9 +68,8 @@ class Firefox:
         rows = [f"user_pref({json.dumps(name)}, {json.dumps(value)});" for name, value in PREFERENCES.items()]
         (folder / "user.js").write_text("\n".join(rows))
         command = [program, "--headless", "--marionette", "--no-remote", "--profile", str(folder)]
-        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
         environment = os.environ | {"DISPLAY": os.environ.get("DISPLAY") or self._display()}
-        self._processes.append(subprocess.Popen(command, env=environment, **quiet))
+        self._processes.append(subprocess.Popen(command, env=environment, stdout=DEVNULL, stderr=DEVNULL))
         port = folder / "MarionetteActivePort"
         for _ in range(10 * PATIENCE):
             if port.exists() and port.read_text().strip():
@@ -87,7 +87,7 @@ class Firefox:
             return ""
         read, write = os.pipe()
         command = [program, "-displayfd", str(write), "-screen", "0", "640x480x24"]
-        self._processes.append(subprocess.Popen(command, pass_fds=[write], stderr=subprocess.DEVNULL))
+        self._processes.append(subprocess.Popen(command, pass_fds=[write], stderr=DEVNULL))
         os.close(write)
         with os.fdopen(read) as numbers:
             return f":{numbers.readline().strip()}"

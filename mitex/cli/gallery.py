@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -53,7 +54,7 @@ class Gallery:
         content = load(method.page)([model["name"] for model in growing], meshes)
         content = content.extended(
             thumbnails=[_thumbnail(model) for model in growing],
-            stills=[_still(model) for model in models if not methods()[model["method"]].page],
+            stills=[*_stills(models)],
         )
         Content("Gallery", content.data).write(out)
         print(self.out)
@@ -65,11 +66,15 @@ def _thumbnail(model: dict[str, Any]) -> str | None:
     return model["thumbnail"] and thumbnail(Path(model["thumbnail"]), SIDE)
 
 
-def _still(model: dict[str, Any]) -> dict[str, Any]:
-    """A model that does not grow in a page, as it is on a ring."""
+def _stills(models: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """The models that do not grow in a page, as they are on a ring."""
+    from mitex.asset import Asset
     from mitex.mesh import torus
     from mitex.page.still import still_data
 
-    texture = methods()[model["method"]].load_texture().load(model["path"])
-    asset = texture.apply(torus(*RING))
-    return {**still_data(replace(asset, name=model["name"])), "thumbnail": _thumbnail(model)}
+    for model in models:
+        method = methods()[model["method"]]
+        if method.page is None:
+            asset = method.load_texture().load(model["path"]).apply(torus(*RING))
+            if isinstance(asset, Asset):
+                yield still_data(replace(asset, name=model["name"])) | {"thumbnail": _thumbnail(model)}

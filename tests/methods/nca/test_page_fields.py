@@ -32,9 +32,9 @@ def smooth(seed, mesh=GIVEN):
     return mesh.vertices @ rng.normal(0, 1, (3, 3)) + rng.normal(0, 0.3, (len(mesh.vertices), 3)) + 0.5
 
 
-def npy(vectors, order="C"):
+def npy(vectors):
     file = io.BytesIO()
-    np.save(file, np.asarray(vectors, order=order))
+    np.save(file, vectors)
     return file.getvalue()
 
 
@@ -125,7 +125,7 @@ def test_dropped_fields_are_followed(browser, texture, tmp_path):
     count = len(GIVEN.vertices)
     files = {
         "a.npy": npy(vectors),
-        "b.npy": npy(vectors.astype(">f4"), "F"),
+        "b.npy": npy(np.asfortranarray(vectors.astype(">f4"))),
         "c.ply": ply(GIVEN, vectors),
         "d.ply": ply(GIVEN, vectors, ("fx", "fy", "fz"), faces=False),
     }
