@@ -65,7 +65,7 @@ void main() {
   float open = dot(barycentric, vec3(texelFetch(occlusion, slot[0], 0).r, texelFetch(occlusion, slot[1], 0).r,
                                      texelFetch(occlusion, slot[2], 0).r));
   colour = vec4(albedo, relief);
-  bent = vec4(facing * normalize(detail), roughness);
-  plain = vec4(facing * normal, occluded);
+  bent = vec4(normalize(detail), roughness);
+  plain = vec4(normal, occluded);
   spot = vec4(position, open);
 }

@@ -3,6 +3,7 @@
 // metallic-roughness with F0 = 0.04 (GGX, Smith, Schlick), sRGB without a film curve.
 precision highp float;
 precision highp int;
+uniform highp usampler2D ids;
 uniform highp sampler2D colour, bent, plain, spot, shadows, ground;
 uniform mat4 light;
 uniform vec3 eye, key, right, up, back, paper;
@@ -89,6 +90,10 @@ vec3 towards(vec3 view, vec3 normal) {
 vec3 surface(ivec2 at, vec4 here) {
   vec4 c = texelFetch(colour, at, 0), b = texelFetch(bent, at, 0), p = texelFetch(plain, at, 0);
   vec3 view = normalize(eye - here.xyz), flat_ = p.xyz, n = b.xyz;
+  if (texelFetch(ids, at, 0).w == 1u && dot(flat_, view) < 0.0) {  // seen from behind
+    flat_ = -flat_;
+    n = -n;
+  }
   flat_ = towards(view, flat_);
   if (relief > 0.0) n = embossed(at, n, here.xyz);
   n = towards(view, n);

@@ -43,7 +43,7 @@ void main() {
   float open = dot(barycentric, vec3(texelFetch(occlusion, slot[0], 0).r, texelFetch(occlusion, slot[1], 0).r,
                                      texelFetch(occlusion, slot[2], 0).r));
   colour = vec4(read(colours), material.z);
-  bent = vec4(facing * (detailed ? normalize(2.0 * read(details) - 1.0) : normal), material.y);
-  plain = vec4(facing * normal, material.x);
+  bent = vec4(detailed ? normalize(2.0 * read(details) - 1.0) : normal, material.y);
+  plain = vec4(normal, material.x);
   spot = vec4(mixed(corner), open);
 }

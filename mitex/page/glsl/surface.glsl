@@ -7,13 +7,11 @@ uniform sampler2D rights;
 
 ivec2 slot[3];
 vec3 barycentric, corner[3], cornerNormal[3];
-float edge;    // length of the edges around [decoder units]
-float facing;  // 1, or -1 where the surface is seen from behind
+float edge;  // length of the edges around [decoder units]
 
 bool locate(ivec2 pixel) {
   uvec4 id = texelFetch(ids, pixel, 0);
   if (id.x == 0u) return false;
-  facing = id.w == 0u ? 1.0 : -1.0;
   barycentric.xy = uintBitsToFloat(id.yz);
   barycentric.z = 1.0 - barycentric.x - barycentric.y;
   int index = int(id.x) - 1;
