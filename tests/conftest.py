@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.browser import Browser
+from tests.firefox import Firefox
 
 # As the commands do that go to and fro between torch and Dr.Jit; see `mitex.runtime.let_idle_threads_sleep`.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
@@ -75,6 +76,14 @@ def browser() -> Iterator[Browser]:
     browser = Browser()
     yield browser
     browser.close()
+
+
+@pytest.fixture(scope="session")
+def firefox() -> Iterator[Firefox]:
+    """One Firefox for all tests."""
+    firefox = Firefox()
+    yield firefox
+    firefox.close()
 
 
 @pytest.fixture

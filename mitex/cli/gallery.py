@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from tyro.conf import arg
 
@@ -13,12 +14,14 @@ from mitex.lazy import load
 from mitex.methods.registry import methods
 
 MESHES = ("knot", "shaderball", "octopus")
+RING = (24, 10)  # vertices around and across it: few, since geometric textures split its faces
 SIDE = 144  # of a thumbnail [px]
 
 
 @dataclass(kw_only=True)
 class Gallery:
-    """Write a page with all textures that ship with Mitex: one click grows each of them on a mesh.
+    """Write a page with all textures that ship with Mitex: one click grows each of them on a mesh. Those that
+    do not grow in a page are shown as they are on a ring.
 
     examples:
       mitex gallery --out gallery.html
@@ -41,12 +44,37 @@ class Gallery:
         inputs = [] if self.mesh is None else mesh_files(self.mesh)
         out = prepare_output(self.out, (".html",), inputs=inputs)
         from mitex.mesh import Mesh
-        from mitex.page import Content, thumbnail
+        from mitex.page import Content
 
         meshes = [Mesh.load(name) for name in ([self.mesh] if self.mesh else MESHES)]
-        method, page = next((method, method.page) for method in methods().values() if method.page)
-        models = [model for model in listing() if model["method"] == method.name]
-        pictures = [model["thumbnail"] and thumbnail(Path(model["thumbnail"]), SIDE) for model in models]
-        content = load(page)([model["name"] for model in models], meshes)
-        Content("Gallery", content.extended(thumbnails=pictures).data).write(out)
+        models = listing()
+        method = next(method for method in methods().values() if method.page)
+        growing = [model for model in models if model["method"] == method.name]
+        assert method.page is not None
+        content = load(method.page)([model["name"] for model in growing], meshes)
+        content = content.extended(
+            thumbnails=[_thumbnail(model) for model in growing],
+            stills=[*_stills(models)],
+        )
+        Content("Gallery", content.data).write(out)
         print(self.out)
+
+
+def _thumbnail(model: dict[str, Any]) -> str | None:
+    from mitex.page import thumbnail
+
+    return model["thumbnail"] and thumbnail(Path(model["thumbnail"]), SIDE)
+
+
+def _stills(models: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """The models that do not grow in a page, as they are on a ring."""
+    from mitex.asset import Asset
+    from mitex.mesh import torus
+    from mitex.page.still import still_data
+
+    for model in models:
+        method = methods()[model["method"]]
+        if method.page is None:
+            asset = method.load_texture().load(model["path"]).apply(torus(*RING))
+            if isinstance(asset, Asset):
+                yield still_data(replace(asset, name=model["name"])) | {"thumbnail": _thumbnail(model)}

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import uniform_filter
 
-from mitex.asset import Asset
+from mitex.asset import Asset, clay
 from mitex.export import SUFFIXES
 from mitex.export.common import default_tangents
 from mitex.geometry.vectors import unit
-from mitex.mesh import torus
+from mitex.mesh import grid, icosphere, torus
 
 
 @pytest.fixture(scope="module")
@@ -44,3 +45,28 @@ def test_a_page_is_one_of_the_formats(asset, tmp_path):
     assert ".html" in SUFFIXES
     text = replace(asset, name="<b>").export(tmp_path / "torus.html").read_text()
     assert "<title>&lt;b&gt;</title>" in text
+
+
+def lit(tab, azimuth):
+    """The picture in the light from a side [degrees]."""
+    tab.run("page.studio.camera.azimuth = argument * Math.PI / 180; page.studio.camera.fit()", azimuth)
+    return tab.picture()
+
+
+def test_faces_are_lit_on_both_sides(browser, tmp_path):
+    """The studio's light turns with the camera: a square looks the same from in front and from behind."""
+    tab = browser.open(clay(grid(4, 4)).export(tmp_path / "square.html"), 64)
+    front, behind = lit(tab, 0), lit(tab, 180)
+    assert front.std() > 0.02 and np.abs(front - behind).mean() < 0.01
+
+
+def test_outlines_of_coarse_meshes_have_no_specks(browser, tmp_path):
+    """There the smooth normal points away from the eye, though the face does not."""
+    tab = browser.open(clay(icosphere(2)).export(tmp_path / "ball.html"), 128)
+    picture = tab.picture().mean(axis=2)
+    _, _, plain, spot, ids = (values[::-1] for values in tab.maps())
+    eye = np.array(tab.run("return page.studio.camera.eye"))
+    hit = ids[..., 0] > 0
+    away = hit & (((eye - spot[..., :3]) * plain[..., :3]).sum(-1) < 0)
+    around = uniform_filter(picture * hit, 9) / np.maximum(uniform_filter(hit.astype(float), 9), 1e-9)
+    assert away.sum() > 20 and np.abs(picture - around)[away].max() < 0.1

@@ -3,6 +3,7 @@
 // metallic-roughness with F0 = 0.04 (GGX, Smith, Schlick), sRGB without a film curve.
 precision highp float;
 precision highp int;
+uniform highp usampler2D ids;
 uniform highp sampler2D colour, bent, plain, spot, shadows, ground;
 uniform mat4 light;
 uniform vec3 eye, key, right, up, back, paper;
@@ -81,15 +82,21 @@ vec3 embossed(ivec2 at, vec3 normal, vec3 position) {
   return normalize(normal - relief * (hx * r1 + hy * r2) / det);
 }
 
+// A normal that does not point away from the eye, as those of details and of coarse meshes do at outlines.
+vec3 towards(vec3 view, vec3 normal) {
+  return normalize(normal + view * max(0.05 - dot(normal, view), 0.0));
+}
+
 vec3 surface(ivec2 at, vec4 here) {
   vec4 c = texelFetch(colour, at, 0), b = texelFetch(bent, at, 0), p = texelFetch(plain, at, 0);
   vec3 view = normalize(eye - here.xyz), flat_ = p.xyz, n = b.xyz;
-  if (dot(flat_, view) < 0.0) {
+  if (texelFetch(ids, at, 0).w == 1u && dot(flat_, view) < 0.0) {  // seen from behind
     flat_ = -flat_;
     n = -n;
   }
+  flat_ = towards(view, flat_);
   if (relief > 0.0) n = embossed(at, n, here.xyz);
-  n = normalize(n + view * max(0.05 - dot(n, view), 0.0));
+  n = towards(view, n);
   float roughness = max(b.w, 0.05), alpha = roughness * roughness, open = here.w;
   vec3 base = toLinear(c.rgb) * p.w;
   float facing = clamp(dot(n, view), 0.02, 1.0);

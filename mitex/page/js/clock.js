@@ -18,7 +18,7 @@ class Clock {
     const passed = Math.min((now - (this.last ?? now)) / 1000, 0.25);
     this.last = now;
     const { page } = this;
-    if (this.playing && !page.automaton.busy) {
+    if (this.playing && page.automaton && !page.automaton.busy) {
       this.due = Math.min(this.due + this.rate * passed, MOST_STEPS);
       // A device that is slow at drawing shall not be asked for many steps, too.
       const steps = Math.min(Math.floor(this.due), passed > 0.1 ? 2 : MOST_STEPS);

@@ -50,8 +50,8 @@ function menu(name, options, chosen, act) {
 }
 
 // Pictures of which one is chosen; a look without one has its name alone.
-function gallery(looks, pictures, chosen, act) {
-  const items = looks.map(({ name }, k) => element("button",
+function gallery(names, pictures, chosen, act) {
+  const items = names.map((name, k) => element("button",
     { type: "button", title: name, "aria-pressed": String(k === chosen), onclick: () => act(k) },
     ...(pictures[k] ? [element("img", { src: pictures[k], alt: "" })] : []), element("span", {}, name)));
   return element("div", { className: "gallery", role: "group", "aria-label": "Look" }, ...items);

@@ -12,24 +12,24 @@ function keysHelp() {
   return element("details", {}, element("summary", {}, "Keys"), element("dl", {}, ...rows));
 }
 
-function listenToKeys(page, panel) {
+function listenToKeys(panel) {
   const seen = (act) => () => {
-    act(page.studio.camera);
-    page.changed = true;
+    act(panel.page.studio.camera);
+    panel.page.changed = true;
   };
-  const alive = () => page.automaton;
+  const alive = () => panel.page.automaton;
   const brush = (step) => () => alive() && panel.size(clamp(Number(panel.brush.querySelector("input").value) + step, 2, 40));
   const acts = {
-    " ": () => alive() && panel.pause(), r: () => alive() && page.reset(), n: () => alive() && panel.reseed(),
+    " ": () => alive() && panel.pause(), r: () => alive() && panel.page.reset(), n: () => alive() && panel.reseed(),
     t: () => panel.choose("turn"), e: () => panel.choose("erase"), g: () => panel.choose("graft"),
-    "[": brush(-2), "]": brush(2), s: () => savePicture(page), f: () => panel.record(),
+    "[": brush(-2), "]": brush(2), s: () => savePicture(panel.page), f: () => panel.record(),
     o: () => alive() && panel.ask(),
     ArrowLeft: seen((view) => view.turn(TURN_STEP, 0)), ArrowRight: seen((view) => view.turn(-TURN_STEP, 0)),
     ArrowUp: seen((view) => view.turn(0, TURN_STEP)), ArrowDown: seen((view) => view.turn(0, -TURN_STEP)),
     "+": seen((view) => view.zoom(0.9)), "-": seen((view) => view.zoom(1 / 0.9)), Home: seen((view) => view.fit()),
   };
   VIEWS.slice(0, 6).forEach(([mode], k) => {
-    acts[k + 1] = () => (mode === "light" || page.look.maps[mode]) && panel.show(mode);
+    acts[k + 1] = () => (mode === "light" || panel.page.look.maps[mode]) && panel.show(mode);
   });
   document.addEventListener("keydown", (event) => {
     const act = acts[event.key.length === 1 ? event.key.toLowerCase() : event.key];

@@ -15,6 +15,7 @@ const FIELD_FILES = "NPY, or PLY with vx vy vz; or drop one onto the page";
 class Panel {
   constructor(page, clock, pointer, { panel, status }) {
     Object.assign(this, { page, clock, pointer, place: panel, status });
+    Object.assign(this, { grower: page.automaton ? page : null, stills: new Map() });
     this.build();
   }
 
@@ -43,16 +44,20 @@ class Panel {
     const { page, place } = this;
     this.tools = this.brush = null;
     place.replaceChildren(element("header", {}, element("h1", {}, page.surface.mesh.name),
-      element("p", {}, page.look.name)), this._view(), this._keep(), keysHelp());
+      element("p", {}, page.look.name)), ...this._looks(), this._view(), this._keep(), keysHelp());
   }
 
   _looks() {
-    const { page } = this;
-    const { looks } = page;
-    if (looks.length < 2) return [];
-    const pictures = page.data.thumbnails;
-    this.looks = pictures ? gallery(looks, pictures, page.chosen, (k) => this.look(k))
-      : choice("Look", looks.map(({ name }, k) => [k, name]), page.chosen, (k) => this.look(k));
+    const { page, grower } = this;
+    if (!grower) return [];
+    const { looks, data: { thumbnails, stills = [] } } = grower;
+    const names = [...looks.map(({ name }) => name), ...stills.map(({ look }) => look)];
+    if (names.length < 2) return [];
+    const chosen = page === grower ? grower.chosen : looks.length + stills.indexOf(page.data);
+    const [pictures, act] = [[...thumbnails ?? [], ...stills.map(({ thumbnail }) => thumbnail)], (k) => this.look(k)];
+    this.looks = thumbnails ? gallery(names, pictures, chosen, act)
+      : choice("Look", names.map((name, k) => [k, name]), chosen, act);
+    if (page !== grower) return [section("Look", this.looks)];
     const related = looks.map(({ name, family }, k) => [k, name, family])
       .filter(([k, , family]) => k !== page.chosen && family === page.look.family);
     const parts = [section("Look", this.looks)];
@@ -179,9 +184,32 @@ class Panel {
     this.tools.set(tool);
   }
 
-  look(chosen) {
-    this.page.setLook(chosen);
+  // One of the looks, or of the assets that stand still beside them.
+  async look(chosen) {
+    const { grower } = this;
+    const still = chosen - grower.looks.length;
+    if (still >= 0) {
+      this._turnTo(await this._still(still));
+      return;
+    }
+    if (this.page !== grower) this._turnTo(grower);
+    grower.setLook(chosen);
     if (this.pointer.tool === "graft") this.pointer.tool = "turn";
+    this.build();
+  }
+
+  async _still(k) {
+    const { data, graphics, studio } = this.grower;
+    if (!this.stills.has(k)) this.stills.set(k, await StillPage.of(data.stills[k], graphics, studio));
+    return this.stills.get(k);
+  }
+
+  // Shows another page in place of the one that is there.
+  _turnTo(page) {
+    [this, this.clock, this.pointer].forEach((one) => { one.page = page; });
+    this.pointer.tool = "turn";
+    page.enter();
+    page.setMode("light");
     this.build();
   }
 

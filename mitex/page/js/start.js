@@ -15,23 +15,23 @@ async function open() {
     const scale = Math.min(window.devicePixelRatio || 1, 2);
     canvas.width = still || Math.max(Math.round(canvas.clientWidth * scale), 1);
     canvas.height = still || Math.max(Math.round(canvas.clientHeight * scale), 1);
-    page.changed = true;
   };
   fit();
   page.draw();
   by("instead").hidden = true;
-  const clock = new Clock(page, (counts) => { by("status").textContent = counted(page, counts); });
+  const clock = new Clock(page, (counts) => { by("status").textContent = counted(clock.page, counts); });
   const panel = new Panel(page, clock, new Pointer(page, by("cursor")), { panel: by("panel"), status: by("status") });
-  listenToKeys(page, panel);
+  listenToKeys(panel);
   listenToDrops(panel);
   page.panel = panel;
   if (data.live) follow(page, panel);
   if (still) return page;
   clock.start();
-  new ResizeObserver(fit).observe(canvas);
+  const again = () => { clock.page.changed = true; };
+  new ResizeObserver(() => { fit(); again(); }).observe(canvas);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     page.studio.paper = paperOf(canvas);
-    page.changed = true;
+    again();
   });
   return page;
 }

@@ -1,14 +1,14 @@
 // An asset that does not grow: its maps are textures, or values at the vertices.
 
 class StillPage extends View {
-  static async of(data, graphics) {
-    const page = new StillPage(data, graphics);
+  static async of(data, graphics, studio) {
+    const page = new StillPage(data, graphics, studio);
     await page._read();
     return page;
   }
 
-  constructor(data, graphics) {
-    super(data, graphics);
+  constructor(data, graphics, studio) {
+    super(data, graphics, studio);
     this.show(meshOf(data.mesh));
     this.baked = Boolean(data.uv);
     const program = written(SHADERS["still.frag"], { SURFACE: SHADERS["surface.glsl"],

@@ -70,7 +70,7 @@ class Studio {
     const [colour, bent, plain, spot] = this.maps.textures;
     const { width, height } = this.maps;
     graphics.fill(this.light, this.shading, {
-      colour, bent, plain, spot, light, key, radius, floor, ...camera.axes(), eye: camera.eye,
+      ids: this.picture.textures[0], colour, bent, plain, spot, light, key, radius, floor, ...camera.axes(), eye: camera.eye,
       shadows: this.shadows.depth, ground: occlusion.ground.textures[0], extent: occlusion.half,
       slopes: camera.slopes(this.aspect), size: [width, height], mode: this.mode, exposure: this.exposure,
       paper: this.paper, relief: this.relief,

@@ -1,14 +1,18 @@
 // A mesh in the studio's light, whatever it wears: what pages have in common.
 
 class View {
-  constructor(data, graphics) {
-    Object.assign(this, { data, graphics, canvas: graphics.canvas, samples: 1 });
-    this.studio = new Studio(this.graphics);
+  constructor(data, graphics, studio = new Studio(graphics)) {
+    Object.assign(this, { data, graphics, studio, canvas: graphics.canvas, samples: 1 });
   }
 
   show(mesh) {
     this.surface?.drop();
     this.surface = new Surface(this.graphics, mesh, this.data.edge, this.turnOn(mesh));
+    this.enter();
+  }
+
+  // Comes into the studio, which another view may have left.
+  enter() {
     this.studio.setSurface(this.surface);
     this.changed = true;
   }

@@ -10,15 +10,14 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from mitex.errors import ConfigError, OutputError
-from mitex.geometry.vectors import unit
 from mitex.images import bilinear
 from mitex.mesh import Mesh, icosphere, subdivide_midpoint, torus
 from mitex.methods.nca import NcaTexture, living_page
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.graft import GraftedGrowth
-from mitex.methods.nca.perception import perception
 from mitex.page import quantised
+from tests.methods.nca.pages import after, points, shown, states
 from tests.node import khronos_reports
 from tests.page.hashes import mask
 
@@ -50,41 +49,21 @@ def tab(browser, path):
     return browser.open(path)
 
 
-@torch.no_grad()
-def states(texture, mesh):
-    """The states after each step, (V, C), with the page's masks."""
-    look = texture.look
-    operator = perception(mesh, look.rule.degree, np.radians(TURN), mean=look.mean)
-    values = look.rule.seed(operator)
-    for step in range(200):
-        fires = torch.from_numpy(mask(len(mesh.vertices), step, SEED))
-        values = look.bounded(look.rule.step(values, operator, fires))
-        yield values[0]
-
-
 @pytest.fixture(scope="module")
 def grown(tab, texture, cells):
     """The page's state after 200 steps, and Python's; those after 16 are compared on the way."""
-    every = list(states(texture, cells))
-    assert every[15].abs().max() > 0.3
+    every = states(texture, cells, SEED, np.radians(TURN))
+    early = after(16, every)
+    assert early.abs().max() > 0.3
     tab.run("page.reset(); await page.step(16)")
-    assert (state(tab, cells) - every[15]).abs().max() < 1e-3
+    assert (state(tab, cells) - early).abs().max() < 1e-3
     tab.run("await page.step(184)")
-    return state(tab, cells), every[-1]
+    return state(tab, cells), after(184, every)
 
 
 def state(tab, cells):
     """The page's states, (V, C)."""
     return torch.from_numpy(tab.array("page.automaton.read()").copy()).reshape(len(cells.vertices), -1)
-
-
-def shown(texture, states, cells, ids):
-    """What Python shows at the pixels that see the surface: maps and normals."""
-    face, bits = ids[:, 0].astype(np.int64) - 1, ids[:, 1:3].copy().view(np.float32)
-    barycentric = np.column_stack([bits, 1 - bits.sum(1)])
-    grown = Grown(texture.look, states, Cells(cells, 0, cells), np.radians(TURN), texture._palette)
-    maps = grown.maps(grown.values(face.astype(np.int32), barycentric))
-    return maps, unit(grown.object_normals(maps["normal"], face, barycentric))
 
 
 def test_states_are_those_of_python(grown):
@@ -102,8 +81,7 @@ def compute(browser, path):
 
 
 def test_webgpu_takes_the_same_steps(compute, tab, texture, cells, grown):
-    every = states(texture, cells)
-    early = [next(every) for _ in range(16)][-1]
+    early = after(16, states(texture, cells, SEED, np.radians(TURN)))
     compute.run("await page.step(16)")
     assert (state(compute, cells) - early).abs().max() < 1e-3
     compute.run("await page.step(184)")
@@ -121,7 +99,7 @@ def test_pixels_are_those_of_python(tab, texture, cells, grown):
     colour, bent, plain, _, ids = tab.maps()
     hit = ids[..., 0] > 0
     assert 0.2 < hit.mean() < 0.8
-    maps, normals = shown(texture, grown[0], cells, ids[hit])
+    maps, normals = shown(texture, grown[0], cells, np.radians(TURN), ids[hit])
     for values, expected in (
         (colour[hit][:, :3], maps["albedo"]),
         (colour[hit][:, 3:], maps["height"]),
@@ -203,8 +181,8 @@ def test_grafted_looks_share_their_steps_and_their_pictures(tab, compute, textur
     fires = torch.from_numpy(mask(len(weights), 30, SEED))[None]
     with patch("torch.rand", lambda *_, **__: 1 - fires.float()):
         expected = graft._step(before[None], torch.Generator())[0]
-    after = state(tab, cells)
-    assert (after - expected).abs().max() < 1e-4
+    now = state(tab, cells)
+    assert (now - expected).abs().max() < 1e-4
     script = """const { automaton, looks } = page; const [shares, states] = argument;
     automaton.setLooks(...looks); page._shares(Float32Array.from(shares));
     automaton.write(Float32Array.from(states)); automaton.steps = 30; await page.step(1)"""
@@ -212,8 +190,7 @@ def test_grafted_looks_share_their_steps_and_their_pictures(tab, compute, textur
     assert (state(compute, cells) - expected).abs().max() < 1e-4
     colour, *_, ids = tab.maps()
     hit = ids[..., 0] > 0
-    face, bits = ids[hit][:, 0].astype(np.int32) - 1, ids[hit][:, 1:3].copy().view(np.float32)
-    values = graft.shown(after).values(face, np.column_stack([bits, 1 - bits.sum(1)]))
+    values = graft.shown(now).values(*points(ids[hit]))
     assert np.abs(colour[hit][:, :3] - values[:, :3]).max() < 4e-3
     tab.run("page.setGraft(null); page.setShare(0)")
 
@@ -226,7 +203,11 @@ def test_a_downloaded_asset_shows_what_the_page_shows(tab, texture, cells, tmp_p
     assert np.abs(mesh.vertices[mesh.faces] - cells.vertices[cells.faces]).max() < 1e-6
     scene = trimesh.load_scene(path, process=False)
     (geometry,) = scene.geometry.values()
-    image = np.asarray(geometry.visual.material.baseColorTexture.convert("RGB")) / 255
+    material = geometry.visual.material
+    image, normals = (
+        np.asarray(one.convert("RGB")) / 255 for one in (material.baseColorTexture, material.normalTexture)
+    )
+    assert normals[..., 2].min() > 0.5  # none points inwards
     faces = np.arange(len(cells.faces), dtype=np.int32)
     middles = np.full((len(faces), 3), 1 / 3, np.float32)
     grown = Grown(texture.look, state(tab, cells), Cells(cells, 0, cells), np.radians(TURN), texture._palette)

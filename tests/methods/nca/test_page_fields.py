@@ -8,17 +8,13 @@ import pytest
 import torch
 import trimesh
 
-from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh, icosphere, subdivide_midpoint, torus
 from mitex.methods.nca import NcaTexture, living_page
-from mitex.methods.nca.bake import Grown
-from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.motion.condition import cell_vectors
 from mitex.methods.nca.orientation import cell_turns
-from mitex.methods.nca.perception import perception
 from mitex.page import quantised
 from tests.methods.nca import tiny
-from tests.page.hashes import mask
+from tests.methods.nca.pages import after, shown, states
 
 GIVEN = torus(12, 6)
 ANGLE = 0.6  # by which the page is turned further [rad]
@@ -36,9 +32,9 @@ def smooth(seed, mesh=GIVEN):
     return mesh.vertices @ rng.normal(0, 1, (3, 3)) + rng.normal(0, 0.3, (len(mesh.vertices), 3)) + 0.5
 
 
-def npy(vectors, order="C"):
+def npy(vectors):
     file = io.BytesIO()
-    np.save(file, np.asarray(vectors, order=order))
+    np.save(file, vectors)
     return file.getvalue()
 
 
@@ -54,19 +50,13 @@ def ply(mesh, vectors=None, names=("vx", "vy", "vz"), faces=True):
     return ("\n".join(lines) + "\n").encode()
 
 
-@torch.no_grad()
-def states(texture, given, motion, upwards, angle=0.0, levels=1, speed=1.0):
-    """The cells' mesh, their turns, and their states (V, C) after 16 steps with the page's masks."""
-    shown = quantised(given)
-    mesh, look = subdivide_midpoint(shown, levels), texture.look
-    turns = cell_turns(upwards, mesh, shown) + angle
-    operator = perception(mesh, look.rule.degree, turns, mean=look.mean)
-    told = torch.from_numpy(cell_vectors(shown, mesh, motion, speed, turns))
-    values = look.rule.seed(operator)
-    for step in range(16):
-        fires = torch.from_numpy(mask(len(mesh.vertices), step, 0))
-        values = look.bounded(look.rule.step(values, operator, fires, told))
-    return mesh, turns, values[0].numpy()
+def grown(texture, given, motion, upwards, angle=0.0, levels=1, speed=1.0):
+    """The cells' mesh, their turns, and their states (V, C) after 16 steps."""
+    base = quantised(given)
+    mesh = subdivide_midpoint(base, levels)
+    turns = cell_turns(upwards, mesh, base) + angle
+    told = cell_vectors(base, mesh, motion, speed, turns)
+    return mesh, turns, after(16, states(texture, mesh, turn=turns, told=told)).numpy()
 
 
 @pytest.fixture(scope="module")
@@ -81,19 +71,19 @@ def path(texture, tmp_path_factory):
 @pytest.mark.parametrize("way", ["webgl", "webgpu"])
 def test_the_fields_of_files_are_followed(browser, path, texture, way):
     tab = browser.open(path, steps=way)
-    mesh, turns, expected = states(texture, GIVEN, smooth(1), smooth(2), speed=1.3)
+    mesh, turns, expected = grown(texture, GIVEN, smooth(1), smooth(2), speed=1.3)
     tab.run("await page.step(16)")
     ours = tab.array("page.automaton.read()").reshape(expected.shape)
     assert np.abs(ours - expected).max() < 1e-3 < 0.1 < np.abs(expected).max()
-    plain = states(texture, GIVEN, "right", 0.0)[2]
+    plain = grown(texture, GIVEN, "right", 0.0)[2]
     assert np.abs(expected - plain).max() > 0.05
     if way == "webgl":
         _shows_the_turns(tab, texture, mesh, turns, torch.from_numpy(ours.copy()))
-        _, _, further = states(texture, GIVEN, smooth(1), smooth(2), ANGLE, speed=1.3)
+        _, _, further = grown(texture, GIVEN, smooth(1), smooth(2), ANGLE, speed=1.3)
         tab.run("page.orient(argument); page.reset(); await page.step(16)", ANGLE)
         assert np.abs(tab.array("page.automaton.read()").reshape(further.shape) - further).max() < 1e-3
         tab.run("page.setMesh(page.base, 0); await page.step(16)")
-        _, _, coarse = states(texture, GIVEN, smooth(1), smooth(2), ANGLE, levels=0, speed=1.3)
+        _, _, coarse = grown(texture, GIVEN, smooth(1), smooth(2), ANGLE, levels=0, speed=1.3)
         assert np.abs(tab.array("page.automaton.read()").reshape(coarse.shape) - coarse).max() < 1e-3
     assert tab.errors == []
 
@@ -102,18 +92,9 @@ def _shows_the_turns(tab, texture, mesh, turns, state):
     """Normals at the pixels are turned with the cells around."""
     _, bent, _, _, ids = tab.maps()
     hit = ids[..., 0] > 0
-    face, bits = ids[hit][:, 0].astype(np.int32) - 1, ids[hit][:, 1:3].copy().view(np.float32)
-    points = face, np.column_stack([bits, 1 - bits.sum(1)])
-    grown = Grown(texture.look, state, Cells(mesh, 0, mesh), turns)
-    normals = unit(grown.object_normals(grown.maps(grown.values(*points))["normal"], *points))
-    straight = Grown(texture.look, state, Cells(mesh, 0, mesh))
+    normals, straight = (shown(texture, state, mesh, turn, ids[hit])[1] for turn in (turns, 0.0))
     assert np.abs(bent[hit][:, :3] - normals).max() < 4e-3
-    assert (
-        np.abs(
-            normals - unit(straight.object_normals(grown.maps(grown.values(*points))["normal"], *points))
-        ).max()
-        > 0.1
-    )
+    assert np.abs(normals - straight).max() > 0.1
 
 
 DROP = """const [name, content, steps] = argument;
@@ -144,11 +125,11 @@ def test_dropped_fields_are_followed(browser, texture, tmp_path):
     count = len(GIVEN.vertices)
     files = {
         "a.npy": npy(vectors),
-        "b.npy": npy(vectors.astype(">f4"), "F"),
+        "b.npy": npy(np.asfortranarray(vectors.astype(">f4"))),
         "c.ply": ply(GIVEN, vectors),
         "d.ply": ply(GIVEN, vectors, ("fx", "fy", "fz"), faces=False),
     }
-    expected = states(texture, GIVEN, vectors, 0.0, levels=0)[2].ravel()
+    expected = grown(texture, GIVEN, vectors, 0.0, levels=0)[2].ravel()
     for name, content in files.items():
         tab.run("page.move('up', 1)")
         assert dropped(tab, name, content) == ["", count, "motion", None]
@@ -157,11 +138,11 @@ def test_dropped_fields_are_followed(browser, texture, tmp_path):
     tab.run("page.look.condition = 0")
     assert dropped(tab, "up.npy", npy(smooth(4))) == ["", count, "motion", "upwards"]
     tab.run("page.look.condition = 3; page.move('motion', 1)")
-    expected = states(texture, GIVEN, vectors, smooth(4), levels=0)[2].ravel()
+    expected = grown(texture, GIVEN, vectors, smooth(4), levels=0)[2].ravel()
     assert np.abs(sixteen(tab) - expected).max() < 1e-3
     tab.run("page.panel.build()")
     tab.page.get_by_role("button", name="Leave the field").click()
-    assert np.abs(sixteen(tab) - states(texture, GIVEN, vectors, 0.0, levels=0)[2].ravel()).max() < 1e-3
+    assert np.abs(sixteen(tab) - grown(texture, GIVEN, vectors, 0.0, levels=0)[2].ravel()).max() < 1e-3
     # Another mesh has none of these fields, unless it brings its own.
     ball = icosphere(2)
     assert dropped(tab, "ball.ply", ply(ball)) == ["", 42, "right", None]

@@ -1,0 +1,64 @@
+"""`mitex gallery`: every bundled model with its picture, and one click to see it grow, or stand."""
+
+import numpy as np
+import pytest
+
+from mitex.cli.entry import main
+from mitex.cli.models import listing
+from mitex.mesh import icosphere
+
+
+@pytest.fixture(scope="module")
+def tab(browser, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("gallery")
+    mesh = folder / "ball.ply"
+    mesh.write_bytes(ball())
+    out = folder / "gallery.html"
+    assert main(["gallery", "--mesh", str(mesh), "--out", str(out), "--quiet"]) == 0
+    assert out.stat().st_size < 3_000_000
+    return browser.open(out, 96)
+
+
+def ball():
+    """A sphere as a PLY of text."""
+    mesh = icosphere(4)
+    lines = ["ply", "format ascii 1.0", f"element vertex {len(mesh.vertices)}"]
+    lines += [f"property float {axis}" for axis in "xyz"]
+    lines += [f"element face {len(mesh.faces)}", "property list uchar int vertex_indices", "end_header"]
+    lines += [" ".join(map(str, row)) for row in mesh.vertices] + [f"3 {a} {b} {c}" for a, b, c in mesh.faces]
+    return "\n".join(lines).encode()
+
+
+def test_every_model_has_a_picture_to_click(tab):
+    names = {model["name"] for model in listing()}
+    assert set(tab.page.locator(".gallery span").all_inner_texts()) == names
+    pictures = tab.page.locator(".gallery img")
+    assert pictures.count() == len(names)
+    assert all(
+        pictures.nth(k).evaluate("image => image.decode().then(() => image.naturalWidth)") > 99
+        for k in (0, 17)
+    )
+
+
+def test_a_click_shows_a_geometric_texture_and_another_one_grows_on(tab):
+    """The relief is the mesh itself: its shading varies where the ring's own is smooth."""
+    tab.run("page.setMesh(page.base, 1); await page.step(20)")
+    states = tab.array("page.automaton.read()")
+    grown = tab.picture()
+    for name in ("scales", "spikes"):
+        tab.page.locator(".gallery button", has_text=name).click()
+        tab.run(
+            "while (page.panel.page.look.name !== argument) await new Promise((go) => setTimeout(go, 10))",
+            name,
+        )
+        size = tab.run("return page.panel.page.surface.faceCount")
+        pixels = tab.array("page.panel.page.pixels()").reshape(96, 96, 4)[::-1, :, :3] / 255
+        assert size == 16 * 2 * 24 * 10 and np.abs(pixels - grown).mean() > 0.02
+        shade = np.abs(np.diff(pixels[:, :, 0], axis=1))
+        assert (shade > 0.05).mean() > 0.03
+        assert tab.page.locator(".gallery [aria-pressed=true]").inner_text() == name
+        assert tab.page.get_by_role("button", name="Regrow").count() == 0
+    tab.page.locator(".gallery button", has_text=tab.run("return page.look.name")).click()
+    assert np.array_equal(tab.array("page.automaton.read()"), states)
+    tab.run("page.draw()")
+    assert np.abs(tab.picture() - grown).max() < 0.05 and tab.errors == []
