@@ -205,13 +205,9 @@ PRESETS[CLIP] = replace(
     preset=CLIP,
     text="red dots on white",
     steps=300,
-    # Words may ask for colours that no exemplar has.
-    whitened=False,
-    colours=0.0,
-    lr=0.03,
+    colours=0.0,  # words may ask for some that no exemplar has
     milestones=(210, 270),
     coarse_share=0.5,
-    noise=0.2,
     diffusion=0.05,
 )
 PRESETS[EMBEDDED] = replace(
