@@ -174,6 +174,11 @@ class TestLoss:
         assert value(one) > 1
         assert value(task("text_weight=1", content=True)) > 1
 
+    def test_steps_cost_what_they_look_at(self):
+        alone, both = task(), task(image=True)
+        assert alone.cost(0) == alone.cost(3) == 1
+        assert both.cost(3) - both.cost(0) == pytest.approx(0.75) and both.cost(0) > 1
+
     def test_negatives_are_computed_once(self):
         one, again = task(), task()
         first = seen(one).negative(1)
