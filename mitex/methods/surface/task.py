@@ -165,8 +165,8 @@ class SurfaceTask(ParameterTask):
         return 0 if step >= coarse else self.config.scales - step * self.config.scales // coarse
 
     def cost(self, step: int) -> float:
-        """Of a step: what the network reads, a quarter for each pooling, what is done with all texels, and words,
-        which cost about as much on any scale as the network on the finest.
+        """Of a step: what the network reads, a quarter for each pooling, what is done with all texels, and
+        words, which cost about as much on any scale as the network on the finest.
         """
         words = 0.0 if self.config.text is None else 1.0
         return words if words and not self.networks else words + 0.25 ** self.scale(step) + ALL_TEXELS
