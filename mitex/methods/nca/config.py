@@ -10,6 +10,7 @@ from mitex.features.layers import check_layers
 from mitex.features.text_image import PROMPT
 from mitex.methods.nca.decoder.shape import COORDINATES, DecoderShape
 from mitex.methods.nca.ranges import MOST_STEPS
+from mitex.methods.words_config import check_words
 from mitex.training.settings import TrainingConfig, key
 
 SURFACES = ("even", "uneven", "flat")
@@ -147,8 +148,7 @@ class NcaConfig(TrainingConfig):
             raise ConfigError(f"coordinates holds {unknown}", f"use some of {', '.join(COORDINATES)}")
         if len(self.motion_speeds) != 2 or self.motion_speeds[0] > self.motion_speeds[1]:
             raise ConfigError(f"motion_speeds holds {self.motion_speeds}", "give the least and the most")
-        if "{text}" not in self.text_prompt:
-            raise ConfigError(f"text_prompt = '{self.text_prompt}' leaves out the text", "put {text} in it")
+        check_words(self, "text_whole_weight", "text_close_weight", "text_relief_weight")
         if not self.text_distances:
             raise ConfigError("text_distances holds nothing", "give one or more [normalised mesh units]")
         if not self.wave_frequencies:
