@@ -1,13 +1,13 @@
 """Draws docs/gallery/words-methods.jpg: textures from words on one mesh, by methods.
 
-    python tools/make_words_methods.py vase runs/dots-nca runs/dots-text2mesh runs/dots-x-mesh ...
+usage: python tools/make_words_methods.py MESH RUN [RUN ...] [--out FILE]
 
-The arguments are a mesh, and runs of fits from words, three of which are in a row. Reliefs are shown.
+A RUN is of a fit from words; three are in a row. Reliefs are shown.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -22,17 +22,20 @@ COLUMNS, CELL, SPP = 3, 320, 32  # pictures in a row, side of a picture [px], an
 
 
 def main() -> None:
-    mesh, *runs = sys.argv[1:]
-    surface, pictures, labels = Mesh.load(mesh), [], []
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("mesh")
+    parser.add_argument("runs", nargs="+")
+    parser.add_argument("--out", type=Path, default=SHEET)
+    arguments = parser.parse_args()
+    surface, pictures, labels = Mesh.load(arguments.mesh), [], []
     with TemporaryDirectory() as folder:
-        for run in runs:
+        for run in arguments.runs:
             texture, path = load(run), Path(folder) / "a.png"
             options = {"displace": True} if isinstance(texture, NcaTexture) else {}
             texture.apply(surface, **options).render(path, resolution=CELL, spp=SPP)
             pictures.append(read_image(path))
             labels.append(f"{method_of(run).name}: {texture.about['text']}")
-    write_image(SHEET, sheet(pictures, columns=COLUMNS, labels=labels, cell=CELL))
-    print(SHEET)
+    print(write_image(arguments.out, sheet(pictures, columns=COLUMNS, labels=labels, cell=CELL)))
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from mitex.methods.words_config import WordsConfig
+from mitex.methods.words_config import WordsConfig, check_words
 from mitex.training.settings import TrainingConfig, key
 
 
@@ -36,7 +36,7 @@ class StyleConfig(WordsConfig, TrainingConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.check_words("text_relief_weight")
+        check_words(self, "text_whole_weight", "text_close_weight", "text_relief_weight")
 
     @property
     def schedule(self) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from mitex.errors import ConfigError
 from mitex.features.text_image import PROMPT, object_prompt
@@ -28,17 +29,18 @@ class WordsConfig:
         """What the model of texts and images reads of the mesh of that name."""
         return object_prompt(self.text or "", self.text_object or name, self.text_prompt)
 
-    def check_words(self, *further: str) -> None:
-        """Refuses a prompt without the text, and a loss of nothing.
 
-        Args:
-            further: names of weights beside those of whole views and close-ups.
+def check_words(config: Any, *weights: str) -> None:
+    """Refuses a prompt without the text, and a loss of nothing.
 
-        Raises:
-            ConfigError: it is one of these.
-        """
-        if "{text}" not in self.text_prompt:
-            raise ConfigError(f"text_prompt = '{self.text_prompt}' leaves out the text", "put {text} in it")
-        weights = ("text_whole_weight", "text_close_weight", *further)
-        if not any(getattr(self, name) for name in weights):
-            raise ConfigError(f"{', '.join(weights)} are all 0", "let one count")
+    Args:
+        config: with `text_prompt`.
+        weights: its keys of the parts of the loss.
+
+    Raises:
+        ConfigError: it is one of these.
+    """
+    if "{text}" not in config.text_prompt:
+        raise ConfigError(f"text_prompt = '{config.text_prompt}' leaves out the text", "put {text} in it")
+    if not any(getattr(config, name) for name in weights):
+        raise ConfigError(f"{', '.join(weights)} are all 0", "let one count")

@@ -210,7 +210,8 @@ class TestUsage:
                 "displacement, gatys, image_quilting, multi_view_gram, nerf_tex, plain_field, quilted, "
                 "reaction_diffusion, solid_texture, style_mesh, text2mesh, x_mesh",
             ),
-            (["fit", "surface"], "--exemplar is missing; see `mitex fit surface --help`"),
+            (["fit", "gatys"], "--exemplar is missing; see `mitex fit gatys --help`"),
+            (["fit", "surface"], "--exemplar is missing; give --exemplar IMAGE, or --text WORDS"),
             (["apply"], "RUN|MODEL is missing; see `mitex apply --help`"),
             (["apply", "waffle"], "--out is missing; see `mitex apply --help`"),
             (["apply", "spikes"], "--out and --mesh are missing; see `mitex apply --help`"),

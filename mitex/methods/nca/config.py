@@ -10,6 +10,7 @@ from mitex.features.layers import check_layers
 from mitex.features.text_image import PROMPT
 from mitex.methods.nca.decoder.shape import COORDINATES, DecoderShape
 from mitex.methods.nca.ranges import MOST_STEPS
+from mitex.methods.words_config import check_words
 from mitex.training.settings import TrainingConfig, key
 
 SURFACES = ("even", "uneven", "flat")
@@ -147,8 +148,7 @@ class NcaConfig(TrainingConfig):
             raise ConfigError(f"coordinates holds {unknown}", f"use some of {', '.join(COORDINATES)}")
         if len(self.motion_speeds) != 2 or self.motion_speeds[0] > self.motion_speeds[1]:
             raise ConfigError(f"motion_speeds holds {self.motion_speeds}", "give the least and the most")
-        if "{text}" not in self.text_prompt:
-            raise ConfigError(f"text_prompt = '{self.text_prompt}' leaves out the text", "put {text} in it")
+        check_words(self, "text_whole_weight", "text_close_weight", "text_relief_weight")
         if not self.text_distances:
             raise ConfigError("text_distances holds nothing", "give one or more [normalised mesh units]")
         if not self.wave_frequencies:
@@ -242,6 +242,7 @@ PRESETS["text"] = replace(
     resolution=224,
     pool=32,
     text_parent="knit",
+    motion_weight=0.05,  # with more, one colour everywhere costs less than what the words say
     text_roughness=0.15,  # a soft relief of a few edges' width; at 0.01, as published, there is none
     text_distances=(2.0, 2.5),
     milestones=(600, 850),
@@ -276,6 +277,12 @@ PRESETS["text-paper"] = replace(
     inject_every=32,
     view_count=8,
     resolution=224,
+    motion_estimator="flow",
+    motion_gamma=0.15,
+    motion_weight=0.67,
+    motion_period=10.0,
+    motion_turns=False,
+    motion_speeds=(1.0, 1.0),
     text_bank=256,
     text_relief=5.0,
     text_distances=(2.0, 3.0, 4.0),

@@ -10,6 +10,7 @@ import torch
 
 from mitex.exemplar import Exemplar
 
+TYPICAL_SPREAD = 0.15  # standard deviation of an exemplar's channels
 MIN_SPREAD = 0.1  # of the largest: so much is left to directions in which the exemplar does not vary
 
 
@@ -49,8 +50,8 @@ class ColourSpace:
 
     @staticmethod
     def around_grey(channels: int) -> ColourSpace:
-        """The channels, seen from the middle of their range."""
-        return ColourSpace(torch.full((channels,), 0.5), torch.eye(channels))
+        """The channels, seen from the middle of their range, of which nothing is known."""
+        return ColourSpace(torch.full((channels,), 0.5), TYPICAL_SPREAD * torch.eye(channels))
 
     def values(self, coordinates: torch.Tensor) -> torch.Tensor:
         """Channel values (..., C) of coordinates (..., C)."""

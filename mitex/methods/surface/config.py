@@ -9,7 +9,7 @@ from mitex.errors import ConfigError
 from mitex.features.layers import LAYERS, LAYERS_19, with_poolings
 from mitex.methods.layout import EXEMPLAR_WIDTH
 from mitex.methods.wording import CLIP, EMBEDDED
-from mitex.methods.words_config import WordsConfig
+from mitex.methods.words_config import WordsConfig, check_words
 from mitex.training.settings import TrainingConfig, key
 
 WORDS = (CLIP, EMBEDDED)  # presets for words
@@ -162,7 +162,7 @@ class SurfaceConfig(WordsConfig, TexelConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.check_words()
+        check_words(self, "text_whole_weight", "text_close_weight")
         if self.text is not None and self.optimizer == "lbfgs":
             raise ConfigError("lbfgs needs a loss without randomness", "set optimizer=adam for words")
 
@@ -205,13 +205,9 @@ PRESETS[CLIP] = replace(
     preset=CLIP,
     text="red dots on white",
     steps=300,
-    # Words may ask for colours that no exemplar has.
-    whitened=False,
-    colours=0.0,
-    lr=0.03,
+    colours=0.0,  # words may ask for some that no exemplar has
     milestones=(210, 270),
     coarse_share=0.5,
-    noise=0.2,
     diffusion=0.05,
 )
 PRESETS[EMBEDDED] = replace(

@@ -165,10 +165,11 @@ class SurfaceTask(ParameterTask):
         return 0 if step >= coarse else self.config.scales - step * self.config.scales // coarse
 
     def cost(self, step: int) -> float:
-        """Of a step: what the network reads, a quarter for each pooling, and what is done with all texels; of
-        words alone, always the same.
+        """Of a step: what the network reads, a quarter for each pooling, what is done with all texels, and
+        words, which cost about as much on any scale as the network on the finest.
         """
-        return 0.25 ** self.scale(step) + ALL_TEXELS if self.networks else 1.0
+        words = 0.0 if self.config.text is None else 1.0
+        return words if words and not self.networks else words + 0.25 ** self.scale(step) + ALL_TEXELS
 
     def _diffuse_and_clamp(self, step: int) -> None:
         """Wears down what is finer than the taps, and brings values back to [0, 1].

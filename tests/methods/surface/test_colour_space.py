@@ -33,9 +33,11 @@ def test_the_exemplar_is_white_but_for_the_floor():
 def test_round_trips():
     picture = exemplar()
     x = torch.rand(7, 4, generator=torch.Generator().manual_seed(0))
-    for space in (ColourSpace.of(picture, texel_layout(list(picture.maps))), ColourSpace.plain(4)):
+    known = ColourSpace.of(picture, texel_layout(list(picture.maps)))
+    for space in (known, ColourSpace.plain(4), ColourSpace.around_grey(4)):
         assert torch.allclose(space.values(space.coordinates(x)), x, atol=1e-5)
     assert torch.equal(ColourSpace.plain(4).values(x), x)
+    assert torch.equal(ColourSpace.around_grey(4).values(torch.zeros(2, 4)), torch.full((2, 4), 0.5))
 
 
 def test_one_constant_map():

@@ -170,9 +170,14 @@ class TestLoss:
         assert np.abs(one.in_texel_order() - RED).max() < 1e-5
         assert value(one, 0) == pytest.approx(0, abs=1e-3) and value(one, 3) == pytest.approx(0, abs=1e-3)
         with torch.no_grad():
-            one.coordinates[::2] += 0.3
+            one.coordinates[::2] += 2.0
         assert value(one) > 1
         assert value(task("text_weight=1", content=True)) > 1
+
+    def test_steps_cost_what_they_look_at(self):
+        alone, both = task(), task(image=True)
+        assert alone.cost(0) == alone.cost(3) == 1
+        assert both.cost(3) - both.cost(0) == pytest.approx(0.75) and both.cost(0) > 1
 
     def test_negatives_are_computed_once(self):
         one, again = task(), task()
@@ -192,7 +197,7 @@ class TestLoss:
 def test_a_colour_is_learned():
     for text, channel in (("red", 0), ("green", 1)):
         one = task("steps=25", text=text)
-        train(one, one.config, None, lr=0.05)
+        train(one, one.config, None, lr=0.3)
         change = (one.in_texel_order().mean(0) - 0.5).tolist()
         assert change[channel] > 0.1 + max(change[k] for k in range(3) if k != channel), (text, change)
 
@@ -231,7 +236,7 @@ def test_settings_matter(setting, base):
     def patterned(*settings: str) -> float:
         one = task(*settings)
         with torch.no_grad():
-            one.coordinates.copy_(0.4 * torch.sin(7 * torch.tensor(one.levels.position)))
+            one.coordinates.copy_(2.5 * torch.sin(7 * torch.tensor(one.levels.position)))
         return value(one, seed=1)
 
     assert patterned(*base, setting) != pytest.approx(patterned(*base), abs=1e-6)

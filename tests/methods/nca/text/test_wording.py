@@ -58,3 +58,5 @@ def test_an_empty_text_and_presets_for_exemplars():
         check(config("order_weight=0", preset="patch"))
     with pytest.raises(ConfigError, match="text_prompt = 'a stone' leaves out the text"):
         config("text_prompt=a stone")
+    with pytest.raises(ConfigError, match="text_relief_weight are all 0; let one count"):
+        config("text_whole_weight=0", "text_close_weight=0", "text_relief_weight=0")
