@@ -54,8 +54,9 @@ def main() -> None:
     for k, word in enumerate(words):
         mesh = find_mesh(word, Path(meshes))
         if k:
-            cells.append(picture(mesh))
-            labels += [mesh.name.split("~")[0], "", "", ""]
+            original = find_mesh(word.split("~")[0], Path(meshes))
+            cells.append(picture(original))
+            labels += [original.name, "", "", ""]
         for field, texture in (("up", directed), ("turned", directed), ("no field", blind)):
             cells.append(picture(grown(texture, mesh, field, field == "turned")))
     write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=4, labels=labels, cell=CELL))

@@ -38,6 +38,7 @@ FILM_ONLY = {
     "remesh",
     "seed",
     "to_seed",
+    "field",
     "start_level",
     "end_level",
 }

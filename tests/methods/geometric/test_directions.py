@@ -293,15 +293,14 @@ def test_symmetry_is_of_a_field(tmp_path):
 
 @pytest.mark.slow
 def test_ribs_follow_the_field(tmp_path):
-    """Learned upright, and turned with the field on another mesh; minutes."""
-    settings = ["steps=900", "level_steps=300", "fit_steps=200", "preview_every=0", "symmetric=true"]
-    texture = geometric.fit(reference(), tmp_path / "run", field="up", set=settings)
-    mesh = torus(36, 14, tube=0.5)
-    field = np.cross(mesh.normals, vector_field(mesh, "about-y"))
-    for told, turn in ((field, 0), (vector_field(mesh, "about-y"), 90)):
-        asset = texture.apply(mesh, field=told, start_level=1)
-        base = subdivide_midpoint(mesh)
-        measured = relief_direction(
-            base, asset.mesh, spread(field, Hierarchy.of(mesh, 2).pairs, True)[1].numpy()
-        )
-        assert abs((measured.turn - turn + 90) % 180 - 90) < 15
+    """Learned upright; on another mesh they turn with the field. Minutes."""
+    settings = ["steps=800", "level_steps=200", "fit_steps=200", "preview_every=0", "symmetric=true"]
+    texture = geometric.fit("cactus", tmp_path / "run", field="up", set=settings)
+    mesh = torus(72, 32, tube=0.5)
+    around = vector_field(mesh, "about-y")
+    across = np.cross(mesh.normals, around)
+    turns = []
+    for field in (around, across):
+        relief = texture.apply(mesh, field=field, start_level=3).mesh
+        turns.append(relief_direction(mesh, relief, around).turn)
+    assert abs(turns[0]) < 15 and abs(turns[1]) > 75
