@@ -176,7 +176,7 @@ def test_where_patches_are_joined(files, run, monkeypatch, words):
 APPLIED = {
     "quilting": ("--quilting sphere", "--quilting"),
     "quilting and guide": ("--quilting surface --guide no.png", "--quilting surface and --guide"),
-    "too fine for the surface": ("--size 128 --scale 0.05", "use larger scales"),
+    "too fine for the surface": ("--size 128 --scale 0.05 --quilting surface", "use larger scales"),
     "lift": ("--lift 2", "--lift"),
     "size": ("--size 10", "--size"),
     "size and guide": ("--size 128 --guide no.png", "--size and --guide"),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mitex.atlas import usable_uv
-from mitex.errors import ConfigError, MeshError
+from mitex.errors import ConfigError, MeshError, MeshWarning
 from mitex.evaluation.seams import ratio_across
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nerf.texture import NerfTexture
@@ -77,9 +77,19 @@ def test_the_option_says_where_patches_are_joined(texture: NerfTexture, monkeypa
     monkeypatch.setattr(texture, "synthesize", in_plane)
     monkeypatch.setattr(texture, "covering", lambda *_: 128)
     mesh = icosphere(3)
-    for options in ({}, {"quilting": "surface"}, {"quilting": "plane"}, {"guide": np.zeros((4, 4, 3))}):
-        texture.apply(mesh, scale=2.0, **options)
+    texture.apply(mesh, scale=2.0)
+    texture.apply(mesh, scale=2.0, quilting="surface")
+    texture.apply(mesh, scale=2.0, quilting="plane")
+    texture.apply(mesh, scale=2.0, guide=np.zeros((4, 4, 3), np.float32))
     assert calls == [("surface", 2.0), ("surface", 2.0), "plane", "plane"]
+
+
+def test_too_fine_for_the_surface_it_is_quilted_in_the_plane(texture: NerfTexture, monkeypatch):
+    flat = texture.synthesize(128, patches=30)
+    monkeypatch.setattr(texture, "synthesize", lambda *_, **__: flat)
+    with pytest.warns(MeshWarning, match="blurs them.*in the plane"):
+        field = texture.apply(icosphere(2), size=128, scale=0.2)
+    assert field._maps is flat
 
 
 @pytest.mark.parametrize(
@@ -87,7 +97,7 @@ def test_the_option_says_where_patches_are_joined(texture: NerfTexture, monkeypa
     [
         ({"quilting": "sphere"}, "unknown quilting"),
         ({"quilting": "surface", "guide": np.zeros((4, 4, 3))}, 'quilting="plane"'),
-        ({"scale": 0.05, "size": 128}, "blurs them"),
+        ({"scale": 0.05, "size": 128, "quilting": "surface"}, "blurs them"),
         ({"scale": 0.0}, "0 times the size"),
     ],
 )
