@@ -27,10 +27,11 @@ from mitex.render.framing import rotation
 from mitex.render.shell import shell_still
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
-CELL, SPP = 288, 8  # side of a picture [px], samples
+CELL, SPP = 240, 6  # side of a picture [px], samples
 AZIMUTH, ELEVATION = -30.0, 18.0  # of the camera [degrees]
 CLOSE = 0.16  # of a close-up [extents of the mesh]
-PATCHES = 1000
+PATCHES = 300
+SCALE = 2.0  # of elements, so that single strands are seen
 
 
 def seams(field: AppliedTexture, plane: AppliedTexture, gap: float) -> float:
@@ -72,14 +73,15 @@ def main() -> None:
     cells, labels = [], []
     for texture_name in textures.split(","):
         texture = NerfTexture.load(Path(runs) / texture_name)
-        maps = texture.synthesize(1024, seed=0, tileable=True, patches=PATCHES)
+        maps = texture.synthesize(512, seed=0, tileable=True, patches=PATCHES)
         for target in targets:
             mesh = find_mesh(target, Path(meshes))
-            plane = texture.apply(mesh, maps)
+            plane = texture.apply(mesh, maps, scale=SCALE)
             start = time.perf_counter()
-            surface = texture.apply(*texture.synthesize_on(mesh, patches=PATCHES))
+            own = texture.synthesize_on(mesh, patches=PATCHES, scale=SCALE)
+            surface = texture.apply(*own, scale=SCALE)
             seconds = time.perf_counter() - start
-            ratios = [seams(field, plane, maps.gap) for field in (plane, surface)]
+            ratios = [seams(field, plane, SCALE * maps.gap) for field in (plane, surface)]
             print(
                 f"{texture_name} on {target}: seam ratio {ratios[0]:.2f} laid over the UVs, {ratios[1]:.2f} "
                 f"joined on the surface, in {seconds:.0f} s",
