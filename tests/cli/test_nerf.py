@@ -166,7 +166,17 @@ def test_a_guide_a_lift_and_a_light(files, run, monkeypatch):
     assert np.abs(read_image(files / "out" / "lit.png") - own).max() > 0.1
 
 
+@pytest.mark.parametrize("words", ["", "--quilting surface", "--quilting plane"])
+def test_where_patches_are_joined(files, run, monkeypatch, words):
+    few_patches(monkeypatch)
+    assert main(apply(f"--size 128 --scale 16 --density 1000 {words}")) == 0
+    assert len(Mesh.load(files / "out" / "a.ply").faces) > 100
+
+
 APPLIED = {
+    "quilting": ("--quilting sphere", "--quilting"),
+    "quilting and guide": ("--quilting surface --guide no.png", "--quilting surface and --guide"),
+    "too fine for the surface": ("--size 128 --scale 0.05 --quilting surface", "use larger scales"),
     "lift": ("--lift 2", "--lift"),
     "size": ("--size 10", "--size"),
     "size and guide": ("--size 128 --guide no.png", "--size and --guide"),

@@ -111,6 +111,7 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(NcaTexture, "tile", _small_tile(NcaTexture.tile))
     patch.setattr(fitting, "find_base", lambda *_, **__: _ball_as_base())
     patch.setattr(NerfTexture, "synthesize", _small_quilt(NerfTexture.synthesize))
+    patch.setattr(NerfTexture, "synthesize_on", _small_quilt_on(NerfTexture.synthesize_on))
     sketch, sensor = _with_few_paths(renderer.accumulated), renderer.sensor
     for module in (renderer, shell):
         patch.setattr(module, "accumulated", sketch)
@@ -192,6 +193,13 @@ def _ball_as_base() -> Any:
 def _small_quilt(synthesize: Callable[..., Any]) -> Callable[..., Any]:
     def small(texture: Any, size: Any = 128, *others: Any, **options: Any) -> Any:
         return synthesize(texture, 128, *others, **options | {"patches": 30})
+
+    return small
+
+
+def _small_quilt_on(synthesize_on: Callable[..., Any]) -> Callable[..., Any]:
+    def small(texture: Any, mesh: Any, size: Any = 128, *others: Any, **options: Any) -> Any:
+        return synthesize_on(texture, mesh, 128, *others, **options | {"patches": 30, "scale": 8.0})
 
     return small
 

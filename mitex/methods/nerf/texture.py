@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
@@ -11,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from mitex.atlas import laid_out
-from mitex.errors import ConfigError
+from mitex.errors import MeshWarning
 from mitex.mesh import Mesh, Similarity
 from mitex.methods.nerf import files
 from mitex.methods.nerf.field.decoder import Decoder
@@ -40,9 +41,10 @@ from mitex.methods.nerf.use.on_plane import SCALE, TextureOnPlane, plane
 from mitex.methods.nerf.use.placement import (
     EXTENT,
     UNWRAP_SIZE,
+    TooFine,
+    guided_side,
     in_scene_cube,
     own_layout,
-    uv_unit_length,
 )
 from mitex.methods.nerf.use.self_maps import self_maps
 from mitex.progress import announce
@@ -51,7 +53,6 @@ from mitex.runtime.jit import mi
 from mitex.runtime.upload import upload
 
 SIZE = 2048  # side of a synthesized texture [texels]
-LARGEST = 8192  # side of a texture under a guide, at most [texels]
 BLOCK = PATCH // 16  # a guide is compared with patches in 16 x 16 blocks
 DEEPEST = 2.0  # percentile of the scan's distances that counts as the ground
 
@@ -230,14 +231,7 @@ class NerfTexture:
             ConfigError: the scale is out of range, or the side is smaller than a patch or larger than 8192.
         """
         check_ranges(scale, density=1.0, lift=1.0)
-        gap = texel_gap(self.model.base.mesh, pattern_rate) * scale
-        texels = round(uv_unit_length(in_scene_cube(laid_out(mesh, UNWRAP_SIZE))[0]) / gap)
-        if not PATCH <= texels <= LARGEST:
-            raise ConfigError(
-                f"a guide over {texels} x {texels} texels",
-                f"use {'smaller' if texels < PATCH else 'larger'} scales: it takes {PATCH} to {LARGEST}",
-            )
-        return texels
+        return guided_side(mesh, texel_gap(self.model.base.mesh, pattern_rate) * scale, PATCH)
 
     def patches(
         self, rng: np.random.Generator, count: int = 2000, pattern_rate: float = PATTERN_RATE
@@ -311,8 +305,8 @@ class NerfTexture:
             guide: without `maps`, a picture that lies once over the unit square of the mesh's UVs, as of
                 `synthesize`; `size` is then as the mesh and `scale` ask.
             quilting: without `maps`, "surface" joins patches on the mesh itself, "plane" in the plane, as
-                published: then they follow the UVs, and break where these are cut. None: on the surface, with
-                a guide in the plane.
+                published: then they follow the UVs, and break where these are cut. None: on the surface, but
+                in the plane with a guide or, with a warning, if `size` is too small for the scale.
 
         Raises:
             MeshError: the mesh has no area.
@@ -323,7 +317,12 @@ class NerfTexture:
         light_coefficients = self.light if light is None else checked_light(light)
         on_surface = joined_on_surface(quilting, guide)
         if maps is None and on_surface:
-            mesh, maps = self.synthesize_on(mesh, size, seed, scale=scale)
+            try:
+                mesh, maps = self.synthesize_on(mesh, size, seed, scale=scale)
+            except TooFine as problem:
+                if quilting == "surface":
+                    raise
+                warnings.warn(f"{problem}; it is quilted in the plane", MeshWarning, stacklevel=2)
         if maps is None or maps.angle is None:
             mesh = laid_out(mesh, UNWRAP_SIZE)
         if maps is None:

@@ -7,6 +7,7 @@ around the point. Patches at neighbouring points are then turned alike, whatever
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,23 @@ TORN = 0.25  # sides of faces whose ends were reached on ways so far apart are c
 ROUND = 0.3  # a map that fails so near to its point is made anew, along the point's own direction [reach]
 LEAST = 1e-12  # area of a face, at least, relative to the largest
 PIN = 1e-9  # holds the constant of a solution, relative to the mean diagonal
+
+
+@dataclass(frozen=True, eq=False)
+class _Surroundings:
+    """The faces around a face.
+
+    Attributes:
+        face: in the middle.
+        faces: (N,) ascending, all within reach, among them `face`.
+        away: (V,) how far the vertices are from its corners along edges, infinite beyond reach.
+        previous: (V,) the vertex before on the shortest way, negative where there is none.
+    """
+
+    face: int
+    faces: np.ndarray
+    away: np.ndarray
+    previous: np.ndarray
 
 
 class Flattening:
@@ -76,20 +94,18 @@ class Flattening:
             (K,) faces, among them `face`, and (K, 3, 2) where their corners are, x to the right and y up, the
             point at 0 [mesh units].
         """
-        away, previous = self._surroundings(face)
-        near = np.flatnonzero(np.isfinite(away))
-        faces = np.unique(np.concatenate([self.around[v] for v in near]))
-        faces = faces[np.isfinite(away[self.corners[faces]]).all(1)]
-        map_ = self._mapped(face, faces, away, previous, self.right[faces], self.up[faces])
-        close = faces[(away[self.corners[faces]] < ROUND * self.reach).all(1) & (self.areas[faces] > 0)]
-        if not np.isin(close, map_[0]).all():
+        around = self._surroundings(face)
+        faces = around.faces
+        corners_away = around.away[self.corners[faces]]
+        close = faces[(corners_away < ROUND * self.reach).all(1) & (self.areas[faces] > 0)]
+        result = self._mapped(around, self.right[faces], self.up[faces])
+        if not np.isin(close, result[0]).all():
             right = orthonormal(np.broadcast_to(self.right[face], (len(faces), 3)), self.normals[faces])
-            other = self._mapped(face, faces, away, previous, right, np.cross(self.normals[faces], right))
-            map_ = max(map_, other, key=lambda m: np.isin(close, m[0]).sum())
-        return self._around_the_point(face, barycentric, *map_)
+            other = self._mapped(around, right, np.cross(self.normals[faces], right))
+            result = max(result, other, key=lambda r: np.isin(close, r[0]).sum())
+        return self._around_the_point(face, barycentric, *result)
 
-    def _surroundings(self, face: int) -> tuple[np.ndarray, np.ndarray]:
-        """How far vertices are from a face's corners (V,), infinite beyond reach, and those before them."""
+    def _surroundings(self, face: int) -> _Surroundings:
         away, previous, _ = dijkstra(
             self.graph,
             indices=np.unique(self.corners[face]),
@@ -97,69 +113,63 @@ class Flattening:
             limit=self.reach,
             return_predecessors=True,
         )
-        return away, previous
+        near = np.isfinite(away)
+        faces = np.unique(np.concatenate([self.around[vertex] for vertex in np.flatnonzero(near)]))
+        return _Surroundings(face, faces[near[self.corners[faces]].all(1)], away, previous)
 
     def _mapped(
-        self,
-        face: int,
-        faces: np.ndarray,
-        away: np.ndarray,
-        previous: np.ndarray,
-        right: np.ndarray,
-        up: np.ndarray,
+        self, around: _Surroundings, right: np.ndarray, up: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Those of the faces that fit into the plane, and their corners there (K, 3, 2)."""
-        axes = np.stack([right, up], axis=2)  # (N, 3, 2)
-        steps = (np.roll(self.points[faces], -1, axis=1) - self.points[faces]) @ axes
-        whole = ~self._torn(face, faces, steps, away, previous)
-        faces, axes = faces[whole], axes[whole]
+        """Those of the N faces that fit into the plane, and their corners there, (K,) and (K, 3, 2).
+
+        Args:
+            around: the faces.
+            right, up: (N, 3) the field on them.
+        """
+        axes = np.stack([right, up], axis=2)
+        points = self.points[around.faces]
+        whole = ~self._torn(around, (np.roll(points, -1, axis=1) - points) @ axes)
+        faces, axes = around.faces[whole], axes[whole]
         used, corners = np.unique(self.corners[faces], return_inverse=True)
         corners = corners.reshape(-1, 3)
         hats, areas = self.hats[faces], self.areas[faces]
         stiffness = areas[:, None, None] * (hats @ hats.swapaxes(1, 2))
         load = areas[:, None, None] * (hats @ axes)
         place = _solution(corners, stiffness, load, len(used))[corners]
-        fits = self._fits(np.einsum("fka,fkb->fab", place, hats @ axes)) & (areas > 0)
-        fits &= _connected(corners, fits, np.flatnonzero(faces == face))
+        fits = _fits(np.einsum("fka,fkb->fab", place, hats @ axes)) & (areas > 0)
+        fits &= _connected(corners, fits, int(faces.searchsorted(around.face)))
         return faces[fits], place[fits]
 
-    def _torn(
-        self, face: int, faces: np.ndarray, steps: np.ndarray, away: np.ndarray, previous: np.ndarray
-    ) -> np.ndarray:
+    def _torn(self, around: _Surroundings, steps: np.ndarray) -> np.ndarray:
         """(N,) bool, which faces lie where ways around both sides of something meet.
 
         The field is followed along the shortest way to each vertex; where the ends of a side come out
         elsewhere than the field between them says, the surface is cut, as on the far side of a tube.
+
+        Args:
+            around: the faces.
+            steps: (N, 3, 2) what their sides are in the field.
         """
-        used, corners = np.unique(self.corners[faces], return_inverse=True)
+        used, corners = np.unique(self.corners[around.faces], return_inverse=True)
         start = corners.reshape(-1, 3)
         end = np.roll(start, -1, axis=1)
-        begins = previous[used] < 0  # the corners of the face, and what was reached by none of the faces
-        before = np.searchsorted(used[:-1], np.where(begins, used, previous[used]))
-        begins |= used[before] != previous[used]
-        before = np.where(begins, np.arange(len(used)), before)
+        own, last = np.arange(len(used)), around.previous[used]
+        before = np.minimum(np.searchsorted(used, last), len(used) - 1)
+        before = np.where(used[before] == last, before, own)  # ways begin where nothing is before
         way = np.zeros((len(used), 2))
         for tail, head, sign in ((start, end, 1.0), (end, start, -1.0)):
-            last = (before[head] == tail) & ~begins[head]
-            way[head[last]] = sign * steps[last]
-        while (
-            before[before] != before
-        ).any():  # each round makes the parts of ways that are known twice as long
+            taken = (before[head] == tail) & (before[head] != head)
+            way[head[taken]] = sign * steps[taken]
+        # What is known of the ways doubles with each round.
+        while (before[before] != before).any():
             way += way[before]
             before = before[before]
-        first = faces.searchsorted(face)
+        own_face = around.faces.searchsorted(around.face)
         origin = np.zeros((len(used), 2))
-        origin[start[first]] = np.concatenate([np.zeros((1, 2)), np.cumsum(steps[first, :2], axis=0)])
+        origin[start[own_face, 1:]] = np.cumsum(steps[own_face, :2], axis=0)
         way += origin[before]
         jumps = np.linalg.norm(way[end] - way[start] - steps, axis=2)
-        return (jumps > TORN * self.reach).any(1) & (faces != face)
-
-    @staticmethod
-    def _fits(jacobians: np.ndarray) -> np.ndarray:
-        """(N,) bool, which of (N, 2, 2) neither mirror nor stretch by more than `STRETCH`."""
-        sizes = np.linalg.svd(jacobians, compute_uv=False)
-        upright = np.linalg.det(jacobians) > 0
-        return upright & (sizes[:, 0] < STRETCH) & (sizes[:, 1] > 1 / STRETCH)
+        return (jumps > TORN * self.reach).any(1) & (around.faces != around.face)
 
     def _around_the_point(
         self, face: int, barycentric: np.ndarray, faces: np.ndarray, place: np.ndarray
@@ -171,6 +181,13 @@ class Flattening:
             faces, place = np.array([face]), (self.points[face] @ axes)[None]
             own = [0]
         return faces, place - barycentric @ place[own[0]]
+
+
+def _fits(jacobians: np.ndarray) -> np.ndarray:
+    """(N,) bool, which of (N, 2, 2) neither mirror nor stretch by more than `STRETCH`."""
+    sizes = np.linalg.svd(jacobians, compute_uv=False)
+    upright = np.linalg.det(jacobians) > 0
+    return upright & (sizes[:, 0] < STRETCH) & (sizes[:, 1] > 1 / STRETCH)
 
 
 def _vertex_faces(corners: np.ndarray, count: int) -> list[np.ndarray]:
@@ -207,13 +224,13 @@ def _solution(corners: np.ndarray, stiffness: np.ndarray, load: np.ndarray, coun
     return np.stack([solve(total) for total in sums], axis=1)
 
 
-def _connected(corners: np.ndarray, used: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """(N,) bool, which of the `used` faces are connected with the face `start`, (1,), by such faces."""
-    if not len(start) or not used[start[0]]:
+def _connected(corners: np.ndarray, used: np.ndarray, start: int) -> np.ndarray:
+    """(N,) bool, which of the `used` faces are connected with the face `start` by such faces."""
+    if not used[start]:
         return np.zeros(len(corners), bool)
     links = corners[used]
     pairs = np.concatenate([links[:, :2], links[:, 1:]])
     count = int(corners.max()) + 1
     graph = coo_array((np.ones(len(pairs), bool), tuple(pairs.T)), shape=(count,) * 2)
     part = connected_components(graph, directed=False)[1]
-    return part[corners[:, 0]] == part[corners[start[0], 0]]
+    return part[corners[:, 0]] == part[corners[start, 0]]

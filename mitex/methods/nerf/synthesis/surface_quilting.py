@@ -24,6 +24,7 @@ from mitex.progress import announce
 
 FINE_CELL = 2  # side of the cells that a cut goes between, where texels are so fine [texels of a patch]
 FINE_TEXELS = 2.0  # area of a texel [texels of a patch] up to which nearly each such cell has one
+OUTWARD = 3 / 16  # by which a patch's middle is moved away from what is there; half less an overlap [sides]
 MARGIN = 2  # cells between a cut and what was empty, over which the seam is averaged
 
 
@@ -56,7 +57,7 @@ def quilt_on(
     repetition = Repetition(matcher.centres, source.length, evenness)
     canvas = _Canvas(source, target, matcher.shape)
     for texel in canvas.empty():
-        place = canvas.around(texel)
+        place = canvas.beside(texel)
         costs = matcher.distances(*place.blocks())
         costs = costs + (costs.mean() or 1.0) * repetition.penalties()
         allowed = matcher.allowed(canvas.neighbours(place))
@@ -133,6 +134,17 @@ class _Canvas:
             start += int(missing.argmax())
             announce("quilting the surface", int((self.patch >= 0).sum()), len(order))
             yield int(order[start])
+
+    def beside(self, texel: int) -> _Place:
+        """What a patch covers with this empty texel in it, moved away from what is there."""
+        place = self.around(texel)
+        if not place.known.any():
+            return place
+        empty, where = place.texels[~place.known], place.where[~place.known]
+        away = where.mean(0) - 0.5 * (self.side - 1)
+        goal = 0.5 * (self.side - 1) + OUTWARD * self.side * away / max(float(np.abs(away).max()), 1.0)
+        farther = self.around(int(empty[np.square(where - goal).sum(1).argmin()]))
+        return farther if texel in farther.texels else place
 
     def around(self, texel: int) -> _Place:
         """What a patch covers whose middle is there."""

@@ -15,6 +15,7 @@ EXTENT = 1 / 1.2  # largest half extent of the mesh in the scene cube
 UNWRAP_SIZE = 1024  # side of the map that charts are packed for [texels]
 COARSEST = 4.0  # side of a texel of a map on a mesh, at most [texels of patches]
 SMALLEST = 16  # side of such a map [texels]
+LARGEST = 8192  # side of a texture under a guide, at most [texels]
 
 
 def in_scene_cube(mesh: Mesh) -> tuple[Mesh, Similarity]:
@@ -47,6 +48,31 @@ def uv_unit_length(mesh: Mesh) -> float:
     return mean_edge(mesh.vertices[mesh.faces]) / flat
 
 
+def guided_side(mesh: Mesh, gap: float, patch: int) -> int:
+    """Side of the texture that the unit square of a mesh's UVs shows once [texels].
+
+    Args:
+        mesh: any.
+        gap: between texels, on the mesh in the scene cube.
+        patch: side of a patch, which the texture is not smaller than [texels].
+
+    Raises:
+        MeshError: the mesh has no area.
+        ConfigError: the side is smaller than a patch or larger than 8192.
+    """
+    texels = round(uv_unit_length(in_scene_cube(laid_out(mesh, UNWRAP_SIZE))[0]) / gap)
+    if not patch <= texels <= LARGEST:
+        raise ConfigError(
+            f"a guide over {texels} x {texels} texels",
+            f"use {'smaller' if texels < patch else 'larger'} scales: it takes {patch} to {LARGEST}",
+        )
+    return texels
+
+
+class TooFine(ConfigError):
+    """The elements of a texture are too small for a map on the mesh."""
+
+
 def own_layout(mesh: Mesh, gap: float, size: int) -> tuple[Mesh, int]:
     """The mesh with UVs for a map on it, whatever UVs it has, and the side of the map [texels].
 
@@ -58,12 +84,12 @@ def own_layout(mesh: Mesh, gap: float, size: int) -> tuple[Mesh, int]:
 
     Raises:
         MeshError: the mesh has no area.
-        ConfigError: texels would be more than 4 times as far apart.
+        TooFine: texels would be more than 4 times as far apart.
     """
     mesh = laid_out(replace(mesh, uv=None), UNWRAP_SIZE)
     needed = layout_side(in_scene_cube(mesh)[0]) / gap
     if needed > COARSEST * size:
-        raise ConfigError(
+        raise TooFine(
             f"elements so small on '{mesh.name}' that a map of {size} x {size} texels blurs them",
             f'use larger scales, a size from {needed / COARSEST:.0f} on, or quilting="plane"',
         )

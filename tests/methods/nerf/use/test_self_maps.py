@@ -57,6 +57,32 @@ def test_mirrored_charts_mirror_the_normals():
     np.testing.assert_allclose(axes[1], np.diag([1, -1, 1]), atol=1e-6)
 
 
+def test_an_angle_turns_the_texture_on_its_chart():
+    """A quarter turn: what points to the texture's right points to where v grows."""
+    turns = np.eye(3, dtype=np.float32)[None]
+    maps = LatentMaps(np.zeros((4, 4, 24), np.float32), np.zeros((4, 4), np.int32), turns, 0.1)
+    mesh, place = grid(1, 1), at([(0.3, 0.2)])
+    for angle in (0.5 * np.pi, 0.3):
+        turned = replace(maps, angle=np.full((4, 4), angle, np.float32))
+        latents = MappedLatents.over(mesh, turned, scale=3.0)
+        axes = np.concatenate([rows(v) for v in latents.frame(place)])
+        sine, cosine = np.sin(angle), np.cos(angle)
+        expected = [[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]]
+        np.testing.assert_allclose(axes, expected, atol=1e-6)
+
+
+def test_maps_of_a_mesh_lie_over_its_uvs_once():
+    """Whatever the scale; those of the plane are as large as it says."""
+    features = np.random.default_rng(0).normal(size=(4, 4, 24)).astype(np.float32)
+    maps = LatentMaps(features, np.zeros((4, 4), np.int32), np.eye(3, dtype=np.float32)[None], 0.1)
+    own = replace(maps, angle=np.zeros((4, 4), np.float32))
+    mesh, place = grid(1, 1), at([(0.3, 0.2), (0.1, 0.6)])
+    once, again = (np.array(MappedLatents.over(mesh, own, s).features(place)) for s in (1.0, 2.0))
+    np.testing.assert_array_equal(once, again)
+    plane = np.array(MappedLatents.over(mesh, maps, 1.0).features(place))
+    assert np.abs(plane - np.array(MappedLatents.over(mesh, maps, 2.0).features(place))).max() > 0.1
+
+
 def test_pictures_of_patches_are_what_is_seen_from_above(texture):
     patches = texture.patches(np.random.default_rng(0), 20)
     whole = render_patches(texture.shell, patches)
