@@ -14,7 +14,7 @@ from mitex.lazy import load
 from mitex.methods.registry import methods
 
 MESHES = ("knot", "shaderball", "octopus")
-RING = (24, 10)  # vertices around and across it: few, since geometric textures split its faces
+RING = (24, 10)  # vertices around and across it: few, since some textures split its faces
 SIDE = 144  # of a thumbnail [px]
 
 
