@@ -15,9 +15,7 @@ from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
 from mitex.features.frozen import Tap
-from mitex.features.layers import LAYERS
-from mitex.features.vgg import Weights, convolutions
-from mitex.features.vgg19 import vgg19_convolutions
+from mitex.features.vgg import Weights
 from mitex.methods.surface.colour_space import ColourSpace
 from mitex.methods.surface.comparison import Comparison, GramComparison, TransportComparison
 from mitex.methods.surface.config import SurfaceConfig
@@ -26,6 +24,7 @@ from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.palette import Palette
 from mitex.methods.surface.texture import texel_layout
 from mitex.methods.surface.views import Views
+from mitex.methods.surface.weights import network_weights
 from mitex.methods.surface.words import Words
 from mitex.progress import announce
 from mitex.runtime import keep_freed_memory
@@ -87,7 +86,7 @@ class SurfaceTask(ParameterTask):
         self.comparisons: list[Comparison] = []
         self.content: list[torch.Tensor] = []
         if exemplar is not None or content is not None:
-            weights = _weights(config, generator)
+            weights = network_weights(config, generator)
             self.networks = [self._network(scale, weights) for scale in range(config.scales + 1)]
             if exemplar is not None:
                 self.comparisons = self._comparisons(exemplar, weights)
@@ -271,15 +270,6 @@ def _check_maps(config: SurfaceConfig, maps: list[str], content: bool, words: bo
         raise ConfigError("the exemplar has no albedo, which words are about", "give an image as `exemplar`")
 
 
-def _weights(config: SurfaceConfig, generator: torch.Generator) -> Weights:
-    if config.weights == "random":
-        return random_weights(generator)
-    if config.weights == "vgg19":
-        return vgg19_convolutions()
-    # Moments are not scale free; Gram matrices want the published scale.
-    return convolutions(config.pooling, normalised=config.loss == "transport")
-
-
 def _comparison(
     config: SurfaceConfig, network: Vgg16, images: torch.Tensor, palette: Palette | None
 ) -> Comparison:
@@ -287,13 +277,3 @@ def _comparison(
         region = round((config.region * images.shape[1]) ** 2) or None
         return GramComparison(network, images, config.compared, region, palette, config.colours)
     return TransportComparison(network, images, config.compared, config.samples, config.moment_weight)
-
-
-def random_weights(generator: torch.Generator) -> Weights:
-    """Weights of the network's shape, drawn as He et al. do, without biases (figure 5 b)."""
-    weights = {}
-    for name in LAYERS:
-        weight, bias = convolutions("average", False)[name]
-        scale = (2.0 / weight[0].numel()) ** 0.5
-        weights[name] = torch.randn(weight.shape, generator=generator) * scale, torch.zeros_like(bias)
-    return weights

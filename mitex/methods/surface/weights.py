@@ -1,0 +1,30 @@
+"""The weights of the network that textures are looked at with."""
+
+from __future__ import annotations
+
+import torch
+
+from mitex.features.layers import LAYERS
+from mitex.features.vgg import Weights, convolutions
+from mitex.features.vgg19 import vgg19_convolutions
+from mitex.methods.surface.config import SurfaceConfig
+
+
+def network_weights(config: SurfaceConfig, generator: torch.Generator) -> Weights:
+    """Layer -> weight and bias, as the settings say; random ones are drawn by the generator."""
+    if config.weights == "random":
+        return random_weights(generator)
+    if config.weights == "vgg19":
+        return vgg19_convolutions()
+    # Moments are not scale free; Gram matrices want the published scale.
+    return convolutions(config.pooling, normalised=config.loss == "transport")
+
+
+def random_weights(generator: torch.Generator) -> Weights:
+    """Weights of the network's shape, drawn as He et al. do, without biases (figure 5 b)."""
+    weights = {}
+    for name in LAYERS:
+        weight, bias = convolutions("average", False)[name]
+        scale = (2.0 / weight[0].numel()) ** 0.5
+        weights[name] = torch.randn(weight.shape, generator=generator) * scale, torch.zeros_like(bias)
+    return weights
