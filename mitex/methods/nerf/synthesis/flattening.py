@@ -7,7 +7,7 @@ around the point. Patches at neighbouring points are then turned alike, whatever
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,8 @@ from mitex.mesh.topology import mesh_edges, welded
 
 STRETCH = 1.6  # the largest factor by which lengths may change, up or down
 TORN = 0.25  # sides of faces whose ends were reached on ways so far apart are cut [reach]
-ROUND = 0.3  # a map that fails so near to its point is made anew, along the point's own direction [reach]
+PARTS = (1.0, 0.5, 0.25)  # of the reach; the next one is tried where the surface bends too much
+ROUND = 0.3  # faces so near to the point have to fit [reach]
 LEAST = 1e-12  # area of a face, at least, relative to the largest
 PIN = 1e-9  # holds the constant of a solution, relative to the mean diagonal
 
@@ -43,6 +44,11 @@ class _Surroundings:
     faces: np.ndarray
     away: np.ndarray
     previous: np.ndarray
+
+    def within(self, reach: float, corners: np.ndarray) -> _Surroundings:
+        """Those of the faces, whose corners are (F, 3), that are nearer."""
+        near = (self.away[corners[self.faces]] <= reach).all(1)
+        return replace(self, faces=self.faces[near])
 
 
 class Flattening:
@@ -94,15 +100,19 @@ class Flattening:
             (K,) faces, among them `face`, and (K, 3, 2) where their corners are, x to the right and y up, the
             point at 0 [mesh units].
         """
-        around = self._surroundings(face)
-        faces = around.faces
-        corners_away = around.away[self.corners[faces]]
-        close = faces[(corners_away < ROUND * self.reach).all(1) & (self.areas[faces] > 0)]
-        result = self._mapped(around, self.right[faces], self.up[faces])
-        if not np.isin(close, result[0]).all():
-            right = orthonormal(np.broadcast_to(self.right[face], (len(faces), 3)), self.normals[faces])
-            other = self._mapped(around, right, np.cross(self.normals[faces], right))
-            result = max(result, other, key=lambda r: np.isin(close, r[0]).sum())
+        whole = self._surroundings(face)
+        result = np.zeros(0, np.int64), np.zeros((0, 3, 2))
+        for part in PARTS:
+            around = whole.within(part * self.reach, self.corners)
+            faces = around.faces
+            corners_away = around.away[self.corners[faces]]
+            close = faces[(corners_away < ROUND * part * self.reach).all(1) & (self.areas[faces] > 0)]
+            along = orthonormal(np.broadcast_to(self.right[face], (len(faces), 3)), self.normals[faces])
+            for right in (self.right[faces], along):
+                other = self._mapped(around, right, np.cross(self.normals[faces], right))
+                result = max(result, other, key=lambda r: self.areas[r[0]].sum())
+                if np.isin(close, other[0]).all():
+                    return self._around_the_point(face, barycentric, *other)
         return self._around_the_point(face, barycentric, *result)
 
     def _surroundings(self, face: int) -> _Surroundings:

@@ -156,6 +156,17 @@ def test_hard_meshes(name: str):
     assert (np.linalg.norm(seen(mesh, quilt, face, barycentric), axis=1) > 0.3).mean() > 0.95
 
 
+def test_patches_larger_than_the_mesh(monkeypatch):
+    """They cover what they can of it, not one face at a time."""
+    mesh = icosphere(6)
+    target = Target(replace(mesh, uv=unwrap(mesh, 64, 3)), 64, PATCH, 8 / PATCH)
+    places = []
+    around = Target.around
+    monkeypatch.setattr(Target, "around", lambda self, texel: places.append(texel) or around(self, texel))
+    quilt_on(strands(), target, np.random.default_rng(0))
+    assert len(places) < 100 < len(target.mesh.faces) / 10
+
+
 def test_seeds():
     first, again, other = (on(icosphere(6), seed=seed)[1] for seed in (0, 0, 1))
     np.testing.assert_array_equal(first.patch, again.patch)
