@@ -68,10 +68,11 @@ def test_a_run_is_resumed_with_its_field(tmp_path, lava):
 def test_a_pattern_keeps_its_size_when_it_learns_to_move(tmp_path, lava):
     """Unless another one is asked for; a still texture from the same parent has its own preset's."""
     parent = texture(seed=3, hidden=16, shape=config().decoder_shape)
-    path = NcaTexture(parent.look, parent.about | {"density": 10.0}).save(tmp_path / "parent.safetensors")
+    path = NcaTexture(parent.look, {**parent.about, "density": 10.0}).save(tmp_path / "parent.safetensors")
     words = [word for word in (*TINY, "steps=0") if not word.startswith("density")]
-    for options in ({"motion": "up"}, {"preset": "motion"}, {"motion": "up", "preset": "patch"}):
-        assert nca.fit(lava, init=path, set=words, **options).about["density"] == 10
+    for motion, preset in (("up", None), (None, "motion"), ("up", "patch")):
+        moving = nca.fit(lava, init=path, motion=motion, preset=preset, set=words)
+        assert moving.about["density"] == 10
     assert nca.fit(lava, init=path, motion="up", set=[*words, "density=9"]).about["density"] == 9
     assert nca.fit(lava, init=path, set=words).about["density"] == 32
     assert nca.fit(lava, motion="up", set=words).about["density"] == 32
