@@ -23,7 +23,7 @@ from mitex.mesh.topology import mesh_edges, welded
 
 STRETCH = 1.6  # the largest factor by which lengths may change, up or down
 TORN = 0.25  # sides of faces whose ends were reached on ways so far apart are cut [reach]
-PARTS = (1.0, 0.5, 0.25)  # of the reach; the next one is tried where the surface bends too much
+PARTS = (1.0, 0.5, 0.25, 0.12, 0.06)  # of the reach; the next one is tried where the surface bends too much
 ROUND = 0.3  # faces so near to the point have to fit [reach]
 LEAST = 1e-12  # area of a face, at least, relative to the largest
 PIN = 1e-9  # holds the constant of a solution, relative to the mean diagonal

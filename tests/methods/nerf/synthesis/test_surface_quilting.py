@@ -159,7 +159,7 @@ def test_hard_meshes(name: str):
 def test_patches_larger_than_the_mesh(monkeypatch):
     """They cover what they can of it, not one face at a time."""
     mesh = icosphere(6)
-    target = Target(replace(mesh, uv=unwrap(mesh, 64, 3)), 64, PATCH, 8 / PATCH)
+    target = Target(replace(mesh, uv=unwrap(mesh, 64, 3)), 64, PATCH, 4 / PATCH)
     places = []
     around = Target.around
     monkeypatch.setattr(Target, "around", lambda self, texel: places.append(texel) or around(self, texel))
