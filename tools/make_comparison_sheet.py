@@ -25,7 +25,6 @@ from mitex.render import sheet
 
 SHEET = Path(__file__).parents[1] / "docs" / "gallery" / "comparison.jpg"
 CELL = 240  # side of a picture [px]
-MEASURES = [measure.key for measure in LOOKS]
 Row = dict[str, str]
 
 
@@ -54,12 +53,12 @@ def number(rows: Sequence[Row], key: str) -> str:
 
 def table(groups: Iterable[tuple[str, Sequence[Row]]], methods: Sequence[str]) -> str:
     """Markdown: a line for each group and method."""
-    names = ["exemplar", "method", *MEASURES]
+    names = ["exemplar", "method", *(measure.label for measure in LOOKS)]
     lines = [f"| {' | '.join(names)} |", "| --- " * len(names) + "|"]
     for name, group in groups:
         for method in methods:
             own = [row for row in group if row["method"] == method]
-            cells = " | ".join(number(own, key) for key in MEASURES)
+            cells = " | ".join(number(own, measure.key) for measure in LOOKS)
             lines.append(f"| {name} | `{method}` | {cells} |")
     return "\n".join(lines)
 
