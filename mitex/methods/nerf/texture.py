@@ -41,10 +41,10 @@ from mitex.methods.nerf.use.on_plane import SCALE, TextureOnPlane, plane
 from mitex.methods.nerf.use.placement import (
     EXTENT,
     UNWRAP_SIZE,
-    TooFine,
     guided_side,
     in_scene_cube,
     own_layout,
+    too_fine,
 )
 from mitex.methods.nerf.use.self_maps import self_maps
 from mitex.progress import announce
@@ -207,13 +207,28 @@ class NerfTexture:
         check_ranges(scale, density=1.0, lift=1.0)
         gap = texel_gap(self.model.base.mesh, pattern_rate) * scale
         mesh, side = own_layout(mesh, gap, size)
+        if side is None:
+            raise too_fine(mesh, size)
+        return mesh, self._quilted_on(mesh, side, gap, seed, patches, pattern_rate, evenness)
+
+    def _quilted_on(
+        self,
+        mesh: Mesh,
+        side: int,
+        gap: float,
+        seed: int,
+        patches: int = 2000,
+        pattern_rate: float = PATTERN_RATE,
+        evenness: float = EVENNESS,
+    ) -> LatentMaps:
+        """Maps of a side on a mesh with UVs of its own; texels of patches are `gap` apart on it."""
         announce("taking patches of the texture")
         rng = np.random.default_rng(seed)
         squares = self.patches(rng, patches, pattern_rate)
         announce("laying the mesh flat around its points")
         target = Target(in_scene_cube(mesh)[0], side, PATCH, gap)
         maps = self.maps(squares, quilt_on(self.source(squares), target, rng, evenness=evenness))
-        return mesh, replace(maps, angle=target.map(target.angles()))
+        return replace(maps, angle=target.map(target.angles()))
 
     def source(self, squares: Patches) -> FeatureSource:
         """The features of patches, which are compared by f."""
@@ -317,12 +332,15 @@ class NerfTexture:
         light_coefficients = self.light if light is None else checked_light(light)
         on_surface = joined_on_surface(quilting, guide)
         if maps is None and on_surface:
-            try:
-                mesh, maps = self.synthesize_on(mesh, size, seed, scale=scale)
-            except TooFine as problem:
-                if quilting == "surface":
-                    raise
-                warnings.warn(f"{problem}; it is quilted in the plane", MeshWarning, stacklevel=2)
+            gap = texel_gap(self.model.base.mesh, PATTERN_RATE) * scale
+            own, own_side = own_layout(mesh, gap, size)
+            if own_side is not None:
+                mesh, maps = own, self._quilted_on(own, own_side, gap, seed)
+            elif quilting == "surface":
+                raise too_fine(mesh, size)
+            else:
+                problem = f"{too_fine(mesh, size).problem}; it is quilted in the plane"
+                warnings.warn(problem, MeshWarning, stacklevel=2)
         if maps is None or maps.angle is None:
             mesh = laid_out(mesh, UNWRAP_SIZE)
         if maps is None:

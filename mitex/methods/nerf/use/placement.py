@@ -69,11 +69,7 @@ def guided_side(mesh: Mesh, gap: float, patch: int) -> int:
     return texels
 
 
-class TooFine(ConfigError):
-    """The elements of a texture are too small for a map on the mesh."""
-
-
-def own_layout(mesh: Mesh, gap: float, size: int) -> tuple[Mesh, int]:
+def own_layout(mesh: Mesh, gap: float, size: int) -> tuple[Mesh, int | None]:
     """The mesh with UVs for a map on it, whatever UVs it has, and the side of the map [texels].
 
     Args:
@@ -82,18 +78,25 @@ def own_layout(mesh: Mesh, gap: float, size: int) -> tuple[Mesh, int]:
             `size` suffices.
         size: of the side, at most.
 
+    Returns:
+        Mesh and side; None for the side if texels would be more than 4 times as far apart, which blurs them.
+
     Raises:
         MeshError: the mesh has no area.
-        TooFine: texels would be more than 4 times as far apart.
     """
     mesh = laid_out(replace(mesh, uv=None), UNWRAP_SIZE)
     needed = layout_side(in_scene_cube(mesh)[0]) / gap
     if needed > COARSEST * size:
-        raise TooFine(
-            f"elements so small on '{mesh.name}' that a map of {size} x {size} texels blurs them",
-            f'use larger scales, a size from {needed / COARSEST:.0f} on, or quilting="plane"',
-        )
+        return mesh, None
     side = int(np.clip(np.ceil(needed), SMALLEST, size))
     assert mesh.uv is not None
     # A texel beside the square's border is left free, so that lookups never read what is on the other side.
     return replace(mesh, uv=(mesh.uv * (side - 2) + 1) / side), side
+
+
+def too_fine(mesh: Mesh, size: int) -> ConfigError:
+    """What is wrong where `own_layout` finds no side."""
+    return ConfigError(
+        f"elements so small on '{mesh.name}' that a map of {size} x {size} texels blurs them",
+        'use larger scales or sizes, or quilting="plane"',
+    )

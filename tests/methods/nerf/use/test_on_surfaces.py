@@ -11,6 +11,7 @@ from mitex.atlas import usable_uv
 from mitex.errors import ConfigError, MeshError, MeshWarning
 from mitex.evaluation.seams import ratio_across
 from mitex.mesh import Mesh, icosphere
+from mitex.methods.nerf.synthesis.patches import PATTERN_RATE, texel_gap
 from mitex.methods.nerf.texture import NerfTexture
 from mitex.methods.nerf.use.applied import AppliedTexture
 from mitex.methods.nerf.use.placement import own_layout
@@ -63,17 +64,15 @@ def test_the_option_says_where_patches_are_joined(texture: NerfTexture, monkeypa
     calls = []
     flat = texture.synthesize(128, patches=30)
 
-    def on(mesh: Mesh, *_: object, **options: object):
-        calls.append(("surface", options["scale"]))
-        return replace(mesh, uv=own_layout(mesh, 0.1, 64)[0].uv), replace(
-            flat, angle=0 * flat.features[..., 0]
-        )
+    def on(mesh: Mesh, side: int, gap: float, seed: int):
+        calls.append(("surface", gap))
+        return replace(flat, angle=0 * flat.features[..., 0])
 
     def in_plane(*_: object, **__: object):
         calls.append("plane")
         return flat
 
-    monkeypatch.setattr(texture, "synthesize_on", on)
+    monkeypatch.setattr(texture, "_quilted_on", on)
     monkeypatch.setattr(texture, "synthesize", in_plane)
     monkeypatch.setattr(texture, "covering", lambda *_: 128)
     mesh = icosphere(3)
@@ -81,7 +80,8 @@ def test_the_option_says_where_patches_are_joined(texture: NerfTexture, monkeypa
     texture.apply(mesh, scale=2.0, quilting="surface")
     texture.apply(mesh, scale=2.0, quilting="plane")
     texture.apply(mesh, scale=2.0, guide=np.zeros((4, 4, 3), np.float32))
-    assert calls == [("surface", 2.0), ("surface", 2.0), "plane", "plane"]
+    gap = 2 * texel_gap(texture.model.base.mesh, PATTERN_RATE)
+    assert calls == [("surface", gap), ("surface", gap), "plane", "plane"]
 
 
 def test_too_fine_for_the_surface_it_is_quilted_in_the_plane(texture: NerfTexture, monkeypatch):
@@ -118,10 +118,12 @@ def test_the_layout_is_the_maps_own():
     overlapping = np.tile(np.array([[0, 0], [1, 0], [0, 1]], np.float32), (len(ball.faces), 1, 1))
     plain, side = own_layout(ball, 0.02, 2048)
     other, _ = own_layout(replace(ball, uv=overlapping), 0.02, 2048)
-    assert plain.uv is not None
+    assert plain.uv is not None and side is not None
     np.testing.assert_array_equal(np.asarray(other.uv), np.asarray(plain.uv))
     assert usable_uv(plain, np.asarray(plain.uv))
     assert plain.uv.min() >= 0.99 / side and plain.uv.max() <= 1 - 0.99 / side
-    assert 1.8 < own_layout(ball, 0.01, 2048)[1] / side < 2.2
+    _, twice = own_layout(ball, 0.01, 2048)
+    assert twice is not None and 1.8 < twice / side < 2.2
+    assert own_layout(ball, 0.01, 16)[1] is None
     assert own_layout(ball, 0.02, 100)[1] == 100
     assert own_layout(ball, 5.0, 100)[1] == 16
