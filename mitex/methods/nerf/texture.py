@@ -168,10 +168,9 @@ class NerfTexture:
         rng = np.random.default_rng(seed)
         squares = self.patches(rng, patches, pattern_rate)
         shape = (size, size) if isinstance(size, int) else size
+        target = None
         if guide is not None:
             target = Guide(guide, render_patches(self.shell, squares, BLOCK), guide_weight)
-        else:
-            target = None
         layout = quilt(
             self.source(squares), shape, rng, flips=flips, tileable=tileable, guide=target, evenness=evenness
         )
@@ -209,26 +208,13 @@ class NerfTexture:
         mesh, side = own_layout(mesh, gap, size)
         if side is None:
             raise too_fine(mesh, size)
-        return mesh, self._quilted_on(mesh, side, gap, seed, patches, pattern_rate, evenness)
-
-    def _quilted_on(
-        self,
-        mesh: Mesh,
-        side: int,
-        gap: float,
-        seed: int,
-        patches: int = 2000,
-        pattern_rate: float = PATTERN_RATE,
-        evenness: float = EVENNESS,
-    ) -> LatentMaps:
-        """Maps of a side on a mesh with UVs of its own; texels of patches are `gap` apart on it."""
         announce("taking patches of the texture")
         rng = np.random.default_rng(seed)
         squares = self.patches(rng, patches, pattern_rate)
         announce("laying the mesh flat around its points")
         target = Target(in_scene_cube(mesh)[0], side, PATCH, gap)
         maps = self.maps(squares, quilt_on(self.source(squares), target, rng, evenness=evenness))
-        return replace(maps, angle=target.map(target.angles()))
+        return mesh, replace(maps, angle=target.map(target.angles()))
 
     def source(self, squares: Patches) -> FeatureSource:
         """The features of patches, which are compared by f."""
@@ -333,14 +319,11 @@ class NerfTexture:
         on_surface = joined_on_surface(quilting, guide)
         if maps is None and on_surface:
             gap = texel_gap(self.model.base.mesh, PATTERN_RATE) * scale
-            own, own_side = own_layout(mesh, gap, size)
-            if own_side is not None:
-                mesh, maps = own, self._quilted_on(own, own_side, gap, seed)
-            elif quilting == "surface":
-                raise too_fine(mesh, size)
-            else:
+            if quilting is None and own_layout(mesh, gap, size)[1] is None:
                 problem = f"{too_fine(mesh, size).problem}; it is quilted in the plane"
                 warnings.warn(problem, MeshWarning, stacklevel=2)
+            else:
+                mesh, maps = self.synthesize_on(mesh, size, seed, scale=scale)
         if maps is None or maps.angle is None:
             mesh = laid_out(mesh, UNWRAP_SIZE)
         if maps is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -69,6 +70,9 @@ def guided_side(mesh: Mesh, gap: float, patch: int) -> int:
     return texels
 
 
+@lru_cache(
+    maxsize=1
+)  # unwrapping takes seconds, and whether a texture is too fine is asked before it is made
 def own_layout(mesh: Mesh, gap: float, size: int) -> tuple[Mesh, int | None]:
     """The mesh with UVs for a map on it, whatever UVs it has, and the side of the map [texels].
 

@@ -11,7 +11,6 @@ from mitex.atlas import usable_uv
 from mitex.errors import ConfigError, MeshError, MeshWarning
 from mitex.evaluation.seams import ratio_across
 from mitex.mesh import Mesh, icosphere
-from mitex.methods.nerf.synthesis.patches import PATTERN_RATE, texel_gap
 from mitex.methods.nerf.texture import NerfTexture
 from mitex.methods.nerf.use.applied import AppliedTexture
 from mitex.methods.nerf.use.placement import own_layout
@@ -64,15 +63,17 @@ def test_the_option_says_where_patches_are_joined(texture: NerfTexture, monkeypa
     calls = []
     flat = texture.synthesize(128, patches=30)
 
-    def on(mesh: Mesh, side: int, gap: float, seed: int):
-        calls.append(("surface", gap))
-        return replace(flat, angle=0 * flat.features[..., 0])
+    def on(mesh: Mesh, *_: object, **options: object):
+        calls.append(("surface", options["scale"]))
+        return replace(mesh, uv=own_layout(mesh, 0.1, 64)[0].uv), replace(
+            flat, angle=0 * flat.features[..., 0]
+        )
 
     def in_plane(*_: object, **__: object):
         calls.append("plane")
         return flat
 
-    monkeypatch.setattr(texture, "_quilted_on", on)
+    monkeypatch.setattr(texture, "synthesize_on", on)
     monkeypatch.setattr(texture, "synthesize", in_plane)
     monkeypatch.setattr(texture, "covering", lambda *_: 128)
     mesh = icosphere(3)
@@ -80,8 +81,7 @@ def test_the_option_says_where_patches_are_joined(texture: NerfTexture, monkeypa
     texture.apply(mesh, scale=2.0, quilting="surface")
     texture.apply(mesh, scale=2.0, quilting="plane")
     texture.apply(mesh, scale=2.0, guide=np.zeros((4, 4, 3), np.float32))
-    gap = 2 * texel_gap(texture.model.base.mesh, PATTERN_RATE)
-    assert calls == [("surface", gap), ("surface", gap), "plane", "plane"]
+    assert calls == [("surface", 2.0), ("surface", 2.0), "plane", "plane"]
 
 
 def test_too_fine_for_the_surface_it_is_quilted_in_the_plane(texture: NerfTexture, monkeypatch):
