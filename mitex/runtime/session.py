@@ -7,6 +7,7 @@ from typing import Any
 from mitex.errors import ConfigError, RuntimeUnavailable
 from mitex.runtime import llvm, workers
 from mitex.runtime.collection import collect_between_kernels
+from mitex.runtime.signals import deferred
 
 DEFAULT_VARIANT = "llvm_ad_rgb"
 
@@ -34,7 +35,8 @@ def init(variant: str = DEFAULT_VARIANT, needs: str = "") -> Any:
         raise ConfigError(f"Mitsuba has no variant '{variant}'", f"choose one of {names}")
     if mi.variant() is None:
         try:
-            mi.set_variant(variant)
+            with deferred():
+                mi.set_variant(variant)
         except ImportError as e:
             raise RuntimeUnavailable(
                 f"Mitsuba cannot start '{variant}' ({e})", "choose another variant or run `mitex doctor`"
@@ -77,8 +79,9 @@ def load_mitsuba(needs_llvm: bool = True) -> Any:
             if needs_llvm:
                 raise
     try:
-        mi = import_module("mitsuba")
-        dr = import_module("drjit")
+        with deferred():
+            mi = import_module("mitsuba")
+            dr = import_module("drjit")
     except ImportError as e:
         raise RuntimeUnavailable(
             f"Mitsuba cannot be imported ({e})", "run `pip install 'mitsuba>=3.9,<3.10'` in this environment"

@@ -1,4 +1,4 @@
-"""Stopping on Ctrl-C and SIGTERM between two steps rather than inside one."""
+"""Ctrl-C and SIGTERM: stopping between two steps rather than inside one, and where nothing is harmed."""
 
 import logging
 import signal
@@ -49,6 +49,28 @@ class StopSignals:
         self.requested = True
         # The lock of `logging` lets its own thread in again; a handler that writes unbuffered is safe here.
         log.info("stopping after this step; once more to stop at once")
+
+
+@contextmanager
+def deferred() -> Iterator[None]:
+    """Context at whose end SIGINT and SIGTERM arrive that came within it.
+
+    For loading an extension, which makes another error of what a handler raises meanwhile. Only in the main
+    thread; ignored signals stay ignored.
+    """
+    came: list[int] = []
+    earlier: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if signal.getsignal(number) not in (signal.SIG_IGN, None):
+                earlier[number] = signal.signal(number, lambda n, _: came.append(n))
+    try:
+        yield
+    finally:
+        for number, handler in earlier.items():
+            signal.signal(number, handler)
+        for number in came[:1]:
+            signal.raise_signal(number)
 
 
 @contextmanager

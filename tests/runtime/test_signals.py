@@ -2,11 +2,13 @@
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 
 import pytest
 
-from mitex.runtime.signals import StopSignals, terminable
+from mitex.runtime.signals import StopSignals, deferred, terminable
 
 
 @pytest.fixture(autouse=True)
@@ -68,6 +70,46 @@ def test_the_first_signal_is_answered_in_the_log(caplog):
     with caplog.at_level("INFO", "mitex"), StopSignals():
         os.kill(os.getpid(), signal.SIGTERM)
     assert "stopping after this step" in caplog.text
+
+
+class TestDeferred:
+    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+    def test_what_comes_within_arrives_at_the_end(self, number):
+        steps = []
+        with pytest.raises(KeyboardInterrupt), deferred():
+            for _ in range(2):
+                os.kill(os.getpid(), number)
+            steps.append("loaded")
+        assert steps == ["loaded"]
+        assert signal.getsignal(number) is signal.default_int_handler
+
+    def test_without_a_signal_nothing_happens(self):
+        with deferred():
+            pass
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+    def test_an_ignored_signal_stays_ignored(self):
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        with deferred():
+            os.kill(os.getpid(), signal.SIGINT)
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+
+    def test_an_extension_that_is_interrupted_while_it_is_loaded(self):
+        """Dr.Jit asks `typing` for names while it starts; not deferred, that would end with a NameError."""
+        code = (
+            "import os, signal, typing\n"
+            "from mitex.runtime import init\n"
+            "get = typing.TypeVar.__init__\n"
+            "def interrupted(*a, **k):\n"
+            "    os.kill(os.getpid(), signal.SIGINT)\n"
+            "    return get(*a, **k)\n"
+            "typing.TypeVar.__init__ = interrupted\n"
+            "try:\n"
+            "    init()\n"
+            "except KeyboardInterrupt:\n"
+            "    raise SystemExit(130)\n"
+        )
+        assert subprocess.run([sys.executable, "-c", code], timeout=120).returncode == 130
 
 
 class TestTerminable:
