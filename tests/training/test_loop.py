@@ -6,6 +6,8 @@ import os
 import signal
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import count
+from types import SimpleNamespace
 from typing import Any
 from unittest.mock import patch
 
@@ -107,7 +109,9 @@ def test_a_finished_run_resumes_to_its_result(tmp_path):
     assert len(lines(tmp_path)) == 20
 
 
-def test_seconds_go_on(tmp_path):
+def test_seconds_go_on(tmp_path, monkeypatch):
+    """By a clock that goes on by a second whenever it is looked at."""
+    monkeypatch.setattr("mitex.training.state.time", SimpleNamespace(monotonic=count().__next__))
     _, first = _train(tmp_path, config=SmallConfig(steps=5))
     _, second = _train(tmp_path, resume=True)
     assert second.seconds > first.seconds
