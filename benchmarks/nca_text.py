@@ -58,7 +58,7 @@ class Words:
         (self.sphere,) = self.task.spheres
         self.state = 0.2 * torch.randn(self.task.pool.shape[1:], generator=torch.Generator().manual_seed(0))
         self.task.pool[:] = self.state
-        self.task.negative(self.sphere, 0)
+        self.task.banks[self.sphere].negative(0)
         count = config.view_count * (1 + 2 * config.text_crops)
         self.images = torch.rand(count, 224, 224, 3, requires_grad=True)
 
@@ -70,7 +70,7 @@ class Words:
     def views(self) -> None:
         state = self.state.clone().requires_grad_()
         views = self.task.figures[self.sphere].textured(
-            self.task.look, state, self.task.sight(self.sphere, 0).cameras
+            self.task.look, state, self.task.banks[self.sphere].sight(0).cameras
         )
         torch.autograd.grad((views.coloured + views.plain).sum(), state)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -18,9 +18,13 @@ from mitex.scenes.shaded import BACKGROUND
 SAME = 1e-4  # squared distance of the unit embeddings of texts that mean the same
 
 
-class Cuts(Protocol):
-    """The settings of what is cut out of a view."""
+class BankConfig(Protocol):
+    """The settings of a bank of sights, and of what is cut out of their views."""
 
+    @property
+    def seed(self) -> int: ...
+    @property
+    def text_bank(self) -> int: ...
     @property
     def text_crops(self) -> int: ...
     @property
@@ -44,13 +48,13 @@ class Sight:
     close: Augmentation
 
     @staticmethod
-    def draw(cuts: Cuts, cameras: Cameras, generator: torch.Generator) -> Sight:
+    def draw(config: BankConfig, cameras: Cameras, generator: torch.Generator) -> Sight:
         """Of these views."""
-        count, tilt = len(cameras), cuts.text_tilt
+        count, tilt = len(cameras), config.text_tilt
         return Sight(
             cameras,
             Augmentation.draw(generator, count, tilt=tilt),
-            Augmentation.draw(generator, count, cuts.text_crops, cuts.text_crop_area, tilt),
+            Augmentation.draw(generator, count, config.text_crops, config.text_crop_area, tilt),
         )
 
 
@@ -141,3 +145,41 @@ class WordsDistance:
             assert negative is not None
             return directional_distance(pictures, negative, self.text, self.negative)
         return text_distance(pictures, self.text)
+
+
+class SightBank:
+    """Sights of one surface that are drawn once, of which a step sees one, and what is seen of it bare.
+
+    Args:
+        config: settings.
+        cameras: draws the views of a sight.
+        words: what the sights are for.
+        bare: pictures (K, H, W, 3) of the surface without its texture, by the views.
+    """
+
+    def __init__(
+        self,
+        config: BankConfig,
+        cameras: Callable[[torch.Generator], Cameras],
+        words: WordsDistance,
+        bare: Callable[[Cameras], torch.Tensor],
+    ) -> None:
+        self._config, self._cameras, self._words, self._bare = config, cameras, words, bare
+        self._negatives: dict[int, Negative] = {}
+
+    def draw(self, generator: torch.Generator) -> int:
+        """The number of a sight."""
+        return int(torch.randint(self._config.text_bank, (), generator=generator))
+
+    def sight(self, index: int) -> Sight:
+        """By its number, the same whenever it is asked for."""
+        seed = self._config.seed * self._config.text_bank + index
+        generator = torch.Generator().manual_seed(seed)
+        return Sight.draw(self._config, self._cameras(generator), generator)
+
+    def negative(self, index: int) -> Negative:
+        """Of a sight, computed when it is wanted first."""
+        if index not in self._negatives:
+            sight = self.sight(index)
+            self._negatives[index] = self._words.bare(sight, self._bare(sight.cameras))
+        return self._negatives[index]

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from tyro.conf import arg
 
+from mitex.errors import ConfigError
 from mitex.methods.options import TrainingOptions
+from mitex.training.settings import RunSettings
 
 LONGEST = 60  # name of a run folder from words [characters]
 
@@ -26,3 +28,39 @@ class WordsOptions(TrainingOptions):
         """The run folder: --out, else one in runs/ whose name is made of a text and further words."""
         letters = re.findall(r"[a-z0-9]+", words[0].lower())
         return self.folder("-".join(["-".join(letters)[:LONGEST] or "text", *words[1:]]))
+
+
+@dataclass(kw_only=True)
+class ExemplarOrWordsOptions(WordsOptions):
+    """Options of the methods that learn from an exemplar, or from words, whose help is their own."""
+
+    source: ClassVar[str | None] = "exemplar"
+
+    exemplar: Annotated[str | None, arg(metavar="IMAGE|DIR|NAME", help_behavior_hint="")] = None
+    """PNG or JPEG, a folder with any of albedo, height, normal, roughness, ambient_occlusion, or a name."""
+
+    text: Annotated[str | None, arg(metavar="WORDS", help_behavior_hint="")] = None
+    """What the mesh is made of."""
+
+    def check_source(self) -> None:
+        """Refuses a fit from nothing, and --clip without words.
+
+        Raises:
+            ConfigError: it is one of these.
+        """
+        if self.exemplar is None and self.text is None:
+            raise ConfigError("--exemplar is missing", "give --exemplar IMAGE, or --text WORDS")
+        if self.clip is not None and self.text is None:
+            raise ConfigError("--clip means nothing without --text", "leave it out")
+
+    def fitted(self, options: RunSettings) -> Path:
+        """Fits from what was given; the run folder."""
+        return self.fit_exemplar(options) if self.text is None else self.fit_text(self.text, options)
+
+    def fit_exemplar(self, options: RunSettings) -> Path:
+        """Fits from the exemplar alone; the run folder."""
+        raise NotImplementedError
+
+    def fit_text(self, text: str, options: RunSettings) -> Path:
+        """Fits from words; the run folder."""
+        raise NotImplementedError

@@ -13,7 +13,7 @@ from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unu
 from mitex.methods.nca.arguments import RESOLUTION, levels, oriented
 from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS, TILE_CELLS, TILE_SIDES
 from mitex.methods.options import EXPORTS, PICTURES, ReliefOptions, field_files
-from mitex.methods.words_options import WordsOptions
+from mitex.methods.words_options import ExemplarOrWordsOptions
 from mitex.training.settings import RunSettings
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ PAGE = ".html"
 
 
 @dataclass(kw_only=True)
-class Fit(WordsOptions):
+class Fit(ExemplarOrWordsOptions):
     """Learn a texture from an image, a set of PBR maps, or words with a neural cellular automaton (MeshNCA).
 
     The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the texture; Ctrl-C
@@ -42,10 +42,6 @@ class Fit(WordsOptions):
     """
 
     only_at_start: ClassVar[frozenset[str]] = frozenset({"init"})
-    source: ClassVar[str | None] = "exemplar"
-
-    exemplar: Annotated[str | None, arg(metavar="IMAGE|DIR|NAME", help_behavior_hint="")] = None
-    """PNG or JPEG, a folder with any of albedo, height, normal, roughness, ambient_occlusion, or a name."""
 
     text: Annotated[str | None, arg(metavar="WORDS", help_behavior_hint="")] = None
     """In place of an exemplar: what the texture is made of. It gets colours and a relief."""
@@ -72,22 +68,20 @@ class Fit(WordsOptions):
 
     def run(self) -> None:
         mutually_exclusive("--resume", "--init", self.resume and self.init is not None)
-        self._check_source()
+        self.check_source()
         options = self.run_options(device=self.device)
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()
-        print(self._fit_exemplar(options) if self.text is None else self._fit_text(self.text, options))
+        print(self.fitted(options))
 
-    def _check_source(self) -> None:
-        if self.exemplar is None and self.text is None:
-            raise ConfigError("--exemplar is missing", "give --exemplar IMAGE, or --text WORDS")
+    def check_source(self) -> None:
+        super().check_source()
         mutually_exclusive("--text", "--exemplar", self.text is not None and self.exemplar is not None)
-        for option, value in (("--mesh", self.mesh), ("--clip", self.clip)):
-            if value is not None and self.text is None:
-                raise ConfigError(f"{option} means nothing without --text", "leave it out")
+        if self.mesh is not None and self.text is None:
+            raise ConfigError("--mesh means nothing without --text", "leave it out")
 
-    def _fit_exemplar(self, options: RunSettings) -> Path:
+    def fit_exemplar(self, options: RunSettings) -> Path:
         from mitex.exemplar import Exemplar
 
         exemplar = Exemplar.load(str(self.exemplar))
@@ -98,7 +92,7 @@ class Fit(WordsOptions):
             nca.fit(exemplar, out, init=self.init, motion=self.motion, on_step=on_step, **options)
         return out
 
-    def _fit_text(self, text: str, options: RunSettings) -> Path:
+    def fit_text(self, text: str, options: RunSettings) -> Path:
         from mitex.mesh import Mesh
         from mitex.methods import nca
 

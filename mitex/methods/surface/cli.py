@@ -11,7 +11,7 @@ from tyro.conf import arg
 from mitex.errors import ConfigError
 from mitex.methods.checks import in_range, mutually_exclusive
 from mitex.methods.options import ReliefOptions
-from mitex.methods.words_options import WordsOptions
+from mitex.methods.words_options import ExemplarOrWordsOptions
 from mitex.training.settings import RunSettings
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ TILE_SIDES = (32, 4096)  # of a tile [px]
 
 
 @dataclass(kw_only=True)
-class Fit(WordsOptions):
+class Fit(ExemplarOrWordsOptions):
     """Synthesize a texture directly on one mesh, without views and without seams (tangent-space CNN), or on a
     flat square that repeats (--tile): from an exemplar, from words, or from both.
 
@@ -39,11 +39,7 @@ class Fit(WordsOptions):
       mitex fit surface --exemplar maps/ --tile 1024 --out runs/tile
     """
 
-    source: ClassVar[str | None] = "exemplar"
     fits_to_mesh: ClassVar[bool] = True
-
-    exemplar: Annotated[str | None, arg(metavar="IMAGE|DIR|NAME", help_behavior_hint="")] = None
-    """PNG or JPEG, a folder with any of albedo, height, normal, roughness, ambient_occlusion, or a name."""
 
     text: Annotated[str | None, arg(metavar="WORDS", help_behavior_hint="")] = None
     """What the mesh is made of: in place of an exemplar, or beside one."""
@@ -79,12 +75,12 @@ class Fit(WordsOptions):
     """Use the mesh's own UVs, which must not overlap."""
 
     def run(self) -> None:
-        self._check_source()
+        self.check_source()
         self._check_tile()
         options = self.run_options(resolution=self.tile or self.resolution, scale=self.scale)
-        print(self._fit_exemplar(options) if self.text is None else self._fit_text(self.text, options))
+        print(self.fitted(options))
 
-    def _fit_exemplar(self, options: RunSettings) -> Path:
+    def fit_exemplar(self, options: RunSettings) -> Path:
         from mitex.exemplar import Exemplar
         from mitex.mesh import Mesh
 
@@ -96,7 +92,7 @@ class Fit(WordsOptions):
             surface.fit(exemplar, mesh, out, on_step=on_step, **self._on_mesh(), **options)
         return out
 
-    def _fit_text(self, text: str, options: RunSettings) -> Path:
+    def fit_text(self, text: str, options: RunSettings) -> Path:
         from mitex.exemplar import Exemplar
         from mitex.mesh import Mesh
 
@@ -126,12 +122,9 @@ class Fit(WordsOptions):
             "scale_map": self.scale_map,
         }
 
-    def _check_source(self) -> None:
-        if self.exemplar is None and self.text is None:
-            raise ConfigError("--exemplar is missing", "give --exemplar IMAGE, or --text WORDS")
+    def check_source(self) -> None:
+        super().check_source()
         mutually_exclusive("--tile", "--text", self.tile is not None and self.text is not None)
-        if self.clip is not None and self.text is None:
-            raise ConfigError("--clip means nothing without --text", "leave it out")
         for option, value in (("--orientation", self.orientation), ("--scale-map", self.scale_map)):
             if value is not None and self.exemplar is None:
                 raise ConfigError(f"{option} means nothing without --exemplar", "leave it out")

@@ -8,7 +8,7 @@ import torch.nn.functional as F
 from mitex.features.text_image import TextImageModel
 from mitex.methods.surface.config import SurfaceConfig
 from mitex.methods.surface.domain import SurfaceDomain
-from mitex.methods.words_distance import Negative, Part, Sight, WordsDistance
+from mitex.methods.words_distance import Part, SightBank, WordsDistance
 from mitex.scenes.cameras import Cameras, patch_views, random_views
 from mitex.scenes.shaded import GREY, lamps_of_pixels, pictured, shading
 from mitex.scenes.stage import Hits, Stage
@@ -69,7 +69,7 @@ class Words:
             model, self.prompt, thing, config.text_directional, config.text_background
         )
         self.figure = Figure(domain, config.text_background)
-        self._negatives: dict[int, Negative] = {}
+        self.bank = SightBank(config, self._cameras, self.distance, self.figure.bare)
 
     def terms(self, colours: torch.Tensor, generator: torch.Generator) -> dict[str, torch.Tensor]:
         """The weighted distances of whole views and of close-ups, of one of the bank's sets of views.
@@ -79,29 +79,16 @@ class Words:
             generator: source of all randomness.
         """
         config = self.config
-        index = int(torch.randint(config.text_bank, (), generator=generator))
-        sight = self.sight(index)
+        index = self.bank.draw(generator)
+        sight = self.bank.sight(index)
         pictures = self.figure.textured(sight.cameras, colours)
-        bare = self.negative(index) if config.text_directional else None
+        bare = self.bank.negative(index) if config.text_directional else None
         return self.distance(
             {
                 "whole": Part(config.text_whole_weight, sight.whole, pictures, bare and bare.whole),
                 "close": Part(config.text_close_weight, sight.close, pictures, bare and bare.close),
             }
         )
-
-    def sight(self, index: int) -> Sight:
-        """One of the bank's."""
-        config = self.config
-        generator = torch.Generator().manual_seed(config.seed * config.text_bank + index)
-        return Sight.draw(config, self._cameras(generator), generator)
-
-    def negative(self, index: int) -> Negative:
-        """Of a sight of the bank, computed when it is wanted first."""
-        if index not in self._negatives:
-            sight = self.sight(index)
-            self._negatives[index] = self.distance.bare(sight, self.figure.bare(sight.cameras))
-        return self._negatives[index]
 
     def metadata(self) -> dict[str, str]:
         """What a resumed run must share."""

@@ -95,7 +95,7 @@ def words_cost(one: SurfaceTask, colours: torch.Tensor) -> float:
 class TestFigure:
     def test_grey_texels_are_the_bare_mesh(self):
         one = task()
-        cameras, grey = seen(one).sight(0).cameras, torch.full((len(one.coordinates), 3), 0.5)
+        cameras, grey = seen(one).bank.sight(0).cameras, torch.full((len(one.coordinates), 3), 0.5)
         assert torch.allclose(
             seen(one).figure.textured(cameras, grey), seen(one).figure.bare(cameras), atol=1e-6
         )
@@ -103,7 +103,7 @@ class TestFigure:
     def test_texels_are_seen_where_they_lie(self):
         """Colours that are places, of which shading leaves the ratios."""
         one = task("text_background=0", "text_distance=3", "text_view=48")
-        cameras, place = seen(one).sight(0).cameras, torch.tensor(one.levels.position)
+        cameras, place = seen(one).bank.sight(0).cameras, torch.tensor(one.levels.position)
         picture = seen(one).figure.textured(cameras, (0.5 + 0.4 * place).float())
         hit = picture.sum(3) > 0
         origin, direction = (torch.tensor(rays) for rays in cameras.rays())
@@ -121,7 +121,7 @@ class TestFigure:
 
         def total(scale: torch.Tensor) -> torch.Tensor:
             return (
-                seen(one).figure.textured(seen(one).sight(0).cameras, colours + scale * way) * weights
+                seen(one).figure.textured(seen(one).bank.sight(0).cameras, colours + scale * way) * weights
             ).sum()
 
         (slope,) = torch.autograd.grad(total(scale := torch.zeros((), requires_grad=True)), scale)
@@ -134,7 +134,7 @@ class TestLoss:
     def test_the_terms_are_those_of_the_paper(self):
         """MeshNCA's equations 7 to 9, picture by picture."""
         one = task("text_close_weight=2")
-        sight, figure, model = seen(one).sight(DRAWN), seen(one).figure, MeanColour()
+        sight, figure, model = seen(one).bank.sight(DRAWN), seen(one).figure, MeanColour()
         texts = model.encode_texts(["an image of a sphere made of red", "sphere"])
         pictures, bare = figure.textured(sight.cameras, one.values), figure.bare(sight.cameras)
 
@@ -181,9 +181,10 @@ class TestLoss:
 
     def test_negatives_are_computed_once(self):
         one, again = task(), task()
-        first = seen(one).negative(1)
-        assert seen(one).negative(1) is first and torch.equal(first.close, seen(again).negative(1).close)
-        assert not torch.equal(first.close, seen(one).negative(2).close)
+        first = seen(one).bank.negative(1)
+        assert seen(one).bank.negative(1) is first
+        assert torch.equal(first.close, seen(again).bank.negative(1).close)
+        assert not torch.equal(first.close, seen(one).bank.negative(2).close)
 
     @pytest.mark.parametrize("options", [{}, {"image": True}, {"content": True}])
     def test_the_contract(self, options):

@@ -8,15 +8,14 @@ from typing import Annotated, ClassVar
 
 from tyro.conf import arg
 
-from mitex.errors import ConfigError
 from mitex.methods.checks import mutually_exclusive
 from mitex.methods.mesh_texture_options import MeshTextureOptions
-from mitex.methods.words_options import WordsOptions
+from mitex.methods.words_options import ExemplarOrWordsOptions
 from mitex.training.settings import RunSettings
 
 
 @dataclass(kw_only=True)
-class Fit(WordsOptions):
+class Fit(ExemplarOrWordsOptions):
     """Learn a network that colours one mesh by the place, as Text2Mesh (Michel et al. 2022) does: until views
     of it look like an exemplar's albedo, or are what words say. Words also move its vertices.
 
@@ -30,11 +29,7 @@ class Fit(WordsOptions):
       mitex fit text2mesh --exemplar lava --mesh vase --out runs/field --resume
     """
 
-    source: ClassVar[str | None] = "exemplar"
     fits_to_mesh: ClassVar[bool] = True
-
-    exemplar: Annotated[str | None, arg(metavar="IMAGE|DIR|NAME", help_behavior_hint="")] = None
-    """PNG or JPEG, a folder with any of albedo, height, normal, roughness, ambient_occlusion, or a name."""
 
     text: Annotated[str | None, arg(metavar="WORDS", help_behavior_hint="")] = None
     """In place of an exemplar: what the mesh is made of. It gets colours, and a shape."""
@@ -46,21 +41,18 @@ class Fit(WordsOptions):
     """Use the mesh's own UVs, which must not overlap."""
 
     def run(self) -> None:
-        self._check_source()
+        self.check_source()
         options = self.run_options()
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()
-        print(self._fit_exemplar(options) if self.text is None else self._fit_text(self.text, options))
+        print(self.fitted(options))
 
-    def _check_source(self) -> None:
-        if self.exemplar is None and self.text is None:
-            raise ConfigError("--exemplar is missing", "give --exemplar IMAGE, or --text WORDS")
+    def check_source(self) -> None:
+        super().check_source()
         mutually_exclusive("--text", "--exemplar", self.text is not None and self.exemplar is not None)
-        if self.clip is not None and self.text is None:
-            raise ConfigError("--clip means nothing without --text", "leave it out")
 
-    def _fit_exemplar(self, options: RunSettings) -> Path:
+    def fit_exemplar(self, options: RunSettings) -> Path:
         from mitex.exemplar import Exemplar
         from mitex.mesh import Mesh
         from mitex.methods.baselines import text2mesh
@@ -71,7 +63,7 @@ class Fit(WordsOptions):
             text2mesh.fit(exemplar, mesh, out, keep_uvs=self.keep_uvs, on_step=on_step, **options)
         return out
 
-    def _fit_text(self, text: str, options: RunSettings) -> Path:
+    def fit_text(self, text: str, options: RunSettings) -> Path:
         from mitex.mesh import Mesh
         from mitex.methods.baselines import text2mesh
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 import torch
@@ -18,7 +19,7 @@ from mitex.methods.nca.pool import PoolTask, initial_look
 from mitex.methods.nca.surfaces import TrainingSphere, TrainingSurface, training_surfaces
 from mitex.methods.nca.text.views import Figure, training_cameras
 from mitex.methods.nca.text.wording import MAPS, prompts
-from mitex.methods.words_distance import Negative, Part, Sight, WordsDistance
+from mitex.methods.words_distance import Part, SightBank, WordsDistance
 from mitex.progress import announce
 from mitex.runtime import available_device, keep_freed_memory
 from mitex.scenes.cameras import orbit
@@ -61,18 +62,22 @@ class TextTask(PoolTask):
         self.spheres = [surface for surface in surfaces if isinstance(surface, TrainingSphere)]
         self.figures = {sphere: Figure(sphere, config.text_relief, device) for sphere in self.spheres}
         self._edges = {sphere: _edges(sphere.mesh, device) for sphere in self.spheres}
-        self._negatives: dict[tuple[TrainingSphere, int], Negative] = {}
+        self.banks = {sphere: self._bank(sphere) for sphere in self.spheres}
+
+    def _bank(self, sphere: TrainingSphere) -> SightBank:
+        config, figure = self.config, self.figures[sphere]
+        return SightBank(config, partial(training_cameras, config, sphere), self.words, figure.bare)
 
     def terms(
         self, surface: TrainingSurface, state: torch.Tensor, generator: torch.Generator
     ) -> dict[str, torch.Tensor]:
         assert isinstance(surface, TrainingSphere)
-        config = self.config
-        index = int(torch.randint(config.text_bank, (), generator=generator))
-        sight = self.sight(surface, index)
+        config, bank = self.config, self.banks[surface]
+        index = bank.draw(generator)
+        sight = bank.sight(index)
         views = self.figures[surface].textured(self.look, state, sight.cameras)
         excess = laplacian_excess(2 * views.height - 1, *self._edges[surface], config.text_roughness)
-        bare = self.negative(surface, index)
+        bare = bank.negative(index)
         parts = {
             "whole": Part(config.text_whole_weight, sight.whole, views.coloured, bare.whole),
             "close": Part(config.text_close_weight, sight.close, views.coloured, bare.close),
@@ -82,20 +87,6 @@ class TextTask(PoolTask):
             "rough": config.text_smooth_weight * excess,
             "range": config.text_range_weight * overflow_loss(2 * views.values - 1),
         }
-
-    def sight(self, surface: TrainingSphere, index: int) -> Sight:
-        """One of the bank's."""
-        seed = self.config.seed * self.config.text_bank + index
-        generator = torch.Generator().manual_seed(seed)
-        return Sight.draw(self.config, training_cameras(self.config, surface, generator), generator)
-
-    def negative(self, surface: TrainingSphere, index: int) -> Negative:
-        """Of a sight of the bank, computed when it is wanted first."""
-        if (surface, index) not in self._negatives:
-            sight = self.sight(surface, index)
-            pictures = self.figures[surface].bare(sight.cameras)
-            self._negatives[surface, index] = self.words.bare(sight, pictures)
-        return self._negatives[surface, index]
 
     @torch.no_grad()
     def preview(self, step: int) -> np.ndarray:

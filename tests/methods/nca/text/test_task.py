@@ -50,7 +50,7 @@ def test_the_terms_are_those_of_the_paper():
     surface, state, generator = one.spheres[0], one.pool[0], torch.Generator()
     terms = one.terms(surface, state, generator.manual_seed(5))
     index = int(torch.randint(3, (), generator=generator.manual_seed(5)))
-    sight, figure, model = one.sight(surface, index), one.figures[surface], MeanColour()
+    sight, figure, model = one.banks[surface].sight(index), one.figures[surface], MeanColour()
     views, bare = figure.textured(one.look, state, sight.cameras), figure.bare(sight.cameras)
     texts = model.encode_texts(["an image of a sphere made of red", "sphere"])
 
@@ -72,25 +72,26 @@ def test_the_terms_are_those_of_the_paper():
 def test_negatives_are_computed_once_and_equal_fresh_ones():
     one, again = task(), task()
     surface = one.spheres[0]
-    first = one.negative(surface, 1)
-    assert one.negative(surface, 1) is first and one.negative(surface, 2) is not first
+    first = one.banks[surface].negative(1)
+    assert one.banks[surface].negative(1) is first and one.banks[surface].negative(2) is not first
     loss(grown(one))
-    fresh = again.negative(again.spheres[0], 1)
+    fresh = again.banks[again.spheres[0]].negative(1)
     assert torch.equal(fresh.whole, first.whole) and torch.equal(fresh.close, first.close)
-    assert not torch.equal(one.negative(surface, 2).close, first.close)
+    assert not torch.equal(one.banks[surface].negative(2).close, first.close)
 
 
 def test_a_bank_holds_other_views_for_another_seed():
     one, same, other = task(), task(), task("seed=1")
-    cameras = [t.sight(t.spheres[0], 2).cameras.origin for t in (one, same, other)]
+    cameras = [t.banks[t.spheres[0]].sight(2).cameras.origin for t in (one, same, other)]
     assert np.array_equal(cameras[0], cameras[1]) and not np.array_equal(cameras[0], cameras[2])
-    assert not np.array_equal(cameras[0], one.sight(one.spheres[0], 0).cameras.origin)
+    assert not np.array_equal(cameras[0], one.banks[one.spheres[0]].sight(0).cameras.origin)
 
 
 def test_it_learns_a_colour():
     def colour(one):
         state = one.evolved(0, torch.zeros_like(one.grown(0)), 3, torch.Generator().manual_seed(0))[0]
-        views = one.figures[one.spheres[0]].textured(one.look, state, one.sight(one.spheres[0], 0).cameras)
+        cameras = one.banks[one.spheres[0]].sight(0).cameras
+        views = one.figures[one.spheres[0]].textured(one.look, state, cameras)
         return views.values[:, :3].mean(0)
 
     settings = ("steps=40", "inject_every=1", "pool=1", "lr=0.01")

@@ -10,7 +10,7 @@ from tests.methods.nca.text.tiny_text import grown, task
 def scene():
     """A figure, a look, a state of it, and cameras."""
     one = grown(task())
-    return one.figures[one.spheres[0]], one.look, one.pool[0], one.sight(one.spheres[0], 0).cameras
+    return one.figures[one.spheres[0]], one.look, one.pool[0], one.banks[one.spheres[0]].sight(0).cameras
 
 
 def test_the_background_is_white_and_the_rest_is_shaded(scene):
@@ -28,7 +28,7 @@ def test_the_background_is_white_and_the_rest_is_shaded(scene):
 def test_close_ups_are_as_wide_as_the_density():
     """Seen along the normals, nothing but the surface in them, and other ones for other seeds."""
     one = task("views=patch", "density=4", "view_count=3")
-    cameras, other = (one.sight(one.spheres[0], index).cameras for index in (0, 1))
+    cameras, other = (one.banks[one.spheres[0]].sight(index).cameras for index in (0, 1))
     assert (cameras.kind, len(cameras)) == ("orthographic", 3)
     assert cameras.half_width == pytest.approx(2 * one.spheres[0].edge)
     assert one.spheres[0].stage.hits(cameras).hit.all()
@@ -61,6 +61,6 @@ def test_gradients_by_finite_differences(scene, picture):
 
 def test_a_sight_is_drawn_from_its_settings():
     one = task("text_distances=3", "text_crops=4", "view_count=3")
-    sight = one.sight(one.spheres[0], 0)
+    sight = one.banks[one.spheres[0]].sight(0)
     assert len(sight.whole.picture) == 3 and len(sight.close.picture) == 12
     assert torch.tensor(sight.cameras.origin).norm(dim=1).sub(3).abs().max() < 1e-5
