@@ -61,3 +61,15 @@ def merged_settings(groups: Sequence[Sequence[str]], **flags: object) -> list[st
         if values.setdefault(key, value) != value:
             raise ConfigError(f"{key} is set to {values[key]} and to {value}", "give it once")
     return words
+
+
+def check_source(exemplar: str | None, text: str | None, clip: str | None) -> None:
+    """Refuses a fit from neither an exemplar nor words, and a model of texts without any.
+
+    Raises:
+        ConfigError: it is one of these.
+    """
+    if exemplar is None and text is None:
+        raise ConfigError("--exemplar is missing", "give --exemplar IMAGE, or --text WORDS")
+    if clip is not None and text is None:
+        raise ConfigError("--clip means nothing without --text", "leave it out")

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 
 from tyro.conf import arg
 
-from mitex.errors import ConfigError
+from mitex.methods.checks import check_source
 from mitex.methods.options import TrainingOptions
 from mitex.training.settings import RunSettings
 
@@ -43,15 +43,8 @@ class ExemplarOrWordsOptions(WordsOptions):
     """What the mesh is made of."""
 
     def check_source(self) -> None:
-        """Refuses a fit from nothing, and --clip without words.
-
-        Raises:
-            ConfigError: it is one of these.
-        """
-        if self.exemplar is None and self.text is None:
-            raise ConfigError("--exemplar is missing", "give --exemplar IMAGE, or --text WORDS")
-        if self.clip is not None and self.text is None:
-            raise ConfigError("--clip means nothing without --text", "leave it out")
+        """Refuses sources that are missing, or do not go together."""
+        check_source(self.exemplar, self.text, self.clip)
 
     def fitted(self, options: RunSettings) -> Path:
         """Fits from what was given; the run folder."""
