@@ -23,7 +23,7 @@ from mitex.mesh import icosphere
 from mitex.methods.nca import PRESETS, NcaTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.growth import LookGrowth
-from mitex.methods.nca.motion.condition import cell_vectors
+from mitex.methods.nca.motion.cell_motion import STILL, look_motion
 from mitex.methods.nca.motion.drift import Drift, draw_drift
 from mitex.methods.nca.motion.estimator import load_estimator
 from mitex.methods.nca.motion.start import with_condition
@@ -84,8 +84,8 @@ def steps_per_second(frequency: int, moving: bool, repetitions: int) -> float:
     look = with_condition(look) if moving else look
     mesh = icosphere(frequency)
     cells, generator = Cells.of(mesh, 0), torch.Generator().manual_seed(0)
-    vectors = torch.from_numpy(cell_vectors(mesh, mesh, "right", 1.0)) if moving else None
-    growth = LookGrowth(look, cells, condition=vectors)
+    motion = look_motion(look, {}, mesh, mesh, "right", 1.0) if moving else STILL
+    growth = LookGrowth(look, cells, motion=motion)
     state = growth.evolve(growth.seed(), 1, generator)
     return 1e3 * GROWTH / best(lambda: growth.evolve(state, GROWTH, generator), repetitions)
 

@@ -20,7 +20,6 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from mitex.errors import ConfigError
 from mitex.evaluation.metrics import single_image_frechet
 from mitex.evaluation.motion import measured_motion
 from mitex.exemplar import Exemplar
@@ -30,6 +29,7 @@ from mitex.mesh import Mesh, icosphere
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.growth import Growth
+from mitex.methods.nca.motion.cell_motion import STILL, carried, period
 from mitex.methods.nca.motion.condition import cell_vectors
 from mitex.scenes.cameras import Cameras, patch_views
 from mitex.scenes.screen import screen_motion
@@ -100,19 +100,15 @@ def motion_of(
     texture: NcaTexture, closeups: CloseUps, field: str, later: tuple[int, ...]
 ) -> tuple[float, float, list[float]]:
     """Direction error [degrees], speed ratio, and distances from the exemplar after so many steps each."""
-    if "motion" not in texture.about:
-        raise ConfigError(f"{texture.about['name']} does not move", "train it with `motion`")
-    encoded = texture.look.rule.condition > 0  # else it moves along the field of its training alone
-    condition = texture.condition(closeups.cells, field) if encoded else None
-    growth = texture.growth(closeups.cells, 0.0, condition)
+    guided = texture.look.rule.condition or carried(texture.look, texture.about)  # else as it was trained
+    growth = texture.growth(closeups.cells, 0.0, texture.motion(closeups.cells, field) if guided else STILL)
     generator = torch.Generator().manual_seed(0)
     state = growth.evolve(growth.seed(), texture.steps, generator)
-    period = float(texture.about["motion_period"])
     mesh = closeups.cells.mesh
     target = closeups.target(cell_vectors(mesh, mesh, field, 1.0).astype(np.float64))
     films = np.stack(list(film(growth, state, closeups)), axis=1)
     errors = [
-        measured_motion(frames, motion, covered, steps=STEPS, period=period)
+        measured_motion(frames, motion, covered, steps=STEPS, period=period(texture.about))
         for frames, motion, covered in zip(films, target, closeups.covered, strict=True)
         if covered.mean() > 0.5
     ]

@@ -29,7 +29,7 @@ def moments(texture: NcaTexture, field: str) -> list[np.ndarray]:
     """Pictures (H, W, 3) of a texture that follows a field."""
     mesh, generator = ROWS[field], torch.Generator().manual_seed(0)
     cells = Cells.of(mesh, 0)
-    growth = texture.growth(cells, 0.0, texture.condition(cells, field))
+    growth = texture.growth(cells, 0.0, texture.motion(cells, field))
     camera = PreviewCamera(mesh, Shooting(resolution=CELL, azimuth=0.0))
     state, pictures = growth.evolve(growth.seed(), texture.steps, generator), []
     for _ in range(PICTURES):

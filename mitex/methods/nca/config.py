@@ -95,6 +95,7 @@ class NcaConfig(TrainingConfig):
     normalise_gradients: bool = key(True, "divide each parameter tensor's gradient by its norm")
     motion: str | None = key(None, "vector field that the texture moves along, by name or direction")
     motion_encoding: bool = key(True, "whether cells know the field at their place (MPE)")
+    motion_advection: bool = key(True, "whether each step carries the states along the field")
     motion_estimator: Literal["advection", "flow", "lucas-kanade"] = key(
         "advection", "what tells how it moves: the states themselves, or pictures of the albedo"
     )
@@ -203,6 +204,7 @@ PRESETS = {
         interpolation="linear",
         blend=False,
         colour_histogram=False,
+        motion_advection=False,
         milestones=(1000, 2000),
     ),
 }

@@ -70,7 +70,7 @@ def fit(
 
     def texture(about: dict[str, Any]) -> NcaTexture:
         look = task.look.to("cpu")
-        steps = settling_steps(look, task.exemplar, config.density)
+        steps = settling_steps(look, task.exemplar, config.density, origin)
         family = {"family": weights_key(look)}
         return NcaTexture(look, about | origin | family | lineage | {"growth_steps": steps})
 

@@ -24,6 +24,7 @@ from mitex.methods.nca.decoder.surface import Points
 from mitex.methods.nca.growth import Growth, LookGrowth
 from mitex.methods.nca.look import held, traits
 from mitex.methods.nca.model import FIRE_RATE
+from mitex.methods.nca.motion.cell_motion import STILL, CellMotion
 from mitex.methods.nca.motion.condition import Field
 from mitex.methods.nca.orientation import Turn
 from mitex.methods.nca.texture import GrowingTexture, NcaTexture
@@ -64,20 +65,18 @@ class Graft(GrowingTexture):
         """As many as the slower of the two needs."""
         return max(self.first.steps, self.second.steps)
 
-    def condition(
+    def motion(
         self,
         cells: Cells,
         field: Field | None,
         speed: float,
         orientation: Turn = 0.0,
         given: Mesh | None = None,
-    ) -> torch.Tensor | None:
-        return self.first.condition(cells, field, speed, orientation, given)
+    ) -> CellMotion:
+        return self.first.motion(cells, field, speed, orientation, given)
 
-    def growth(self, cells: Cells, orientation: Turn = 0.0, condition: torch.Tensor | None = None) -> Growth:
-        first, second = (
-            texture.growth(cells, orientation, condition) for texture in (self.first, self.second)
-        )
+    def growth(self, cells: Cells, orientation: Turn = 0.0, motion: CellMotion = STILL) -> Growth:
+        first, second = (texture.growth(cells, orientation, motion) for texture in (self.first, self.second))
         return GraftedGrowth(first, second, self.weights(cells.mesh.vertices.astype(np.float64)))
 
 
@@ -140,15 +139,18 @@ class GraftedGrowth(Growth):
         The next states are mixed rather than the updates, which is the same but for rounding: with a weight
         of 0 or 1, the state is exactly that of the single rule.
         """
+        motion = self.first.motion
         mask = torch.rand(state.shape[:2], generator=generator) < FIRE_RATE
         parts = ((self.first, self._of_first), (self.second, self._of_second))
         first, second = (
-            growth.look.rule.step(state, growth.operator, mask & own, growth.condition)
+            growth.look.rule.step(state, growth.operator, mask & own, motion.condition)
             if own.any()
             else state
             for growth, own in parts
         )
-        return held(torch.lerp(first, second, self._share[:, None]), self._low, self._high)
+        mixed = torch.lerp(first, second, self._share[:, None])
+        mixed = mixed if motion.advection is None else motion.advection(mixed)
+        return held(mixed, self._low, self._high)
 
 
 class GraftedGrown(Grown):

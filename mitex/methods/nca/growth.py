@@ -17,6 +17,7 @@ from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.surface import Surface
 from mitex.methods.nca.embossed import Embossed
 from mitex.methods.nca.look import Look, weights_key
+from mitex.methods.nca.motion.cell_motion import STILL, CellMotion
 from mitex.methods.nca.orientation import Turn
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import Perception, perception
@@ -71,7 +72,7 @@ class LookGrowth(Growth):
         orientation: of the texture.
         palette: the exemplar's colours; None if they are not known.
         operator: perception of the cells, if it is not simply that of their mesh.
-        condition: of the cells, (V, 3), of a look that moves.
+        motion: of the cells.
         relief: how far the height moves the surface at most [edges]; 0 if it is a map and no more.
     """
 
@@ -82,25 +83,25 @@ class LookGrowth(Growth):
         orientation: Turn = 0.0,
         palette: Palette | None = None,
         operator: Perception | None = None,
-        condition: torch.Tensor | None = None,
+        motion: CellMotion = STILL,
         relief: float = 0.0,
     ) -> None:
-        self.condition, self.relief, self.moved = condition, relief, False
+        self.motion, self.relief, self.moved = motion, relief, False
         self.look, self.cells, self.orientation, self.palette = look, cells, orientation, palette
         self.operator = operator or perception(cells.mesh, look.rule.degree, orientation, mean=look.mean)
 
     @property
     def key(self) -> str:
-        condition = () if self.condition is None else (self.condition.numpy(),)
         place = self.cells.mesh.vertices, self.cells.mesh.faces, np.asarray(self.orientation)
-        return content_key(weights_key(self.look), *place, *condition)
+        return content_key(weights_key(self.look), *place, *self.motion.arrays)
 
     def seed(self) -> torch.Tensor:
         return self.look.rule.seed(self.operator)[0]
 
     @torch.no_grad()
     def evolve(self, state: torch.Tensor, steps: int, generator: torch.Generator) -> torch.Tensor:
-        return self.look.evolve(state[None], self.operator, steps, generator, self.condition)[0]
+        motion = self.motion.condition, self.motion.advection
+        return self.look.evolve(state[None], self.operator, steps, generator, *motion)[0]
 
     def shown(self, state: torch.Tensor) -> Grown:
         parts = (self.look, state, self.cells, self.orientation, self.palette, self._surface)

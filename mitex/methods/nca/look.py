@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import deepcopy
 from dataclasses import asdict
 from typing import Any
@@ -106,13 +106,14 @@ class Look(nn.Module):
         steps: int,
         generator: torch.Generator,
         condition: torch.Tensor | None = None,
+        advection: Callable[[torch.Tensor], torch.Tensor] | None = None,
     ) -> torch.Tensor:
-        """`steps` steps of the rule from a state (B, V, C), held within the bounds after each; `condition` as
-        of `MeshNCA.step`.
+        """`steps` steps of the rule from a state (B, V, C), held within the bounds after each;
+        `condition` and `advection` as of `MeshNCA.evolve`.
         """
         for step in range(steps):
             announce("growing the texture", step, steps)
-            state = self.bounded(self.rule.evolve(state, operator, 1, generator, condition))
+            state = self.bounded(self.rule.evolve(state, operator, 1, generator, condition, advection))
         return state
 
     def bounded(self, state: torch.Tensor) -> torch.Tensor:

@@ -12,7 +12,7 @@ from mitex.methods.nca.decoder.decoder import Decoder, Readout
 from mitex.methods.nca.decoder.surface import EDGE
 from mitex.methods.nca.displacement import known_relief
 from mitex.methods.nca.look import MARGIN, traits
-from mitex.methods.nca.motion.condition import fastest
+from mitex.methods.nca.motion.cell_motion import fastest
 from mitex.methods.nca.palette import NEARLY, TOLERANCE, Palette
 from mitex.methods.nca.texture import NcaTexture
 from mitex.page import packed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import torch
@@ -96,11 +97,15 @@ class MeshNCA(nn.Module):
         steps: int,
         generator: torch.Generator,
         condition: torch.Tensor | None = None,
+        advection: Callable[[torch.Tensor], torch.Tensor] | None = None,
     ) -> torch.Tensor:
-        """`steps` steps, each with a fresh random mask drawn on the CPU, so that devices agree."""
+        """`steps` steps, each with a fresh random mask drawn on the CPU, so that devices agree, and
+        followed by an `advection` of the states (B, V, C) if there is one.
+        """
         for _ in range(steps):
             mask = torch.rand(state.shape[:2], generator=generator) < FIRE_RATE
             state = self.step(state, mesh, mask.to(state.device), condition)
+            state = state if advection is None else advection(state)
         return state
 
     def _check(

@@ -7,12 +7,16 @@ too, and is best left earlier.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import torch
 
 from mitex.evaluation.regularity import regularity
 from mitex.exemplar import Exemplar
 from mitex.methods.nca.look import Look
+from mitex.methods.nca.motion.cell_motion import tile_motion
 from mitex.methods.nca.ranges import REPEATS, square_cells
 from mitex.methods.nca.surfaces import TrainingPlane
 
@@ -21,7 +25,9 @@ SIDE = 128  # of the exemplar when patterns are compared [px]
 
 
 @torch.no_grad()
-def settling_steps(look: Look, exemplar: Exemplar, density: float) -> int:
+def settling_steps(
+    look: Look, exemplar: Exemplar, density: float, about: Mapping[str, Any] | None = None
+) -> int:
     """The fewest of `STEPS` after which the maps on a flat square are as regular as the exemplar's, on
     average; the most if they never are (`mitex.evaluation.regularity`).
 
@@ -29,17 +35,17 @@ def settling_steps(look: Look, exemplar: Exemplar, density: float) -> int:
         look: a trained rule and decoder; one that moves is looked at while it moves to the right.
         exemplar: its maps.
         density: cells along the exemplar's width.
+        about: what its file tells of how it moves.
     """
     maps = exemplar.resized(SIDE).maps
     goal = np.mean([regularity(maps[name]) for name in look.layout])
     plane = TrainingPlane.of(square_cells(density), look)
     generator = torch.Generator().manual_seed(0)
-    right = None
-    if look.rule.condition:
-        right = torch.from_numpy(plane.axes[:1].astype(np.float32)).expand(plane.perception.vertices, -1)
+    motion = tile_motion(look, about or {}, plane.lattice, None, 1.0)
+    told = motion.condition, motion.advection
     state, age = look.rule.seed(plane.perception), 0
     for steps in STEPS:
-        state = look.evolve(state, plane.perception, steps - age, generator, right)
+        state = look.evolve(state, plane.perception, steps - age, generator, *told)
         age = steps
         if _regularity(plane.whole(look, state[0], REPEATS * SIDE), look) >= goal:
             break

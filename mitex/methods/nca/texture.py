@@ -23,7 +23,8 @@ from mitex.methods.nca.film import Shooting, film
 from mitex.methods.nca.growth import Growth, LookGrowth, grown_state
 from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look, weights_key
-from mitex.methods.nca.motion.condition import Field, Motion, look_condition, tile_condition
+from mitex.methods.nca.motion.cell_motion import STILL, CellMotion, look_motion, tile_motion
+from mitex.methods.nca.motion.condition import Field, Motion
 from mitex.methods.nca.orientation import Orientation, Turn, cell_turns
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import lattice_perception
@@ -56,30 +57,31 @@ class GrowingTexture(ABC):
         return float(density) if isinstance(density, int | float) and density > 0 else DENSITY
 
     @abstractmethod
-    def condition(
+    def motion(
         self,
         cells: Cells,
         field: Field | None = None,
         speed: float = 1.0,
         orientation: Turn = 0.0,
         given: Mesh | None = None,
-    ) -> torch.Tensor | None:
-        """What the cells are told of a vector field, (V, 3); None for a texture that does not move.
+    ) -> CellMotion:
+        """How the cells move along a vector field.
 
         Args:
             cells: the automaton's mesh.
-            field: see `mitex.mesh.fields`; None for the one that the texture was trained with.
+            field: see `mitex.mesh.fields`; None for the one that the texture was trained with, if any.
             speed: factor of the field, whose mean length is 1.
             orientation: of the texture.
             given: whose vertices the vectors of a file or an array belong to; None for `cells.given`.
 
         Raises:
-            ConfigError: a field of a texture that does not move, or one that cannot be used on the mesh.
+            ConfigError: a field that the texture cannot follow, or that cannot be used on the mesh; a speed
+                of a texture that stands still.
         """
 
     @abstractmethod
-    def growth(self, cells: Cells, orientation: Turn = 0.0, condition: torch.Tensor | None = None) -> Growth:
-        """The automaton on a mesh, its texture turned; with the cells' `condition`."""
+    def growth(self, cells: Cells, orientation: Turn = 0.0, motion: CellMotion = STILL) -> Growth:
+        """The automaton on a mesh, its texture turned, its cells moving."""
 
     def growth_on(
         self,
@@ -91,7 +93,7 @@ class GrowingTexture(ABC):
     ) -> Growth:
         """The automaton on a mesh; options and errors as of `apply`, whose vectors are those of `given`."""
         turn = cell_turns(orientation, cells.mesh, given)
-        return self.growth(cells, turn, self.condition(cells, field, speed, turn, given))
+        return self.growth(cells, turn, self.motion(cells, field, speed, turn, given))
 
     def apply(
         self,
@@ -130,16 +132,16 @@ class GrowingTexture(ABC):
             keep_dense: returns the finer mesh itself, rounded by Loop subdivision, instead of the given one.
             displace: moves the vertices by the relief of a texture from words, which else is a normal map
                 alone; a mesh of few vertices needs `keep_dense` to show it.
-            field: vector field that a moving texture follows, see `mitex.mesh.fields`; None for the one that
-                it was trained with.
+            field: vector field that the texture moves along while it grows, see `mitex.mesh.fields`; None for
+                the one that it was trained with, if any.
             speed: factor of the field, whose mean length is 1.
 
         Returns:
             An asset on the given mesh, with one map per learned map.
 
         Raises:
-            ConfigError: options out of range, a field of a texture that does not move, or one that cannot be
-                used on the mesh; a texture without a relief that shall displace it.
+            ConfigError: options out of range; a field or a speed as of `motion`; a texture without a relief
+                that shall displace it.
             MeshError: the mesh cannot be remeshed.
         """
         if exemplar_width is not None:
@@ -266,7 +268,8 @@ class NcaTexture(GrowingTexture):
             resolution: side of the maps [px], 16 to 8192.
             cells: along a side, 8 to 1024; if None, the exemplar appears about `REPEATS` times along it.
             seed, steps, speed: as of `apply`.
-            field: as of `apply`, but the same everywhere, as any other has a seam; None for "right".
+            field: as of `apply`, but the same everywhere, as any other has a seam; None for "right" if it has
+                learned to move.
 
         Returns:
             Maps (N, N, c) float32 in [0, 1], row 0 on top, the exemplar's up upwards; they go on at their
@@ -278,8 +281,8 @@ class NcaTexture(GrowingTexture):
         lattice = flat_cells(square_cells(self.density) if cells is None else cells, resolution)
         operator = lattice_perception(lattice, self.look.rule.degree, self.look.mean)
         cells_of_square = Cells(lattice.joined, 0, lattice.joined)
-        condition = tile_condition(self.look, self.about, lattice, field, speed)
-        growth = LookGrowth(self.look, cells_of_square, 0.0, self._palette, operator, condition)
+        motion = tile_motion(self.look, self.about, lattice, field, speed)
+        growth = LookGrowth(self.look, cells_of_square, 0.0, self._palette, operator, motion)
         state = _healthy(growth, seed, self.steps if steps is None else steps)
         return tile_maps(self.look, state, lattice, resolution, self._palette)
 
@@ -310,22 +313,20 @@ class NcaTexture(GrowingTexture):
         growth = self.growth_on(Cells(mesh, 0, mesh), mesh, orientation, **motion)
         return grown_state(growth, seed, self.steps if steps is None else steps)
 
-    def condition(
+    def motion(
         self,
         cells: Cells,
         field: Field | None = None,
         speed: float = 1.0,
         orientation: Turn = 0.0,
         given: Mesh | None = None,
-    ) -> torch.Tensor | None:
+    ) -> CellMotion:
         whose = given or cells.given
-        return look_condition(self.look, self.about, whose, cells.mesh, field, speed, orientation)
+        return look_motion(self.look, self.about, whose, cells.mesh, field, speed, orientation)
 
-    def growth(
-        self, cells: Cells, orientation: Turn = 0.0, condition: torch.Tensor | None = None
-    ) -> LookGrowth:
+    def growth(self, cells: Cells, orientation: Turn = 0.0, motion: CellMotion = STILL) -> LookGrowth:
         relief = known_relief(self.about, self.look.maps)
-        return LookGrowth(self.look, cells, orientation, self._palette, condition=condition, relief=relief)
+        return LookGrowth(self.look, cells, orientation, self._palette, motion=motion, relief=relief)
 
     @property
     def steps(self) -> int:

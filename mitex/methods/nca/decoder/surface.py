@@ -10,7 +10,7 @@ import torch
 from mitex.mesh import Mesh, Similarity
 from mitex.mesh.gradients import values_and_gradients
 from mitex.plugins import init
-from mitex.sparse import LinearMap
+from mitex.sparse import LinearMap, Weights
 from mitex.textures.interpolation import Kind, SurfaceLookup
 
 # Mean length of the edges in decoder units: that of the sphere that the default preset trains on. So even
@@ -58,7 +58,11 @@ class Surface:
 
     def read(self, table: torch.Tensor, points: Points) -> torch.Tensor:
         """The interpolated state at the points: (P, C)."""
-        return self._lookup.weights(points.face, points.barycentric).to(self.device)(table)
+        return self.weights(points)(table)
+
+    def weights(self, points: Points) -> Weights:
+        """What `read` does at points, for points that are read more than once."""
+        return self._lookup.weights(points.face, points.barycentric).to(self.device)
 
     def place(self, points: Points) -> tuple[torch.Tensor, torch.Tensor]:
         """Positions (P, 3) and lengths of the edges around (P,) of the points [decoder units]."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +14,7 @@ from mitex.mesh.mesh import Mesh
 from mitex.mesh.nearest import nearest_points
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.decoder.surface import Points
+from mitex.methods.nca.motion.advection import Advection, as_points
 from mitex.methods.nca.surfaces import TrainingPlane, TrainingSphere, TrainingSurface
 
 
@@ -35,10 +35,11 @@ class Drift:
         """What the cells know of it, (V, 3) (equation 10)."""
         return torch.from_numpy(self.field.astype(np.float32))
 
-    def transport(self, share: float) -> Callable[[torch.Tensor], torch.Tensor]:
-        """What a share of the period makes of a state (V, C): each cell gets that of the place upstream."""
-        where = self._upstream(self._cells, self.field, share)
-        return lambda state: self.surface.surface.read(self.table(state), where)
+    def advection(self, share: float) -> Advection:
+        """What a share of the period makes of states: each cell gets that of the place upstream."""
+        surface = self.surface
+        source = surface.lattice.source if isinstance(surface, TrainingPlane) else None
+        return Advection(surface.surface, self._upstream(self._cells, self.field, share), source)
 
     def table(self, state: torch.Tensor) -> torch.Tensor:
         """What the decoder reads of a state (V, C)."""
@@ -61,7 +62,7 @@ class Drift:
             field = field[self.surface.lattice.source]
         places = interpolate(weights, mesh.vertices[corners].astype(np.float64))
         before = self._upstream(places, interpolate(weights, field[corners]), share)
-        return _points(face.astype(np.int32), weights.astype(np.float32)), before
+        return as_points(face, weights), before
 
     @property
     def _mesh(self) -> Mesh:
@@ -76,13 +77,9 @@ class Drift:
         """Where what is at places (P, 3) was before, given the field there (P, 3)."""
         surface = self.surface
         if isinstance(surface, TrainingSphere):
-            return _points(*nearest_points(surface.mesh, places - share * surface.edge * field))
+            return as_points(*nearest_points(surface.mesh, places - share * surface.edge * field))
         columns = surface.lattice.columns
-        return _points(*surface.lattice.locate((places - share * field) @ surface.axes.T / columns))
-
-
-def _points(face: np.ndarray, barycentric: np.ndarray) -> Points:
-    return Points(torch.from_numpy(face), torch.from_numpy(barycentric))
+        return as_points(*surface.lattice.locate((places - share * field) @ surface.axes.T / columns))
 
 
 def draw_drift(config: NcaConfig, surface: TrainingSurface, generator: torch.Generator) -> Drift:

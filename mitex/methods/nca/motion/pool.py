@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -52,9 +52,10 @@ class MovingPool(PoolTask):
             way = torch.randint(MOST_WAYS, (), generator=generator)
         drift = self.drift(index, way)
         apart = min(config.motion_steps, steps)
-        states = [self._moved(state, drift, steps % apart, generator)]
+        grow = self._growth(drift, generator)
+        states = [grow(state, steps % apart)]
         for _ in range(steps // apart):
-            states.append(self._moved(states[-1], drift, apart, generator))
+            states.append(grow(states[-1], apart))
         terms = {}
         if not seed and step >= config.motion_start:  # else there is no pattern yet that could move
             loss = self.motion([state[0] for state in states], drift, apart, generator)
@@ -64,18 +65,20 @@ class MovingPool(PoolTask):
     def evolved(
         self, index: int, state: torch.Tensor, steps: int, generator: torch.Generator
     ) -> torch.Tensor:
-        return self._moved(state, self.drift(index, self.ways[index]), steps, generator)
+        return self._growth(self.drift(index, self.ways[index]), generator)(state, steps)
 
     def drift(self, index: int, way: torch.Tensor) -> Drift:
         """How the pool's state `index` moves, given the random seed of its way."""
         return draw_drift(self.config, self.surface(index), torch.Generator().manual_seed(int(way)))
 
-    def _moved(
-        self, state: torch.Tensor, drift: Drift, steps: int, generator: torch.Generator
-    ) -> torch.Tensor:
+    def _growth(
+        self, drift: Drift, generator: torch.Generator
+    ) -> Callable[[torch.Tensor, int], torch.Tensor]:
+        """Of states (1, V, C), by so many steps, along a drift."""
         rule, operator = self.look.rule, drift.surface.perception
-        condition = drift.condition.to(state.device) if rule.condition else None
-        return rule.evolve(state, operator, steps, generator, condition)
+        condition = drift.condition.to(self.look.device) if rule.condition else None
+        advection = drift.advection(1 / self.config.motion_period) if self.config.motion_advection else None
+        return lambda state, steps: rule.evolve(state, operator, steps, generator, condition, advection)
 
     def _keep(self, index: int, way: torch.Tensor) -> None:
         self.ways[index] = way
@@ -93,8 +96,8 @@ class MovingPool(PoolTask):
         """How far states (V, C), each `apart` automaton steps from the next, are from moving with a drift."""
         period, gamma = self.config.motion_period, self.config.motion_gamma
         if self.estimator is None:
-            transport = drift.transport(apart / period)
-            residuals = [advection_residual(a, b, transport(a), FLOOR) for a, b in pairwise(states)]
+            advection = drift.advection(apart / period)
+            residuals = [advection_residual(a, b, advection(a), FLOOR) for a, b in pairwise(states)]
             shown = self._shown(states[-2].detach(), states[-1], drift, apart / period, generator)
             return torch.stack(residuals).mean() + shown
         pairs = self.pairs((states[-2].detach(), states[-1]), drift, generator)

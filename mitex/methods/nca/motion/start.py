@@ -63,7 +63,8 @@ def motion_record(config: NcaConfig) -> dict[str, Any]:
     """What the file of a texture tells of how it learned to move; nothing of a still one."""
     if not config.motion:
         return {}
-    about = {"motion": config.motion, "motion_period": config.motion_period}
+    about: dict[str, Any] = {"motion": config.motion, "motion_period": config.motion_period}
+    about |= {"motion_advection": config.motion_advection}
     return about | {"motion_speed": config.motion_speeds[1]}
 
 
