@@ -354,6 +354,18 @@ def what_cells_know(build):
     assert (told.condition, untold.condition) == (3, 0)
 
 
+@check("motion_advection")
+def what_carries_states(build):
+    """A rule that changes nothing leaves a state in its place, or it goes along with the field."""
+    for carried in (False, True):
+        task = build(*MOVING, f"motion_advection={carried}")
+        state = torch.randn(task.pool[:1].shape, generator=torch.Generator().manual_seed(1))
+        for weight in task.look.rule.parameters():
+            weight.data.zero_()
+        after = task.evolved(0, state, 4, torch.Generator().manual_seed(0))
+        assert torch.equal(after, state) == (not carried)
+
+
 @check("motion_weight")
 def weight_of_motion(build):
     one, three = (_motion(build(*MOVING, f"motion_weight={weight}")) for weight in (1, 3))
@@ -370,10 +382,11 @@ def motion_begins_later(build):
 def speed_of_motion(build):
     """Ways between two states are as many edges as there are steps in a part of the period."""
     for steps, period, expected in ((2, 4, 0.5), (3, 4, 0.75), (2, 16, 0.125)):
-        task = build("motion=up", f"motion_steps={steps}", f"motion_period={period}", "min_steps=3")
+        settings = ("motion=up", "motion_advection=false", "min_steps=3")
+        task = build(*settings, f"motion_steps={steps}", f"motion_period={period}")
         shares = []
         with patch.object(
-            Drift, "transport", lambda self, share, to=shares: to.append(share) or (lambda s: s + 1)
+            Drift, "advection", lambda self, share, to=shares: to.append(share) or (lambda s: s + 1)
         ):
             _motion(task)
         assert shares == [expected]

@@ -42,7 +42,7 @@ def test_growing_stops_when_the_pattern_is_regular_enough(exemplar, monkeypatch,
     ages = []
     look = texture().look
     evolve = look.evolve
-    monkeypatch.setattr(look, "evolve", lambda s, o, n, g, c: ages.append(n) or evolve(s, o, n, g, c))
+    monkeypatch.setattr(look, "evolve", lambda s, o, n, g, *m: ages.append(n) or evolve(s, o, n, g, *m))
     assert settling_steps(look, exemplar, 8) == steps / 100
     assert sum(ages) == steps / 100
 

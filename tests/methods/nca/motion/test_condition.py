@@ -13,6 +13,7 @@ from mitex.mesh import Lattice, grid, icosphere, subdivide_midpoint
 from mitex.mesh.fields import vector_field
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.motion.cell_motion import STILL
 from mitex.methods.nca.motion.condition import flat_vectors
 from tests.methods.nca import tiny
 
@@ -35,7 +36,7 @@ def sphere():
 
 
 def _condition(texture, mesh, levels=0, **options):
-    return texture.condition(Cells.of(mesh, levels), **options).numpy()
+    return texture.motion(Cells.of(mesh, levels), **options).condition.numpy()
 
 
 def test_the_condition_is_the_field_times_the_speed(moving, still, sphere):
@@ -44,7 +45,7 @@ def test_the_condition_is_the_field_times_the_speed(moving, still, sphere):
         expected = 1.5 * vector_field(fine, field)
         assert np.allclose(_condition(moving, sphere, 1, field=field, speed=1.5), expected, atol=1e-6)
     assert np.allclose(_condition(moving, sphere), vector_field(sphere, "right"), atol=1e-6)
-    assert still.condition(Cells.of(sphere, 0)) is None
+    assert still.motion(Cells.of(sphere, 0)) is STILL
 
 
 def test_vectors_of_the_given_mesh_are_carried_to_the_cells(moving, sphere, tmp_path):
@@ -87,12 +88,11 @@ def test_a_tile_moves_to_the_right_by_default(moving):
     assert np.allclose(diagonal, turned, atol=1e-5) and np.abs(diagonal - default).max() > 0.01
 
 
-@pytest.mark.parametrize("option", [{"field": "up"}, {"speed": 0.5}])
 @pytest.mark.parametrize("use", ["apply", "grow", "tile", "fields"])
-def test_a_texture_that_does_not_move_says_so(still, sphere, use, option):
+def test_a_texture_that_stands_still_says_so(still, sphere, use):
     arguments = () if use == "tile" else (sphere,)
-    with pytest.raises(ConfigError, match="'tiny' does not move: it was trained without a vector field"):
-        getattr(still, use)(*arguments, steps=200_000_000, **option)
+    with pytest.raises(ConfigError, match="'tiny' stands still, so that a speed means nothing; give `field`"):
+        getattr(still, use)(*arguments, steps=200_000_000, speed=0.5)
 
 
 def test_a_texture_whose_cells_know_no_field(still, sphere):

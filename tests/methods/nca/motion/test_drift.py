@@ -31,7 +31,7 @@ def test_a_square_carries_waves_along(look, azimuth):
         return torch.from_numpy(np.stack([np.sin(3 * x), np.cos(2 * x - 3 * y)], 1)).float()
 
     field = np.tile(2 * way @ plane.axes, (len(places), 1))
-    carried = Drift(plane, field).transport(0.5)(waves(0 * way))
+    carried = Drift(plane, field).advection(0.5)(waves(0 * way))
     assert (carried - waves(way)).abs().max() < 0.01
     assert (waves(0 * way) - waves(way)).abs().max() > 0.5
 
@@ -48,7 +48,7 @@ def test_a_sphere_carries_a_pattern_about_an_axis(look, mesh):
         return torch.from_numpy(np.stack([np.sin(5 * x), z * y, x * x], 1)).float()
 
     field = np.cross([0.0, 1.5, 0.0], points)  # [edges] at the equator
-    carried = Drift(sphere, field).transport(1.0)(pattern(0.0))
+    carried = Drift(sphere, field).advection(1.0)(pattern(0.0))
     error = (carried - pattern(angle)).abs().max()
     assert error < 0.1 * (pattern(0.0) - pattern(angle)).abs().max()
 
@@ -94,7 +94,7 @@ def test_places_upstream_show_what_is_carried_here(look, kind):
     scale = 2 * math.pi / 32 if kind == "plane" else 3.0
     state = torch.from_numpy(np.sin(scale * places).round(9)).float()
     points, before = drift.random_places(4000, 0.5, torch.Generator().manual_seed(0))
-    carried = drift.table(drift.transport(0.5)(state))
+    carried = drift.table(drift.advection(0.5)(state))
     here, there = surface.surface.read(carried, points), surface.surface.read(drift.table(state), before)
     still = surface.surface.read(drift.table(state), points)
     assert (here - there).abs().mean() < 0.05 * (here - still).abs().mean()

@@ -42,7 +42,7 @@ def test_the_command_line_has_both(moving, tmp_path, monkeypatch):
     assert np.abs(a - b).max() > 0.02 and np.abs(a - c).max() > 0.02
 
 
-def test_a_texture_that_does_not_move(tmp_path):
-    with pytest.raises(ConfigError, match="'tiny' does not move"):
-        tiny.texture().animate(icosphere(4), tmp_path / "film", **OPTIONS, field="up")
+def test_a_speed_of_a_texture_that_stands_still(tmp_path):
+    with pytest.raises(ConfigError, match="'tiny' stands still"):
+        tiny.texture().animate(icosphere(4), tmp_path / "film", **OPTIONS, speed=2.0)
     assert not list(tmp_path.iterdir())

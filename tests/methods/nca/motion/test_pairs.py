@@ -52,7 +52,7 @@ def test_windows_of_a_square(look):
     drift = Drift(plane, np.tile(np.array([1.5, 1.0]) @ plane.axes, (len(places), 1)))
     state = _state(places.round(9))
     windows = plane.places(CloseUps(16, 3, 40), torch.Generator().manual_seed(0))
-    pairs = plane_pairs(look, (state, drift.transport(SHARE)(state)), drift, windows)
+    pairs = plane_pairs(look, (state, drift.advection(SHARE)(state)), drift, windows)
     _assert_moving(pairs, (3, 40, 40))
     assert torch.allclose(pairs.target[:, 0], torch.tensor(1.5 * 40 / 16))
     assert torch.allclose(pairs.target[:, 1], torch.tensor(-1.0 * 40 / 16))
@@ -66,6 +66,6 @@ def test_views_of_a_sphere(look, views):
     cameras = sphere.cameras(CloseUps(8, 2, 40), generator)
     if views == "full":
         cameras = random_views(generator, 2, 2.0, 60.0, 40)
-    pairs = sphere_pairs(look, (state, drift.transport(SHARE)(state)), drift, cameras)
+    pairs = sphere_pairs(look, (state, drift.advection(SHARE)(state)), drift, cameras)
     _assert_moving(pairs, (2, 40, 40))
     assert pairs.mask.all() == (views == "patch")

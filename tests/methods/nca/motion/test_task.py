@@ -94,6 +94,7 @@ def test_a_perfect_transport_would_cost_nothing(exemplar, monkeypatch):
     decoder with grain, which stays in place, never is perfect.
     """
     settings = (*MOVING, "min_steps=7", "max_steps=7", "motion_period=4", "motion_weight=1")
+    settings += ("motion_advection=false",)
     task, grainy = (
         _smooth(MotionTask(config(*settings, f"coordinates={words}"), exemplar)) for words in ("", "waves")
     )
@@ -108,9 +109,10 @@ def test_a_perfect_transport_would_cost_nothing(exemplar, monkeypatch):
     original = training.draw_drift
     monkeypatch.setattr(training, "draw_drift", draw)
 
-    def evolve(state, operator, steps, generator, condition):
+    def evolve(state, operator, steps, generator, condition, advection):
+        assert advection is None
         assert torch.equal(condition, drifts[-1].condition)
-        return drifts[-1].transport(steps / 4)(state[0])[None]
+        return drifts[-1].advection(steps / 4)(state[0])[None]
 
     for one in (task, grainy):
         monkeypatch.setattr(one.look.rule, "evolve", evolve)
