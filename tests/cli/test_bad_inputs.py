@@ -185,9 +185,10 @@ APPLIES = {
     "relief of colours at vertices": (apply("--relief 0.1 --vertex-colors"), "--relief and --vertex-colors"),
     "relief of variants": (apply("--relief 0.1 --variants 2"), "--relief and --variants"),
     "relief of a page": (apply("--relief 0.1", out="out/a.html"), "--relief means nothing for .html"),
-    "field of a still texture": (apply("--field up"), "'pebbles' does not move"),
-    "speed of a still texture": (apply("--speed 2"), "'pebbles' does not move"),
-    "field of a still tile": ("apply pebbles --tile 64 --field up --out out/tile", "'pebbles' does not move"),
+    "speed of a still texture": (apply("--speed 2"), "'pebbles' stands still, so that a speed means nothing"),
+    "field of no name": (apply("--field rihgt"), "did you mean right?"),
+    "field of a tile": ("apply pebbles --tile 64 --field about-x --out out/tile", "normal to the surface"),
+    "field of a page": (apply("--field up", out="out/a.html"), "pages carry nothing"),
 }
 
 RENDERS = {

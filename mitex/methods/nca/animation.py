@@ -29,7 +29,7 @@ class Animate:
       mitex animate pebbles --mesh bunny.obj --out loop.gif --loop --seconds 3 --resolution 256
       mitex animate pebbles --mesh bunny.obj --out healing.mp4 --damage 0,0.5,0,0.3
       mitex animate pebbles --mesh bunny.obj --out frames/ --renderer path --spp 64
-      mitex animate runs/flowing --mesh bunny.obj --out flow.mp4 --start 200 --field about-y --speed 1.5
+      mitex animate lava --mesh bunny.obj --out flow.mp4 --start 200 --field about-y --speed 1.5
       mitex animate pebbles --mesh bunny.obj --out growth.mp4 --resume
     """
 
@@ -98,10 +98,11 @@ class Animate:
     """Size of the pattern."""
 
     field: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="(default: the training's)")] = None
-    """Vector field that a moving texture follows: a name, a direction, or a file (.npy .ply .json)."""
+    """Vector field that the texture moves along: a name, a direction, or a file (.npy .ply .json)."""
 
     speed: Annotated[float, arg(metavar="X")] = 1.0
-    """Speed of a moving texture, as a factor of the field."""
+    """Speed of the texture along --field, as a factor of its mean of one edge in 6 steps, or in as many as the
+    texture was trained with."""
 
     resume: Annotated[bool, arg(help_behavior_hint="")] = False
     """Go on with a film that was interrupted."""

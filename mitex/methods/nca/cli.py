@@ -146,10 +146,11 @@ class Apply(ReliefOptions):
     layout's square]."""
 
     field: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="(default: the training's)")] = None
-    """Vector field that a moving texture follows: a name, a direction, or a file (.npy .ply .json)."""
+    """Vector field that the texture moves along: a name, a direction, or a file (.npy .ply .json)."""
 
     speed: Annotated[float, arg(metavar="X")] = 1.0
-    """Speed of a moving texture, as a factor of the field."""
+    """Speed of the texture along --field, as a factor of its mean of one edge in 6 steps, or in as many as the
+    texture was trained with."""
 
     resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {RESOLUTION})")] = None
     """Side of the baked textures [texels]."""

@@ -211,11 +211,14 @@ PRESETS = {
 PRESETS["motion"] = replace(
     DEFAULT,
     preset="motion",
-    steps=600,
+    steps=300,
     pool=24,
-    view_count=2,
-    milestones=(350, 500),
+    view_count=4,
+    lr=5e-4,
+    milestones=(150, 240),
     motion="right",
+    motion_weight=0.25,
+    motion_period=6.0,
 )
 PRESETS["motion-paper"] = replace(
     PRESETS["paper"],

@@ -107,8 +107,8 @@ def _followed(texture: NcaTexture, field: Field | None, speed: float) -> Field |
     followed = followed_field(look, about, field, speed, about.get("motion"))
     if followed is not None and carried(look, about):
         raise ConfigError(
-            f"'{about.get('name')}' is carried along its field, which pages cannot do",
-            "train one with motion_advection=false",
+            f"'{about.get('name')}' is carried along its field, and pages carry nothing",
+            "film it, or train one with motion_advection=false",
         )
     return followed
 

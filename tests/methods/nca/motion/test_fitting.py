@@ -38,7 +38,7 @@ def test_a_still_look_learns_to_move(tmp_path, lava):
     path = _parent(tmp_path)
     first = nca.fit(lava, init=path, motion="about-y", set=[*TINY, "steps=0"])
     assert (first.about["preset"], first.about["motion"]) == ("motion", "about-y")
-    assert first.about["motion_period"] == 12.0 and first.about["parent"] == "tiny"
+    assert first.about["motion_period"] == 6.0 and first.about["parent"] == "tiny"
     assert first.about["motion_speed"] == 2.0
     still = NcaTexture.load(path)
     sphere = icosphere(4)
