@@ -149,8 +149,7 @@ class Apply(ReliefOptions):
     """Vector field that the texture moves along: a name, a direction, or a file (.npy .ply .json)."""
 
     speed: Annotated[float, arg(metavar="X")] = 1.0
-    """Speed of the texture along --field, as a factor of its mean of one edge in 6 steps, or in as many as the
-    texture was trained with."""
+    """Speed along --field. At 1, the mean is an edge of the automaton's mesh in 6 steps, or as trained."""
 
     resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {RESOLUTION})")] = None
     """Side of the baked textures [texels]."""

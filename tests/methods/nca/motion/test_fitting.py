@@ -43,7 +43,7 @@ def test_a_still_look_learns_to_move(tmp_path, lava):
     still = NcaTexture.load(path)
     sphere = icosphere(4)
     assert torch.equal(first.grow(sphere, steps=6, speed=0.0), still.grow(sphere, steps=6))
-    uncarried = NcaTexture(first.look, first.about | {"motion_advection": False})
+    uncarried = NcaTexture(first.look, {**first.about, "motion_advection": False})
     assert torch.equal(uncarried.grow(sphere, steps=6, speed=1.5), still.grow(sphere, steps=6))
     assert (first.grow(sphere, steps=6, speed=1.5) - still.grow(sphere, steps=6)).abs().max() > 0.01
     out = tmp_path / "run"

@@ -1,5 +1,5 @@
-"""Textures move, and turn with their field: a still one that is carried, and one that has learned it, in a real
-training, small but to the end.
+"""Textures move, and turn with their field: a still one that is carried, and one that learns it in a training,
+which is small, but real and to the end.
 """
 
 import math
