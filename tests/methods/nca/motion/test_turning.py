@@ -1,4 +1,4 @@
-"""Textures move, and turn with their field: a still one that is carried, and one that learns it in a training,
+"""Textures move, and turn with their field: a still one that is carried, and one that learns it in training,
 which is small, but real and to the end.
 """
 
