@@ -43,7 +43,9 @@ def test_a_texture_from_words_learns_to_move(tmp_path):
         "red dots", clip=clip, init=tmp_path / "still", motion="up", set=[*settings, "steps=0"]
     )
     sphere = icosphere(4)
-    assert torch.equal(first.grow(sphere, steps=6, speed=1.5), still.grow(sphere, steps=6))
+    assert torch.equal(first.grow(sphere, steps=6, field="up", speed=0.0), still.grow(sphere, steps=6))
+    carried = still.grow(sphere, steps=6, field="up", speed=0.75)  # in a period half as long
+    assert torch.allclose(first.grow(sphere, steps=6, speed=1.5), carried, atol=1e-6)
     nca.fit_text("red dots", out, clip=clip, init=tmp_path / "still", motion="up", set=[*settings, "steps=4"])
     moved = NcaTexture.load(out)
     about = (moved.about[name] for name in ("motion", "motion_speed", "text", "parent"))
