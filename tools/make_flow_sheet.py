@@ -22,7 +22,7 @@ from mitex.render import sheet
 
 SHEET = Path(__file__).parents[1] / "docs" / "gallery" / "nca-flow.jpg"
 ROWS = {"right": icosphere(26), "about-y": embedded("vase")}
-PICTURES, STEPS, CELL = 5, 24, 256  # in a row, between two of them, and their side [px]
+PICTURES, STEPS, CELL = 5, 12, 256  # in a row, between two of them, and their side [px]
 
 
 def moments(texture: NcaTexture, field: str) -> list[np.ndarray]:
