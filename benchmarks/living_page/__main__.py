@@ -2,10 +2,11 @@
 
 usage: python -m benchmarks.living_page [--quick]
 
-Steps of the automaton in four ways on the same mesh, in turns: four passes as on MeshNCA's own page, the
+Steps of the automaton in several ways on the same mesh, in turns: four passes as on MeshNCA's own page, the
 page's one pass in WebGL2, and its compute shader in WebGPU, with the states brought to WebGL2 once at the end
-or, as while it is drawn, after each step. Pictures of 512 x 512 pixels. Times are those that processors
-worked for the browser, so that other work on the machine counts little; the least of several.
+or, as while it is drawn, after each step; and with states that are carried along a field. Pictures of
+512 x 512 pixels. Times are those that processors worked for the browser, so that other work on the machine
+counts little; the least of several.
 """
 
 from __future__ import annotations
@@ -32,12 +33,15 @@ WAYS = {
     "one pass (WebGL2)": "await page.step(argument); wait()",
     "compute (WebGPU)": "await page.step(argument); wait()",
     "compute, brought each step": "for (let k = 0; k < argument; k++) await page.step(1); wait()",
+    "one pass, flowing": "await page.step(argument); wait()",
+    "compute, flowing": "await page.step(argument); wait()",
     "picture": "page.pixels()",
 }
 
 
 def milliseconds(tab: Tab, way: str, count: int) -> float:
     """What one step takes of processors' time."""
+    tab.run("page.move(argument, 1)", "right" if way.endswith("flowing") else None)
     begun = worked()
     tab.run(TIMED % WAYS[way], count)
     return 1000 * (worked() - begun) / count

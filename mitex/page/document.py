@@ -33,6 +33,7 @@ SCRIPTS = (
     "studio",
     "brush",
     "fields",
+    "advection",
     "elements",
     "bake",
     "glb",

@@ -188,7 +188,7 @@ APPLIES = {
     "speed of a still texture": (apply("--speed 2"), "'pebbles' stands still, so that a speed means nothing"),
     "field of no name": (apply("--field rihgt"), "did you mean right?"),
     "field of a tile": ("apply pebbles --tile 64 --field about-x --out out/tile", "normal to the surface"),
-    "field of a page": (apply("--field up", out="out/a.html"), "pages carry nothing"),
+    "field of a page": (apply("--field rihgt", out="out/a.html"), "did you mean right?"),
 }
 
 RENDERS = {

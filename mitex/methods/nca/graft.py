@@ -148,9 +148,8 @@ class GraftedGrowth(Growth):
             else state
             for growth, own in parts
         )
-        mixed = torch.lerp(first, second, self._share[:, None])
-        mixed = mixed if motion.advection is None else motion.advection(mixed)
-        return held(mixed, self._low, self._high)
+        mixed = held(torch.lerp(first, second, self._share[:, None]), self._low, self._high)
+        return mixed if motion.advection is None else motion.advection(mixed)
 
 
 class GraftedGrown(Grown):

@@ -108,12 +108,13 @@ class Look(nn.Module):
         condition: torch.Tensor | None = None,
         advection: Callable[[torch.Tensor], torch.Tensor] | None = None,
     ) -> torch.Tensor:
-        """`steps` steps of the rule from a state (B, V, C), held within the bounds after each;
-        `condition` and `advection` as of `MeshNCA.evolve`.
+        """`steps` steps of the rule from a state (B, V, C), held within the bounds after each, before it is
+        carried; `condition` and `advection` as of `MeshNCA.evolve`.
         """
         for step in range(steps):
             announce("growing the texture", step, steps)
-            state = self.bounded(self.rule.evolve(state, operator, 1, generator, condition, advection))
+            state = self.bounded(self.rule.evolve(state, operator, 1, generator, condition))
+            state = state if advection is None else advection(state)
         return state
 
     def bounded(self, state: torch.Tensor) -> torch.Tensor:

@@ -8,14 +8,13 @@ from math import radians
 from pathlib import Path
 from typing import Any
 
-from mitex.errors import ConfigError
 from mitex.mesh import Mesh
 from mitex.mesh.fields import NAMES
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.surface import EDGE
 from mitex.methods.nca.film import PreviewCamera, Shooting
 from mitex.methods.nca.look_data import look_data
-from mitex.methods.nca.motion.cell_motion import carried, followed_field
+from mitex.methods.nca.motion.cell_motion import followed_field
 from mitex.methods.nca.motion.condition import Field, cell_vectors
 from mitex.methods.nca.orientation import Orientation
 from mitex.methods.nca.texture import NcaTexture, grown_state
@@ -102,15 +101,8 @@ def _content(
 
 
 def _followed(texture: NcaTexture, field: Field | None, speed: float) -> Field | None:
-    """The vector field that a texture follows in a page, whose cells are told of it, but not carried."""
-    look, about = texture.look, texture.about
-    followed = followed_field(look, about, field, speed, about.get("motion"))
-    if followed is not None and carried(look, about):
-        raise ConfigError(
-            f"'{about.get('name')}' is carried along its field, and pages carry nothing",
-            "film it, or train one with motion_advection=false",
-        )
-    return followed
+    """The vector field that a texture follows in a page."""
+    return followed_field(texture.look, texture.about, field, speed, texture.about.get("motion"))
 
 
 def _anywhere(field: Field | None) -> str | list[float] | None:

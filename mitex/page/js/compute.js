@@ -48,6 +48,21 @@ class ComputeAutomaton extends Automaton {
     Object.assign(this, { pipeline, directions, numbers });
   }
 
+  // What carries the states after each step, of `advectionOf`; null for nothing.
+  carry(advection) {
+    const { device, shape } = this;
+    this._letGo();
+    if (!advection) return;
+    const pipeline = computePipeline(device, written(SHADERS["carry.wgsl"], { CONSTANTS: `const VECTORS = ${shape.vectors}u;` }));
+    const sources = storageBuffer(device, 16 * this._plane);
+    device.queue.writeBuffer(sources, 0, advection.sources);
+    const buffers = [sources, filledBuffer(device, advection.parts)];
+    // In the order of the pair's directions as they are now.
+    const directions = [this.pair, this.pair.toReversed()].map((states) =>
+      bindGroup(device, pipeline, 0, [...buffers, ...states]));
+    this.carrying = { pipeline, buffers, directions };
+  }
+
   get _plane() {
     return WIDTH * this.surface.height;
   }
@@ -87,17 +102,23 @@ class ComputeAutomaton extends Automaton {
     device.queue.writeBuffer(buffers.numbers, 0, this._numbers(count));
     const commands = device.createCommandEncoder();
     const pass = commands.beginComputePass();
-    pass.setPipeline(this.pipeline);
     for (let k = 0; k < count; k++) {
-      pass.setBindGroup(0, this.directions[0]);
-      pass.setBindGroup(1, this.numbers[k]);
-      pass.dispatchWorkgroups(this._plane / TILE);
-      this.pair.reverse();
-      this.directions.reverse();
+      this._pass(pass, this.pipeline, this.directions[0], this.numbers[k]);
+      if (this.carrying) this._pass(pass, this.carrying.pipeline, this.carrying.directions[0]);
     }
     pass.end();
     device.queue.submit([commands.finish()]);
     this.steps += count;
+  }
+
+  // New states of all cells from the present ones.
+  _pass(pass, pipeline, ...groups) {
+    pass.setPipeline(pipeline);
+    groups.forEach((group, k) => pass.setBindGroup(k, group));
+    pass.dispatchWorkgroups(this._plane / TILE);
+    this.pair.reverse();
+    this.directions.reverse();
+    this.carrying?.directions.reverse();
   }
 
   // What the shader knows of each step.
@@ -144,6 +165,11 @@ class ComputeAutomaton extends Automaton {
     list.destroy();
   }
 
+  _letGo() {
+    this.carrying?.buffers.forEach((one) => one.destroy());
+    this.carrying = null;
+  }
+
   _dropWeights() {
     Object.values(this.weights ?? {}).forEach((one) => one.destroy());
   }
@@ -151,6 +177,7 @@ class ComputeAutomaton extends Automaton {
   drop() {
     this.version++;
     this._dropWeights();
+    this._letGo();
     [...this.pair, ...Object.values(this.buffers)].forEach((one) => one.destroy());
     super.drop();
   }

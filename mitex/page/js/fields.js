@@ -35,16 +35,20 @@ function named(mesh, field) {
   return (v) => cross(AXES[field], unit(minus(mesh.point(v), centre)));
 }
 
-// What cells are told (count x 3): the field at some speed, no faster than they have learned to move, turned
-// back by the texture's orientation.
-function conditionOf(mesh, field, speed, longest, turn) {
+// (count x 3) vectors of a field at some speed, none longer than a texture can follow.
+function slowedVectors(mesh, field, speed, longest) {
   const vectors = fieldVectors(mesh, field);
-  const told = new Float32Array(vectors.length);
   for (let v = 0; v < mesh.count; v++) {
     const vector = scaled(rowOf(vectors, v), speed);
-    const slowed = scaled(vector, Math.min(1, longest / Math.max(norm(vector), 1e-12)));
-    told.set(rotated(slowed, mesh.normal(v), -turnAt(turn, v)), 3 * v);
+    vectors.set(scaled(vector, Math.min(1, longest / Math.max(norm(vector), 1e-12))), 3 * v);
   }
+  return vectors;
+}
+
+// What cells are told of these vectors: turned back by the texture's orientation.
+function toldVectors(mesh, vectors, turn) {
+  const told = new Float32Array(vectors.length);
+  for (let v = 0; v < mesh.count; v++) told.set(rotated(rowOf(vectors, v), mesh.normal(v), -turnAt(turn, v)), 3 * v);
   return told;
 }
 

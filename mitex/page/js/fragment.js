@@ -23,6 +23,19 @@ class FragmentAutomaton extends Automaton {
     this.program = this.graphics.program(SHADERS["fill.vert"], fragmentStep(this.shape, Object.keys(rules)));
   }
 
+  // What carries the states after each step, of `advectionOf`; null for nothing.
+  carry(advection) {
+    const { graphics, shape, surface } = this;
+    this._letGo();
+    if (!advection) return;
+    this.carrying = { sources: surface.cells("RGBA32UI", advection.sources), parts: graphics.list("RGBA32UI", advection.parts) };
+    this.carryProgram = graphics.program(SHADERS["fill.vert"], written(SHADERS["carry.frag"], {
+      SAMPLERS: each(shape.vectors, (c) => `uniform sampler2D state${c};`),
+      OUTPUTS: each(shape.vectors, (c) => `layout(location = ${c}) out vec4 next${c};`),
+      ZERO: each(shape.vectors, (c) => `next${c} = vec4(0.0);`),
+      ADD: each(shape.vectors, (c) => `next${c} += weight * texelFetch(state${c}, place, 0);`) }));
+  }
+
   // Takes steps; the states can be drawn when the promise is kept, which here is at once.
   async advance(count) {
     for (let k = 0; k < count; k++) this._step();
@@ -30,14 +43,25 @@ class FragmentAutomaton extends Automaton {
 
   _step() {
     const { surface, uniforms, condition, shares } = this;
-    const [from, to] = this.states;
-    this.graphics.fill(to, this.program, {
-      ...uniforms, ...textures(from, "state"), rows: surface.rows, links: surface.links, shares, condition,
+    this._pass(this.program, {
+      ...uniforms, rows: surface.rows, links: surface.links, shares, condition,
       phase: phaseOf(this.steps, this.seed), count: surface.mesh.count, regular: this.look.mean ? 6 : 0,
     });
-    this.states = [to, from];
+    if (this.carrying) this._pass(this.carryProgram, this.carrying);
     this.steps++;
     this.fresh = false;
+  }
+
+  // New states of all cells from the present ones.
+  _pass(program, values) {
+    const [from, to] = this.states;
+    this.graphics.fill(to, program, { ...values, ...textures(from, "state") });
+    this.states = [to, from];
+  }
+
+  _letGo() {
+    Object.values(this.carrying ?? {}).forEach((texture) => this.graphics.gl.deleteTexture(texture));
+    this.carrying = null;
   }
 
   _dropWeights() {
@@ -48,6 +72,7 @@ class FragmentAutomaton extends Automaton {
 
   drop() {
     this._dropWeights();
+    this._letGo();
     super.drop();
   }
 }

@@ -30,7 +30,7 @@ class Page extends View {
   setMesh(base, levels) {
     if (base !== this.base) {
       const led = (own, now, otherwise) => (base.fields[own] ? own : now === own || now === undefined ? otherwise : now);
-      this.field = led(MOTION, this.field, this.data.field ?? FIELDS[0]);
+      this.field = led(MOTION, this.field, this.data.field);
       this.upwards = led(UPWARDS, this.upwards, this.data.upwards);
     }
     Object.assign(this, { base, levels });
@@ -83,7 +83,8 @@ class Page extends View {
   orient(turn, upwards = this.upwards) {
     Object.assign(this, { turn, upwards });
     this.surface.orient(this.turnOn(this.surface.mesh));
-    this.move(this.field, this.speed);
+    this._tell();
+    this.changed = true;
   }
 
   turnOn(mesh) {
@@ -98,21 +99,35 @@ class Page extends View {
     else this.orient(this.turn, own);
   }
 
-  // Lets a moving texture follow a field at some speed.
+  // Lets a texture that can move follow a field at some speed; null for none.
   move(field, speed) {
     Object.assign(this, { field, speed, changed: true });
+    const { look, surface, followed } = this;
+    this.vectors = followed && slowedVectors(surface.mesh, followed, speed, look.fastest ?? Infinity);
+    this._tell();
+    this.automaton.carry(followed && look.carried ? advectionOf(surface, this.vectors, look.period) : null);
+  }
+
+  // The field that moves the texture; null for none. What was trained to be told of one needs one.
+  get followed() {
+    if (this.look.condition) return this.field ?? FIELDS[0];
+    return this.look.carried ? this.field : null;
+  }
+
+  _tell() {
     if (!this.look.condition) return;
-    const { mesh, slots } = this.surface;
-    const told = conditionOf(mesh, field, speed, this.look.fastest ?? Infinity, this.surface.turn);
-    this.automaton.tell(slots.spread(told, 3));
+    const { mesh, slots, turn } = this.surface;
+    this.automaton.tell(slots.spread(toldVectors(mesh, this.vectors, turn), 3));
   }
 
   // Another look on the mesh; one of the same family goes on from the state that is there.
   setLook(chosen) {
     const related = this.looks[chosen].family === this.look.family;
     Object.assign(this, { chosen, grafted: null });
-    if (related) this._weights();
-    else {
+    if (related) {
+      this._weights();
+      this.move(this.field, this.speed);
+    } else {
       this.decoder = null;
       this._grow();
     }

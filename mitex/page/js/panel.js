@@ -136,11 +136,12 @@ class Panel {
   // Where a texture moves that can.
   _motion() {
     const { page } = this;
-    if (!page.look.condition) return [];
+    if (!page.look.condition && !page.look.carried) return [];
+    const none = page.look.condition ? [] : [[null, "none"]];
     const given = Array.isArray(page.data.field) ? [[page.data.field, page.data.field.join(", ")]] : [];
     const own = page.base.fields[MOTION] ? [[MOTION, "the file's"]] : [];
     const names = FIELDS.map((name) => [name, name.replace("-", " ")]);
-    const fields = choice("Direction", [...names, ...given, ...own], page.field, (name) => {
+    const fields = choice("Direction", [...none, ...names, ...given, ...own], page.followed, (name) => {
       page.move(name, page.speed);
       fields.set(name);
     });
@@ -246,7 +247,7 @@ class Panel {
   }
 
   // Grows the texture on a mesh of the user's, or lets it follow vectors at the vertices of the one that is there.
-  open(file, led = this.page.look.condition ? MOTION : UPWARDS) {
+  open(file, led = this.page.followed ? MOTION : UPWARDS) {
     const { page } = this;
     if (!file || !page.automaton) return;
     this.attempt(async () => {

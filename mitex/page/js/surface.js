@@ -18,9 +18,9 @@ class Surface {
     this.linkValues = this._links(turn);
     this.rows = this._cells("RGBA32UI", this.rowValues);
     this.links = graphics.list("RGBA32UI", this.linkValues);
-    const { links, own } = gradients(this.points, mesh);
-    this.slopes = graphics.list("RGBA32F", links);
-    this.ownSlopes = this._cells("RGBA32F", slots.spread(own, 3));
+    this.gradients = gradients(this.points, mesh);
+    this.slopes = graphics.list("RGBA32F", this.gradients.links);
+    this.ownSlopes = this._cells("RGBA32F", slots.spread(this.gradients.own, 3));
   }
 
   // Turns the texture about the normals by this angle [rad], one or those of the vertices.

@@ -10,23 +10,24 @@ from mitex.mesh import Mesh
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.motion.cell_motion import STILL, CellMotion
 from mitex.methods.nca.orientation import Turn
 from mitex.methods.nca.perception import perception
 from tests.page.hashes import mask
 
 
 def states(
-    texture: NcaTexture, mesh: Mesh, seed: int = 0, turn: Turn = 0.0, told: np.ndarray | None = None
+    texture: NcaTexture, mesh: Mesh, seed: int = 0, turn: Turn = 0.0, motion: CellMotion = STILL
 ) -> Iterator[torch.Tensor]:
-    """The states (V, C) after each step, of cells that are told `told` of a field."""
+    """The states (V, C) after each step, of cells that move."""
     look = texture.look
     operator = perception(mesh, look.rule.degree, turn, mean=look.mean)
-    condition = None if told is None else torch.from_numpy(told)
     values, step = look.rule.seed(operator), 0
     while True:
         fires = torch.from_numpy(mask(len(mesh.vertices), step, seed))
         with torch.no_grad():
-            values = look.bounded(look.rule.step(values, operator, fires, condition))
+            values = look.bounded(look.rule.step(values, operator, fires, motion.condition))
+            values = values if motion.advection is None else motion.advection(values)
         step += 1
         yield values[0]
 

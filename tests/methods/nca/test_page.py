@@ -267,8 +267,8 @@ def test_what_a_page_cannot_follow_is_refused(texture, tmp_path):
         living_page(texture, torus(8, 6), tmp_path / "a.html", orientation="sideways")
     with pytest.raises(ConfigError, match="for each vertex"):
         living_page(texture, torus(8, 6), tmp_path / "a.html", orientation=np.ones((5, 3)))
-    with pytest.raises(ConfigError, match="is carried along its field, and pages carry nothing"):
-        living_page(texture, torus(8, 6), tmp_path / "a.html", field="up")
+    with pytest.raises(ConfigError, match="there is no vector field 'sideways'"):
+        living_page(texture, torus(8, 6), tmp_path / "a.html", field="sideways")
     with pytest.raises(ConfigError, match="stands still"):
         living_page(texture, torus(8, 6), tmp_path / "a.html", speed=2.0)
     with pytest.raises(OutputError):

@@ -4,6 +4,7 @@ import base64
 
 import numpy as np
 import pytest
+import torch
 import trimesh
 from imageio_ffmpeg import read_frames
 from trimesh.exchange.gltf import export_glb
@@ -13,6 +14,7 @@ from mitex.evaluation.metrics import single_image_frechet
 from mitex.exemplar import Exemplar
 from mitex.mesh import icosphere
 from mitex.methods.nca import NcaTexture, living_page
+from mitex.methods.nca.motion.cell_motion import CellMotion
 from mitex.methods.nca.motion.condition import cell_vectors
 from mitex.page import quantised
 from tests.methods.nca import tiny
@@ -85,7 +87,8 @@ def test_a_moving_texture_is_led(browser, tmp_path):
     tab.page.get_by_role("slider", name="Pace").fill("1.7")
     turn = np.radians(30.0)
     told = cell_vectors(mesh, mesh, "about-y", 1.7, turn)
-    state = after(4, states(texture, mesh, turn=turn, told=told)).numpy()
+    motion = CellMotion(torch.from_numpy(told))
+    state = after(4, states(texture, mesh, turn=turn, motion=motion)).numpy()
     # As processors take the steps, as graphics cards do, where a thread has one cell, and in WebGL2.
     for way in ("", "page.device.cellsPerThread = 1; page._settle()", "page.device = null; page._settle()"):
         tab.run(f"{way}; page.reset(); await page.step(4)")
