@@ -90,7 +90,7 @@ class Words:
         loss = self.task.loss(1, torch.Generator().manual_seed(0)).value
         torch.autograd.grad(loss, self.task.parameters)
 
-    def parts(self, models: Mapping[str, TextImageModel]) -> dict[str, Callable[[], object]]:
+    def parts(self, models: Mapping[str, TextImageModel]) -> Mapping[str, Callable[[], object]]:
         """What is measured, by name; `models` are to look at the pictures of a step alone."""
         pictures = self.pictures()
 
@@ -116,7 +116,7 @@ def main() -> None:
     let_idle_threads_sleep()
     clip = {str(dtype)[6:]: RandomTower(TINY if quick else B32, dtype) for dtype in DTYPES}
     towers = {f"image tower, {name}": tower for name, tower in clip.items()}
-    trainings: dict[str, dict[str, TextImageModel]] = {"text": towers, "text-words": {"model": words_model()}}
+    trainings: Mapping[str, Mapping[str, TextImageModel]] = {"text": towers, "text-words": {"model": words_model()}}
     titles = {"text": "a ViT-B/32 (steps in bfloat16)", "text-words": "the embedded model"}
     Console().print(cpu())
     for preset, models in trainings.items():
