@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import deepcopy
 from pathlib import Path
 
 import torch
+import torch.nn.functional as F
 
 from mitex.errors import ConfigError, WeightsError
 from mitex.features.clip.shape import ClipShape
 from mitex.features.clip.tokenizer import Tokenizer
-from mitex.features.clip.towers import Linear, Towers
+from mitex.features.clip.towers import ImageTower, Linear, Towers
 from mitex.runtime import bfloat16_is_fast
+
+AGREEMENT = 0.999  # cosine of gradients from which on bfloat16 is as good as float32
 
 
 class Clip:
@@ -23,8 +27,8 @@ class Clip:
     Args:
         folder: where the files are.
         precision: of the products that images go through: "bfloat16", "float32", or "auto", bfloat16 where
-            the processor multiplies it natively. Gradients of a cosine then have a cosine of over 0.999 with
-            those of float32 (with random weights). Texts always get float32.
+            the processor multiplies it natively and these weights allow it: the gradient of a cosine must
+            have a cosine of over 0.999 with that of float32. Texts always get float32.
         device: where the weights live.
 
     Raises:
@@ -35,15 +39,14 @@ class Clip:
     def __init__(self, folder: Path, precision: str = "auto", device: torch.device | str = "cpu") -> None:
         if precision not in ("auto", "bfloat16", "float32"):
             raise ConfigError(f"unknown precision {precision!r}", "use 'auto', 'bfloat16' or 'float32'")
-        fast = precision == "bfloat16" or (precision == "auto" and bfloat16_is_fast(str(device)))
         self._shape, self._device = ClipShape.read(folder), device
         self._name = _name(folder)
         self._tokenizer = Tokenizer(folder, self._shape)
         self._towers = _loaded(folder, self._shape).to(device)
-        if fast:
-            for layer in self._towers.vision_model.modules():
-                if isinstance(layer, Linear):
-                    layer.to(torch.bfloat16)
+        if precision == "bfloat16" or (precision == "auto" and bfloat16_is_fast(str(device))):
+            exact, fast = self._towers.vision_model, _in_bfloat16(self._towers.vision_model)
+            if precision == "bfloat16" or _agree(exact, fast, self.resolution):
+                self._towers.vision_model = fast
         self._mean, self._deviation = (
             torch.tensor(values, device=device) for values in (self._shape.mean, self._shape.deviation)
         )
@@ -90,6 +93,30 @@ class Clip:
             return torch.zeros(0, self._shape.embedding, device=self._device)
         tokens, last = (part.to(self._device) for part in self._tokenizer(texts))
         return self._towers.text_projection(self._towers.text_model(tokens, last))
+
+
+def _in_bfloat16(tower: ImageTower) -> ImageTower:
+    """A copy whose products are in bfloat16."""
+    fast = deepcopy(tower)
+    for layer in fast.modules():
+        if isinstance(layer, Linear):
+            layer.to(torch.bfloat16)
+    return fast
+
+
+def _agree(exact: ImageTower, fast: ImageTower, resolution: int) -> bool:
+    """Whether a picture of soft blots has the same gradient in both, but for a small angle."""
+    device, generator = exact.post_layernorm.weight.device, torch.Generator().manual_seed(0)
+    blots = F.interpolate(
+        torch.randn(1, 3, 8, 8, generator=generator), (resolution, resolution), mode="bicubic"
+    )
+    aim = torch.randn(exact.post_layernorm.weight.shape, generator=generator).to(device)
+    gradients = []
+    for tower in (exact, fast):
+        picture = blots.to(device).requires_grad_()
+        (gradient,) = torch.autograd.grad(F.cosine_similarity(tower(picture)[0], aim, dim=0), picture)
+        gradients.append(gradient.flatten())
+    return F.cosine_similarity(*gradients, dim=0).item() > AGREEMENT
 
 
 def _loaded(folder: Path, shape: ClipShape) -> Towers:

@@ -6,6 +6,7 @@ import pytest
 import torch
 
 from mitex.features.clip import Clip
+from mitex.features.clip.towers import Linear
 from tests.features.clip.folders import END, MERGES, SHAPES, START, vocabulary, write_folder
 from tests.features.reference import cosine
 
@@ -80,6 +81,21 @@ def test_bfloat16_gives_the_gradient_of_float32(tmp_path):
         loss = torch.cosine_similarity(model.encode_images(images), text).sum()
         values.append(torch.autograd.grad(loss, images)[0])
     assert not torch.equal(*values) and cosine(*values) > 0.999
+
+
+@pytest.mark.parametrize(
+    ("fast", "sharp", "expected"), [(True, 1, "bfloat16"), (True, 20, "float32"), (False, 1, "float32")]
+)
+def test_bfloat16_where_processor_and_weights_allow_it(tmp_path, monkeypatch, fast, sharp, expected):
+    """Not where attention is so sharp that its choice depends on the last bits."""
+    from safetensors.torch import load_file, save_file
+
+    monkeypatch.setattr("mitex.features.clip.model.bfloat16_is_fast", lambda device: fast)
+    path = write_folder(tmp_path / "clip", "wide", layers=6) / "model.safetensors"
+    weights = load_file(path)
+    save_file({name: sharp * w if "q_proj.weight" in name else w for name, w in weights.items()}, path)
+    layers = [part for part in Clip(path.parent)._towers.vision_model.modules() if isinstance(part, Linear)]
+    assert {str(layer.weight.dtype) for layer in layers} == {f"torch.{expected}"}
 
 
 def test_colours_are_normalised_as_the_folder_says(tmp_path):
