@@ -1,7 +1,10 @@
 """Measures how a relief from words is best learned: through shading normals, or through geometry that moves.
 
 usage: python tools/compare_reliefs.py steps MODEL [--whole]
-       python tools/compare_reliefs.py train normals|geometry OUT [--text WORDS] [--minutes X] [--whole]
+       python tools/compare_reliefs.py train WAY OUT [--text WORDS] [--minutes X] [--whole]
+
+The WAYs are `normals`, as `mitex fit nca`, and `geometry`, which shows the colours of the vertices, linear
+between them; `vertices` shows such colours too, and shades by normals.
 
 `steps` lets a texture of `mitex fit nca --text` grow, and compares what the embedded model sees of it with
 its text both ways. It prints the time of a step and of the views in it, and the cosine of both gradients in
@@ -26,10 +29,14 @@ from moved_figure import MovedFigure
 
 from mitex.features.words import words_model
 from mitex.methods.nca import PRESETS, NcaConfig, NcaTexture
+from mitex.methods.nca.look import Look
 from mitex.methods.nca.text.task import TextTask
 from mitex.methods.nca.text.views import Figure, Views
 from mitex.methods.words_distance import Part
 from mitex.runtime import let_idle_threads_sleep
+from mitex.scenes.cameras import Cameras
+from mitex.scenes.shaded import GREY, pictured
+from mitex.sparse import Weights
 from mitex.training.state import TrainState
 
 FALLS = (0.6, 0.85)  # shares of a training after which its learning rate falls, as in the preset
@@ -41,11 +48,26 @@ REPETITIONS = 10
 STEP = 0.02  # of finite differences, as a length of the V heights
 
 
+class VertexFigure(Figure):
+    """The pictures of a `Figure`, with the colours of the vertices, linear between them."""
+
+    def textured(self, look: Look, state: torch.Tensor, cameras: Cameras) -> Views:
+        hit, points = self._visible(cameras)
+        values = look.decoder(self.sphere.surface, self.sphere.surface.table(state), self.relief.corners)
+        height, colours = values[:, look.layout["height"][0]], values[:, list(look.layout["albedo"])]
+        shade = self._shade(self.relief.normals(height), points, hit, cameras)
+        between = Weights(self._faces[points.face.long()], points.barycentric, len(colours))
+        coloured = shade * between(colours).clamp(0, 1)
+        return Views(pictured(coloured, hit, cameras), pictured(shade * GREY, hit, cameras), values, height)
+
+
+WAYS = {"normals": Figure, "geometry": MovedFigure, "vertices": VertexFigure}
+
+
 def task_of(config: NcaConfig, way: str, start: NcaTexture | None = None) -> TextTask:
     """A training on the even sphere whose reliefs are seen one way or the other."""
     task = TextTask(config, words_model(), start.look if start else None)
-    if way == "geometry":
-        task.figures.update({sphere: MovedFigure(sphere, config.text_relief) for sphere in task.spheres})
+    task.figures.update({sphere: WAYS[way](sphere, config.text_relief) for sphere in task.spheres})
     return task
 
 
@@ -159,7 +181,7 @@ def main() -> None:
     commands = parser.add_subparsers(dest="command", required=True)
     steps, train = commands.add_parser("steps"), commands.add_parser("train")
     steps.add_argument("model")
-    train.add_argument("way", choices=("normals", "geometry"))
+    train.add_argument("way", choices=WAYS)
     train.add_argument("out", type=Path)
     train.add_argument("--text", default="red dots on white")
     train.add_argument("--minutes", type=float, default=6.0)
