@@ -116,7 +116,10 @@ def main() -> None:
     let_idle_threads_sleep()
     clip = {str(dtype)[6:]: RandomTower(TINY if quick else B32, dtype) for dtype in DTYPES}
     towers = {f"image tower, {name}": tower for name, tower in clip.items()}
-    trainings: Mapping[str, Mapping[str, TextImageModel]] = {"text": towers, "text-words": {"model": words_model()}}
+    trainings: Mapping[str, Mapping[str, TextImageModel]] = {
+        "text": towers,
+        "text-words": {"model": words_model()},
+    }
     titles = {"text": "a ViT-B/32 (steps in bfloat16)", "text-words": "the embedded model"}
     Console().print(cpu())
     for preset, models in trainings.items():
