@@ -47,7 +47,7 @@ def test_derivatives_by_finite_differences(seen):
     brighter = torch.linspace(-1, 1, bare.shape[2])[:, None].exp()  # to the right, so that places matter
 
     def value(height, colours):
-        return sum((picture * brighter).mean() for picture in pictures(height, colours))
+        return torch.stack([(picture * brighter).mean() for picture in pictures(height, colours)]).sum()
 
     inputs = [0.5 + 0.1 * torch.sin(4 * points).prod(1), 0.5 + 0.4 * torch.sin(3 * points)]
     gradients = torch.autograd.grad(value(*(x.requires_grad_() for x in inputs)), inputs)
