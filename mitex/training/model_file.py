@@ -71,6 +71,21 @@ def read(path: Path) -> tuple[dict[str, torch.Tensor], dict[str, str]]:
         return {key: file.get_tensor(key) for key in file.keys()}, file.metadata() or {}  # noqa: SIM118
 
 
+def of_shapes(
+    tensors: Mapping[str, torch.Tensor], shapes: Mapping[str, tuple[int, ...]]
+) -> dict[str, torch.Tensor]:
+    """The tensors in the order of their `shapes`.
+
+    Raises:
+        ValueError: other names or shapes, or values that are not finite.
+    """
+    if {name: tuple(value.shape) for name, value in tensors.items()} != dict(shapes):
+        raise ValueError("tensors are missing, or of another shape")
+    if not all(value.isfinite().all() for value in tensors.values()):
+        raise ValueError("values that are not finite")
+    return {name: tensors[name] for name in shapes}
+
+
 def _description(text: str) -> dict[str, Any]:
     about = json.loads(text)
     if not isinstance(about.get("name", ""), str):

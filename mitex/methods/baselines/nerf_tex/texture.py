@@ -61,16 +61,11 @@ class NerfTexTexture:
         init(needs="ad")
         with model_file.opened(source, METHOD.name) as (tensors, about):
             occupied = unpacked_cells(tensors.pop("occupied"), int(about["occupancy"]))
-            texture = cls(tensors, occupied, about)
-            shapes = network_of(texture.config).shapes
-            if {name: tuple(value.shape) for name, value in tensors.items()} != shapes:
-                raise ValueError("parameters of another shape")
-            if not all(value.isfinite().all() for value in tensors.values()):
-                raise ValueError("values that are not finite")
+            shapes = network_of(cls(tensors, occupied, about).config).shapes
             numbers = np.array([about["half"], about["ground"], *about["light"]], np.float64)
             if numbers.shape != (5,) or not np.isfinite(numbers).all() or not numbers[0] > 0:
                 raise ValueError("a box without a size, a ground or a light")
-            return cls({name: tensors[name] for name in shapes}, occupied, about)
+            return cls(model_file.of_shapes(tensors, shapes), occupied, about)
 
     def save(self, path: str | Path) -> Path:
         """Writes the model file (safetensors).

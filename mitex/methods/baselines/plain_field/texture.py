@@ -52,13 +52,9 @@ class PlainFieldTexture:
         with model_file.opened(source, METHOD.name) as (tensors, about):
             occupied = unpacked_cells(tensors.pop("occupied"), int(about["occupancy"]))
             texture = cls(tensors, occupied, about)
-            shapes = parameter_shapes(hash_grid(texture.config))
-            if {name: tuple(value.shape) for name, value in tensors.items()} != shapes:
-                raise ValueError("parameters of another shape")
             texture.similarity  # noqa: B018  (raises where its numbers are none)
-            if not all(value.isfinite().all() for value in tensors.values()):
-                raise ValueError("values that are not finite")
-            return cls({name: tensors[name] for name in shapes}, occupied, about)
+            shapes = parameter_shapes(hash_grid(texture.config))
+            return cls(model_file.of_shapes(tensors, shapes), occupied, about)
 
     def save(self, path: str | Path) -> Path:
         """Writes the model file (safetensors).

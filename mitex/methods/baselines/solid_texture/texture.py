@@ -60,12 +60,11 @@ class SolidTexture:
         """
         with model_file.opened(source, METHOD.name) as (tensors, about):
             voxels, width = int(tensors.pop("voxels")), float(tensors.pop("width"))
-            if {k: tuple(v.shape) for k, v in tensors.items()} != shapes() | statistic_shapes():
-                raise ValueError("weights of another shape")
-            if not all(value.isfinite().all() for value in tensors.values()) or voxels < 1 or not width > 0:
-                raise ValueError("values that are not finite, or an exemplar without a size")
-            weights = {name: tensors[name] for name in shapes()}
-            return cls(Generator(weights, {k: tensors[k] for k in statistic_shapes()}), voxels, width, about)
+            if voxels < 1 or not 0 < width < np.inf:
+                raise ValueError("an exemplar without a size")
+            every = model_file.of_shapes(tensors, shapes() | statistic_shapes())
+            weights, statistics = ({k: every[k] for k in own} for own in (shapes(), statistic_shapes()))
+            return cls(Generator(weights, statistics), voxels, width, about)
 
     def save(self, path: str | Path) -> Path:
         """Writes the model file (safetensors).
