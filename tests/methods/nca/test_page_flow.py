@@ -6,6 +6,7 @@ import pytest
 from mitex.mesh import subdivide_midpoint, torus
 from mitex.methods.nca import NcaTexture, living_page
 from mitex.methods.nca.motion.cell_motion import look_motion
+from mitex.methods.nca.page import contents
 from mitex.page import quantised
 from tests.methods.nca import tiny
 from tests.methods.nca.pages import after, states
@@ -71,3 +72,10 @@ def test_a_still_texture_flows_from_the_panel(browser, tmp_path):
     tab.page.get_by_role("button", name="none").click()
     assert np.abs(page_states(tab) - still).max() < 1e-3
     assert tab.errors == []
+
+
+def test_a_run_that_learns_to_flow_can_be_watched(tmp_path):
+    TEXTURES["trained"].save(tmp_path / "a.safetensors")
+    data = contents([tmp_path / "a.safetensors"], [GIVEN]).data
+    look = data["looks"][0]
+    assert (data["field"], look["carried"], look["period"], look["fastest"]) == ("up", True, 4, 4)
