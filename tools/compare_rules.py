@@ -37,10 +37,8 @@ VARIANTS = {
     "degree 0": ("degree=0",),
     "degree 2": ("degree=2",),
     "32 hidden": ("hidden=32",),
-    "64 hidden": ("hidden=64",),
     "192 hidden": ("hidden=192",),
     "12 channels": ("channels=12",),
-    "24 channels": ("channels=24",),
     "32 channels": ("channels=32",),
 }
 PARENT = "ceramic"
@@ -63,7 +61,7 @@ def main() -> None:
     for label, picture in grafts(mesh, stranger, NcaTexture.load(name)).items():
         cells.append(picture)
         labels.append(label)
-    write_image(GALLERY / "nca-ablations.jpg", sheet(cells, columns=5, labels=labels, cell=CELL))
+    write_image(GALLERY / "nca-ablations.jpg", sheet(cells, columns=4, labels=labels, cell=CELL))
 
 
 def closeup(texture: NcaTexture, mesh: Mesh) -> Cameras:
