@@ -7,6 +7,7 @@ function advectionOf(surface, vectors, period) {
   const { mesh, slots } = surface;
   const around = facesAround(mesh);
   const sums = Array.from({ length: mesh.count }, (_, v) => {
+    if (around.start[v] === around.start[v + 1]) return new Map([[v, 1]]); // a vertex without a face
     const upstream = plus(mesh.point(v), rowOf(vectors, v), -mesh.edgeLengths[v] / period);
     return interpolated(surface, nearestFrom(mesh, around, v, upstream));
   });

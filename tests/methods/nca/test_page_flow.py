@@ -74,6 +74,20 @@ def test_a_still_texture_flows_from_the_panel(browser, tmp_path):
     assert tab.errors == []
 
 
+def test_vertices_without_a_face_do_no_harm(browser, tmp_path):
+    """Those of files that are dropped onto the page."""
+    tab = browser.open(living_page(TEXTURES["still"], GIVEN, tmp_path / "a.html", steps=1, field="up"))
+    states = tab.run(
+        """const { base } = page, positions = new Float32Array(base.positions.length + 3).fill(9);
+        positions.set(base.positions);
+        page.setMesh(new base.constructor(positions, base.faces, "lone"), 0);
+        await page.step(8);
+        return [...page.automaton.read()]"""
+    )
+    assert len(states) == 16 * (len(GIVEN.vertices) + 1)
+    assert np.isfinite(states).all() and np.abs(states).max() > 0.05 and tab.errors == []
+
+
 def test_a_run_that_learns_to_flow_can_be_watched(tmp_path):
     TEXTURES["trained"].save(tmp_path / "a.safetensors")
     data = contents([tmp_path / "a.safetensors"], [GIVEN]).data
