@@ -37,7 +37,6 @@ VARIANTS = {
     "degree 0": ("degree=0",),
     "degree 2": ("degree=2",),
     "32 hidden": ("hidden=32",),
-    "192 hidden": ("hidden=192",),
     "12 channels": ("channels=12",),
     "32 channels": ("channels=32",),
 }
@@ -61,7 +60,7 @@ def main() -> None:
     for label, picture in grafts(mesh, stranger, NcaTexture.load(name)).items():
         cells.append(picture)
         labels.append(label)
-    write_image(GALLERY / "nca-ablations.jpg", sheet(cells, columns=4, labels=labels, cell=CELL))
+    write_image(GALLERY / "nca-ablations.jpg", sheet(cells, columns=5, labels=labels, cell=CELL))
 
 
 def closeup(texture: NcaTexture, mesh: Mesh) -> Cameras:
