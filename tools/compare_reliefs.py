@@ -20,6 +20,7 @@ from __future__ import annotations
 import argparse
 import resource
 import time
+import timeit
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -32,7 +33,6 @@ from mitex.methods.nca import PRESETS, NcaConfig, NcaTexture
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.text.task import TextTask
 from mitex.methods.nca.text.views import Figure, Views
-from mitex.methods.words_distance import Part
 from mitex.runtime import let_idle_threads_sleep
 from mitex.scenes.cameras import Cameras
 from mitex.scenes.shaded import GREY, pictured
@@ -92,13 +92,8 @@ class Scene:
 
     def distance(self, coloured: torch.Tensor, plain: torch.Tensor) -> torch.Tensor:
         """Of pictures (K, H, W, 3) from the text."""
-        config, sight, bare = self.task.config, self.sight, self.negative
-        parts = {
-            "whole": Part(config.text_whole_weight, sight.whole, coloured, bare.whole),
-            "close": Part(config.text_close_weight, sight.close, coloured, bare.close),
-            "relief": Part(config.text_relief_weight, sight.close, plain, bare.close),
-        }
-        return torch.stack(list(self.task.words(parts).values())).sum()
+        parts = self.task.distances(self.sight, self.negative, coloured, plain)
+        return torch.stack(list(parts.values())).sum()
 
     def gradient(self) -> torch.Tensor:
         """Of the distance in the heights, (V,)."""
@@ -131,12 +126,7 @@ class Scene:
 
 def best(function: Callable[[], object]) -> float:
     """Shortest time of several calls after one that warms up [ms]."""
-    times = []
-    for _ in range(REPETITIONS + 1):
-        start = time.perf_counter()
-        function()
-        times.append(time.perf_counter() - start)
-    return 1e3 * min(times[1:])
+    return 1e3 * min(timeit.repeat(function, number=1, repeat=REPETITIONS + 1)[1:])
 
 
 def compare(texture: NcaTexture, config: NcaConfig) -> None:

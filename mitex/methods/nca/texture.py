@@ -321,8 +321,7 @@ class NcaTexture(GrowingTexture):
         orientation: Turn = 0.0,
         given: Mesh | None = None,
     ) -> CellMotion:
-        whose = given or cells.given
-        return look_motion(self.look, self.about, whose, cells.mesh, field, speed, orientation)
+        return look_motion(self.look, self.about, given or cells.given, cells.mesh, field, speed, orientation)
 
     def growth(self, cells: Cells, orientation: Turn = 0.0, motion: CellMotion = STILL) -> LookGrowth:
         relief = known_relief(self.about, self.look.maps)

@@ -19,7 +19,7 @@ from mitex.methods.nca.pool import PoolTask, initial_look
 from mitex.methods.nca.surfaces import TrainingSphere, TrainingSurface, training_surfaces
 from mitex.methods.nca.text.views import Figure, training_cameras
 from mitex.methods.nca.text.wording import MAPS, prompts
-from mitex.methods.words_distance import Part, SightBank, WordsDistance
+from mitex.methods.words_distance import Negative, Part, Sight, SightBank, WordsDistance
 from mitex.progress import announce
 from mitex.runtime import available_device, keep_freed_memory
 from mitex.scenes.cameras import orbit
@@ -77,16 +77,23 @@ class TextTask(PoolTask):
         sight = bank.sight(index)
         views = self.figures[surface].textured(self.look, state, sight.cameras)
         excess = laplacian_excess(2 * views.height - 1, *self._edges[surface], config.text_roughness)
-        bare = bank.negative(index)
-        parts = {
-            "whole": Part(config.text_whole_weight, sight.whole, views.coloured, bare.whole),
-            "close": Part(config.text_close_weight, sight.close, views.coloured, bare.close),
-            "relief": Part(config.text_relief_weight, sight.close, views.plain, bare.close),
-        }
-        return self.words(parts) | {
+        return self.distances(sight, bank.negative(index), views.coloured, views.plain) | {
             "rough": config.text_smooth_weight * excess,
             "range": config.text_range_weight * overflow_loss(2 * views.values - 1),
         }
+
+    def distances(
+        self, sight: Sight, bare: Negative, coloured: torch.Tensor, plain: torch.Tensor
+    ) -> dict[str, torch.Tensor]:
+        """Of pictures (K, H, W, 3), coloured and grey, from the text, by part."""
+        config = self.config
+        return self.words(
+            {
+                "whole": Part(config.text_whole_weight, sight.whole, coloured, bare.whole),
+                "close": Part(config.text_close_weight, sight.close, coloured, bare.close),
+                "relief": Part(config.text_relief_weight, sight.close, plain, bare.close),
+            }
+        )
 
     @torch.no_grad()
     def preview(self, step: int) -> np.ndarray:
