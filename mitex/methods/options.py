@@ -110,6 +110,19 @@ class TrainingOptions(FitOptions):
 
 
 @dataclass(kw_only=True)
+class DeviceOptions(TrainingOptions):
+    """Options of the methods that can train on a graphics card."""
+
+    device: Annotated[
+        Literal["cpu", "cuda"] | None, arg(metavar="cpu|cuda", help_behavior_hint="(default: cpu)")
+    ] = None
+    """Train on the processor, or on the first CUDA graphics card."""
+
+    def run_options(self, **flags: object) -> RunSettings:
+        return super().run_options(device=self.device, **flags)
+
+
+@dataclass(kw_only=True)
 class ExemplarOptions(TrainingOptions):
     """Options of the methods that learn from images."""
 

@@ -118,8 +118,10 @@ def multistep(lr: float, milestones: Sequence[int] = (), decay: float = 1.0) -> 
 
 def gradient_norms(parameters: Sequence[torch.Tensor]) -> torch.Tensor:
     """L2 norm of each parameter tensor's gradient, (P,) float32; 0 where there is none."""
-    zero = torch.zeros(())
-    return torch.stack([zero if p.grad is None else p.grad.norm().float().cpu() for p in parameters])
+    norms = [
+        p.new_zeros((), dtype=torch.float32) if p.grad is None else p.grad.norm().float() for p in parameters
+    ]
+    return torch.stack(norms).cpu()  # one transfer from a graphics card, not one for each tensor
 
 
 @torch.no_grad()

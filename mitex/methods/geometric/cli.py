@@ -11,7 +11,7 @@ from tyro.conf import arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive
-from mitex.methods.options import MeshOptions, TrainingOptions, field_files
+from mitex.methods.options import DeviceOptions, MeshOptions, field_files
 
 if TYPE_CHECKING:
     import numpy as np
@@ -24,7 +24,7 @@ TEMPLATE = "template"  # as a mesh: the one that the texture's training started 
 
 
 @dataclass(kw_only=True)
-class Fit(TrainingOptions):
+class Fit(DeviceOptions):
     """Learn the geometric texture of one mesh with a hierarchy of face-convolution GANs.
 
     The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the texture;

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -54,6 +54,11 @@ class FaceGraph:
 
     def __len__(self) -> int:
         return len(self.faces)
+
+    def to(self, device: torch.device | str) -> FaceGraph:
+        """The same on another device."""
+        tensors = {name: value.to(device) for name, value in vars(self).items() if torch.is_tensor(value)}
+        return replace(self, **tensors)
 
 
 def check_corners(mesh: Mesh) -> None:

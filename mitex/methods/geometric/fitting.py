@@ -91,7 +91,11 @@ def fit(
         task,
         shape.name,
         lambda about: GeometricTexture(
-            task.generators[: config.levels], start, task.fixed, about | origin, fields
+            [generator.to("cpu") for generator in task.generators[: config.levels]],
+            start,
+            task.fixed.cpu(),
+            about | origin,
+            fields,
         ),
         lr=partial(learning_rate, config),
         optimizer=partial(Adam, betas=betas(config)),

@@ -59,6 +59,11 @@ class Hierarchy:
         )
         return replace(self, graphs=graphs)
 
+    def to(self, device: torch.device | str) -> Hierarchy:
+        """The same with graphs and pairs on another device."""
+        graphs = tuple(graph.to(device) for graph in self.graphs)
+        return replace(self, graphs=graphs, pairs=tuple(pairs.to(device) for pairs in self.pairs))
+
     def finer(self, vertices: torch.Tensor, level: int) -> torch.Tensor:
         """Vertices (..., V, 3) of a level, split and scaled by 2 for the next: edges keep their length."""
         ends = vertices[..., self.pairs[level], :]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 
 import torch
 import torch.nn.functional as F
@@ -61,6 +62,12 @@ class FaceNetwork:
             theirs, along = across.split([x.shape[-1], guides.shape[-1]])
             x = largest(x @ theirs, graph, guides @ along if guides.shape[-1] else None) + x @ own
         return x + bias
+
+    def to(self, device: torch.device | str) -> FaceNetwork:
+        """A network with the same parameters on another device; this one if they are there."""
+        moved = copy(self)
+        moved.parameters = [p.detach().to(device).requires_grad_() for p in self.parameters]
+        return moved
 
     def load(self, parameters: Sequence[torch.Tensor]) -> None:
         """Takes over other values of all parameters.

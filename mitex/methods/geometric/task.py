@@ -16,6 +16,7 @@ from mitex.methods.geometric.gan import adversarial_loss, critic_loss, generate
 from mitex.methods.geometric.hierarchy import Hierarchy
 from mitex.methods.geometric.model import grow, network
 from mitex.methods.geometric.portrait import portrait
+from mitex.runtime import available_device
 from mitex.training import Change, Step
 from mitex.training.optim import Adam, gradient_norms
 
@@ -52,16 +53,23 @@ class GeometricTask:
         reference: Mesh,
         field: np.ndarray | None = None,
     ) -> None:
-        self.config, self.hierarchy, self.template = config, hierarchy, template
-        self.meshes, self.reference, self.field = meshes, reference, field
+        self.device = available_device(config.device)
+        self.config, self.hierarchy, self.template = (
+            config,
+            hierarchy.to(self.device),
+            template.to(self.device),
+        )
+        self.meshes = [vertices.to(self.device) for vertices in meshes]
+        self.reference, self.field = reference, field
         rng = torch.Generator().manual_seed(config.seed)
         directed = hierarchy.graphs[0].directions is not None
-        self.generators = [network(level, 3, rng, directed) for level in range(MAX_LEVELS)]
-        self.critics = [network(level, 1, rng, directed) for level in range(MAX_LEVELS)]
-        self.fixed = config.noise * torch.randn(template.shape, generator=rng)
+        self.generators = [network(level, 3, rng, directed).to(self.device) for level in range(MAX_LEVELS)]
+        self.critics = [network(level, 1, rng, directed).to(self.device) for level in range(MAX_LEVELS)]
+        self.fixed = self._noise(template, rng)
         self.optimizers = [Adam(critic.parameters, betas(config)) for critic in self.critics]
         with torch.no_grad():
-            self.real = [face_features(v, g) for v, g in zip(meshes, hierarchy.graphs, strict=True)]
+            graphs = self.hierarchy.graphs
+            self.real = [face_features(v, graph) for v, graph in zip(self.meshes, graphs, strict=True)]
         self.started = 0
         self._start: tuple[int, torch.Tensor] | None = None
 
@@ -148,12 +156,12 @@ class GeometricTask:
     def preview(self, step: int) -> np.ndarray:
         """The reference, the training mesh of the level, its reconstruction, and two random samples."""
         level = self.level(step - 1)
-        faces = self.hierarchy.graphs[level].faces.numpy()
+        faces = self.hierarchy.graphs[level].faces.cpu().numpy()
         rng = torch.Generator().manual_seed(self.config.seed)
         with torch.no_grad():
             reconstruction = self._reconstruction(level)
             samples = [self._sample(level, rng) for _ in range(2)]
-        portraits = [portrait(v.numpy(), faces) for v in (self.meshes[level], reconstruction, *samples)]
+        portraits = [portrait(v.cpu().numpy(), faces) for v in (self.meshes[level], reconstruction, *samples)]
         return np.hstack([portrait(self.reference.vertices, self.reference.faces), *portraits])
 
     def metadata(self) -> dict[str, str]:
@@ -169,7 +177,7 @@ class GeometricTask:
         graph, optimizer = self.hierarchy.graphs[level], self.optimizers[level]
         with torch.no_grad():
             fake = face_features(self._sample(level, generator), graph)
-        mix = torch.rand((), generator=generator)
+        mix = torch.rand((), generator=generator).to(self.device)
         with torch.enable_grad():
             loss, distance = critic_loss(
                 self.critics[level], self.real[level], fake, graph, mix, self.config.penalty
@@ -188,11 +196,15 @@ class GeometricTask:
         for k in range(level + 1):
             if k:
                 vertices = self.hierarchy.finer(vertices, k - 1)
-            noise = self.config.noise * torch.randn(vertices.shape, generator=generator)
+            noise = self._noise(vertices, generator)
             with torch.set_grad_enabled(k == level and torch.is_grad_enabled()):
                 graph = self.hierarchy.graphs[k]
                 vertices = generate(self.generators[k], vertices, graph, noise, self.config.remeasure)
         return vertices
+
+    def _noise(self, vertices: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
+        """Noise for vertices (V, 3), drawn on the CPU, so that devices agree."""
+        return (self.config.noise * torch.randn(vertices.shape, generator=generator)).to(self.device)
 
     def _reconstruction_start(self, level: int) -> torch.Tensor:
         """Where the reconstruction of a level starts from; the lower levels are finished and stay."""

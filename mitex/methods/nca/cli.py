@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from tyro.conf import arg
 
@@ -12,7 +12,7 @@ from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
 from mitex.methods.nca.arguments import RESOLUTION, levels, oriented
 from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS, TILE_CELLS, TILE_SIDES
-from mitex.methods.options import EXPORTS, PICTURES, ReliefOptions, field_files
+from mitex.methods.options import EXPORTS, PICTURES, DeviceOptions, ReliefOptions, field_files
 from mitex.methods.words_options import ExemplarOrWordsOptions
 from mitex.training.settings import RunSettings
 
@@ -24,7 +24,7 @@ PAGE = ".html"
 
 
 @dataclass(kw_only=True)
-class Fit(ExemplarOrWordsOptions):
+class Fit(DeviceOptions, ExemplarOrWordsOptions):
     """Learn a texture from an image, a set of PBR maps, or words with a neural cellular automaton (MeshNCA).
 
     The run folder gets config.toml, checkpoint.safetensors, metrics.jsonl, previews and the texture; Ctrl-C
@@ -61,15 +61,10 @@ class Fit(ExemplarOrWordsOptions):
     motion: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="")] = None
     """Vector field that the texture learns to move along, by name (right, up, about-y ...) or direction."""
 
-    device: Annotated[
-        Literal["cpu", "cuda"] | None, arg(metavar="cpu|cuda", help_behavior_hint="(default: cpu)")
-    ] = None
-    """Train on the processor, or on the first CUDA graphics card."""
-
     def run(self) -> None:
         mutually_exclusive("--resume", "--init", self.resume and self.init is not None)
         self.check_source()
-        options = self.run_options(device=self.device)
+        options = self.run_options()
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()
