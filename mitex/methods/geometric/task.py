@@ -54,11 +54,8 @@ class GeometricTask:
         field: np.ndarray | None = None,
     ) -> None:
         self.device = available_device(config.device)
-        self.config, self.hierarchy, self.template = (
-            config,
-            hierarchy.to(self.device),
-            template.to(self.device),
-        )
+        self.config, self.hierarchy = config, hierarchy.to(self.device)
+        self.template = template.to(self.device)
         self.meshes = [vertices.to(self.device) for vertices in meshes]
         self.reference, self.field = reference, field
         rng = torch.Generator().manual_seed(config.seed)
