@@ -29,7 +29,7 @@ def text_image_model(
         ConfigError: a CLIP model needs the package tokenizers.
     """
     folder = model_folder(clip)
-    return Clip(folder, device=device) if folder else words_model()
+    return Clip(folder, device=device) if folder else words_model(device)
 
 
 def model_folder(clip: str | os.PathLike[str] | None = None) -> Path | None:

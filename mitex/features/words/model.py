@@ -54,12 +54,16 @@ class WordsModel:
         Raises:
             ConfigError: a text that is empty, too long, or has an unknown word.
         """
-        return self.network.text(numbered([concepts(text) for text in texts]))
+        numbers = numbered([concepts(text) for text in texts])
+        return self.network.text(numbers.to(next(self.network.parameters()).device))
 
 
 @cache
-def words_model() -> WordsModel:
+def words_model(device: torch.device | str = "cpu") -> WordsModel:
     """The model that ships with the package.
+
+    Args:
+        device: where its weights live.
 
     Raises:
         WeightsError: the file is missing or not the expected one.
@@ -71,4 +75,4 @@ def words_model() -> WordsModel:
     with torch.random.fork_rng(devices=()):  # first weights are drawn, and replaced
         network = WordsNetwork()
     network.load_state_dict(load_file(path))
-    return WordsModel(network)
+    return WordsModel(network.to(device))

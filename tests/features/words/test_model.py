@@ -7,6 +7,7 @@ import torch.nn.functional as F
 from mitex.errors import ConfigError, ImageError, WeightsError
 from mitex.features import weights
 from mitex.features.text_image import TextImageModel
+from mitex.features.text_model import EMBEDDED, text_image_model
 from mitex.features.words import WordsModel, model, words_model
 from mitex.features.words.network import WordsNetwork
 from tests.features.words.pictures import COLOURS, PATTERNS, picture
@@ -126,3 +127,11 @@ def test_the_file_is_small_and_tells_how_it_was_made():
         about = file.metadata()
     assert int(about["training_steps"]) > 1000
     assert float(about["text_among_100"]) > 0.9 and float(about["picture_among_100"]) > 0.9
+
+
+def test_on_another_device():
+    """The device without values stands in for a graphics card."""
+    model = text_image_model(EMBEDDED, device="meta")
+    pictures = torch.zeros(2, 64, 64, 3, device="meta")
+    for vectors in (model.encode_images(pictures), model.encode_texts(["red dots", "blue"])):
+        assert vectors.device.type == "meta" and vectors.shape == (2, 128)
