@@ -7,6 +7,7 @@ from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import torch
 
 from mitex.errors import ConfigError
@@ -65,7 +66,12 @@ def motion_record(config: NcaConfig) -> dict[str, Any]:
         return {}
     about: dict[str, Any] = {"motion": config.motion, "motion_period": config.motion_period}
     about |= {"motion_advection": config.motion_advection}
-    return about | {"motion_speed": config.motion_speeds[1]}
+    return about | {"motion_speed": config.motion_speeds[1] * _longest(config.motion)}
+
+
+def _longest(field: str) -> float:
+    """Length of the longest vectors of a field on a sphere, whose mean length is 1."""
+    return float(np.linalg.norm(vector_field(icosphere(8), field), axis=1).max())
 
 
 def learner(config: NcaConfig, look: Look) -> Look:

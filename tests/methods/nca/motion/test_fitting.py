@@ -1,15 +1,21 @@
 """From a field's name to a model that moves."""
 
 import json
+import math
+import warnings
 
+import numpy as np
 import pytest
 import torch
 
 from mitex.errors import CheckpointError, ConfigError
 from mitex.exemplar import Exemplar
 from mitex.mesh import icosphere
+from mitex.mesh.fields import vector_field
 from mitex.methods import nca
 from mitex.methods.nca import NcaTexture, settling
+from mitex.methods.nca.motion.cell_motion import fastest
+from mitex.methods.nca.motion.condition import cell_vectors
 from mitex.runtime import threads
 from tests.methods.nca.tiny import SETTINGS, config, texture
 from tests.training.contract import assert_same_checkpoint
@@ -39,7 +45,7 @@ def test_a_still_look_learns_to_move(tmp_path, lava):
     first = nca.fit(lava, init=path, motion="about-y", set=[*TINY, "steps=0"])
     assert (first.about["preset"], first.about["motion"]) == ("motion", "about-y")
     assert first.about["motion_period"] == 6.0 and first.about["parent"] == "tiny"
-    assert first.about["motion_speed"] == 2.0
+    assert first.about["motion_speed"] == pytest.approx(2 * 4 / math.pi, rel=0.01)  # the sine's mean: pi / 4
     still = NcaTexture.load(path)
     sphere = icosphere(4)
     assert torch.equal(first.grow(sphere, steps=6, speed=0.0), still.grow(sphere, steps=6))
@@ -111,3 +117,14 @@ def test_a_parent_must_fit_but_for_the_condition(tmp_path, lava):
         nca.fit(lava, init=_parent(tmp_path, condition=3), set=TINY)
     moving = nca.fit(lava, init=_parent(tmp_path, condition=3), motion="up", set=[*TINY, "steps=0"])
     assert moving.about["parent"] == "tiny"
+
+
+def test_it_follows_its_own_field_at_the_speed_of_its_training(tmp_path, lava):
+    """On a sphere, half of the field is longer than its mean; the training told the cells all of it."""
+    settings = [*TINY, "steps=0", "motion_speeds=1,1"]
+    texture = nca.fit(lava, init=_parent(tmp_path), motion="right", set=settings)
+    sphere = icosphere(12)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        told = cell_vectors(sphere, sphere, "right", 1.0, longest=fastest(texture.about))
+    assert np.allclose(told, vector_field(sphere, "right"), atol=0.01)

@@ -48,8 +48,8 @@ def test_a_texture_from_words_learns_to_move(tmp_path):
     assert torch.allclose(first.grow(sphere, steps=6, speed=1.5), carried, atol=1e-6)
     nca.fit_text("red dots", out, clip=clip, init=tmp_path / "still", motion="up", set=[*settings, "steps=4"])
     moved = NcaTexture.load(out)
-    about = (moved.about[name] for name in ("motion", "motion_speed", "text", "parent"))
-    assert tuple(about) == ("up", 2.0, "red dots", "red dots")
+    about = (moved.about[name] for name in ("motion", "text", "parent"))
+    assert tuple(about) == ("up", "red dots", "red dots")
     here, there = (moved.grow(sphere, steps=6, field=field) for field in ("about-y", "up"))
     assert (here - there).abs().max() > 1e-6
     metrics = [json.loads(line) for line in (out / "metrics.jsonl").read_text().splitlines()]
