@@ -1,10 +1,10 @@
 """Grows geometric textures on meshes and renders them, the reference beside them.
 
-usage: python tools/make_geometric_gallery.py RUNS MESHES SHEET REFERENCE[:map][,...] MESH~FACES ...
+usage: python tools/make_geometric_gallery.py RUNS MESHES SHEET REFERENCE[@LEVEL][:map][,...] MESH~FACES ...
        python tools/make_geometric_gallery.py RUNS MESHES SHEET REFERENCE:levels MESH~FACES ...
 
 RUNS holds a finished run of `mitex fit geometric` for each reference, MESHES is a folder; meshes are named as
-for make_surface_gallery.py, so that they are remeshed first. Each one is displaced from level 2 on, and
+for make_surface_gallery.py, so that they are remeshed first. Each one is displaced from LEVEL on (2), and
 rendered: docs/gallery/SHEET.jpg has a row for each reference, which stands first, and above them the meshes
 alone. For every pair the Wasserstein-1 distances between the local statistics of result and reference are
 printed, and those of the mesh itself, remeshed to as many vertices as the result has. REFERENCE:map makes a
@@ -12,8 +12,8 @@ row of displacement maps.
 
 REFERENCE:levels makes a sheet of start levels: a row for the reference and each mesh, which stand first, then
 what grows from levels 0, 1, 2 and 3 on: on the meshes, and, for the reference, on its own template, whose
-lower levels are rebuilt. FACES are those to begin level 2 with; lower levels begin with a quarter as many for
-each level, so that all end alike.
+lower levels are rebuilt. FACES are those to begin level 2 with; each lower level begins with a quarter as
+many, each higher one with four times as many, so that all end alike.
 """
 
 from __future__ import annotations
@@ -46,10 +46,16 @@ def picture(mesh: Mesh) -> np.ndarray:
     return tone(still(clay(mesh), resolution=CELL, spp=96, azimuth=AZIMUTH))
 
 
-def displaced(texture: GeometricTexture, reference: Mesh, mesh: Mesh, mapped: bool) -> Mesh:
+def coarse_mesh(word: str, level: int, meshes: Path) -> Mesh:
+    """MESH~FACES with as many faces as growth from a level on begins with."""
+    name, faces = word.split("~")
+    return find_mesh(f"{name}~{int(4.0 ** (level - START) * int(faces))}", meshes)
+
+
+def displaced(texture: GeometricTexture, reference: Mesh, mesh: Mesh, level: int, mapped: bool) -> Mesh:
     """The mesh with its texture, or with a displacement map of the reference, features as large."""
     if not mapped:
-        return texture.apply(mesh).mesh
+        return texture.apply(mesh, start_level=level).mesh
     size, _ = texture.relative_size(mesh)
     return DisplacementMap.bake(reference).apply(mesh, scale=size, levels=texture.levels - 1 - START).mesh
 
@@ -59,10 +65,10 @@ def level_sheet(texture: GeometricTexture, reference: str, meshes: Path, words: 
     reconstruction = texture.generate(start_level=texture.levels)
     results = [find_reference(reference), *(texture.generate(start_level=k) for k in LEVELS)]
     for word in words:
-        name, faces = word.split("~")
+        name, _ = word.split("~")
         results.append(find_mesh(name, meshes))
         for k in LEVELS:
-            coarse = find_mesh(f"{name}~{int(4.0 ** (k - START) * int(faces))}", meshes)
+            coarse = coarse_mesh(word, k, meshes)
             results.append(texture.apply(coarse, start_level=k).mesh)
             distances = statistic_distances(results[-1], reconstruction)
             summary = ", ".join(f"{key} {d:.3f}" for key, d in distances.items())
@@ -81,19 +87,21 @@ def main() -> None:
         write_image(GALLERY / f"{name}.jpg", image)
         return
     originals = [find_mesh(word.split("~")[0], Path(meshes)) for word in words]
-    coarse = [find_mesh(word, Path(meshes)) for word in words]
     fine: dict[tuple[str, int], Mesh] = {}
     cells, labels = [np.ones((CELL, CELL, 3)), *map(picture, originals)], ["", *(m.name for m in originals)]
     for word in references.split(","):
-        reference, *mapped = word.split(":")
+        row, *mapped = word.split(":")
+        reference, _, start_level = row.partition("@")
+        level = int(start_level or START)
         texture = GeometricTexture.load(Path(runs) / reference)
         # The reference with edges as long as the results'.
         reconstruction = texture.generate(start_level=texture.levels)
         cells.append(picture(find_reference(reference)))
         labels.append(" ".join([reference, *mapped]))
-        for mesh, even in zip(originals, coarse, strict=True):
+        for mesh, mesh_word in zip(originals, words, strict=True):
+            even = coarse_mesh(mesh_word, level, Path(meshes))
             start = time.perf_counter()
-            grown = displaced(texture, find_reference(reference), even, bool(mapped))
+            grown = displaced(texture, find_reference(reference), even, level, bool(mapped))
             seconds = time.perf_counter() - start
             key = mesh.name, len(grown.vertices)
             fine.setdefault(key, remesh(mesh, key[1]))
