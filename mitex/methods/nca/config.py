@@ -55,11 +55,11 @@ class NcaConfig(TrainingConfig):
     )
     view_count: int = key(4, "views in a step, of each zoom", 1, 4096)
     resolution: int = key(128, "side of a view [px]", 16, 2048)
-    zooms: int = key(3, "sizes at which views are compared, each half of the next", 1, 6)
+    zooms: int = key(4, "sizes at which views are compared, each half of the next", 1, 6)
     distance: float = key(2.5, "of the camera of a full view [normalised mesh units]", 1.01, 100)
     fov: float = key(60.0, "field of view of a full view [degrees]", 1, 170)
     density: float = key(32.0, "vertices along the exemplar's width in a patch: the size on a mesh", 4, 4096)
-    exemplar_size: int = key(512, "side that a larger exemplar is resized to [px]", 16, 2048)
+    exemplar_size: int = key(1024, "side that a larger exemplar is resized to [px]", 16, 2048)
     target_size: int = key(0, "side that it is enlarged to for the features [px]; 0: its own", 0, 2048)
     blend: bool = key(
         True, "a view shows one picture of several maps, mixed, so that they are learned in register"

@@ -1,6 +1,7 @@
 """The training task: pool, randomness, views, state, and bit-identical resumption."""
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from mitex.errors import CheckpointError
 from mitex.exemplar import Exemplar
 from mitex.mesh import icosphere
 from mitex.methods.nca import task as training
+from mitex.methods.nca.config import DEFAULT
 from mitex.methods.nca.surfaces import TrainingSphere
 from mitex.methods.nca.task import NcaTask
 from mitex.runtime import threads
@@ -147,6 +149,18 @@ def test_zooms_that_would_be_too_small_are_left_out(exemplar):
         for size in (32, 200, 256)
     ]
     assert sizes == [[32], [200], [128, 256]]
+
+
+@pytest.mark.parametrize(("side", "sizes"), [(128, 1), (256, 2), (600, 3), (1024, 4)])
+def test_exemplars_of_1024_pixels_are_seen_at_their_own_size_by_default(exemplar, side, sizes):
+    """The finest views have all of an exemplar's pixels, and the coarsest 128 or a bit more."""
+    default = {key: getattr(DEFAULT, key) for key in ("exemplar_size", "zooms", "target_size")}
+    enlarged = Exemplar(
+        {name: np.repeat(np.repeat(values, 2, 0), 2, 1) for name, values in exemplar.maps.items()}
+    ).resized(side)
+    assert list(NcaTask(replace(config("layers=relu1_1"), **default), enlarged).zooms) == [
+        side >> halvings for halvings in reversed(range(sizes))
+    ]
 
 
 def test_parameters_are_those_of_rule_and_decoder(task):
