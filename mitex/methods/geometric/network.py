@@ -64,7 +64,7 @@ class FaceNetwork:
         return x + bias
 
     def to(self, device: torch.device | str) -> FaceNetwork:
-        """A network with the same parameters on another device; this one if they are there."""
+        """A network with the same parameters on another device."""
         moved = copy(self)
         moved.parameters = [p.detach().to(device).requires_grad_() for p in self.parameters]
         return moved
