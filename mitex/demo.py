@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 # Synthesized here and now: exemplar, mesh, settings.
 EXEMPLAR, MESH = "hexagons", "vase"
-MAPS, SETTINGS = ("albedo", "height", "normal"), ("steps=120", "milestones=90,108")
+MAPS, SETTINGS = ("albedo", "height", "normal"), ("steps=100", "milestones=75,90")
 # Bundled models, and the meshes that they grow on.
 MODELS = {"ceramic": "octopus", "lava": "knot", "cobblestone": "shaderball"}
 RESOLUTION = 2048  # of what the models grow [texels]
