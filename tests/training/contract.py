@@ -42,6 +42,19 @@ def assert_loss_is_pure(task: Task, step: int) -> None:
     assert_same_bytes(task.state(), before)
 
 
+def assert_steps_agree(one: Task, other: Task) -> None:
+    """A step of two tasks that differ in the device alone; random numbers come from the CPU on both."""
+    losses, gradients = [], []
+    for task in (one, other):
+        step = task.loss(1, torch.Generator().manual_seed(0))
+        step.value.backward()
+        step.commit()
+        losses.append(step.value.item())
+        gradients.append(torch.cat([p.grad.flatten().cpu() for p in task.parameters if p.grad is not None]))
+    assert abs(losses[1] - losses[0]) < 1e-2 * abs(losses[0])
+    assert torch.cosine_similarity(*gradients, dim=0) > 0.99
+
+
 def with_nan_gradients(loss: torch.Tensor, parameters: Sequence[torch.Tensor]) -> torch.Tensor:
     """The same value."""
     for p in parameters:
