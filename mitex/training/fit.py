@@ -10,6 +10,7 @@ from typing import Any, Generic, Protocol, TypeVar, Unpack
 
 from mitex.errors import ConfigError
 from mitex.paths import expanded
+from mitex.runtime.devices import available_device
 from mitex.runtime.session import check_variant
 from mitex.training import run
 from mitex.training.config import by_key, resolve
@@ -17,7 +18,7 @@ from mitex.training.control import Control
 from mitex.training.inputs import check_inputs
 from mitex.training.locate import NAME
 from mitex.training.loop import train
-from mitex.training.settings import FitConfig, RunOptions
+from mitex.training.settings import DeviceConfig, FitConfig, RunOptions
 from mitex.training.task import Task
 
 Config = TypeVar("Config", bound=FitConfig)
@@ -66,7 +67,8 @@ class Run(Generic[Config]):
 
         Raises:
             OutputError, CheckpointError: As `run.check`.
-            ConfigError: As `resolve`; or the program has chosen a variant of Mitsuba that fits cannot use.
+            ConfigError: As `resolve`; or the program has chosen a variant of Mitsuba that fits cannot use, or
+                there is no such device.
         """
         folder, resume = None if out is None else expanded(out), options.get("resume", False)
         run.check(folder, resume)
@@ -76,6 +78,8 @@ class Run(Generic[Config]):
         if folder is not None and resume and file is None and (folder / run.CONFIG).is_file():
             file = folder / run.CONFIG
         config = resolve(presets, options.get("preset"), file, _settings(options))
+        if isinstance(config, DeviceConfig):
+            available_device(config.device)
         return Run(folder, config, resume, Control(options.get("on_step"), options.get("cancel")))
 
     def check_inputs(self, metadata: Mapping[str, str]) -> None:

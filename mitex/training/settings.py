@@ -89,6 +89,13 @@ class TrainingConfig(FitConfig):
     preview_every: int = key(100, "steps between two previews; 0 makes none", 0)
 
 
+@dataclass(frozen=True)
+class DeviceConfig(TrainingConfig):
+    """What the configs of methods have that can train on a graphics card."""
+
+    device: Literal["cpu", "cuda"] = key("cpu", "that trains: the processor, or the first CUDA graphics card")
+
+
 def meaning(config: type[FitConfig], one: Field) -> str:
     """The phrase that explains a key."""
     return _metadata(config, one)["meaning"]

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 from mitex.errors import ConfigError
-from mitex.training.settings import TrainingConfig, key
+from mitex.training.settings import DeviceConfig, key
 
 MAX_LEVELS = 7  # 0 to 6
 
 
 @dataclass(frozen=True)
-class GeometricConfig(TrainingConfig):
+class GeometricConfig(DeviceConfig):
     """Settings of a fit; every key can be set from a TOML file or with `--set`."""
 
     preset: str = "fast"
-    device: Literal["cpu", "cuda"] = key("cpu", "that trains: the processor, or the first CUDA graphics card")
     steps: int = key(10_000, "steps of the generators, all levels together; more add levels", 1)
     level_steps: int = key(2_000, "of these for each level", 1)
     critic_steps: int = key(2, "steps of a critic", 1, 100)

@@ -25,7 +25,7 @@ from mitex.methods.geometric.template import find_template, normalised
 from mitex.methods.geometric.texture import GeometricTexture
 from mitex.methods.geometric.training_meshes import fit_level
 from mitex.paths import cache_dir
-from mitex.runtime import available_device, keep_freed_memory
+from mitex.runtime import keep_freed_memory
 from mitex.training.control import ALONE, Control
 from mitex.training.fit import Run
 from mitex.training.optim import Adam
@@ -67,7 +67,6 @@ def fit(
     """
     run = Run.of(PRESETS, out, **options)
     config = run.config
-    available_device(config.device)  # before the training meshes, which take long
     shape = reference if isinstance(reference, Mesh) else find_reference(reference)
     template = Mesh.load(template) if isinstance(template, str | Path) else template
     if field is None and config.symmetric:

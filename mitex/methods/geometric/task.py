@@ -16,7 +16,6 @@ from mitex.methods.geometric.gan import adversarial_loss, critic_loss, generate
 from mitex.methods.geometric.hierarchy import Hierarchy
 from mitex.methods.geometric.model import grow, network
 from mitex.methods.geometric.portrait import portrait
-from mitex.runtime import available_device
 from mitex.training import Change, Step
 from mitex.training.optim import Adam, gradient_norms
 
@@ -53,7 +52,7 @@ class GeometricTask:
         reference: Mesh,
         field: np.ndarray | None = None,
     ) -> None:
-        self.device = available_device(config.device)
+        self.device = config.device
         self.config, self.hierarchy = config, hierarchy.to(self.device)
         self.template = template.to(self.device)
         self.meshes = [vertices.to(self.device) for vertices in meshes]

@@ -11,7 +11,7 @@ from mitex.features.text_image import PROMPT
 from mitex.methods.nca.decoder.shape import COORDINATES, DecoderShape
 from mitex.methods.nca.ranges import MOST_STEPS
 from mitex.methods.words_config import check_words
-from mitex.training.settings import TrainingConfig, key
+from mitex.training.settings import DeviceConfig, key
 
 SURFACES = ("even", "uneven", "flat")
 # Keys that shape the decoder -> attributes of its shape.
@@ -28,12 +28,11 @@ DECODER_KEYS = {
 
 
 @dataclass(frozen=True)
-class NcaConfig(TrainingConfig):
+class NcaConfig(DeviceConfig):
     """Everything that shapes a training; every key can be set from a TOML file or with `--set`."""
 
     preset: str = "patch"
     steps: int = key(900, "training steps", 0)
-    device: Literal["cpu", "cuda"] = key("cpu", "that trains: the processor, or the first CUDA graphics card")
     channels: int = key(16, "channels of a cell's state", 12, 256)
     hidden: int = key(128, "width of the hidden layer", 1, 4096)
     degree: int = key(1, "highest degree of the spherical harmonics of the perception", 0, 2)

@@ -24,7 +24,7 @@ from mitex.methods.nca.surfaces import (
 )
 from mitex.methods.nca.targets import Targets, enlarged
 from mitex.progress import announce
-from mitex.runtime import available_device, keep_freed_memory
+from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, random_views
 from mitex.triples import channel_triples, triple_images
 
@@ -49,12 +49,11 @@ class NcaTask(PoolTask):
         init: Look | None = None,
         lineage: Mapping[str, str] | None = None,
     ) -> None:
-        device = available_device(config.device)
         keep_freed_memory()
         announce("preparing spheres and the exemplar")
         self.exemplar = exemplar.resized(min(config.exemplar_size, *exemplar.size))
         self.maps = sorted(exemplar.maps)
-        look = initial_look(config, self.maps, init, device)
+        look = initial_look(config, self.maps, init, config.device)
         super().__init__(config, look, training_surfaces(config, look), lineage)
         self.zooms = self._appearances()
         self.relief = None

@@ -21,7 +21,7 @@ from mitex.methods.nca.text.views import Figure, training_cameras
 from mitex.methods.nca.text.wording import MAPS, prompts
 from mitex.methods.words_distance import Negative, Part, Sight, SightBank, WordsDistance
 from mitex.progress import announce
-from mitex.runtime import available_device, keep_freed_memory
+from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import orbit
 
 PREVIEW = 256  # side of a preview's pictures [px]
@@ -49,7 +49,7 @@ class TextTask(PoolTask):
         lineage: Mapping[str, str] | None = None,
         mesh: Mesh | None = None,
     ) -> None:
-        device = available_device(config.device)
+        device = config.device
         keep_freed_memory()
         self.mesh = mesh
         self.thing = config.text_object or ("sphere" if mesh is None else mesh.name)
