@@ -12,10 +12,12 @@ from mitex.asset import Asset, clay
 from mitex.errors import ConfigError
 from mitex.export.common import asset_from_textures
 from mitex.geometry.triangles import twice_area
+from mitex.geometry.vectors import scatter_add
 from mitex.images import bilinear
 from mitex.mesh import Mesh, subdivide_midpoint
 
 DEEPEST = 0.5  # relief [radii of the mesh]
+BUMPS = ("height", "normal")  # maps that are on the mesh then
 FACES = 400_000  # that the mesh is split into, about, where its texels are as fine
 
 
@@ -35,33 +37,59 @@ def embossed(asset: Asset, relief: float, faces: int = FACES) -> Asset:
     Raises:
         ConfigError: there is no height map, or the relief is too deep.
     """
+    if not abs(relief) <= DEEPEST:
+        raise ConfigError(f"a relief of {relief:g} radii", f"use {-DEEPEST:g} to {DEEPEST:g}")
+    asset = asset if asset.texture_maps is not None else asset.baked()
+    mesh, height = vertex_heights(asset, faces)
+    assert mesh.uv is not None and asset.texture_maps is not None
+    offset = relief * asset.mesh.normalised()[1].scale * height
+    moved = mesh.with_vertices(mesh.vertices + offset[:, None].astype(np.float32) * mesh.normals)
+    maps = {name: values for name, values in asset.texture_maps.items() if name not in BUMPS}
+    return asset_from_textures(moved, mesh.uv, maps, asset.name) if maps else clay(moved)
+
+
+def vertex_heights(asset: Asset, faces: int = FACES) -> tuple[Mesh, np.ndarray]:
+    """The mesh of an asset with finer faces, as of `embossed`, and what its height map says at the vertices.
+
+    Args:
+        asset: with textures.
+        faces: as of `embossed`.
+
+    Returns:
+        The mesh with the UVs of the textures, and (V,) float64 heights, from -1 to 1 and 0 in the mean over
+        the surface; the same on all sides of a seam.
+
+    Raises:
+        ConfigError: there is no height map.
+    """
     if "height" not in asset.maps:
         raise ConfigError(
             f"the texture has no height map; it has {', '.join(asset.maps)}",
             "learn it from an exemplar that has one",
         )
-    if not abs(relief) <= DEEPEST:
-        raise ConfigError(f"a relief of {relief:g} radii", f"use {-DEEPEST:g} to {DEEPEST:g}")
-    asset = asset if asset.texture_maps is not None else asset.baked()
     assert asset.atlas is not None and asset.texture_maps is not None
-    heights, side = asset.texture_maps["height"], asset.atlas.resolution
-    mesh = _split(replace(asset.mesh, uv=asset.atlas.uv), side, faces)
+    mesh = split_faces(replace(asset.mesh, uv=asset.atlas.uv), asset.atlas.resolution, faces)
+    height = at_vertices(asset.texture_maps["height"], mesh)[:, 0]
+    return mesh, height - _mean(height, mesh)
+
+
+def at_vertices(image: np.ndarray, mesh: Mesh) -> np.ndarray:
+    """The values (V, c) float64 of a map (N, N, c) at the vertices of a mesh with UVs.
+
+    Vertices whose neighbours are several texels away get what lies around them on average; those on a seam
+    the mean over its sides, so that the surface stays closed.
+    """
     assert mesh.uv is not None
-    # Vertices closer than texels would see each of them, others what lies around them on average.
-    blurred = ndimage.gaussian_filter(heights[..., 0], 0.5 * _texels_per_edge(mesh, side))[..., None]
-    at_corners = bilinear(blurred, mesh.uv.reshape(-1, 2))[:, 0]
-    # The same on all sides of a seam, so that the surface stays closed.
+    blur = 0.5 * _texels_per_edge(mesh, len(image))
+    blurred = ndimage.gaussian_filter(image, (blur, blur, 0))
     corners = mesh.faces.ravel()
     count = np.maximum(np.bincount(corners, minlength=len(mesh.vertices)), 1)
-    height = np.bincount(corners, at_corners, minlength=len(mesh.vertices)) / count
-    offset = relief * asset.mesh.normalised()[1].scale * (height - _mean(height, mesh))
-    moved = mesh.with_vertices(mesh.vertices + offset[:, None].astype(np.float32) * mesh.normals)
-    maps = {name: values for name, values in asset.texture_maps.items() if name not in ("height", "normal")}
-    return asset_from_textures(moved, mesh.uv, maps, asset.name) if maps else clay(moved)
+    total = scatter_add(corners, bilinear(blurred, mesh.uv.reshape(-1, 2)).astype(np.float64), len(count))
+    return total / count[:, None]
 
 
-def _split(mesh: Mesh, side: int, faces: int) -> Mesh:
-    """The mesh with faces as fine as texels, or as many as there may be."""
+def split_faces(mesh: Mesh, side: int, faces: int) -> Mesh:
+    """The mesh with faces as fine as a map's texels, or with up to twice `faces` of them."""
     allowed = math.floor(math.log(max(2 * faces / max(len(mesh.faces), 1), 1), 4))
     useful = math.ceil(math.log2(max(_texels_per_edge(mesh, side), 1)))
     return subdivide_midpoint(mesh, min(allowed, useful))

@@ -57,10 +57,9 @@ class SlopeAgreement:
 
 def slope_agreement(encoded: np.ndarray) -> SlopeAgreement:
     """The `SlopeAgreement` of map values (H, W, 3) in [0, 1], row 0 on top."""
-    n = 2.0 * encoded.astype(np.float64) - 1.0
-    slopes = -n[..., :2] / np.maximum(n[..., 2:], LEAST)
-    along_x = (np.roll(slopes, -1, 1) - np.roll(slopes, 1, 1))[1:-1, 1:-1]
-    along_y = (np.roll(slopes, 1, 0) - np.roll(slopes, -1, 0))[1:-1, 1:-1]
+    rises = slopes(encoded)
+    along_x = (np.roll(rises, -1, 1) - np.roll(rises, 1, 1))[1:-1, 1:-1]
+    along_y = (np.roll(rises, 1, 0) - np.roll(rises, -1, 0))[1:-1, 1:-1]
 
     def correlation(a: np.ndarray, b: np.ndarray) -> float:
         return float((a * b).mean() / np.sqrt(max((a * a).mean() * (b * b).mean(), 1e-20)))
@@ -68,6 +67,21 @@ def slope_agreement(encoded: np.ndarray) -> SlopeAgreement:
     return SlopeAgreement(
         correlation(along_y[..., 0], along_x[..., 1]), correlation(along_y[..., 1], along_x[..., 0])
     )
+
+
+def slopes(encoded: np.ndarray) -> np.ndarray:
+    """How much the surface of map values (..., 3) in [0, 1] rises to the right and upwards, (..., 2) float64.
+
+    Normals that are flatter than `LEAST` count as if they were not.
+    """
+    n = 2.0 * encoded.astype(np.float64) - 1.0
+    return -n[..., :2] / np.maximum(n[..., 2:], LEAST)
+
+
+def of_slopes(rises: np.ndarray) -> np.ndarray:
+    """Map values (..., 3) float32 of a surface that rises by (..., 2); the inverse of `slopes`."""
+    normals = unit(np.concatenate([-rises, np.ones_like(rises[..., :1])], axis=-1))
+    return (0.5 + 0.5 * normals).astype(np.float32)
 
 
 def decode(encoded: np.ndarray, tangent: np.ndarray, bitangent: np.ndarray, normal: np.ndarray) -> np.ndarray:

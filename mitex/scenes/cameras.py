@@ -211,10 +211,12 @@ def patch_views(
     count: int,
     half_width: float,
     resolution: int = 96,
+    directions: Array | None = None,
 ) -> Cameras:
     """Orthographic close-ups of area-uniform random surface points, each seen along its inward normal.
 
-    Up in the image is +y projected into the tangent plane (+x where the normal is within 1 degree of +-y).
+    Without `directions`, up in the image is +y projected into the tangent plane (+x where the normal is
+    within 1 degree of +-y).
     The camera stands outside the mesh's bounding sphere, so the patch is what an outside observer sees there.
     On a unit sphere every pixel shows surface when `half_width sqrt(2) < 1`.
 
@@ -224,6 +226,7 @@ def patch_views(
         count: number of patches K.
         half_width: half of a patch's side [mesh units].
         resolution: image height and width [px].
+        directions: (V, 3) where right in the image points, across the normals.
     """
     import torch
 
@@ -248,6 +251,8 @@ def patch_views(
     distance = np.linalg.norm(point - center, axis=1) + 1.01 * radius + 1e-3
     near_pole = np.abs(normal[:, 1]) > math.cos(math.radians(1))
     up = np.where(near_pole[:, None], (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    if directions is not None:
+        up = np.cross(normal, interpolate(weight, directions[mesh.faces[face]]))
     return Cameras(
         "orthographic",
         origin=point + distance[:, None] * normal,

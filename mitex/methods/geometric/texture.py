@@ -15,12 +15,12 @@ from mitex.asset import Asset, clay
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, subdivide_midpoint
 from mitex.mesh.fields import vector_field
+from mitex.mesh.untangling import untangled
 from mitex.methods.geometric import files
 from mitex.methods.geometric.directions import spread
 from mitex.methods.geometric.hierarchy import Hierarchy, mean_edge
 from mitex.methods.geometric.model import grow
 from mitex.methods.geometric.network import FaceNetwork
-from mitex.methods.geometric.untangling import untangled
 from mitex.progress import counted
 from mitex.runtime import keep_freed_memory
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from mitex.mesh import Mesh, grid
 from mitex.mesh.self_intersections import piercing_pairs
-from mitex.methods.geometric.untangling import untangled
+from mitex.mesh.untangling import untangled
 
 
 def plates(gap: float) -> Mesh:
@@ -33,7 +33,7 @@ def test_what_pierces_is_drawn_back_and_nothing_else(caplog):
         result = untangled(before, after)
     first = len(piercing_pairs(after))
     assert first > 10 and len(piercing_pairs(result)) == 0
-    assert f": 0, without --untangle {first}, on the mesh itself 0" in caplog.text
+    assert f": 0, before {first}, on the mesh itself 0" in caplog.text
     right = before.vertices[:, 0] > 0.2
     assert np.array_equal(result.vertices[right], after.vertices[right])
     down = result.vertices[:, 2].min(initial=0, where=before.vertices[:, 2] > -1e-6)

@@ -48,7 +48,7 @@ def untangled(before: Mesh, after: Mesh) -> Mesh:
         mesh = after.with_vertices(before.vertices + share[:, None] * move)
         pairs = piercing_pairs(mesh)
     log.info(
-        "pairs of faces that pierce each other: %d, without --untangle %d, on the mesh itself %d",
+        "pairs of faces that pierce each other: %d, before %d, on the mesh itself %d",
         len(pairs),
         first,
         own,
