@@ -65,3 +65,11 @@ def test_slopes_of_a_height_agree(rng):
     assert slope_agreement(exchanged).across == agreement.upward and slope_agreement(exchanged).exchanged
     flat = slope_agreement(np.full((16, 16, 3), 0.5))
     assert not flat.downward and not flat.exchanged
+
+
+def test_slopes_and_back():
+    rises = np.random.default_rng(5).uniform(-2, 2, (4, 5, 2))
+    encoded = of_slopes(rises)
+    np.testing.assert_allclose(slopes(encoded), rises, atol=1e-5)
+    # To the right of a ramp that rises by 1 a unit, the normal leans back by 45 degrees.
+    np.testing.assert_allclose(of_slopes(np.array([1.0, 0.0])), [0.5 - 0.5**1.5, 0.5, 0.5 + 0.5**1.5])

@@ -43,6 +43,11 @@ FITS = {
         f"layers=relu1_1 {SMALL_RUN}",
         "--mesh cube.obj",
     ),
+    "relief": TinyFit(
+        "--exemplar lava --mesh cube.obj --steps 2 --set resolution=32 surface_steps=2 faces=200 view=32 "
+        f"width=1 layers=relu1_1 {SMALL_RUN}",
+        "--mesh cube.obj",
+    ),
     "geometric": TinyFit(
         f"--reference cube.obj --steps 2 --set level_steps=2 fit_steps=10 fit_samples=100 {SMALL_RUN}",
         "--mesh cube.obj --start-level 0",

@@ -69,21 +69,23 @@ def _rises(height: np.ndarray) -> np.ndarray:
 def _integrated(rises: np.ndarray) -> np.ndarray:
     """Heights (H, W) [px] whose slopes are nearest to (H, W, 2) by least squares.
 
-    As Frankot and Chellappa do (1988). The picture is continued by its mirror image, so that it needs not
-    repeat.
+    As Frankot and Chellappa do (1988), with the differences between pixels for derivatives. The picture is
+    continued by its mirror image, so that it needs not repeat.
     """
     right, down = rises[..., 0], -rises[..., 1]
     right = np.concatenate([right, -right[:, ::-1]], axis=1)
     right = np.concatenate([right, right[::-1]], axis=0)
     down = np.concatenate([down, down[:, ::-1]], axis=1)
     down = np.concatenate([down, -down[::-1]], axis=0)
-    # The derivatives are those of central differences, as in `_rises`.
-    y = np.sin(2 * np.pi * np.fft.fftfreq(down.shape[0]))[:, None]
-    x = np.sin(2 * np.pi * np.fft.fftfreq(down.shape[1]))[None]
-    square = x * x + y * y
-    spectrum = -1j * (x * np.fft.fft2(right) + y * np.fft.fft2(down))
-    heights = np.fft.ifft2(np.where(square > 1e-9, spectrum / np.maximum(square, 1e-9), 0)).real
-    return heights[: len(rises), : rises.shape[1]]
+    total, squares = np.zeros(right.shape, complex), np.zeros(right.shape)
+    for axis, values in ((1, right), (0, down)):
+        between = 0.5 * (values + np.roll(values, -1, axis))
+        frequency = np.expand_dims(np.fft.fftfreq(values.shape[axis]), 1 - axis)
+        difference = np.exp(2j * np.pi * frequency) - 1
+        total += difference.conj() * np.fft.fft2(between)
+        squares += np.abs(difference) ** 2
+    squares[0, 0] = 1.0  # the mean is free
+    return np.fft.ifft2(total / squares).real[: len(rises), : rises.shape[1]]
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:

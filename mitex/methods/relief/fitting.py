@@ -14,7 +14,7 @@ from mitex.methods.relief.config import PRESETS
 from mitex.methods.relief.depth import with_depth
 from mitex.methods.relief.maps import synthesized
 from mitex.methods.relief.start import Start
-from mitex.methods.relief.task import ReliefTask
+from mitex.methods.relief.task import ReliefTask, inputs
 from mitex.methods.relief.texture import ReliefTexture
 from mitex.progress import announce
 from mitex.training.fit import Run
@@ -58,6 +58,7 @@ def fit(
     given = mesh if isinstance(mesh, Mesh) else Mesh.load(mesh)
     loaded = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
     target, depth = with_depth(loaded, config.depth)
+    run.check_inputs(inputs(target, given))
     run.control.check()
     if config.start == "flat":
         start = Start.flat(with_layout(given, config.resolution, keep_uvs), config)

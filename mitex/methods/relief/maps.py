@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from mitex.cache import cached, content_key
 from mitex.exemplar import Exemplar
@@ -45,7 +48,9 @@ def synthesized(
 
     def compute() -> SurfaceTexture:
         folder = training if keep else None
-        return surface.fit(exemplar, mesh, folder, keep_uvs=keep_uvs, resume=begun, **options)
+        texture = surface.fit(exemplar, mesh, folder, keep_uvs=keep_uvs, resume=begun, **options)
+        # As files keep them, so that it does not matter whether they come from the cache.
+        return replace(texture, values=texture.values.astype(np.float16).astype(np.float32))
 
     texture = cached(place, compute, SurfaceTexture.load, _write, keep)
     if keep:

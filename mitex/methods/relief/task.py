@@ -106,6 +106,14 @@ class ReliefTask(ParameterTask):
 
     def metadata(self) -> dict[str, str]:
         mesh = self._start.mesh
-        key = content_key(mesh.vertices, mesh.faces, mesh.uv)
-        exemplar = {"exemplar": self._exemplar.name, "exemplar_key": self._exemplar.key}
-        return {"method": "relief", "mesh": mesh.name, "mesh_key": key} | exemplar
+        return {"method": "relief", "layout_key": content_key(mesh.uv), **inputs(self._exemplar, mesh)}
+
+
+def inputs(exemplar: Exemplar, mesh: Mesh) -> dict[str, str]:
+    """What a run that goes on must have been made with."""
+    return {
+        "exemplar": exemplar.name,
+        "exemplar_key": exemplar.key,
+        "mesh": mesh.name,
+        "mesh_key": content_key(mesh.vertices, mesh.faces),
+    }
