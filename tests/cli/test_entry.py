@@ -206,7 +206,7 @@ class TestUsage:
             (["fit", "nac"], "`mitex fit` knows no method 'nac'; did you mean nca?"),
             (
                 ["fit", "--exemplar", "a.png"],
-                "`mitex fit` knows no method '--exemplar'; use one of geometric, nca, nerf, surface, "
+                "`mitex fit` knows no method '--exemplar'; use one of geometric, nca, nerf, relief, surface, "
                 "displacement, gatys, image_quilting, multi_view_gram, nerf_tex, plain_field, quilted, "
                 "reaction_diffusion, solid_texture, style_mesh, text2mesh, x_mesh",
             ),

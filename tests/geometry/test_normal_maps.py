@@ -2,7 +2,15 @@
 
 import numpy as np
 
-from mitex.geometry.normal_maps import MIN_Z, decode, decode_at_vertices, encode, slope_agreement
+from mitex.geometry.normal_maps import (
+    MIN_Z,
+    decode,
+    decode_at_vertices,
+    encode,
+    of_slopes,
+    slope_agreement,
+    slopes,
+)
 from mitex.geometry.vectors import orthonormal, unit
 
 
