@@ -8,7 +8,7 @@ from sphinx.util.matching import patfilter
 # Group -> its pages as patterns, whose `*` ends at a slash. A page belongs to the first that it matches.
 GROUPS = {
     "Tutorials": ["docs/tutorials/texture-a-mesh", "docs/tutorials/*"],
-    "Methods": ["docs/nca", "docs/surface", "docs/geometric", "docs/nerf"],
+    "Methods": ["docs/nca", "docs/surface", "docs/relief", "docs/geometric", "docs/nerf"],
     "Guides": [
         "docs/moving",
         "docs/living-page",

@@ -47,6 +47,7 @@ from mitex.methods.nerf.capture import visual_hull
 from mitex.methods.nerf.capture.capture import load_capture
 from mitex.methods.nerf.capture.transforms import read_frames
 from mitex.methods.nerf.training.plain import hash_grid, parameter_shapes
+from mitex.methods.relief.texture import ReliefTexture
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.texture import SurfaceTexture
 from mitex.runtime import init
@@ -177,6 +178,11 @@ def _text2mesh(path: Path) -> None:
     Text2MeshTexture(grid(1, 1), np.full((8, 8, 3), 0.5, np.float32), {"name": "a"}).save(path)
 
 
+def _relief(path: Path) -> None:
+    maps = {"albedo": np.full((8, 8, 3), 0.5, np.float32), "roughness": np.full((8, 8, 1), 0.5, np.float32)}
+    ReliefTexture(grid(1, 1), grid(2, 2), grid(2, 2), maps, {"name": "a"}).save(path)
+
+
 def _x_mesh(path: Path) -> None:
     image = np.full((8, 8, 3), 0.5, np.float32)
     XMeshTexture(grid(1, 1), image, {"name": "a"}, grid(2, 2)).save(path)
@@ -268,6 +274,7 @@ LOADERS = {
     "solid_texture": Loader("a.safetensors", _solid, mitex.load),
     "style_mesh": Loader("a.safetensors", _style_mesh, mitex.load),
     "text2mesh": Loader("a.safetensors", _text2mesh, mitex.load),
+    "relief": Loader("a.safetensors", _relief, mitex.load),
     "x_mesh": Loader("a.safetensors", _x_mesh, mitex.load),
     "multi_view_gram": Loader("a.safetensors", _multi_view, mitex.load),
     "checkpoint": Loader("checkpoint.safetensors", _checkpoint, lambda path: checkpoint.load(path.parent)),

@@ -25,7 +25,7 @@ class ReliefConfig(TrainingConfig):
     resolution: int = key(SURFACE.resolution, "side of the maps [texels]", 16, 4096)
     scale: float = key(1.0, "size of the pattern, as of surface", 0.05, 20)
     surface_steps: int = key(SURFACE.steps, "steps of surface", 1)
-    faces: int = key(200_000, "of the relief, about; at most twice as many", 1, 16_000_000)
+    faces: int = key(200_000, "of the relief, about; at most twice as many", 1, 2_000_000)
     depth: float = key(
         0.0,
         "of the relief, from the lowest to the highest point of the height map [widths of the exemplar]; "
