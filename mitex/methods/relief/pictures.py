@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import torch
 import torch.nn.functional as F
@@ -67,7 +69,7 @@ class Pictures:
 
 
 class CloseUps:
-    """Close-ups of a relief, seen from outside.
+    """Close-ups of a relief.
 
     What they see is traced on the moved surface without derivatives; gradients reach its vertices through
     heights and normals.
@@ -105,8 +107,9 @@ class CloseUps:
         )
 
     def cameras(self, generator: torch.Generator, count: int, width: float, pixels: int) -> Cameras:
-        """Random ones that look at squares of this width."""
-        return patch_views(generator, self._mesh, count, 0.5 * width, pixels, self._directions)
+        """Random ones that look at squares of this width, from so near that they see into hollows."""
+        views = patch_views(generator, self._mesh, count, 0.5 * width, pixels, self._directions)
+        return replace(views, origin=views.target - DEEP * width * views.axes()[2])
 
     def __call__(self, offsets: torch.Tensor, cameras: Cameras) -> tuple[torch.Tensor, torch.Tensor]:
         """Pictures (K, kinds, H, W, 3) of the surface with these offsets, and (K, H, W) bool, which pixels

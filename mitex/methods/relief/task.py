@@ -60,8 +60,9 @@ class ReliefTask(ParameterTask):
         """The distance of all kinds of pictures and layers, summed."""
         config = self.config
         cameras = self.views.cameras(generator, config.views, config.width, config.view)
-        pictures, counts = self.views(self.offsets, cameras)
-        total = torch.zeros(())
+        offsets = self.offsets
+        pictures, counts = self.views(offsets, cameras)
+        total = 0 * offsets.sum()  # close-ups may see nothing that counts
         for layer, values in self.network.features(pictures.flatten(0, 1), config.layers).items():
             size = values.shape[1], values.shape[2]
             shares = F.adaptive_avg_pool2d(counts[:, None].float(), size)[:, 0]

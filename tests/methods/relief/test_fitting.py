@@ -77,6 +77,16 @@ class TestTask:
         ):
             assert value(**options) != plain, options
 
+    def test_a_step_that_sees_nothing_moves_nothing(self, monkeypatch):
+        task = task_of()
+        cameras = replace(
+            task.views.cameras(torch.Generator().manual_seed(0), 2, 1.0, 32), target=[[0, 9, 9]] * 2
+        )
+        monkeypatch.setattr(task.views, "cameras", lambda *_: cameras)
+        step = task.loss(0, torch.Generator().manual_seed(0))
+        step.value.backward()
+        assert step.metrics["seen"] == 0 and not task.named["relief"].grad.any()
+
     def test_it_starts_with_the_heights_of_the_maps(self):
         """In widths of the exemplar, whose unit the mesh's vertices then are in."""
         config = replace(CONFIG, sideways=0.0)

@@ -1,5 +1,7 @@
 """Close-ups of a surface with an exemplar's relief are the exemplar's own maps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -99,6 +101,20 @@ def test_what_is_far_or_looks_aside_does_not_count():
     assert (shown[0, :, ~counts[0]] == 0.5).all()
     near = looking(np.eye(3), 0.3)  # shows depths of +-0.3 around its middle, which is the ball's, 1 below
     assert not views(none, near)[1].any()
+
+
+def test_hollows_are_seen():
+    """The inside of a ball, from within; a camera outside of it would see nothing that counts."""
+    ball = icosphere(12)
+    hollow = replace(ball, faces=ball.faces[:, ::-1])
+    shape = Shape(hollow, 0.0, 1.0)
+    right = orthonormal(np.broadcast_to((1.0, 0.1, 0), ball.vertices.shape), hollow.normals)
+    views = CloseUps(hollow, right, shape, None, Pictures(waves("height", "normal"), False), DEPTH)
+    cameras = views.cameras(torch.Generator().manual_seed(0), 3, 0.5, 16)
+    none = torch.zeros(len(ball.vertices), 3)
+    assert views(none, cameras)[1].all()
+    outside = replace(cameras, origin=-3 * cameras.axes()[2])
+    assert not views(none, outside)[1].any()
 
 
 def test_frames_turn_with_the_surface():
