@@ -17,7 +17,7 @@ FLATTEST = 1e-4  # depth of a relief [widths of the exemplar]
 class ReliefConfig(TrainingConfig):
     """Everything that shapes a fit; every key can be set from a TOML file or with `--set`."""
 
-    steps: int = 150
+    steps: int = 100
     start: Literal["surface", "flat"] = key(
         "surface",
         "begin with maps that surface synthesizes, or with the mesh as it is, without colours",
@@ -35,7 +35,13 @@ class ReliefConfig(TrainingConfig):
     )
     views: int = key(4, "close-ups in a step", 1, 64)
     view: int = key(128, "side of a close-up [px]", 32, 2048)
-    width: float = key(0.5, "of what a close-up shows [widths of the exemplar]", 0.05, 4)
+    width: float = key(
+        0.0,
+        "of what a close-up shows [widths of the exemplar]; 0: as many edges of the relief as it has pixels, "
+        "since vertices cannot follow finer detail",
+        0,
+        16,
+    )
     loss: Literal["transport", "gram"] = key(
         "transport", "relaxed transport and moments of features, or their Gram matrices"
     )
@@ -46,7 +52,7 @@ class ReliefConfig(TrainingConfig):
     sideways: float = key(1.0, "how easily vertices move along the surface; 0: along normals only", 0, 10)
     smoothing: float = key(16.0, "how far a vertex takes others along (Nicolet et al. 2021, lambda)", 0, 1e4)
     lr: float = key(1e-3, "learning rate of Adam [widths of the exemplar]", 0)
-    milestones: tuple[int, ...] = key((120,), "steps at which the learning rate falls", 0)
+    milestones: tuple[int, ...] = key((75,), "steps at which the learning rate falls", 0)
     decay: float = key(0.1, "factor of the learning rate at a milestone", 0)
     checkpoint_every: int = 50
     preview_every: int = 50

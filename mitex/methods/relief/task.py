@@ -20,6 +20,7 @@ from mitex.training import ParameterTask, Step
 
 FULL = 0.999  # coverage from which on a feature shows pixels that count alone
 LEAST = 32  # side of the exemplar beside a close-up [px], which four layers need
+LARGEST = 8  # side of the exemplar [close-ups]
 
 
 class ReliefTask(ParameterTask):
@@ -30,6 +31,10 @@ class ReliefTask(ParameterTask):
         exemplar: with height and normal maps.
         depth: of its relief [its widths].
         start: what is moved.
+
+    Attributes:
+        unit: width of the exemplar on the mesh [mesh units].
+        width: of what a close-up shows [widths of the exemplar].
     """
 
     def __init__(self, config: ReliefConfig, exemplar: Exemplar, depth: float, start: Start) -> None:
@@ -41,7 +46,9 @@ class ReliefTask(ParameterTask):
         )
         self.shape = Shape(fine, config.smoothing, config.sideways)
         super().__init__({"relief": self.shape.coordinates(depth * start.heights)})
-        side = max(round(config.view / config.width), LEAST)
+        side = round(config.view / config.width if config.width else 1 / fine.edge_lengths.mean())
+        side = min(max(side, LEAST), LARGEST * config.view)
+        self.width = config.view / side
         self.pictures = Pictures(exemplar.resized(side), config.joint and start.colours is not None)
         self.views = CloseUps(coarse, start.directions, self.shape, start.colours, self.pictures, depth)
         self.network = Vgg16()
@@ -59,7 +66,7 @@ class ReliefTask(ParameterTask):
     def loss(self, step: int, generator: torch.Generator) -> Step:
         """The distance of all kinds of pictures and layers, summed."""
         config = self.config
-        cameras = self.views.cameras(generator, config.views, config.width, config.view)
+        cameras = self.views.cameras(generator, config.views, self.width, config.view)
         offsets = self.offsets
         pictures, counts = self.views(offsets, cameras)
         total = 0 * offsets.sum()  # close-ups may see nothing that counts
@@ -97,7 +104,7 @@ class ReliefTask(ParameterTask):
     def preview(self, step: int) -> np.ndarray:
         """The exemplar's normals and heights, and those of three close-ups."""
         config = self.config
-        cameras = self.views.cameras(torch.Generator().manual_seed(0), 3, config.width, config.view)
+        cameras = self.views.cameras(torch.Generator().manual_seed(0), 3, self.width, config.view)
         pictures, _ = self.views(self.offsets, cameras)
         beside = torch.full_like(pictures[0], 0.5)
         part = self.pictures.exemplar[:, : config.view, : config.view]

@@ -220,3 +220,15 @@ def test_another_mesh_is_refused():
     ball = with_layout(icosphere(4), 32)
     with pytest.raises(ConfigError, match="belongs to mesh"):
         ReliefTexture(ball, ball, ball, {}).apply(icosphere(5))
+
+
+def test_close_ups_are_as_fine_as_the_mesh():
+    """A pixel for each edge, as far as that leaves enough of the exemplar for four layers."""
+    plane = grid(20, 20)
+    for faces, side in ((1, 32), (8000, None)):
+        config = replace(CONFIG, width=0.0, faces=faces, resolution=256)
+        task = ReliefTask(config, waves(*ALL), DEPTH, Start.flat(plane, config))
+        cell = 0.1 / (1 if faces == 1 else 4) / task.unit
+        edge = cell * (2 + np.sqrt(2)) / 3  # the mean of two sides and a diagonal
+        assert task.pictures.exemplar.shape[1] == (side or pytest.approx(1 / edge, abs=1))
+        assert task.width == config.view / task.pictures.exemplar.shape[1]
