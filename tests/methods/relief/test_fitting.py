@@ -2,6 +2,7 @@
 
 import threading
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ from tests.training.contract import (
 )
 
 pytestmark = pytest.mark.usefixtures("own_cache")
-SMALL = {
+SMALL: dict[str, Any] = {
     "resolution": 32,
     "faces": 400,
     "view": 32,
@@ -37,8 +38,8 @@ SMALL = {
     "checkpoint_every": 2,
     "preview_every": 0,
 }
-FLAT = SMALL | {"start": "flat"}
-WITH_MAPS = SMALL | {"surface_steps": 2}
+FLAT: dict[str, Any] = SMALL | {"start": "flat"}
+WITH_MAPS: dict[str, Any] = SMALL | {"surface_steps": 2}
 CONFIG = ReliefConfig(steps=4, milestones=(), **FLAT)
 DEPTH = 3 * AMPLITUDE
 ALL = ("albedo", "height", "normal")
@@ -63,7 +64,7 @@ class TestTask:
         assert_third_step_leaves_no_trace(task_of, CONFIG, fault)
 
     def test_options_matter(self):
-        def value(**options) -> float:
+        def value(**options: Any) -> float:
             task = task_of(replace(CONFIG, **options))
             generator = torch.Generator().manual_seed(0)
             task.named["relief"].data.add_(0.05 * torch.randn(task.offsets.shape, generator=generator))
@@ -85,7 +86,8 @@ class TestTask:
         monkeypatch.setattr(task.views, "cameras", lambda *_: cameras)
         step = task.loss(0, torch.Generator().manual_seed(0))
         step.value.backward()
-        assert step.metrics["seen"] == 0 and not task.named["relief"].grad.any()
+        gradient = task.named["relief"].grad
+        assert step.metrics["seen"] == 0 and gradient is not None and not gradient.any()
 
     def test_it_starts_with_the_heights_of_the_maps(self):
         """In widths of the exemplar, whose unit the mesh's vertices then are in."""
@@ -127,7 +129,11 @@ class TestMaps:
     def test_colours_are_those_of_surface_and_kept(self, tmp_path):
         """The second fit finds the maps in the cache: `surface` takes no step."""
         stages: list[str] = []
-        options = {"set": WITH_MAPS, "steps": 2, "on_step": lambda progress: stages.append(progress.stage)}
+        options: Any = {
+            "set": WITH_MAPS,
+            "steps": 2,
+            "on_step": lambda progress: stages.append(progress.stage),
+        }
         texture = relief.fit(waves(*ALL), icosphere(4), tmp_path / "one", **options)
         assert texture.textures.keys() == {"albedo"}  # bumps are on the mesh
         kept = len(results())
@@ -136,6 +142,7 @@ class TestMaps:
         assert stages[6:] == 3 * ["relief"] and len(results()) == kept
         np.testing.assert_array_equal(again.textures["albedo"], texture.textures["albedo"])
         asset = texture.apply(icosphere(4))
+        assert asset.texture_maps is not None
         np.testing.assert_array_equal(asset.texture_maps["albedo"], texture.textures["albedo"])
         np.testing.assert_array_equal(asset.mesh.vertices, texture.moved.vertices)
 
@@ -146,7 +153,7 @@ class TestMaps:
 
     def test_a_synthesis_that_was_stopped_goes_on(self, tmp_path):
         inputs = waves(*ALL, side=40), icosphere(4), tmp_path / "run"
-        settings = {"set": WITH_MAPS | {"surface_steps": 6}, "steps": 1}
+        settings: Any = {"set": WITH_MAPS | {"surface_steps": 6}, "steps": 1}
         stop, steps = threading.Event(), []
 
         def on_step(progress):
@@ -161,7 +168,7 @@ class TestMaps:
         assert steps[5:] == [4, 5, 6, 0, 1]
 
     def test_more_settings_matter(self):
-        def albedo(**options) -> np.ndarray:
+        def albedo(**options: Any) -> np.ndarray:
             settings = WITH_MAPS | options
             return relief.fit(waves(*ALL), icosphere(4), set=settings, steps=1).textures["albedo"]
 
@@ -187,15 +194,16 @@ def test_resuming_changes_nothing(tmp_path):
 def test_piercing_parts_are_drawn_back():
     """Two plates above each other, the lower one pushed through the upper one."""
     low = grid(12, 12)
-    vertices = np.concatenate([low.vertices, low.vertices + np.float32([0.013, 0.027, 0.1])])
+    assert low.uv is not None
+    vertices = np.concatenate([low.vertices, low.vertices + np.array([0.013, 0.027, 0.1], np.float32)])
     plates = replace(
         low,
         vertices=vertices,
         faces=np.concatenate([low.faces, low.faces + len(low.vertices)]),
-        uv=np.concatenate([0.5 * low.uv, 0.5 * low.uv + np.float32([0.5, 0])]),
+        uv=np.concatenate([0.5 * low.uv, 0.5 * low.uv + np.array([0.5, 0], np.float32)]),
     )
     push = 0.4 * np.exp(-(vertices[:, :2] ** 2).sum(1) / 0.04) * (vertices[:, 2] < 0.05)
-    moved = plates.with_vertices(vertices + push[:, None] * np.float32([0, 0, 1]))
+    moved = plates.with_vertices(vertices + push[:, None] * np.array([0, 0, 1], np.float32))
     texture = ReliefTexture(plates, plates, moved, {})
     assert texture.apply().mesh.vertices[:, 2].max() > 0.3
     assert texture.apply(untangle=True).mesh.vertices[:, 2].max() < 0.15

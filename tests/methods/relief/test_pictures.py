@@ -147,6 +147,7 @@ def test_gradients_by_finite_differences(monkeypatch):
 
     offsets.requires_grad_()
     value(offsets).backward()
+    assert offsets.grad is not None
     slope = (offsets.grad * way).sum().item()
     with torch.no_grad():
         change = (value(offsets + 0.1 * way) - value(offsets - 0.1 * way)).item() / 0.2

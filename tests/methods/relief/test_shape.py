@@ -54,6 +54,7 @@ def test_gradients_by_finite_differences():
     place, way, weights = (torch.randn(len(BALL.vertices), 3, generator=generator) for _ in range(3))
     place.requires_grad_()
     (weights * shape.offsets(place)).sum().backward()
+    assert place.grad is not None
     with torch.no_grad():
         change = (weights.double() * (shape.offsets(place + way) - shape.offsets(place - way))).sum() / 2
     assert (place.grad * way).sum().item() == pytest.approx(change.item(), rel=1e-3)
