@@ -79,7 +79,7 @@ TINY: dict[str, dict[str, Any]] = {
         "table": 10,
         "occupancy": 16,
     },
-    "relief": {"resolution": 32, "faces": 200, "view": 32, "width": 1.0, "layers": ("relu1_1",)},
+    "relief": {"resolution": 64, "faces": 200, "view": 32, "width": 1.0, "layers": ("relu1_1",)},
     "geometric": {"level_steps": 2, "fit_steps": 10, "fit_samples": 100},
 }
 
