@@ -53,6 +53,16 @@ def layout_side(mesh: Mesh) -> float:
     return float(np.median(np.sqrt(area[solid] / in_layout[solid])))
 
 
-def same_surface(a: Mesh, b: Mesh) -> bool:
-    """Whether two meshes have the same vertices and faces."""
-    return np.array_equal(a.vertices, b.vertices) and np.array_equal(a.faces, b.faces)
+def check_mesh(mesh: Mesh | None, own: Mesh) -> None:
+    """Refuses another mesh than the one that a texture was made on; None is not checked.
+
+    Raises:
+        ConfigError: it has other vertices or faces.
+    """
+    if mesh is None:
+        return
+    if not (np.array_equal(mesh.vertices, own.vertices) and np.array_equal(mesh.faces, own.faces)):
+        raise ConfigError(
+            f"this texture belongs to mesh '{own.name}', not to '{mesh.name}'",
+            "synthesize it there, with the config.toml of its run folder",
+        )

@@ -12,13 +12,12 @@ import torch
 
 from mitex.asset import Asset
 from mitex.atlas import spread
-from mitex.errors import ConfigError
 from mitex.export.common import asset_from_textures
 from mitex.geometry.conservative import cover
 from mitex.geometry.raster import texel_space
 from mitex.mesh import Mesh
 from mitex.mesh.arrays import mesh_arrays, mesh_of_arrays
-from mitex.methods.layout import same_surface
+from mitex.methods.layout import check_mesh
 from mitex.training import model_file
 
 PADDING = 8  # texels by which charts are continued outwards
@@ -68,11 +67,7 @@ class MeshTexture:
         Raises:
             ConfigError: it is another mesh: the texture belongs to the mesh it was optimized on.
         """
-        if mesh is not None and not same_surface(mesh, self.mesh):
-            raise ConfigError(
-                f"this texture belongs to mesh '{self.mesh.name}', not to '{mesh.name}'",
-                "synthesize it there, with the config.toml of its run folder",
-            )
+        check_mesh(mesh, self.mesh)
         surface = self.surface
         assert surface.uv is not None
         resolution = len(self.image)

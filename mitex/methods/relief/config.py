@@ -10,8 +10,6 @@ from mitex.methods.surface.config import DEFAULT as SURFACE
 from mitex.methods.surface.config import SurfaceConfig
 from mitex.training.settings import TrainingConfig, key
 
-FLATTEST = 1e-4  # depth of a relief [widths of the exemplar]
-
 
 @dataclass(frozen=True)
 class ReliefConfig(TrainingConfig):

@@ -8,8 +8,8 @@ from scipy.ndimage import uniform_filter
 from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.geometry.normal_maps import of_slopes, slopes
-from mitex.methods.relief.config import FLATTEST
 
+FLATTEST = 1e-4  # depth of a relief [widths of the exemplar]
 AROUND = 3  # pixels that slopes are averaged over: maps of 8 bits are rough
 
 
@@ -34,8 +34,7 @@ def with_depth(exemplar: Exemplar, depth: float = 0.0) -> tuple[Exemplar, float]
         raise ConfigError(
             f"exemplar {exemplar.name} has no height map and no normals", "give a folder with one of them"
         )
-    known = "normal" in maps
-    if not known and not depth:
+    if "normal" not in maps and not depth:
         raise ConfigError(
             f"exemplar {exemplar.name} has no normals, which would say how deep its height map is",
             "set the depth, such as depth=0.05",
@@ -47,7 +46,7 @@ def with_depth(exemplar: Exemplar, depth: float = 0.0) -> tuple[Exemplar, float]
         maps["height"] = ((heights - low) / (high - low)).astype(np.float32)[..., None]
         told = high - low
     else:
-        told = _told(maps["height"][..., 0], slopes(maps["normal"])) if known else depth
+        told = depth or _told(maps["height"][..., 0], slopes(maps["normal"]))
         _check_depth(told, exemplar.name)
     if depth:
         maps["normal"] = of_slopes(depth * _rises(maps["height"][..., 0]))

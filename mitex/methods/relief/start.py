@@ -60,5 +60,5 @@ class Start:
         return Start(mesh, vertex_directions(mesh), fine, heights, None, {})
 
     def exemplar_width(self, config: ReliefConfig) -> float:
-        """[mesh units]"""
+        """How wide the exemplar is on the mesh [mesh units]."""
         return layout_side(self.mesh) * config.exemplar_side / config.resolution

@@ -11,13 +11,12 @@ import numpy as np
 import torch
 
 from mitex.asset import Asset, clay
-from mitex.errors import ConfigError
 from mitex.exemplar import MAPS
 from mitex.export.common import asset_from_textures
 from mitex.mesh import Mesh
 from mitex.mesh.arrays import mesh_arrays, mesh_of_arrays
 from mitex.mesh.untangling import untangled
-from mitex.methods.layout import same_surface
+from mitex.methods.layout import check_mesh
 from mitex.methods.relief import METHOD
 from mitex.training import model_file
 
@@ -82,11 +81,7 @@ class ReliefTexture:
         Raises:
             ConfigError: it is another mesh: a relief belongs to the mesh that it was made on.
         """
-        if mesh is not None and not same_surface(mesh, self.mesh):
-            raise ConfigError(
-                f"this relief belongs to mesh '{self.mesh.name}', not to '{mesh.name}'",
-                "fit it there, with the config.toml of its run folder",
-            )
+        check_mesh(mesh, self.mesh)
         moved = untangled(self.plain, self.moved) if untangle else self.moved
         if not self.textures:
             return clay(moved)

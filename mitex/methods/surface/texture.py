@@ -13,14 +13,13 @@ import torch
 
 from mitex.asset import Asset
 from mitex.atlas import Atlas, spread
-from mitex.errors import ConfigError
 from mitex.exemplar import MAPS
 from mitex.geometry.normal_maps import decode
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import rotate_about, unit_normals
 from mitex.mesh import Mesh
 from mitex.mesh.arrays import mesh_arrays, mesh_of_arrays
-from mitex.methods.layout import same_surface
+from mitex.methods.layout import check_mesh
 from mitex.methods.surface import METHOD
 from mitex.methods.surface.config import SurfaceConfig
 from mitex.methods.surface.domain import SurfaceDomain
@@ -69,11 +68,7 @@ class SurfaceTexture:
         Raises:
             ConfigError: it is another mesh: a surface texture belongs to the mesh it was synthesized on.
         """
-        if mesh is not None and not same_surface(mesh, self.mesh):
-            raise ConfigError(
-                f"this texture belongs to mesh '{self.mesh.name}', not to '{mesh.name}'",
-                "synthesize it there, with the config.toml of its run folder",
-            )
+        check_mesh(mesh, self.mesh)
         texels, layout = self.domain.texels, texel_layout(list(self.maps))
         atlas = Atlas.from_uv(self.domain.uv, texels.resolution, PADDING)
         used = texels.image(np.ones((len(self.values), 1), np.float32))[..., 0] > 0

@@ -61,6 +61,18 @@ def test_a_given_depth_makes_normals_steeper():
     assert np.abs(steep - 2 * plain).max() < 0.03
 
 
+def test_a_given_depth_counts_where_normals_say_something_else():
+    """Heights turned over: their slopes are the opposite of the normals'."""
+    maps = waves("height", "normal").maps
+    other = Exemplar(maps | {"height": 1 - maps["height"]}, "other")
+    with pytest.raises(ConfigError, match="of its width deep"):
+        with_depth(other)
+    exemplar, depth = with_depth(other, DEPTH)
+    assert depth == DEPTH
+    turned, plain = (slopes(e.maps["normal"])[5:-5, 5:-5] for e in (exemplar, waves("normal")))
+    assert np.abs(turned + plain).max() < 0.03
+
+
 def test_other_maps_stay():
     plain = waves("height", "normal", "albedo")
     assert np.array_equal(with_depth(plain)[0].maps["albedo"], plain.maps["albedo"])
