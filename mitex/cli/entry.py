@@ -20,6 +20,7 @@ from mitex.cli import commands, overview
 from mitex.cli.settings import settings_text
 from mitex.cli.usage import UsageError, as_options, parse
 from mitex.errors import MitexError, MitexWarning
+from mitex.runtime.workers import use_one_blas_thread
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -33,6 +34,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if argv is None else argv)
     command = None
+    use_one_blas_thread()
     _print_any_name()
     with warnings.catch_warnings():
         _route_warnings()

@@ -7,7 +7,13 @@ from mitex.runtime.memory import available_memory, keep_freed_memory
 from mitex.runtime.precision import bfloat16_is_fast
 from mitex.runtime.seeds import seed_everything
 from mitex.runtime.session import init, load_mitsuba
-from mitex.runtime.workers import let_idle_threads_sleep, lower_worker_priority, set_workers, threads
+from mitex.runtime.workers import (
+    let_idle_threads_sleep,
+    lower_worker_priority,
+    set_workers,
+    threads,
+    use_one_blas_thread,
+)
 
 __all__ = [
     "Check",
@@ -24,4 +30,5 @@ __all__ = [
     "seed_everything",
     "set_workers",
     "threads",
+    "use_one_blas_thread",
 ]

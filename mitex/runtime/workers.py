@@ -59,6 +59,19 @@ def let_idle_threads_sleep() -> None:
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 
+def use_one_blas_thread() -> None:
+    """Lets OpenBLAS, which NumPy and SciPy multiply with, use one thread.
+
+    Its threads spin until all have done their part of a product. A sparse factorization has many small
+    products: beside another program on two cores, one of 165,199 unknowns took 206 s instead of 5. Alone it
+    gains nothing from a second thread. Large products are torch's here.
+    To be called before NumPy is imported, later it has no effect; OPENBLAS_NUM_THREADS and OMP_NUM_THREADS
+    have precedence.
+    """
+    if "OMP_NUM_THREADS" not in os.environ:
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
 def lower_worker_priority() -> None:
     """Lets torch go before Dr.Jit's workers where both want a core (on Linux; elsewhere nothing happens).
 

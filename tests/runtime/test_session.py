@@ -12,6 +12,7 @@ import pytest
 
 import mitex.plugins
 import mitex.runtime
+from mitex.batch.process import cores
 from mitex.errors import ConfigError
 from mitex.runtime import llvm
 
@@ -201,6 +202,27 @@ def test_torch_yields_cores_unless_the_user_says_otherwise(monkeypatch: pytest.M
     monkeypatch.delenv("OMP_WAIT_POLICY")
     mitex.runtime.let_idle_threads_sleep()
     assert os.environ["OMP_WAIT_POLICY"] == "PASSIVE"
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="threads cannot be counted")
+@pytest.mark.parametrize(
+    ("environment", "blas"), [({}, 1), ({"OMP_NUM_THREADS": "2"}, 2), ({"OPENBLAS_NUM_THREADS": "2"}, 2)]
+)
+def test_commands_multiply_with_one_thread_in_numpy_unless_the_user_says_otherwise(
+    environment: dict[str, str], blas: int, monkeypatch: pytest.MonkeyPatch
+):
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        monkeypatch.delenv(name, raising=False)
+    code = (
+        "import os, sys, mitex.cli\n"
+        "assert 'numpy' not in sys.modules\n"
+        "mitex.cli.main(['--version'])\n"
+        "import numpy as np\n"
+        "a = np.ones((2000, 2000))\n"
+        "a @ a\n"
+        "print(len(os.listdir('/proc/self/task')))"
+    )
+    assert run(code, **environment).stdout.split()[-1] == str(min(blas, cores()))
 
 
 def test_fitting_radiance_fields_asks_torch_to_yield_before_it_is_loaded():

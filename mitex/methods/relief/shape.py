@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import scipy.sparse
 import torch
-from scipy.sparse.linalg import splu
 
 from mitex.mesh import Mesh
+from mitex.mesh.connection import solver
 
 
 class Shape:
@@ -33,8 +33,7 @@ class Shape:
         )
         laplacian = scipy.sparse.diags_array(graph.valence.astype(float)) - neighbours
         self._matrix = (scipy.sparse.eye_array(count) + smoothing * laplacian).tocsc()
-        # In SuperLU's own order of columns: its minimum degree does not end on some meshes that were split.
-        self._solve = splu(self._matrix).solve
+        self._solve = solver(self._matrix)
 
     def coordinates(self, heights: np.ndarray) -> torch.Tensor:
         """The u (V, 3) float32 of vertices that are raised by heights (V,) along their normals."""
