@@ -20,6 +20,7 @@ ORDER = [
     "comparison",
     "batch",
     "methods",
+    "quilting",
     "evaluation",
     "render",
     "export",

@@ -31,14 +31,19 @@ def split_long_edges(mesh: Mesh, length: float) -> Mesh:
     Raises:
         MeshError: the result would have more than 32 million faces.
     """
-    vertices, faces = mesh.vertices.astype(np.float64), mesh.faces
+    return split_with_values(mesh, length, np.zeros((len(mesh.vertices), 0)))[0]
+
+
+def split_with_values(mesh: Mesh, length: float, values: np.ndarray) -> tuple[Mesh, np.ndarray]:
+    """`split_long_edges`, and values (V, K) of the vertices, which are halved linearly, too, float64."""
+    vertices, faces = np.concatenate([mesh.vertices, values], axis=1, dtype=np.float64), mesh.faces
     uv = mesh.uv
     while True:
         pairs, sides = face_edges(faces, len(vertices))
         ends = vertices[pairs]
-        long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > length
+        long = np.linalg.norm(ends[:, 1, :3] - ends[:, 0, :3], axis=1) > length
         if not long.any():
-            return Mesh(vertices, faces, uv, mesh.name)
+            return Mesh(vertices[:, :3], faces, uv, mesh.name), vertices[:, 3:]
         middle = len(vertices) + np.cumsum(long) - 1
         kinds = long[sides] @ (1, 2, 4)
         parents, places = _children(kinds)

@@ -21,8 +21,7 @@ from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.field.rendering import render_step
 from mitex.methods.nerf.field.shell import CapturedLatents, Shell
 from mitex.methods.nerf.field.tensors import channels
-from mitex.methods.nerf.synthesis.guide import WEIGHT, Guide
-from mitex.methods.nerf.synthesis.maps import LatentMaps, latent_maps
+from mitex.methods.nerf.synthesis.maps import LatentMaps, angles_of, latent_maps
 from mitex.methods.nerf.synthesis.patch_images import render_patches
 from mitex.methods.nerf.synthesis.patches import (
     PATTERN_RATE,
@@ -32,10 +31,6 @@ from mitex.methods.nerf.synthesis.patches import (
     texel_gap,
 )
 from mitex.methods.nerf.synthesis.patches import SIZE as PATCH
-from mitex.methods.nerf.synthesis.quilting import Quilt, quilt
-from mitex.methods.nerf.synthesis.repetition import EVENNESS
-from mitex.methods.nerf.synthesis.surface_quilting import quilt_on
-from mitex.methods.nerf.synthesis.target import Target
 from mitex.methods.nerf.use.applied import AppliedTexture, check_ranges, checked_light, joined_on_surface
 from mitex.methods.nerf.use.on_plane import SCALE, TextureOnPlane, plane
 from mitex.methods.nerf.use.placement import (
@@ -48,6 +43,11 @@ from mitex.methods.nerf.use.placement import (
 )
 from mitex.methods.nerf.use.self_maps import self_maps
 from mitex.progress import announce
+from mitex.quilting.guide import WEIGHT, Guide
+from mitex.quilting.plane import Quilt, quilt
+from mitex.quilting.repetition import EVENNESS
+from mitex.quilting.surface import quilt_on
+from mitex.quilting.target import SurfaceTarget
 from mitex.runtime import init
 from mitex.runtime.jit import mi
 from mitex.runtime.upload import upload
@@ -212,9 +212,9 @@ class NerfTexture:
         rng = np.random.default_rng(seed)
         squares = self.patches(rng, patches, pattern_rate)
         announce("laying the mesh flat around its points")
-        target = Target(in_scene_cube(mesh)[0], side, PATCH, gap)
+        target = SurfaceTarget(in_scene_cube(mesh)[0], side, PATCH, gap)
         maps = self.maps(squares, quilt_on(self.source(squares), target, rng, evenness=evenness))
-        return mesh, replace(maps, angle=target.map(target.angles()))
+        return mesh, replace(maps, angle=target.map(angles_of(target)))
 
     def source(self, squares: Patches) -> FeatureSource:
         """The features of patches, which are compared by f."""

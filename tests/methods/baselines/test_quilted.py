@@ -13,8 +13,8 @@ from mitex.methods.baselines.quilted.albedo import in_even_light, quilted_albedo
 from mitex.methods.nerf import NerfTexture
 from mitex.methods.nerf.base.base_shape import face_frames
 from mitex.methods.nerf.synthesis.patches import Patches, extract_patches
-from mitex.methods.nerf.synthesis.repetition import EVENNESS
 from mitex.methods.nerf.use.placement import EXTENT
+from mitex.quilting.repetition import EVENNESS
 from tests.methods.nerf.small import small_texture
 
 SMALL = ["size=128", "patches=12"]  # of a small fit

@@ -21,11 +21,11 @@ from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.field.lighting import rotated
 from mitex.methods.nerf.field.rendering import render_rays
 from mitex.methods.nerf.synthesis.patches import Patches, extract_patches
-from mitex.methods.nerf.synthesis.quilting import Quilt
 from mitex.methods.nerf.texture import NerfTexture
 from mitex.methods.nerf.use.applied import AppliedTexture
 from mitex.methods.nerf.use.placement import EXTENT
 from mitex.progress import counted
+from mitex.quilting.plane import Quilt
 from mitex.runtime.jit import mi
 
 SQUARES = 96  # of the plane along a side

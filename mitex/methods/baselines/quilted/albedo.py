@@ -6,10 +6,10 @@ import numpy as np
 
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh
-from mitex.methods.nerf.synthesis.matching import ArraySource
 from mitex.methods.nerf.synthesis.patches import Patches
-from mitex.methods.nerf.synthesis.quilting import quilt
 from mitex.methods.nerf.training.light_estimate import brightness
+from mitex.quilting.matching import ArraySource
+from mitex.quilting.plane import quilt
 
 
 def quilted_albedo(

@@ -7,13 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from mitex.geometry.triangles import twice_area
+from mitex.geometry.vectors import dot
 from mitex.mesh import Mesh
+from mitex.mesh.frames import interpolate_frames
 from mitex.methods.nerf.base.base_shape import face_frames
 from mitex.methods.nerf.field.networks import FEATURES, PHASES
 from mitex.methods.nerf.field.shell import ShellCoords
 from mitex.methods.nerf.synthesis.patches import Patches, mirror_frames
-from mitex.methods.nerf.synthesis.quilting import Quilt
 from mitex.methods.nerf.use.placement import uv_unit_length
+from mitex.quilting.plane import Quilt
+from mitex.quilting.target import SurfaceTarget
 from mitex.runtime.jit import dr, mi
 from mitex.runtime.upload import upload
 
@@ -173,3 +176,12 @@ def uv_frames(mesh: Mesh) -> np.ndarray:
 def _wrapped(index: mi.Int32, size: int) -> mi.Int32:
     rest = index % size
     return dr.select(rest < 0, rest + size, rest)
+
+
+def angles_of(target: SurfaceTarget) -> np.ndarray:
+    """(N,) float32 [rad] from dP/du of the texels' charts to the texture's right, counter-clockwise seen from
+    outside."""
+    face = target.texels.face
+    right, _ = interpolate_frames(target.mesh, face, target.texels.barycentric, target.directions)
+    t, b = np.moveaxis(face_frames(target.mesh)[face, :2], 1, 0)
+    return np.arctan2(dot(right, b), dot(right, t)).astype(np.float32)

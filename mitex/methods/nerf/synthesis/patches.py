@@ -19,7 +19,7 @@ from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import orthonormal
 from mitex.mesh import Mesh
 from mitex.mesh.topology import mesh_edges
-from mitex.methods.nerf.synthesis.matching import HORIZONTAL, VERTICAL
+from mitex.quilting.matching import HORIZONTAL, VERTICAL
 from mitex.runtime import init
 from mitex.runtime.jit import dr, mi
 from mitex.scenes.shapes import mesh_shape

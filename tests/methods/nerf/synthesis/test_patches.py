@@ -7,7 +7,6 @@ import pytest
 
 from mitex.errors import ConfigError, MeshError
 from mitex.mesh import Mesh, grid, icosphere
-from mitex.methods.nerf.synthesis.matching import ArraySource
 from mitex.methods.nerf.synthesis.patches import (
     FeatureSource,
     Patches,
@@ -16,7 +15,8 @@ from mitex.methods.nerf.synthesis.patches import (
     principal_direction,
     spread_points,
 )
-from mitex.methods.nerf.synthesis.quilting import quilt
+from mitex.quilting.matching import ArraySource
+from mitex.quilting.plane import quilt
 
 TURN = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
 TURN *= np.linalg.det(TURN)

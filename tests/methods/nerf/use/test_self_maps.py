@@ -15,8 +15,8 @@ from mitex.methods.nerf.field.rendering import render_batch, render_rays
 from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents, uv_frames
 from mitex.methods.nerf.synthesis.patch_images import render_patches
 from mitex.methods.nerf.synthesis.patches import PATTERN_RATE, extract_patches
-from mitex.methods.nerf.synthesis.quilting import Quilt
 from mitex.methods.nerf.use.placement import EXTENT
+from mitex.quilting.plane import Quilt
 from tests.methods.nerf.field.test_shell import at, mi, rows, shell
 from tests.methods.nerf.tiny import tiny_capture
 

@@ -13,10 +13,10 @@ import numpy as np
 
 from mitex.cuts import cheapest_path, feather, new_part, overlap_paths
 from mitex.errors import ConfigError
-from mitex.methods.nerf.synthesis.guide import Guide, GuideDistance
-from mitex.methods.nerf.synthesis.matching import FLIPS, SIDES, Matcher, Source, mirror, overlap, strip
-from mitex.methods.nerf.synthesis.repetition import EVENNESS, Repetition
 from mitex.progress import announce
+from mitex.quilting.guide import Guide, GuideDistance
+from mitex.quilting.matching import FLIPS, SIDES, Matcher, Source, mirror, overlap, strip
+from mitex.quilting.repetition import EVENNESS, Repetition
 
 NEAREST = 16  # candidates for a place
 Maps = dict[str, np.ndarray]  # the fields of `Quilt`

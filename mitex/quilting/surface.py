@@ -15,12 +15,12 @@ from scipy.ndimage import binary_closing, binary_dilation, binary_erosion
 from mitex.cuts import cheapest_cut, feather
 from mitex.errors import ConfigError
 from mitex.geometry.vectors import scatter_add
-from mitex.methods.nerf.synthesis.block_matching import BlockMatcher, block_means
-from mitex.methods.nerf.synthesis.matching import BLOCK, Source
-from mitex.methods.nerf.synthesis.quilting import NEAREST, Quilt
-from mitex.methods.nerf.synthesis.repetition import EVENNESS, Repetition
-from mitex.methods.nerf.synthesis.target import Target
 from mitex.progress import announce
+from mitex.quilting.block_matching import BlockMatcher, block_means
+from mitex.quilting.matching import BLOCK, Source
+from mitex.quilting.plane import NEAREST, Quilt
+from mitex.quilting.repetition import EVENNESS, Repetition
+from mitex.quilting.target import Target
 
 FINE_CELL = 2  # side of the cells that a cut goes between, where texels are so fine [texels of a patch]
 FINE_TEXELS = 2.0  # area of a texel [texels of a patch] up to which nearly each such cell has one
@@ -46,7 +46,7 @@ def quilt_on(
         evenness: how much repetition is avoided, see `Repetition`.
 
     Returns:
-        The texture in the map (side, side); zeros between charts.
+        The texture in the target's map.
 
     Raises:
         ConfigError: a number is out of range, or the patches cannot be used.
@@ -117,7 +117,7 @@ class _Canvas:
     def __init__(self, source: Source, target: Target, shape: tuple[int, int, int]) -> None:
         self.source, self.target, self.side = source, target, shape[0]
         self.cell = FINE_CELL if target.area < FINE_TEXELS else BLOCK
-        count = len(target.texels.index)
+        count = target.count
         self.features = np.zeros((count, shape[2]), np.float32)
         self.patch = np.full(count, -1, np.int32)
         self.texel = np.zeros((count, 2), np.int16)

@@ -38,12 +38,14 @@ class _Surroundings:
         faces: (N,) ascending, all within reach, among them `face`.
         away: (V,) how far the vertices are from its corners along edges, infinite beyond reach.
         previous: (V,) the vertex before on the shortest way, negative where there is none.
+        reach: [mesh units].
     """
 
     face: int
     faces: np.ndarray
     away: np.ndarray
     previous: np.ndarray
+    reach: float
 
     def within(self, reach: float, corners: np.ndarray) -> _Surroundings:
         """Those of the faces, whose corners are (F, 3), that are nearer."""
@@ -89,24 +91,28 @@ class Flattening:
         away = dijkstra(self.graph, indices=self.corners[first, 0], min_only=True)
         return away[self.corners].mean(axis=1)
 
-    def __call__(self, face: int, barycentric: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def __call__(
+        self, face: int, barycentric: np.ndarray, size: float = 1.0
+    ) -> tuple[np.ndarray, np.ndarray]:
         """The faces around a point in the plane, without those that do not fit in.
 
         Args:
             face: that the point lies on.
             barycentric: (3,) where on it.
+            size: factor of the reach.
 
         Returns:
             (K,) faces, among them `face`, and (K, 3, 2) where their corners are, x to the right and y up, the
             point at 0 [mesh units].
         """
-        whole = self._surroundings(face)
+        reach = size * self.reach
+        whole = self._surroundings(face, reach)
         result = np.zeros(0, np.int64), np.zeros((0, 3, 2))
         for part in PARTS:
-            around = whole.within(part * self.reach, self.corners)
+            around = whole.within(part * reach, self.corners)
             faces = around.faces
             corners_away = around.away[self.corners[faces]]
-            close = faces[(corners_away < ROUND * part * self.reach).all(1) & (self.areas[faces] > 0)]
+            close = faces[(corners_away < ROUND * part * reach).all(1) & (self.areas[faces] > 0)]
             along = orthonormal(np.broadcast_to(self.right[face], (len(faces), 3)), self.normals[faces])
             for right in (self.right[faces], along):
                 other = self._mapped(around, right, np.cross(self.normals[faces], right))
@@ -115,17 +121,17 @@ class Flattening:
                     return self._around_the_point(face, barycentric, *other)
         return self._around_the_point(face, barycentric, *result)
 
-    def _surroundings(self, face: int) -> _Surroundings:
+    def _surroundings(self, face: int, reach: float) -> _Surroundings:
         away, previous, _ = dijkstra(
             self.graph,
             indices=np.unique(self.corners[face]),
             min_only=True,
-            limit=self.reach,
+            limit=reach,
             return_predecessors=True,
         )
         near = np.isfinite(away)
         faces = np.unique(np.concatenate([self.around[vertex] for vertex in np.flatnonzero(near)]))
-        return _Surroundings(face, faces[near[self.corners[faces]].all(1)], away, previous)
+        return _Surroundings(face, faces[near[self.corners[faces]].all(1)], away, previous, reach)
 
     def _mapped(
         self, around: _Surroundings, right: np.ndarray, up: np.ndarray
@@ -179,7 +185,7 @@ class Flattening:
         origin[start[own_face, 1:]] = np.cumsum(steps[own_face, :2], axis=0)
         way += origin[before]
         jumps = np.linalg.norm(way[end] - way[start] - steps, axis=2)
-        return (jumps > TORN * self.reach).any(1) & (around.faces != around.face)
+        return (jumps > TORN * around.reach).any(1) & (around.faces != around.face)
 
     def _around_the_point(
         self, face: int, barycentric: np.ndarray, faces: np.ndarray, place: np.ndarray

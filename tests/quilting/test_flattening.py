@@ -7,8 +7,8 @@ import pytest
 
 from mitex.mesh import Mesh, grid, icosphere
 from mitex.mesh.frames import vertex_directions
-from mitex.methods.nerf.synthesis.flattening import STRETCH, Flattening
-from tests.methods.nerf.synthesis.tubes import joined, tube
+from mitex.quilting.flattening import STRETCH, Flattening
+from tests.quilting.tubes import joined, tube
 
 THIRD = np.full(3, 1 / 3)
 

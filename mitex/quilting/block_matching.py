@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mitex.methods.nerf.synthesis.matching import BLOCK, Candidates, Source, centre
+from mitex.quilting.matching import BLOCK, Candidates, Source, centre
 
 
 class BlockMatcher(Candidates):

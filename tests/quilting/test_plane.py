@@ -8,9 +8,9 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from mitex.errors import ConfigError
-from mitex.methods.nerf.synthesis.guide import Guide, GuideDistance
-from mitex.methods.nerf.synthesis.matching import SIDES, ArraySource, Matcher, mirror, overlap, strip
-from mitex.methods.nerf.synthesis.quilting import Quilt, quilt
+from mitex.quilting.guide import Guide, GuideDistance
+from mitex.quilting.matching import SIDES, ArraySource, Matcher, mirror, overlap, strip
+from mitex.quilting.plane import Quilt, quilt
 
 SIDE, STRIDE = 32, 20
 

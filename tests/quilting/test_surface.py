@@ -13,11 +13,11 @@ from mitex.evaluation.seams import ratio_across
 from mitex.geometry.triangles import interpolate
 from mitex.images import bilinear
 from mitex.mesh import Mesh, grid, icosphere
-from mitex.methods.nerf.synthesis.matching import ArraySource
-from mitex.methods.nerf.synthesis.quilting import Quilt
-from mitex.methods.nerf.synthesis.surface_quilting import quilt_on
-from mitex.methods.nerf.synthesis.target import Target
-from tests.methods.nerf.synthesis.tubes import joined, tube
+from mitex.quilting.matching import ArraySource
+from mitex.quilting.plane import Quilt
+from mitex.quilting.surface import quilt_on
+from mitex.quilting.target import SurfaceTarget
+from tests.quilting.tubes import joined, tube
 
 PATCH, PERIOD = 32, 16.0  # [texels]
 GAP = 0.05  # between texels of patches, on meshes of size 2
@@ -38,7 +38,7 @@ def on(mesh: Mesh, source: ArraySource | None = None, side: int = SIDE, seed: in
     """The mesh with charts, unless it has them, and what was quilted on it."""
     if mesh.uv is None:
         mesh = replace(mesh, uv=unwrap(mesh, side, 3))
-    target = Target(mesh, side, PATCH, GAP)
+    target = SurfaceTarget(mesh, side, PATCH, GAP)
     return mesh, quilt_on(source or strands(), target, np.random.default_rng(seed))
 
 
@@ -159,10 +159,12 @@ def test_hard_meshes(name: str):
 def test_patches_larger_than_the_mesh(monkeypatch):
     """They cover what they can of it, not one face at a time."""
     mesh = icosphere(6)
-    target = Target(replace(mesh, uv=unwrap(mesh, 64, 3)), 64, PATCH, 4 / PATCH)
+    target = SurfaceTarget(replace(mesh, uv=unwrap(mesh, 64, 3)), 64, PATCH, 4 / PATCH)
     places = []
-    around = Target.around
-    monkeypatch.setattr(Target, "around", lambda self, texel: places.append(texel) or around(self, texel))
+    around = SurfaceTarget.around
+    monkeypatch.setattr(
+        SurfaceTarget, "around", lambda self, texel: places.append(texel) or around(self, texel)
+    )
     quilt_on(strands(), target, np.random.default_rng(0))
     assert len(places) < 100 < len(target.mesh.faces) / 10
 
@@ -179,14 +181,14 @@ def test_evenness_shows_what_is_rare():
     counts = []
     for evenness in (0.0, 2.0):
         mesh = icosphere(6)
-        target = Target(replace(mesh, uv=unwrap(mesh, SIDE, 3)), SIDE, PATCH, GAP)
+        target = SurfaceTarget(replace(mesh, uv=unwrap(mesh, SIDE, 3)), SIDE, PATCH, GAP)
         quilt = quilt_on(strands(), target, np.random.default_rng(0), nearest=2, evenness=evenness)
         counts.append(len(np.unique(quilt.patch)))
     assert counts[1] > counts[0]
 
 
 def test_refusals():
-    target = Target(replace(grid(2, 2)), 16, PATCH, GAP)
+    target = SurfaceTarget(replace(grid(2, 2)), 16, PATCH, GAP)
     with pytest.raises(ConfigError, match="candidates"):
         quilt_on(strands(), target, np.random.default_rng(0), nearest=0)
     with pytest.raises(ConfigError, match="evenness"):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mitex.errors import ConfigError
-from mitex.methods.nerf.synthesis.block_matching import BlockMatcher, block_means
-from mitex.methods.nerf.synthesis.matching import ArraySource
+from mitex.quilting.block_matching import BlockMatcher, block_means
+from mitex.quilting.matching import ArraySource
 
 
 def test_distances_are_those_of_the_blocks(rng: np.random.Generator):

@@ -9,7 +9,7 @@ import numpy as np
 
 from mitex.errors import ConfigError
 from mitex.images import resize
-from mitex.methods.nerf.synthesis.matching import mirror
+from mitex.quilting.matching import mirror
 
 WEIGHT = 5.0
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from mitex.errors import ConfigError
-from mitex.methods.nerf.synthesis.guide import Guide
-from mitex.methods.nerf.synthesis.matching import ArraySource
-from mitex.methods.nerf.synthesis.quilting import Quilt, quilt
-from mitex.methods.nerf.synthesis.repetition import REACH, Repetition
+from mitex.quilting.guide import Guide
+from mitex.quilting.matching import ArraySource
+from mitex.quilting.plane import Quilt, quilt
+from mitex.quilting.repetition import REACH, Repetition
 
 SIDE, STRIDE = 32, 20
 
