@@ -6,7 +6,7 @@ outline, in blocks of texels. It is joined along the cheapest cut of any form (K
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +35,7 @@ def quilt_on(
     *,
     nearest: int = NEAREST,
     evenness: float = EVENNESS,
+    interpolated: bool = True,
 ) -> Quilt:
     """Synthesizes a texture on a surface.
 
@@ -44,6 +45,8 @@ def quilt_on(
         rng: of all choices.
         nearest: candidates for a place, among which chance decides; doubled until one is allowed.
         evenness: how much repetition is avoided, see `Repetition`.
+        interpolated: values lie between those of a patch's texels, which takes fine grain from pictures;
+            instead of being the nearest ones.
 
     Returns:
         The texture in the target's map.
@@ -55,7 +58,7 @@ def quilt_on(
         raise ConfigError(f"{nearest} candidates", "use 1 or more")
     matcher = BlockMatcher(source)
     repetition = Repetition(matcher.centres, source.length, evenness)
-    canvas = _Canvas(source, target, matcher.shape)
+    canvas = _Canvas(source, target, matcher.shape, _between if interpolated else _nearest)
     for texel in canvas.empty():
         place = canvas.beside(texel)
         costs = matcher.distances(*place.blocks())
@@ -114,8 +117,14 @@ class _Place:
 class _Canvas:
     """A texture in the making on a surface of N texels."""
 
-    def __init__(self, source: Source, target: Target, shape: tuple[int, int, int]) -> None:
-        self.source, self.target, self.side = source, target, shape[0]
+    def __init__(
+        self,
+        source: Source,
+        target: Target,
+        shape: tuple[int, int, int],
+        sampled: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    ) -> None:
+        self.source, self.target, self.side, self.sampled = source, target, shape[0], sampled
         self.cell = FINE_CELL if target.area < FINE_TEXELS else BLOCK
         count = target.count
         self.features = np.zeros((count, shape[2]), np.float32)
@@ -179,7 +188,7 @@ class _Canvas:
         column, row = np.clip(np.rint(place.where).astype(np.int16), 0, self.side - 1).T
         weights = np.where(place.known, share[row, column], 1.0)[:, None]
         values = self.features[place.texels]
-        self.features[place.texels] = values + weights * (_sampled(patch, place.where) - values)
+        self.features[place.texels] = values + weights * (self.sampled(patch, place.where) - values)
         shown = weights[:, 0] > 0.5
         self.patch[place.texels[shown]] = index
         self.texel[place.texels[shown]] = np.stack([row, column], axis=1)[shown]
@@ -190,7 +199,13 @@ class _Canvas:
         return Quilt(features, patch, np.zeros(patch.shape, np.uint8), texel)
 
 
-def _sampled(patch: np.ndarray, where: np.ndarray) -> np.ndarray:
+def _nearest(patch: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """(M, C) of the texels of a patch (S, S, C) that are nearest to columns and rows (M, 2)."""
+    column, row = np.clip(np.rint(where).astype(np.int64), 0, len(patch) - 1).T
+    return patch[row, column]
+
+
+def _between(patch: np.ndarray, where: np.ndarray) -> np.ndarray:
     """(M, C) of a patch (S, S, C) at columns and rows (M, 2), bilinear; its border goes on beyond it."""
     last = len(patch) - 1
     where = np.clip(where, 0, last)

@@ -7,7 +7,7 @@ from mitex.errors import MeshError
 from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh, grid, icosphere, split
 from mitex.mesh.nearest import surface_points
-from mitex.mesh.split import split_long_edges
+from mitex.mesh.split import split_long_edges, split_with_values
 from mitex.mesh.topology import boundary_edges, mesh_edges
 
 
@@ -65,3 +65,11 @@ def test_too_many_faces_are_refused(monkeypatch):
     monkeypatch.setattr(split, "MAX_FACES", 1000)
     with pytest.raises(MeshError, match="use longer ones"):
         split_long_edges(icosphere(3), 0.01)
+
+
+def test_values_of_vertices_go_along():
+    """Those that are linear in the places are so after."""
+    mesh, matrix = icosphere(3), np.random.default_rng(0).normal(size=(3, 2))
+    fine, values = split_with_values(mesh, 0.2, mesh.vertices @ matrix)
+    assert len(fine.vertices) > len(mesh.vertices)
+    np.testing.assert_allclose(values, fine.vertices @ matrix, atol=1e-6)

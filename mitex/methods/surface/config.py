@@ -83,10 +83,16 @@ class TexelConfig(TrainingConfig):
         0,
         1,
     )
+    start: Literal["patches", "noise"] = key(
+        "patches",
+        "begin with patches of the exemplar, joined on the surface, or with noise (the paper); style "
+        "transfer begins with its content, and words alone with noise",
+    )
+    patch: float = key(0.25, "start=patches: side of a patch [sides of the exemplar]", 0.02, 1)
     noise: float = key(
         1.0,
-        "width of the uniform noise at the start: from 0 on (the paper), or around the exemplar's mean and "
-        "in multiples of its spread, if whitened",
+        "start=noise: width of uniform noise: from 0 on (the paper), or around the exemplar's mean and in "
+        "multiples of its spread, if whitened",
         0,
         10,
     )
@@ -178,6 +184,7 @@ PRESETS = {
         milestones=(200, 400),
         frames="fixed",
         continued=False,
+        start="noise",
         exemplar_size=512,
         whitened=False,
         region=0.0,
@@ -205,6 +212,7 @@ PRESETS[CLIP] = replace(
     preset=CLIP,
     text="red dots on white",
     steps=300,
+    start="noise",
     colours=0.0,  # words may ask for some that no exemplar has
     milestones=(210, 270),
     coarse_share=0.5,

@@ -8,7 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
+from mitex.atlas import spread
 from mitex.cache import content_key
+from mitex.geometry.vectors import rotate_about
 from mitex.mesh import Mesh
 from mitex.mesh.frames import interpolate_frames, vertex_directions
 from mitex.methods.surface.borders import Border
@@ -20,6 +22,7 @@ from mitex.methods.surface.scale_map import ScaleMap
 from mitex.methods.surface.taps import Surroundings, build
 from mitex.methods.surface.texels import Texels
 from mitex.progress import announce
+from mitex.quilting.target import SurfaceTarget, Target
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +113,20 @@ class SurfaceDomain:
     def steps(self) -> np.ndarray | None:
         """(N,) steps of the taps at the texels, 1 in the mean [texels]; None where all are 1."""
         return None if self.factors is None else self.factors / self.mean_scale
+
+    def target(self, patch: int) -> Target:
+        """What `mitex.quilting.quilt_on` covers with patches of `patch` texels, which lie as the taps do."""
+        texels, steps = self.texels, self.steps
+        turned = rotate_about(self.directions, self.mesh.normals.astype(np.float64), math.radians(self.angle))
+        sizes = None
+        if steps is not None:
+            used = np.zeros(self.resolution**2, bool)
+            used[texels.index] = True
+            sizes = np.ones((self.resolution**2, 1))
+            sizes[texels.index, 0] = steps
+            shape = (self.resolution, self.resolution)
+            sizes = spread(sizes.reshape(*shape, 1), used.reshape(shape), self.resolution)[..., 0]
+        return SurfaceTarget(self.mesh, self.resolution, patch, texels.size, turned, sizes)
 
     @cached_property
     def tracer(self) -> GeodesicTracer:

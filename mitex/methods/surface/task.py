@@ -22,6 +22,7 @@ from mitex.methods.surface.config import SurfaceConfig
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.palette import Palette
+from mitex.methods.surface.patches import joined_patches
 from mitex.methods.surface.texture import texel_layout
 from mitex.methods.surface.views import Views
 from mitex.methods.surface.weights import network_weights
@@ -80,7 +81,7 @@ class SurfaceTask(ParameterTask):
         self.triples = channel_triples(self.layout, True, config.seed)
         generator = torch.Generator().manual_seed(config.seed)
         self.space = self._space()
-        super().__init__({"coordinates": self._start(generator)})
+        super().__init__({"coordinates": self._start(generator, content)})
         self.coordinates = self.named["coordinates"]
         self.networks: list[SurfaceVgg] = []
         self.comparisons: list[Comparison] = []
@@ -94,8 +95,6 @@ class SurfaceTask(ParameterTask):
             start = torch.from_numpy(content[self.levels.order].astype(np.float32))
             layer = config.content_layer
             self.content = [network.features(start, [layer])[layer] for network in self.networks]
-            with torch.no_grad():
-                self.coordinates.copy_(self.space.coordinates(start))
 
     @property
     def channels(self) -> int:
@@ -241,7 +240,14 @@ class SurfaceTask(ParameterTask):
             comparisons.append(_comparison(config, network, images, palette))
         return comparisons
 
-    def _start(self, generator: torch.Generator) -> torch.Tensor:
+    def _start(self, generator: torch.Generator, content: np.ndarray | None) -> torch.Tensor:
+        """The coordinates before the first step, of a content (N, 3) or of what the settings say."""
+        order = self.levels.order
+        if content is not None:
+            return self.space.coordinates(torch.from_numpy(content[order].astype(np.float32)))
+        if self.exemplar is not None and self.config.start == "patches":
+            patches = joined_patches(self.exemplar, self.layout, self.domain, self.config)
+            return self.space.coordinates(torch.from_numpy(patches[order]))
         noise = torch.rand(len(self.levels.order), self.channels, generator=generator)
         centred = self.config.whitened or self.exemplar is None
         noise = self.config.noise * (noise - 0.5 if centred else noise)

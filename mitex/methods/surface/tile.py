@@ -17,6 +17,7 @@ from mitex.mesh import grid
 from mitex.methods.surface.config import SurfaceConfig
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.levels import POOLS, Level, Levels
+from mitex.quilting.target import Target, TileTarget
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +46,10 @@ class TileDomain(SurfaceDomain):
     def levels(self) -> Levels:
         """The levels of the network."""
         return tile_levels(self.resolution, self.depth)
+
+    def target(self, patch: int) -> Target:
+        """See `SurfaceDomain`."""
+        return TileTarget(self.resolution, patch)
 
 
 def tile_levels(side: int, depth: int) -> Levels:

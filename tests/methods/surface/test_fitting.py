@@ -292,13 +292,13 @@ def test_a_fit_computes_its_domain_once(mesh, exemplar, tmp_path, monkeypatch):
 
 
 def test_noise_start_and_range(mesh, exemplar, tmp_path):
-    texture = surface.fit(exemplar, mesh, tmp_path / "run", set=[*SMALL, "steps=1", "lr=0"])
+    texture = surface.fit(exemplar, mesh, tmp_path / "run", set=[*SMALL, "steps=1", "lr=0", "start=noise"])
     maps = [exemplar.maps[name] for name in texture.maps]
     assert np.abs(texture.values.mean(0) - np.concatenate([m.mean((0, 1)) for m in maps])).max() < 0.05
     spread = np.concatenate([m.std((0, 1)) for m in maps])
     # Uniform noise of width 1 deviates by 0.289; a channel that hardly varies gets a little of the floor.
     assert np.abs(texture.values.std(0) - 0.289 * spread).max() < 0.02
-    overrides = [*SMALL, "steps=1", "lr=0", "whitened=false", "noise=0.2"]
+    overrides = [*SMALL, "steps=1", "lr=0", "start=noise", "whitened=false", "noise=0.2"]
     texture = surface.fit(exemplar, mesh, tmp_path / "paper", set=overrides)
     assert texture.values.min() >= 0 and texture.values.max() <= 0.2
     assert abs(texture.values.mean() - 0.1) < 0.005
@@ -308,7 +308,7 @@ def test_diffusion_wears_down_what_is_finer_than_the_taps(mesh, exemplar, tmp_pa
     """Without a gradient noise fades and the mean stays."""
     textures = {}
     for amount in ("0", "0.1"):
-        overrides = [*SMALL, "lr=0", f"diffusion={amount}"]
+        overrides = [*SMALL, "lr=0", "start=noise", f"diffusion={amount}"]
         textures[amount] = surface.fit(exemplar, mesh, tmp_path / amount, set=overrides).values
     assert np.abs(textures["0.1"].mean(0) - textures["0"].mean(0)).max() < 0.01
     assert (textures["0.1"].std(0) < 0.6 * textures["0"].std(0)).all()

@@ -1,0 +1,94 @@
+"""What a synthesis starts from: patches of the exemplar, laid as the taps lie."""
+
+import numpy as np
+import pytest
+
+from mitex.exemplar import Exemplar
+from mitex.methods.surface.config import PRESETS
+from mitex.methods.surface.domain import SurfaceDomain
+from mitex.methods.surface.patches import joined_patches, patch_side
+from mitex.methods.surface.scale_map import ScaleMap
+from mitex.methods.surface.tile import TileDomain
+from mitex.training import resolve
+from tests.methods.surface.grids import flat_square
+
+SIDE, PERIODS = 64, 8  # stripes along the exemplar
+SETTINGS = [f"resolution={SIDE}", f"exemplar_size={SIDE}", "scales=0"]
+
+
+def config(*settings: str):
+    return resolve(PRESETS, None, None, [*SETTINGS, *settings])
+
+
+def stripes() -> Exemplar:
+    """Upright stripes, and a height that follows them."""
+    wave = 0.5 + 0.4 * np.sin(2 * np.pi * PERIODS * (np.arange(SIDE) + 0.5) / SIDE)
+    image = np.tile(wave.astype(np.float32)[None, :, None], (SIDE, 1, 1))
+    return Exemplar({"albedo": np.tile(image, (1, 1, 3)), "height": image}, "stripes")
+
+
+def frequencies(image: np.ndarray) -> tuple[int, int]:
+    """Of the strongest wave in a picture (S, S), [waves along a row, along a column]."""
+    spectrum = np.abs(np.fft.rfft2(image - image.mean()))
+    down, along = np.unravel_index(spectrum.argmax(), spectrum.shape)
+    return int(along), min(int(down), len(image) - int(down))
+
+
+def image_of(domain: SurfaceDomain, settings) -> np.ndarray:
+    values = joined_patches(stripes(), ["albedo", "height"], domain, settings)
+    assert values.shape == (len(domain.texels.index), 4) and values.dtype == np.float32
+    np.testing.assert_allclose(values[:, 0], values[:, 3], atol=1e-6)  # maps stay together
+    image = np.full(domain.resolution**2, values[:, 0].mean())
+    image[domain.texels.index] = values[:, 0]
+    return image.reshape(domain.resolution, domain.resolution)
+
+
+@pytest.mark.parametrize(
+    ("settings", "waves"),
+    [((), (8, 0)), (("angle=90",), (0, 8)), (("scale=2",), (4, 0)), (("patch=0.5",), (8, 0))],
+    ids=["as it is", "turned", "larger", "larger patches"],
+)
+def test_stripes_lie_as_the_settings_say(settings, waves):
+    """On a square as wide as the exemplar at scale 1."""
+    chosen = config(*settings)
+    image = image_of(SurfaceDomain.of(flat_square(SIDE), chosen, keep=False), chosen)
+    assert np.abs(np.subtract(frequencies(image), waves)).max() <= 1  # patches need not fit exactly
+    assert image.std() > 0.9 * stripes().maps["albedo"].std()
+
+
+def test_stripes_follow_a_field_and_a_map_of_sizes():
+    mesh, chosen = flat_square(SIDE), config()
+    upwards = np.tile(np.array([0.0, 1.0, 0.0], np.float32), (len(mesh.vertices), 1))
+    along, down = frequencies(image_of(SurfaceDomain.of(mesh, chosen, upwards, keep=False), chosen))
+    assert along <= 1 and abs(down - PERIODS) <= 1
+    factors = np.where(mesh.vertices[:, 1] > mesh.vertices[:, 1].mean(), 2.0, 0.5)
+    domain = SurfaceDomain.of(mesh, chosen, None, ScaleMap(factors), keep=False)
+    image = image_of(domain, chosen)
+    upper, lower = (frequencies(part)[0] for part in (image[: SIDE // 4], image[-SIDE // 4 :]))
+    assert abs(upper - PERIODS / 2) <= 1 and abs(lower - PERIODS * 2) <= 2
+
+
+def test_a_tile_repeats():
+    chosen = config()
+    image = image_of(TileDomain.flat(chosen), chosen)
+    assert np.abs(np.subtract(frequencies(image), (PERIODS, 0))).max() <= 1
+    assert np.abs(image[:, 0] - image[:, -1]).mean() < 1.5 * np.abs(np.diff(image, axis=1)).mean()
+
+
+def test_chance_follows_the_seed():
+    rng = np.random.default_rng(0)
+    noise = Exemplar({"albedo": rng.random((SIDE, SIDE, 3), np.float32)}, "noise")
+    domain = SurfaceDomain.of(flat_square(SIDE), config(), keep=False)
+    first, same, other = (
+        joined_patches(noise, ["albedo"], domain, config(f"seed={seed}")) for seed in (0, 0, 1)
+    )
+    assert np.array_equal(first, same) and not np.array_equal(first, other)
+    # Colours are the exemplar's own, but where a seam is averaged.
+    assert np.isin(first, noise.maps["albedo"]).mean() > 0.4
+
+
+def test_sides_of_patches():
+    assert patch_side(0.25, 256, 512) == 64
+    assert patch_side(0.25, 16, 512) == 8  # at least
+    assert patch_side(1.0, 250, 512) == 248  # a multiple of 8 within the exemplar
+    assert patch_side(0.5, 512, 48) == 48  # within the texture
