@@ -21,7 +21,7 @@ class TexelConfig(TrainingConfig):
     """What shapes a synthesis from an exemplar."""
 
     preset: str = "fast"
-    steps: int = 200
+    steps: int = 60
     resolution: int = key(512, "side of the texture [texels]", 1, 4096)
     scale: float = key(
         1.0, "size of the pattern, beside that at which exemplar_size is the exemplar's side", 0.05, 20
@@ -68,7 +68,7 @@ class TexelConfig(TrainingConfig):
     layers: tuple[str, ...] = key((), "compared: VGG's convolutions and poolings; none stands for all")
     content_layer: str = key("relu4_2", "style transfer: the layer whose features stay the content's")
     content_weight: float = key(1000.0, "style transfer: how much that counts", 0)
-    scales: int = key(2, "coarser pyramids of texels matched first, each half as fine", 0, 3)
+    scales: int = key(0, "coarser pyramids of texels matched first, each half as fine", 0, 3)
     coarse_share: float = key(0.4, "of the steps, spent on the coarser scales together", 0, 0.95)
     triples: int = key(2, "triples of channels compared in a step, for several maps", 1, 16)
     whitened: bool = key(
@@ -77,7 +77,7 @@ class TexelConfig(TrainingConfig):
         "spread, so that colours move together as they do there; instead of in the channels (the paper)",
     )
     diffusion: float = key(
-        0.03,
+        0.0,
         "part of each texel replaced in every step by the mean of what its taps read, which wears down what "
         "the first convolution cannot see; it falls with the learning rate; the paper: 0",
         0,
@@ -88,7 +88,7 @@ class TexelConfig(TrainingConfig):
         "begin with patches of the exemplar, joined on the surface, or with noise (the paper); style "
         "transfer begins with its content, and words alone with noise",
     )
-    patch: float = key(0.25, "start=patches: side of a patch [sides of the exemplar]", 0.02, 1)
+    patch: float = key(0.5, "start=patches: side of a patch [sides of the exemplar]", 0.02, 1)
     noise: float = key(
         1.0,
         "start=noise: width of uniform noise: from 0 on (the paper), or around the exemplar's mean and in "
@@ -99,8 +99,8 @@ class TexelConfig(TrainingConfig):
     optimizer: Literal["adam", "lbfgs"] = key(
         "adam", "Adam (the paper), or L-BFGS, for one map, one scale and Gram matrices"
     )
-    lr: float = key(0.2, "learning rate; of L-BFGS the largest change in a step", 0)
-    milestones: tuple[int, ...] = key((150, 180), "steps at which the learning rate falls", 0)
+    lr: float = key(0.05, "learning rate; of L-BFGS the largest change in a step", 0)
+    milestones: tuple[int, ...] = key((40, 50), "steps at which the learning rate falls", 0)
     decay: float = key(0.5, "factor of the learning rate at a milestone", 0)
     shared_moment: bool = key(
         True,
@@ -174,17 +174,27 @@ class SurfaceConfig(WordsConfig, TexelConfig):
 
 
 DEFAULT = SurfaceConfig()
+NOISE = replace(
+    DEFAULT,
+    preset="noise",
+    start="noise",
+    steps=200,
+    scales=2,
+    diffusion=0.03,
+    lr=0.2,
+    milestones=(150, 180),
+)
 PRESETS = {
     DEFAULT.preset: DEFAULT,
+    NOISE.preset: NOISE,
     "paper": replace(
-        DEFAULT,
+        NOISE,
         preset="paper",
         steps=500,
         scales=0,
         milestones=(200, 400),
         frames="fixed",
         continued=False,
-        start="noise",
         exemplar_size=512,
         whitened=False,
         region=0.0,
@@ -195,7 +205,7 @@ PRESETS = {
         shared_moment=False,
     ),
     "style": replace(
-        DEFAULT,
+        NOISE,
         preset="style",
         colours=0.0,
         steps=300,
@@ -208,11 +218,10 @@ PRESETS = {
     ),
 }
 PRESETS[CLIP] = replace(
-    DEFAULT,
+    NOISE,
     preset=CLIP,
     text="red dots on white",
     steps=300,
-    start="noise",
     colours=0.0,  # words may ask for some that no exemplar has
     milestones=(210, 270),
     coarse_share=0.5,

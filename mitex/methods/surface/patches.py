@@ -20,7 +20,7 @@ from mitex.quilting.matching import BLOCK
 from mitex.quilting.picture import PictureSource
 from mitex.quilting.surface import quilt_on
 
-STRIDES = 16  # patches of the exemplar along the side of one
+PLACES = 40  # that patches are taken from, along a side of the exemplar, about
 STEP = 2 * BLOCK  # sides of patches are multiples of it [px]
 
 
@@ -51,7 +51,7 @@ def joined_patches(
     images = exemplar.resized(side).maps
     image = np.concatenate([images[name].reshape(side, side, -1) for name in maps], axis=2)
     size = patch_side(config.patch, side, config.resolution)
-    source = PictureSource(image.astype(np.float32), size, max(size // STRIDES, 1))
+    source = PictureSource(image.astype(np.float32), size, max((side - size) // PLACES, 1))
     rng = np.random.default_rng(config.seed)
     quilt = quilt_on(source, domain.target(size), rng, interpolated=False)
     texture = spread(quilt.features, quilt.patch >= 0, config.resolution)
