@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 # Synthesized here and now: exemplar, mesh, settings.
 EXEMPLAR, MESH = "hexagons", "vase"
-MAPS, SETTINGS = ("albedo", "height", "normal"), ("steps=100", "milestones=75,90")
+MAPS = ("albedo", "height", "normal")
 # Bundled models, and the meshes that they grow on.
 MODELS = {"ceramic": "octopus", "lava": "knot", "cobblestone": "shaderball"}
 RESOLUTION = 2048  # of what the models grow [texels]
@@ -122,7 +122,7 @@ def _synthesized(run: Path, seed: int, quiet: bool) -> SurfaceTexture:
     exemplar = Exemplar({name: maps[name] for name in MAPS}, EXEMPLAR)
     resume = any((run / name).is_file() for name in (CHECKPOINT, PREVIOUS))
     with nullcontext() if quiet else ProgressDisplay() as on_step:
-        return surface.fit(exemplar, MESH, run, seed=seed, set=SETTINGS, resume=resume, on_step=on_step)
+        return surface.fit(exemplar, MESH, run, seed=seed, resume=resume, on_step=on_step)
 
 
 def _grown(model: str, mesh: str, seed: int) -> tuple[Asset, str]:

@@ -1,5 +1,7 @@
 """`mitex demo`, at toy size."""
 
+from functools import partial
+
 import pytest
 
 from mitex import demo
@@ -10,7 +12,6 @@ from mitex.images import read_image
 from mitex.mesh import embedded_names
 from mitex.methods import surface
 from mitex.methods.nca import NcaTexture
-from mitex.training import resolve
 from mitex.training.locate import CHECKPOINT, PREVIOUS
 
 TINY = ("resolution=32", "exemplar_size=32", "steps=2", "scales=0", "weights=random", "preview_every=0")
@@ -22,14 +23,13 @@ def test_what_it_shows_is_there():
     assert set(demo.MAPS) <= Exemplar.load(demo.EXEMPLAR).maps.keys()
     assert {demo.MESH, *demo.MODELS.values()} <= set(embedded_names())
     assert all(NcaTexture.load(model).about["exemplar"] in exemplar_names() for model in demo.MODELS)
-    assert resolve(surface.PRESETS, overrides=demo.SETTINGS).preset == "fast"
 
 
 def test_it_leaves_assets_pictures_and_a_sheet(tmp_path, monkeypatch, capfd):
     """The second call goes on from the first, and gives the same pictures."""
     grow = NcaTexture.apply
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(demo, "SETTINGS", TINY)
+    monkeypatch.setattr(surface, "fit", partial(surface.fit, set=TINY))
     monkeypatch.setattr(demo, "MESH", "mushrooms")
     monkeypatch.setattr(demo, "MODELS", {"lava": "knot"})
     monkeypatch.setattr(demo, "RESOLUTION", 64)

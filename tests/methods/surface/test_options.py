@@ -45,7 +45,7 @@ CASES: dict[str, tuple[str, dict[str, str]]] = {
     "whitened": ("false", {}),
     "diffusion": ("0.5", {}),
     "start": ("noise", {}),
-    "patch": ("0.5", {}),
+    "patch": ("0.25", {}),
     "noise": ("0.5", {"start": "noise"}),
     "optimizer": ("lbfgs", {}),
     "lr": ("0.1", {}),
