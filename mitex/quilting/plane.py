@@ -1,4 +1,5 @@
-"""Texture synthesis by quilting (section 3.2.2; Efros and Freeman 2001): patches that overlap, one by one.
+"""Texture synthesis by quilting (Efros and Freeman 2001), as NeRF-Texture does it (Huang et al. 2023, section
+3.2.2): patches that overlap, one by one.
 
 Of 128 texels of a patch, 48 overlap the neighbour on each side and 32 are the core, so that patches are 80
 apart. Everything is generic over a `Source`: latent features and colours are quilted by the same program.

@@ -1,8 +1,8 @@
-"""How much the parts of the captured surface are repeated in a texture, as a penalty.
+"""How much the parts of an exemplar are repeated in a texture, as a penalty.
 
 Left alone, the search for the least difference shows a few patches over and over and shuns whatever is rare
-on the surface. Counting uses is the remedy of Kaspar et al. 2015 (Self Tuning Texture Optimization);
-the paper has none.
+on the exemplar. Counting uses is the remedy of Kaspar et al. 2015 (Self Tuning Texture Optimization);
+Huang et al. (2023) have none.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ import numpy as np
 from mitex.errors import ConfigError
 
 EVENNESS = 0.1
-REACH = 0.3  # standard deviation of a use's spread over the surface [sides of a patch]
+REACH = 0.3  # standard deviation of a use's spread over the exemplar [sides of a patch]
 
 
 class Repetition:
     """Counts how often patches are used.
 
     Args:
-        centres: (P, D) middles of the patches on the surface.
+        centres: (P, D) middles of the patches on the exemplar.
         length: side of a patch in the same units.
         evenness: one use of a patch weighs as much as this times the mean distance of all patches; 0 or more.
 

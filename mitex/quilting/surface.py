@@ -1,7 +1,7 @@
 """Quilting on a surface: patches are laid around its points, so that charts play no part.
 
-The patch for a place is chosen as in the plane (section 3.2.2), by what it has to continue, here of any
-outline, in blocks of texels. It is joined along the cheapest cut of any form (Kwatra et al. 2003).
+The patch for a place is chosen as in the plane (`mitex.quilting.plane`), by what it has to continue, here of
+any outline, in blocks of texels. It is joined along the cheapest cut of any form (Kwatra et al. 2003).
 """
 
 from __future__ import annotations
