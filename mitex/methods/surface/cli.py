@@ -51,8 +51,9 @@ class Fit(ExemplarOrWordsOptions):
     """In place of a mesh: a texture of N x N pixels that repeats without a seam."""
 
     preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: fast)")] = None
-    """Settings to start from: `fast` is quick and clean, `paper` follows the publication, `style` goes with
-    --content; `text` and `text-words` (the default with the small embedded model) are for words."""
+    """Settings to start from: `fast` begins with patches of the exemplar, `noise` with noise, `paper` follows
+    the publication, `style` goes with --content; `text` and `text-words` (the default with the small
+    embedded model) are for words."""
 
     resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the preset's)")] = None
     """Side of the texture [texels]."""

@@ -62,7 +62,8 @@ def fit(
         orientation: (V, 3) where the exemplar's right shall point, or a file of it, see
             `mitex.mesh.fields.read_vectors`; else the frames follow the config.
         scale_map: where the pattern's size varies: factors of it, see `ScaleMap.of`.
-        options: preset ("fast", "paper", or "style", the default with `content`), and those of `RunOptions`.
+        options: preset ("fast", "noise", "paper", or "style", the default with `content`), and those of
+            `RunOptions`.
 
     Returns:
         The texture, also saved as `texture.safetensors` in `out` if that is given.
