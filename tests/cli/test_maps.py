@@ -108,7 +108,7 @@ REFUSALS = {
     "surface on both": ("fit surface --exemplar lava --tile 64 --mesh good.obj", "--tile and --mesh"),
     "surface on none": ("fit surface --exemplar lava", "--mesh is missing; give --mesh MESH, or --tile N"),
     "surface of a pixel": ("fit surface --exemplar lava --tile 1", "--tile 1 is out of range"),
-    "surface uneven": ("fit surface --exemplar lava --tile 200 --out out/run", "use a multiple of 128"),
+    "surface uneven": ("fit surface --exemplar lava --tile 200 --out out/run", "use a multiple of 32"),
 }
 
 

@@ -38,8 +38,8 @@ def test_another_preset_shows_only_what_differs(script):
     lines = list(script.section(methods()["surface"]))
     (steps,) = [line for line in lines if line.startswith("| `steps`")]
     (frames,) = [line for line in lines if line.startswith("| `frames`")]
-    assert steps.split(" | ")[1:4] == ["`200`", "`500`", "`300`"]
-    assert frames.split(" | ")[1:4] == ["`smooth`", "`fixed`", ""]
+    assert steps.split(" | ")[1:5] == ["`60`", "`200`", "`500`", "`300`"]
+    assert frames.split(" | ")[1:5] == ["`smooth`", "", "`fixed`", ""]
 
 
 def test_a_bar_does_not_end_a_cell(script):

@@ -29,9 +29,10 @@ def patch_side(share: float, exemplar: int, texture: int) -> int:
 
     Args:
         share: of the exemplar's side, in (0, 1].
-        exemplar, texture: sides, at least 8 [px].
+        exemplar: its side, at least 8 [px].
+        texture: its side; textures of less than 8 texels lie under one patch [texels].
     """
-    most = STEP * (min(exemplar, texture) // STEP)
+    most = STEP * (min(exemplar, max(texture, STEP)) // STEP)
     return min(max(STEP * round(share * exemplar / STEP), STEP), most)
 
 

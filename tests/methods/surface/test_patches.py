@@ -92,3 +92,4 @@ def test_sides_of_patches():
     assert patch_side(0.25, 16, 512) == 8  # at least
     assert patch_side(1.0, 250, 512) == 248  # a multiple of 8 within the exemplar
     assert patch_side(0.5, 512, 48) == 48  # within the texture
+    assert patch_side(0.5, 64, 1) == 8
