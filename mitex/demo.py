@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-# Synthesized here and now: exemplar, mesh, settings.
+# Synthesized here and now: exemplar, mesh, maps.
 EXEMPLAR, MESH = "hexagons", "vase"
 MAPS = ("albedo", "height", "normal")
 # Bundled models, and the meshes that they grow on.

@@ -120,12 +120,8 @@ class SurfaceDomain:
         turned = rotate_about(self.directions, self.mesh.normals.astype(np.float64), math.radians(self.angle))
         sizes = None
         if steps is not None:
-            used = np.zeros(self.resolution**2, bool)
-            used[texels.index] = True
-            sizes = np.ones((self.resolution**2, 1))
-            sizes[texels.index, 0] = steps
-            shape = (self.resolution, self.resolution)
-            sizes = spread(sizes.reshape(*shape, 1), used.reshape(shape), self.resolution)[..., 0]
+            image = texels.image(steps[:, None])
+            sizes = spread(image, image[..., 0] > 0, self.resolution)[..., 0]
         return SurfaceTarget(self.mesh, self.resolution, patch, texels.size, turned, sizes)
 
     @cached_property

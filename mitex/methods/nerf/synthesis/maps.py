@@ -173,11 +173,6 @@ def uv_frames(mesh: Mesh) -> np.ndarray:
     return frames
 
 
-def _wrapped(index: mi.Int32, size: int) -> mi.Int32:
-    rest = index % size
-    return dr.select(rest < 0, rest + size, rest)
-
-
 def angles_of(target: SurfaceTarget) -> np.ndarray:
     """(N,) float32 [rad] from dP/du of the texels' charts to the texture's right, counter-clockwise seen from
     outside."""
@@ -185,3 +180,8 @@ def angles_of(target: SurfaceTarget) -> np.ndarray:
     right, _ = interpolate_frames(target.mesh, face, target.texels.barycentric, target.directions)
     t, b = np.moveaxis(face_frames(target.mesh)[face, :2], 1, 0)
     return np.arctan2(dot(right, b), dot(right, t)).astype(np.float32)
+
+
+def _wrapped(index: mi.Int32, size: int) -> mi.Int32:
+    rest = index % size
+    return dr.select(rest < 0, rest + size, rest)
