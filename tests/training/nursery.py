@@ -62,21 +62,31 @@ def check_loss(out: Path, before: int) -> int:
     return step
 
 
+def await_writing(out: Path, patience: float) -> None:
+    """Returns as soon as a temporary file lies in the folder, or after `patience` seconds."""
+    began = time.monotonic()
+    while time.monotonic() - began < patience and not any(out.glob(".*")):
+        time.sleep(1e-4)
+
+
 def random_kills(folder: Path, kills: int = 25) -> dict:
-    """Kills at random moments; the state is large, so that most moments lie inside the writing of a file."""
+    """Kills at random moments, every other time once a file is being written; at least one writing is hit."""
     rng = random.Random(5)
     whole = folder / "whole"
     began = time.monotonic()
     assert ended(child(fit, whole, 16, POOL))
     typical = time.monotonic() - began
     report = {"kills": 0, "runs": 0, "leftovers": 0}
-    while report["kills"] < kills:
+    while report["kills"] < kills or not report["leftovers"]:
         out = folder / f"run{report['runs']}"
         step, finished = 0, False
         while not finished:
             pid = child(fit, out, 16, POOL)
-            if report["kills"] < kills:
-                time.sleep(rng.uniform(0, 0.4 * typical))
+            if report["kills"] < kills or not report["leftovers"]:
+                if report["kills"] % 2:
+                    await_writing(out, patience=typical)
+                else:
+                    time.sleep(rng.uniform(0, 0.4 * typical))
                 os.kill(pid, signal.SIGKILL)
             finished = ended(pid)
             report["kills"] += not finished
