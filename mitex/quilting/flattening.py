@@ -201,9 +201,10 @@ class Flattening:
 
 def _fits(jacobians: np.ndarray) -> np.ndarray:
     """(N,) bool, which of (N, 2, 2) neither mirror nor stretch by more than `STRETCH`."""
-    sizes = np.linalg.svd(jacobians, compute_uv=False)
-    upright = np.linalg.det(jacobians) > 0
-    return upright & (sizes[:, 0] < STRETCH) & (sizes[:, 1] > 1 / STRETCH)
+    (a, b), (c, d) = jacobians.transpose(1, 2, 0)
+    area, squares = a * d - b * c, a * a + b * b + c * c + d * d  # product and squared sum of the stretches
+    total, difference = np.sqrt(np.maximum(squares + 2 * np.stack([area, -area]), 0.0))
+    return (area > 0) & (total + difference < 2 * STRETCH) & (total - difference > 2 / STRETCH)
 
 
 def _vertex_faces(corners: np.ndarray, count: int) -> list[np.ndarray]:

@@ -7,7 +7,7 @@ import pytest
 
 from mitex.mesh import Mesh, grid, icosphere
 from mitex.mesh.frames import vertex_directions
-from mitex.quilting.flattening import STRETCH, Flattening
+from mitex.quilting.flattening import STRETCH, Flattening, _fits
 from tests.quilting.tubes import joined, tube
 
 THIRD = np.full(3, 1 / 3)
@@ -91,3 +91,13 @@ def test_distances_begin_anew_on_each_part():
     distances = flattening(mesh, 0.5).distances()
     assert np.isfinite(distances).all()
     np.testing.assert_allclose(distances[: len(far.faces)], distances[len(far.faces) :], atol=1e-5)
+
+
+def test_what_fits_agrees_with_singular_values():
+    rng = np.random.default_rng(0)
+    maps = np.eye(2) * rng.uniform(0.5, 2, (2000, 1, 1)) + 0.2 * rng.normal(size=(2000, 2, 2))
+    maps[:400, 0] *= -1
+    stretches = np.linalg.svd(maps, compute_uv=False)
+    expected = (np.linalg.det(maps) > 0) & (stretches[:, 0] < STRETCH) & (stretches[:, 1] > 1 / STRETCH)
+    assert 0.2 < expected.mean() < 0.8 and np.array_equal(_fits(maps), expected)
+    assert not _fits(np.zeros((1, 2, 2))).any()

@@ -156,7 +156,7 @@ def _synthesized(
     if domain.factors is not None:
         inputs["scale_map_key"] = content_key(domain.factors)
     words = None if model is None else Words(config, model, domain)
-    task = SurfaceTask(config, exemplar, domain, start, inputs, words)
+    task = SurfaceTask(config, exemplar, domain, start, inputs, words, run.resume)
     origin: dict[str, Any] = {key: getattr(config, key) for key in ("resolution", "frames", "angle")}
     if words is not None:
         origin |= {"text": config.text, "text_model": words.distance.model.name}

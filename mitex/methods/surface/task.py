@@ -57,6 +57,7 @@ class SurfaceTask(ParameterTask):
             becomes the exemplar's (style transfer). The synthesis starts from it.
         inputs: further metadata of inputs that a resumed run must share.
         words: what the albedo shall be, beside the exemplar and the content if there are such.
+        resumed: a checkpoint brings the texels: no patches are laid before it is read.
 
     Raises:
         ConfigError: a content for more than the albedo, or without words on several scales; L-BFGS for
@@ -71,6 +72,7 @@ class SurfaceTask(ParameterTask):
         content: np.ndarray | None = None,
         inputs: Mapping[str, str] | None = None,
         words: Words | None = None,
+        resumed: bool = False,
     ) -> None:
         keep_freed_memory()
         self.config, self.exemplar, self.domain, self.levels = config, exemplar, domain, domain.levels
@@ -81,7 +83,7 @@ class SurfaceTask(ParameterTask):
         self.triples = channel_triples(self.layout, True, config.seed)
         generator = torch.Generator().manual_seed(config.seed)
         self.space = self._space()
-        super().__init__({"coordinates": self._start(generator, content)})
+        super().__init__({"coordinates": self._start(generator, content, resumed)})
         self.coordinates = self.named["coordinates"]
         self.networks: list[SurfaceVgg] = []
         self.comparisons: list[Comparison] = []
@@ -240,12 +242,14 @@ class SurfaceTask(ParameterTask):
             comparisons.append(_comparison(config, network, images, palette))
         return comparisons
 
-    def _start(self, generator: torch.Generator, content: np.ndarray | None) -> torch.Tensor:
+    def _start(self, generator: torch.Generator, content: np.ndarray | None, resumed: bool) -> torch.Tensor:
         """The coordinates before the first step, of a content (N, 3) or of what the settings say."""
         order = self.levels.order
         if content is not None:
             return self.space.coordinates(torch.from_numpy(content[order].astype(np.float32)))
         if self.exemplar is not None and self.config.start == "patches":
+            if resumed:
+                return torch.zeros(len(order), self.channels)
             patches = joined_patches(self.exemplar, self.layout, self.domain, self.config)
             return self.space.coordinates(torch.from_numpy(patches[order]))
         noise = torch.rand(len(self.levels.order), self.channels, generator=generator)
