@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from importlib import import_module
+from pathlib import Path
+from shutil import copytree
 from typing import Any
 
 import numpy as np
@@ -20,19 +22,35 @@ from tests.cli.refusals import check_refused
 from tests.shapes import moebius
 
 pytestmark = pytest.mark.usefixtures("own_cache")
-QUICK = "--quiet --set resolution=32 exemplar_size=32 steps=4 checkpoint_every=2 preview_every=0 scales=0"
+SMALL = "--quiet --set resolution=32 exemplar_size=32 steps=4 checkpoint_every=2 preview_every=0 scales=0"
+QUICK = f"{SMALL} start=noise"
 
 
 def fit(words=QUICK, exemplar="good.png", mesh="good.obj", out="out/run"):
     return f"fit surface --exemplar {exemplar} --mesh {mesh} --out {out} {words}".split()
 
 
+@pytest.fixture(scope="module")
+def source(tmp_path_factory, own_cache):
+    folder = tmp_path_factory.mktemp("fitted")
+    bad.image(folder / "good.png")
+    bad.text(folder / "good.obj", bad.CUBE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert main(fit()) == 0
+    return folder / "out" / "run"
+
+
 @pytest.fixture
-def run(files, capsys):
+def run(files, source):
     bad.image(files / "good.png")
-    assert main(fit()) == 0
+    return Path(copytree(source, files / "out" / "run"))
+
+
+def test_a_fit_from_patches_says_where_its_run_is(files, capsys):
+    bad.image(files / "good.png")
+    assert main(fit(SMALL)) == 0
     assert capsys.readouterr().out.strip() == "out/run"
-    return files / "out" / "run"
 
 
 def test_fit_apply_render(files, run, capsys):
@@ -175,7 +193,7 @@ HARD = {
 def test_hard_meshes_get_a_texture(files, name, capsys):
     bad.image(files / "good.png")
     bad.text(files / "hard.obj", HARD[name])
-    assert main(fit(mesh="hard.obj")) == 0
+    assert main(fit(SMALL, mesh="hard.obj")) == 0
     assert main(["apply", "out/run", "--mesh", "hard.obj", "--out", "out/a.glb"]) == 0
     output = capsys.readouterr()
     assert all(line.startswith("warning: ") for line in output.err.splitlines())
@@ -190,6 +208,6 @@ def test_a_moebius_strip(files, capsys):
     strip = moebius()
     trimesh.Trimesh(strip.vertices, strip.faces, process=False).export(files / "strip.obj")
     bad.image(files / "good.png")
-    assert main(fit(mesh="strip.obj")) == 0
+    assert main(fit(SMALL, mesh="strip.obj")) == 0
     assert main(["apply", "out/run", "--mesh", "strip.obj", "--out", "out/a.glb"]) == 0
     assert "opposite winding" in capsys.readouterr().err

@@ -83,13 +83,14 @@ class SurfaceTask(ParameterTask):
         self.triples = channel_triples(self.layout, True, config.seed)
         generator = torch.Generator().manual_seed(config.seed)
         self.space = self._space()
+        seen = exemplar is not None or content is not None
+        weights = network_weights(config, generator) if seen else {}  # what is missing is missed at once
         super().__init__({"coordinates": self._start(generator, content, resumed)})
         self.coordinates = self.named["coordinates"]
         self.networks: list[SurfaceVgg] = []
         self.comparisons: list[Comparison] = []
         self.content: list[torch.Tensor] = []
-        if exemplar is not None or content is not None:
-            weights = network_weights(config, generator)
+        if seen:
             self.networks = [self._network(scale, weights) for scale in range(config.scales + 1)]
             if exemplar is not None:
                 self.comparisons = self._comparisons(exemplar, weights)
