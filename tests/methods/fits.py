@@ -40,7 +40,7 @@ FITS = {
     ),
     "surface": TinyFit(
         "--exemplar photo.png --mesh cube.obj --steps 2 --set resolution=32 exemplar_size=32 scales=0 "
-        f"layers=relu1_1 {SMALL_RUN}",
+        f"layers=relu1_1 start=noise {SMALL_RUN}",
         "--mesh cube.obj",
     ),
     "relief": TinyFit(

@@ -38,6 +38,7 @@ from tests.training.contract import (
 
 pytestmark = pytest.mark.usefixtures("own_cache")
 SMALL = ["resolution=48", "exemplar_size=48", "steps=12", "scales=0", "checkpoint_every=6", "preview_every=0"]
+SMALL += ["start=noise"]  # which is there at once
 
 
 @pytest.fixture(scope="module")
@@ -114,8 +115,9 @@ def test_resuming_changes_nothing(mesh, exemplar, tmp_path, monkeypatch):
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
-        whole = surface.fit(exemplar, mesh, tmp_path / "whole", set=SMALL)
-        part = [*SMALL, "steps=6"]
+        settings = [*SMALL, "start=patches"]
+        whole = surface.fit(exemplar, mesh, tmp_path / "whole", set=settings)
+        part = [*settings, "steps=6"]
         surface.fit(exemplar, mesh, tmp_path / "part", set=part)
         assert method_of(tmp_path / "part") == METHOD
         monkeypatch.delattr("mitex.methods.surface.task.joined_patches")
@@ -294,13 +296,13 @@ def test_a_fit_computes_its_domain_once(mesh, exemplar, tmp_path, monkeypatch):
 
 
 def test_noise_start_and_range(mesh, exemplar, tmp_path):
-    texture = surface.fit(exemplar, mesh, tmp_path / "run", set=[*SMALL, "steps=1", "lr=0", "start=noise"])
+    texture = surface.fit(exemplar, mesh, tmp_path / "run", set=[*SMALL, "steps=1", "lr=0"])
     maps = [exemplar.maps[name] for name in texture.maps]
     assert np.abs(texture.values.mean(0) - np.concatenate([m.mean((0, 1)) for m in maps])).max() < 0.05
     spread = np.concatenate([m.std((0, 1)) for m in maps])
     # Uniform noise of width 1 deviates by 0.289; a channel that hardly varies gets a little of the floor.
     assert np.abs(texture.values.std(0) - 0.289 * spread).max() < 0.02
-    overrides = [*SMALL, "steps=1", "lr=0", "start=noise", "whitened=false", "noise=0.2"]
+    overrides = [*SMALL, "steps=1", "lr=0", "whitened=false", "noise=0.2"]
     texture = surface.fit(exemplar, mesh, tmp_path / "paper", set=overrides)
     assert texture.values.min() >= 0 and texture.values.max() <= 0.2
     assert abs(texture.values.mean() - 0.1) < 0.005
@@ -310,7 +312,7 @@ def test_diffusion_wears_down_what_is_finer_than_the_taps(mesh, exemplar, tmp_pa
     """Without a gradient noise fades and the mean stays."""
     textures = {}
     for amount in ("0", "0.1"):
-        overrides = [*SMALL, "lr=0", "start=noise", f"diffusion={amount}"]
+        overrides = [*SMALL, "lr=0", f"diffusion={amount}"]
         textures[amount] = surface.fit(exemplar, mesh, tmp_path / amount, set=overrides).values
     assert np.abs(textures["0.1"].mean(0) - textures["0"].mean(0)).max() < 0.01
     assert (textures["0.1"].std(0) < 0.6 * textures["0"].std(0)).all()
