@@ -14,7 +14,7 @@ VGG16_SHA256 = "bb5788b61d3a34c37ba2a93772a503da31be4676f46e9bc45243f09542557316
 FLOW_FILE = "flow.safetensors"
 FLOW_SHA256 = "cd69fffabcc5fd97d1d9f64742aa4644ce1a3666866a906cda6bbc3a1b5e9914"
 WORDS_FILE = "words.safetensors"
-WORDS_SHA256 = "9fe08a52821b1d92a2a0b422b9a1161f560f18ba1abf058753e44cea2c593393"
+WORDS_SHA256 = "6dd05ed322f01ed55f8f60d7462faaec72617cb3ecf29ac79cca0cb15d6b59fd"
 FOLDER = Path(__file__).parents[1] / "data" / "weights"
 
 

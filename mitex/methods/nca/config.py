@@ -254,7 +254,7 @@ PRESETS["text"] = replace(
 PRESETS["text-words"] = replace(
     PRESETS["text"],
     preset="text-words",
-    steps=300,
+    steps=900,
     surfaces=("even",),
     frequency=24,
     min_steps=12,
@@ -264,7 +264,7 @@ PRESETS["text-words"] = replace(
     resolution=64,
     density=24.0,
     coordinates=(),
-    milestones=(180, 255),
+    milestones=(540, 765),
     text_parent=None,
     text_prompt="{text}",
     text_directional=False,
