@@ -14,7 +14,7 @@ from mitex.errors import ConfigError
 from mitex.integrators.feature import FeatureIntegrator
 from mitex.runtime import raise_causes
 from mitex.runtime.jit import dr, mi
-from mitex.runtime.upload import upload
+from mitex.runtime.upload import tensor_with_room, upload
 from mitex.scenes.stage import Visibility, background_values
 from mitex.sparse import transposed_product
 from mitex.suggestions import suggestion
@@ -129,7 +129,7 @@ def call(function: Callable[..., Any], *tensors: torch.Tensor) -> Any:
         Exception: what the function raises, also inside Dr.Jit's custom operations and loops.
     """
     # Dr.Jit does not convert an nn.Parameter, a view of it is a plain tensor with the same gradient.
-    views = (tensor.view_as(tensor) for tensor in tensors)
+    views = (tensor_with_room(tensor) for tensor in tensors)
     with raise_causes():
         return dr.wrap(source="torch", target="drjit")(function)(*views)
 

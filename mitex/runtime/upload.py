@@ -1,4 +1,4 @@
-"""NumPy's arrays as Dr.Jit's, with room behind them.
+"""Arrays of NumPy and tensors of torch as Dr.Jit's, with room behind them.
 
 Dr.Jit takes over the memory of an array as it is, and its LLVM kernels read packets of 16 elements: past the
 end of an array whose number of elements is no multiple of that. What is read there does not matter. But where
@@ -10,9 +10,12 @@ from __future__ import annotations
 
 import mmap
 from collections.abc import Callable
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import torch
 
 A = TypeVar("A")
 PACKET = 16  # elements
@@ -33,10 +36,28 @@ def upload(kind: Callable[..., A], array: np.ndarray) -> A:
 def with_room(array: np.ndarray) -> np.ndarray:
     """The array, or a copy of it if a packet that begins in it may reach into the next page."""
     array = np.ascontiguousarray(array)
-    beyond = -array.size % PACKET * array.itemsize
-    end = array.__array_interface__["data"][0] + array.nbytes
-    if not array.size or (end - 1) // mmap.PAGESIZE == (end + beyond - 1) // mmap.PAGESIZE:
+    if not _leaves_page(array.__array_interface__["data"][0], array.size, array.itemsize):
         return array
     roomy = np.empty(array.size + PACKET, array.dtype)
     roomy[: array.size] = array.ravel()
     return roomy[: array.size].reshape(array.shape)
+
+
+def tensor_with_room(tensor: torch.Tensor) -> torch.Tensor:
+    """The same for a tensor on the CPU: a view of it or a copy, with its gradient.
+
+    Memory of torch's own begins where packets do; that of `torch.from_numpy` begins anywhere.
+    """
+    values = tensor.contiguous()
+    if not _leaves_page(values.data_ptr(), values.numel(), values.element_size()):
+        return values.view_as(values)
+    roomy = values.new_empty(values.numel() + PACKET)
+    roomy[: values.numel()] = values.flatten()
+    return roomy[: values.numel()].view(values.shape)
+
+
+def _leaves_page(start: int, count: int, itemsize: int) -> bool:
+    """Whether the packet in which an array ends reaches into the page after that in which the array ends."""
+    end = start + count * itemsize
+    beyond = -count % PACKET * itemsize
+    return count > 0 and (end - 1) // mmap.PAGESIZE != (end + beyond - 1) // mmap.PAGESIZE

@@ -20,7 +20,7 @@ import numpy as np
 
 from mitex.mesh import Mesh
 from mitex.runtime.jit import dr, mi
-from mitex.runtime.upload import upload
+from mitex.runtime.upload import tensor_with_room, upload
 
 if TYPE_CHECKING:
     import torch
@@ -143,8 +143,8 @@ class SurfaceLookup:
         if not len(face):  # Dr.Jit has no arithmetic on empty arrays
             width = 12 if self.kind == "smooth" else 3
             return Weights(face.new_empty(0, width), barycentric.new_empty(0, width), columns)
-        b = [mi.Float(barycentric[:, k].contiguous()) for k in range(3)]
-        triangle = 3 * mi.UInt32(face.to(torch.int32).contiguous())
+        b = [mi.Float(tensor_with_room(barycentric[:, k])) for k in range(3)]
+        triangle = 3 * mi.UInt32(tensor_with_room(face.to(torch.int32)))
         index = [dr.gather(mi.UInt32, self._faces, triangle + k) for k in range(3)]
         position = [dr.gather(mi.Point3f, self._positions, i) for i in index]
         normal = [dr.gather(mi.Normal3f, self._normals, i) for i in index]

@@ -42,7 +42,7 @@ def _mesh(mesh: Mesh) -> dict[str, Any]:
     from mitex.runtime.jit import mi
 
     vertices = decoder_units(mesh).apply(mesh.vertices).astype(np.float32)
-    return {"vertices": mi.TensorXf(vertices), "faces": mi.TensorXf(mesh.faces)}
+    return {"vertices": upload(mi.TensorXf, vertices), "faces": upload(mi.TensorXf, mesh.faces)}
 
 
 def _decoder(decoder: Decoder) -> dict[str, Any]:

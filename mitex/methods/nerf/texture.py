@@ -106,7 +106,7 @@ class NerfTexture:
             self.decoder,
             self.light,
             model.base.thickness,
-            mask=mi.TensorXu8(model.occupied),
+            mask=upload(mi.TensorXu8, model.occupied),
             step=render_step(config),
         )
 

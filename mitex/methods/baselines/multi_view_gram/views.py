@@ -12,6 +12,7 @@ from mitex.geometry.tangents import split_at_seams
 from mitex.mesh import Mesh
 from mitex.plugins import init
 from mitex.runtime.jit import mi
+from mitex.runtime.upload import upload
 from mitex.scenes.cameras import Cameras, random_views
 from mitex.scenes.shapes import mesh_shape
 
@@ -31,8 +32,8 @@ class TextureViews:
         assert mesh.uv is not None
         field = {
             "type": "texel_field",
-            "data": mi.TensorXf(np.zeros((*charts.shape, 4), np.float32)),
-            "charts": mi.TensorXf(charts.astype(np.float32)),
+            "data": upload(mi.TensorXf, np.zeros((*charts.shape, 4), np.float32)),
+            "charts": upload(mi.TensorXf, charts.astype(np.float32)),
         }
         shape = mesh_shape(
             mesh, {"type": "diffuse", "reflectance": field}, split=split_at_seams(mesh, mesh.uv)

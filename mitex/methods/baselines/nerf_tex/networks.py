@@ -156,7 +156,7 @@ class FrequencyNetwork(Network):
             with torch.no_grad():
                 parts = zip(*(value.split(CHUNK) for value in values), strict=True)
                 density, colour = (torch.cat(v) for v in zip(*(self(fixed, *p) for p in parts), strict=True))
-            return mi.Float(density.numpy()), channels(mi.Color3f, colour.numpy())
+            return upload(mi.Float, density.numpy()), channels(mi.Color3f, colour.numpy())
 
         return evaluate
 

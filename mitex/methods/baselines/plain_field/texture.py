@@ -21,6 +21,7 @@ from mitex.methods.nerf.field.rendering import render_step
 from mitex.methods.nerf.training.plain import PlainField, hash_grid, parameter_shapes
 from mitex.runtime import init
 from mitex.runtime.jit import mi
+from mitex.runtime.upload import upload
 from mitex.training import model_file
 from mitex.training.config import of_record
 
@@ -74,7 +75,7 @@ class PlainFieldTexture:
     def field(self) -> PlainField:
         """The field in the scene cube, ready to be marched."""
         init(needs="ad")
-        mask = mi.TensorXu8(self.occupied)
+        mask = upload(mi.TensorXu8, self.occupied)
         return PlainField.of(self.parameters, hash_grid(self.config), mask, render_step(self.config))
 
     @property

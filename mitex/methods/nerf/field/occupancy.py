@@ -11,6 +11,7 @@ from scipy import ndimage
 from mitex.methods.nerf.capture.capture import Capture, object_mask
 from mitex.methods.nerf.capture.visual_hull import View, visual_hull
 from mitex.runtime.jit import mi
+from mitex.runtime.upload import upload
 
 WARMUP = 16  # refreshes of all cells; later ones are of half of them
 DECAY = 0.95  # of the running maximum, for each refresh
@@ -79,7 +80,7 @@ class Occupancy:
     def mask(self) -> mi.TensorXu8:
         """(side, side, side) `mi.TensorXu8` of 0 and 1; before the first refresh all possible cells."""
         if self._mask is None:
-            self._mask = mi.TensorXu8(self.occupied)
+            self._mask = upload(mi.TensorXu8, self.occupied)
         return self._mask
 
     @property

@@ -44,7 +44,7 @@ class ShellCoords:
         """Of projections that all hit; `scale` divides the distances."""
         return ShellCoords(
             channels(mi.Point3f, projections.point),
-            mi.Float(projections.distance / np.float32(scale)),
+            upload(mi.Float, projections.distance / np.float32(scale)),
             upload(mi.UInt32, projections.face.astype(np.uint32)),
             channels(mi.Point2f, projections.barycentric),
             channels(mi.Vector3f, projections.normal),

@@ -64,7 +64,7 @@ class MappedLatents:
 
     def __init__(self, maps: LatentMaps, uv: np.ndarray, frames: np.ndarray) -> None:
         self.size = maps.size
-        self.texels = mi.TensorXf(maps.features)
+        self.texels = upload(mi.TensorXf, maps.features)
         self._which = upload(mi.UInt32, maps.frame.astype(np.uint32).ravel())
         self._turns = upload(mi.Float, np.ascontiguousarray(maps.frames, np.float32).ravel())
         self._uv = upload(mi.Float, np.ascontiguousarray(uv, np.float32).ravel())

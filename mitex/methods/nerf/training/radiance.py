@@ -100,7 +100,7 @@ class RadianceTask(ABC, Generic[Config]):
         background = torch.rand(batch.colours.shape, generator=generator)
         if not len(samples):
             raise ValueError("no ray meets an occupied cell")
-        samples = visible(samples, *rays, lambda points: mi.Float(self.density(rows(points))))
+        samples = visible(samples, *rays, lambda points: upload(mi.Float, self.density(rows(points))))
         rendered = self.render(step, batch, samples, generator)
         error = self.error(rendered, batch, background)
         total = error + sum(rendered.terms.values())
