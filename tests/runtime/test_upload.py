@@ -1,17 +1,18 @@
-"""Arrays of NumPy as Dr.Jit's: right values, and nothing read that is not there."""
+"""Arrays of NumPy and tensors of torch as Dr.Jit's: right values, and nothing read that is not there."""
 
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+import torch
 
 from mitex.runtime import init
 
 init()
 
 from mitex.runtime.jit import mi  # noqa: E402
-from mitex.runtime.upload import PACKET, upload, with_room  # noqa: E402
+from mitex.runtime.upload import PACKET, tensor_with_room, upload, with_room  # noqa: E402
 
 # An array whose last byte is the last one of a page, before a page that must not be read.
 GUARDED = """
@@ -32,15 +33,28 @@ end = start + pages * mmap.PAGESIZE
 assert ctypes.CDLL(None).mprotect(ctypes.c_void_p(end), mmap.PAGESIZE, 0) == 0
 array = np.frombuffer((ctypes.c_char * size).from_address(end - size), dtype)
 array[:] = np.arange(count)
-values = upload(kind, array) + 1
-dr.eval(values)
+if sys.argv[3] == "torch":
+    import torch
+    from mitex.bridge import call
+    values = call(lambda tensor: tensor + 1, torch.from_numpy(array))
+else:
+    values = upload(kind, array) + 1
+    dr.eval(values)
 assert (np.array(values) == np.arange(count) + 1).all()
 """
 
 
-@pytest.mark.parametrize(("kind", "count"), [("Float", 1001), ("Float64", 1001), ("TensorXf", 3)])
-def test_nothing_is_read_past_the_last_page(kind, count):
-    assert subprocess.run([sys.executable, "-c", GUARDED, kind, str(count)]).returncode == 0
+@pytest.mark.parametrize(
+    ("kind", "count", "library"),
+    [
+        ("Float", 1001, "numpy"),
+        ("Float64", 1001, "numpy"),
+        ("TensorXf", 3, "numpy"),
+        ("TensorXf", 3, "torch"),
+    ],
+)
+def test_nothing_is_read_past_the_last_page(kind, count, library):
+    assert subprocess.run([sys.executable, "-c", GUARDED, kind, str(count), library]).returncode == 0
 
 
 @pytest.mark.parametrize("shape", [(0,), (1,), (15,), (16,), (17,), (5, 7), (3, 1, 2)])
@@ -64,3 +78,17 @@ def test_arrays_are_copied_only_where_a_packet_may_leave_the_page():
     assert roomy.base is not None and roomy.base.size == len(last) + PACKET
     whole = page[first + 4096 - 64 : first + 4096].view(np.float32)
     assert np.shares_memory(with_room(whole), whole)
+
+
+def test_tensors_are_copied_only_where_a_packet_may_leave_the_page_and_keep_their_gradient():
+    page = torch.zeros(8192, dtype=torch.uint8)
+    first = -page.data_ptr() % 4096
+    inside = page[first : first + 40].view(torch.float32)
+    assert tensor_with_room(inside).data_ptr() == inside.data_ptr()
+    last = page[first + 4096 - 40 : first + 4096].view(torch.float32).view(5, 2).requires_grad_()
+    roomy = tensor_with_room(last)
+    assert roomy.data_ptr() != last.data_ptr() and roomy.shape == last.shape
+    assert roomy.untyped_storage().nbytes() == 4 * (10 + PACKET)
+    weights = torch.arange(10.0).view(5, 2)
+    (weights * roomy).sum().backward()
+    assert last.grad is not None and (last.grad == weights).all()
