@@ -13,6 +13,7 @@ from mitex.features import Vgg16
 from mitex.features.flow import lucas_kanade
 from mitex.losses import gram_loss, gram_matrix, motion_loss, relaxed_transport
 from mitex.mesh import Mesh, icosphere
+from mitex.runtime.upload import upload
 from mitex.scenes import Cameras, random_views
 from mitex.scenes.stage import Stage
 from tests.scenes.helpers import gradient, live_variables
@@ -219,8 +220,8 @@ def lit(mi):
     look = mi.ScalarTransform4f().look_at
     texture = {
         "type": "texel_field",
-        "data": mi.TensorXf(np.full((8, 8, 3), 0.5, np.float32)),
-        "charts": mi.TensorXf(np.zeros((8, 8), np.float32)),
+        "data": upload(mi.TensorXf, np.full((8, 8, 3), 0.5, np.float32)),
+        "charts": upload(mi.TensorXf, np.zeros((8, 8), np.float32)),
     }
     ball = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.7, 0.2, 0.1]}}
     lamp = look([0, 0, 4], [0, 0, 0], [0, 1, 0])

@@ -11,6 +11,7 @@ import numpy as np
 from mitex.integrators import FeatureIntegrator, LitShellIntegrator, MotionIntegrator, ShellIntegrator
 from mitex.mesh import Similarity, icosphere
 from mitex.runtime.jit import mi
+from mitex.runtime.upload import upload
 from mitex.textures import DecodedField, TexelField, VertexField
 from mitex.textures.shell_field import shell_field
 
@@ -53,14 +54,14 @@ def fog() -> Any:
 
 
 def _tensor(*shape: int) -> mi.TensorXf:
-    return mi.TensorXf(np.full(shape, 0.5, np.float32))
+    return upload(mi.TensorXf, np.full(shape, 0.5, np.float32))
 
 
 def _decoded() -> dict[str, Any]:
     mesh = {name: np.asarray(getattr(BALL, name), np.float32) for name in ("vertices", "faces")}
     layer = {"weight_0": _tensor(4, 5), "bias_0": _tensor(4)}
     waves = {"coordinates": "waves", "waves": _tensor(2, 4)}
-    return {"data": _tensor(12, 3)} | {name: mi.TensorXf(v) for name, v in mesh.items()} | layer | waves
+    return {"data": _tensor(12, 3)} | {name: upload(mi.TensorXf, v) for name, v in mesh.items()} | layer | waves
 
 
 PLUGINS = {

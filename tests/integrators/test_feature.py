@@ -9,6 +9,7 @@ import torch
 from mitex.errors import ConfigError
 from mitex.geometry.tangents import split_at_seams
 from mitex.mesh import Mesh, icosphere
+from mitex.runtime.upload import upload
 from mitex.scenes import Cameras, random_views
 from mitex.scenes.shapes import mesh_shape
 from tests.scenes.helpers import front_camera, gradient
@@ -32,7 +33,7 @@ def cameras(kind: str = "perspective", count: int = 1, width: int = 11, height: 
 
 
 def field(mi, data: np.ndarray, **options) -> dict:
-    return {"type": "vertex_field", "data": mi.TensorXf(data)} | options
+    return {"type": "vertex_field", "data": upload(mi.TensorXf, data)} | options
 
 
 def scene(mi, mesh: Mesh, views: Cameras, integrator: dict, bsdf=None):
@@ -103,7 +104,7 @@ def test_crop_is_a_part_of_the_picture(mi, mesh, data):
 
 @pytest.mark.parametrize("value", [0.3, [0.1, 0.2, 0.3, 0.4, 0.5]], ids=["one", "each"])
 def test_background(mi, mesh, data, value):
-    background = value if isinstance(value, float) else mi.TensorXf(np.array([value], np.float32))
+    background = value if isinstance(value, float) else upload(mi.TensorXf, np.array([value], np.float32))
     views = cameras()
     world = scene(mi, mesh, views, {"field": field(mi, data), "background": background})
     expected = images(mesh, views, data, np.array(value))[0]
@@ -264,7 +265,7 @@ def test_bad_properties_are_refused(mi, integrator: dict, problem: str):
 )
 def test_bad_renders_are_refused(mi, mesh, data, integrator: dict, options: dict, problem: str):
     if "background" in integrator:
-        integrator = integrator | {"background": mi.TensorXf(np.zeros((1, 2), np.float32))}
+        integrator = integrator | {"background": upload(mi.TensorXf, np.zeros((1, 2), np.float32))}
     bsdf = mi.load_dict({"type": "diffuse", "reflectance": field(mi, data)})
     world = scene(mi, mesh, cameras(), integrator, bsdf)
     with pytest.raises(ConfigError, match=problem):

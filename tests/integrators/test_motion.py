@@ -10,6 +10,7 @@ import torch
 from mitex import bridge
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, icosphere
+from mitex.runtime.upload import upload
 from mitex.scenes import Cameras, random_views
 from mitex.scenes.shapes import mesh_shape
 from tests.scenes.helpers import front_camera
@@ -61,7 +62,7 @@ def reference(mesh: Mesh, views: Cameras, vectors: np.ndarray, antialias: int) -
 
 
 def field(mi, values: np.ndarray) -> dict:
-    return {"type": "vertex_field", "data": mi.TensorXf(values), "raw": True}
+    return {"type": "vertex_field", "data": upload(mi.TensorXf, values), "raw": True}
 
 
 def moving(values: np.ndarray, mesh: Mesh = BALL, name: str = "vertex_motion"):

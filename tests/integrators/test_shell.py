@@ -13,6 +13,7 @@ from mitex.errors import ConfigError
 from mitex.mesh import Similarity
 from mitex.plugins import init
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 
 init()
 
@@ -31,7 +32,7 @@ class Ball:
 
     def __init__(self, density: float = 1000.0, colour=COLOUR) -> None:
         self.density, self.colour = mi.Float(density), colour
-        self.mask = mi.TensorXu8(np.ones((8, 8, 8), np.uint8))
+        self.mask = upload(mi.TensorXu8, np.ones((8, 8, 8), np.uint8))
 
     def parameters(self):
         return {"density": self.density}

@@ -12,6 +12,7 @@ from mitex.mesh import Similarity
 from mitex.render import shell
 from mitex.runtime import init
 from mitex.runtime.jit import mi
+from mitex.runtime.upload import upload
 
 SIMILARITY = Similarity(np.zeros(3), 1.0)
 OUTLINE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
@@ -22,7 +23,7 @@ class Nothing:
 
     def __init__(self) -> None:
         init()
-        self.mask, self.step = mi.TensorXu8(np.zeros((8, 8, 8), np.uint8)), 0.1
+        self.mask, self.step = upload(mi.TensorXu8, np.zeros((8, 8, 8), np.uint8)), 0.1
 
     def evaluate(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, mi.Float, mi.Color3f]:
         return mi.UInt32(), mi.Float(), mi.Color3f()

@@ -15,12 +15,14 @@ import mitex
 mitex.init()
 from mitex.mesh import icosphere
 from mitex.runtime.jit import mi
+from mitex.runtime.upload import upload
 from mitex.scenes import mesh_shape
 from mitex.textures import vertex_rows
 
 def scene():
     mesh = icosphere(2)
-    colour = {"type": "vertex_field", "data": mi.TensorXf(np.full((len(mesh.vertices), 3), 0.5, np.float32))}
+    grey = np.full((len(mesh.vertices), 3), 0.5, np.float32)
+    colour = {"type": "vertex_field", "data": upload(mi.TensorXf, grey)}
     film = {"type": "hdrfilm", "width": 8, "height": 8}
     shape = mesh_shape(mesh, {"type": "diffuse", "reflectance": colour}, smooth=True)
     sensor = {"type": "perspective", "film": film}

@@ -15,6 +15,7 @@ import mitex.runtime
 from mitex.batch.process import cores
 from mitex.errors import ConfigError
 from mitex.runtime import llvm
+from mitex.runtime.upload import upload
 
 
 def run(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -66,7 +67,7 @@ def test_plugins_are_registered_again_for_every_variant(mi, tmp_path: Path, monk
 def test_the_real_plugins_follow_the_variant(mi):
     for variant in ("llvm_ad_mono", "llvm_ad_spectral", "llvm_ad_rgb"):
         mi.set_variant(variant)
-        field = {"type": "vertex_field", "data": mi.TensorXf(np.zeros((3, 2)))}
+        field = {"type": "vertex_field", "data": upload(mi.TensorXf, np.zeros((3, 2)))}
         assert isinstance(mi.load_dict(field), mi.Texture)
         assert isinstance(mi.load_dict({"type": "feature", "field": field}), mi.Integrator)
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from mitex.geometry.tangents import Split
 from mitex.mesh import Mesh, icosphere
+from mitex.runtime.upload import upload
 from mitex.scenes.shapes import mesh_shape
 
 QUAD = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32)
@@ -37,7 +38,7 @@ def interaction(mi, shape, face: np.ndarray, barycentric: np.ndarray):
     from mitex.runtime.jit import dr
 
     si = dr.zeros(mi.SurfaceInteraction3f, len(face))
-    si.t, si.shape, si.prim_index = mi.Float(1), mi.ShapePtr(shape), mi.UInt32(face.astype(np.uint32))
+    si.t, si.shape, si.prim_index = mi.Float(1), mi.ShapePtr(shape), upload(mi.UInt32, face.astype(np.uint32))
     si.uv = mi.Point2f(*np.asarray(barycentric, np.float32).T[1:])
     return si
 

@@ -15,6 +15,7 @@ from mitex.methods.nca.decoder.surface import Points, Surface
 from mitex.methods.nca.field import fields
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.views import render_views
+from mitex.runtime.upload import upload
 from mitex.scenes import random_views
 from mitex.scenes.shapes import mesh_shape
 from mitex.scenes.stage import Stage
@@ -78,7 +79,7 @@ def constant(mi, value: list[float], data: np.ndarray | None = None, **options) 
         "weight_0": weight,
         "bias_0": np.array(value),
     }
-    tensors = {name: mi.TensorXf(np.asarray(tensor, np.float32)) for name, tensor in tensors.items()}
+    tensors = {name: upload(mi.TensorXf, np.asarray(tensor, np.float32)) for name, tensor in tensors.items()}
     return {"type": "decoded_field"} | tensors | options
 
 
@@ -240,7 +241,7 @@ def test_slopes_have_gradients(mi, rng):
     of_data = np.array(dr.grad(params["data"]))
 
     def total(step: float) -> float:
-        params["data"] = mi.TensorXf((start + step * direction).astype(np.float32))
+        params["data"] = upload(mi.TensorXf, (start + step * direction).astype(np.float32))
         params.update()
         return float((np.array(texture.eval_1_grad(si), np.float64) ** 2).sum())
 
@@ -385,7 +386,7 @@ def test_gradient_through_a_path_tracer(mi, name: str, rng):
     direction = rng.normal(size=start.shape)
 
     def total(step: float) -> float:
-        params[key] = mi.TensorXf((start + step * direction).astype(np.float32))
+        params[key] = upload(mi.TensorXf, (start + step * direction).astype(np.float32))
         params.update()
         return float(np.array(mi.render(scene, spp=64, seed=3), np.float64).sum())
 
@@ -417,7 +418,7 @@ def test_to_string(mi):
 
 
 def tensor(*shape: int, value: float = 0.0):
-    return lambda mi: mi.TensorXf(np.full(shape, value, np.float32))
+    return lambda mi: upload(mi.TensorXf, np.full(shape, value, np.float32))
 
 
 @pytest.mark.parametrize(
@@ -461,7 +462,7 @@ def test_bad_properties_are_refused(mi, options: dict, problem: str):
 @pytest.mark.parametrize(("name", "shape"), [("data", (5, 3)), ("weight_0", (3, 2)), ("bias_0", (4,))])
 def test_bad_updates_are_refused(mi, name: str, shape: tuple[int, ...]):
     params = mi.traverse(mi.load_dict(constant(mi, [0.0] * 3)))
-    params[name] = mi.TensorXf(np.zeros(shape, np.float32))
+    params[name] = upload(mi.TensorXf, np.zeros(shape, np.float32))
     with pytest.raises(ConfigError, match=name):
         params.update()
 

@@ -9,6 +9,7 @@ import pytest
 
 from mitex.runtime import init
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 from mitex.textures.march import OPAQUE, Samples, composite, march, sum_rays, visible, weights_of
 
 init()
@@ -20,7 +21,7 @@ class Slab:
     def __init__(self, density: float, step: float, side: int = 16, colour=(0.2, 0.5, 0.8)) -> None:
         self.density, self.colour, self.step = mi.Float(density), mi.Color3f(*colour), step
         where = np.abs((np.arange(side) + 0.5) * 2 / side - 1) < 0.5
-        self.mask = mi.TensorXu8(np.broadcast_to(where[:, None, None], (side,) * 3).astype(np.uint8))
+        self.mask = upload(mi.TensorXu8, np.broadcast_to(where[:, None, None], (side,) * 3).astype(np.uint8))
         self.evaluated = 0
 
     def evaluate(self, points, view):
@@ -73,7 +74,7 @@ def test_a_coarse_march_agrees_with_a_fine_one():
     """A smooth field, the step as a preset has it against a sixteenth of that."""
 
     class Ball:
-        mask = mi.TensorXu8(np.ones((8, 8, 8), np.uint8))
+        mask = upload(mi.TensorXu8, np.ones((8, 8, 8), np.uint8))
 
         def __init__(self, step):
             self.step = step
@@ -103,7 +104,7 @@ def test_samples_are_where_cells_are_occupied():
 def test_rays_that_miss_the_cube_have_no_samples():
     _, direction, jitter = rays(2)
     origin = mi.Point3f(np.array([[-2, 3], [5, 0], [0, 0]], np.float32))
-    mask = mi.TensorXu8(np.ones((4, 4, 4), np.uint8))
+    mask = upload(mi.TensorXu8, np.ones((4, 4, 4), np.uint8))
     assert len(march(origin, direction, mask, 0.1, jitter)) == 0
     pixels = composite(Slab(1.0, 0.1), origin, direction, jitter)
     np.testing.assert_array_equal(np.array(pixels.transmittance), 1)
@@ -113,7 +114,7 @@ def test_weights_and_their_derivative_agree_with_loops():
     rng = np.random.default_rng(0)
     ray = np.sort(rng.integers(0, 6, 40)).astype(np.uint32)
     density = rng.uniform(0, 30, 40)
-    samples = Samples(mi.UInt32(ray), mi.Float(np.arange(40)), 0.05, 6)
+    samples = Samples(mi.UInt32(ray), upload(mi.Float, np.arange(40)), 0.05, 6)
     share, end = rng.normal(size=40), rng.normal(size=6)
 
     def by_loops(density):
@@ -143,7 +144,7 @@ def test_weights_of_a_long_batch_keep_their_digits():
     """Sums over a hundred thousand dense samples must not drown the last ray."""
     count = 100_000
     ray = np.arange(count, dtype=np.uint32) // 10
-    samples = Samples(mi.UInt32(ray), mi.Float(np.zeros(count)), 0.01, count // 10)
+    samples = Samples(mi.UInt32(ray), upload(mi.Float, np.zeros(count)), 0.01, count // 10)
     density = np.full(count, 1000.0)
     density[-10:] = 1.0
     weights, transmittance = weights_of(mi.Float(density), samples)
@@ -154,7 +155,7 @@ def test_weights_of_a_long_batch_keep_their_digits():
 def test_what_is_behind_an_opaque_surface_is_not_visible():
     """Rays that end in their first samples, far behind these, or never; against loops."""
     origin, direction, jitter = rays(3)
-    full = mi.TensorXu8(np.ones((8, 8, 8), np.uint8))
+    full = upload(mi.TensorXu8, np.ones((8, 8, 8), np.uint8))
     samples = march(origin, direction, full, 1 / 32, jitter)
     looked_at = []
 
@@ -179,7 +180,7 @@ def test_what_is_behind_an_opaque_surface_is_not_visible():
 
 def test_rays_gather_the_same_of_what_is_visible():
     origin, direction, jitter = rays(4)
-    full = mi.TensorXu8(np.ones((8, 8, 8), np.uint8))
+    full = upload(mi.TensorXu8, np.ones((8, 8, 8), np.uint8))
     samples = march(origin, direction, full, 1 / 64, jitter)
 
     def dense(points):

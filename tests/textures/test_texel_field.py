@@ -9,20 +9,25 @@ import torch
 from mitex.bridge import render
 from mitex.colour import srgb_to_linear
 from mitex.errors import ConfigError
+from mitex.runtime.upload import upload
 from tests.textures.helpers import QUAD, quad, radiance, sphere_picture
 
 UNIT = (QUAD[:, :2] + 1) / 2  # uv of the quad whose map covers it once
 
 
 def field(mi, data: np.ndarray, charts: np.ndarray | None = None, **options) -> dict:
-    plugin = {"type": "texel_field", "data": mi.TensorXf(np.asarray(data, np.float32))} | options
-    return plugin if charts is None else plugin | {"charts": mi.TensorXf(np.asarray(charts, np.float32))}
+    plugin = {"type": "texel_field", "data": upload(mi.TensorXf, np.asarray(data, np.float32))} | options
+    return (
+        plugin if charts is None else plugin | {"charts": upload(mi.TensorXf, np.asarray(charts, np.float32))}
+    )
 
 
 def at(mi, uv: np.ndarray):
     """Surface interactions with the given (N, 2) uv."""
     si = mi.SurfaceInteraction3f()
-    si.uv = mi.Point2f(mi.Float(uv[:, 0].astype(np.float32)), mi.Float(uv[:, 1].astype(np.float32)))
+    si.uv = mi.Point2f(
+        upload(mi.Float, uv[:, 0].astype(np.float32)), upload(mi.Float, uv[:, 1].astype(np.float32))
+    )
     return si
 
 
@@ -134,7 +139,7 @@ def test_other_charts_are_not_touched_at_all(mi, rng):
     texture = mi.load_dict(field(mi, data, charts))
     params = mi.traverse(texture)
     data[:, 3:] = np.nan
-    params["data"] = mi.TensorXf(data.astype(np.float32))
+    params["data"] = upload(mi.TensorXf, data.astype(np.float32))
     params.update()
     left = rng.uniform(0, 0.499, (100, 2))
     np.testing.assert_allclose(texture.eval_1(at(mi, left)).numpy(), 1, atol=1e-6)
@@ -160,7 +165,7 @@ def test_gradient_is_the_transposed_lookup(mi, rng, uv, charts, kind: str, maske
     params.update()
     values = texture.gather(texture.locate(at(mi, uv)))
     loss: Any = sum(
-        dr.sum(v * mi.Float(w.astype(np.float32))) for v, w in zip(values, upstream.T, strict=True)
+        dr.sum(v * upload(mi.Float, w.astype(np.float32))) for v, w in zip(values, upstream.T, strict=True)
     )
     dr.backward(loss)
     gradient = dr.grad(params["data"]).numpy()
@@ -329,7 +334,7 @@ def test_update_through_traverse(mi, points):
     shape = quad(mi, {"type": "diffuse", "reflectance": plugin}, UNIT)
     np.testing.assert_allclose(radiance(mi, shape, *points), 0.2, atol=1e-6)
     params, key = mi.traverse(shape), "bsdf.reflectance."
-    params[key + "data"] = mi.TensorXf(np.full((4, 4, 3), 0.7, np.float32))
+    params[key + "data"] = upload(mi.TensorXf, np.full((4, 4, 3), 0.7, np.float32))
     params[key + "scale"] = 0.5
     params.update()
     np.testing.assert_allclose(radiance(mi, shape, *points), 0.35, atol=1e-6)
@@ -342,7 +347,7 @@ def test_update_through_traverse(mi, points):
     np.testing.assert_allclose(radiance(mi, shape, x, y)[:, 0], np.where(far, 0, 0.35), atol=1e-6)
     for name, bad in (("data", (4, 12)), ("data", (4, 5, 3)), ("charts", (4, 4, 1))):
         good = mi.TensorXf(params[key + name])
-        params[key + name] = mi.TensorXf(np.zeros(bad, np.float32))
+        params[key + name] = upload(mi.TensorXf, np.zeros(bad, np.float32))
         with pytest.raises(ConfigError, match="shape"):
             params.update()
         params[key + name] = good
@@ -388,7 +393,9 @@ def test_to_string(mi):
 def test_bad_properties_are_refused(mi, options: dict, problem: str):
     plugin = field(mi, np.zeros((4, 4, 3)))
     for key, value in options.items():
-        plugin[key] = mi.TensorXf(value.astype(np.float32)) if isinstance(value, np.ndarray) else value
+        plugin[key] = (
+            upload(mi.TensorXf, value.astype(np.float32)) if isinstance(value, np.ndarray) else value
+        )
     with pytest.raises(RuntimeError, match=problem):
         mi.load_dict({k: v for k, v in plugin.items() if v is not None})
 

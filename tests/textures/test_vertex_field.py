@@ -5,13 +5,14 @@ import pytest
 
 from mitex.colour import srgb_to_linear
 from mitex.errors import ConfigError
+from mitex.runtime.upload import upload
 from tests.textures.helpers import QUAD, quad, radiance, sphere_picture
 
 QUAD_UV = np.array([(0.1, 0), (0.7, 0.2), (0.5, 0.9), (0.2, 0.8)], np.float32)  # skewed on purpose
 
 
 def field(mi, data: np.ndarray, **options) -> dict:
-    return {"type": "vertex_field", "data": mi.TensorXf(np.asarray(data, np.float32))} | options
+    return {"type": "vertex_field", "data": upload(mi.TensorXf, np.asarray(data, np.float32))} | options
 
 
 @pytest.mark.parametrize("uv", [None, QUAD_UV, np.zeros_like(QUAD_UV)], ids=["none", "skewed", "degenerate"])
@@ -127,11 +128,11 @@ def test_update_through_traverse_changes_the_picture(mi, points):
     shape = quad(mi, {"type": "diffuse", "reflectance": field(mi, np.full((4, 3), 0.2), raw=True)})
     np.testing.assert_allclose(radiance(mi, shape, *points), 0.2, atol=1e-6)
     params = mi.traverse(shape)
-    params["bsdf.reflectance.data"] = mi.TensorXf(np.full((4, 3), 0.7, np.float32))
+    params["bsdf.reflectance.data"] = upload(mi.TensorXf, np.full((4, 3), 0.7, np.float32))
     params["bsdf.reflectance.scale"] = 0.5
     params.update()
     np.testing.assert_allclose(radiance(mi, shape, *points), 0.35, atol=1e-6)
-    params["bsdf.reflectance.data"] = mi.TensorXf(np.zeros((4, 2, 2), np.float32))
+    params["bsdf.reflectance.data"] = upload(mi.TensorXf, np.zeros((4, 2, 2), np.float32))
     with pytest.raises(ConfigError, match="shape"):
         params.update()
 
@@ -157,7 +158,7 @@ def test_gradient_through_a_path_tracer(mi):
     gradient = np.array(dr.grad(params[key]))
 
     def total(value: np.ndarray) -> float:
-        params[key] = mi.TensorXf(value.astype(np.float32))
+        params[key] = upload(mi.TensorXf, value.astype(np.float32))
         params.update()
         return float(np.array(mi.render(scene, spp=64, seed=3), np.float64).sum())
 

@@ -9,6 +9,7 @@ import pytest
 from mitex.errors import ConfigError
 from mitex.mesh import icosphere
 from mitex.runtime import raise_causes
+from mitex.runtime.upload import upload
 from mitex.scenes.shapes import mesh_shape
 from tests.textures.helpers import FACES, QUAD, quad
 
@@ -30,7 +31,7 @@ mi.render(scene, integrator=mi.load_dict({"type": "path"}), spp=1)
 
 
 def field(mi, rows: int) -> dict:
-    return {"type": "vertex_field", "data": mi.TensorXf(np.full((rows, 3), 0.5, np.float32))}
+    return {"type": "vertex_field", "data": upload(mi.TensorXf, np.full((rows, 3), 0.5, np.float32))}
 
 
 def decoded(mi) -> dict:
@@ -42,7 +43,9 @@ def decoded(mi) -> dict:
         "weight_0": np.ones((3, 1)),
     }
     tensors["bias_0"] = np.zeros(3)
-    return {"type": "decoded_field"} | {k: mi.TensorXf(v.astype(np.float32)) for k, v in tensors.items()}
+    return {"type": "decoded_field"} | {
+        k: upload(mi.TensorXf, v.astype(np.float32)) for k, v in tensors.items()
+    }
 
 
 def world(mi, bsdf: dict, **entries):
@@ -105,7 +108,7 @@ def test_new_rows_and_new_vertices_are_checked(mi):
     scene = world(mi, {"type": "diffuse", "reflectance": field(mi, 4)})
     params = mi.traverse(scene)
     mi.render(scene, spp=1)
-    params["quad.bsdf.reflectance.data"] = mi.TensorXf(np.zeros((3, 3), np.float32))
+    params["quad.bsdf.reflectance.data"] = upload(mi.TensorXf, np.zeros((3, 3), np.float32))
     params.update()
     with pytest.raises(ConfigError, match=ROWS), raise_causes():
         mi.render(scene, spp=1)

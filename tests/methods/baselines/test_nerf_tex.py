@@ -36,6 +36,7 @@ from mitex.methods.nerf.training.radiance import Rendered
 from mitex.methods.nerf.use.placement import EXTENT
 from mitex.runtime import init
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 from mitex.training.config import resolve
 from tests.methods.nerf.small import small_texture
 
@@ -107,7 +108,7 @@ def test_rays_gather_what_a_march_through_all_boxes_does():
     """Against a slow one in NumPy: nearest box of those that a sample is in, density by their number."""
     anchors, half, step, light = random_anchors(12, seed=3), 0.3, 0.01, np.array([0.0, 0.6, 0.8])
     field = instanced(anchors)
-    field.mask = mi.TensorXu8(np.ones((16,) * 3, np.uint8))
+    field.mask = upload(mi.TensorXu8, np.ones((16,) * 3, np.uint8))
     rng = np.random.default_rng(5)
     origins = rng.normal(size=(40, 3))
     origins *= 2.5 / np.linalg.norm(origins, axis=1, keepdims=True)
@@ -308,7 +309,9 @@ def test_most_light_comes_from_its_main_direction():
         (rotated(light, turn), turn @ main_direction(light)),
     ):
         normal, one = channels(mi.Vector3f, normals), mi.Float(1)
-        shown = shade(normal, -normal, one, one * 0, one, mi.TensorXf(coefficients.astype(np.float32)))
+        shown = shade(
+            normal, -normal, one, one * 0, one, upload(mi.TensorXf, coefficients.astype(np.float32))
+        )
         assert normals[rows(shown)[:, 0].argmax()] @ direction > 0.99
     assert main_direction(np.array([4.0] + [0.0] * 15)).tolist() == [0, 0, 1]
 

@@ -19,6 +19,7 @@ from mitex.methods.nerf.field.networks import FINE, weight_shapes
 from mitex.methods.nerf.field.tensors import rows, tensor
 from mitex.runtime import init
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 
 init()
 
@@ -142,9 +143,9 @@ def test_surfaces_mirror_more_at_grazing_angles():
 
 def test_as_published_they_mirror_as_much_from_all_sides():
     f, phase, distance = inputs()
-    decoder = Decoder([mi.TensorXf(w.numpy()) for w in weights("paper")])
-    f, phase = (_columns(mi.TensorXf(x.numpy())) for x in (f, phase))
-    reflection = decoder(f, phase, mi.Float(distance.numpy()))
+    decoder = Decoder([upload(mi.TensorXf, w.numpy()) for w in weights("paper")])
+    f, phase = (_columns(upload(mi.TensorXf, x.numpy())) for x in (f, phase))
+    reflection = decoder(f, phase, upload(mi.Float, distance.numpy()))
     for cosine in (0.0, 0.3, 1.0):
         np.testing.assert_array_equal(np.array(reflection.specular_at(cosine)), np.array(reflection.specular))
 

@@ -14,6 +14,7 @@ from mitex.methods.nerf.field.hash_grid import HashGrid
 from mitex.methods.nerf.field.tensors import channels, stack_rows
 from mitex.runtime import init
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 
 init()
 
@@ -72,5 +73,5 @@ def test_points_beyond_the_cube_get_features_of_its_border(encoding, trained):
 
 def test_a_grid_keeps_nothing_of_a_table():
     grid = HashGrid(2, 4, 8, 10)
-    grid(channels(mi.Point3f, np.zeros((1, 3))), mi.Float(np.zeros(grid.size, np.float32)))
+    grid(channels(mi.Point3f, np.zeros((1, 3))), upload(mi.Float, np.zeros(grid.size, np.float32)))
     assert grid._grid.data is None

@@ -17,6 +17,7 @@ from mitex.methods.nerf.field.lighting import (
     shade,
     to_display,
 )
+from mitex.runtime.upload import upload
 
 
 def _harmonics(directions: np.ndarray, bands: int = 4) -> np.ndarray:
@@ -65,7 +66,7 @@ def _shade(mi, normals, light, *, view=None, kd: Any = 0.0, ks=0.0, glossiness=1
     """`shade` from arrays and back: (N, 3)."""
     view = -normals if view is None else view
     n, v = (mi.Vector3f(np.ascontiguousarray(x.T, np.float32)) for x in (normals, view))
-    light = mi.TensorXf(np.asarray(light, np.float32))
+    light = upload(mi.TensorXf, np.asarray(light, np.float32))
     radiance = shade(n, v, mi.Color3f(kd), mi.Float(ks), mi.Float(glossiness), light, **options)
     return np.broadcast_to(np.array(radiance).T, normals.shape)
 
@@ -255,7 +256,7 @@ def test_gradients_are_finite_differences(mi, unit, rng):
 
 def test_display_is_the_power_but_next_to_black(mi):
     values = np.concatenate([np.linspace(0, 2, 2001), np.geomspace(1e-8, TOE, 2000), [-0.5]])
-    display = np.array(to_display(mi.Float(values.astype(np.float32))))
+    display = np.array(to_display(upload(mi.Float, values.astype(np.float32))))
     exact = values.clip(0) ** (1 / 2.4)
     away = values >= TOE
     np.testing.assert_allclose(display[away], exact[away], rtol=1e-5)

@@ -9,6 +9,7 @@ import torch
 from mitex.methods.nerf.field import mlp
 from mitex.runtime import init, threads
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 from tests.state import in_thread
 
 init()
@@ -36,7 +37,7 @@ def test_values_and_gradients_are_those_of_autograd(arguments, learning, chunk, 
     expected = weights[-1] @ x
     expected.square().sum().backward()
 
-    ours, *matrices = (mi.TensorXf(value.detach().numpy()) for value in arguments)
+    ours, *matrices = (upload(mi.TensorXf, value.detach().numpy()) for value in arguments)
     dr.enable_grad(ours, *(matrices if learning else ()))
     outputs = mlp.evaluate(matrices, ours)
     dr.backward(dr.sum(outputs.array * outputs.array))

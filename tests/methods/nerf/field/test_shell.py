@@ -19,6 +19,7 @@ from mitex.methods.nerf.field.tensors import channels, rows
 from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents
 from mitex.runtime import init
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 
 init()
 
@@ -47,8 +48,8 @@ def at(barycentric) -> ShellCoords:
     zero = np.zeros((count, 3), np.float32)
     return ShellCoords(
         channels(mi.Point3f, zero),
-        mi.Float(np.zeros(count)),
-        mi.UInt32(np.zeros(count, np.uint32)),
+        upload(mi.Float, np.zeros(count)),
+        upload(mi.UInt32, np.zeros(count, np.uint32)),
         channels(mi.Point2f, np.array(barycentric)),
         channels(mi.Vector3f, zero),
     )
@@ -57,15 +58,15 @@ def at(barycentric) -> ShellCoords:
 def shell(strength: float = 1.0, scale: float = 1.0) -> Shell:
     rng = np.random.default_rng(0)
     weights = [
-        mi.TensorXf(rng.uniform(-1, 1, s).astype(np.float32) * weight_bound(s))
+        upload(mi.TensorXf, rng.uniform(-1, 1, s).astype(np.float32) * weight_bound(s))
         for s in weight_shapes(PRESETS["fast"])
     ]
     mesh = ball()
     uv = np.random.default_rng(2).uniform(size=(len(mesh.faces), 3, 2))
     frames = np.broadcast_to(np.eye(3), (len(mesh.faces), 3, 3))
     latents = MappedLatents(square(1e-3), uv, frames)
-    mask = mi.TensorXu8(np.ones((8, 8, 8), np.uint8))
-    light = mi.TensorXf(np.array([4.0, *[0.0] * 15], np.float32))  # even
+    mask = upload(mi.TensorXu8, np.ones((8, 8, 8), np.uint8))
+    light = upload(mi.TensorXf, np.array([4.0, *[0.0] * 15], np.float32))  # even
     return Shell(
         Projection(mesh), latents, Decoder(weights, packed=True), light, 0.1, mask, 0.02, scale, strength
     )
@@ -126,7 +127,7 @@ def surface_appearance(view, light, theta: mi.Float | float = 0.0, detach: bool 
 
     latents = MappedLatents(square(), np.zeros((1, 3, 2), np.float32), np.eye(3)[None])
     decoder: Any = surface
-    light = mi.TensorXf(np.array(light, np.float32))
+    light = upload(mi.TensorXf, np.array(light, np.float32))
     return appearance(latents, decoder, light, at([(0.2, 0.2)]), view, detach)[1:]
 
 
@@ -139,7 +140,7 @@ def test_a_surface_shines_more_at_grazing_angles():
     for angle, mirrored in ((0, 0.1), (60, 0.1 + 0.6 / 32), (90, 0.7), (120, 0.7)):
         turned = -np.cos(np.radians(angle)) * up + np.sin(np.radians(angle)) * across
         colour = surface_appearance(mi.Vector3f(*turned.tolist()), light)[0]
-        expected = to_display(mi.Float(4.0 * (0.2 + mirrored) / np.sqrt(4 * np.pi)))
+        expected = to_display(upload(mi.Float, 4.0 * (0.2 + mirrored) / np.sqrt(4 * np.pi)))
         np.testing.assert_allclose(rows(colour)[0], np.array(expected)[0], rtol=1e-4)
 
 

@@ -15,6 +15,7 @@ from mitex.methods.nerf import NerfTexture
 from mitex.methods.nerf.field.networks import LAYERS
 from mitex.runtime import init
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 from tests.methods.nerf.small import small_maps, small_texture
 from tests.scenes.helpers import shell_scene
 
@@ -155,6 +156,6 @@ def with_value(name: str, value: np.ndarray):
 def test_values_of_another_shape_are_refused():
     scene = scene_of(applied())
     params, key = parameter(scene, "weights.density.0")
-    params[key] = mi.TensorXf(np.zeros((3, 3), np.float32))
+    params[key] = upload(mi.TensorXf, np.zeros((3, 3), np.float32))
     with pytest.raises(ConfigError, match=r"weights\.density\.0"):
         params.update()
