@@ -11,6 +11,7 @@ from mitex.geometry.tangents import HardSplit, Split
 from mitex.mesh import Mesh
 from mitex.plugins import init
 from mitex.runtime.jit import mi
+from mitex.runtime.upload import upload
 
 
 def mesh_shape(
@@ -53,12 +54,12 @@ def mesh_shape(
         props=props,
     )
     params = mi.traverse(shape)
-    params["vertex_positions"] = vertices.ravel()
-    params["faces"] = faces.astype(np.uint32).ravel()
+    params["vertex_positions"] = upload(mi.Float, vertices.ravel())
+    params["faces"] = upload(mi.UInt32, faces.astype(np.uint32).ravel())
     if isinstance(split, Split):
-        params["vertex_texcoords"] = split.uv.ravel()
+        params["vertex_texcoords"] = upload(mi.Float, split.uv.ravel())
     params.update()
     if smooth and split is not None:  # last: with new positions, Mitsuba finds its own
-        params["vertex_normals"] = split.normals.ravel()
+        params["vertex_normals"] = upload(mi.Float, split.normals.ravel())
         params.update()
     return shape

@@ -144,7 +144,7 @@ class Stage:
         """
         self.mesh = self.mesh.with_vertices(vertices)
         params = mi.traverse(self.scene)
-        params["mesh.vertex_positions"] = self.mesh.vertices.ravel()
+        params["mesh.vertex_positions"] = upload(mi.Float, self.mesh.vertices.ravel())
         params.update()
 
     def visibility(self, cameras: Cameras, antialias: int = 1) -> Visibility:
