@@ -35,6 +35,7 @@ from mitex.mesh import Mesh, embedded
 from mitex.mesh.fields import vector_field
 from mitex.methods.layout import with_layout
 from mitex.methods.surface.texels import Texels
+from mitex.runtime.upload import upload
 from mitex.scenes import mesh_shape
 
 mi.set_variant("llvm_ad_rgb")
@@ -54,8 +55,8 @@ def load_scene(vase: Mesh, resolution: int, side: int) -> mi.Scene:
     charts = texels.image(texels.chart[texels.face][:, None], -1)[..., 0]
     texture = {
         "type": "texel_field",
-        "data": mi.TensorXf(np.full((resolution, resolution, 3), 0.5, np.float32)),
-        "charts": mi.TensorXf(charts.astype(np.float32)),
+        "data": upload(mi.TensorXf, np.full((resolution, resolution, 3), 0.5, np.float32)),
+        "charts": upload(mi.TensorXf, charts.astype(np.float32)),
     }
     shape = mesh_shape(
         vase,
@@ -136,7 +137,7 @@ def turning_loss(scene: mi.Scene, vase: Mesh, start: list[torch.Tensor], masks: 
     assert vase.uv is not None
     split = split_at_seams(vase, vase.uv)
     params = mi.traverse(scene)
-    params["vase.vertex_motion"] = np.asarray(field, np.float32)[split.source].ravel()
+    params["vase.vertex_motion"] = upload(mi.Float, np.asarray(field, np.float32)[split.source].ravel())
     params.update()
     integrator = mi.load_dict({"type": "motion", "antialias": 1})
     pictures = [mi.render(scene, sensor=view, integrator=integrator) for view in range(VIEWS)]

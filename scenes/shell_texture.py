@@ -21,6 +21,7 @@ from mitex.mesh import Similarity, embedded
 from mitex.methods.nca import NcaTexture
 from mitex.render import tone
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 from mitex.scenes import mesh_shape
 from mitex.textures.phong import Phong
 from mitex.textures.shell_field import shell_field
@@ -124,7 +125,7 @@ def textured(asset, place):
     mesh = asset.mesh.normalised()[0]
     vertices = 0.85 * mesh.vertices
     vertices += np.array([place[0], FLOOR - vertices[:, 1].min(), place[1]])
-    colour = {"type": "vertex_field", "data": mi.TensorXf(asset.vertex_maps["albedo"])}
+    colour = {"type": "vertex_field", "data": upload(mi.TensorXf, asset.vertex_maps["albedo"])}
     return mesh_shape(mesh.with_vertices(vertices), {"type": "diffuse", "reflectance": colour}, smooth=True)
 
 

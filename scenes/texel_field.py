@@ -20,6 +20,7 @@ from scipy.sparse.csgraph import connected_components
 from mitex.atlas import Atlas
 from mitex.geometry.tangents import Split, split_at_seams
 from mitex.mesh import embedded
+from mitex.runtime.upload import upload
 from mitex.scenes import mesh_shape
 
 mi.set_variant("llvm_ad_rgb")
@@ -59,8 +60,8 @@ def load_vase() -> mi.Mesh:
 
     shared = {
         "type": "texel_field",
-        "data": mi.TensorXf(texels.astype(np.float32)),
-        "charts": mi.TensorXf(chart.astype(np.float32)),
+        "data": upload(mi.TensorXf, texels.astype(np.float32)),
+        "charts": upload(mi.TensorXf, chart.astype(np.float32)),
     }
     material = {
         "type": "principled",

@@ -15,6 +15,7 @@ import mitsuba as mi
 import numpy as np
 
 from mitex.mesh import Mesh
+from mitex.runtime.upload import upload
 from mitex.scenes import mesh_shape
 
 mi.set_variant("llvm_ad_rgb")
@@ -53,7 +54,7 @@ def channels(angles: np.ndarray) -> np.ndarray:
 def load_ring() -> mi.Mesh:
     """The ring as a Mitsuba mesh, which needs no UVs."""
     vertices, faces, angles = ring()
-    data = mi.TensorXf(channels(angles))
+    data = upload(mi.TensorXf, channels(angles))
     bsdf = {
         "type": "bumpmap",
         "height": {"type": "vertex_field", "data": data, "channel": 4},

@@ -1,9 +1,10 @@
 """Arrays of NumPy and tensors of torch as Dr.Jit's, with room behind them.
 
 Dr.Jit takes over the memory of an array as it is, and its LLVM kernels read packets of 16 elements: past the
-end of an array whose number of elements is no multiple of that. What is read there does not matter. But where
-the array ends at the end of a page and the next page is not mapped, as happens with large arrays once in a
-while, the process ends with a segmentation fault (Dr.Jit 1.5).
+end of an array whose number of elements is no multiple of that. Embree reads vertices and faces as four
+numbers instead of three, and so one past their end. What is read there does not matter. But where the array
+ends at the end of a page and the next page is not mapped, as happens with large arrays once in a while, the
+process ends with a segmentation fault (Dr.Jit 1.5, Mitsuba 3.9).
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ def upload(kind: Callable[..., A], array: np.ndarray) -> A:
 
 
 def with_room(array: np.ndarray) -> np.ndarray:
-    """The array, or a copy of it if a packet that begins in it may reach into the next page."""
+    """The array, or a copy of it if what is read past its end may be on the next page."""
     array = np.ascontiguousarray(array)
     if not _leaves_page(array.__array_interface__["data"][0], array.size, array.itemsize):
         return array
@@ -57,7 +58,7 @@ def tensor_with_room(tensor: torch.Tensor) -> torch.Tensor:
 
 
 def _leaves_page(start: int, count: int, itemsize: int) -> bool:
-    """Whether the packet in which an array ends reaches into the page after that in which the array ends."""
-    end = start + count * itemsize
-    beyond = -count % PACKET * itemsize
-    return count > 0 and (end - 1) // mmap.PAGESIZE != (end + beyond - 1) // mmap.PAGESIZE
+    """Whether the packet with the first element past an array reaches beyond the page of the last one."""
+    last = start + count * itemsize - 1
+    beyond = (count // PACKET + 1) * PACKET - count
+    return count > 0 and last // mmap.PAGESIZE != (last + beyond * itemsize) // mmap.PAGESIZE

@@ -61,7 +61,9 @@ def _decoded() -> dict[str, Any]:
     mesh = {name: np.asarray(getattr(BALL, name), np.float32) for name in ("vertices", "faces")}
     layer = {"weight_0": _tensor(4, 5), "bias_0": _tensor(4)}
     waves = {"coordinates": "waves", "waves": _tensor(2, 4)}
-    return {"data": _tensor(12, 3)} | {name: upload(mi.TensorXf, v) for name, v in mesh.items()} | layer | waves
+    return (
+        {"data": _tensor(12, 3)} | {name: upload(mi.TensorXf, v) for name, v in mesh.items()} | layer | waves
+    )
 
 
 PLUGINS = {
