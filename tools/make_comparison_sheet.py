@@ -1,10 +1,11 @@
-"""Puts comparisons together: one table of all of them, and docs/gallery/comparison.jpg.
+"""Puts comparisons together: one table of all of them, and a sheet in docs/gallery.
 
     python tools/make_comparison_sheet.py --mesh vase --methods surface nca -- out/lava out/bricks ...
 
 The arguments are folders that `mitex compare` wrote, each with other exemplars. Prints a Markdown table: the
 means over all pairs, and those of each exemplar over its meshes, with the standard deviation over seeds
-where there are several. The sheet has a row for each exemplar: itself, and the mesh by each method.
+where there are several. The sheet has a row for each exemplar: itself, and a mesh by each method; with
+several meshes, the rows take them in turn.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import argparse
 import csv
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +25,7 @@ from mitex.comparison.results import label
 from mitex.images import read_image, write_image
 from mitex.render import sheet
 
-SHEET = Path(__file__).parents[1] / "docs" / "gallery" / "comparison.jpg"
+GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 CELL = 240  # side of a picture [px]
 Row = dict[str, str]
 
@@ -63,17 +65,21 @@ def table(groups: Iterable[tuple[str, Sequence[Row]]], methods: Sequence[str]) -
     return "\n".join(lines)
 
 
-def pictures(rows: Sequence[Row], exemplars: Sequence[str], methods: Sequence[str], mesh: str) -> np.ndarray:
+def pictures(
+    rows: Sequence[Row], exemplars: Sequence[str], methods: Sequence[str], meshes: Sequence[str]
+) -> np.ndarray:
     """The sheet; each method's first seed."""
-    first = {(row["exemplar"], row["method"]): row for row in reversed(rows) if label(row["mesh"]) == mesh}
-    images = [read_image(Path(first[e, m]["picture"])) for e in exemplars for m in methods]
+    first = {(row["exemplar"], row["method"], label(row["mesh"])): row for row in reversed(rows)}
+    pairs = zip(exemplars, cycle(meshes), strict=False)
+    images = [read_image(Path(first[e, method, mesh]["picture"])) for e, mesh in pairs for method in methods]
     originals = [picture_of(exemplar) for exemplar in exemplars]
     return sheet(images, len(methods), [*methods] * len(exemplars), exemplar=originals, cell=CELL)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--mesh", default="vase", help="that the sheet shows")
+    parser.add_argument("--mesh", default=["vase"], nargs="+", help="that the sheet shows, row by row")
+    parser.add_argument("--sheet", default="comparison.jpg", help="its name in the gallery")
     parser.add_argument("--methods", nargs="+", required=True, help="of tables and sheet, in this order")
     parser.add_argument("folders", nargs="+", type=Path)
     arguments = parser.parse_args()
@@ -81,8 +87,9 @@ def main() -> None:
     exemplars = list(dict.fromkeys(row["exemplar"] for row in rows))
     groups = [("all", rows), *((label(e), [r for r in rows if r["exemplar"] == e]) for e in exemplars)]
     print(table(groups, arguments.methods))
-    write_image(SHEET, pictures(rows, exemplars, arguments.methods, arguments.mesh))
-    print(SHEET)
+    path = GALLERY / arguments.sheet
+    write_image(path, pictures(rows, exemplars, arguments.methods, arguments.mesh))
+    print(path)
 
 
 if __name__ == "__main__":
