@@ -3,7 +3,7 @@
     python tools/make_comparison_sheet.py --mesh vase --methods surface nca -- out/lava out/bricks ...
 
 The arguments are folders that `mitex compare` wrote, each with other exemplars. Prints a Markdown table: the
-means over all pairs, and those of each exemplar over its meshes, with the standard deviation over seeds
+means over all pairs, those of each exemplar, and those of each mesh, with the standard deviation over seeds
 where there are several. The sheet has a row for each exemplar: itself, and a mesh by each method; with
 several meshes, the rows take them in turn.
 """
@@ -55,7 +55,7 @@ def number(rows: Sequence[Row], key: str) -> str:
 
 def table(groups: Iterable[tuple[str, Sequence[Row]]], methods: Sequence[str]) -> str:
     """Markdown: a line for each group and method."""
-    names = ["exemplar", "method", *(measure.label for measure in LOOKS)]
+    names = ["of", "method", *(measure.label for measure in LOOKS)]
     lines = [f"| {' | '.join(names)} |", "| --- " * len(names) + "|"]
     for name, group in groups:
         for method in methods:
@@ -63,6 +63,12 @@ def table(groups: Iterable[tuple[str, Sequence[Row]]], methods: Sequence[str]) -
             cells = " | ".join(number(own, measure.key) for measure in LOOKS)
             lines.append(f"| {name} | `{method}` | {cells} |")
     return "\n".join(lines)
+
+
+def _grouped(rows: Sequence[Row], key: str) -> list[tuple[str, Sequence[Row]]]:
+    """The rows of each exemplar or of each mesh, with its label."""
+    values = dict.fromkeys(row[key] for row in rows)
+    return [(label(value), [row for row in rows if row[key] == value]) for value in values]
 
 
 def pictures(
@@ -85,8 +91,7 @@ def main() -> None:
     arguments = parser.parse_args()
     rows = [row for folder in arguments.folders for row in rows_of(folder)]
     exemplars = list(dict.fromkeys(row["exemplar"] for row in rows))
-    groups = [("all", rows), *((label(e), [r for r in rows if r["exemplar"] == e]) for e in exemplars)]
-    print(table(groups, arguments.methods))
+    print(table([("all", rows), *_grouped(rows, "exemplar"), *_grouped(rows, "mesh")], arguments.methods))
     path = GALLERY / arguments.sheet
     write_image(path, pictures(rows, exemplars, arguments.methods, arguments.mesh))
     print(path)
