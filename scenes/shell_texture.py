@@ -37,7 +37,7 @@ class Sponge:
     step = 1 / 64  # between samples along a ray [half sides of the cube]
 
     def __init__(self) -> None:
-        self.mask = mi.TensorXu8(np.ones((8, 8, 8), np.uint8))  # all cells of the cube may have matter
+        self.mask = upload(mi.TensorXu8, np.ones((8, 8, 8), np.uint8))  # matter may be in all cells
 
     def extinction(self, points: mi.Point3f) -> tuple[mi.UInt32, mi.Float]:
         """Which points have matter, and its density."""

@@ -129,7 +129,7 @@ class Stage:
                 "integrator": {
                     "type": "feature",
                     "name": "reflectance",
-                    "background": mi.TensorXf(np.array([self.background], np.float32)),
+                    "background": upload(mi.TensorXf, np.array([self.background], np.float32)),
                 },
                 "mesh": mesh_shape(mesh, {"type": "diffuse", "reflectance": field}),
             }

@@ -1,7 +1,9 @@
 """Arrays of NumPy and tensors of torch as Dr.Jit's: right values, and nothing read that is not there."""
 
+import ast
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,9 @@ init()
 
 from mitex.runtime.jit import mi  # noqa: E402
 from mitex.runtime.upload import PACKET, tensor_with_room, upload, with_room  # noqa: E402
+
+FLAT = ("Float", "UInt", "Int", "Bool", "Tensor")  # how types of Dr.Jit begin that hold one flat array
+NUMPY = ("np.", ".numpy()", ".astype(")
 
 # An array whose last byte is the last one of a page, before a page that must not be read.
 GUARDED = """
@@ -94,3 +99,27 @@ def test_tensors_are_copied_only_where_a_packet_may_leave_the_page_and_keep_thei
     weights = torch.arange(10.0).view(5, 2)
     (weights * roomy).sum().backward()
     assert last.grad is not None and (last.grad == weights).all()
+
+
+def test_no_array_of_numpy_enters_without_room():
+    """Dr.Jit's own constructors are for its own arrays, and for Python's numbers."""
+    root = Path(__file__).parents[2]
+    files = [file for folder in ("mitex", "scenes") for file in (root / folder).rglob("*.py")]
+    assert len(files) > 300
+    bare = [
+        f"{file.relative_to(root)}:{call.lineno}"
+        for file in files
+        for call in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        if isinstance(call, ast.Call) and _is_flat(call.func) and any(_of_numpy(a) for a in call.args)
+    ]
+    assert not bare, f"pass these through mitex.runtime.upload: {', '.join(bare)}"
+
+
+def _is_flat(function: ast.expr) -> bool:
+    """Whether it is a type such as `mi.Float` or `mi.TensorXf`, which shares the memory that it is given."""
+    return ast.unparse(function).startswith(tuple(f"mi.{kind}" for kind in FLAT))
+
+
+def _of_numpy(argument: ast.expr) -> bool:
+    text = ast.unparse(argument)
+    return not text.startswith("tensor_with_room") and any(sign in text for sign in NUMPY)

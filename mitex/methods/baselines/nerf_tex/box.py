@@ -27,6 +27,7 @@ from mitex.methods.nerf.use.placement import EXTENT
 from mitex.progress import counted
 from mitex.quilting.plane import Quilt
 from mitex.runtime.jit import mi
+from mitex.runtime.upload import upload
 
 SQUARES = 96  # of the plane along a side
 CANDIDATES = 64  # places on the base shape that pieces are taken from
@@ -142,7 +143,7 @@ def picture_box(box: Box, count: int, size: int, seed: int) -> tuple[Capture, np
     rows, columns = np.mgrid[:size, :size]
     pixels = np.stack([columns.ravel(), rows.ravel()], 1) + 0.5
     for view in counted("picturing the box", range(count), count):
-        box.field.light = mi.TensorXf(rotated(box.light, turns[view]))
+        box.field.light = upload(mi.TensorXf, rotated(box.light, turns[view]))
         colour, transmittance = render_rays(box.field, *capture.rays(view, pixels))
         opacity = 1 - transmittance[:, None]
         straight = colour / np.maximum(opacity, 1e-3)

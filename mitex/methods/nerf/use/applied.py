@@ -53,7 +53,7 @@ def checked_light(light: np.ndarray) -> mi.TensorXf:
             f"a light of shape {coefficients.shape}",
             f"give finite spherical harmonics, ({COEFFICIENTS},) or ({COEFFICIENTS}, 3)",
         )
-    return mi.TensorXf(coefficients)
+    return upload(mi.TensorXf, coefficients)
 
 
 def joined_on_surface(quilting: str | None, guide: np.ndarray | None) -> bool:

@@ -19,6 +19,7 @@ from mitex.methods.nerf.field.shell import Shell, appearance
 from mitex.methods.nerf.field.tensors import channels, rows
 from mitex.progress import announce
 from mitex.runtime.jit import mi
+from mitex.runtime.upload import upload
 
 CELLS = 3  # of the grid along a side of a cell of the occupancy grid
 FLOOR = -4.0  # logarithm of a density beside the level's, at least
@@ -79,7 +80,7 @@ def _albedo_and_normals(shell: Shell, mesh: Mesh) -> tuple[np.ndarray, np.ndarra
     """Colours (V, 3) under an even light of the learned one's strength, and fine normals (V, 3)."""
     even = np.zeros(COEFFICIENTS, np.float32)
     even[0] = np.array(shell.light).reshape(COEFFICIENTS, -1)[0].mean()
-    light = mi.TensorXf(even)
+    light = upload(mi.TensorXf, even)
     colours, normals = np.full((len(mesh.vertices), 3), 0.5, np.float32), mesh.normals.copy()
     for start in range(0, len(mesh.vertices), CHUNK):
         part = slice(start, start + CHUNK)

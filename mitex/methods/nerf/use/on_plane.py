@@ -16,6 +16,7 @@ from mitex.methods.nerf.field.shell import Shell
 from mitex.methods.nerf.use.applied import AppliedTexture
 from mitex.methods.nerf.use.placement import EXTENT
 from mitex.runtime.jit import mi
+from mitex.runtime.upload import upload
 from mitex.textures.march import RadianceField
 
 SIDE = 96  # squares along the plane
@@ -82,4 +83,4 @@ class TextureOnPlane(PlaneRenderer[AppliedTexture]):
     """Renders a captured texture; its light are (16,) spherical harmonics."""
 
     def turn_light(self, turn: np.ndarray) -> None:
-        self.field.light = mi.TensorXf(rotated(self.light, turn))
+        self.field.light = upload(mi.TensorXf, rotated(self.light, turn))
