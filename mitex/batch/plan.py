@@ -38,7 +38,7 @@ class MethodPlan:
         label: its name in the plan, of which there can be several for one method.
         method: its name.
         exemplars, meshes: paths, patterns or names; relative ones belong to the plan's folder.
-        seeds: of the fits; none for that of the preset.
+        seeds: of the fits, and of `apply` where it takes one; none for those of preset and `apply`.
         output: what `apply` writes: a file of this format, or a folder of maps.
         fit: options and settings of `mitex fit`, by name.
         apply: options of `mitex apply`, by name.

@@ -97,6 +97,17 @@ class TestCommands:
         fit, _ = jobs({"surface": {"exemplars": ["lava"], "meshes": ["vase"], "keep_uvs": value}})
         assert [word for word in fit.words if word.startswith("--keep")] == words
 
+    @pytest.mark.parametrize(
+        ("method", "own", "seeds"),
+        [("nca", {}, ["--seed=7"]), ("nca", {"apply": {"seed": 3}}, ["--seed=3"]), ("surface", {}, [])],
+    )
+    def test_what_is_applied_with_a_seed_gets_that_of_the_fit(self, jobs, method, own, seeds):
+        table = {method: {"exemplars": ["lava"], "meshes": ["vase"], **own}}
+        _, apply = jobs(table, seeds=[7])
+        assert [word for word in apply.words if word.startswith("--seed")] == seeds
+        _, apply = jobs({method: {"exemplars": ["lava"], "meshes": ["vase"]}})
+        assert not [word for word in apply.words if word.startswith("--seed")]
+
     def test_records_come_back(self, jobs):
         for job in jobs(seeds=[3]):
             assert Job.of_record(json.loads(json.dumps(job.record()))) == job
