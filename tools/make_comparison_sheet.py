@@ -55,7 +55,7 @@ def number(rows: Sequence[Row], key: str) -> str:
 
 def table(groups: Iterable[tuple[str, Sequence[Row]]], methods: Sequence[str]) -> str:
     """Markdown: a line for each group and method."""
-    names = ["of", "method", *(measure.label for measure in LOOKS)]
+    names = ["exemplar or mesh", "method", *(measure.label for measure in LOOKS)]
     lines = [f"| {' | '.join(names)} |", "| --- " * len(names) + "|"]
     for name, group in groups:
         for method in methods:

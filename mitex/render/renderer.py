@@ -230,7 +230,7 @@ def _bsdf(asset: Asset, split: HardSplit, ao: bool) -> dict[str, object]:
         maps, kind = asset.texture_maps, "texel_field"
 
     def texture(values: np.ndarray) -> dict[str, object]:
-        return {"type": kind, "data": upload(mi.TensorXf, values.astype(np.float32)), "raw": True}
+        return {"type": kind, "data": upload(mi.TensorXf, np.asarray(values, np.float32)), "raw": True}
 
     albedo, roughness = _material(maps, ao)
     bsdf = {

@@ -45,7 +45,7 @@ def with_room(array: np.ndarray) -> np.ndarray:
 
 
 def tensor_with_room(tensor: torch.Tensor) -> torch.Tensor:
-    """The same for a tensor on the CPU: a view of it or a copy, with its gradient.
+    """As `with_room` for a tensor on the CPU: a view of it or a copy, both with its gradient.
 
     Memory of torch's own begins where packets do; that of `torch.from_numpy` begins anywhere.
     """
@@ -58,7 +58,7 @@ def tensor_with_room(tensor: torch.Tensor) -> torch.Tensor:
 
 
 def _leaves_page(start: int, count: int, itemsize: int) -> bool:
-    """Whether the packet with the first element past an array reaches beyond the page of the last one."""
+    """Whether what is read past an array, to the end of the packet there, is beyond its last byte's page."""
     last = start + count * itemsize - 1
     beyond = (count // PACKET + 1) * PACKET - count
     return count > 0 and last // mmap.PAGESIZE != (last + beyond * itemsize) // mmap.PAGESIZE
