@@ -21,6 +21,7 @@ from mitex.methods.geometric.directions import spread
 from mitex.methods.geometric.hierarchy import Hierarchy, mean_edge
 from mitex.methods.geometric.model import grow
 from mitex.methods.geometric.network import FaceNetwork
+from mitex.methods.geometric.placement import Placement, bumps, placed
 from mitex.progress import counted
 from mitex.runtime import keep_freed_memory
 
@@ -76,6 +77,7 @@ class GeometricTexture:
         end_level: int | None = None,
         untangle: bool = False,
         field: str | Path | np.ndarray | None = None,
+        placement: Placement = "even",
     ) -> Asset:
         """Grows the texture on a mesh; every level after the first splits each face in four.
 
@@ -90,6 +92,9 @@ class GeometricTexture:
             untangle: draw the relief back where the surface pierces itself; see `untangled`.
             field: the vector field on the mesh that the relief follows, if it has learned to follow one; see
                 `mitex.mesh.fields`.
+            placement: where bumps and dents go that are larger than a face of the first level: "even" spreads
+                them as densely as on the reference (`geometric.placement`); "none" leaves it to the
+                generators, as published. Reliefs of other kinds, and those that follow a field, have none.
 
         Returns:
             The displaced mesh in light grey, in the mesh's own units and place; UVs are interpolated.
@@ -98,7 +103,7 @@ class GeometricTexture:
             ConfigError: levels out of range, too many faces, or a field that is missing, wrong or of no use.
             MeshError: a face names a vertex twice.
         """
-        rollout = self.rollout(mesh, start_level, end_level, field)
+        rollout = self.rollout(mesh, start_level, end_level, field, placement, seed)
         *_, last = rollout.run(rollout.noise(seed))
         return clay(untangled(rollout.hierarchy.meshes[-1], last) if untangle else last)
 
@@ -111,15 +116,16 @@ class GeometricTexture:
         start_level: int | None = None,
         end_level: int | None = None,
         field: str | Path | np.ndarray | None = None,
+        placement: Placement = "even",
     ) -> Iterator[Mesh]:
         """Meshes between those of two seeds: the noise goes along a great circle, so that its variance stays.
 
         Args:
-            mesh, start_level, end_level, field: as in `apply`.
-            seeds: of the first and the last mesh.
+            mesh, start_level, end_level, field, placement: as in `apply`.
+            seeds: of the first and the last mesh; bumps that are placed stay where the first one puts them.
             frames: number of meshes, at least 2.
         """
-        rollout = self.rollout(mesh, start_level, end_level, field)
+        rollout = self.rollout(mesh, start_level, end_level, field, placement, seeds[0])
         first, last = (rollout.noise(seed) for seed in seeds)
         for t in np.linspace(0, 1, frames):
             *_, result = rollout.run([slerp(a, b, float(t)) for a, b in zip(first, last, strict=True)])
@@ -148,12 +154,13 @@ class GeometricTexture:
         start_level: int | None = None,
         end_level: int | None = None,
         field: str | Path | np.ndarray | None = None,
+        placement: Placement = "even",
     ) -> Iterator[Mesh]:
         """The texture growing on a mesh: the mesh itself, then `frames` meshes for each level.
 
         Arguments as in `apply`. The last of a level's meshes is displaced by the whole of it.
         """
-        rollout = self.rollout(mesh, start_level, end_level, field)
+        rollout = self.rollout(mesh, start_level, end_level, field, placement, seed)
         before = mesh
         for level, after in enumerate(rollout.run(rollout.noise(seed))):
             start = subdivide_midpoint(before) if level else before
@@ -182,10 +189,12 @@ class GeometricTexture:
         start_level: int | None,
         end_level: int | None,
         field: str | Path | np.ndarray | None = None,
+        placement: Placement = "none",
+        seed: int = 0,
     ) -> Rollout:
         """The generators of a range of levels, ready to run on a mesh; arguments and errors as of `apply`.
 
-        The template has its own field.
+        The template has its own field. The seed is that of the placement.
         """
         start, end = self._range(start_level, end_level)
         faces = len(mesh.faces) * 4 ** (end - start)
@@ -197,7 +206,15 @@ class GeometricTexture:
         keep_freed_memory()
         generators = self.generators[start : end + 1]
         hierarchy = self._directed(Hierarchy.of(mesh, len(generators)), mesh, field)
-        return Rollout(generators, hierarchy, float(self.about["noise"]), bool(self.about["remeasure"]))
+        vertices = mesh.vertices if placement == "none" else self._placed(mesh, start, seed)
+        noise, remeasure = float(self.about["noise"]), bool(self.about["remeasure"])
+        return Rollout(generators, hierarchy, vertices, noise, remeasure)
+
+    def _placed(self, mesh: Mesh, level: int, seed: int) -> np.ndarray:
+        """Vertices (V, 3) of a mesh with the bumps that the generator of a level makes of the template."""
+        reference = self.generate(start_level=self.levels, end_level=level)
+        texture = None if self.about.get("field") else bumps(reference, 0.5**level)
+        return mesh.vertices if texture is None else placed(mesh, texture, seed)
 
     def _directed(self, hierarchy: Hierarchy, mesh: Mesh, field: str | Path | np.ndarray | None) -> Hierarchy:
         """The hierarchy of a mesh with the directions that the relief follows, if it follows any."""
@@ -234,12 +251,14 @@ class Rollout:
     Attributes:
         generators: of the levels.
         hierarchy: of the mesh, with as many levels.
+        vertices: (V, 3) of the mesh, from which they start.
         noise_scale: standard deviation of the noise [mean edges].
         remeasure: as in `generate`.
     """
 
     generators: Sequence[FaceNetwork]
     hierarchy: Hierarchy
+    vertices: np.ndarray
     noise_scale: float
     remeasure: bool
 
@@ -254,9 +273,12 @@ class Rollout:
         """The mesh after each level, in its own units and place."""
         mesh, graph = self.hierarchy.meshes[0], self.hierarchy.graphs[0]
         centre = mesh.vertices.mean(0, dtype=np.float64)
-        centred = torch.from_numpy((mesh.vertices - centre).astype(np.float32))
+        centred, start = (
+            torch.from_numpy((vertices - centre).astype(np.float32))
+            for vertices in (mesh.vertices, self.vertices)
+        )
         unit = float(mean_edge(centred, graph))
-        steps = grow(self.generators, self.hierarchy, centred / unit, noises, self.remeasure)
+        steps = grow(self.generators, self.hierarchy, start / unit, noises, self.remeasure)
         for level, vertices in enumerate(counted("growing levels", steps, len(self.generators))):
             positions = vertices.numpy().astype(np.float64) * (unit / 2**level) + centre
             yield self.hierarchy.meshes[level].with_vertices(positions)

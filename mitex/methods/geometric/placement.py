@@ -1,0 +1,109 @@
+"""Bumps and dents for the first generator to start from, spread as densely as on the reference.
+
+Where a knob or a crater takes many faces of a level, lower generators put it in its place, on the template.
+Growth on other meshes starts above these (Hertz et al. 2020, section 4, "Hierarchical generation"), so that
+nothing says where one ends and the next begins: knobs flow together. So the reference, as the first generator leaves it, is asked how many
+faces there are for each bump and how high it is, and the mesh gets bumps like these, evenly spread.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.linalg import spsolve
+
+from mitex.mesh import Mesh
+from mitex.mesh.topology import mesh_edges
+
+Placement = Literal["even", "none"]
+
+REACH = 3.0  # of the smoothing that tells bumps from the shape [edges]
+TOP = 0.97  # quantile of the heights that counts as the top; half of it divides bumps from the ground
+FEWEST = 8  # bumps or dents that make a texture
+LARGEST = 0.1  # share of what is raised that one bump may have: winding ridges are no bumps
+SHARE = 0.6  # of a bump's height that is given: generators add to it, and whole dents would pierce thin walls
+LOWEST = 0.5  # height of a bump [edges]; what is lower the first generator makes by itself
+
+
+class Bumps(NamedTuple):
+    """How bumps cover a surface.
+
+    Attributes:
+        faces: for each of them, on average.
+        height: of one above the ground [edges]; below 0 for dents.
+    """
+
+    faces: float
+    height: float
+
+
+def bumps(mesh: Mesh, edge: float) -> Bumps | None:
+    """The bumps or dents of a surface; None if it has no separate ones.
+
+    Args:
+        mesh: a coarse mesh whose bumps are a few vertices wide.
+        edge: the length in which heights are measured [mesh units].
+    """
+    heights = _heights(mesh) / edge
+    side = 1.0 if np.mean((heights - heights.mean()) ** 3) > 0 else -1.0  # a minority is up, or down
+    heights *= side
+    raised = np.flatnonzero(heights > 0.5 * np.quantile(heights, TOP))
+    count, label = connected_components(_graph(mesh)[raised][:, raised], directed=False)
+    if count < FEWEST or np.bincount(label).max() > LARGEST * len(raised):
+        return None
+    tops = np.zeros(count)
+    np.maximum.at(tops, label, heights[raised])
+    height = float(np.median(tops))
+    return Bumps(len(mesh.faces) / count, side * height) if height >= LOWEST else None
+
+
+def placed(mesh: Mesh, texture: Bumps, seed: int) -> np.ndarray:
+    """Vertices (V, 3) float64 of a mesh with bumps, each of which raises one vertex along its normal.
+
+    Args:
+        mesh: any mesh.
+        texture: how many there shall be, and how high.
+        seed: of the first one; each further one is farthest from all before along the edges.
+    """
+    graph, used = _graph(mesh), np.unique(mesh.faces)
+    count = min(round(len(mesh.faces) / texture.faces), len(used))
+    where = used[_farthest(graph[used][:, used], count, seed)]
+    vertices = mesh.vertices.astype(np.float64)
+    vertices[where] += SHARE * texture.height * graph.data.mean() * mesh.normals[where]
+    return vertices
+
+
+def _farthest(graph: sparse.csr_array, count: int, seed: int) -> np.ndarray:
+    """Vertices (count,) of a graph, each farthest from those before (Gonzalez 1985)."""
+    away = np.full(graph.shape[0], np.inf)
+    nodes, node = [], int(np.random.default_rng(seed).integers(graph.shape[0]))
+    for _ in range(count):
+        nodes.append(node)
+        limit = away.max()
+        away = np.minimum(away, dijkstra(graph, directed=False, indices=node, limit=limit))
+        node = int(np.argmax(away))
+    return np.array(nodes, np.int64)
+
+
+def _heights(mesh: Mesh) -> np.ndarray:
+    """(V,) of the vertices above the smoothed surface, along its normals; their median is 0."""
+    count = len(mesh.vertices)
+    near = (_graph(mesh) > 0).astype(np.float64)
+    means = sparse.diags_array(1 / np.maximum(near.sum(1), 1)) @ near
+    smoothing = sparse.eye_array(count) * (1 + REACH**2) - REACH**2 * means
+    smooth = mesh.with_vertices(spsolve(smoothing.tocsc(), mesh.vertices.astype(np.float64)))
+    heights = ((mesh.vertices - smooth.vertices) * smooth.normals).sum(1)
+    return heights - np.median(heights)
+
+
+def _graph(mesh: Mesh) -> sparse.csr_array:
+    """(V, V) symmetric: the lengths of the edges."""
+    count = len(mesh.vertices)
+    ends = mesh_edges(mesh.faces, count)[0]
+    lengths = np.linalg.norm(np.diff(mesh.vertices[ends].astype(np.float64), axis=1)[:, 0], axis=1)
+    lengths = np.maximum(lengths, 1e-12 * max(lengths.max(initial=0.0), 1e-30))  # 0 would be no edge
+    graph = sparse.coo_array((lengths, ends.T), (count, count))
+    return (graph + graph.T).tocsr()
