@@ -10,6 +10,7 @@ import pytest
 
 from mitex.cli import main
 from mitex.mesh import Mesh, grid, icosphere, quality, subdivide_midpoint
+from mitex.methods.geometric.placement import Bumps
 from tests.cli import bad_files as bad
 from tests.cli.refusals import check_refused
 from tests.shapes import collapsed, fan, pair, turned
@@ -86,6 +87,23 @@ def test_untangling_draws_back_towards_the_mesh(files, run, monkeypatch):
         assert main(apply("--start-level 0 --end-level 1" + words)) == 0
         vertices = Mesh.load(files / "out" / "a.ply").vertices
         assert (np.abs(vertices - split).max() < 1e-5) == bare
+
+
+@pytest.mark.parametrize("command", ["apply", "animate"])
+def test_bumps_are_placed_or_not(files, run, monkeypatch, command):
+    bumps = Bumps(4.0, 3.0)
+    monkeypatch.setattr("mitex.methods.geometric.texture.bumps", lambda mesh, edge: bumps)
+    results = []
+    for words in ("", "--placement even", "--placement none"):
+        arguments = [*apply(words), "--quiet"]
+        if command == "animate":
+            small = "--meshes out/meshes --frames 2 --resolution 16 --spp 1 --end-level 0"
+            arguments = f"animate out/run --mesh good.obj --out out/a.gif {small} {words}".split()
+        assert main(arguments) == 0
+        result = "out/a.ply" if command == "apply" else "out/meshes/0002.ply"
+        results.append(Mesh.load(files / result).vertices)
+    assert np.array_equal(results[0], results[1])
+    assert np.abs(results[0] - results[2]).max() > 0.5
 
 
 @pytest.fixture(scope="module")
@@ -287,6 +305,7 @@ BAD_APPLIES = {
     "orientation": ("--orientation 30", "--orientation is no option"),
     "steps": ("--steps 10", "--steps is no option"),
     "few vertices": ("--remesh 3", "--remesh"),
+    "another placement": ("--placement odd", "--placement"),
 }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -111,7 +112,8 @@ class Animate(GrowthOptions):
     def _sequence(
         self, texture: GeometricTexture, mesh: Mesh, field: np.ndarray | None, start: int | None
     ) -> Iterator[Mesh]:
-        where = {"start_level": start, "end_level": self.end_level}
         if self.to_seed is None:
-            return texture.growth(mesh, self.frames, seed=self.seed, field=field, **where)
-        return texture.interpolate(mesh, (self.seed, self.to_seed), self.frames, field=field, **where)
+            frames = partial(texture.growth, mesh, self.frames, seed=self.seed)
+        else:
+            frames = partial(texture.interpolate, mesh, (self.seed, self.to_seed), self.frames)
+        return frames(start_level=start, end_level=self.end_level, field=field, placement=self.placement)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import arg
 
@@ -83,6 +83,10 @@ class GrowthOptions:
     """Vector field on the mesh that a relief with a direction follows: a name (up, about-y ...), a direction,
     or a file (.npy .ply .json)."""
 
+    placement: Annotated[Literal["even", "none"], arg(metavar="even|none")] = "even"
+    """Spread bumps and dents that are larger than a triangle evenly, as densely as on the reference, or leave
+    that to the generators, as published."""
+
     def check_growth(self, mesh: str) -> None:
         in_range("--start-level", self.start_level, 0, 6)
         in_range("--end-level", self.end_level, 0, 6)
@@ -143,7 +147,14 @@ class Apply(GrowthOptions, MeshOptions):
         if self.mesh == TEMPLATE:
             return clay(texture.generate(self.seed, self.start_level or 0, self.end_level))
         mesh, field = self.even_mesh(self.mesh)
-        levels = {"start_level": self.start_level, "end_level": self.end_level}
-        asset = texture.apply(mesh, seed=self.seed, untangle=self.untangle, field=field, **levels)
+        asset = texture.apply(
+            mesh,
+            seed=self.seed,
+            start_level=self.start_level,
+            end_level=self.end_level,
+            untangle=self.untangle,
+            field=field,
+            placement=self.placement,
+        )
         self.advise(texture, mesh)
         return asset

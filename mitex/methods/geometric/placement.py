@@ -2,8 +2,9 @@
 
 Where a knob or a crater takes many faces of a level, lower generators put it in its place, on the template.
 Growth on other meshes starts above these (Hertz et al. 2020, section 4, "Hierarchical generation"), so that
-nothing says where one ends and the next begins: knobs flow together. So the reference, as the first generator leaves it, is asked how many
-faces there are for each bump and how high it is, and the mesh gets bumps like these, evenly spread.
+nothing says where one ends and the next begins: knobs flow together. So the reference, as the first generator
+leaves it, is asked how many faces there are for each bump and how high it is, and the mesh gets bumps like
+these, evenly spread.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu
 
 from mitex.mesh import Mesh
-from mitex.mesh.topology import mesh_edges
+from mitex.mesh.topology import edge_graph
 
 Placement = Literal["even", "none"]
 
@@ -51,7 +52,7 @@ def bumps(mesh: Mesh, edge: float) -> Bumps | None:
     side = 1.0 if np.mean((heights - heights.mean()) ** 3) > 0 else -1.0  # a minority is up, or down
     heights *= side
     raised = np.flatnonzero(heights > 0.5 * np.quantile(heights, TOP))
-    count, label = connected_components(_graph(mesh)[raised][:, raised], directed=False)
+    count, label = connected_components(_lengths(mesh, raised), directed=False)
     if count < FEWEST or np.bincount(label).max() > LARGEST * len(raised):
         return None
     tops = np.zeros(count)
@@ -68,9 +69,10 @@ def placed(mesh: Mesh, texture: Bumps, seed: int) -> np.ndarray:
         texture: how many there shall be, and how high.
         seed: of the first one; each further one is farthest from all before along the edges.
     """
-    graph, used = _graph(mesh), np.unique(mesh.faces)
+    used = np.unique(mesh.faces)
+    graph = _lengths(mesh, used)
     count = min(round(len(mesh.faces) / texture.faces), len(used))
-    where = used[_farthest(graph[used][:, used], count, seed)]
+    where = used[_farthest(graph, count, seed)]
     vertices = mesh.vertices.astype(np.float64)
     vertices[where] += SHARE * texture.height * graph.data.mean() * mesh.normals[where]
     return vertices
@@ -78,32 +80,31 @@ def placed(mesh: Mesh, texture: Bumps, seed: int) -> np.ndarray:
 
 def _farthest(graph: sparse.csr_array, count: int, seed: int) -> np.ndarray:
     """Vertices (count,) of a graph, each farthest from those before (Gonzalez 1985)."""
-    away = np.full(graph.shape[0], np.inf)
-    nodes, node = [], int(np.random.default_rng(seed).integers(graph.shape[0]))
+    size = len(graph.indptr) - 1
+    away = np.full(size, np.inf)
+    nodes, node = [], int(np.random.default_rng(seed).integers(size))
     for _ in range(count):
         nodes.append(node)
-        limit = away.max()
-        away = np.minimum(away, dijkstra(graph, directed=False, indices=node, limit=limit))
+        away = np.minimum(away, dijkstra(graph, directed=False, indices=node, limit=away.max()))
         node = int(np.argmax(away))
     return np.array(nodes, np.int64)
 
 
 def _heights(mesh: Mesh) -> np.ndarray:
     """(V,) of the vertices above the smoothed surface, along its normals; their median is 0."""
-    count = len(mesh.vertices)
-    near = (_graph(mesh) > 0).astype(np.float64)
-    means = sparse.diags_array(1 / np.maximum(near.sum(1), 1)) @ near
-    smoothing = sparse.eye_array(count) * (1 + REACH**2) - REACH**2 * means
-    smooth = mesh.with_vertices(spsolve(smoothing.tocsc(), mesh.vertices.astype(np.float64)))
+    count, near = len(mesh.vertices), edge_graph(mesh.faces, len(mesh.vertices))
+    shares = np.repeat(REACH**2 / np.maximum(near.valence, 1), near.valence)
+    means = sparse.csr_array((shares, near.indices, near.indptr), (count, count))
+    smoothing = sparse.eye_array(count) * (1 + REACH**2) - means
+    smooth = mesh.with_vertices(splu(smoothing.tocsc()).solve(mesh.vertices.astype(np.float64)))
     heights = ((mesh.vertices - smooth.vertices) * smooth.normals).sum(1)
     return heights - np.median(heights)
 
 
-def _graph(mesh: Mesh) -> sparse.csr_array:
-    """(V, V) symmetric: the lengths of the edges."""
-    count = len(mesh.vertices)
-    ends = mesh_edges(mesh.faces, count)[0]
-    lengths = np.linalg.norm(np.diff(mesh.vertices[ends].astype(np.float64), axis=1)[:, 0], axis=1)
-    lengths = np.maximum(lengths, 1e-12 * max(lengths.max(initial=0.0), 1e-30))  # 0 would be no edge
-    graph = sparse.coo_array((lengths, ends.T), (count, count))
-    return (graph + graph.T).tocsr()
+def _lengths(mesh: Mesh, among: np.ndarray) -> sparse.csr_array:
+    """(N, N) symmetric: the lengths of the edges between some of the vertices."""
+    near = edge_graph(mesh.faces, len(mesh.vertices))
+    ways = mesh.vertices[near.rows].astype(np.float64) - mesh.vertices[near.indices]
+    lengths = np.maximum(np.linalg.norm(ways, axis=1), np.finfo(np.float64).tiny)  # 0 would be no edge
+    graph = sparse.csr_array((lengths, near.indices, near.indptr), (len(mesh.vertices),) * 2)
+    return sparse.csr_array(graph[among][:, among])

@@ -103,8 +103,8 @@ class GeometricTexture:
             ConfigError: levels out of range, too many faces, or a field that is missing, wrong or of no use.
             MeshError: a face names a vertex twice.
         """
-        rollout = self.rollout(mesh, start_level, end_level, field, placement, seed)
-        *_, last = rollout.run(rollout.noise(seed))
+        rollout = self.rollout(mesh, start_level, end_level, field)
+        *_, last = rollout.run(rollout.noise(seed), self._placed(mesh, rollout.level, placement, seed))
         return clay(untangled(rollout.hierarchy.meshes[-1], last) if untangle else last)
 
     def interpolate(
@@ -122,13 +122,15 @@ class GeometricTexture:
 
         Args:
             mesh, start_level, end_level, field, placement: as in `apply`.
-            seeds: of the first and the last mesh; bumps that are placed stay where the first one puts them.
+            seeds: of the first and the last mesh.
             frames: number of meshes, at least 2.
         """
-        rollout = self.rollout(mesh, start_level, end_level, field, placement, seeds[0])
+        rollout = self.rollout(mesh, start_level, end_level, field)
         first, last = (rollout.noise(seed) for seed in seeds)
+        start, stop = (self._placed(mesh, rollout.level, placement, seed) for seed in seeds)
         for t in np.linspace(0, 1, frames):
-            *_, result = rollout.run([slerp(a, b, float(t)) for a, b in zip(first, last, strict=True)])
+            noise = [slerp(a, b, float(t)) for a, b in zip(first, last, strict=True)]
+            *_, result = rollout.run(noise, (1 - t) * start + t * stop)
             yield result
 
     def generate(self, seed: int = 0, start_level: int = 0, end_level: int | None = None) -> Mesh:
@@ -160,9 +162,9 @@ class GeometricTexture:
 
         Arguments as in `apply`. The last of a level's meshes is displaced by the whole of it.
         """
-        rollout = self.rollout(mesh, start_level, end_level, field, placement, seed)
-        before = mesh
-        for level, after in enumerate(rollout.run(rollout.noise(seed))):
+        rollout = self.rollout(mesh, start_level, end_level, field)
+        before, placed = mesh, self._placed(mesh, rollout.level, placement, seed)
+        for level, after in enumerate(rollout.run(rollout.noise(seed), placed)):
             start = subdivide_midpoint(before) if level else before
             for t in np.linspace(0, 1, frames + 1)[0 if level == 0 else 1 :]:
                 yield after.with_vertices(start.vertices + t * (after.vertices - start.vertices))
@@ -189,12 +191,10 @@ class GeometricTexture:
         start_level: int | None,
         end_level: int | None,
         field: str | Path | np.ndarray | None = None,
-        placement: Placement = "none",
-        seed: int = 0,
     ) -> Rollout:
         """The generators of a range of levels, ready to run on a mesh; arguments and errors as of `apply`.
 
-        The template has its own field. The seed is that of the placement.
+        The template has its own field.
         """
         start, end = self._range(start_level, end_level)
         faces = len(mesh.faces) * 4 ** (end - start)
@@ -206,14 +206,14 @@ class GeometricTexture:
         keep_freed_memory()
         generators = self.generators[start : end + 1]
         hierarchy = self._directed(Hierarchy.of(mesh, len(generators)), mesh, field)
-        vertices = mesh.vertices if placement == "none" else self._placed(mesh, start, seed)
         noise, remeasure = float(self.about["noise"]), bool(self.about["remeasure"])
-        return Rollout(generators, hierarchy, vertices, noise, remeasure)
+        return Rollout(generators, hierarchy, start, noise, remeasure)
 
-    def _placed(self, mesh: Mesh, level: int, seed: int) -> np.ndarray:
-        """Vertices (V, 3) of a mesh with the bumps that the generator of a level makes of the template."""
-        reference = self.generate(start_level=self.levels, end_level=level)
-        texture = None if self.about.get("field") else bumps(reference, 0.5**level)
+    def _placed(self, mesh: Mesh, level: int, placement: Placement, seed: int) -> np.ndarray:
+        """Vertices (V, 3) of a mesh with bumps like those that the generators up to a level make."""
+        if placement == "none" or self.about.get("field"):
+            return mesh.vertices
+        texture = bumps(self.generate(start_level=self.levels, end_level=level), 0.5**level)
         return mesh.vertices if texture is None else placed(mesh, texture, seed)
 
     def _directed(self, hierarchy: Hierarchy, mesh: Mesh, field: str | Path | np.ndarray | None) -> Hierarchy:
@@ -251,14 +251,14 @@ class Rollout:
     Attributes:
         generators: of the levels.
         hierarchy: of the mesh, with as many levels.
-        vertices: (V, 3) of the mesh, from which they start.
+        level: of the first generator.
         noise_scale: standard deviation of the noise [mean edges].
         remeasure: as in `generate`.
     """
 
     generators: Sequence[FaceNetwork]
     hierarchy: Hierarchy
-    vertices: np.ndarray
+    level: int
     noise_scale: float
     remeasure: bool
 
@@ -269,18 +269,21 @@ class Rollout:
         return [self.noise_scale * torch.randn(count, 3, generator=rng) for count in counts]
 
     @torch.no_grad()
-    def run(self, noises: Sequence[torch.Tensor]) -> Iterator[Mesh]:
-        """The mesh after each level, in its own units and place."""
+    def run(self, noises: Sequence[torch.Tensor], vertices: np.ndarray | None = None) -> Iterator[Mesh]:
+        """The mesh after each level, in its own units and place.
+
+        Args:
+            noises: (V, 3) of each level [mean edges].
+            vertices: (V, 3) to start from, in place of the mesh's own.
+        """
         mesh, graph = self.hierarchy.meshes[0], self.hierarchy.graphs[0]
         centre = mesh.vertices.mean(0, dtype=np.float64)
-        centred, start = (
-            torch.from_numpy((vertices - centre).astype(np.float32))
-            for vertices in (mesh.vertices, self.vertices)
-        )
+        given = mesh.vertices if vertices is None else vertices
+        centred, start = (torch.from_numpy((v - centre).astype(np.float32)) for v in (mesh.vertices, given))
         unit = float(mean_edge(centred, graph))
         steps = grow(self.generators, self.hierarchy, start / unit, noises, self.remeasure)
-        for level, vertices in enumerate(counted("growing levels", steps, len(self.generators))):
-            positions = vertices.numpy().astype(np.float64) * (unit / 2**level) + centre
+        for level, grown in enumerate(counted("growing levels", steps, len(self.generators))):
+            positions = grown.numpy().astype(np.float64) * (unit / 2**level) + centre
             yield self.hierarchy.meshes[level].with_vertices(positions)
 
 
