@@ -1,6 +1,6 @@
 """Grows geometric textures on meshes and renders them, the reference beside them.
 
-usage: python tools/make_geometric_gallery.py RUNS MESHES SHEET REFERENCE[@LEVEL][:map][,...] MESH~FACES ...
+usage: python tools/make_geometric_gallery.py RUNS MESHES SHEET REFERENCE[@LEVEL][:map|:none][,...] MESH~FACES ...
        python tools/make_geometric_gallery.py RUNS MESHES SHEET REFERENCE:levels MESH~FACES ...
 
 RUNS holds a finished run of `mitex fit geometric` for each reference, MESHES is a folder; meshes are named as
@@ -9,7 +9,7 @@ rendered: docs/gallery/SHEET.jpg has a row for each reference, which stands firs
 alone. For every pair the Wasserstein-1 distances between the local statistics of result and reference are
 printed, and those of the mesh itself, remeshed to as many vertices as the result has, which takes minutes for
 finer results than those of five levels: there they are left out. REFERENCE:map makes a row of displacement
-maps.
+maps, REFERENCE:none one without bumps that are placed (`mitex.methods.geometric.placement`).
 
 REFERENCE:levels makes a sheet of start levels: a row for the reference and each mesh, which stand first, then
 what grows from levels 0, 1, 2 and 3 on: on the meshes, and, for the reference, on its own template, whose
@@ -39,6 +39,7 @@ from mitex.render import sheet, still, tone
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 CELL = 224  # side of a picture [px]
 LEVELS = range(4)  # to start at, on a sheet of them
+LABELS = {"": "{}", "map": "{} map", "none": "{}, none placed"}  # of a row, by its kind
 AZIMUTH = 20  # [degrees]
 MEASURED = 40_000  # most vertices of a result whose statistics are compared
 
@@ -54,10 +55,10 @@ def coarse_mesh(word: str, level: int, meshes: Path) -> Mesh:
     return find_mesh(f"{name}~{int(4.0 ** (level - START) * int(faces))}", meshes)
 
 
-def displaced(texture: GeometricTexture, reference: Mesh, mesh: Mesh, level: int, mapped: bool) -> Mesh:
+def displaced(texture: GeometricTexture, reference: Mesh, mesh: Mesh, level: int, kind: str) -> Mesh:
     """The mesh with its texture, or with a displacement map of the reference, features as large."""
-    if not mapped:
-        return texture.apply(mesh, start_level=level).mesh
+    if kind != "map":
+        return texture.apply(mesh, start_level=level, placement="none" if kind == "none" else "even").mesh
     size, _ = texture.relative_size(mesh)
     return DisplacementMap.bake(reference).apply(mesh, scale=size, levels=texture.levels - 1 - START).mesh
 
@@ -92,18 +93,18 @@ def main() -> None:
     fine: dict[tuple[str, int], Mesh] = {}
     cells, labels = [np.ones((CELL, CELL, 3)), *map(picture, originals)], ["", *(m.name for m in originals)]
     for word in references.split(","):
-        row, *mapped = word.split(":")
+        row, _, kind = word.partition(":")
         reference, _, start_level = row.partition("@")
         level = int(start_level or START)
         texture = GeometricTexture.load(Path(runs) / reference)
         # The reference with edges as long as the results'.
         reconstruction = texture.generate(start_level=texture.levels)
         cells.append(picture(find_reference(reference)))
-        labels.append(" ".join([reference, *mapped]))
+        labels.append(LABELS[kind].format(reference))
         for mesh, mesh_word in zip(originals, words, strict=True):
             even = coarse_mesh(mesh_word, level, Path(meshes))
             start = time.perf_counter()
-            grown = displaced(texture, find_reference(reference), even, level, bool(mapped))
+            grown = displaced(texture, find_reference(reference), even, level, kind)
             seconds = time.perf_counter() - start
             print(f"{word} on {mesh.name}, {len(grown.faces):,} faces, {seconds:.1f} s", flush=True)
             key = mesh.name, len(grown.vertices)

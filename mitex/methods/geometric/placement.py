@@ -25,7 +25,7 @@ REACH = 3.0  # of the smoothing that tells bumps from the shape [edges]
 TOP = 0.97  # quantile of the heights that counts as the top; half of it divides bumps from the ground
 FEWEST = 8  # bumps or dents that make a texture
 LARGEST = 0.1  # share of what is raised that one bump may have: winding ridges are no bumps
-SHARE = 0.6  # of a bump's height that is given: generators add to it, and whole dents would pierce thin walls
+SHARE = 0.4  # of the height that is given: generators add to it, and whole dents would pierce thin walls
 LOWEST = 0.5  # height of a bump [edges]; what is lower the first generator makes by itself
 
 
