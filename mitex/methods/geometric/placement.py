@@ -25,7 +25,7 @@ REACH = 3.0  # of the smoothing that tells bumps from the shape [edges]
 TOP = 0.97  # quantile of the heights that counts as the top; half of it divides bumps from the ground
 FEWEST = 8  # bumps or dents that make a texture
 LARGEST = 0.1  # share of what is raised that one bump may have: winding ridges are no bumps
-SHARE = 0.4  # of the height that is given: generators add to it, and whole dents would pierce thin walls
+SHARE_UP, SHARE_DOWN = 0.6, 0.4  # of the height that bumps, or dents, get: generators add to it
 LOWEST = 0.5  # height of a bump [edges]; what is lower the first generator makes by itself
 
 
@@ -73,8 +73,9 @@ def placed(mesh: Mesh, texture: Bumps, seed: int) -> np.ndarray:
     graph = _lengths(mesh, used)
     count = min(round(len(mesh.faces) / texture.faces), len(used))
     where = used[_farthest(graph, count, seed)]
+    height = max(SHARE_UP * texture.height, 0) + min(SHARE_DOWN * texture.height, 0)
     vertices = mesh.vertices.astype(np.float64)
-    vertices[where] += SHARE * texture.height * graph.data.mean() * mesh.normals[where]
+    vertices[where] += height * graph.data.mean() * mesh.normals[where]
     return vertices
 
 
