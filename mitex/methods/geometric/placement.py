@@ -9,11 +9,12 @@ these, evenly spread.
 
 from __future__ import annotations
 
+from heapq import heappop, heappush
 from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from mitex.mesh import Mesh
@@ -80,13 +81,26 @@ def placed(mesh: Mesh, texture: Bumps, seed: int) -> np.ndarray:
 
 
 def _farthest(graph: sparse.csr_array, count: int, seed: int) -> np.ndarray:
-    """Vertices (count,) of a graph, each farthest from those before (Gonzalez 1985)."""
-    size = len(graph.indptr) - 1
-    away = np.full(size, np.inf)
-    nodes, node = [], int(np.random.default_rng(seed).integers(size))
+    """Vertices (count,) of a graph, each farthest from those before (Gonzalez 1985).
+
+    A vertex spreads only as far as no other is nearer (Dijkstra), so that late ones cost little.
+    """
+    first, ends = list(map(int, graph.indptr)), list(map(int, graph.indices))
+    lengths = list(map(float, graph.data))
+    away = np.full(len(first) - 1, np.inf)
+    nodes, node = [], int(np.random.default_rng(seed).integers(len(away)))
     for _ in range(count):
         nodes.append(node)
-        away = np.minimum(away, dijkstra(graph, directed=False, indices=node, limit=away.max()))
+        away[node], front = 0.0, [(0.0, node)]
+        while front:
+            distance, near = heappop(front)
+            if distance > away[near]:
+                continue
+            for k in range(first[near], first[near + 1]):
+                beyond = distance + lengths[k]
+                if beyond < away[ends[k]]:
+                    away[ends[k]] = beyond
+                    heappush(front, (beyond, ends[k]))
         node = int(np.argmax(away))
     return np.array(nodes, np.int64)
 
