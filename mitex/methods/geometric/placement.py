@@ -27,6 +27,7 @@ TOP = 0.97  # quantile of the heights that counts as the top; half of it divides
 FEWEST = 8  # bumps or dents that make a texture
 LARGEST = 0.1  # share of what is raised that one bump may have: winding ridges are no bumps
 SHARE_UP, SHARE_DOWN = 0.6, 0.4  # of the height that bumps, or dents, get: generators add to it
+WIDEST = 40  # faces for each bump: larger ones are more than a vertex that is raised
 LOWEST = 0.5  # height of a bump [edges]; what is lower the first generator makes by itself
 
 
@@ -58,8 +59,8 @@ def bumps(mesh: Mesh, edge: float) -> Bumps | None:
         return None
     tops = np.zeros(count)
     np.maximum.at(tops, label, heights[raised])
-    height = float(np.median(tops))
-    return Bumps(len(mesh.faces) / count, side * height) if height >= LOWEST else None
+    faces, height = len(mesh.faces) / count, float(np.median(tops))
+    return Bumps(faces, side * height) if faces <= WIDEST and height >= LOWEST else None
 
 
 def placed(mesh: Mesh, texture: Bumps, seed: int) -> np.ndarray:

@@ -39,13 +39,14 @@ def test_bumps_that_were_placed_are_found_again(side):
 
 
 def test_what_has_no_separate_bumps():
-    """A ball, a rough one, one with ridges around it, and one with a single bump."""
+    """A ball; with ridges around it, a single bump, low bumps, roughness, and bumps far apart."""
     points, rng = BALL.vertices.astype(np.float64), np.random.default_rng(0)
     ridges = points * (1 + 0.1 * np.cos(24 * points[:, 1:2]))
     single = points * (1 + 0.5 * (points[:, 1:2] > 0.97))
     low = placed(BALL, Bumps(24.0, 0.5), 0)
     rough = points + 0.05 * EDGE * rng.normal(size=points.shape)
-    for vertices in (points, ridges, single, low, rough):
+    apart = placed(BALL, Bumps(60.0, 2.0), 0)
+    for vertices in (points, ridges, single, low, rough, apart):
         assert bumps(BALL.with_vertices(vertices), EDGE) is None
 
 
