@@ -39,6 +39,7 @@ FILM_ONLY = {
     "seed",
     "to_seed",
     "field",
+    "placement",
     "start_level",
     "end_level",
 }

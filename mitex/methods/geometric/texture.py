@@ -22,7 +22,7 @@ from mitex.methods.geometric.hierarchy import Hierarchy, mean_edge
 from mitex.methods.geometric.model import grow
 from mitex.methods.geometric.network import FaceNetwork
 from mitex.methods.geometric.placement import Placement, bumps, placed
-from mitex.progress import counted
+from mitex.progress import counted, listening
 from mitex.runtime import keep_freed_memory
 
 START = 2  # the paper starts at level 2 or 3
@@ -213,7 +213,9 @@ class GeometricTexture:
         """Vertices (V, 3) of a mesh with bumps like those that the generators up to a level make."""
         if placement == "none" or self.about.get("field"):
             return mesh.vertices
-        texture = bumps(self.generate(start_level=self.levels, end_level=level), 0.5**level)
+        with listening(None):
+            reference = self.generate(start_level=self.levels, end_level=level)
+        texture = bumps(reference, 0.5**level)
         return mesh.vertices if texture is None else placed(mesh, texture, seed)
 
     def _directed(self, hierarchy: Hierarchy, mesh: Mesh, field: str | Path | np.ndarray | None) -> Hierarchy:
