@@ -5,9 +5,9 @@ from __future__ import annotations
 import logging
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from mitex.mesh import Mesh
+from mitex.mesh.matrices import ring_means
 from mitex.mesh.self_intersections import piercing_pairs
 from mitex.progress import announce
 
@@ -32,7 +32,7 @@ def untangled(before: Mesh, after: Mesh) -> Mesh:
     Returns:
         `after` with other vertices; what `ROUNDS` rounds leave, if that is more.
     """
-    ring, move = _ring_means(after), after.vertices.astype(np.float64) - before.vertices
+    ring, move = ring_means(after), after.vertices.astype(np.float64) - before.vertices
     share, mesh = np.ones(len(move)), after
     own, pairs = len(piercing_pairs(before)), piercing_pairs(after)
     first = len(pairs)
@@ -54,10 +54,3 @@ def untangled(before: Mesh, after: Mesh) -> Mesh:
         own,
     )
     return mesh
-
-
-def _ring_means(mesh: Mesh) -> csr_array:
-    """(V, V): the mean over each vertex's neighbours."""
-    edges = mesh.edges
-    weights = np.repeat(1.0 / np.maximum(edges.valence, 1), edges.valence)
-    return csr_array((weights, edges.indices, edges.indptr), shape=(len(edges.valence),) * 2)

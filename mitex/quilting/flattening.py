@@ -8,7 +8,6 @@ around the point. Patches at neighbouring points are then turned alike, whatever
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -19,7 +18,8 @@ from mitex.geometry.vectors import orthonormal, unit_normals
 from mitex.mesh import Mesh
 from mitex.mesh.connection import solver
 from mitex.mesh.frames import interpolate_frames
-from mitex.mesh.topology import mesh_edges, welded
+from mitex.mesh.matrices import edge_lengths
+from mitex.mesh.topology import welded
 
 STRETCH = 1.6  # the largest factor by which lengths may change, up or down
 TORN = 0.25  # sides of faces whose ends were reached on ways so far apart are cut [reach]
@@ -82,7 +82,7 @@ class Flattening:
         self.around = _vertex_faces(self.corners, self.count)
         place_of = np.empty((self.count, 3))
         place_of[place] = mesh.vertices
-        self.graph = _edge_lengths(self.corners, place_of)
+        self.graph = edge_lengths(self.corners, place_of)
 
     def distances(self) -> np.ndarray:
         """(F,) of the faces from the first face of their connected part, along edges [mesh units]."""
@@ -212,14 +212,6 @@ def _vertex_faces(corners: np.ndarray, count: int) -> list[np.ndarray]:
     order = np.argsort(corners.ravel(), kind="stable") // 3
     ends = np.cumsum(np.bincount(corners.ravel(), minlength=count))
     return np.split(order, ends[:-1])
-
-
-def _edge_lengths(corners: np.ndarray, places: np.ndarray) -> Any:
-    """(V, V) scipy CSR, symmetric, of the edges of faces (F, 3) between places (V, 3)."""
-    pairs, _ = mesh_edges(corners, len(places))
-    length = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1)
-    graph = coo_array((length, tuple(pairs.T)), shape=(len(places),) * 2).tocsr()
-    return graph + graph.T
 
 
 def _solution(corners: np.ndarray, stiffness: np.ndarray, load: np.ndarray, count: int) -> np.ndarray:

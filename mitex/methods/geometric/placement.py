@@ -15,10 +15,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
 
 from mitex.mesh import Mesh
-from mitex.mesh.topology import edge_graph
+from mitex.mesh.connection import solver
+from mitex.mesh.matrices import edge_lengths, ring_means
 
 Placement = Literal["even", "none"]
 
@@ -54,7 +54,8 @@ def bumps(mesh: Mesh, edge: float) -> Bumps | None:
     side = 1.0 if np.mean((heights - heights.mean()) ** 3) > 0 else -1.0  # a minority is up, or down
     heights *= side
     raised = np.flatnonzero(heights > 0.5 * np.quantile(heights, TOP))
-    count, label = connected_components(_lengths(mesh, raised), directed=False)
+    graph = edge_lengths(mesh.faces, mesh.vertices)[raised][:, raised]
+    count, label = connected_components(graph, directed=False)
     if count < FEWEST or np.bincount(label).max() > LARGEST * len(raised):
         return None
     tops = np.zeros(count)
@@ -71,12 +72,11 @@ def placed(mesh: Mesh, texture: Bumps, seed: int) -> np.ndarray:
         texture: how many there shall be, and how high.
         seed: of the first one; each further one is farthest from all before along the edges.
     """
-    used = np.unique(mesh.faces)
-    graph = _lengths(mesh, used)
+    vertices, used = mesh.vertices.astype(np.float64), np.unique(mesh.faces)
+    graph = sparse.csr_array(edge_lengths(mesh.faces, vertices)[used][:, used])
     count = min(round(len(mesh.faces) / texture.faces), len(used))
     where = used[_farthest(graph, count, seed)]
     height = max(SHARE_UP * texture.height, 0) + min(SHARE_DOWN * texture.height, 0)
-    vertices = mesh.vertices.astype(np.float64)
     vertices[where] += height * graph.data.mean() * mesh.normals[where]
     return vertices
 
@@ -108,19 +108,9 @@ def _farthest(graph: sparse.csr_array, count: int, seed: int) -> np.ndarray:
 
 def _heights(mesh: Mesh) -> np.ndarray:
     """(V,) of the vertices above the smoothed surface, along its normals; their median is 0."""
-    count, near = len(mesh.vertices), edge_graph(mesh.faces, len(mesh.vertices))
-    shares = np.repeat(REACH**2 / np.maximum(near.valence, 1), near.valence)
-    means = sparse.csr_array((shares, near.indices, near.indptr), (count, count))
-    smoothing = sparse.eye_array(count) * (1 + REACH**2) - means
-    smooth = mesh.with_vertices(splu(smoothing.tocsc()).solve(mesh.vertices.astype(np.float64)))
-    heights = ((mesh.vertices - smooth.vertices) * smooth.normals).sum(1)
+    weights = np.maximum(mesh.edges.valence, 1.0)[:, None]  # with which the matrix is symmetric
+    mean = sparse.eye_array(len(weights)) * (1 + REACH**2) - REACH**2 * ring_means(mesh)
+    smooth = solver((mean * weights).tocsc())(weights * mesh.vertices.astype(np.float64))
+    surface = mesh.with_vertices(smooth)
+    heights = ((mesh.vertices - smooth) * surface.normals).sum(1)
     return heights - np.median(heights)
-
-
-def _lengths(mesh: Mesh, among: np.ndarray) -> sparse.csr_array:
-    """(N, N) symmetric: the lengths of the edges between some of the vertices."""
-    near = edge_graph(mesh.faces, len(mesh.vertices))
-    ways = mesh.vertices[near.rows].astype(np.float64) - mesh.vertices[near.indices]
-    lengths = np.maximum(np.linalg.norm(ways, axis=1), np.finfo(np.float64).tiny)  # 0 would be no edge
-    graph = sparse.csr_array((lengths, near.indices, near.indptr), (len(mesh.vertices),) * 2)
-    return sparse.csr_array(graph[among][:, among])

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import torch
@@ -100,7 +100,8 @@ class GeometricTexture:
             The displaced mesh in light grey, in the mesh's own units and place; UVs are interpolated.
 
         Raises:
-            ConfigError: levels out of range, too many faces, or a field that is missing, wrong or of no use.
+            ConfigError: levels out of range, too many faces, an unknown placement, or a field that is
+                missing, wrong or of no use.
             MeshError: a face names a vertex twice.
         """
         rollout = self.rollout(mesh, start_level, end_level, field)
@@ -163,8 +164,8 @@ class GeometricTexture:
         Arguments as in `apply`. The last of a level's meshes is displaced by the whole of it.
         """
         rollout = self.rollout(mesh, start_level, end_level, field)
-        before, placed = mesh, self._placed(mesh, rollout.level, placement, seed)
-        for level, after in enumerate(rollout.run(rollout.noise(seed), placed)):
+        before, vertices = mesh, self._placed(mesh, rollout.level, placement, seed)
+        for level, after in enumerate(rollout.run(rollout.noise(seed), vertices)):
             start = subdivide_midpoint(before) if level else before
             for t in np.linspace(0, 1, frames + 1)[0 if level == 0 else 1 :]:
                 yield after.with_vertices(start.vertices + t * (after.vertices - start.vertices))
@@ -211,6 +212,8 @@ class GeometricTexture:
 
     def _placed(self, mesh: Mesh, level: int, placement: Placement, seed: int) -> np.ndarray:
         """Vertices (V, 3) of a mesh with bumps like those that the generators up to a level make."""
+        if placement not in get_args(Placement):
+            raise ConfigError(f"placement {placement!r}", f"use {' or '.join(get_args(Placement))}")
         if placement == "none" or self.about.get("field"):
             return mesh.vertices
         with listening(None):

@@ -7,6 +7,7 @@ import pytest
 import torch
 from scipy.sparse.csgraph import dijkstra
 
+from mitex.errors import ConfigError
 from mitex.mesh import Mesh, grid, icosphere
 from mitex.mesh.topology import mesh_edges
 from mitex.methods.geometric.network import FaceNetwork
@@ -132,6 +133,11 @@ def test_reliefs_without_bumps_and_those_that_follow_a_field_are_as_published(te
     directed = replace(texture, about={**texture.about, "field": "vector"})
     monkeypatch.setattr("mitex.methods.geometric.texture.placed", None)
     assert directed._placed(mesh, 2, "even", 0) is mesh.vertices
+
+
+def test_an_unknown_placement_is_refused(texture):
+    with pytest.raises(ConfigError, match="use even or none"):
+        texture.apply(icosphere(2), placement="odd")
 
 
 def test_the_reference_is_measured_as_the_first_generator_leaves_it(texture, monkeypatch):
