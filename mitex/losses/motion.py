@@ -41,7 +41,8 @@ def motion_loss(
         L_str = mean |T |U_gen| / n - |U_2D||
 
     Their combination is L_dir while the direction is wrong (L_dir >= 1), else (1 - L_dir) L_str +
-    gamma L_dir, so that the direction comes first.
+    gamma L_dir, so that the direction comes first. Its factor 1 - L_dir has no gradient: where the strength
+    is off by more than gamma, a descent would else lessen the factor by turning to a wrong direction.
 
     Means are over all pixels of all pictures that count: those in the mask whose target is longer than
     `LEAST` times the mean there. The paper's are over all, background included.
@@ -66,5 +67,5 @@ def motion_loss(
     cosine = (flow * target).sum(1) / (speed * length.clamp(min=TINY))
     direction = ((1 - cosine) * mask).sum() / count
     strength = ((period / steps * speed - length).abs() * mask).sum() / count
-    both = (1 - direction) * strength + gamma * direction
+    both = (1 - direction).detach() * strength + gamma * direction
     return MotionLoss(direction, strength, torch.where(direction >= 1, direction, both))

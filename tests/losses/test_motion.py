@@ -49,10 +49,32 @@ def test_it_is_the_loop_over_the_pixels_that_count(sign):
     assert (expected[0] < 1) == (sign == 1)
 
 
-def test_the_gradient_is_that_of_finite_differences():
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_gradient_is_that_of_finite_differences(sign):
+    """Of both parts, and of their combination with a factor that stays as it is."""
     target, mask = _random(1, 2, 3, 3), torch.ones(1, 3, 3, dtype=torch.bool)
-    flow = (0.3 * target + 0.2 * _random(1, 2, 3, 3, seed=1)).requires_grad_()
-    assert torch.autograd.gradcheck(lambda f: motion_loss(f, target, mask, **OPTIONS).total, flow)
+    flow = (sign * 0.3 * target + 0.2 * _random(1, 2, 3, 3, seed=1)).requires_grad_()
+    parts = [lambda f, at=at: motion_loss(f, target, mask, **OPTIONS)[at] for at in (0, 1)]
+    assert all(torch.autograd.gradcheck(part, flow) for part in parts)
+    direction, strength, total = motion_loss(flow, target, mask, **OPTIONS)
+    factor = 1 - direction.item()
+    expected = direction if factor <= 0 else factor * strength + GAMMA * direction
+    gradients = [torch.autograd.grad(value, flow, retain_graph=True)[0] for value in (total, expected)]
+    assert (factor > 0) == (sign == 1) and torch.allclose(*gradients, rtol=1e-12)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("length", [0.5, 4.0, 20.0])
+@pytest.mark.parametrize("degrees", [5, 45, 85, 130])
+def test_a_descent_turns_towards_the_target(share, length, degrees):
+    """At any speed, also where the strength is off by much more than gamma."""
+    angle = torch.tensor(math.radians(degrees), dtype=torch.float64, requires_grad=True)
+    turned = torch.stack([angle.cos(), angle.sin()])[None, :, None, None].expand(1, 2, 4, 4)
+    target = torch.zeros(1, 2, 4, 4, dtype=torch.float64)
+    target[:, 0] = length
+    flow = share * length * STEPS / PERIOD * turned
+    motion_loss(flow, target, **OPTIONS).total.backward()
+    assert angle.grad is not None and angle.grad > 0
 
 
 def test_the_right_motion_costs_nothing():

@@ -15,7 +15,7 @@ from mitex.methods.nca import NcaConfig
 from mitex.methods.nca.motion import pool as motion_pool
 from mitex.methods.nca.motion import task as motion_task
 from mitex.methods.nca.motion.drift import Drift, draw_drift
-from mitex.methods.nca.motion.pairs import sphere_pairs
+from mitex.methods.nca.motion.views import sphere_views
 from mitex.methods.nca.motion.task import MotionTask
 from mitex.methods.nca.task import NcaTask
 from mitex.runtime import threads
@@ -413,13 +413,13 @@ def motion_in_pictures(build):
         names.append(name)
         return lambda first, second: 0.1 * targets[-1] + (second - first)
 
-    def pairs(look, states, drift, cameras):
-        result = sphere_pairs(look, states, drift, cameras)
+    def views(look, drift, cameras):
+        result = sphere_views(look, drift, cameras)
         targets.append(result.target)
         return result
 
     loading = patch.object(motion_pool, "load_estimator", load)
-    with loading, patch.object(motion_task, "sphere_pairs", pairs):
+    with loading, patch.object(motion_task, "sphere_views", views):
         settings = (*MOVING, "motion_estimator=lucas-kanade")
         tasks = [build(*settings, f"motion_gamma={gamma}") for gamma in (0.5, 4, 7.5)]
         losses = [_motion(MotionTask(task.config, task.exemplar)) for task in tasks]

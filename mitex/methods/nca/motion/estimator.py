@@ -9,6 +9,8 @@ import torch
 # (first (K, 1, H, W), second (K, 1, H, W)) in [0, 1] -> (K, 2, H, W) [px]
 Estimator = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
 
+FARTHEST = 4.0  # [px], up to which estimators tell a motion
+
 
 def load_estimator(name: str, device: torch.device | str = "cpu") -> Estimator | None:
     """The flow network, or Lucas and Kanade's method; None for the residual of states."""

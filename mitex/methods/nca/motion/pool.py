@@ -14,8 +14,8 @@ from mitex.losses.advection import advection_residual
 from mitex.losses.motion import motion_loss
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.motion.drift import Drift, draw_drift
-from mitex.methods.nca.motion.estimator import load_estimator
-from mitex.methods.nca.motion.pairs import Pairs
+from mitex.methods.nca.motion.estimator import FARTHEST, load_estimator
+from mitex.methods.nca.motion.views import MotionViews
 from mitex.methods.nca.pool import PoolTask, Rollout
 
 MOST_WAYS = 2**31
@@ -41,8 +41,8 @@ class MovingPool(PoolTask):
         self.estimator = load_estimator(config.motion_estimator, self.look.device)
 
     @abstractmethod
-    def pairs(self, states: Sequence[torch.Tensor], drift: Drift, generator: torch.Generator) -> Pairs:
-        """What the estimator looks at, of two states (V, C)."""
+    def motion_views(self, drift: Drift, generator: torch.Generator) -> MotionViews:
+        """What an estimator of motions in pictures looks at."""
 
     def rollout(
         self, index: int, state: torch.Tensor, step: int, steps: int, generator: torch.Generator
@@ -51,14 +51,18 @@ class MovingPool(PoolTask):
         if seed:
             way = torch.randint(MOST_WAYS, (), generator=generator)
         drift = self.drift(index, way)
-        apart = min(config.motion_steps, steps)
+        apart, views = min(config.motion_steps, steps), None
+        if self.estimator:
+            views = self.motion_views(drift, generator)
+            apart = min(apart, views.steps_within(FARTHEST, config.motion_period))
         grow = self._growth(drift, generator)
         states = [grow(state, steps % apart)]
         for _ in range(steps // apart):
             states.append(grow(states[-1], apart))
         terms = {}
         if not seed and step >= config.motion_start:  # else there is no pattern yet that could move
-            loss = self.motion([state[0] for state in states], drift, apart, generator)
+            bare = [state[0] for state in states]
+            loss = self.pictured(bare, views, apart) if views else self.carried(bare, drift, apart, generator)
             terms = {"motion": config.motion_weight * loss}
         return Rollout(states[-1], terms, partial(self._keep, index, way))
 
@@ -90,21 +94,23 @@ class MovingPool(PoolTask):
         super().load_state(state)
         self.ways = state["pool.ways"]
 
-    def motion(
+    def carried(
         self, states: Sequence[torch.Tensor], drift: Drift, apart: int, generator: torch.Generator
     ) -> torch.Tensor:
         """How far states (V, C), each `apart` automaton steps from the next, are from moving with a drift."""
-        period, gamma = self.config.motion_period, self.config.motion_gamma
-        if self.estimator is None:
-            advection = drift.advection(apart / period)
-            residuals = [advection_residual(a, b, advection(a), FLOOR) for a, b in pairwise(states)]
-            shown = self._shown(states[-2].detach(), states[-1], drift, apart / period, generator)
-            return torch.stack(residuals).mean() + shown
-        pairs = self.pairs((states[-2].detach(), states[-1]), drift, generator)
-        flow = self.estimator(pairs.first, pairs.second)
-        return motion_loss(flow, pairs.target, pairs.mask, steps=apart, period=period, gamma=gamma).total
+        share = apart / self.config.motion_period
+        advection = drift.advection(share)
+        residuals = [advection_residual(a, b, advection(a), FLOOR) for a, b in pairwise(states)]
+        return torch.stack(residuals).mean() + self._decoded(*states[-2:], drift, share, generator)
 
-    def _shown(
+    def pictured(self, states: Sequence[torch.Tensor], views: MotionViews, apart: int) -> torch.Tensor:
+        """The same of the last two states, by what views show of them."""
+        assert self.estimator is not None
+        flow = self.estimator(views.grey(states[-2].detach()), views.grey(states[-1]))
+        period, gamma = self.config.motion_period, self.config.motion_gamma
+        return motion_loss(flow, views.target, views.mask, steps=apart, period=period, gamma=gamma).total
+
+    def _decoded(
         self,
         before: torch.Tensor,
         after: torch.Tensor,

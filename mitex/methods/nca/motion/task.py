@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import torch
 
 from mitex.methods.nca.motion.drift import Drift
-from mitex.methods.nca.motion.pairs import Pairs, plane_pairs, sphere_pairs
 from mitex.methods.nca.motion.pool import MovingPool
+from mitex.methods.nca.motion.views import MotionViews, plane_views, sphere_views
 from mitex.methods.nca.surfaces import TrainingSphere
 from mitex.methods.nca.task import NcaTask
 
@@ -16,10 +14,9 @@ from mitex.methods.nca.task import NcaTask
 class MotionTask(MovingPool, NcaTask):
     """Trains a look that moves along a vector field (MeshNCA, section 4.3); arguments as of `NcaTask`."""
 
-    def pairs(self, states: Sequence[torch.Tensor], drift: Drift, generator: torch.Generator) -> Pairs:
-        """What the estimator looks at: the widest views, in which motions are the fewest pixels."""
+    def motion_views(self, drift: Drift, generator: torch.Generator) -> MotionViews:
+        """The widest views, in which motions are the fewest pixels."""
         surface, size = drift.surface, next(iter(self.zooms))
         if isinstance(surface, TrainingSphere):
-            return sphere_pairs(self.look, states, drift, self.cameras(surface, size, generator))
-        windows = surface.places(self.closeups(size), generator)
-        return plane_pairs(self.look, states, drift, windows)
+            return sphere_views(self.look, drift, self.cameras(surface, size, generator))
+        return plane_views(self.look, drift, surface.places(self.closeups(size), generator))

@@ -1,8 +1,8 @@
-"""Pictures of the same places before and after a texture moved, and the motion that they should show."""
+"""Grey pictures of a texture that moves, and the motion that they should show."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,28 +16,33 @@ from mitex.methods.nca.surfaces import TrainingPlane, TrainingSphere, Windows
 from mitex.scenes.cameras import Cameras
 from mitex.scenes.screen import screen_motion
 
+STILL = 1e-6  # [px] in a period
+
 
 @dataclass(frozen=True, eq=False)
-class Pairs:
-    """K pairs of grey pictures.
+class MotionViews:
+    """K views of a surface.
 
     Attributes:
-        first, second: (K, 1, H, W), differentiable in the states.
+        grey: of a state (V, C), its luminance (K, 1, H, W), differentiable in the state.
         target: (K, 2, H, W) the drift in the motion's period [px]; x to the right, y down.
         mask: (K, H, W) bool, where the surface is.
     """
 
-    first: torch.Tensor
-    second: torch.Tensor
+    grey: Callable[[torch.Tensor], torch.Tensor]
     target: torch.Tensor
     mask: torch.Tensor
 
+    def steps_within(self, pixels: float, period: float) -> int:
+        """Automaton steps in which nothing moves farther, at least one; the period has `period`."""
+        farthest = float((self.target.norm(dim=1) * self.mask).max())
+        return max(int(pixels * period / max(farthest, STILL)), 1)
 
-def sphere_pairs(look: Look, states: Sequence[torch.Tensor], drift: Drift, cameras: Cameras) -> Pairs:
-    """Of two states (V, C) of a sphere, as cameras see them."""
+
+def sphere_views(look: Look, drift: Drift, cameras: Cameras) -> MotionViews:
+    """Of a sphere, as cameras see it."""
     sphere = drift.surface
     assert isinstance(sphere, TrainingSphere)
-    first, second = (_grey(look, sphere.views(look, state, cameras)) for state in states)
     hits = sphere.stage.hits(cameras)
     corners = sphere.mesh.faces[hits.face.numpy()]
     weights = hits.barycentric.numpy().astype(np.float64)
@@ -48,17 +53,25 @@ def sphere_pairs(look: Look, states: Sequence[torch.Tensor], drift: Drift, camer
     motion[hit] = screen_motion(cameras, camera, points, sphere.edge * field)
     size = cameras.shape
     target = torch.from_numpy(motion.astype(np.float32)).view(*size, 2).permute(0, 3, 1, 2)
-    return Pairs(first, second, target.to(first.device), hits.hit.view(size).to(first.device))
+    return MotionViews(
+        lambda state: _grey(look, sphere.views(look, state, cameras)),
+        target.to(look.device),
+        hits.hit.view(size).to(look.device),
+    )
 
 
-def plane_pairs(look: Look, states: Sequence[torch.Tensor], drift: Drift, windows: Windows) -> Pairs:
-    """Of two states (V, C) of a flat square, in windows."""
+def plane_views(look: Look, drift: Drift, windows: Windows) -> MotionViews:
+    """Of a flat square, in windows."""
     plane = drift.surface
     assert isinstance(plane, TrainingPlane)
-    first, second = (_grey(look, plane.windows(look, state, windows)) for state in states)
     right, up = plane.axes @ drift.field[0] * (windows.pixels / (windows.width * plane.lattice.columns))
-    target = first.new_tensor([right, -up])[:, None, None].expand(len(first), -1, *first.shape[2:])
-    return Pairs(first, second, target, torch.ones_like(first[:, 0], dtype=torch.bool))
+    size = len(windows.corners), windows.pixels, windows.pixels
+    target = torch.tensor([right, -up], dtype=torch.float32, device=look.device)
+    return MotionViews(
+        lambda state: _grey(look, plane.windows(look, state, windows)),
+        target[:, None, None].expand(size[0], -1, *size[1:]),
+        torch.ones(size, dtype=torch.bool, device=look.device),
+    )
 
 
 def _grey(look: Look, views: torch.Tensor) -> torch.Tensor:

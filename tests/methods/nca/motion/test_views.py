@@ -1,4 +1,4 @@
-"""Pictures of the same places at two times, and the motion between them."""
+"""Views of a texture at two times, the motion between them, and how long it stays a few pixels."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ import torch
 
 from mitex.mesh import icosphere
 from mitex.methods.nca.motion.drift import Drift, turned_field
-from mitex.methods.nca.motion.pairs import Pairs, plane_pairs, sphere_pairs
+from mitex.methods.nca.motion.views import MotionViews, plane_views, sphere_views
 from mitex.methods.nca.surfaces import CloseUps, TrainingPlane, TrainingSphere
 from mitex.scenes.cameras import random_views
 from tests.methods.nca.tiny import SHAPE, texture
@@ -22,17 +22,18 @@ def look():
     return texture(shape=replace(SHAPE, coordinates=())).look
 
 
-def _assert_moving(pairs: Pairs, size: tuple[int, int, int]) -> None:
+def _assert_moving(views: MotionViews, drift: Drift, state: torch.Tensor, size: tuple[int, int, int]) -> None:
     """Grey values change by the target's share times their slope, with the opposite sign."""
-    assert pairs.first.shape == pairs.second.shape == (size[0], 1, *size[1:])
-    assert pairs.target.shape == (size[0], 2, *size[1:]) and pairs.mask.shape == size
-    first, second = (grey[:, 0].detach().numpy() for grey in (pairs.first, pairs.second))
+    pictures = views.grey(state), views.grey(drift.advection(SHARE)(state))
+    assert pictures[0].shape == pictures[1].shape == (size[0], 1, *size[1:])
+    assert views.target.shape == (size[0], 2, *size[1:]) and views.mask.shape == size
+    first, second = (grey[:, 0].detach().numpy() for grey in pictures)
     down, right = np.gradient((first + second) / 2, axis=(1, 2))
-    x, y = SHARE * pairs.target.numpy().transpose(1, 0, 2, 3)
+    x, y = SHARE * views.target.numpy().transpose(1, 0, 2, 3)
     expected, change = -(x * right + y * down), second - first
-    inner = pairs.mask.numpy().copy()
+    inner = views.mask.numpy().copy()
     for axis in (1, 2):  # away from the border of the surface
-        inner &= np.roll(pairs.mask.numpy(), 1, axis) & np.roll(pairs.mask.numpy(), -1, axis)
+        inner &= np.roll(views.mask.numpy(), 1, axis) & np.roll(views.mask.numpy(), -1, axis)
     inner[:, [0, -1]], inner[:, :, [0, -1]] = False, False
     assert inner.mean() > 0.2
     change, expected = change[inner], expected[inner]
@@ -52,10 +53,10 @@ def test_windows_of_a_square(look):
     drift = Drift(plane, np.tile(np.array([1.5, 1.0]) @ plane.axes, (len(places), 1)))
     state = _state(places.round(9))
     windows = plane.places(CloseUps(16, 3, 40), torch.Generator().manual_seed(0))
-    pairs = plane_pairs(look, (state, drift.advection(SHARE)(state)), drift, windows)
-    _assert_moving(pairs, (3, 40, 40))
-    assert torch.allclose(pairs.target[:, 0], torch.tensor(1.5 * 40 / 16))
-    assert torch.allclose(pairs.target[:, 1], torch.tensor(-1.0 * 40 / 16))
+    views = plane_views(look, drift, windows)
+    _assert_moving(views, drift, state, (3, 40, 40))
+    assert torch.allclose(views.target[:, 0], torch.tensor(1.5 * 40 / 16))
+    assert torch.allclose(views.target[:, 1], torch.tensor(-1.0 * 40 / 16))
 
 
 @pytest.mark.parametrize("views", ["patch", "full"])
@@ -66,6 +67,25 @@ def test_views_of_a_sphere(look, views):
     cameras = sphere.cameras(CloseUps(8, 2, 40), generator)
     if views == "full":
         cameras = random_views(generator, 2, 2.0, 60.0, 40)
-    pairs = sphere_pairs(look, (state, drift.advection(SHARE)(state)), drift, cameras)
-    _assert_moving(pairs, (2, 40, 40))
-    assert pairs.mask.all() == (views == "patch")
+    seen = sphere_views(look, drift, cameras)
+    _assert_moving(seen, drift, state, (2, 40, 40))
+    assert seen.mask.all() == (views == "patch")
+
+
+@pytest.mark.parametrize(
+    ("pixels", "period", "steps"), [(4.0, 24.0, 19), (4.0, 6.0, 4), (0.1, 6.0, 1), (10.0, 6.5, 13)]
+)
+def test_steps_in_which_nothing_moves_farther(pixels, period, steps):
+    """The longest of the surface's, which is 5 pixels in a period, counts, and what is beside it does not."""
+    target = torch.zeros(2, 2, 3, 3)
+    target[0, :, 1, 1], target[1, 0, 2, 2], target[1, 1, 0, 0] = torch.tensor([3.0, -4.0]), 1.0, 100.0
+    mask = torch.ones(2, 3, 3, dtype=torch.bool)
+    mask[1, 0, 0] = False
+    views = MotionViews(torch.clone, target, mask)
+    assert views.steps_within(pixels, period) == steps
+    assert steps == 1 or steps / period * 5 <= pixels < (steps + 1) / period * 5
+
+
+def test_what_does_not_move_stays_within_any_steps():
+    views = MotionViews(torch.clone, torch.zeros(1, 2, 3, 3), torch.ones(1, 3, 3, dtype=torch.bool))
+    assert views.steps_within(4.0, 12.0) > 10_000
