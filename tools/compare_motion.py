@@ -5,9 +5,10 @@ usage: python tools/compare_motion.py MOVING[:STILL] ... [--fields F ...] [--mes
 MOVING and STILL are models, run folders or bundled names; STILL is the texture that MOVING was trained from.
 Without it the look is not compared, as of textures from words, which have no exemplar.
 Close-ups of the albedo, four pixels an edge of the cells' mesh, are taken some steps apart. Lucas and
-Kanade's method estimates the motion between them, which is compared with that of the field. The look is
-compared with the exemplar, by the Frechet distance of VGG-16's features at relu2_2, some steps after the
-pattern is in order, as a multiple of the still texture's. Prints a Markdown table.
+Kanade's method estimates the motion between them, which is compared with that of the field, where that is at
+least a fifth of its mean. The look is compared with the exemplar, by the Frechet distance of VGG-16's
+features at relu2_2, some steps after the pattern is in order, as a multiple of the still texture's. Prints a
+Markdown table.
 """
 
 from __future__ import annotations
@@ -24,7 +25,6 @@ from mitex.evaluation.metrics import single_image_frechet
 from mitex.evaluation.motion import measured_motion
 from mitex.exemplar import Exemplar
 from mitex.geometry.triangles import interpolate
-from mitex.geometry.vectors import scatter_add
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.cells import Cells
@@ -39,6 +39,7 @@ SPHERE = "sphere"
 FREQUENCY = 32  # of the sphere that textures are trained on
 VIEWS, SIDE, PIXELS = 6, 128, 4  # close-ups, their side [px], and pixels an edge
 FRAMES, STEPS = 4, 4  # of a film, and steps of the automaton between two of them
+SLOWEST = 0.2  # edges in a period: where a field is weaker, what changes by itself would count as motion
 LATER = (50, 500, 1000)  # steps after which the look is compared
 
 
@@ -48,11 +49,9 @@ class CloseUps:
 
     Attributes:
         cells: the automaton's mesh, which is the one that is seen.
-        edge: mean length of the edges at each vertex (V,).
     """
 
     cells: Cells
-    edge: np.ndarray
     cameras: Cameras
     hit: np.ndarray
     face: np.ndarray
@@ -61,19 +60,21 @@ class CloseUps:
     @staticmethod
     def of(mesh: Mesh) -> CloseUps:
         fine = Cells.dense(mesh).mesh
-        rows, columns = fine.edges.rows, fine.edges.indices
-        lengths = np.linalg.norm(fine.vertices[rows] - fine.vertices[columns], axis=1)
-        edge = scatter_add(rows, lengths[:, None], len(fine.vertices))[:, 0] / np.diff(fine.edges.indptr)
-        half = 0.5 * SIDE / PIXELS * float(np.median(edge))
+        half = 0.5 * SIDE / PIXELS * float(np.median(fine.edge_lengths))
         cameras = patch_views(torch.Generator().manual_seed(0), fine, VIEWS, half, SIDE)
         hits = Stage(fine).hits(cameras, 1)
         arrays = hits.hit.numpy(), hits.face.numpy(), hits.barycentric.numpy()
-        return CloseUps(Cells(fine, 0, fine), edge, cameras, *arrays)
+        return CloseUps(Cells(fine, 0, fine), cameras, *arrays)
 
     @property
     def covered(self) -> np.ndarray:
         """(K, H, W) bool."""
         return self.hit.reshape(self.cameras.shape)
+
+    def moving(self, field: np.ndarray) -> np.ndarray:
+        """(K, H, W) bool, where cells' vectors (V, 3) are so long that the pattern should be seen to move."""
+        length = np.linalg.norm(field, axis=1, keepdims=True)[self.cells.mesh.faces[self.face]]
+        return self._image(interpolate(self.barycentric, length))[..., 0] > SLOWEST
 
     def pictures(self, growth: Growth, state: torch.Tensor) -> np.ndarray:
         """The albedo (K, H, W, 3) of a state, black where there is no surface."""
@@ -85,7 +86,7 @@ class CloseUps:
         """Motion (K, H, W, 2) of the cells' vectors (V, 3), of which 1 is an edge [px]."""
         mesh = self.cells.mesh
         corners = mesh.faces[self.face]
-        velocities = interpolate(self.barycentric, (field * self.edge[:, None])[corners])
+        velocities = interpolate(self.barycentric, (field * mesh.edge_lengths[:, None])[corners])
         points = interpolate(self.barycentric, mesh.vertices[corners].astype(np.float64))
         camera = np.repeat(np.arange(len(self.cameras)), SIDE * SIDE)[self.hit]
         return self._image(screen_motion(self.cameras, camera, points, velocities))
@@ -105,12 +106,14 @@ def motion_of(
     generator = torch.Generator().manual_seed(0)
     state = growth.evolve(growth.seed(), texture.steps, generator)
     mesh = closeups.cells.mesh
-    target = closeups.target(cell_vectors(mesh, mesh, field, 1.0).astype(np.float64))
+    vectors = cell_vectors(mesh, mesh, field, 1.0).astype(np.float64)
     films = np.stack(list(film(growth, state, closeups)), axis=1)
     errors = [
-        measured_motion(frames, motion, covered, steps=STEPS, period=period(texture.about))
-        for frames, motion, covered in zip(films, target, closeups.covered, strict=True)
-        if covered.mean() > 0.5
+        measured_motion(frames, motion, moving, steps=STEPS, period=period(texture.about))
+        for frames, motion, moving in zip(
+            films, closeups.target(vectors), closeups.moving(vectors), strict=True
+        )
+        if moving.mean() > 0.5
     ]
     looks = []
     for before, after in zip((0, *later), later, strict=False):
