@@ -53,7 +53,7 @@ def test_what_is_carried_moves_as_it_should(tool, closeups, field):
 def test_the_speed_is_that_of_the_period(tool, closeups, monkeypatch):
     """What is carried in 12 steps as far as it should be in 6 is half as fast."""
     texture = _carried(closeups)
-    slow = NcaTexture(texture.look, texture.about | {"motion_period": 12.0})
+    slow = NcaTexture(texture.look, dict(texture.about) | {"motion_period": 12.0})
     monkeypatch.setattr(NcaTexture, "motion", lambda self, *arguments: MOTION(slow, *arguments))
     with torch.no_grad():
         assert 0.37 < tool.motion_of(texture, closeups, "about-y", ())[1] < 0.51

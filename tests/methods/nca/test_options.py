@@ -15,8 +15,8 @@ from mitex.methods.nca import NcaConfig
 from mitex.methods.nca.motion import pool as motion_pool
 from mitex.methods.nca.motion import task as motion_task
 from mitex.methods.nca.motion.drift import Drift, draw_drift
-from mitex.methods.nca.motion.views import sphere_views
 from mitex.methods.nca.motion.task import MotionTask
+from mitex.methods.nca.motion.views import sphere_views
 from mitex.methods.nca.task import NcaTask
 from mitex.runtime import threads
 from tests.methods.nca.tiny import SETTINGS, config

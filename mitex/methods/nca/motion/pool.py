@@ -101,7 +101,9 @@ class MovingPool(PoolTask):
         share = apart / self.config.motion_period
         advection = drift.advection(share)
         residuals = [advection_residual(a, b, advection(a), FLOOR) for a, b in pairwise(states)]
-        return torch.stack(residuals).mean() + self._decoded(*states[-2:], drift, share, generator)
+        return torch.stack(residuals).mean() + self._decoded_residual(
+            states[-2], states[-1], drift, share, generator
+        )
 
     def pictured(self, states: Sequence[torch.Tensor], views: MotionViews, apart: int) -> torch.Tensor:
         """The same of the last two states, by what views show of them."""
@@ -110,7 +112,7 @@ class MovingPool(PoolTask):
         period, gamma = self.config.motion_period, self.config.motion_gamma
         return motion_loss(flow, views.target, views.mask, steps=apart, period=period, gamma=gamma).total
 
-    def _decoded(
+    def _decoded_residual(
         self,
         before: torch.Tensor,
         after: torch.Tensor,
