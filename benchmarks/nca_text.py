@@ -32,7 +32,7 @@ DTYPES = (torch.float32, torch.bfloat16)
 
 
 class RandomTower:
-    """A model of texts and images without sense."""
+    """A vision-language model without sense."""
 
     name = "random weights"
 

@@ -1,4 +1,4 @@
-"""Pictures that the embedded text-image model leads to: what its gradient knows of the words.
+"""Pictures that the embedded vision-language model leads to: what its gradient knows of the words.
 
 python tools/make_words_sheet.py OUT.jpg ["red dots on white" ...]
 """

@@ -1,4 +1,4 @@
-"""Trains the embedded text-image model on captioned patterns, and measures it.
+"""Trains the embedded vision-language model on captioned patterns, and measures it.
 
     python tools/train_words.py draw PICTURES.npy [--count N]
     python tools/train_words.py train PICTURES.npy RUN [--steps N] [--resume]

@@ -1,4 +1,4 @@
-"""What one may say about a picture, in the concepts of the embedded text-image model."""
+"""What one may say about a picture, in the concepts of the embedded vision-language model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How often the embedded text-image model finds the text of a picture, and the picture of a text."""
+"""How often the embedded vision-language model finds the text of a picture, and the picture of a text."""
 
 from __future__ import annotations
 

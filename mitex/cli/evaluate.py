@@ -19,7 +19,7 @@ class Evaluate:
 
     With --exemplar, patches of the surface are compared with the picture: Frechet distances, transport, Gram
     matrices, seams and repetition, as in the reports of `mitex compare`. With --reference, the form and the
-    local statistics of its relief are compared with those of a mesh. With --text, a model of texts and images
+    local statistics of its relief are compared with those of a mesh. With --text, a vision-language model
     looks at it from 24 sides: MES and MES-dir of the MeshNCA paper, in which more is better. Take another
     model than the one that it was trained with.
 

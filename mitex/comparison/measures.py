@@ -98,7 +98,7 @@ TEXTS = (
         "MES",
         HIGHER,
         "Cosine times 100 of the pictures and the words. It rises with patterns that only the model likes. "
-        "Both scores are by the model of texts and images that is here; if it is the one that a method was "
+        "Both scores are by the vision-language model that is here; if it is the one that a method was "
         "trained with, they say little.",
         _negative,
     ),

@@ -19,7 +19,7 @@ from mitex.render.sides import sides
 
 @cache
 def model() -> TextImageModel:
-    """The model of texts and images that judges: a CLIP folder if there is one, else that of Mitex."""
+    """The vision-language model that judges: a CLIP folder if there is one, else that of Mitex."""
     return text_image_model()
 
 

@@ -32,7 +32,7 @@ def text_scores(
     """Scores of a textured object, by another model than the one that it was trained with.
 
     Args:
-        model: of texts and images.
+        model: the vision-language model.
         pictures: (K, R, R, 3) sRGB in [0, 1], R the model's resolution: the object from all sides, as 24 in
             the paper.
         bare: (K, R, R, 3), the same views of the object in grey.

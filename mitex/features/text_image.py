@@ -1,4 +1,4 @@
-"""What losses and searches ask of a model of texts and images: two encoders into one space."""
+"""What losses and searches ask of a vision-language model: two encoders into one space."""
 
 from __future__ import annotations
 

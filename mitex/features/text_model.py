@@ -1,4 +1,4 @@
-"""The model of texts and images that a fit from words looks through."""
+"""The vision-language model that a fit from words looks through."""
 
 from __future__ import annotations
 

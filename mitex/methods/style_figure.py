@@ -13,7 +13,7 @@ from mitex.scenes.stage import Stage
 
 
 class Figure:
-    """A mesh, as a model of texts and images is shown it.
+    """A mesh, as a vision-language model is shown it.
 
     What the cameras see is traced on the moved surface, outline and all, without derivatives; gradients reach
     the vertices through the normals that the surface is shaded with.

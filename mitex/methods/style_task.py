@@ -30,7 +30,7 @@ class StyleTask(ParameterTask):
 
     Args:
         config: settings, `text` among them.
-        model: the frozen model of texts and images.
+        model: the frozen vision-language model.
         mesh: with the UVs of the texture.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""How fits from words begin: their settings, and the preset that suits the model of texts and images."""
+"""How fits from words begin: their settings, and the preset that suits the vision-language model."""
 
 from __future__ import annotations
 

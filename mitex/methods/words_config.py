@@ -16,7 +16,7 @@ class WordsConfig:
 
     text: str | None = key(None, "what the mesh is made of, in words")
     text_object: str | None = key(None, "what the mesh is; by default its name")
-    text_prompt: str = key(PROMPT, "that the model of texts and images reads")
+    text_prompt: str = key(PROMPT, "that the vision-language model reads")
     text_model: str | None = key(None, "CLIP folder, or words for the small embedded model")
     text_background: float = key(1.0, "around the mesh [sRGB]; the papers: white", 0, 1)
     text_crops: int = key(4, "close-ups that are cut out of a view", 1, 64)
@@ -26,7 +26,7 @@ class WordsConfig:
     text_close_weight: float = key(1.0, "of that of the close-ups", 0)
 
     def prompt(self, name: str) -> str:
-        """What the model of texts and images reads of the mesh of that name."""
+        """What the vision-language model reads of the mesh of that name."""
         return object_prompt(self.text or "", self.text_object or name, self.text_prompt)
 
 

@@ -1,4 +1,4 @@
-"""How far views of a surface are from what words say, in the eyes of a model of texts and images."""
+"""How far views of a surface are from what words say, in the eyes of a vision-language model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Surfaces as models of texts and images see them: on one colour, with a lamp beside each camera."""
+"""Surfaces as vision-language models see them: on one colour, with a lamp beside each camera."""
 
 from __future__ import annotations
 

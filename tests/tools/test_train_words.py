@@ -1,4 +1,4 @@
-"""The training of the text-image model: true captions, pictures of what they say, a file of weights."""
+"""The training of the vision-language model: true captions, pictures of what they say, a file of weights."""
 
 import sys
 from dataclasses import replace

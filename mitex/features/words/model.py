@@ -1,4 +1,4 @@
-"""The trained text-image model that ships with the package."""
+"""The trained vision-language model that ships with the package."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class WordsModel:
         network: with its weights.
     """
 
-    name = "the embedded text-image model"
+    name = "the embedded vision-language model"
     resolution = RESOLUTION
 
     def __init__(self, network: WordsNetwork) -> None:

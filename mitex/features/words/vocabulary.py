@@ -1,4 +1,4 @@
-"""The words of the embedded text-image model, and how a text becomes a series of its concepts."""
+"""The words of the embedded vision-language model, and how a text becomes a series of its concepts."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ class NcaConfig(DeviceConfig):
     motion_speeds: tuple[float, ...] = key((0.0, 2.0), "least and most factor of the field in a step", 0)
     text: str | None = key(None, "what the texture is made of, in words, instead of an exemplar")
     text_object: str | None = key(None, "what has the texture; by default a sphere, or the mesh's name")
-    text_prompt: str = key(PROMPT, "that the model of texts and images reads")
+    text_prompt: str = key(PROMPT, "that the vision-language model reads")
     text_model: str | None = key(None, "CLIP folder, or words for the small embedded model")
     text_parent: str | None = key(None, "model that training starts from if no other is given")
     text_directional: bool = key(

@@ -51,7 +51,7 @@ class Figure:
 
 
 class Words:
-    """A text, in the eyes of a model of texts and images, and the views of a mesh that are compared with it.
+    """A text, in the eyes of a vision-language model, and the views of a mesh that are compared with it.
 
     Args:
         config: settings, `text` among them.

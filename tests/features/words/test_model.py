@@ -1,4 +1,4 @@
-"""The embedded text-image model as it ships: what it tells apart, its gradients, its file."""
+"""The embedded vision-language model as it ships: what it tells apart, its gradients, its file."""
 
 import pytest
 import torch

@@ -1,4 +1,4 @@
-"""The parts of the text-image network, untrained."""
+"""The parts of the vision-language network, untrained."""
 
 import torch
 

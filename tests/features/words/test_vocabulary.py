@@ -1,4 +1,4 @@
-"""What the embedded text-image model reads in a text, and what it refuses."""
+"""What the embedded vision-language model reads in a text, and what it refuses."""
 
 import pytest
 

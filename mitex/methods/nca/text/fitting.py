@@ -34,7 +34,7 @@ def fit_text(
 ) -> NcaTexture:
     """Trains a MeshNCA to be what words say; writes a run folder with the texture in it.
 
-    The texture has colours and a relief, and can be put on any mesh. A frozen model of texts and images
+    The texture has colours and a relief, and can be put on any mesh. A frozen vision-language model
     compares: see `mitex.features.text_model.text_image_model`.
 
     Args:

@@ -16,7 +16,7 @@ class MovingTextTask(MovingPool, TextTask):
     """Trains a look to be what words say, and to move along a vector field; arguments as of `TextTask`."""
 
     def motion_views(self, drift: Drift, generator: torch.Generator) -> MotionViews:
-        """Like those that the model of texts and images sees."""
+        """Like those that the vision-language model sees."""
         sphere = drift.surface
         assert isinstance(sphere, TrainingSphere)
         return sphere_views(self.look, drift, training_cameras(self.config, sphere, generator))

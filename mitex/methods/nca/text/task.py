@@ -28,7 +28,7 @@ PREVIEW = 256  # side of a preview's pictures [px]
 
 
 class TextTask(PoolTask):
-    """Trains a look to be what words say, in the eyes of a model of texts and images.
+    """Trains a look to be what words say, in the eyes of a vision-language model.
 
     Args:
         config: settings, `text` among them.

@@ -1,4 +1,4 @@
-"""What a model of texts and images is shown: a textured surface, and the same without its texture."""
+"""What a vision-language model is shown: a textured surface, and the same without its texture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The smallest training from words, and a model of texts and images whose meaning is plain."""
+"""The smallest training from words, and a vision-language model whose meaning is plain."""
 
 from collections.abc import Sequence
 
