@@ -26,8 +26,8 @@ class Compare(JobOptions):
     assets. The same command again goes on; `mitex batch status DIR/batch` tells how far it is.
 
     examples:
-      mitex compare --exemplar lava --mesh vase --methods surface,image-quilting --out out/compare
-      mitex compare --exemplar lava rust --mesh vase --methods gatys,image-quilting --seeds 3 --out out/all
+      mitex compare --exemplar lava --mesh vase --methods surface,image_quilting --out out/compare
+      mitex compare --exemplar lava rust --mesh vase --methods gatys,image_quilting --seeds 3 --out out/all
       mitex compare --exemplar lava --mesh vase --methods gatys --set gatys:steps=300 --out out/compare
     """
 

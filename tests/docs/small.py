@@ -29,7 +29,6 @@ from mitex.cli import main
 from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods.registry import methods
 from mitex.training.run import CONFIG
-from tests.cli.test_nerf import save
 from tests.docs.blocks import ROOT, blocks
 from tests.features.clip.folders import write_folder
 from tests.methods.nerf.tiny import tiny_capture, write_capture
@@ -86,7 +85,6 @@ TINY: dict[str, dict[str, Any]] = {
 
 def prepare(folder: Path) -> None:
     """Writes the files that pages name and that the user brings along, or has from a script."""
-    save(icosphere(6), folder / "bunny.obj")
     write_folder(folder / "models" / "clip-b32")
     write_capture(tiny_capture(views=8, side=24, spp=1), folder / "captures" / "cobbles")
     plan = next(block for block in blocks(ROOT / "docs" / "batch.md") if block.language == "toml")

@@ -79,7 +79,7 @@ class Animate:
     """Frames over which a loop fades."""
 
     damage: Annotated[str | None, arg(metavar="X,Y,Z,R|AXIS:LOW:HIGH", help_behavior_hint="")] = None
-    """Set a region back to the seed, to see it grow again: a ball, or what is between two heights along an
+    """Erase a region, to see it grow again: a ball, or what is between two heights along an
     axis [mesh units]; y:0: is the half above 0."""
 
     damage_at: Annotated[float | None, arg(metavar="S", help_behavior_hint="(default: 0.5)")] = None
