@@ -37,7 +37,7 @@ def texture(name: str) -> str:
         field.eval(si)
     except ConfigError as e:
         assert "colours need an rgb or mono variant" in str(e)
-        return "roughness, normals, bumps"
+        return "only roughness, normals, bumps"
     return "yes"
 
 
@@ -58,7 +58,7 @@ def feature(_: str) -> str:
         image("feature", {"type": "checkerboard"})
     except ConfigError as e:
         assert "does not image Mitsuba's own textures" in str(e)
-        return "fields of Mitex"
+        return "only Mitex's fields"
     return "yes"
 
 
