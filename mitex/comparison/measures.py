@@ -187,8 +187,8 @@ COSTS = (
         "fit_seconds",
         "Fit [s]",
         LOWER,
-        "Wall time of the fit, with the start of its process; of a method that learns from another's run, "
-        "that of both.",
+        "Wall time of the fit, with the start of its process; of one that was interrupted, also that of the "
+        "attempts before, up to their checkpoints; of a method that learns from another's run, that of both.",
     ),
     Measure(
         "apply_seconds",
