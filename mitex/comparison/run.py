@@ -4,29 +4,24 @@ from __future__ import annotations
 
 import csv
 import json
-import logging
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 from mitex.batch import Engine, Event, Plan, Report, run_plan
 from mitex.batch.folder import BatchFolder
-from mitex.comparison.inputs import forget
 from mitex.comparison.kept import Kept
 from mitex.comparison.kinds import KINDS, Kind
+from mitex.comparison.measuring import Measurements, measure
 from mitex.comparison.page import Page
 from mitex.comparison.plan import source_of
 from mitex.comparison.results import Result, results_of
 from mitex.comparison.study import write_study
 from mitex.comparison.summary import Summary, summaries
-from mitex.errors import MitexError, OutputError
+from mitex.errors import OutputError
 from mitex.paths import atomic_write, check_writable, expanded, is_temporary
-from mitex.progress import announce
-
-log = logging.getLogger(__name__)
 
 BATCH, MEASURED = "batch", "measured"  # folders: of the jobs, and of what was measured of their results
 REPORT, TABLE, RECORD = "report.html", "report.csv", "report.json"
@@ -89,8 +84,10 @@ def compare(
     place = checked_folder(folder)
     report = run_plan(plan, place / BATCH, engine, threads=threads, retry=retry, on_event=on_event)
     kind = KINDS[source_of(plan)]
-    comparison = _measured(results_of(report, source_of(plan)), report, kind, place)
-    _write(comparison, kind, study)
+    made = results_of(report, source_of(plan))
+    measurements = measure(made, kind, Kept(place / MEASURED))
+    comparison = _comparison(place, made, measurements, report, kind)
+    _write(comparison, measurements, kind, study)
     return comparison
 
 
@@ -108,39 +105,26 @@ def checked_folder(folder: str | Path) -> Path:
     return place
 
 
-def _measured(made: Sequence[Result], report: Report, kind: Kind, folder: Path) -> Comparison:
-    """Measures the results that were not measured before; one that cannot be is a failure of its own."""
-    forget()
-    kept, pair_of = Kept(folder / MEASURED), cache(kind.pair_of)
-    results, failures = [], [f"{row.job.name}: {row.record.get('error')}" for row in report.failures]
-    for k, result in enumerate(made):
-        announce("measuring", k, len(made))
-        known = kept.completed(result)
-        if known is None:
-            try:
-                known = kept.measured(result, pair_of(*result.pair))
-            except OutputError:
-                raise
-            except MitexError as e:
-                failures.append(f"{result.id.rpartition('-')[0]} cannot be measured: {e}")
-                continue
-        results.append(known)
+def _comparison(
+    folder: Path, made: Sequence[Result], measurements: Measurements, report: Report, kind: Kind
+) -> Comparison:
+    results = tuple(measurements.known[result.id] for result in made if result.id in measurements.known)
+    failures = (
+        *(f"{row.job.name}: {row.record.get('error')}" for row in report.failures),
+        *measurements.failures,
+    )
     total = len(report.rows)
     missing = total - report.count("done") + len(made) - len(results)
-    tables = tuple(summaries(results, kind.measures))
-    return Comparison(folder, tuple(results), tables, tuple(failures), missing, total)
+    return Comparison(folder, results, tuple(summaries(results, kind.measures)), failures, missing, total)
 
 
-def _write(comparison: Comparison, kind: Kind, study: bool) -> None:
-    kept, results = Kept(comparison.folder / MEASURED), comparison.results
-    pairs = {pair: kind.pair_of(*pair) for pair in dict.fromkeys(r.pair for r in results)}
-    floors = {names: kept.floor(pair) for names, pair in pairs.items()}
-    images = {exemplar: pair.image for (exemplar, _), pair in pairs.items()}
-    page = Page(results, comparison.tables, images, floors, comparison.failures, kind)
+def _write(comparison: Comparison, measurements: Measurements, kind: Kind, study: bool) -> None:
+    results, exemplars, floors = comparison.results, measurements.exemplars, measurements.floors
+    page = Page(results, comparison.tables, exemplars, floors, comparison.failures, kind)
     with atomic_write(comparison.report) as temporary:
         temporary.write_text(page.html(), encoding="utf-8", errors="replace")
     if study:
-        write_study(comparison.folder, comparison.results, images)
+        write_study(comparison.folder, results, exemplars)
     _write_csv(comparison.folder / TABLE, results, kind)
     record: dict[str, Any] = {
         "results": [_flat(result, comparison.folder) for result in comparison.results],
