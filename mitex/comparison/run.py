@@ -18,7 +18,7 @@ from mitex.comparison.measuring import Measurements, measure
 from mitex.comparison.page import Page
 from mitex.comparison.plan import source_of
 from mitex.comparison.results import Result, results_of
-from mitex.comparison.study import write_study
+from mitex.comparison.study import check_study, write_study
 from mitex.comparison.summary import Summary, summaries
 from mitex.errors import OutputError
 from mitex.paths import atomic_write, check_writable, expanded, is_temporary
@@ -77,17 +77,22 @@ def compare(
         What was measured.
 
     Raises:
-        ConfigError: An input does not exist, or a job is there twice.
+        ConfigError: An input does not exist, a job is there twice, or there are no two methods for a study;
+            if others have failed, the report is there nevertheless.
         OutputError: The folder holds other files, or cannot be written to.
         KeyboardInterrupt: As of `run_plan`; what was measured is kept.
     """
+    if study:
+        check_study(plan)
     place = checked_folder(folder)
     report = run_plan(plan, place / BATCH, engine, threads=threads, retry=retry, on_event=on_event)
     kind = KINDS[source_of(plan)]
     made = results_of(report, source_of(plan))
     measurements = measure(made, kind, Kept(place / MEASURED))
     comparison = _comparison(place, made, measurements, report, kind)
-    _write(comparison, measurements, kind, study)
+    _write(comparison, measurements, kind)
+    if study:
+        write_study(place, comparison.results, measurements.exemplars)
     return comparison
 
 
@@ -118,13 +123,11 @@ def _comparison(
     return Comparison(folder, results, tuple(summaries(results, kind.measures)), failures, missing, total)
 
 
-def _write(comparison: Comparison, measurements: Measurements, kind: Kind, study: bool) -> None:
+def _write(comparison: Comparison, measurements: Measurements, kind: Kind) -> None:
     results, exemplars, floors = comparison.results, measurements.exemplars, measurements.floors
     page = Page(results, comparison.tables, exemplars, floors, comparison.failures, kind)
     with atomic_write(comparison.report) as temporary:
         temporary.write_text(page.html(), encoding="utf-8", errors="replace")
-    if study:
-        write_study(comparison.folder, results, exemplars)
     _write_csv(comparison.folder / TABLE, results, kind)
     record: dict[str, Any] = {
         "results": [_flat(result, comparison.folder) for result in comparison.results],

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from mitex.asset import clay
 from mitex.cli import main
-from mitex.mesh import icosphere
+from mitex.mesh import Mesh, icosphere
 from tests.cli import bad_files as bad
 
 
@@ -31,6 +32,14 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     values = {"look_pair.PATCHES": 2, "look_pair.WINDOWS": 1, "inputs.CELL": 16, "inputs.SPP": 1}
     for name, value in values.items():
         monkeypatch.setattr(f"mitex.comparison.{name}", value)
+
+
+@pytest.fixture
+def grey(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Jobs learn nothing and write grey meshes; words are judged by one view."""
+    monkeypatch.setattr("mitex.batch.task.Process", Grey)
+    monkeypatch.setattr("mitex.render.sides.AZIMUTHS", (0,))
+    monkeypatch.setattr("mitex.render.sides.ELEVATIONS", (0.0,))
 
 
 def write_mesh(path: Path) -> None:
@@ -54,3 +63,18 @@ class InThisProcess:
     def wait(self) -> tuple[int, int]:
         with chdir(self._folder):
             return main(self._words), 1000
+
+
+class Grey(InThisProcess):
+    """Writes what a job would write, without any texture."""
+
+    failing: tuple[str, ...] = ()  # methods
+
+    def wait(self) -> tuple[int, int]:
+        command, what, *options = self._words
+        out = self._folder / options[options.index("--out") + 1]
+        if command == "fit":
+            out.mkdir(parents=True)
+            return (2 if what in self.failing else 0), 1000
+        clay(Mesh.load(options[options.index("--mesh") + 1])).export(out)
+        return 0, 1000

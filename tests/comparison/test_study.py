@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 import scipy.stats
 
+from mitex.batch import Plan
 from mitex.cli import main
+from mitex.comparison import compare
 from mitex.comparison.answers import Answer, evaluate, holm, read_answers
+from mitex.comparison.plan import prepared
 from mitex.comparison.study import KEY, PAGE, Question, Study, write_study
 from mitex.errors import ConfigError
 from tests.cli import bad_files as bad
@@ -40,9 +43,14 @@ def test_all_pairs_of_what_was_made_are_asked_about(study):
     assert asked == [("ball", ("a", "b")), ("ball", ("a", "c")), ("ball", ("b", "c")), ("vase", ("a", "b"))]
 
 
+def page_data(page):
+    """What the script of a study's page reads."""
+    return json.loads(re.findall(r'<script id="data" type="application/json">(.*?)</script>', page)[0])
+
+
 def test_the_page_shows_the_pictures_and_names_nothing(study, tmp_path):
     page = (tmp_path / PAGE).read_text()
-    data = json.loads(re.findall(r'<script id="data" type="application/json">(.*?)</script>', page)[0])
+    data = page_data(page)
     assert data["id"] == study.id and len(data["pictures"]) == 6  # the first seed's, and the exemplar
     for asked, question in zip(data["questions"], study.questions, strict=True):
         for choice, method in zip(asked["choices"], question.methods, strict=True):
@@ -55,6 +63,42 @@ def test_one_method_is_nothing_to_ask_about(tmp_path):
     with pytest.raises(ConfigError, match="no two methods"):
         write_study(tmp_path, [result("a", 0)], EXEMPLARS)
     assert not (tmp_path / KEY).exists()
+
+
+def test_words_are_shown_themselves(tmp_path):
+    """Whatever stands in them."""
+    words = "</script>$style red bricks"
+    picture = bad.image(tmp_path / "a.jpg", (8, 8), "JPEG")
+    made = [replace(result(m, 0), exemplar=words, pictures={"picture": picture}) for m in "ab"]
+    data = page_data(write_study(tmp_path, made, {words: None}).read_text())
+    assert [asked["exemplar"] for asked in data["questions"]] == [words] and len(data["pictures"]) == 1
+    assert Study.load(tmp_path).questions == (Question(words, "ball", ("a", "b")),)
+
+
+@pytest.mark.usefixtures("small", "grey")
+class TestComparisons:
+    """The whole way, with jobs that take no time."""
+
+    def plan(self, names=("nca", "x_mesh"), exemplars=("red bricks", "green marble")):
+        table = {"exemplars": list(exemplars), "meshes": ["ball.obj"], "source": "text"}
+        return prepared(Plan.of({"methods": {name: table for name in names}}))
+
+    def test_words_can_be_asked_about(self, place):
+        done = compare(self.plan(), "out", study=True)
+        assert done.missing == 0 and {"mes", "mes_dir"} <= done.results[0].numbers.keys()
+        asked = {(question.exemplar, question.methods) for question in Study.load("out").questions}
+        assert asked == {(words, ("nca", "x_mesh")) for words in ("red bricks", "green marble")}
+
+    def test_one_method_is_refused_before_any_work(self, place):
+        with pytest.raises(ConfigError, match="a study of one method"):
+            compare(self.plan(["nca"]), "out", study=True)
+        assert not (place / "out").exists()
+
+    def test_if_the_others_fail_the_report_is_there(self, place, monkeypatch):
+        monkeypatch.setattr("tests.comparison.conftest.Grey.failing", ("x_mesh",))
+        with pytest.raises(ConfigError, match="no two methods"):
+            compare(self.plan(), "out", study=True)
+        assert {"report.html", "report.csv", "report.json"} <= {file.name for file in place.glob("out/*")}
 
 
 CASES = Study("x", tuple(Question("lava", mesh, ("a", "b")) for mesh in ("ball", "vase", "knot")))
