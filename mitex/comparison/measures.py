@@ -98,8 +98,8 @@ TEXTS = (
         "MES",
         HIGHER,
         "Cosine times 100 of the pictures and the words. It rises with patterns that only the model likes. "
-        "Both scores are by the model of texts and images that is here; if it is the one that a method was "
-        "trained with, they say little.",
+        "Both scores are by the judge, a model of texts and images: of a method that was trained with it, "
+        "they say little.",
         _negative,
     ),
 )

@@ -11,7 +11,7 @@ import numpy as np
 
 from mitex import __version__
 from mitex.comparison.html import count_text, items, jpeg, picture, template, text_of
-from mitex.comparison.kinds import Kind
+from mitex.comparison.measures import Measure
 from mitex.comparison.results import Result, label
 from mitex.comparison.summary import Summary
 from mitex.comparison.tables import meaning_html, table_html
@@ -34,7 +34,8 @@ class Page:
         exemplars: path, name or words -> picture (S, S, 3), sRGB in [0, 1]; None without one.
         floors: exemplar and mesh -> measure -> value of the exemplar beside itself.
         failures: a line for each job or measurement that failed.
-        kind: of the comparison.
+        measures: what the numbers are.
+        conditions: what was the same for all, besides inputs and pictures.
     """
 
     results: Sequence[Result]
@@ -42,7 +43,8 @@ class Page:
     exemplars: Mapping[str, np.ndarray | None]
     floors: Mapping[tuple[str, str], Mapping[str, float]]
     failures: Sequence[str]
-    kind: Kind
+    measures: Sequence[Measure]
+    conditions: Sequence[str]
 
     def html(self) -> str:
         """The text of the file."""
@@ -55,8 +57,8 @@ class Page:
             looks="".join(map(self._looks, self.exemplars)),
             numbers_note=escape(self._note()),
             tables=self._tables(),
-            meanings="".join(map(meaning_html, self.kind.measures)),
-            conditions=items((FIRST, *self.kind.conditions, *LAST)),
+            meanings="".join(map(meaning_html, self.measures)),
+            conditions=items((FIRST, *self.conditions, *LAST)),
             footer=f"Mitex {escape(__version__)}, {time.strftime('%-d %B %Y')}",
         )
 

@@ -7,6 +7,7 @@ import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from mitex.comparison.plan import source_of
 from mitex.comparison.results import Result, results_of
 from mitex.comparison.study import check_study, write_study
 from mitex.comparison.summary import Summary, summaries
-from mitex.errors import OutputError
+from mitex.errors import ConfigError, OutputError
 from mitex.paths import atomic_write, check_writable, expanded, is_temporary
 
 BATCH, MEASURED = "batch", "measured"  # folders: of the jobs, and of what was measured of their results
@@ -61,6 +62,7 @@ def compare(
     threads: int | None = None,
     retry: bool = False,
     study: bool = False,
+    judge: str | None = None,
     on_event: Callable[[Event], None] | None = None,
 ) -> Comparison:
     """Does what is not done of a plan, measures what is not measured, and writes report.html, .csv and .json.
@@ -72,23 +74,26 @@ def compare(
         folder: new, empty, or that of an earlier call, which goes on.
         engine, threads, retry, on_event: as of `run_plan`.
         study: whether to write study.html and study.json, too.
+        judge: CLIP folder that scores textures from words, as of `text_image_model`.
 
     Returns:
         What was measured.
 
     Raises:
-        ConfigError: An input does not exist, a job is there twice, or there are no two methods for a study;
-            if others have failed, the report is there nevertheless.
+        WeightsError: There is no such judge.
+        ConfigError: An input does not exist, a job is there twice, there are no words to judge, or no two
+            methods for a study; if others have failed, the report is there nevertheless.
         OutputError: The folder holds other files, or cannot be written to.
         KeyboardInterrupt: As of `run_plan`; what was measured is kept.
     """
+    kind = KINDS[source_of(plan)]
+    _check_judge(kind, judge)
     if study:
         check_study(plan)
     place = checked_folder(folder)
     report = run_plan(plan, place / BATCH, engine, threads=threads, retry=retry, on_event=on_event)
-    kind = KINDS[source_of(plan)]
     made = results_of(report, source_of(plan))
-    measurements = measure(made, kind, Kept(place / MEASURED))
+    measurements = measure(made, partial(kind.pair_of, judge=judge), Kept(place / MEASURED))
     comparison = _comparison(place, made, measurements, report, kind)
     _write(comparison, measurements, kind)
     if study:
@@ -110,6 +115,16 @@ def checked_folder(folder: str | Path) -> Path:
     return place
 
 
+def _check_judge(kind: Kind, judge: str | None) -> None:
+    """Refuses, before any work, a judge that is not there, or where there is nothing to judge."""
+    if kind.judged:
+        from mitex.features.text_model import model_folder
+
+        model_folder(judge)
+    elif judge is not None:
+        raise ConfigError("there are no words to judge", "leave out `judge`")
+
+
 def _comparison(
     folder: Path, made: Sequence[Result], measurements: Measurements, report: Report, kind: Kind
 ) -> Comparison:
@@ -125,11 +140,14 @@ def _comparison(
 
 def _write(comparison: Comparison, measurements: Measurements, kind: Kind) -> None:
     results, exemplars, floors = comparison.results, measurements.exemplars, measurements.floors
-    page = Page(results, comparison.tables, exemplars, floors, comparison.failures, kind)
+    judge = measurements.judge
+    conditions = kind.conditions if judge is None else (*kind.conditions, f"The judge: {judge}.")
+    page = Page(results, comparison.tables, exemplars, floors, comparison.failures, kind.measures, conditions)
     with atomic_write(comparison.report) as temporary:
         temporary.write_text(page.html(), encoding="utf-8", errors="replace")
     _write_csv(comparison.folder / TABLE, results, kind)
     record: dict[str, Any] = {
+        "judge": measurements.judge,
         "results": [_flat(result, comparison.folder) for result in comparison.results],
         "means": [_record(table, floors) for table in comparison.tables],
         "failures": list(comparison.failures),

@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 from mitex.asset import clay
+from mitex.batch import Plan
 from mitex.cli import main
+from mitex.comparison.plan import prepared
 from mitex.mesh import Mesh, icosphere
 from tests.cli import bad_files as bad
 
@@ -40,6 +42,12 @@ def grey(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mitex.batch.task.Process", Grey)
     monkeypatch.setattr("mitex.render.sides.AZIMUTHS", (0,))
     monkeypatch.setattr("mitex.render.sides.ELEVATIONS", (0.0,))
+
+
+def words_plan(words: Sequence[str], names: Sequence[str] = ("nca", "x_mesh")) -> Plan:
+    """Textures from words on the ball, to be compared."""
+    table = {"exemplars": list(words), "meshes": ["ball.obj"], "source": "text"}
+    return prepared(Plan.of({"methods": dict.fromkeys(names, table)}))
 
 
 def write_mesh(path: Path) -> None:

@@ -12,11 +12,13 @@ from tests.comparison.test_summary import result
 
 
 @pytest.fixture
-def kind():
-    """A kind of which one pair can be there at a time; tells which pairs and pictures there were."""
+def pairs():
+    """Makes pairs, of which one can be there at a time; tells which pairs and pictures there were."""
     alive, told = weakref.WeakSet(), []
 
     class Pair:
+        judge = None
+
         def __init__(self, exemplar, mesh):
             if mesh == "broken":
                 raise MeshError("no mesh", "take another one")
@@ -29,30 +31,30 @@ def kind():
         def image(self):
             told.append("picture")
 
-    return SimpleNamespace(pair_of=Pair, told=told)
+    return SimpleNamespace(of=Pair, told=told)
 
 
 def kept(known=()) -> Any:
     return SimpleNamespace(
-        completed=lambda result: result if result.id in known else None,
+        completed=lambda result, pair: result if result.id in known else None,
         measured=lambda result, pair: result,
         floor=lambda pair: {"gram": len(pair.mesh)},
     )
 
 
-def test_a_pair_is_there_once_and_alone(kind):
+def test_a_pair_is_there_once_and_alone(pairs):
     """The exemplar's picture is taken once."""
     made = [result(method, 0, mesh) for method in "ab" for mesh in ("ball", "vase")]
-    found = measure(made, kind, kept(known={made[0].id}))
-    assert kind.told == ["ball", "picture", "vase"]
+    found = measure(made, pairs.of, kept(known={made[0].id}))
+    assert pairs.told == ["ball", "picture", "vase"]
     assert found.known == {one.id: one for one in made} and not found.failures
     assert found.exemplars == {"lava": None}
     assert found.floors == {("lava", "ball"): {"gram": 4}, ("lava", "vase"): {"gram": 4}}
 
 
-def test_what_cannot_be_measured_is_a_failure_of_its_own(kind):
+def test_what_cannot_be_measured_is_a_failure_of_its_own(pairs):
     made = [result("a", 0, "broken"), result("b", 0, "broken"), result("a", 0, "ball")]
-    found = measure(made, kind, kept())
+    found = measure(made, pairs.of, kept())
     assert found.failures == [
         "a-0 cannot be measured: no mesh; take another one",
         "b-0 cannot be measured: no mesh; take another one",

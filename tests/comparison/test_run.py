@@ -2,12 +2,15 @@
 
 import csv
 import json
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
 from mitex.cli import main
 from mitex.comparison import compare, comparison_plan
 from mitex.comparison.kept import VERSION, Kept, optimized_numbers
+from mitex.comparison.kinds import Pair
 from tests.cli import bad_files as bad
 
 QUILT = ["image_quilting:size=64", "image_quilting:exemplar_size=32", "image_quilting:block=12"]
@@ -63,21 +66,25 @@ def check_files(folder):
     assert html.count("data:image/jpeg;base64,") == 3 and "http" not in html
 
 
-def test_numbers_of_another_version_are_measured_again(tmp_path, place, monkeypatch):
+def test_numbers_of_another_version_or_judge_are_measured_again(tmp_path):
     from tests.comparison.test_summary import result
 
-    kept, one = Kept(tmp_path / "kept"), result("a", 0)
-    assert kept.completed(one) is None
-    bad.image(tmp_path / "kept" / f"{one.id}.jpg", kind="JPEG")
-    file = tmp_path / "kept" / f"{one.id}.json"
-    file.write_text(json.dumps({"version": VERSION, "numbers": {"gram": 2.5}}))
-    known = kept.completed(one)
-    assert known is not None and known.numbers["gram"] == 2.5
+    kept, one = Kept(tmp_path), result("a", 0)
+    clip, none = (cast(Pair, SimpleNamespace(judge=judge)) for judge in ("clip", None))
+    assert kept.completed(one, none) is None
+    bad.image(tmp_path / f"{one.id}.jpg", kind="JPEG")
+    file = tmp_path / f"{one.id}.json"
+    record = {"version": VERSION, "numbers": {"gram": 2.5}}
+    for judge, pair, other in ((None, none, clip), ("clip", clip, none)):
+        file.write_text(json.dumps(record | ({"judge": judge} if judge else {})))
+        known = kept.completed(one, pair)
+        assert known is not None and known.numbers["gram"] == 2.5
+        assert kept.completed(one, other) is None
     for content in ({"version": VERSION - 1, "numbers": {}}, [], {"version": VERSION}):
         file.write_text(json.dumps(content))
-        assert kept.completed(one) is None
+        assert kept.completed(one, none) is None
     file.write_text("{")
-    assert kept.completed(one) is None
+    assert kept.completed(one, none) is None
 
 
 def test_what_a_fit_optimizes_is_counted_by_its_checkpoint(tmp_path):

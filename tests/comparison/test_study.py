@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from mitex.batch import Plan
 from mitex.cli import main
 from mitex.comparison import compare
 from mitex.comparison.answers import Answer, evaluate, holm, read_answers
-from mitex.comparison.plan import prepared
 from mitex.comparison.study import KEY, PAGE, Question, Study, write_study
 from mitex.errors import ConfigError
 from tests.cli import bad_files as bad
+from tests.comparison.conftest import words_plan
 from tests.comparison.test_summary import result
 
+WORDS = ("red bricks", "green marble")
 EXEMPLARS = {"lava": np.zeros((4, 4, 3))}
 
 
@@ -79,25 +79,21 @@ def test_words_are_shown_themselves(tmp_path):
 class TestComparisons:
     """The whole way, with jobs that take no time."""
 
-    def plan(self, names=("nca", "x_mesh"), exemplars=("red bricks", "green marble")):
-        table = {"exemplars": list(exemplars), "meshes": ["ball.obj"], "source": "text"}
-        return prepared(Plan.of({"methods": {name: table for name in names}}))
-
     def test_words_can_be_asked_about(self, place):
-        done = compare(self.plan(), "out", study=True)
+        done = compare(words_plan(WORDS), "out", study=True)
         assert done.missing == 0 and {"mes", "mes_dir"} <= done.results[0].numbers.keys()
         asked = {(question.exemplar, question.methods) for question in Study.load("out").questions}
-        assert asked == {(words, ("nca", "x_mesh")) for words in ("red bricks", "green marble")}
+        assert asked == {(words, ("nca", "x_mesh")) for words in WORDS}
 
     def test_one_method_is_refused_before_any_work(self, place):
         with pytest.raises(ConfigError, match="a study of one method"):
-            compare(self.plan(["nca"]), "out", study=True)
+            compare(words_plan(WORDS, ["nca"]), "out", study=True)
         assert not (place / "out").exists()
 
     def test_if_the_others_fail_the_report_is_there(self, place, monkeypatch):
         monkeypatch.setattr("tests.comparison.conftest.Grey.failing", ("x_mesh",))
         with pytest.raises(ConfigError, match="no two methods"):
-            compare(self.plan(), "out", study=True)
+            compare(words_plan(WORDS), "out", study=True)
         assert {"report.html", "report.csv", "report.json"} <= {file.name for file in place.glob("out/*")}
 
 
