@@ -12,6 +12,7 @@ import numpy as np
 from mitex import __version__
 from mitex.comparison.html import count_text, items, jpeg, picture, template, text_of
 from mitex.comparison.measures import Measure
+from mitex.comparison.provenance import Provenance
 from mitex.comparison.results import Result, label
 from mitex.comparison.summary import Summary
 from mitex.comparison.tables import meaning_html, table_html
@@ -19,8 +20,8 @@ from mitex.comparison.tables import meaning_html, table_html
 FIRST = "Exemplars, meshes and seeds: every method has made the same ones, but where a cell is empty."
 LAST = (
     "Pictures: the same camera and light. What a method has learned besides what is measured shows in them.",
-    "Not the same: steps and settings, which are each method's own defaults unless something else was asked "
-    "for, and the load of the machine while seconds were measured.",
+    "Not the same: steps and settings, which are each method's own defaults unless the table below says "
+    "something else, and the load of the machine while seconds were measured.",
 )
 
 
@@ -36,6 +37,7 @@ class Page:
         failures: a line for each job or measurement that failed.
         measures: what the numbers are.
         conditions: what was the same for all, besides inputs and pictures.
+        provenance: how the results were made.
     """
 
     results: Sequence[Result]
@@ -45,6 +47,7 @@ class Page:
     failures: Sequence[str]
     measures: Sequence[Measure]
     conditions: Sequence[str]
+    provenance: Provenance
 
     def html(self) -> str:
         """The text of the file."""
@@ -59,6 +62,7 @@ class Page:
             tables=self._tables(),
             meanings="".join(map(meaning_html, self.measures)),
             conditions=items((FIRST, *self.conditions, *LAST)),
+            provenance=self.provenance.html(),
             footer=f"Mitex {escape(__version__)}, {time.strftime('%-d %B %Y')}",
         )
 

@@ -18,6 +18,7 @@ from mitex.comparison.kinds import KINDS, Kind
 from mitex.comparison.measuring import Measurements, measure
 from mitex.comparison.page import Page
 from mitex.comparison.plan import source_of
+from mitex.comparison.provenance import Provenance
 from mitex.comparison.results import Result, results_of
 from mitex.comparison.study import check_study, write_study
 from mitex.comparison.summary import Summary, summaries
@@ -25,6 +26,7 @@ from mitex.errors import ConfigError, OutputError
 from mitex.paths import atomic_write, check_writable, expanded, is_temporary
 
 BATCH, MEASURED = "batch", "measured"  # folders: of the jobs, and of what was measured of their results
+NAMES, PLACES = ("exemplar", "mesh", "method", "seed"), ("asset", "run")  # of a result, besides its numbers
 REPORT, TABLE, RECORD = "report.html", "report.csv", "report.json"
 
 
@@ -95,7 +97,7 @@ def compare(
     made = results_of(report, source_of(plan))
     measurements = measure(made, partial(kind.pair_of, judge=judge), Kept(place / MEASURED))
     comparison = _comparison(place, made, measurements, report, kind)
-    _write(comparison, measurements, kind)
+    _write(comparison, measurements, kind, Provenance.of(plan, comparison.results))
     if study:
         write_study(place, comparison.results, measurements.exemplars)
     return comparison
@@ -138,15 +140,25 @@ def _comparison(
     return Comparison(folder, results, tuple(summaries(results, kind.measures)), failures, missing, total)
 
 
-def _write(comparison: Comparison, measurements: Measurements, kind: Kind) -> None:
+def _write(comparison: Comparison, measurements: Measurements, kind: Kind, provenance: Provenance) -> None:
     results, exemplars, floors = comparison.results, measurements.exemplars, measurements.floors
     judge = measurements.judge
     conditions = kind.conditions if judge is None else (*kind.conditions, f"The judge: {judge}.")
-    page = Page(results, comparison.tables, exemplars, floors, comparison.failures, kind.measures, conditions)
+    page = Page(
+        results,
+        comparison.tables,
+        exemplars,
+        floors,
+        comparison.failures,
+        kind.measures,
+        conditions,
+        provenance,
+    )
     with atomic_write(comparison.report) as temporary:
         temporary.write_text(page.html(), encoding="utf-8", errors="replace")
     _write_csv(comparison.folder / TABLE, results, kind)
     record: dict[str, Any] = {
+        **provenance.record(),
         "judge": measurements.judge,
         "results": [_flat(result, comparison.folder) for result in comparison.results],
         "means": [_record(table, floors) for table in comparison.tables],
@@ -158,7 +170,7 @@ def _write(comparison: Comparison, measurements: Measurements, kind: Kind) -> No
 
 
 def _write_csv(path: Path, results: Sequence[Result], kind: Kind) -> None:
-    columns = ("exemplar", "mesh", "method", "seed", *(measure.key for measure in kind.measures), "asset")
+    columns = (*NAMES, *(measure.key for measure in kind.measures), *PLACES)
     with (
         atomic_write(path) as temporary,
         temporary.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file,
@@ -169,8 +181,9 @@ def _write_csv(path: Path, results: Sequence[Result], kind: Kind) -> None:
 
 
 def _flat(result: Result, folder: Path) -> dict[str, Any]:
-    names = {key: getattr(result, key) for key in ("exemplar", "mesh", "method", "seed")}
-    return {**names, **result.numbers, "asset": os.path.relpath(result.asset, folder)}
+    names = {key: getattr(result, key) for key in NAMES}
+    places = {key: os.path.relpath(getattr(result, key), folder) for key in PLACES}
+    return {**names, **result.numbers, **places}
 
 
 def _record(table: Summary, floors: Mapping[tuple[str, str], Mapping[str, float]]) -> dict[str, Any]:

@@ -2,11 +2,17 @@
 
 import csv
 import json
+import re
+import time
+import tomllib
+from html import unescape
 from types import SimpleNamespace
 from typing import cast
 
 import pytest
 
+from mitex import __version__
+from mitex.batch import Plan
 from mitex.cli import main
 from mitex.comparison import compare, comparison_plan
 from mitex.comparison.kept import VERSION, Kept, optimized_numbers
@@ -48,6 +54,8 @@ def test_a_comparison_goes_on_and_ends_in_files(place, measurings, capsys):
     done = compare(quilting(seeds=2), place / "out")
     assert done.missing == 0 and measurings[1:] == ["apply-image_quilting-a-s1-ball"]
     check_files(place / "out")
+    again = Plan.of(json.loads((place / "out" / "report.json").read_text())["plan"], place)
+    assert compare(again, place / "out").missing == 0 and len(measurings) == 2
 
 
 def check_files(folder):
@@ -62,8 +70,21 @@ def check_files(folder):
     cells = {cell["measure"]: cell for cell in table["cells"]}
     assert cells["gram"]["mean"] == pytest.approx(sum(float(row["gram"]) for row in rows) / 2)
     assert cells["parameters"]["mean"] == 0
+    check_provenance(folder, record, rows)
     html = (folder / "report.html").read_text()
     assert html.count("data:image/jpeg;base64,") == 3 and "http" not in html
+
+
+def check_provenance(folder, record, rows):
+    """What was asked for, and all settings that a fit had."""
+    config = tomllib.loads((folder / rows[0]["run"] / "config.toml").read_text())
+    assert record["settings"] == {"image_quilting": config} and config["tolerance"] == 0.1
+    assert record["mitex"] == __version__ and record["date"] == time.strftime("%Y-%m-%d")
+    html = (folder / "report.html").read_text()
+    assert "<td>size = 64, exemplar_size = 32, block = 12</td><td>defaults</td>" in html
+    assert "tolerance = 0.1\n" in html
+    (text,) = re.findall("mitex compare --plan</summary><pre>(.*?)</pre>", html, re.DOTALL)
+    assert tomllib.loads(unescape(text)) == record["plan"]
 
 
 def test_numbers_of_another_version_or_judge_are_measured_again(tmp_path):
