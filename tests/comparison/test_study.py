@@ -134,7 +134,22 @@ class TestEvaluation:
     def test_one_case_has_no_spread(self):
         done = evaluate(CASES, {"x": answers(0), "y": answers(1)})
         assert np.isnan([done.f, done.p]).all() and done.pairs == {}
-        assert "needs two cases" in done.text() and "±" not in done.text()
+        assert "needs two methods in two cases" in done.text() and "±" not in done.text()
+
+    def test_a_method_of_one_case_is_left_out_and_named(self):
+        """The tests are those without it; its share is told."""
+        also = Study("x", (*CASES.questions, Question("lava", "cow", ("a", "c"))))
+        without = Study("x", (*CASES.questions, Question("lava", "cow", ("a", "b"))))
+        (done, other) = (
+            evaluate(s, {"x": answers(0, 0, 1, 1), "y": answers(0, 1, 0, 0)}) for s in (also, without)
+        )
+        assert done.untested == ("c",) and done.pairs.keys() == {("a", "b")}
+        a, b = [1.0, 0.5, 0.5, 0.5], [0.0, 0.5, 0.5]
+        f: Any = scipy.stats.f_oneway(a, b)
+        assert (done.f, done.p) == pytest.approx((f.statistic, f.pvalue))
+        text = "of a single case, and not tested: c\n"
+        assert text in done.text() and other.untested == () and text not in other.text()
+        assert {one.method: one.count for one in done.preferences}["c"] == 2
 
 
 def saved(path, study="x", participant="p", entries=((0, 0), (1, 1), (2, 0))):
@@ -160,6 +175,7 @@ def test_files_to_answers(tmp_path):
         ({"entries": ((3, 0),)}, "holds no answers"),
         ({"entries": ((-1, 0),)}, "holds no answers"),
         ({"entries": ((0, 2),)}, "holds no answers"),
+        ({"entries": ((1, 0), (0, 1), (1, 0))}, "answers a question twice"),
         ({"entries": ()}, "there are no answers"),
     ],
 )
