@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import os
-import time
 from collections.abc import Sequence
-from contextlib import chdir
 from pathlib import Path
 
 import pytest
 
 from mitex.asset import clay
 from mitex.batch import Plan
-from mitex.cli import main
 from mitex.comparison.plan import prepared
 from mitex.mesh import Mesh, icosphere
+from tests.batch.in_this_process import InThisProcess
 from tests.cli import bad_files as bad
 
 
@@ -57,30 +54,14 @@ def write_mesh(path: Path) -> None:
     path.write_text("\n".join(lines) + "\n")
 
 
-class InThisProcess:
-    """In place of `mitex.batch.process.Process`."""
-
-    pid = os.getpid()
-
-    def __init__(self, words: Sequence[str], folder: Path, *_: object) -> None:
-        self._words, self._folder, self._began = words, folder, time.monotonic()
-
-    def stop(self, *_: object) -> None:
-        """It cannot be stopped."""
-
-    def wait(self) -> tuple[int, int]:
-        with chdir(self._folder):
-            return main(self._words), 1000
-
-
 class Grey(InThisProcess):
     """Writes what a job would write, without any texture."""
 
     failing: tuple[str, ...] = ()  # methods
 
     def wait(self) -> tuple[int, int]:
-        command, what, *options = self._words
-        out = self._folder / options[options.index("--out") + 1]
+        command, what, *options = self.words
+        out = self.folder / options[options.index("--out") + 1]
         if command == "fit":
             out.mkdir(parents=True)
             return (2 if what in self.failing else 0), 1000
