@@ -1,11 +1,11 @@
-"""Puts comparisons together: one table of all of them, and a sheet in docs/gallery.
+"""Puts comparisons together: tables of all of them, and a sheet in docs/gallery.
 
     python tools/make_comparison_sheet.py --mesh vase --methods surface nca -- out/lava out/bricks ...
 
-The arguments are folders that `mitex compare` wrote, each with other exemplars. Prints a Markdown table: the
-means over all pairs, those of each exemplar, and those of each mesh, with the standard deviation over seeds
-where there are several. The sheet has a row for each exemplar: itself, and a mesh by each method; with
-several meshes, the rows take them in turn.
+The arguments are folders that `mitex compare` wrote, each with other exemplars. Prints two Markdown tables,
+of likeness and of costs: the means over all pairs, those of each exemplar, and those of each mesh, with the
+standard deviation over seeds where there are several. The sheet has a row for each exemplar: itself, and a
+mesh by each method; with several meshes, the rows take them in turn.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
+from mitex.comparison.html import DASH, number_text
 from mitex.comparison.look_pair import picture_of
-from mitex.comparison.measures import LOOKS
+from mitex.comparison.measures import COSTS, LOOKS, Measure
 from mitex.comparison.results import label
 from mitex.images import read_image, write_image
 from mitex.render import sheet
@@ -40,27 +41,29 @@ def _picture(folder: Path, asset: str) -> Path:
     return folder / "measured" / f"{Path(asset).parent.name}.jpg"
 
 
-def number(rows: Sequence[Row], key: str) -> str:
+def number(rows: Sequence[Row], measure: Measure) -> str:
     """The mean over pairs, and the standard deviation over seeds; a dash where nothing was measured."""
     by_seed: dict[str, list[float]] = defaultdict(list)
     for row in rows:
-        if row[key]:
-            by_seed[row["seed"]].append(float(row[key]))
-    means = [np.mean(values) for values in by_seed.values()]
+        if row[measure.key]:
+            by_seed[row["seed"]].append(measure.scale * float(row[measure.key]))
+    means = [float(np.mean(values)) for values in by_seed.values()]
     if not means:
-        return "–"
-    spread = f" ± {np.std(means, ddof=1):.2g}" if len(means) > 1 else ""
-    return f"{np.mean(means):.3g}{spread}"
+        return DASH
+    spread = float(np.std(means, ddof=1)) if len(means) > 1 else 0.0
+    return number_text(float(np.mean(means))) + (f" ± {number_text(spread, 2)}" if spread else "")
 
 
-def table(groups: Iterable[tuple[str, Sequence[Row]]], methods: Sequence[str]) -> str:
+def table(
+    groups: Iterable[tuple[str, Sequence[Row]]], methods: Sequence[str], measures: Sequence[Measure]
+) -> str:
     """Markdown: a line for each group and method."""
-    names = ["exemplar or mesh", "method", *(measure.label for measure in LOOKS)]
+    names = ["exemplar or mesh", "method", *(measure.label for measure in measures)]
     lines = [f"| {' | '.join(names)} |", "| --- " * len(names) + "|"]
     for name, group in groups:
         for method in methods:
             own = [row for row in group if row["method"] == method]
-            cells = " | ".join(number(own, measure.key) for measure in LOOKS)
+            cells = " | ".join(number(own, measure) for measure in measures)
             lines.append(f"| {name} | `{method}` | {cells} |")
     return "\n".join(lines)
 
@@ -91,7 +94,9 @@ def main() -> None:
     arguments = parser.parse_args()
     rows = [row for folder in arguments.folders for row in rows_of(folder)]
     exemplars = list(dict.fromkeys(row["exemplar"] for row in rows))
-    print(table([("all", rows), *_grouped(rows, "exemplar"), *_grouped(rows, "mesh")], arguments.methods))
+    groups = [("all", rows), *_grouped(rows, "exemplar"), *_grouped(rows, "mesh")]
+    for measures in (LOOKS, COSTS):
+        print(table(groups, arguments.methods, measures), end="\n\n")
     path = GALLERY / arguments.sheet
     write_image(path, pictures(rows, exemplars, arguments.methods, arguments.mesh))
     print(path)

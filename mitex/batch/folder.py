@@ -3,7 +3,8 @@
 plan.jsonl         the jobs, one a line
 results/ID/        what a job writes: a run folder, or an asset
 jobs/ID/done.json  time, seconds, memory, metrics and host of a job that is done
-jobs/ID/failed.json, log.txt, claim.N, starts.json
+jobs/ID/failed.json, log.txt, claim.N
+jobs/ID/starts.json  how often it was started, and what the attempts took that the last one goes on from
 drivers/NAME       of a command that is running; its jobs stop when the file is gone
 """
 
@@ -107,12 +108,26 @@ class BatchFolder:
         """Lets a job that failed be run again."""
         (self.of(job) / FAILED).unlink(missing_ok=True)
 
-    def count_start(self, job: Job, driver: str) -> int:
-        """How often a job has been started for a driver, this time included, whether or not it ended."""
+    def start(self, job: Job, driver: str, saved: float | None) -> dict[str, Any]:
+        """Writes down that a job begins, and returns it: driver, count, time, seconds and memory.
+
+        `count` is how often it has been started for the driver, this time included, whether or not it ended.
+        `seconds` and `memory` are of the attempts before whose work it goes on with, up to their checkpoints;
+        of one whose end nobody saw, the memory [bytes] is not known.
+
+        Args:
+            job: the job.
+            driver: the command that wants it.
+            saved: when the checkpoint was written that it goes on from; None if it begins anew.
+        """
         before = _read(self.of(job) / STARTS) or {}
         count = before.get("count", 0) + 1 if before.get("driver") == driver else 1
-        self.write(job, STARTS, {"driver": driver, "count": count})
-        return count
+        record = {"driver": driver, "count": count, "time": time.time(), "seconds": 0.0, "memory": 0}
+        if saved is not None:
+            record["seconds"] = before.get("seconds", 0.0) + max(saved - before.get("time", saved), 0.0)
+            record["memory"] = before.get("memory", 0)
+        self.write(job, STARTS, record)
+        return record
 
     def has_driver(self, name: str) -> bool:
         """Whether a command goes on, rather than wanting its jobs to stop."""

@@ -63,6 +63,12 @@ class MethodPlan:
         """The option of `mitex fit` that the exemplars, or the runs of another method, are given to."""
         return self.source or methods()[self.method].learns_from
 
+    def table(self) -> dict[str, Any]:
+        """Its table in the TOML file of a plan that has no other keys."""
+        own = {key: value for key in OWN_KEYS if (value := getattr(self, key))}
+        values = {**own, **self.fit, **({"apply": dict(self.apply)} if self.apply else {})}
+        return {key: list(value) if isinstance(value, tuple) else value for key, value in values.items()}
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -79,6 +85,10 @@ class Plan:
     def first(self, part: MethodPlan) -> MethodPlan:
         """The method that is given the exemplars which a method learns from: mostly itself."""
         return part if part.of is None else next(one for one in self.methods if one.label == part.of)
+
+    def content(self) -> dict[str, Any]:
+        """The tables of its TOML file: the inverse of `of`, in the same folder."""
+        return {"methods": {part.label: part.table() for part in self.methods}}
 
     @staticmethod
     def read(path: str | Path) -> Plan:

@@ -9,14 +9,14 @@ import signal
 import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 from mitex.batch.claims import Claim
-from mitex.batch.folder import DONE, FAILED, LOG, BatchFolder
+from mitex.batch.folder import DONE, FAILED, LOG, STARTS, BatchFolder
 from mitex.batch.jobs import Job
 from mitex.batch.process import Process, environment
 from mitex.paths import writing
@@ -83,12 +83,15 @@ class Task:
     def _attempts(self, claim: Claim) -> Outcome:
         why = "its machine or its worker ended while it ran"
         while self.folder.has_driver(self.driver):
-            if self.folder.count_start(self.job, self.driver) > 1 + RETRIES:
+            saved = self._saved()
+            start = self.folder.start(self.job, self.driver, saved)
+            if start["count"] > 1 + RETRIES:
                 return self._failure(f"started {1 + RETRIES} times; {why}")
-            began = time.time()
-            code, memory = self._run(claim)
+            code, memory = self._run(claim, saved is not None)
+            start["memory"] = max(start["memory"], memory)
             if code == 0:
-                return self._success(began, memory)
+                return self._success(start)
+            self.folder.write(self.job, STARTS, start)
             if code == INTERRUPTED:
                 break
             if code > 0:
@@ -96,22 +99,22 @@ class Task:
             why = f"ended by {_signal_name(code)}"
         return Outcome("interrupted")
 
-    def _run(self, claim: Claim) -> tuple[int, int]:
-        """Exit code and memory of the job's command."""
-        words = self._words()
+    def _saved(self) -> float | None:
+        """When the checkpoint was written from which the job goes on; None if it begins anew."""
+        folder = self.folder.result(self.job)
+        files = [folder / name for name in (CHECKPOINT, PREVIOUS)] if self.job.resumed else []
+        return max((file.stat().st_mtime for file in files if file.is_file()), default=None)
+
+    def _run(self, claim: Claim, resumes: bool) -> tuple[int, int]:
+        """Exit code and memory of the job's command, which begins anew without what an earlier one left."""
+        if not resumes:
+            shutil.rmtree(self.folder.result(self.job), ignore_errors=True)
+        words = self.job.resumed if resumes else self.job.words
         with (self.folder.of(self.job) / LOG).open("wb") as log:
             process = Process(words, self.folder.path, log, environment(self.threads))
             with _running(process), self._watched(process, claim):
                 claim.note(process.pid)
                 return process.wait()
-
-    def _words(self) -> tuple[str, ...]:
-        """Those that go on if there is a checkpoint; else what an earlier attempt left is removed."""
-        result = self.folder.result(self.job)
-        if self.job.resumed and any((result / name).is_file() for name in (CHECKPOINT, PREVIOUS)):
-            return self.job.resumed
-        shutil.rmtree(result, ignore_errors=True)
-        return self.job.words
 
     @contextmanager
     def _watched(self, process: Process, claim: Claim) -> Iterator[None]:
@@ -133,11 +136,11 @@ class Task:
             over.set()
             watcher.join()
 
-    def _success(self, began: float, memory: int) -> Outcome:
+    def _success(self, start: Mapping[str, Any]) -> Outcome:
         record = {
-            "time": time.strftime("%Y-%m-%dT%H:%M:%S%z", time.localtime(began)),
-            "seconds": round(time.time() - began, 3),
-            "memory": memory,
+            "time": time.strftime("%Y-%m-%dT%H:%M:%S%z", time.localtime(start["time"])),
+            "seconds": round(start["seconds"] + time.time() - start["time"], 3),
+            "memory": start["memory"],
             "host": socket.gethostname(),
             "metrics": _last_metrics(self.folder.result(self.job) / METRICS),
         }

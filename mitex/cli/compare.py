@@ -62,6 +62,9 @@ class Compare(JobOptions):
     study: Annotated[bool, arg(help_behavior_hint="")] = False
     """Write study.html, too: a page for a blind test of preference that others can open."""
 
+    judge: Annotated[str | None, arg(metavar="DIR|NAME", help_behavior_hint="(default: as of `fit`)")] = None
+    """CLIP folder that scores textures from words, or `words` for the small model that ships with Mitex."""
+
     out: Annotated[Path, arg(metavar="DIR")]
     """Folder for everything."""
 
@@ -74,8 +77,15 @@ class Compare(JobOptions):
         let_idle_threads_sleep()
         from mitex.comparison.run import compare
 
-        options = {"threads": self.threads, "retry": self.retry, "study": self.study}
-        done = compare(plan, self.out, self.chosen_engine(), **options)
+        done = compare(
+            plan,
+            self.out,
+            self.chosen_engine(),
+            threads=self.threads,
+            retry=self.retry,
+            study=self.study,
+            judge=self.judge,
+        )
         for line in done.failures:
             print(f"failed   {line}")
         print(done.report)

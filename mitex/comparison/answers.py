@@ -72,6 +72,7 @@ class Evaluation:
         preferences: the most preferred method first.
         f, p: of the analysis of variance over methods, with the cases as samples; NaN of fewer than two.
         pairs: two methods -> p of a t-test of their shares in the cases, adjusted by Holm's procedure.
+        untested: methods that were asked about in a single case, which the tests leave out.
         people: whose answers there are.
     """
 
@@ -79,6 +80,7 @@ class Evaluation:
     f: float
     p: float
     pairs: Mapping[tuple[str, str], float]
+    untested: tuple[str, ...]
     people: int
 
     def text(self) -> str:
@@ -95,7 +97,9 @@ class Evaluation:
             share = f"{_percent(one.share)} (95 %: {low:.0f} to {high:.0f} %)"
             lines.append(f"{one.method:{width}}  {share} of {one.count}{spread}")
         if math.isnan(self.p):
-            return "\n".join([*lines, "analysis of variance: needs two cases that differ, or more"])
+            return "\n".join([*lines, "analysis of variance: needs two methods in two cases that differ"])
+        if self.untested:
+            lines.append(f"of a single case, and not tested: {', '.join(self.untested)}")
         lines.append(f"analysis of variance: F = {self.f:.3f}, p = {self.p:.2g}")
         pairs = [f"{one} and {other}: p = {p:.2g}" for (one, other), p in self.pairs.items()]
         return "\n".join([*lines, *pairs])
@@ -105,7 +109,8 @@ def read_answers(study: Study, files: Iterable[str | Path]) -> dict[str, list[An
     """The answers in files that the page saved: participant -> answers.
 
     Raises:
-        ConfigError: A file cannot be read, is of another study, or the same person's as another.
+        ConfigError: A file cannot be read, is of another study, answers a question twice, or is the same
+            person's as another.
     """
     people: dict[str, list[Answer]] = {}
     for file in files:
@@ -131,9 +136,10 @@ def evaluate(study: Study, people: Mapping[str, Sequence[Answer]]) -> Evaluation
     methods = list(dict.fromkeys(method for method, _ in counts))
     shares = {m: [wins[key] / counts[key] for key in counts if key[0] == m] for m in methods}
     preferences = [_preference(m, shares[m], _total(wins, m), int(_total(counts, m))) for m in methods]
-    f, p, pairs = _tests(shares)
+    untested = tuple(m for m in methods if len(shares[m]) < 2)
+    f, p, pairs = _tests({m: shares[m] for m in methods if m not in untested})
     ordered = sorted(preferences, key=lambda one: -one.share)
-    return Evaluation(tuple(ordered), f, p, pairs, len(people))
+    return Evaluation(tuple(ordered), f, p, pairs, untested, len(people))
 
 
 def _read(study: Study, file: Path) -> tuple[str, list[Answer]]:
@@ -143,9 +149,12 @@ def _read(study: Study, file: Path) -> tuple[str, list[Answer]]:
         record = json.loads(file.read_text(encoding="utf-8"))
         if record["study"] != study.id:
             raise ConfigError(f"'{file}' answers another study", "name answers to this one")
-        return str(record["participant"]), [_answer(study, entry) for entry in record["answers"]]
+        name, answers = str(record["participant"]), [_answer(study, entry) for entry in record["answers"]]
     except (OSError, ValueError, TypeError, KeyError, IndexError, RecursionError) as e:
         raise ConfigError(f"'{file}' holds no answers", "name a file that the study's page has saved") from e
+    if len({answer.question for answer in answers}) < len(answers):
+        raise ConfigError(f"'{file}' answers a question twice", "name one that the study's page has saved")
+    return name, answers
 
 
 def _answer(study: Study, entry: Mapping[str, Any]) -> Answer:
@@ -170,7 +179,7 @@ def _preference(method: str, shares: Sequence[float], wins: float, count: int) -
 def _tests(shares: Mapping[str, Sequence[float]]) -> tuple[float, float, dict[tuple[str, str], float]]:
     """F and p of the analysis of variance, and of the t-tests the adjusted p; NaN where nothing varies."""
     varies = any(np.ptp(values) > 0 for values in shares.values())
-    if len(shares) < 2 or min(map(len, shares.values())) < 2 or not varies:
+    if len(shares) < 2 or not varies:
         return math.nan, math.nan, {}
     f, p = scipy.stats.f_oneway(*shares.values())
     raw = {pair: _t_test(*(shares[m] for m in pair)) for pair in combinations(shares, 2)}

@@ -77,6 +77,8 @@ class CapturePair:
         mesh: path or name.
     """
 
+    judge = None
+
     def __init__(self, exemplar: str, mesh: str) -> None:
         self.folder, self.capture, self.mesh = exemplar, capture_of(exemplar), mesh_of(mesh)
 

@@ -27,9 +27,9 @@ class Kept:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def completed(self, result: Result) -> Result | None:
-        """The result with what is known of it; None if that is not all."""
-        picture, numbers = self._file(result, ".jpg"), _read(self._file(result, ".json"))
+    def completed(self, result: Result, pair: Pair) -> Result | None:
+        """The result with what is known of it; None if that is not all, or by another judge."""
+        picture, numbers = self._file(result, ".jpg"), _read(self._file(result, ".json"), pair.judge)
         return None if numbers is None or not picture.is_file() else _with(result, numbers, picture)
 
     def measured(self, result: Result, pair: Pair) -> Result:
@@ -42,15 +42,15 @@ class Kept:
         numbers = pair.numbers(asset, result.run) | {"parameters": optimized_numbers(result.run)}
         known = {key: value for key, value in numbers.items() if math.isfinite(value)}
         picture = write_image(self._file(result, ".jpg"), pair.picture(asset))
-        _write(self._file(result, ".json"), known)
+        _write(self._file(result, ".json"), known, pair.judge)
         return _with(result, known, picture)
 
     def floor(self, pair: Pair) -> dict[str, float]:
         """That of a pair."""
         path = self.folder / f"exemplar-{pair.key}.json"
-        if (known := _read(path)) is None:
+        if (known := _read(path, pair.judge)) is None:
             known = pair.floor()
-            _write(path, known)
+            _write(path, known, pair.judge)
         return known
 
     def _file(self, result: Result, suffix: str) -> Path:
@@ -67,19 +67,19 @@ def optimized_numbers(run: Path) -> int:
         return sum(math.prod(file.get_slice(name).get_shape()) for name in names)
 
 
-def _read(path: Path) -> dict[str, float] | None:
-    """Numbers that were kept; None if there are none, or if they were measured by another version."""
+def _read(path: Path, judge: str | None) -> dict[str, float] | None:
+    """Numbers that were kept; None if there are none, or if another version or judge has measured them."""
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
-        if record["version"] != VERSION:
+        if (record["version"], record.get("judge")) != (VERSION, judge):
             return None
         return {key: float(value) for key, value in record["numbers"].items()}
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return None
 
 
-def _write(path: Path, numbers: Mapping[str, float]) -> None:
-    record = {"version": VERSION, "numbers": dict(numbers)}
+def _write(path: Path, numbers: Mapping[str, float], judge: str | None) -> None:
+    record = {"version": VERSION, "numbers": dict(numbers)} | ({"judge": judge} if judge else {})
     with atomic_write(path) as temporary:
         temporary.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 

@@ -23,6 +23,11 @@ class Pair(Protocol):
         ...
 
     @property
+    def judge(self) -> str | None:
+        """Name of the model that judges; None where that is always the same one, or none."""
+        ...
+
+    @property
     def image(self) -> np.ndarray | None:
         """(S, S, 3) sRGB in [0, 1]: what is learned from; None if that has no picture."""
         ...
@@ -49,19 +54,25 @@ class Kind:
         measures: what results have.
         pair: reference to the class of its pairs.
         conditions: what was the same for all, besides inputs and pictures.
+        judged: whether there is a choice of the model that judges.
     """
 
     measures: tuple[Measure, ...]
     pair: str
     conditions: tuple[str, ...]
+    judged: bool = False
 
-    def pair_of(self, exemplar: str, mesh: str) -> Pair:
+    def pair_of(self, exemplar: str, mesh: str, judge: str | None = None) -> Pair:
         """What results are measured with.
 
+        Args:
+            exemplar, mesh: paths, names or words.
+            judge: CLIP folder, as of `mitex.features.text_model.text_image_model`, where there is a choice.
+
         Raises:
-            MitexError: One of the two cannot be read.
+            MitexError: One of them cannot be read.
         """
-        return load(self.pair)(exemplar, mesh)
+        return load(self.pair)(exemplar, mesh, **({"judge": judge} if self.judged else {}))
 
 
 SIZE = (
@@ -84,6 +95,7 @@ KINDS: Mapping[str, Kind] = {
         (*TEXTS, *COSTS),
         "mitex.comparison.text_pair:TextPair",
         ("What is measured: the same 24 views of the object in light, and of the object in grey.",),
+        judged=True,
     ),
     "reference": Kind(
         (*RELIEFS, *COSTS),

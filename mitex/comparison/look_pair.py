@@ -58,6 +58,8 @@ class LookPair:
         exemplar, mesh: paths or names.
     """
 
+    judge = None
+
     def __init__(self, exemplar: str, mesh: str) -> None:
         self.image = picture_of(exemplar)
         self.mesh, self.width = sized_mesh(mesh)

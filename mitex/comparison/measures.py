@@ -98,8 +98,8 @@ TEXTS = (
         "MES",
         HIGHER,
         "Cosine times 100 of the pictures and the words. It rises with patterns that only the model likes. "
-        "Both scores are by the vision-language model that is here; if it is the one that a method was "
-        "trained with, they say little.",
+        "Both scores are by the judge, a vision-language model: of a method that was trained with it, "
+        "they say little.",
         _negative,
     ),
 )
@@ -187,8 +187,8 @@ COSTS = (
         "fit_seconds",
         "Fit [s]",
         LOWER,
-        "Wall time of the fit, with the start of its process; of a method that learns from another's run, "
-        "that of both.",
+        "Wall time of the fit, with the start of its process; of one that was interrupted, also that of the "
+        "attempts before, up to their checkpoints; of a method that learns from another's run, that of both.",
     ),
     Measure(
         "apply_seconds",

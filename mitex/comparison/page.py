@@ -11,7 +11,8 @@ import numpy as np
 
 from mitex import __version__
 from mitex.comparison.html import count_text, items, jpeg, picture, template, text_of
-from mitex.comparison.kinds import Kind
+from mitex.comparison.measures import Measure
+from mitex.comparison.provenance import Provenance
 from mitex.comparison.results import Result, label
 from mitex.comparison.summary import Summary
 from mitex.comparison.tables import meaning_html, table_html
@@ -19,8 +20,8 @@ from mitex.comparison.tables import meaning_html, table_html
 FIRST = "Exemplars, meshes and seeds: every method has made the same ones, but where a cell is empty."
 LAST = (
     "Pictures: the same camera and light. What a method has learned besides what is measured shows in them.",
-    "Not the same: steps and settings, which are each method's own defaults unless something else was asked "
-    "for, and the load of the machine while seconds were measured.",
+    "Not the same: steps and settings, which are each method's own defaults unless the table below says "
+    "something else, and the load of the machine while seconds were measured.",
 )
 
 
@@ -34,7 +35,9 @@ class Page:
         exemplars: path, name or words -> picture (S, S, 3), sRGB in [0, 1]; None without one.
         floors: exemplar and mesh -> measure -> value of the exemplar beside itself.
         failures: a line for each job or measurement that failed.
-        kind: of the comparison.
+        measures: what the numbers are.
+        conditions: what was the same for all, besides inputs and pictures.
+        provenance: how the results were made.
     """
 
     results: Sequence[Result]
@@ -42,7 +45,9 @@ class Page:
     exemplars: Mapping[str, np.ndarray | None]
     floors: Mapping[tuple[str, str], Mapping[str, float]]
     failures: Sequence[str]
-    kind: Kind
+    measures: Sequence[Measure]
+    conditions: Sequence[str]
+    provenance: Provenance
 
     def html(self) -> str:
         """The text of the file."""
@@ -55,8 +60,9 @@ class Page:
             looks="".join(map(self._looks, self.exemplars)),
             numbers_note=escape(self._note()),
             tables=self._tables(),
-            meanings="".join(map(meaning_html, self.kind.measures)),
-            conditions=items((FIRST, *self.kind.conditions, *LAST)),
+            meanings="".join(map(meaning_html, self.measures)),
+            conditions=items((FIRST, *self.conditions, *LAST)),
+            provenance=self.provenance.html(),
             footer=f"Mitex {escape(__version__)}, {time.strftime('%-d %B %Y')}",
         )
 

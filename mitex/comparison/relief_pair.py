@@ -44,6 +44,8 @@ class ReliefPair:
         mesh: path or name.
     """
 
+    judge = None
+
     def __init__(self, exemplar: str, mesh: str) -> None:
         self.reference, self.mesh = reference_of(exemplar), mesh_of(mesh)
 

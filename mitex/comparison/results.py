@@ -22,7 +22,7 @@ class Result:
         seed: of the fit.
         asset: the file.
         run: the run folder of the fit.
-        numbers: measure -> value, as of `MEASURES`; without those that could not be measured.
+        numbers: key of a `Measure` -> value; without those that could not be measured.
         pictures: kind -> file.
     """
 

@@ -4,31 +4,29 @@ from __future__ import annotations
 
 import csv
 import json
-import logging
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import cache
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from mitex.batch import Engine, Event, Plan, Report, run_plan
 from mitex.batch.folder import BatchFolder
-from mitex.comparison.inputs import forget
 from mitex.comparison.kept import Kept
 from mitex.comparison.kinds import KINDS, Kind
+from mitex.comparison.measuring import Measurements, measure
 from mitex.comparison.page import Page
 from mitex.comparison.plan import source_of
+from mitex.comparison.provenance import Provenance
 from mitex.comparison.results import Result, results_of
-from mitex.comparison.study import write_study
+from mitex.comparison.study import check_study, write_study
 from mitex.comparison.summary import Summary, summaries
-from mitex.errors import MitexError, OutputError
+from mitex.errors import ConfigError, OutputError
 from mitex.paths import atomic_write, check_writable, expanded, is_temporary
-from mitex.progress import announce
-
-log = logging.getLogger(__name__)
 
 BATCH, MEASURED = "batch", "measured"  # folders: of the jobs, and of what was measured of their results
+NAMES, PLACES = ("exemplar", "mesh", "method", "seed"), ("asset", "run")  # of a result, besides its numbers
 REPORT, TABLE, RECORD = "report.html", "report.csv", "report.json"
 
 
@@ -66,6 +64,7 @@ def compare(
     threads: int | None = None,
     retry: bool = False,
     study: bool = False,
+    judge: str | None = None,
     on_event: Callable[[Event], None] | None = None,
 ) -> Comparison:
     """Does what is not done of a plan, measures what is not measured, and writes report.html, .csv and .json.
@@ -77,20 +76,30 @@ def compare(
         folder: new, empty, or that of an earlier call, which goes on.
         engine, threads, retry, on_event: as of `run_plan`.
         study: whether to write study.html and study.json, too.
+        judge: CLIP folder that scores textures from words, as of `text_image_model`.
 
     Returns:
         What was measured.
 
     Raises:
-        ConfigError: An input does not exist, or a job is there twice.
+        WeightsError: There is no such judge.
+        ConfigError: An input does not exist, a job is there twice, there are no words to judge, or no two
+            methods for a study; if others have failed, the report is there nevertheless.
         OutputError: The folder holds other files, or cannot be written to.
         KeyboardInterrupt: As of `run_plan`; what was measured is kept.
     """
+    kind = KINDS[source_of(plan)]
+    _check_judge(kind, judge)
+    if study:
+        check_study(plan)
     place = checked_folder(folder)
     report = run_plan(plan, place / BATCH, engine, threads=threads, retry=retry, on_event=on_event)
-    kind = KINDS[source_of(plan)]
-    comparison = _measured(results_of(report, source_of(plan)), report, kind, place)
-    _write(comparison, kind, study)
+    made = results_of(report, source_of(plan))
+    measurements = measure(made, partial(kind.pair_of, judge=judge), Kept(place / MEASURED))
+    comparison = _comparison(place, made, measurements, report, kind)
+    _write(comparison, measurements, kind, Provenance.of(plan, comparison.results))
+    if study:
+        write_study(place, comparison.results, measurements.exemplars)
     return comparison
 
 
@@ -108,41 +117,49 @@ def checked_folder(folder: str | Path) -> Path:
     return place
 
 
-def _measured(made: Sequence[Result], report: Report, kind: Kind, folder: Path) -> Comparison:
-    """Measures the results that were not measured before; one that cannot be is a failure of its own."""
-    forget()
-    kept, pair_of = Kept(folder / MEASURED), cache(kind.pair_of)
-    results, failures = [], [f"{row.job.name}: {row.record.get('error')}" for row in report.failures]
-    for k, result in enumerate(made):
-        announce("measuring", k, len(made))
-        known = kept.completed(result)
-        if known is None:
-            try:
-                known = kept.measured(result, pair_of(*result.pair))
-            except OutputError:
-                raise
-            except MitexError as e:
-                failures.append(f"{result.id.rpartition('-')[0]} cannot be measured: {e}")
-                continue
-        results.append(known)
+def _check_judge(kind: Kind, judge: str | None) -> None:
+    """Refuses, before any work, a judge that is not there, or where there is nothing to judge."""
+    if kind.judged:
+        from mitex.features.text_model import model_folder
+
+        model_folder(judge)
+    elif judge is not None:
+        raise ConfigError("there are no words to judge", "leave out `judge`")
+
+
+def _comparison(
+    folder: Path, made: Sequence[Result], measurements: Measurements, report: Report, kind: Kind
+) -> Comparison:
+    results = tuple(measurements.known[result.id] for result in made if result.id in measurements.known)
+    failures = (
+        *(f"{row.job.name}: {row.record.get('error')}" for row in report.failures),
+        *measurements.failures,
+    )
     total = len(report.rows)
     missing = total - report.count("done") + len(made) - len(results)
-    tables = tuple(summaries(results, kind.measures))
-    return Comparison(folder, tuple(results), tables, tuple(failures), missing, total)
+    return Comparison(folder, results, tuple(summaries(results, kind.measures)), failures, missing, total)
 
 
-def _write(comparison: Comparison, kind: Kind, study: bool) -> None:
-    kept, results = Kept(comparison.folder / MEASURED), comparison.results
-    pairs = {pair: kind.pair_of(*pair) for pair in dict.fromkeys(r.pair for r in results)}
-    floors = {names: kept.floor(pair) for names, pair in pairs.items()}
-    images = {exemplar: pair.image for (exemplar, _), pair in pairs.items()}
-    page = Page(results, comparison.tables, images, floors, comparison.failures, kind)
+def _write(comparison: Comparison, measurements: Measurements, kind: Kind, provenance: Provenance) -> None:
+    results, exemplars, floors = comparison.results, measurements.exemplars, measurements.floors
+    judge = measurements.judge
+    conditions = kind.conditions if judge is None else (*kind.conditions, f"The judge: {judge}.")
+    page = Page(
+        results,
+        comparison.tables,
+        exemplars,
+        floors,
+        comparison.failures,
+        kind.measures,
+        conditions,
+        provenance,
+    )
     with atomic_write(comparison.report) as temporary:
         temporary.write_text(page.html(), encoding="utf-8", errors="replace")
-    if study:
-        write_study(comparison.folder, comparison.results, images)
     _write_csv(comparison.folder / TABLE, results, kind)
     record: dict[str, Any] = {
+        **provenance.record(),
+        "judge": measurements.judge,
         "results": [_flat(result, comparison.folder) for result in comparison.results],
         "means": [_record(table, floors) for table in comparison.tables],
         "failures": list(comparison.failures),
@@ -153,7 +170,7 @@ def _write(comparison: Comparison, kind: Kind, study: bool) -> None:
 
 
 def _write_csv(path: Path, results: Sequence[Result], kind: Kind) -> None:
-    columns = ("exemplar", "mesh", "method", "seed", *(measure.key for measure in kind.measures), "asset")
+    columns = (*NAMES, *(measure.key for measure in kind.measures), *PLACES)
     with (
         atomic_write(path) as temporary,
         temporary.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file,
@@ -164,8 +181,9 @@ def _write_csv(path: Path, results: Sequence[Result], kind: Kind) -> None:
 
 
 def _flat(result: Result, folder: Path) -> dict[str, Any]:
-    names = {key: getattr(result, key) for key in ("exemplar", "mesh", "method", "seed")}
-    return {**names, **result.numbers, "asset": os.path.relpath(result.asset, folder)}
+    names = {key: getattr(result, key) for key in NAMES}
+    places = {key: os.path.relpath(getattr(result, key), folder) for key in PLACES}
+    return {**names, **result.numbers, **places}
 
 
 def _record(table: Summary, floors: Mapping[tuple[str, str], Mapping[str, float]]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""A page for a blind test of preference: pairs of pictures beside their exemplar, without names.
+"""A page for a blind test of preference: pairs of pictures beside their exemplar or words, without names.
 
 The page shuffles questions and sides for each who opens it, and saves the answers as a file. Which methods a
 question is about stands in study.json, which stays with whoever asks.
@@ -14,10 +14,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import combinations
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from mitex.batch import Plan
 from mitex.comparison.html import jpeg, template, text_of
 from mitex.comparison.results import Result
 from mitex.errors import ConfigError
@@ -69,43 +69,48 @@ class Study:
             raise ConfigError(problem, "name the folder of a comparison that was made with a study") from e
 
 
+def check_study(plan: Plan) -> None:
+    """Checks, before any work, that there will be something to ask about.
+
+    Raises:
+        ConfigError: There is one method alone.
+    """
+    if len(plan.methods) < 2:
+        raise ConfigError("a study of one method asks nothing", "name more methods, or leave out `study`")
+
+
 def write_study(folder: Path, results: Sequence[Result], exemplars: Mapping[str, np.ndarray | None]) -> Path:
     """Writes study.html and study.json: all pairs of methods, on each exemplar and mesh that both have done.
 
     Args:
         folder: of the comparison.
         results: with their pictures, of which the first seed's are shown.
-        exemplars: path or name -> picture.
+        exemplars: path, name or words -> picture; words, which have none, are shown themselves.
 
     Returns:
         The page.
 
     Raises:
-        ConfigError: There are no two methods to compare, or an exemplar has no picture.
+        ConfigError: There are no two methods to compare.
         OutputError: The folder cannot be written to.
     """
     shown = {(*result.pair, result.method): result for result in reversed(results) if result.pictures}
     pictures: dict[str, bytes] = {}
-    asked: list[tuple[Question, dict[str, Any]]] = []
+    asked: list[tuple[Question, list[str]]] = []
     for exemplar, mesh in dict.fromkeys(result.pair for result in results):
         methods = sorted({method for one, other, method in shown if (one, other) == (exemplar, mesh)})
-        if (image := exemplars[exemplar]) is None:
-            raise ConfigError("words have no picture to show", "leave out `study`")
-        pictures.setdefault(exemplar, jpeg(image))
+        if (image := exemplars[exemplar]) is not None:
+            pictures.setdefault(exemplar, jpeg(image))
         for pair in combinations(methods, 2):
             files = [shown[exemplar, mesh, method].pictures["picture"] for method in pair]
             pictures |= {str(file): file.read_bytes() for file in files}
-            asked.append(
-                (Question(exemplar, mesh, pair), {"exemplar": exemplar, "choices": list(map(str, files))})
-            )
+            asked.append((Question(exemplar, mesh, pair), list(map(str, files))))
     if not asked:
         raise ConfigError("there are no two methods to ask about", "name more methods, or see what failed")
     return _write(folder, asked, pictures)
 
 
-def _write(
-    folder: Path, asked: Sequence[tuple[Question, dict[str, Any]]], pictures: dict[str, bytes]
-) -> Path:
+def _write(folder: Path, asked: Sequence[tuple[Question, list[str]]], pictures: dict[str, bytes]) -> Path:
     digest = hashlib.sha256(b"".join(hashlib.sha256(content).digest() for content in pictures.values()))
     id = digest.hexdigest()[:16]
     shuffle = random.Random(id)
@@ -113,12 +118,16 @@ def _write(
     names = shuffle.sample(list(pictures), len(pictures))  # so that their places tell nothing either
     place = {name: k for k, name in enumerate(names)}
     questions = [
-        {"exemplar": place[shown["exemplar"]], "choices": [place[name] for name in shown["choices"]]}
-        for _, shown in asked
+        {
+            "exemplar": place.get(question.exemplar, question.exemplar),
+            "choices": [place[name] for name in choices],
+        }
+        for question, choices in asked
     ]
     encoded = [base64.b64encode(pictures[name]).decode() for name in names]
     data = {"id": id, "most": MOST, "questions": questions, "pictures": encoded}
-    page = template(PAGE).substitute(style=text_of("style.css"), data=json.dumps(data))
+    text = json.dumps(data).replace("<", "\\u003c")  # words could end the script
+    page = template(PAGE).substitute(style=text_of("style.css"), data=text)
     key = {"id": id, "questions": [asdict(question) for question, _ in asked]}
     with atomic_write(folder / KEY) as temporary:
         temporary.write_text(json.dumps(key, indent=1) + "\n", encoding="utf-8")

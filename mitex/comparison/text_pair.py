@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -10,17 +10,21 @@ import torch
 
 from mitex.asset import Asset, clay
 from mitex.cache import content_key
-from mitex.comparison.inputs import lit, mesh_of
+from mitex.comparison.inputs import lit, mesh_of, read_once
 from mitex.evaluation.text import text_scores
 from mitex.features.text_image import TextImageModel, object_prompt
 from mitex.features.text_model import text_image_model
 from mitex.render.sides import sides
 
 
-@cache
-def model() -> TextImageModel:
-    """The vision-language model that judges: a CLIP folder if there is one, else that of Mitex."""
-    return text_image_model()
+@read_once
+def judge_of(clip: str) -> TextImageModel:
+    """The vision-language model that judges, as of `text_image_model`; "" names none.
+
+    Raises:
+        WeightsError, ConfigError: There is no such model, or it cannot be read.
+    """
+    return text_image_model(clip)
 
 
 class TextPair:
@@ -29,22 +33,28 @@ class TextPair:
     Args:
         exemplar: the words.
         mesh: path or name.
+        judge: CLIP folder; None for the one that Mitex finds, or else its own small model.
     """
 
     image = None
 
-    def __init__(self, exemplar: str, mesh: str) -> None:
-        self.words, self.mesh = exemplar, mesh_of(mesh)
+    def __init__(self, exemplar: str, mesh: str, judge: str | None = None) -> None:
+        self.words, self.mesh, self._model = exemplar, mesh_of(mesh), judge_of(judge or "")
+
+    @property
+    def judge(self) -> str:
+        """The model's name."""
+        return self._model.name
 
     @property
     def key(self) -> str:
-        """A hash of both, and of the model."""
-        return content_key(self.words, model().name, self.mesh.vertices, self.mesh.faces)
+        """A hash of both, and of the judge's name."""
+        return content_key(self.words, self.judge, self.mesh.vertices, self.mesh.faces)
 
     def numbers(self, asset: Asset, run: Path) -> dict[str, float]:
         """The scores of MeshNCA, section G.1."""
         prompt = object_prompt(self.words, self.mesh.name)
-        scores = text_scores(model(), _seen(asset), self._bare, prompt, self.mesh.name)
+        scores = text_scores(self._model, self._seen(asset), self._bare, prompt, self.mesh.name)
         return {"mes": scores.score, "mes_dir": scores.direction}
 
     def floor(self) -> dict[str, float]:
@@ -57,9 +67,8 @@ class TextPair:
 
     @cached_property
     def _bare(self) -> torch.Tensor:
-        return _seen(clay(self.mesh))
+        return self._seen(clay(self.mesh))
 
-
-def _seen(asset: Asset) -> torch.Tensor:
-    """(24, R, R, 3) sRGB in [0, 1]: an asset from all sides, R the model's resolution."""
-    return torch.from_numpy(sides(asset, model().resolution))
+    def _seen(self, asset: Asset) -> torch.Tensor:
+        """(24, R, R, 3) sRGB in [0, 1]: an asset from all sides, R the model's resolution."""
+        return torch.from_numpy(sides(asset, self._model.resolution))

@@ -200,6 +200,12 @@ class TestInterruptions:
         workshop.run(workshop.plan(steps=6), out="serial")
         assert workshop.files() == workshop.files("serial")
 
+    def check_the_time(self, workshop):
+        """The steps before the interruption count."""
+        for row in status(workshop.folder / "out").rows[::2]:
+            starts = BatchFolder(workshop.folder / "out").of(row.job) / "starts.json"
+            assert row.record["seconds"] > json.loads(starts.read_text())["seconds"] > float(PACE)
+
     def test_sigterm(self, workshop, driver, wait_for, monkeypatch):
         process = driver("--jobs", "2")
         wait_for(lambda: len(set(workshop.told("step"))) == 2)
@@ -210,6 +216,7 @@ class TestInterruptions:
         states = [row.state for row in status(workshop.folder / "out").rows]
         assert states == ["interrupted", "waiting"] * 2
         self.check_the_rest(workshop, driver, monkeypatch)
+        self.check_the_time(workshop)
 
     def test_a_second_signal_does_not_wait_for_a_step(self, workshop, driver, wait_for, monkeypatch):
         monkeypatch.setenv("STRIPES_PACE", "1000")
@@ -227,6 +234,7 @@ class TestInterruptions:
         process.kill()
         process.wait(200)
         self.check_the_rest(workshop, driver, monkeypatch)
+        self.check_the_time(workshop)
 
     def test_a_job_that_someone_else_interrupts(self, workshop, wait_for, monkeypatch):
         monkeypatch.setenv("STRIPES_PACE", PACE)

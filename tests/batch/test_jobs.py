@@ -2,8 +2,10 @@
 
 import json
 import shutil
+import tomllib
 
 import pytest
+import tomli_w
 
 from mitex.batch import Job, Plan
 from mitex.batch.jobs import jobs_of
@@ -19,6 +21,16 @@ def jobs(workshop):
         return jobs_of(Plan.of(content, workshop.folder))
 
     return jobs
+
+
+def test_a_plan_that_is_written_down_is_the_same(workshop):
+    """With all that a plan can say."""
+    small = {"method": "stripes", "depth": 0.25, "salt": "x", "apply": {"turn": 3.0}, "output": "ply"}
+    content = {"exemplars": ["a.png", "*.png"], "seeds": [0, 4], "meshes": ["m.obj"]}
+    tables = {"small": small, "b": {"method": "stripes", "of": "small"}, "stripes": {"source": "salt"}}
+    plan = Plan.of(content | {"methods": tables}, workshop.folder)
+    text = tomli_w.dumps(plan.content())
+    assert Plan.of(tomllib.loads(text), workshop.folder) == plan
 
 
 def names(jobs):

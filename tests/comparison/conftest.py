@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import os
-import time
 from collections.abc import Sequence
-from contextlib import chdir
 from pathlib import Path
 
 import pytest
 
-from mitex.cli import main
-from mitex.mesh import icosphere
+from mitex.asset import clay
+from mitex.batch import Plan
+from mitex.comparison.plan import prepared
+from mitex.mesh import Mesh, icosphere
+from tests.batch.in_this_process import InThisProcess
 from tests.cli import bad_files as bad
 
 
@@ -33,6 +33,20 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(f"mitex.comparison.{name}", value)
 
 
+@pytest.fixture
+def grey(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Jobs learn nothing and write grey meshes; words are judged by one view."""
+    monkeypatch.setattr("mitex.batch.task.Process", Grey)
+    monkeypatch.setattr("mitex.render.sides.AZIMUTHS", (0,))
+    monkeypatch.setattr("mitex.render.sides.ELEVATIONS", (0.0,))
+
+
+def words_plan(words: Sequence[str], names: Sequence[str] = ("nca", "x_mesh")) -> Plan:
+    """Textures from words on the ball, to be compared."""
+    table = {"exemplars": list(words), "meshes": ["ball.obj"], "source": "text"}
+    return prepared(Plan.of({"methods": dict.fromkeys(names, table)}))
+
+
 def write_mesh(path: Path) -> None:
     ball = icosphere(6)
     lines = [f"v {x} {y} {z}" for x, y, z in ball.vertices.tolist()]
@@ -40,17 +54,16 @@ def write_mesh(path: Path) -> None:
     path.write_text("\n".join(lines) + "\n")
 
 
-class InThisProcess:
-    """In place of `mitex.batch.process.Process`."""
+class Grey(InThisProcess):
+    """Writes what a job would write, without any texture."""
 
-    pid = os.getpid()
-
-    def __init__(self, words: Sequence[str], folder: Path, *_: object) -> None:
-        self._words, self._folder, self._began = words, folder, time.monotonic()
-
-    def stop(self, *_: object) -> None:
-        """It cannot be stopped."""
+    failing: tuple[str, ...] = ()  # methods
 
     def wait(self) -> tuple[int, int]:
-        with chdir(self._folder):
-            return main(self._words), 1000
+        command, what, *options = self.words
+        out = self.folder / options[options.index("--out") + 1]
+        if command == "fit":
+            out.mkdir(parents=True)
+            return (2 if what in self.failing else 0), 1000
+        clay(Mesh.load(options[options.index("--mesh") + 1])).export(out)
+        return 0, 1000

@@ -38,7 +38,7 @@ def test_a_surface_beside_itself_is_nearer_than_a_rough_one(place, monkeypatch):
 def test_what_the_words_say_scores_high(place, monkeypatch):
     monkeypatch.setattr("mitex.render.sides.AZIMUTHS", (0,))
     monkeypatch.setattr("mitex.render.sides.ELEVATIONS", (0.0,))
-    monkeypatch.setattr(text_pair, "model", MeanColour)
+    monkeypatch.setattr(text_pair, "judge_of", lambda clip: MeanColour())
     (place / "ball.obj").rename("sphere.obj")
     pair, ball = TextPair("red", "sphere.obj"), Mesh.load("sphere.obj")
 

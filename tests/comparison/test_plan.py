@@ -36,6 +36,7 @@ BROKEN = {
         {"--set": "image-quilting:apply.scale=big"},
         "scale of image_quilting cannot be 'big'; give a finite number",
     ),
+    "a study of one method": ({"--study": ""}, "a study of one method asks nothing"),
     "no seeds": ({"--seeds": "0"}, "--seeds 0 is out of range"),
     "a folder of something else": ({"--out": "."}, "'.' holds other files"),
     "an address without Dask": ({"--address": "tcp://a:1"}, "--address means nothing without Dask"),
@@ -47,7 +48,7 @@ def test_broken_comparisons(name, place, capsys):
     changes, message = BROKEN[name]
     options = {key: value for key, value in (GOOD | changes).items() if value is not None}
     before = sorted(place.rglob("*"))
-    words = [word for key, value in options.items() for word in (key, *value.split(" "))]
+    words = [word for key, value in options.items() for word in (key, *value.split())]
     assert main(["compare", *words, "--quiet"]) == 2
     printed = capsys.readouterr()
     assert printed.err.startswith("error: ") and printed.err.count("\n") == 1 and not printed.out

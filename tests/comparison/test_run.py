@@ -2,12 +2,21 @@
 
 import csv
 import json
+import re
+import time
+import tomllib
+from html import unescape
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
+from mitex import __version__
+from mitex.batch import Plan
 from mitex.cli import main
 from mitex.comparison import compare, comparison_plan
 from mitex.comparison.kept import VERSION, Kept, optimized_numbers
+from mitex.comparison.kinds import Pair
 from tests.cli import bad_files as bad
 
 QUILT = ["image_quilting:size=64", "image_quilting:exemplar_size=32", "image_quilting:block=12"]
@@ -45,6 +54,8 @@ def test_a_comparison_goes_on_and_ends_in_files(place, measurings, capsys):
     done = compare(quilting(seeds=2), place / "out")
     assert done.missing == 0 and measurings[1:] == ["apply-image_quilting-a-s1-ball"]
     check_files(place / "out")
+    again = Plan.of(json.loads((place / "out" / "report.json").read_text())["plan"], place)
+    assert compare(again, place / "out").missing == 0 and len(measurings) == 2
 
 
 def check_files(folder):
@@ -59,25 +70,42 @@ def check_files(folder):
     cells = {cell["measure"]: cell for cell in table["cells"]}
     assert cells["gram"]["mean"] == pytest.approx(sum(float(row["gram"]) for row in rows) / 2)
     assert cells["parameters"]["mean"] == 0
+    check_provenance(folder, record, rows)
     html = (folder / "report.html").read_text()
     assert html.count("data:image/jpeg;base64,") == 3 and "http" not in html
 
 
-def test_numbers_of_another_version_are_measured_again(tmp_path, place, monkeypatch):
+def check_provenance(folder, record, rows):
+    """What was asked for, and all settings that a fit had."""
+    config = tomllib.loads((folder / rows[0]["run"] / "config.toml").read_text())
+    assert record["settings"] == {"image_quilting": config} and config["tolerance"] == 0.1
+    assert record["mitex"] == __version__ and record["date"] == time.strftime("%Y-%m-%d")
+    html = (folder / "report.html").read_text()
+    assert "<td>size = 64, exemplar_size = 32, block = 12</td><td>defaults</td>" in html
+    assert "tolerance = 0.1\n" in html
+    (text,) = re.findall("mitex compare --plan</summary><pre>(.*?)</pre>", html, re.DOTALL)
+    assert tomllib.loads(unescape(text)) == record["plan"]
+
+
+def test_numbers_of_another_version_or_judge_are_measured_again(tmp_path):
     from tests.comparison.test_summary import result
 
-    kept, one = Kept(tmp_path / "kept"), result("a", 0)
-    assert kept.completed(one) is None
-    bad.image(tmp_path / "kept" / f"{one.id}.jpg", kind="JPEG")
-    file = tmp_path / "kept" / f"{one.id}.json"
-    file.write_text(json.dumps({"version": VERSION, "numbers": {"gram": 2.5}}))
-    known = kept.completed(one)
-    assert known is not None and known.numbers["gram"] == 2.5
+    kept, one = Kept(tmp_path), result("a", 0)
+    clip, none = (cast(Pair, SimpleNamespace(judge=judge)) for judge in ("clip", None))
+    assert kept.completed(one, none) is None
+    bad.image(tmp_path / f"{one.id}.jpg", kind="JPEG")
+    file = tmp_path / f"{one.id}.json"
+    record = {"version": VERSION, "numbers": {"gram": 2.5}}
+    for judge, pair, other in ((None, none, clip), ("clip", clip, none)):
+        file.write_text(json.dumps(record | ({"judge": judge} if judge else {})))
+        known = kept.completed(one, pair)
+        assert known is not None and known.numbers["gram"] == 2.5
+        assert kept.completed(one, other) is None
     for content in ({"version": VERSION - 1, "numbers": {}}, [], {"version": VERSION}):
         file.write_text(json.dumps(content))
-        assert kept.completed(one) is None
+        assert kept.completed(one, none) is None
     file.write_text("{")
-    assert kept.completed(one) is None
+    assert kept.completed(one, none) is None
 
 
 def test_what_a_fit_optimizes_is_counted_by_its_checkpoint(tmp_path):

@@ -11,12 +11,15 @@ import pytest
 import scipy.stats
 
 from mitex.cli import main
+from mitex.comparison import compare
 from mitex.comparison.answers import Answer, evaluate, holm, read_answers
 from mitex.comparison.study import KEY, PAGE, Question, Study, write_study
 from mitex.errors import ConfigError
 from tests.cli import bad_files as bad
+from tests.comparison.conftest import words_plan
 from tests.comparison.test_summary import result
 
+WORDS = ("red bricks", "green marble")
 EXEMPLARS = {"lava": np.zeros((4, 4, 3))}
 
 
@@ -40,9 +43,14 @@ def test_all_pairs_of_what_was_made_are_asked_about(study):
     assert asked == [("ball", ("a", "b")), ("ball", ("a", "c")), ("ball", ("b", "c")), ("vase", ("a", "b"))]
 
 
+def page_data(page):
+    """What the script of a study's page reads."""
+    return json.loads(re.findall(r'<script id="data" type="application/json">(.*?)</script>', page)[0])
+
+
 def test_the_page_shows_the_pictures_and_names_nothing(study, tmp_path):
     page = (tmp_path / PAGE).read_text()
-    data = json.loads(re.findall(r'<script id="data" type="application/json">(.*?)</script>', page)[0])
+    data = page_data(page)
     assert data["id"] == study.id and len(data["pictures"]) == 6  # the first seed's, and the exemplar
     for asked, question in zip(data["questions"], study.questions, strict=True):
         for choice, method in zip(asked["choices"], question.methods, strict=True):
@@ -55,6 +63,38 @@ def test_one_method_is_nothing_to_ask_about(tmp_path):
     with pytest.raises(ConfigError, match="no two methods"):
         write_study(tmp_path, [result("a", 0)], EXEMPLARS)
     assert not (tmp_path / KEY).exists()
+
+
+def test_words_are_shown_themselves(tmp_path):
+    """Whatever stands in them."""
+    words = "</script>$style red bricks"
+    picture = bad.image(tmp_path / "a.jpg", (8, 8), "JPEG")
+    made = [replace(result(m, 0), exemplar=words, pictures={"picture": picture}) for m in "ab"]
+    data = page_data(write_study(tmp_path, made, {words: None}).read_text())
+    assert [asked["exemplar"] for asked in data["questions"]] == [words] and len(data["pictures"]) == 1
+    assert Study.load(tmp_path).questions == (Question(words, "ball", ("a", "b")),)
+
+
+@pytest.mark.usefixtures("small", "grey")
+class TestComparisons:
+    """The whole way, with jobs that take no time."""
+
+    def test_words_can_be_asked_about(self, place):
+        done = compare(words_plan(WORDS), "out", study=True)
+        assert done.missing == 0 and {"mes", "mes_dir"} <= done.results[0].numbers.keys()
+        asked = {(question.exemplar, question.methods) for question in Study.load("out").questions}
+        assert asked == {(words, ("nca", "x_mesh")) for words in WORDS}
+
+    def test_one_method_is_refused_before_any_work(self, place):
+        with pytest.raises(ConfigError, match="a study of one method"):
+            compare(words_plan(WORDS, ["nca"]), "out", study=True)
+        assert not (place / "out").exists()
+
+    def test_if_the_others_fail_the_report_is_there(self, place, monkeypatch):
+        monkeypatch.setattr("tests.comparison.conftest.Grey.failing", ("x_mesh",))
+        with pytest.raises(ConfigError, match="no two methods"):
+            compare(words_plan(WORDS), "out", study=True)
+        assert {"report.html", "report.csv", "report.json"} <= {file.name for file in place.glob("out/*")}
 
 
 CASES = Study("x", tuple(Question("lava", mesh, ("a", "b")) for mesh in ("ball", "vase", "knot")))
@@ -94,7 +134,22 @@ class TestEvaluation:
     def test_one_case_has_no_spread(self):
         done = evaluate(CASES, {"x": answers(0), "y": answers(1)})
         assert np.isnan([done.f, done.p]).all() and done.pairs == {}
-        assert "needs two cases" in done.text() and "±" not in done.text()
+        assert "needs two methods in two cases" in done.text() and "±" not in done.text()
+
+    def test_a_method_of_one_case_is_left_out_and_named(self):
+        """The tests are those without it; its share is told."""
+        also = Study("x", (*CASES.questions, Question("lava", "cow", ("a", "c"))))
+        without = Study("x", (*CASES.questions, Question("lava", "cow", ("a", "b"))))
+        (done, other) = (
+            evaluate(s, {"x": answers(0, 0, 1, 1), "y": answers(0, 1, 0, 0)}) for s in (also, without)
+        )
+        assert done.untested == ("c",) and done.pairs.keys() == {("a", "b")}
+        a, b = [1.0, 0.5, 0.5, 0.5], [0.0, 0.5, 0.5]
+        f: Any = scipy.stats.f_oneway(a, b)
+        assert (done.f, done.p) == pytest.approx((f.statistic, f.pvalue))
+        text = "of a single case, and not tested: c\n"
+        assert text in done.text() and other.untested == () and text not in other.text()
+        assert {one.method: one.count for one in done.preferences}["c"] == 2
 
 
 def saved(path, study="x", participant="p", entries=((0, 0), (1, 1), (2, 0))):
@@ -120,6 +175,7 @@ def test_files_to_answers(tmp_path):
         ({"entries": ((3, 0),)}, "holds no answers"),
         ({"entries": ((-1, 0),)}, "holds no answers"),
         ({"entries": ((0, 2),)}, "holds no answers"),
+        ({"entries": ((1, 0), (0, 1), (1, 0))}, "answers a question twice"),
         ({"entries": ()}, "there are no answers"),
     ],
 )

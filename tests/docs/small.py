@@ -15,9 +15,7 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import chdir
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,10 +23,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mitex.cli import main
 from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods.registry import methods
 from mitex.training.run import CONFIG
+from tests.batch.in_this_process import InThisProcess
 from tests.docs.blocks import ROOT, blocks
 from tests.features.clip.folders import write_folder
 from tests.methods.nerf.tiny import tiny_capture, write_capture
@@ -104,7 +102,7 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(texture, "healed", lambda growth, state, generator: state)
     patch.setattr(texture, "film", _with_few_frames(texture.film))
     patch.setattr(texture.GrowingTexture, "apply", _small_growth(texture.GrowingTexture.apply))
-    patch.setattr("mitex.batch.task.Process", _InThisProcess)
+    patch.setattr("mitex.batch.task.Process", InThisProcess)
     for name in ("PATCHES", "WINDOWS"):
         patch.setattr(f"mitex.comparison.look_pair.{name}", 1)
     patch.setattr(NcaTexture, "tile", _small_tile(NcaTexture.tile))
@@ -115,19 +113,6 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     for module in (renderer, shell):
         patch.setattr(module, "accumulated", sketch)
         patch.setattr(module, "sensor", lambda resolution: sensor(SIDE))
-
-
-class _InThisProcess:
-    """In place of `mitex.batch.process.Process`."""
-
-    pid = os.getpid()
-
-    def __init__(self, words: Sequence[str], folder: Path, *_: object) -> None:
-        self._words, self._folder = words, folder
-
-    def wait(self) -> tuple[int, int]:
-        with chdir(self._folder):
-            return main(self._words), 0
 
 
 def _ball_in_place_of(mesh: Mesh) -> Mesh:

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 import torch
+from torch.nn.functional import normalize
 
 from mitex.errors import ImageError
-from mitex.evaluation.likeness import LAYERS, exemplar_patches, likeness, patch_features
+from mitex.evaluation.likeness import exemplar_patches, likeness, patch_features
 from mitex.evaluation.metrics import single_image_frechet
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
@@ -37,16 +38,34 @@ def test_equal_patches_are_nearest_then_those_of_the_same_texture(features):
 
 
 def test_one_patch_gives_the_distances_of_the_two_images(images):
-    """By the functions for whole images."""
+    """By the functions for whole images, and by the formula of the transport; each at its layers."""
     a, b = (image[:SIDE, :SIDE] for image in images)
     views = [(image[None], np.ones((1, SIDE, SIDE), bool)) for image in (a, b)]
     result = likeness(patch_features(views[0]), patch_features(views[1]))
     assert result.frechet_fine == pytest.approx(single_image_frechet(a, b, "relu2_2"), rel=1e-4)
-    network = Vgg16("max", "float32")
-    maps = [network.features(torch.from_numpy(image[None]), LAYERS) for image in (a, b)]
-    ours, theirs = ({k: m.flatten(1, 2) for k, m in of_image.items()} for of_image in maps)
+    assert result.frechet_coarse == pytest.approx(single_image_frechet(a, b, "relu4_1"), rel=1e-4)
+    ours, theirs = map(vectors_of, (a, b))
     grams = {k: (v[0].T @ v[0]) / len(v[0]) for k, v in theirs.items()}
-    assert result.gram == pytest.approx(float(gram_loss(ours, grams)) / len(LAYERS), rel=1e-3)
+    assert result.gram == pytest.approx(float(gram_loss(ours, grams)) / 5, rel=1e-3)
+
+
+def test_transport_is_the_larger_mean_of_cosine_distances_to_the_nearest(images):
+    """MeshNCA, equation 4, summed over five layers; of patches so small that no vector is left out."""
+    a, b = (image[:40, :40] for image in images)
+    views = [(image[None], np.ones((1, 40, 40), bool)) for image in (a, b)]
+    expected = 0.0
+    for ours, theirs in zip(vectors_of(a).values(), vectors_of(b).values(), strict=True):
+        costs = 1 - normalize(ours[0], dim=1) @ normalize(theirs[0], dim=1).T
+        expected += float(max(costs.min(0).values.mean(), costs.min(1).values.mean()))
+    result = likeness(patch_features(views[0]), patch_features(views[1]))
+    assert result.transport == pytest.approx(expected, rel=1e-4)
+
+
+def vectors_of(image):
+    """(1, n, C) features of an image at the five layers that transport and Gram matrices take."""
+    layers = [f"relu{block}_1" for block in (1, 2, 3, 4, 5)]
+    maps = Vgg16("max", "float32").features(torch.from_numpy(image[None]), layers)
+    return {layer: values.flatten(1, 2) for layer, values in maps.items()}
 
 
 def test_pixels_that_do_not_count_leave_their_places_out(images):

@@ -1,0 +1,26 @@
+"""Jobs without processes of their own, for tests in which Python's start would take the most time."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import chdir
+from pathlib import Path
+
+from mitex.cli import main
+
+
+class InThisProcess:
+    """In place of `mitex.batch.process.Process`."""
+
+    pid = os.getpid()
+
+    def __init__(self, words: Sequence[str], folder: Path, *_: object) -> None:
+        self.words, self.folder = words, folder
+
+    def stop(self, *_: object) -> None:
+        """It cannot be stopped."""
+
+    def wait(self) -> tuple[int, int]:
+        with chdir(self.folder):
+            return main(self.words), 1000

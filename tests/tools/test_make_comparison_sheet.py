@@ -1,0 +1,70 @@
+"""The script puts the numbers of several comparisons into two tables, and their pictures on a sheet."""
+
+import csv
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from mitex.comparison.measures import COSTS, LOOKS
+from mitex.images import read_image
+from tests.cli import bad_files as bad
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def script(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    script = import_module("make_comparison_sheet")
+    monkeypatch.setattr(script, "GALLERY", tmp_path)
+    return script
+
+
+def comparison(folder, exemplar, numbers):
+    """A folder of a comparison of one method with two seeds on two meshes: (mesh, seed) -> its numbers."""
+    keys = [measure.key for measure in (*LOOKS, *COSTS)]
+    (folder / "measured").mkdir(parents=True)
+    with (folder / "report.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, ["exemplar", "mesh", "method", "seed", *keys, "asset"], restval="")
+        writer.writeheader()
+        for (mesh, seed), values in numbers.items():
+            id = f"apply-a-{mesh}-{seed}"
+            bad.image(folder / "measured" / f"{id}.jpg", (16, 16), "JPEG")
+            names = {"exemplar": exemplar, "mesh": mesh, "method": "a", "seed": seed}
+            writer.writerow({**names, **values, "asset": f"batch/results/{id}/{mesh}.glb"})
+    return str(folder)
+
+
+def lines(printed):
+    """First cells of a line -> all others."""
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in printed if "|" in line]
+    return {row[0]: row[2:] for row in rows if row[1] == "`a`"}
+
+
+def test_likeness_and_costs(script, tmp_path, monkeypatch, capsys):
+    """Over meshes first, then over seeds: gram 2 and 4; 30 and 50 s, 1.2 million parameters, 1.5 GB."""
+
+    def costs(seconds):
+        return {"fit_seconds": seconds, "parameters": 1_200_000.0, "memory": 1.5e9}
+
+    lava = {
+        ("ball", 0): {"gram": 1.0, **costs(20)},
+        ("vase", 0): {"gram": 3.0, **costs(40)},
+        ("ball", 1): {"gram": 4.0, **costs(50)},
+        ("vase", 1): {"gram": 4.0, **costs(50)},
+    }
+    folders = [comparison(tmp_path / "lava", "lava", lava)]
+    folders.append(comparison(tmp_path / "rust", "rust", {("ball", 0): {"gram": 5.0, **costs(1)}}))
+    options = ["--methods", "a", "--mesh", "ball", "--", *folders]
+    monkeypatch.setattr(sys, "argv", ["make_comparison_sheet.py", *options])
+    script.main()
+    likeness, spent = (part.splitlines() for part in capsys.readouterr().out.split("\n\n")[:2])
+    assert all(measure.label in likeness[0] for measure in LOOKS) and "Gram" not in spent[0]
+    gram = 3
+    assert lines(likeness)["lava"][gram] == "3.00 ± 1.4" and lines(likeness)["rust"][gram] == "5.00"
+    assert lines(likeness)["lava"][0] == "–"
+    assert lines(spent)["lava"] == ["1,200,000", "40.0 ± 14", "–", "1.50"]
+    assert lines(spent)["vase"][1] == "45.0 ± 7.1"
+    assert read_image(tmp_path / "comparison.jpg").shape[2] == 3
