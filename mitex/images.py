@@ -60,7 +60,7 @@ def read_image(
     return pixels if pixels.shape[2] == 3 else pixels.repeat(3, axis=2)
 
 
-def read_bytes(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> np.ndarray:
+def read_bytes(path: str | os.PathLike[str]) -> np.ndarray:
     """Read a PNG or JPEG with its alpha channel; otherwise as `read_image`.
 
     Returns:
@@ -69,7 +69,7 @@ def read_bytes(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> np
     Raises:
         ImageError: missing, empty, not a PNG or JPEG, animated, over the budget, damaged.
     """
-    return _read(Path(path), max_pixels, _bytes)
+    return _read(Path(path), MAX_PIXELS, _bytes)
 
 
 def write_image(path: str | os.PathLike[str], array: np.ndarray) -> Path:

@@ -19,12 +19,12 @@ POINTS = 20_000  # on each kind of edge, at most
 Values = Callable[[np.ndarray, np.ndarray], np.ndarray]  # faces (P,), barycentrics (P, 3) -> (P, C)
 
 
-def seam_ratio(asset: Asset, step: float, seed: int = 0) -> float:
+def seam_ratio(asset: Asset, step: float) -> float:
     """How much more an asset's colours change across the seams of its layout than across other edges.
 
     Args:
         asset: with an albedo texture.
-        step, seed: as of `ratio_across`.
+        step: as of `ratio_across`.
 
     Returns:
         As `ratio_across`, of the albedo in sRGB; NaN without textures.
@@ -36,7 +36,7 @@ def seam_ratio(asset: Asset, step: float, seed: int = 0) -> float:
     def colours(face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         return bilinear(albedo, interpolate(barycentric, uv[face]))
 
-    return ratio_across(asset.mesh, uv, colours, step, seed)
+    return ratio_across(asset.mesh, uv, colours, step)
 
 
 def ratio_across(mesh: Mesh, uv: np.ndarray, values: Values, step: float, seed: int = 0) -> float:
