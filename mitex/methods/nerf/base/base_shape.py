@@ -50,8 +50,8 @@ def base_shape(
         A closed mesh in the scene cube with the bounding box of the object.
 
     Raises:
-        MeshError: the density is not finite or nowhere above 10, or a package of the extra `nerf` is not
-            installed.
+        MeshError: the density is not finite or nowhere above 10.
+        MissingPackage: a package of the extra `nerf` is not installed.
     """
     if not np.isfinite(density).all():
         raise MeshError("the coarse density is not finite", "lower the learning rate, or give `base_mesh`")
