@@ -12,7 +12,7 @@ from mitex.features.vgg import MEAN_RGB, Weights, convolutions
 from mitex.methods.surface.levels import Levels
 from mitex.methods.surface.operations import BilinearConv, SurfaceConv, SurfacePool
 from mitex.methods.surface.regions import bisect
-from mitex.runtime import bfloat16_is_fast
+from mitex.runtime import uses_bfloat16
 
 POOLED = tuple(f"pool{n}" for n in range(1, 6))
 
@@ -43,8 +43,7 @@ class SurfaceVgg:
         scale: int = 0,
         weights: Weights | None = None,
     ) -> None:
-        fast = precision == "bfloat16" or (precision == "auto" and bfloat16_is_fast())
-        self.dtype = torch.bfloat16 if fast else torch.float32
+        self.dtype = torch.bfloat16 if uses_bfloat16(precision) else torch.float32
         self.texels = len(levels.order)
         self.operations: list[Operation] = []
         self.index: dict[str, int] = {}

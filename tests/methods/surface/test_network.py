@@ -195,6 +195,11 @@ def test_bfloat16_agrees(levels, image):
     assert torch.cosine_similarity(gradient.flatten(), close.flatten(), dim=0) > 0.999
 
 
+def test_an_unknown_precision_is_refused(levels):
+    with pytest.raises(ConfigError, match="unknown precision 'float16'"):
+        SurfaceVgg(levels, precision="float16")
+
+
 def test_random_weights_are_used_as_they_are(levels, image):
     """Features are those of the image network with the same weights, and not the trained ones."""
     weights = random_weights(torch.Generator().manual_seed(0))
