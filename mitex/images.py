@@ -96,7 +96,7 @@ def write_image(path: str | os.PathLike[str], array: np.ndarray) -> Path:
         )
     if not np.isfinite(array).all():
         raise ImageError("the image holds NaN or infinite values", "check the step that made it")
-    image = Image.fromarray(np.round(np.clip(array, 0.0, 1.0) * 255.0).astype(np.uint8))
+    image = Image.fromarray(to_bytes(array))
     is_png = path.suffix.lower() == ".png"
     with atomic_write(path) as temporary:
         if is_png:
@@ -104,6 +104,11 @@ def write_image(path: str | os.PathLike[str], array: np.ndarray) -> Path:
         else:
             image.save(temporary, format="JPEG", quality=92, subsampling=0)
     return path
+
+
+def to_bytes(values: np.ndarray) -> np.ndarray:
+    """Values in [0, 1] as uint8, clipped and rounded."""
+    return np.round(np.clip(values, 0.0, 1.0) * 255.0).astype(np.uint8)
 
 
 def resize(array: np.ndarray, height: int, width: int) -> np.ndarray:
