@@ -107,6 +107,16 @@ class Atlas:
         for top in range(0, self.resolution, height):
             yield slice(top, min(top + height, self.resolution))
 
+    def points(self, rows: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What the texels of some rows show, none of it beyond its face.
+
+        Returns:
+            (n, N) bool, which texels show a point; (P,) faces and (P, 3) barycentrics of those.
+        """
+        used = self.face[rows] >= 0
+        barycentric = self.barycentric[rows][used].clip(0)
+        return used, self.face[rows][used], barycentric / barycentric.sum(axis=1, keepdims=True)
+
     def _strip(self, rows: slice) -> Atlas:
         return Atlas(self.uv, self.face[rows], self.barycentric[rows], self.inside[rows])
 
