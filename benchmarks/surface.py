@@ -20,13 +20,14 @@ import torch
 from rich.console import Console
 from rich.table import Table
 
-from mitex.features.layers import CHANNELS, LAYERS
+from mitex.features.frozen import GramTap
+from mitex.features.layers import CHANNELS, LAYERS, with_poolings
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.layout import with_layout
 from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.levels import Levels
-from mitex.methods.surface.network import ALL_LAYERS, SurfaceVgg
+from mitex.methods.surface.network import SurfaceVgg
 from mitex.runtime import keep_freed_memory
 
 PREPARATION = {(5_120, 256): 21, (5_120, 512): 42, (5_120, 1024): 104, (200_000, 1024): 150}  # the paper [s]
@@ -78,7 +79,7 @@ def measure(mesh: Mesh, resolution: int, repetitions: int) -> Result:
 
 def _step(network: SurfaceVgg, values: torch.Tensor) -> float:
     start = time.perf_counter()
-    grams = network.gram_matrices(values, ALL_LAYERS)
+    grams = network.read(values, {name: GramTap(network.place(name)) for name in with_poolings(LAYERS)})
     torch.stack([gram.square().mean() for gram in grams.values()]).sum().backward()
     values.grad = None
     return time.perf_counter() - start

@@ -22,6 +22,7 @@ __all__ = [
     "Mesh",
     "MeshError",
     "MeshWarning",
+    "MissingPackage",
     "MitexError",
     "MitexWarning",
     "OutputError",
@@ -37,8 +38,8 @@ __all__ = [
 ]
 
 _ERRORS = (
-    *("CaptureError", "CheckpointError", "ConfigError", "ImageError", "MeshError", "MitexError"),
-    *("OutputError", "RuntimeUnavailable", "WeightsError"),
+    *("CaptureError", "CheckpointError", "ConfigError", "ImageError", "MeshError", "MissingPackage"),
+    *("MitexError", "OutputError", "RuntimeUnavailable", "WeightsError"),
     *("CaptureWarning", "MeshWarning", "MitexWarning", "TextureWarning"),
 )
 
@@ -68,6 +69,7 @@ if TYPE_CHECKING:
         ImageError,
         MeshError,
         MeshWarning,
+        MissingPackage,
         MitexError,
         MitexWarning,
         OutputError,

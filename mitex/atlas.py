@@ -25,6 +25,7 @@ LARGE = 40_000  # meshes of more faces are unwrapped in pieces
 HUGE = 150_000  # meshes of more faces are projected: unwrapping takes a minute from here on
 ROUGHNESS = 0.03  # by which vertices are moved before unwrapping [edge lengths], see `_rough`
 STRIP = 1 << 18  # texels
+OVERLAP_SIDE = 512  # of the raster on which overlaps are counted [texels]
 FULL = 1.001  # the area of the unit square, and some rounding
 
 
@@ -105,6 +106,16 @@ class Atlas:
         height = max(STRIP // self.resolution, 1)
         for top in range(0, self.resolution, height):
             yield slice(top, min(top + height, self.resolution))
+
+    def points(self, rows: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What the texels of some rows show, none of it beyond its face.
+
+        Returns:
+            (n, N) bool, which texels show a point; (P,) faces and (P, 3) barycentrics of those.
+        """
+        used = self.face[rows] >= 0
+        barycentric = self.barycentric[rows][used].clip(0)
+        return used, self.face[rows][used], barycentric / barycentric.sum(axis=1, keepdims=True)
 
     def _strip(self, rows: slice) -> Atlas:
         return Atlas(self.uv, self.face[rows], self.barycentric[rows], self.inside[rows])
@@ -276,13 +287,12 @@ def laid_out(mesh: Mesh, resolution: int, padding: int = 8) -> Mesh:
     return replace(mesh, uv=unwrap(mesh, resolution, padding))
 
 
-def usable_uv(mesh: Mesh, uv: np.ndarray, resolution: int = 512) -> bool:
+def usable_uv(mesh: Mesh, uv: np.ndarray) -> bool:
     """Whether a layout can carry a map of its own: in [0, 1], no part missing, no two faces overlapping.
 
     Args:
         mesh: the mesh.
         uv: (F, 3, 2) layout.
-        resolution: side of the raster on which overlaps are counted [texels].
     """
     if not np.isfinite(uv).all() or uv.min() < 0.0 or uv.max() > 1.0:
         return False
@@ -291,8 +301,8 @@ def usable_uv(mesh: Mesh, uv: np.ndarray, resolution: int = 512) -> bool:
         return False
     if np.abs(twice_area(uv)).sum() > 2 * FULL:  # more than fits side by side: no need to look
         return False
-    count = np.zeros(resolution * resolution, np.int32)
-    for _, texel, barycentric in covered_texels(uv, resolution):
+    count = np.zeros(OVERLAP_SIDE * OVERLAP_SIDE, np.int32)
+    for _, texel, barycentric in covered_texels(uv, OVERLAP_SIDE):
         # Strictly inside: faces of one chart share their edges.
         count += np.bincount(texel[barycentric.min(axis=1) > 1e-3], minlength=count.size).astype(np.int32)
     return bool((count > 1).sum() <= 1e-3 * max((count > 0).sum(), 1))

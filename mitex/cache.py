@@ -44,8 +44,7 @@ def cached(
     """The result kept in the folder `place`, else that of `compute`, which is kept then.
 
     A cache that cannot be read or written is no error, and neither is one that was damaged, by its manifest:
-    the result is computed again. After a new result the
-    cache is trimmed to its `limit`.
+    the result is computed again. After a new result the cache is trimmed to its `limit`.
 
     Args:
         place: of this result alone.

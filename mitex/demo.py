@@ -115,14 +115,13 @@ class Piece:
 def _synthesized(run: Path, seed: int, quiet: bool) -> SurfaceTexture:
     from mitex.exemplar import Exemplar
     from mitex.methods import surface
-    from mitex.training.locate import CHECKPOINT, PREVIOUS
+    from mitex.training.locate import has_checkpoint
     from mitex.training.progress import ProgressDisplay
 
     maps = Exemplar.load(EXEMPLAR).maps
     exemplar = Exemplar({name: maps[name] for name in MAPS}, EXEMPLAR)
-    resume = any((run / name).is_file() for name in (CHECKPOINT, PREVIOUS))
     with nullcontext() if quiet else ProgressDisplay() as on_step:
-        return surface.fit(exemplar, MESH, run, seed=seed, resume=resume, on_step=on_step)
+        return surface.fit(exemplar, MESH, run, seed=seed, resume=has_checkpoint(run), on_step=on_step)
 
 
 def _grown(model: str, mesh: str, seed: int) -> tuple[Asset, str]:

@@ -49,6 +49,10 @@ class WeightsError(MitexError):
     """Weights of a frozen network are missing or not the expected file."""
 
 
+class MissingPackage(MitexError):
+    """A package of one of Mitex's extras is not installed."""
+
+
 class RuntimeUnavailable(MitexError):
     """Mitsuba cannot run here: no usable LLVM, or a broken installation."""
 

@@ -103,6 +103,11 @@ class Exemplar:
             raise ImageError(f"there is no exemplar {path}", suggestion(str(path), names(), otherwise))
         return Exemplar({"albedo": _check_side(read_image(source), source)}, source.stem)
 
+    @staticmethod
+    def of(source: Exemplar | str | os.PathLike[str]) -> Exemplar:
+        """An exemplar as it is, or that which `load` reads."""
+        return source if isinstance(source, Exemplar) else Exemplar.load(source)
+
     def of_albedo(self) -> Exemplar:
         """The exemplar's albedo alone, for methods that know colours only.
 

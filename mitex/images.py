@@ -60,7 +60,7 @@ def read_image(
     return pixels if pixels.shape[2] == 3 else pixels.repeat(3, axis=2)
 
 
-def read_bytes(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> np.ndarray:
+def read_bytes(path: str | os.PathLike[str]) -> np.ndarray:
     """Read a PNG or JPEG with its alpha channel; otherwise as `read_image`.
 
     Returns:
@@ -69,7 +69,7 @@ def read_bytes(path: str | os.PathLike[str], max_pixels: int = MAX_PIXELS) -> np
     Raises:
         ImageError: missing, empty, not a PNG or JPEG, animated, over the budget, damaged.
     """
-    return _read(Path(path), max_pixels, _bytes)
+    return _read(Path(path), MAX_PIXELS, _bytes)
 
 
 def write_image(path: str | os.PathLike[str], array: np.ndarray) -> Path:
@@ -96,7 +96,7 @@ def write_image(path: str | os.PathLike[str], array: np.ndarray) -> Path:
         )
     if not np.isfinite(array).all():
         raise ImageError("the image holds NaN or infinite values", "check the step that made it")
-    image = Image.fromarray(np.round(np.clip(array, 0.0, 1.0) * 255.0).astype(np.uint8))
+    image = Image.fromarray(to_bytes(array))
     is_png = path.suffix.lower() == ".png"
     with atomic_write(path) as temporary:
         if is_png:
@@ -104,6 +104,11 @@ def write_image(path: str | os.PathLike[str], array: np.ndarray) -> Path:
         else:
             image.save(temporary, format="JPEG", quality=92, subsampling=0)
     return path
+
+
+def to_bytes(values: np.ndarray) -> np.ndarray:
+    """Values in [0, 1] as uint8, clipped and rounded."""
+    return np.round(np.clip(values, 0.0, 1.0) * 255.0).astype(np.uint8)
 
 
 def resize(array: np.ndarray, height: int, width: int) -> np.ndarray:

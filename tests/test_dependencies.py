@@ -51,7 +51,7 @@ def modules(requirements: Iterable[str]) -> set[str]:
 
 
 def imports(*folders: Path) -> set[str]:
-    """Top-level modules imported below folders, by statement or by `import_module`, in functions too.
+    """Top-level modules imported below folders, in functions too, also by `import_module` and `optional`.
 
     The standard library, Mitex, and the files and packages of the folders do not count.
     """
@@ -68,7 +68,7 @@ def _imported(tree: ast.AST) -> Iterable[str]:
                 yield from (alias.name for alias in aliases)
             case ast.ImportFrom(module=str(module), level=0):
                 yield module
-            case ast.Call(func=ast.Name("import_module"), args=[ast.Constant(str(module)), *_]):
+            case ast.Call(func=ast.Name("import_module" | "optional"), args=[ast.Constant(str(module)), *_]):
                 yield module
 
 
@@ -119,15 +119,17 @@ def test_an_unused_and_an_undeclared_dependency_are_named(tmp_path):
         "def late():\n"
         "    from torch.nn import functional\n"
         "    import_module('mitsuba.python')\n"
+        "    optional('coacd', 'nerf')\n"
     )
     imported = imports(tmp_path)
-    assert imported == {"numpy", "PIL", "torch", "mitsuba"}
+    assert imported == {"numpy", "PIL", "torch", "mitsuba", "coacd"}
     declared = modules(
         ["numpy>=2", "pillow", "scipy[all]>=1; python_version>'3'", "torch", "ruff", "mitex[nerf]"]
     )
     assert declared == {"numpy", "PIL", "scipy", "torch"}
     assert faults(declared, imported) == [
         "scipy is declared, but not imported",
+        "coacd is imported, but not declared",
         "mitsuba is imported, but not declared",
     ]
     assert faults({"numpy"}, {"numpy"}) == []

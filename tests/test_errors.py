@@ -24,6 +24,7 @@ SPOKEN = {"cli.py", "arguments.py", "options.py", "checks.py", "animation.py", "
         errors.ConfigError,
         errors.OutputError,
         errors.CheckpointError,
+        errors.MissingPackage,
         errors.RuntimeUnavailable,
     ],
 )

@@ -242,3 +242,8 @@ class TestNormalMaps:
         grey = rng.integers(60, 256, (32, 32, 1), np.uint8).repeat(3, axis=2)
         Image.fromarray(grey).save(tmp_path / "normal.png")
         assert_refused(tmp_path, "normal.png", "not a tangent-space normal map")
+
+
+def test_an_exemplar_is_taken_as_it_is_and_a_name_is_loaded():
+    bricks = Exemplar.load("bricks")
+    assert Exemplar.of(bricks) is bricks and Exemplar.of("bricks").key == bricks.key

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from mitex.errors import ImageError, OutputError
-from mitex.images import read_bytes, read_image, resize, write_image
+from mitex.images import read_bytes, read_image, resize, to_bytes, write_image
 
 
 def pixels(height=5, width=7, channels=3, seed=0):
@@ -273,3 +273,8 @@ class TestResize:
         ramp = np.linspace(0, 1, 8, dtype=np.float32)[:, None, None].repeat(8, 1)
         small = resize(ramp, 4, 8)
         assert (np.diff(small[:, 0, 0]) > 0.1).all() and np.ptp(small[0]) < 1e-6
+
+
+def test_bytes_are_rounded_and_clipped():
+    values = np.array([-0.2, 0.0, 0.4 / 255, 0.6 / 255, 0.5, 1.0, 1.2], np.float32)
+    assert to_bytes(values).tolist() == [0, 0, 0, 1, 128, 255, 255] and to_bytes(values).dtype == np.uint8

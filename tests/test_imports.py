@@ -53,6 +53,7 @@ ORDER = [
     "paths",
     "reading",
     "suggestions",
+    "optional",
     "errors",
     "mitex",
     "lazy",

@@ -36,7 +36,7 @@ def shown(quiet: bool = False, stream: TextIO | None = None) -> Iterator[None]:
         yield
         return
     place = cast(TextIO, stream or sys.stderr)
-    screen: _Screen = _Terminal(place) if place.isatty() else _Lines(place)
+    screen: _Screen = _Terminal(place) if place.isatty() else _ReminderLines(place)
     try:
         with listening(_Teller(screen)):
             announce("starting")
@@ -100,7 +100,7 @@ class _Terminal:
         return bar
 
 
-class _Lines:
+class _ReminderLines:
     """A line once work has taken a while, and again if it goes on; by a thread, since work says nothing."""
 
     def __init__(self, stream: TextIO):

@@ -83,7 +83,7 @@ def _run(command: Any) -> int:
     from mitex.cli.display import shown
     from mitex.runtime.signals import terminable
 
-    log, lines, quiet = logging.getLogger("mitex"), _Lines(), getattr(command, "quiet", False)
+    log, lines, quiet = logging.getLogger("mitex"), _LogLines(), getattr(command, "quiet", False)
     level = log.level
     log.addHandler(lines)
     log.setLevel(logging.WARNING if quiet else logging.INFO)
@@ -102,7 +102,7 @@ def _print_any_name() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
-class _Lines(logging.Handler):
+class _LogLines(logging.Handler):
     """Log records as lines on stderr, unbuffered: one may come from a signal handler inside of a print."""
 
     def emit(self, record: logging.LogRecord) -> None:

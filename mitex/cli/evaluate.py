@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
 from mitex.errors import ConfigError
+
+if TYPE_CHECKING:
+    from mitex.asset import Asset
 
 
 @dataclass
@@ -69,23 +73,27 @@ class Evaluate:
         for label, (value, better) in numbers.items():
             print(f"{label:18}  {value:9.4g}  {better}")
 
+    @cached_property
+    def _loaded(self) -> Asset:
+        from mitex.asset import Asset
+
+        return Asset.load(self.asset)
+
     def _likeness(self) -> dict[str, tuple[float, str]]:
         """Numbers beside the exemplar: label -> value, and which way better lies."""
         if self.exemplar is None:
             return {}
-        from mitex.asset import Asset
         from mitex.comparison.look_pair import LookPair
 
-        return _labelled(LookPair(self.exemplar, str(self.asset)).numbers(Asset.load(self.asset)))
+        return _labelled(LookPair(self.exemplar, str(self.asset)).numbers(self._loaded))
 
     def _relief(self) -> dict[str, tuple[float, str]]:
         """Numbers beside the reference, as `_likeness`."""
         if self.reference is None:
             return {}
-        from mitex.asset import Asset
         from mitex.comparison.relief_pair import ReliefPair
 
-        return _labelled(ReliefPair(self.reference, str(self.asset)).numbers(Asset.load(self.asset)))
+        return _labelled(ReliefPair(self.reference, str(self.asset)).numbers(self._loaded))
 
     def _fit_of_words(self) -> dict[str, tuple[float, str]]:
         """Scores beside the words, as `_likeness`."""
@@ -93,7 +101,7 @@ class Evaluate:
             return {}
         import torch
 
-        from mitex.asset import Asset, clay
+        from mitex.asset import clay
         from mitex.evaluation.text import text_scores
         from mitex.features.text_image import object_prompt
         from mitex.features.text_model import text_image_model
@@ -102,10 +110,8 @@ class Evaluate:
         model, thing = text_image_model(self.clip), self.object or "object"
         prompt = object_prompt(self.text, thing)
         model.encode_texts([prompt, thing])  # before it takes the time of pictures: unknown words are refused
-        asset = Asset.load(self.asset)
-        textured, bare = (
-            torch.from_numpy(sides(shown, model.resolution)) for shown in (asset, clay(asset.mesh))
-        )
+        shown = (self._loaded, clay(self._loaded.mesh))
+        textured, bare = (torch.from_numpy(sides(asset, model.resolution)) for asset in shown)
         scores = text_scores(model, textured, bare, prompt, thing)
         return {"MES": (scores.score, "high is better"), "MES-dir": (scores.direction, "high is better")}
 

@@ -54,7 +54,7 @@ class Gallery:
         content = load(method.page)([model["name"] for model in growing], meshes)
         content = content.extended(
             thumbnails=[_thumbnail(model) for model in growing],
-            stills=[*_stills(models)],
+            stills=[*_stills(model for model in models if model not in growing)],
         )
         Content("Gallery", content.data).write(out)
         print(self.out)
@@ -67,14 +67,13 @@ def _thumbnail(model: dict[str, Any]) -> str | None:
 
 
 def _stills(models: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """The models that do not grow in a page, as they are on a ring."""
+    """Models as they are on a ring."""
     from mitex.asset import Asset
     from mitex.mesh import torus
     from mitex.page.still import still_data
 
     for model in models:
-        method = methods()[model["method"]]
-        if method.page is None:
-            asset = method.load_texture().load(model["path"]).apply(torus(*RING))
-            if isinstance(asset, Asset):
-                yield still_data(replace(asset, name=model["name"])) | {"thumbnail": _thumbnail(model)}
+        texture = methods()[model["method"]].load_texture().load(model["path"])
+        asset = texture.apply(torus(*RING))
+        if isinstance(asset, Asset):
+            yield still_data(replace(asset, name=model["name"])) | {"thumbnail": _thumbnail(model)}

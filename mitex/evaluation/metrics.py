@@ -16,8 +16,9 @@ import numpy as np
 import torch
 import torch.nn.functional as F
 
-from mitex.errors import ImageError, MitexError
+from mitex.errors import ImageError
 from mitex.features import Vgg16
+from mitex.optional import optional
 
 PERCEPTUAL_LAYERS = ("relu1_2", "relu2_2", "relu3_3", "relu4_3", "relu5_3")
 FRECHET_LAYER = "relu2_2"
@@ -42,17 +43,13 @@ def ssim(a: np.ndarray, b: np.ndarray, mask: np.ndarray | None = None) -> float:
     The mean over channels and over the pixels whose 11 x 11 windows lie in the image.
 
     Raises:
-        MitexError: scikit-image is not installed.
+        MissingPackage: scikit-image is not installed.
         ImageError: as in `psnr`, or images smaller than a window.
     """
     _check_pair(a, b)
     if min(a.shape[:2]) <= 2 * SSIM_RADIUS:
         raise ImageError(f"images of {a.shape[1]} x {a.shape[0]} have no SSIM", "give 11 x 11 pixels or more")
-    try:
-        from skimage.metrics import structural_similarity
-    except ImportError as e:
-        raise MitexError("scikit-image is not installed", "run `pip install 'mitex[nerf]'`") from e
-    result = structural_similarity(
+    result = optional("skimage.metrics", "nerf").structural_similarity(
         a.astype(np.float64),
         b.astype(np.float64),
         data_range=1.0,

@@ -11,7 +11,7 @@ from mitex.asset import Asset
 from mitex.geometry.triangles import interpolate
 from mitex.images import bilinear
 from mitex.mesh import Mesh
-from mitex.mesh.topology import face_edges
+from mitex.mesh.topology import paired_sides
 
 POINTS = 20_000  # on each kind of edge, at most
 
@@ -19,12 +19,12 @@ POINTS = 20_000  # on each kind of edge, at most
 Values = Callable[[np.ndarray, np.ndarray], np.ndarray]  # faces (P,), barycentrics (P, 3) -> (P, C)
 
 
-def seam_ratio(asset: Asset, step: float, seed: int = 0) -> float:
+def seam_ratio(asset: Asset, step: float) -> float:
     """How much more an asset's colours change across the seams of its layout than across other edges.
 
     Args:
         asset: with an albedo texture.
-        step, seed: as of `ratio_across`.
+        step: as of `ratio_across`.
 
     Returns:
         As `ratio_across`, of the albedo in sRGB; NaN without textures.
@@ -36,7 +36,7 @@ def seam_ratio(asset: Asset, step: float, seed: int = 0) -> float:
     def colours(face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         return bilinear(albedo, interpolate(barycentric, uv[face]))
 
-    return ratio_across(asset.mesh, uv, colours, step, seed)
+    return ratio_across(asset.mesh, uv, colours, step)
 
 
 def ratio_across(mesh: Mesh, uv: np.ndarray, values: Values, step: float, seed: int = 0) -> float:
@@ -55,20 +55,11 @@ def ratio_across(mesh: Mesh, uv: np.ndarray, values: Values, step: float, seed: 
     Returns:
         1 where seams cannot be seen, more where they can; NaN without seams, or if nothing changes.
     """
-    sides = _paired_sides(mesh.faces, len(mesh.vertices))
+    sides = paired_sides(mesh.faces, len(mesh.vertices))
     cut = _is_cut(uv, mesh.faces, sides)
     generator = np.random.default_rng(seed)
     across, within = (_change(mesh, values, sides[kind], step, generator) for kind in (cut, ~cut))
     return across / within if within > 0 else math.nan
-
-
-def _paired_sides(faces: np.ndarray, vertices: int) -> np.ndarray:
-    """(E, 2) of edges between two faces: their sides 3 f + k, from the corner k to the next one."""
-    pairs, sides = face_edges(faces, vertices)
-    order = np.argsort(sides.ravel(), kind="stable")
-    total = np.bincount(sides.ravel(), minlength=len(pairs))
-    first = (np.cumsum(total) - total)[total == 2]
-    return np.stack([order[first], order[first + 1]], axis=1)
 
 
 def _is_cut(uv: np.ndarray, faces: np.ndarray, sides: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import scipy.stats
 from mitex.geometry.vectors import scatter_add, unit
 from mitex.mesh import Mesh
 from mitex.mesh.cotangents import cotangent_weights
-from mitex.mesh.topology import face_edges
+from mitex.mesh.topology import mesh_edges, paired_sides
 
 LEAST = 1e-12
 
@@ -21,11 +21,11 @@ def local_statistics(mesh: Mesh) -> dict[str, np.ndarray]:
         `edges`: edge lengths over their mean; `curvature`: signed mean curvature at the vertices times the
         mean edge length, positive where the surface is convex.
     """
-    pairs, sides = face_edges(mesh.faces, len(mesh.vertices))
+    pairs, _ = mesh_edges(mesh.faces, len(mesh.vertices))
     points = mesh.vertices.astype(np.float64)
     lengths = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
     return {
-        "dihedral": _dihedral_angles(mesh, sides, len(pairs)),
+        "dihedral": _dihedral_angles(mesh),
         "edges": lengths / lengths.mean(),
         "curvature": _mean_curvature(mesh) * lengths.mean(),
     }
@@ -37,12 +37,9 @@ def statistic_distances(mesh: Mesh, reference: Mesh) -> dict[str, float]:
     return {name: float(scipy.stats.wasserstein_distance(ours[name], theirs[name])) for name in ours}
 
 
-def _dihedral_angles(mesh: Mesh, sides: np.ndarray, count: int) -> np.ndarray:
-    """(E,) of the edges between two faces."""
-    order = np.argsort(sides.ravel(), kind="stable")
-    total = np.bincount(sides.ravel(), minlength=count)
-    first = (np.cumsum(total) - total)[total == 2]
-    one, other = order[first] // 3, order[first + 1] // 3
+def _dihedral_angles(mesh: Mesh) -> np.ndarray:
+    """(P,) of the edges between two faces."""
+    one, other = paired_sides(mesh.faces, len(mesh.vertices)).T // 3
     normals = unit(mesh.face_crosses)
     centres = mesh.vertices[mesh.faces].astype(np.float64).mean(1)
     angle = np.arccos(np.clip((normals[one] * normals[other]).sum(1), -1, 1))

@@ -9,7 +9,7 @@ from pathlib import Path
 from mitex.asset import Asset
 from mitex.errors import ConfigError, MeshError
 from mitex.export.common import REMEDY
-from mitex.export.exr import read_exr, write_exr, write_textures, write_views
+from mitex.export.exr import write_exr, write_textures, write_views
 from mitex.export.folder import Format, check_folder, write_folder, write_maps
 from mitex.export.glb import read_glb, write_glb, write_variants
 from mitex.export.obj import check_side_files, read_obj, write_obj
@@ -29,7 +29,6 @@ __all__ = [
     "is_folder",
     "prepare_export",
     "read_asset",
-    "read_exr",
     "read_glb",
     "read_obj",
     "read_ply",

@@ -12,7 +12,7 @@ import OpenEXR
 from mitex import __version__
 from mitex.asset import Asset
 from mitex.colour import srgb_to_linear
-from mitex.errors import ConfigError, ImageError
+from mitex.errors import ConfigError
 from mitex.exemplar import MAPS
 from mitex.export.common import GENERATOR
 from mitex.paths import atomic_write, prepare_output
@@ -54,19 +54,6 @@ def write_exr(path: str | os.PathLike[str], channels: Mapping[str, np.ndarray], 
         except RuntimeError as e:  # the library has no other error
             raise OSError(0, str(e)) from e
     return target
-
-
-def read_exr(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
-    """The channels of an EXR file, name -> (H, W).
-
-    Raises:
-        ImageError: missing or damaged.
-    """
-    try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
-            return {k: v.pixels for k, v in file.channels().items()}
-    except Exception as e:  # RuntimeError and others, by version
-        raise ImageError(f"{path} is not a readable EXR file", "check the path") from e
 
 
 def is_exr_of_ours(path: Path) -> bool:

@@ -13,6 +13,7 @@ import numpy as np
 from mitex.asset import Asset
 from mitex.export.common import GENERATOR, foreign
 from mitex.geometry.tangents import split_at_hard_edges
+from mitex.images import to_bytes
 from mitex.mesh import Mesh
 from mitex.mesh.polygons import outlines
 from mitex.mesh.readers import Budget
@@ -69,7 +70,7 @@ def _vertices(asset: Asset) -> np.ndarray:
     if mesh.corner_normals is not None:
         columns["vertex"] = split.source.astype(np.uint32)
     if "albedo" in asset.vertex_maps:
-        rgb = np.round(asset.vertex_maps["albedo"][split.source] * 255.0).astype(np.uint8)
+        rgb = to_bytes(asset.vertex_maps["albedo"][split.source])
         columns |= dict(zip(_COLOURS, rgb.T, strict=True))
     table = np.empty(len(split.source), [(k, v.dtype.newbyteorder("<")) for k, v in columns.items()])
     for key, values in columns.items():

@@ -43,6 +43,9 @@ class TextImageModel(Protocol):
 
         Returns:
             (K, D) embeddings, not normalised.
+
+        Raises:
+            ImageError: pictures of another shape.
         """
         ...
 

@@ -12,7 +12,7 @@ from mitex.errors import ConfigError
 from mitex.features import weights
 from mitex.features.frozen import FrozenConv, FrozenStack, Pool, Tap
 from mitex.features.layers import LAYERS
-from mitex.runtime import bfloat16_is_fast
+from mitex.runtime import uses_bfloat16
 
 Weights = Mapping[str, tuple[torch.Tensor, torch.Tensor]]  # layer -> weight (O, I, 3, 3), bias (O,)
 MEAN_RGB = (123.68, 116.779, 103.939)  # of ImageNet, in [0, 255]
@@ -43,11 +43,8 @@ class Vgg16:
     ) -> None:
         if pool not in ("average", "max"):
             raise ConfigError(f"unknown pooling {pool!r}", "use 'average' or 'max'")
-        if precision not in ("auto", "bfloat16", "float32"):
-            raise ConfigError(f"unknown precision {precision!r}", "use 'auto', 'bfloat16' or 'float32'")
-        fast = precision == "bfloat16" or (precision == "auto" and bfloat16_is_fast(device))
         self.pool, self.normalised, self.device = pool, normalised, device
-        self.dtype = torch.bfloat16 if fast else torch.float32
+        self.dtype = torch.bfloat16 if uses_bfloat16(precision, device) else torch.float32
         self.operations: list[FrozenConv | Pool] = []
         self.index: dict[str, int] = {}
         self._mean = torch.tensor(MEAN_RGB, device=device)

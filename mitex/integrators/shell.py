@@ -8,8 +8,6 @@ from mitex.integrators.sources import sampled_light, source_met
 from mitex.runtime.jit import dr, mi
 from mitex.textures.variant import for_variant
 
-TOE, SLOPE = 0.04045, 12.92  # of the sRGB curve
-
 
 class ShellIntegrator(FieldPaths):
     """Ordinary geometry by path tracing, with a radiance field composited by depth on every segment.
@@ -104,8 +102,7 @@ def _linear(display: mi.Color3f, opacity: mi.Float) -> mi.Spectrum:
     """Linear radiance, times opacity, of display values times opacity: fields blend in display values."""
     safe = dr.maximum(opacity, 1e-6)
     value = dr.clip(display / safe, 0, 1)
-    line, power = value / SLOPE, ((dr.maximum(value, TOE) + 0.055) / 1.055) ** 2.4
-    return mi.Spectrum(dr.select(value <= TOE, line, power) * safe)
+    return mi.Spectrum(mi.math.srgb_to_linear(value) * safe)
 
 
 def register() -> None:

@@ -15,6 +15,7 @@ from mitex.mesh.mesh import Mesh
 from mitex.mesh.polygons import Polygons
 from mitex.mesh.readers import SUFFIXES, Budget, Soup, read
 from mitex.mesh.readers.soup import near_origin
+from mitex.mesh.topology import welded
 from mitex.mesh.validate import validate
 from mitex.paths import expanded
 from mitex.progress import announce
@@ -83,14 +84,14 @@ def weld(soup: Soup) -> tuple[np.ndarray, np.ndarray]:
         vertices = soup.vertices.astype(np.float32) + np.float32(0.0)  # -0.0 and 0.0 are one place
     if not len(vertices) or not len(soup.faces):
         return vertices, soup.faces
-    place = _group(vertices)
+    place = welded(vertices)
     used_once = np.bincount(soup.faces.ravel(), minlength=len(vertices)).max() <= 1
     if soup.split or (used_once and len(soup.faces) > 1):
         joined = np.ones(len(vertices), bool)
     elif soup.attributes is None:
         return vertices, soup.faces
     else:
-        kind = _group(np.column_stack([place, soup.attributes]))
+        kind = welded(np.column_stack([place, soup.attributes]))
         pairs = np.unique(np.stack([place, kind], axis=1), axis=0)
         joined = (np.bincount(pairs[:, 0]) > 1)[place]
     first = np.full(len(vertices), len(vertices))
@@ -107,15 +108,6 @@ def _polygons(soup: Soup, count: int) -> Polygons | None:
     triangles = np.arange(soup.faces.size).reshape(-1, 3)
     polygons = soup.polygons or Polygons(np.full(len(soup.faces), 3), triangles)
     return replace(polygons, vertices=polygons.at_corners(soup.faces))
-
-
-def _group(rows: np.ndarray) -> np.ndarray:
-    """(N,) the same number for equal rows of (N, k)."""
-    order = np.lexsort(rows.T)
-    changes = (rows[order][1:] != rows[order][:-1]).any(axis=1)
-    group = np.empty(len(rows), np.int64)
-    group[order] = np.concatenate([[0], np.cumsum(changes)])
-    return group
 
 
 def _check_file(source: Path, max_bytes: int) -> None:

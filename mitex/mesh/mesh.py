@@ -65,6 +65,11 @@ class Mesh:
 
         return load(path, max_vertices)
 
+    @staticmethod
+    def of(source: Mesh | str | os.PathLike[str]) -> Mesh:
+        """A mesh as it is, or that which `load` reads."""
+        return source if isinstance(source, Mesh) else Mesh.load(source)
+
     @cached_property
     def edges(self) -> EdgeGraph:
         """The vertex neighbourhoods: directed edges j -> i, grouped by the receiving vertex i."""

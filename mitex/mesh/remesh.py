@@ -12,6 +12,7 @@ from mitex.errors import MeshError
 from mitex.mesh.mesh import Mesh
 from mitex.mesh.subdivide import subdivide_midpoint
 from mitex.mesh.validate import validate
+from mitex.optional import optional
 from mitex.progress import announce
 
 ROUNDS = 4  # tries to meet the number of vertices
@@ -37,7 +38,8 @@ def remesh(mesh: Mesh, vertices: int, feature_angle: float = 60.0) -> Mesh:
         A new mesh of the same name in the same place.
 
     Raises:
-        MeshError: PyMeshLab is not installed or failed, or too few vertices are asked for.
+        MeshError: PyMeshLab failed, or too few vertices are asked for.
+        MissingPackage: PyMeshLab is not installed.
     """
     if vertices < 12:
         raise MeshError(f"{vertices} vertices are too few for remeshing", "ask for 12 or more")
@@ -66,7 +68,8 @@ def simplified(mesh: Mesh, faces: int) -> Mesh:
         faces: wanted; there are more if the topology needs them.
 
     Raises:
-        MeshError: PyMeshLab is not installed or failed.
+        MeshError: PyMeshLab failed.
+        MissingPackage: PyMeshLab is not installed.
     """
 
     def collapse(meshes: Any) -> None:
@@ -81,7 +84,7 @@ def _isotropic(mesh: Mesh, length: float, feature_angle: float) -> Mesh:
     def remeshed(meshes: Any) -> None:
         meshes.meshing_isotropic_explicit_remeshing(
             iterations=12,
-            targetlen=_pymeshlab().PureValue(length),
+            targetlen=optional("pymeshlab", "remesh").PureValue(length),
             featuredeg=feature_angle,
         )
 
@@ -90,7 +93,7 @@ def _isotropic(mesh: Mesh, length: float, feature_angle: float) -> Mesh:
 
 def _filtered(mesh: Mesh, change: Callable[[Any], None]) -> Mesh:
     """The mesh after a filter of PyMeshLab."""
-    pymeshlab = _pymeshlab()
+    pymeshlab = optional("pymeshlab", "remesh")
     announce(f"remeshing {mesh.name}")
     meshes = pymeshlab.MeshSet(verbose=False)
     try:
@@ -102,11 +105,3 @@ def _filtered(mesh: Mesh, change: Callable[[Any], None]) -> Mesh:
         reason = " ".join(str(error).split())
         raise MeshError(f"{mesh.name} could not be remeshed ({reason})", "repair it in a modeller") from error
     return validate(points, faces, name=mesh.name)
-
-
-def _pymeshlab() -> Any:
-    try:
-        import pymeshlab
-    except ImportError as error:
-        raise MeshError("remeshing needs PyMeshLab", "install it with `pip install mitex[remesh]`") from error
-    return pymeshlab

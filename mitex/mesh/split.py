@@ -23,19 +23,23 @@ CHILDREN = (
 )
 
 
-def split_long_edges(mesh: Mesh, length: float) -> Mesh:
-    """The same surface with no edge longer than `length`, positive [mesh units].
+def split_with_values(mesh: Mesh, length: float, values: np.ndarray) -> tuple[Mesh, np.ndarray]:
+    """The same surface with no edge longer than `length`, and values of its vertices.
 
-    Faces on both sides of an edge are split alike, so there are no gaps; corner UVs are halved linearly.
+    Faces on both sides of an edge are split alike, so there are no gaps; corner UVs and values are halved
+    linearly.
+
+    Args:
+        mesh: V vertices.
+        length: positive [mesh units].
+        values: (V, K).
+
+    Returns:
+        The mesh of V' vertices, and (V', K) float64.
 
     Raises:
         MeshError: the result would have more than 32 million faces.
     """
-    return split_with_values(mesh, length, np.zeros((len(mesh.vertices), 0)))[0]
-
-
-def split_with_values(mesh: Mesh, length: float, values: np.ndarray) -> tuple[Mesh, np.ndarray]:
-    """`split_long_edges`, and values (V, K) of the vertices, which are halved linearly, too, float64."""
     vertices, faces = np.concatenate([mesh.vertices, values], axis=1, dtype=np.float64), mesh.faces
     uv = mesh.uv
     while True:

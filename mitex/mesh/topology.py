@@ -74,6 +74,18 @@ def face_edges(faces: np.ndarray, vertices: int) -> tuple[np.ndarray, np.ndarray
     return _pairs(keys[order][new], vertices), sides.reshape(-1, 3)
 
 
+def paired_sides(faces: np.ndarray, vertices: int) -> np.ndarray:
+    """(P, 2) int64 the sides of those edges that exactly two faces share, in the order of `face_edges`.
+
+    Side 3 f + k of faces (F, 3) runs from the corner k of face f to the next one; the lower number is first.
+    """
+    pairs, edges = face_edges(faces, vertices)
+    order = np.argsort(edges.ravel(), kind="stable")
+    count = np.bincount(edges.ravel(), minlength=len(pairs))
+    first = (np.cumsum(count) - count)[count == 2]
+    return np.stack([order[first], order[first + 1]], axis=1)
+
+
 def _side_keys(faces: np.ndarray, vertices: int) -> np.ndarray:
     """(3 F,) one number per undirected edge for every face side, -1 for sides from a vertex to itself."""
     a = faces.astype(np.int64).ravel()
@@ -109,11 +121,8 @@ def non_manifold_edges(faces: np.ndarray, vertices: int) -> np.ndarray:
 
 def opposed_edges(faces: np.ndarray, vertices: int) -> int:
     """Number of edges of two faces that run along it in the same direction: their windings disagree."""
-    pairs, sides = face_edges(faces, vertices)
-    forward = (faces < np.roll(faces, -1, axis=1)).ravel()
-    total = np.bincount(sides.ravel(), minlength=len(pairs))
-    ahead = np.bincount(sides.ravel(), weights=forward, minlength=len(pairs))
-    return int(((total == 2) & (ahead != 1)).sum())
+    one, other = faces.ravel()[paired_sides(faces, vertices)].T
+    return int((one == other).sum())
 
 
 def euler_characteristic(faces: np.ndarray, vertices: int) -> int:
@@ -133,7 +142,10 @@ def boundary_loops(faces: np.ndarray, vertices: int) -> int:
 
 
 def welded(vertices: np.ndarray) -> np.ndarray:
-    """(V,) int64, the same number for vertices (V, 3) at one position (0 equals -0), ascending from 0."""
+    """(V,) int64, the same number for equal rows (V, k), as of vertices at one position; ascending from 0.
+
+    0 equals -0.
+    """
     order = np.lexsort(vertices.T)
     ordered = vertices[order]
     number = np.empty(len(order), np.int64)

@@ -50,7 +50,7 @@ def fit_style(
     config = run.config
     check_text(config.text, config.preset)
     model = text_image_model(config.text_model)
-    given = mesh if isinstance(mesh, Mesh) else Mesh.load(mesh)
+    given = Mesh.of(mesh)
     model.encode_texts([config.prompt(given.name)])  # refuses unknown words before the mesh is unwrapped
     surface = with_layout(given, config.resolution, keep_uvs)
     run.control.check()

@@ -3,8 +3,8 @@
 The page's own parts are beside this file: `js`, `glsl`, `page.html` and `page.css`, which `document` joins.
 """
 
-from mitex.page.content import Content, data_url, jpeg, thumbnail
-from mitex.page.document import document
+from mitex.page.content import Content, jpeg, thumbnail
+from mitex.page.document import data_url, document
 from mitex.page.packing import packed
 from mitex.page.still import still_content, write_still
 from mitex.page.surface import mesh_data, quantised

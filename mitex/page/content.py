@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -12,7 +11,8 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from mitex.page.document import document
+from mitex.images import to_bytes
+from mitex.page.document import data_url, document
 from mitex.paths import atomic_write
 
 QUALITY = 82  # of JPEGs
@@ -55,7 +55,7 @@ class Content:
 def jpeg(picture: np.ndarray) -> bytes:
     """A picture (H, W, 3), sRGB in [0, 1], as JPEG."""
     buffer = io.BytesIO()
-    Image.fromarray((picture * 255).round().astype(np.uint8)).save(buffer, "JPEG", quality=QUALITY)
+    Image.fromarray(to_bytes(picture)).save(buffer, "JPEG", quality=QUALITY)
     return buffer.getvalue()
 
 
@@ -64,8 +64,3 @@ def thumbnail(path: Path, side: int) -> str:
     with Image.open(path) as image:
         small = image.convert("RGB").resize((side, side), Image.Resampling.LANCZOS)
     return data_url(jpeg(np.asarray(small, np.float32) / 255))
-
-
-def data_url(content: bytes) -> str:
-    """A JPEG as an address that holds it."""
-    return f"data:image/jpeg;base64,{base64.b64encode(content).decode()}"

@@ -86,6 +86,11 @@ def document(title: str, data: Mapping[str, Any], picture: bytes) -> str:
     return before + "".join(values[name] + after for name, _, after in rest)
 
 
+def data_url(content: bytes) -> str:
+    """A JPEG as an address that holds it."""
+    return f"data:image/jpeg;base64,{base64.b64encode(content).decode()}"
+
+
 def _script() -> str:
     files = [file for folder in ("glsl", "wgsl") for file in sorted((PARTS / folder).iterdir())]
     shaders = {file.name: file.read_text(encoding="utf-8") for file in files}
@@ -96,8 +101,7 @@ def _script() -> str:
 def _image(picture: bytes, title: str) -> str:
     if not picture:
         return ""
-    address = f"data:image/jpeg;base64,{base64.b64encode(picture).decode()}"
-    return f'<img src="{address}" alt="{html.escape(title)}">'
+    return f'<img src="{data_url(picture)}" alt="{html.escape(title)}">'
 
 
 def _json(value: object) -> str:

@@ -13,6 +13,7 @@ from mitex.asset import DEFAULT_ALBEDO, DEFAULT_ROUGHNESS, Asset
 from mitex.colour import linear_to_srgb
 from mitex.geometry.normal_maps import decode
 from mitex.geometry.tangents import split_at_hard_edges
+from mitex.images import to_bytes
 from mitex.page.content import Content, jpeg
 from mitex.page.packing import packed
 from mitex.page.surface import mesh_data
@@ -51,7 +52,7 @@ def still_data(asset: Asset) -> dict[str, Any]:
         "maps": {name: True for name in asset.maps},
     }
     if asset.atlas is None:
-        rows = {name: _bytes(values) for name, values in _vertex_images(asset).items()}
+        rows = {name: to_bytes(values) for name, values in _vertex_images(asset).items()}
         return data | {"rows": {name: packed(values) for name, values in rows.items()}}
     images = {name: _webp(values) for name, values in _images(asset).items()}
     uv = np.round(asset.atlas.uv.astype(np.float64) * 65535).astype(np.uint16)
@@ -85,13 +86,9 @@ def _plain(maps: Any, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
     return {"colours": maps.get("albedo", grey), "materials": np.concatenate(rows, axis=-1)}
 
 
-def _bytes(values: np.ndarray) -> np.ndarray:
-    return np.round(values * 255).clip(0, 255).astype(np.uint8)
-
-
 def _webp(image: np.ndarray) -> dict[str, str]:
     buffer = io.BytesIO()
-    Image.fromarray(_bytes(image)).save(buffer, "WEBP", quality=QUALITY, method=4)
+    Image.fromarray(to_bytes(image)).save(buffer, "WEBP", quality=QUALITY, method=4)
     return packed(np.frombuffer(buffer.getvalue(), np.uint8))
 
 

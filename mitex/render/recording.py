@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image
 
 from mitex.errors import ConfigError, OutputError
-from mitex.images import read_image
+from mitex.images import read_image, to_bytes
 from mitex.paths import atomic_write, check_writable, expanded, prepare_output
 from mitex.progress import announce, counted
 from mitex.render.loop import Loop, best_loop
@@ -134,7 +134,7 @@ class Recording:
             try:
                 for picture in pictures:
                     with atomic_write(self._place(done)) as temporary:
-                        Image.fromarray(_bytes(picture)).save(temporary, "PNG")
+                        Image.fromarray(to_bytes(picture)).save(temporary, "PNG")
                     done += 1
                     if stop.requested and done < self.pictures:
                         raise KeyboardInterrupt
@@ -171,7 +171,7 @@ class Recording:
         shutil.rmtree(whole, ignore_errors=True)
         whole.mkdir()
         for k, picture in enumerate(counted("writing the frames", pictures, count)):
-            Image.fromarray(_bytes(picture)).save(whole / f"{k:04}.png")
+            Image.fromarray(to_bytes(picture)).save(whole / f"{k:04}.png")
         os.replace(whole, self.target)
 
     def _place(self, frame: int) -> Path:
@@ -179,10 +179,6 @@ class Recording:
 
     def _read(self, frame: int) -> np.ndarray:
         return read_image(self._place(frame))
-
-
-def _bytes(picture: np.ndarray) -> np.ndarray:
-    return np.round(picture * 255.0).astype(np.uint8)
 
 
 def _checked_target(path: str | os.PathLike[str], frames: int, fps: int, side: int) -> Path:

@@ -8,6 +8,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from mitex.errors import ConfigError
+from mitex.images import to_bytes
 
 GAP = 0.03  # between cells and around the sheet, of a cell's side
 CAPTION = 0.09  # height of a label's line, of a cell's side
@@ -74,7 +75,7 @@ def sheet(
 
 def _paste(canvas: Image.Image, image: np.ndarray, corner: tuple[int, int], side: int) -> None:
     """Puts an image (H, W, 3) in the middle of the cell at a corner, scaled to fit."""
-    picture = Image.fromarray(np.round(np.clip(image, 0.0, 1.0) * 255.0).astype(np.uint8))
+    picture = Image.fromarray(to_bytes(image))
     scale = side / max(picture.size)
     if scale != 1.0:
         fitted = tuple(max(1, round(n * scale)) for n in picture.size)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from mitex.mesh import Mesh
-from mitex.scenes.lights import key_and_fill
+from mitex.scenes.lights import key_light
 
 KEY = 0.77  # strength of the key light
 KEY_DISTANCE = 1.6  # [object radii]; a key light far away lights the floor evenly
@@ -23,7 +23,7 @@ def lights() -> dict[str, object]:
     """
     from mitex.runtime.jit import mi
 
-    key = key_and_fill(KEY, radius=KEY_DISTANCE)["key"]
+    key = key_light(KEY, radius=KEY_DISTANCE)
     # Mitsuba's envmap wants more than one column; the dome does not depend on it.
     up = np.sin(np.linspace(0.5, -0.5, 64) * math.pi)[:, None, None].repeat(128, axis=1)
     share = np.clip((up + 0.4) / 1.4, 0.0, 1.0)

@@ -14,6 +14,7 @@ import numpy as np
 from PIL import Image
 
 from mitex.errors import ConfigError, OutputError
+from mitex.images import to_bytes
 from mitex.paths import atomic_write, prepare_output
 from mitex.progress import counted
 
@@ -61,7 +62,7 @@ def write_video(
         for done, picture in enumerate(counted(work, pictures, frames), 1):
             if done > frames:
                 raise ConfigError(f"more pictures than the {frames} frames of a video", "raise frames")
-            yield np.round(picture * 255.0).astype(np.uint8)
+            yield to_bytes(picture)
         if done < frames:
             raise ConfigError(f"{done} pictures for a video of {frames} frames", "give one for each frame")
 

@@ -4,7 +4,7 @@ from mitex.runtime.causes import raise_causes
 from mitex.runtime.devices import available_device
 from mitex.runtime.health import Check, doctor
 from mitex.runtime.memory import available_memory, keep_freed_memory
-from mitex.runtime.precision import bfloat16_is_fast
+from mitex.runtime.precision import bfloat16_is_fast, uses_bfloat16
 from mitex.runtime.seeds import seed_everything
 from mitex.runtime.session import init, load_mitsuba
 from mitex.runtime.workers import (
@@ -31,4 +31,5 @@ __all__ = [
     "set_workers",
     "threads",
     "use_one_blas_thread",
+    "uses_bfloat16",
 ]

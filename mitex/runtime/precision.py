@@ -7,6 +7,7 @@ from pathlib import Path
 from mitex.errors import ConfigError
 
 VARIABLE = "MITEX_BF16"
+PRECISIONS = ("auto", "bfloat16", "float32")
 
 
 def bfloat16_is_fast(device: str = "cpu") -> bool:
@@ -28,6 +29,21 @@ def bfloat16_is_fast(device: str = "cpu") -> bool:
     import torch
 
     return torch.cuda.is_bf16_supported(including_emulation=False)
+
+
+def uses_bfloat16(precision: str, device: str = "cpu") -> bool:
+    """Whether a network of a precision multiplies in bfloat16 on a device.
+
+    Args:
+        precision: "bfloat16", "float32", or "auto", as `bfloat16_is_fast` says.
+        device: where it runs.
+
+    Raises:
+        ConfigError: Another precision.
+    """
+    if precision not in PRECISIONS:
+        raise ConfigError(f"unknown precision {precision!r}", "use 'auto', 'bfloat16' or 'float32'")
+    return precision == "bfloat16" or (precision == "auto" and bfloat16_is_fast(device))
 
 
 @cache

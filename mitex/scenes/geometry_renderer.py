@@ -17,6 +17,8 @@ from mitex.scenes.cameras import Cameras
 from mitex.scenes.lights import environment
 from mitex.scenes.shapes import mesh_shape
 
+REFLECTANCE = 0.7  # of the mesh, linear
+
 
 class GeometryRenderer:
     """A matte mesh in direct light; gradients reach the vertices through shading and outlines.
@@ -28,7 +30,6 @@ class GeometryRenderer:
     Args:
         mesh: whose faces stay; `render` is given the vertices.
         cameras: K views.
-        reflectance: of the mesh, linear, in [0, 1].
         samples: per pixel of the image.
         gradient_samples: per pixel of the derivative.
     """
@@ -38,14 +39,13 @@ class GeometryRenderer:
         mesh: Mesh,
         cameras: Cameras,
         *,
-        reflectance: float = 0.7,
         samples: int = 16,
         gradient_samples: int = 16,
     ) -> None:
         init(needs="ad")
         self.samples, self.gradient_samples = samples, gradient_samples
         self.shape = mesh.vertices.shape
-        matte = mi.load_dict({"type": "diffuse", "reflectance": {"type": "rgb", "value": [reflectance] * 3}})
+        matte = mi.load_dict({"type": "diffuse", "reflectance": {"type": "rgb", "value": [REFLECTANCE] * 3}})
         self.sensors = [mi.load_dict(_with_border(sensor)) for sensor in cameras.sensors()]
         # The studio's light is soft: moving edges of shadows are not worth their samples.
         scene = {"type": "scene", "integrator": {"type": "direct_projective", "sppi": 0}}

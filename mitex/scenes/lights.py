@@ -64,8 +64,8 @@ def environment(strength: float = 1.0, azimuth: float = 90.0, height: int = 128)
     }
 
 
-def key_and_fill(strength: float = 1.0, radius: float = 1.0) -> dict[str, dict[str, Any]]:
-    """Two rectangular area lights for an object of the given radius at the origin, seen from the +z side.
+def key_light(strength: float = 1.0, radius: float = 1.0) -> dict[str, Any]:
+    """A warm square area light, upper left of an object of the given radius at the origin, seen from +z.
 
     Args:
         strength: factor on the radiance.
@@ -73,27 +73,17 @@ def key_and_fill(strength: float = 1.0, radius: float = 1.0) -> dict[str, dict[s
             not.
 
     Returns:
-        Scene entries `key` (warm, from the upper left) and `fill` (cool, larger and weaker, from the right).
+        A scene entry.
     """
-    return {
-        "key": _panel((-2.6, 3.0, 3.2), 1.1, (20.0, 19.0, 17.5), strength, radius),
-        "fill": _panel((3.6, 1.0, 2.6), 1.8, (1.8, 2.0, 2.3), strength, radius),
-    }
-
-
-def _panel(
-    position: tuple[float, ...], half: float, radiance: tuple[float, ...], strength: float, radius: float
-) -> dict[str, Any]:
-    """A square that faces the origin and emits on that side."""
     from mitex.runtime.jit import mi
 
-    to_world = mi.ScalarTransform4f().look_at(
-        origin=[radius * p for p in position], target=[0, 0, 0], up=[0, 1, 0]
-    )
+    place = [radius * p for p in (-2.6, 3.0, 3.2)]
+    to_world = mi.ScalarTransform4f().look_at(origin=place, target=[0, 0, 0], up=[0, 1, 0])
+    radiance = [strength * r for r in (20.0, 19.0, 17.5)]
     return {
         "type": "rectangle",
-        "to_world": to_world @ mi.ScalarTransform4f().scale(half * radius),
-        "emitter": {"type": "area", "radiance": {"type": "rgb", "value": [strength * r for r in radiance]}},
+        "to_world": to_world @ mi.ScalarTransform4f().scale(1.1 * radius),
+        "emitter": {"type": "area", "radiance": {"type": "rgb", "value": radiance}},
     }
 
 

@@ -123,7 +123,7 @@ class FieldMethods:
         return [dr.gather(mi.Float, self.data.array, row, located.active) for row in rows]
 
     def eval(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Color3f | mi.Color1f:
-        return self._color(self._three(self._lookup(si, active)))
+        return self._colour(self._three(self._lookup(si, active)))
 
     def eval_1(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Float:
         return self.gather(self._lookup(si, active), range(self.channel, self.channel + 1))[0]
@@ -133,11 +133,11 @@ class FieldMethods:
 
     def mean(self) -> mi.Float:
         """Mean over the data's rows of what `eval` returns."""
-        return dr.mean(dr.mean(self._row_colors()))
+        return dr.mean(dr.mean(self._row_colours()))
 
     def max(self) -> float:
         """Largest value in the data's rows of what `eval` returns."""
-        return float(dr.max(dr.max(self._row_colors()))[0])
+        return float(dr.max(dr.max(self._row_colours()))[0])
 
     def is_spatially_varying(self) -> bool:
         return True
@@ -158,7 +158,7 @@ class FieldMethods:
         values = self.gather(located, self._selection())
         return mi.Color3f(*values) if len(values) == 3 else mi.Color3f(values[0])
 
-    def _color(self, rgb: mi.Color3f) -> mi.Color3f | mi.Color1f:
+    def _colour(self, rgb: mi.Color3f) -> mi.Color3f | mi.Color1f:
         if mi.is_spectral:
             raise ConfigError(
                 f"{self.plugin}: colours need an rgb or mono variant", "roughness and normals work in any"
@@ -167,8 +167,8 @@ class FieldMethods:
             rgb = mi.math.srgb_to_linear(dr.clip(rgb, 0, 1))
         return mi.Color1f(mi.luminance(rgb)) if mi.is_monochromatic else rgb
 
-    def _row_colors(self) -> mi.Color3f | mi.Color1f:
-        return self._color(self._three(self._at_rows()))
+    def _row_colours(self) -> mi.Color3f | mi.Color1f:
+        return self._colour(self._three(self._at_rows()))
 
     def _at_rows(self) -> Located:
         """The lookups that read one row each."""

@@ -15,8 +15,8 @@ from mitex.training.metrics import Metrics, plain
 from mitex.training.state import TrainState
 
 
-class Nothing:
-    """A training in memory: only its result is left."""
+class Recorder:
+    """What a training tells of its progress, kept in memory only: nothing is left but the result."""
 
     place = "memory"
 
@@ -42,7 +42,7 @@ class Nothing:
         return "nothing has been kept"
 
 
-class RunFolder(Nothing):
+class RunFolder(Recorder):
     """A training in a run folder, which is open.
 
     Args:
@@ -108,15 +108,15 @@ class RunFolder(Nothing):
 @contextmanager
 def opened(
     out: str | Path | None, resume: bool, checkpoint_every: int, preview_every: int
-) -> Iterator[Nothing]:
-    """The keeping of a training in a run folder; of one in memory if `out` is None.
+) -> Iterator[Recorder]:
+    """The recorder of a training in a run folder; of one in memory if `out` is None.
 
     Raises:
         OutputError, CheckpointError: As `run.check`.
     """
     if out is None:
         run.check(None, resume)
-        yield Nothing()
+        yield Recorder()
         return
     with run.opened(out, resume) as (folder, metrics):
         yield RunFolder(folder, metrics, resume, checkpoint_every, preview_every)

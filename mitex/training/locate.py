@@ -21,6 +21,11 @@ def bundled_files() -> dict[str, Path]:
     return {path.stem: path for path in sorted(BUNDLED.glob("*.safetensors"))}
 
 
+def has_checkpoint(folder: Path) -> bool:
+    """Whether the run in a folder can go on: one killed as it saves leaves only the previous checkpoint."""
+    return any((folder / name).is_file() for name in (CHECKPOINT, PREVIOUS))
+
+
 def locate(source: str | Path) -> list[Path]:
     """The files of a model: a run folder's texture and checkpoints, a file, or the bundled one of that name.
 

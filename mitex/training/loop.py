@@ -130,7 +130,7 @@ def _teller(state: TrainState, place: str, control: Control) -> Callable[[dict[s
     return tell
 
 
-def _diverged(record: dict[str, Any], state: TrainState, kept: keeping.Nothing) -> TrainingDiverged:
+def _diverged(record: dict[str, Any], state: TrainState, kept: keeping.Recorder) -> TrainingDiverged:
     name = record["skipped"].replace("_", " ")
     again = "add `resume=True` and set" if kept.checkpoint else "set"
     return TrainingDiverged(

@@ -13,8 +13,8 @@ from typing import Any
 from mitex import __version__
 from mitex.errors import CheckpointError, OutputError
 from mitex.paths import atomic_write, check_writable, expanded, is_temporary, missing_folders, prepare_folder
-from mitex.training import checkpoint
 from mitex.training.locate import NAME as RESULT
+from mitex.training.locate import has_checkpoint
 from mitex.training.metrics import Metrics
 from mitex.training.toml import to_toml
 
@@ -42,7 +42,7 @@ def check(out: str | os.PathLike[str] | None, resume: bool = False) -> None:
         return
     folder = expanded(out)
     try:
-        begun = any((folder / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
+        begun = has_checkpoint(folder)
         finished = not begun and _is_run(folder) and (folder / RESULT).exists()
         foreign = not begun and folder.is_dir() and not (_is_run(folder) or _is_empty(folder))
     except (OSError, ValueError) as e:  # ValueError: a null byte in the name

@@ -148,4 +148,5 @@ def test_without_opencv(cameras, monkeypatch, files, capsys):
     for module in ("cutting", "silhouette"):
         monkeypatch.delitem(sys.modules, f"mitex.methods.nerf.footage.{module}", raising=False)
     shots(files)
-    check_refused(files, ["capture", "photos", "--out", "out/c", "--quiet"], "needs cv2; install it", capsys)
+    message = "import of cv2 halted; None in sys.modules); run `pip install 'mitex[nerf]'`"
+    check_refused(files, ["capture", "photos", "--out", "out/c", "--quiet"], message, capsys)

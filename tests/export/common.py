@@ -1,4 +1,4 @@
-"""An asset with every map, files of others, and a reader of GLB files that shares no code with Mitex."""
+"""An asset with every map, files of others, and readers of GLB and EXR that share no code with Mitex."""
 
 import io
 import json
@@ -6,11 +6,18 @@ import struct
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 from PIL import Image
 
 from mitex.asset import Asset
 from mitex.geometry.vectors import orthonormal
 from mitex.mesh import Mesh, icosphere
+
+
+def read_exr(path: Path) -> dict[str, np.ndarray]:
+    """The channels of an EXR file, name -> (H, W)."""
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        return {name: channel.pixels for name, channel in file.channels().items()}
 
 
 def wavy(mesh: Mesh | None = None, name: str = "wavy", without: tuple[str, ...] = ()) -> Asset:

@@ -3,15 +3,14 @@
 from typing import Any
 
 import numpy as np
-import OpenEXR
 import pytest
 
 from mitex.asset import Asset
 from mitex.colour import srgb_to_linear
-from mitex.errors import ConfigError, ImageError, OutputError
-from mitex.export import read_exr, write_exr, write_textures, write_views
+from mitex.errors import ConfigError, OutputError
+from mitex.export import write_exr, write_textures, write_views
 from mitex.mesh import icosphere
-from tests.export.common import wavy
+from tests.export.common import read_exr, wavy
 
 ALL = {"albedo.R", "albedo.G", "albedo.B", "ambient_occlusion.Y", "height.Y", "roughness.Y"} | {
     f"normal.{c}" for c in "XYZ"
@@ -26,8 +25,7 @@ def baked() -> Any:
 @pytest.mark.parametrize("half", [True, False])
 def test_textures_come_back_by_name(half, baked, tmp_path):
     write_textures(baked, tmp_path / "a.exr", half=half)
-    with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
-        channels = {k: v.pixels for k, v in file.channels().items()}
+    channels = read_exr(tmp_path / "a.exr")
     assert set(channels) == ALL
     assert {v.dtype for v in channels.values()} == {np.dtype(np.float16 if half else np.float32)}
     tolerance = 1e-3 if half else 0
@@ -70,8 +68,4 @@ def test_wrong_input(tmp_path):
         write_views(tmp_path / "a.exr", np.zeros((1, 2, 2, 3)), ["colour"])
     with pytest.raises(OutputError):
         write_exr(tmp_path / "a.png", {"R": np.zeros((2, 2))})
-    (tmp_path / "b.exr").write_bytes(b"no EXR")
-    for name in ("b.exr", "missing.exr"):
-        with pytest.raises(ImageError, match="not a readable EXR"):
-            read_exr(tmp_path / name)
-    assert [p.name for p in tmp_path.iterdir()] == ["b.exr"]
+    assert not list(tmp_path.iterdir())

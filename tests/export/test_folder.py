@@ -10,9 +10,9 @@ from mitex.asset import Asset
 from mitex.colour import srgb_to_linear
 from mitex.errors import OutputError
 from mitex.exemplar import MAPS, Exemplar
-from mitex.export import prepare_export, read_exr, write_maps
+from mitex.export import prepare_export, write_maps
 from mitex.mesh import icosphere
-from tests.export.common import wavy, write_foreign
+from tests.export.common import read_exr, wavy, write_foreign
 
 
 @pytest.fixture(scope="module")

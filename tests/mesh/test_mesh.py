@@ -225,3 +225,9 @@ def test_corner_normals_stay_where_the_mesh_is_only_moved_and_scaled():
         assert other.corner_normals is None and other.polygons is QUAD
     turned = mesh.with_vertices(mesh.vertices[:, [1, 2, 0]])
     assert turned.corner_normals is None
+
+
+def test_a_mesh_is_taken_as_it_is_and_a_name_is_loaded():
+    mesh = tetrahedron()
+    assert Mesh.of(mesh) is mesh
+    np.testing.assert_array_equal(Mesh.of("vase").vertices, Mesh.load("vase").vertices)

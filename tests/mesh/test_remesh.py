@@ -5,13 +5,13 @@ import sys
 import numpy as np
 import pytest
 
-from mitex.errors import MeshError
+from mitex.errors import MeshError, MissingPackage
 from mitex.mesh import grid, icosphere, quality, remesh
 
 
 def test_names_the_extra_that_is_missing(monkeypatch):
     monkeypatch.setitem(sys.modules, "pymeshlab", None)
-    with pytest.raises(MeshError, match=r"pip install mitex\[remesh\]"):
+    with pytest.raises(MissingPackage, match=r"pip install 'mitex\[remesh\]'"):
         remesh(icosphere(2), 100)
 
 

@@ -7,13 +7,17 @@ from mitex.errors import MeshError
 from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh, grid, icosphere, split
 from mitex.mesh.nearest import surface_points
-from mitex.mesh.split import split_long_edges, split_with_values
+from mitex.mesh.split import split_with_values
 from mitex.mesh.topology import boundary_edges, mesh_edges
 
 
 def longest(mesh: Mesh) -> float:
     pairs, _ = mesh_edges(mesh.faces, len(mesh.vertices))
     return float(np.linalg.norm(mesh.vertices[pairs[:, 0]] - mesh.vertices[pairs[:, 1]], axis=1).max())
+
+
+def split_long_edges(mesh: Mesh, length: float) -> Mesh:
+    return split_with_values(mesh, length, np.zeros((len(mesh.vertices), 0)))[0]
 
 
 def uneven() -> Mesh:

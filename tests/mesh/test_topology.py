@@ -14,6 +14,7 @@ from mitex.mesh.topology import (
     mesh_edges,
     non_manifold_edges,
     opposed_edges,
+    paired_sides,
 )
 from tests.mesh.examples import FAN, OCTAHEDRON, meshes
 
@@ -21,10 +22,11 @@ from tests.mesh.examples import FAN, OCTAHEDRON, meshes
 @settings(max_examples=60, deadline=None)
 @given(meshes())
 def test_edge_lists_equal_brute_force(mesh):
-    sides = {}
-    for face in mesh.faces.tolist():
-        for a, b in zip(face, face[1:] + face[:1], strict=True):
+    sides, numbers = {}, {}
+    for f, face in enumerate(mesh.faces.tolist()):
+        for k, (a, b) in enumerate(zip(face, face[1:] + face[:1], strict=True)):
             sides.setdefault((min(a, b), max(a, b)), []).append(a < b)
+            numbers.setdefault((min(a, b), max(a, b)), []).append(3 * f + k)
     expected = sorted(sides)
     count = len(mesh.vertices)
     pairs, counts = mesh_edges(mesh.faces, count)
@@ -40,6 +42,8 @@ def test_edge_lists_equal_brute_force(mesh):
     assert {tuple(p) for p in non_manifold_edges(mesh.faces, count).tolist()} == {
         p for p in expected if len(sides[p]) > 2
     }
+    twos = [numbers[p] for p in expected if len(sides[p]) == 2]
+    np.testing.assert_array_equal(paired_sides(mesh.faces, count), np.reshape(twos, (-1, 2)))
     assert opposed_edges(mesh.faces, count) == sum(len(s) == 2 and s[0] == s[1] for s in sides.values())
 
 

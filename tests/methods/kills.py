@@ -23,6 +23,7 @@ from mitex.cli import main
 from mitex.methods.registry import methods
 from mitex.training import checkpoint
 from mitex.training.locate import NAME as RESULT
+from mitex.training.locate import has_checkpoint
 from tests.methods.fits import FITS, prepare
 
 STEPS = 12
@@ -49,8 +50,7 @@ def start(method: str, out: Path) -> int:
 
 def checkpoint_step(out: Path) -> int | None:
     """The step of the newest checkpoint that can be read; None if none was written."""
-    begun = any((out / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
-    return checkpoint.load(out).step if begun else None
+    return checkpoint.load(out).step if has_checkpoint(out) else None
 
 
 def strike(process: int, out: Path, aim: str, rng: random.Random) -> bool:

@@ -12,10 +12,10 @@ from PIL import Image
 from mitex.asset import Asset
 from mitex.colour import linear_to_srgb
 from mitex.errors import ConfigError, OutputError
-from mitex.export import read_exr
 from mitex.mesh import icosphere
 from mitex.progress import listening
 from mitex.render import film, render_still, tone, turntable
+from tests.export.common import read_exr
 
 ASSET = Asset(icosphere(3), {"albedo": np.full((92, 3), 0.6), "height": np.zeros((92, 1))})
 SMALL: dict[str, Any] = {"resolution": 16, "spp": 1}

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mitex.errors import ConfigError
-from mitex.runtime import bfloat16_is_fast
+from mitex.runtime import bfloat16_is_fast, uses_bfloat16
 from mitex.runtime.precision import VARIABLE, bfloat16_flags
 
 
@@ -37,3 +37,11 @@ def test_another_value_is_an_error(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv(VARIABLE, "yes")
     with pytest.raises(ConfigError, match="MITEX_BF16 is 'yes'"):
         bfloat16_is_fast()
+
+
+@pytest.mark.parametrize("fast", [False, True])
+def test_a_network_has_the_precision_that_it_is_given(monkeypatch: pytest.MonkeyPatch, fast: bool):
+    monkeypatch.setenv(VARIABLE, str(int(fast)))
+    assert [uses_bfloat16(word) for word in ("bfloat16", "float32", "auto")] == [True, False, fast]
+    with pytest.raises(ConfigError, match="unknown precision 'bf16'"):
+        uses_bfloat16("bf16")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitex.scenes.lights import environment, key_and_fill, studio_image
+from mitex.scenes.lights import environment, key_light, studio_image
 
 
 def sphere_picture(mi, lights: dict, radius: float = 1.0) -> np.ndarray:
@@ -60,8 +60,9 @@ def test_environment_strength_and_key_on_the_left(mi):
 
 
 def test_key_is_upper_left_at_any_size(mi):
-    picture = sphere_picture(mi, key_and_fill())[..., 1]
+    picture = sphere_picture(mi, {"key": key_light()})[..., 1]
     assert picture[5:10, 6:11].mean() > 1.5 * picture[14:19, 13:18].mean() > 0
-    small = sphere_picture(mi, key_and_fill(radius=0.1), radius=0.1)[..., 1]
+    small = sphere_picture(mi, {"key": key_light(radius=0.1)}, radius=0.1)[..., 1]
     np.testing.assert_allclose(small, picture, atol=0.02)
-    np.testing.assert_allclose(sphere_picture(mi, key_and_fill(3.0))[..., 1], 3 * picture, rtol=1e-3)
+    bright = sphere_picture(mi, {"key": key_light(3.0)})[..., 1]
+    np.testing.assert_allclose(bright, 3 * picture, rtol=1e-3)

@@ -15,6 +15,7 @@ from pathlib import Path
 import torch
 
 from mitex.training import checkpoint, train
+from mitex.training.locate import has_checkpoint
 
 from .task import SmallConfig, SmallTask, assert_same_run
 
@@ -23,9 +24,8 @@ POOL = 2_000_000  # 8 MB: much of the time goes into writing
 
 
 def fit(out: Path, steps: int, pool: int) -> None:
-    begun = any((out / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
     config = SmallConfig(steps=steps, checkpoint_every=EVERY)
-    train(SmallTask(pool=pool), config, out, lr=0.01, resume=begun)
+    train(SmallTask(pool=pool), config, out, lr=0.01, resume=has_checkpoint(out))
 
 
 def child(work, *arguments) -> int:
@@ -56,8 +56,7 @@ def check_loss(out: Path, before: int) -> int:
     """After a kill: at most the steps since the last checkpoint are gone. Returns the checkpoint's step."""
     metrics = out / "metrics.jsonl"
     done = metrics.read_bytes().count(b"\n") if metrics.exists() else 0
-    begun = any((out / name).exists() for name in (checkpoint.NAME, checkpoint.PREVIOUS))
-    step = checkpoint.load(out).step if begun else 0
+    step = checkpoint.load(out).step if has_checkpoint(out) else 0
     assert step >= max(before, (done - 1) // EVERY * EVERY), (step, before, done)
     return step
 

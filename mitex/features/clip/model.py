@@ -9,11 +9,11 @@ from pathlib import Path
 import torch
 import torch.nn.functional as F
 
-from mitex.errors import ConfigError, WeightsError
+from mitex.errors import ImageError, WeightsError
 from mitex.features.clip.shape import ClipShape
 from mitex.features.clip.tokenizer import Tokenizer
 from mitex.features.clip.towers import ImageTower, Linear, Towers
-from mitex.runtime import bfloat16_is_fast
+from mitex.runtime import uses_bfloat16
 
 AGREEMENT = 0.999  # cosine of gradients from which on bfloat16 is as good as float32
 
@@ -33,17 +33,17 @@ class Clip:
 
     Raises:
         WeightsError: a file is missing, damaged, or does not fit the others.
-        ConfigError: an unknown precision; the package tokenizers is not installed.
+        ConfigError: an unknown precision.
+        MissingPackage: the package tokenizers is not installed.
     """
 
     def __init__(self, folder: Path, precision: str = "auto", device: torch.device | str = "cpu") -> None:
-        if precision not in ("auto", "bfloat16", "float32"):
-            raise ConfigError(f"unknown precision {precision!r}", "use 'auto', 'bfloat16' or 'float32'")
+        in_bfloat16 = uses_bfloat16(precision, str(device))
         self._shape, self._device = ClipShape.read(folder), device
         self._name = _name(folder)
         self._tokenizer = Tokenizer(folder, self._shape)
         self._towers = _loaded(folder, self._shape).to(device)
-        if precision == "bfloat16" or (precision == "auto" and bfloat16_is_fast(str(device))):
+        if in_bfloat16:
             exact, fast = self._towers.vision_model, _in_bfloat16(self._towers.vision_model)
             if precision == "bfloat16" or _agree(exact, fast, self.resolution):
                 self._towers.vision_model = fast
@@ -71,11 +71,11 @@ class Clip:
             (K, D) embeddings, not normalised.
 
         Raises:
-            ConfigError: images of another shape.
+            ImageError: images of another shape.
         """
         side = self.resolution
         if images.ndim != 4 or images.shape[1:] != (side, side, 3):
-            raise ConfigError(f"images of shape {tuple(images.shape)}", f"give (K, {side}, {side}, 3)")
+            raise ImageError(f"images of shape {tuple(images.shape)}", f"give (K, {side}, {side}, 3)")
         normalised = ((images - self._mean) / self._deviation).permute(0, 3, 1, 2)
         return self._towers.visual_projection(self._towers.vision_model(normalised))
 

@@ -11,6 +11,7 @@ import torch
 
 from mitex.errors import ConfigError, WeightsError
 from mitex.features.clip.shape import ClipShape
+from mitex.optional import optional
 
 if TYPE_CHECKING:
     import tokenizers
@@ -29,17 +30,12 @@ class Tokenizer:
 
     Raises:
         WeightsError: the files are damaged, or of another model.
-        ConfigError: the library that reads them is not installed.
+        MissingPackage: the library that reads them is not installed.
     """
 
     def __init__(self, folder: Path, shape: ClipShape) -> None:
         self._shape = shape
-        try:
-            import tokenizers
-        except ImportError as e:
-            raise ConfigError(
-                "CLIP needs the package tokenizers", 'install it with: pip install "mitex[text]"'
-            ) from e
+        tokenizers = optional("tokenizers", "text")
         whole = folder / "tokenizer.json"
         try:
             if whole.is_file():

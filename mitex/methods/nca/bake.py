@@ -84,9 +84,7 @@ class Grown:
         images = {name: np.zeros((side, side, MAPS[name]), np.float32) for name in maps}
         for rows in atlas.strips():
             announce("baking the maps", rows.start, side)
-            used = atlas.face[rows] >= 0
-            face, barycentric = atlas.face[rows][used], atlas.barycentric[rows][used].clip(0)
-            barycentric /= barycentric.sum(axis=1, keepdims=True)
+            used, face, barycentric = atlas.points(rows)
             for name, values in self.maps(self.values(face, barycentric)).items():
                 detail = self.object_normals(values, face, barycentric) if name == "normal" else values
                 images[name][rows][used] = detail

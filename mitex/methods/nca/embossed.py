@@ -45,9 +45,7 @@ class Embossed(Grown):
     def textures(self, atlas: Atlas) -> dict[str, np.ndarray]:
         detail = np.zeros((*atlas.face.shape, 3), np.float32)
         for rows in atlas.strips():
-            used = atlas.face[rows] >= 0
-            face, barycentric = atlas.face[rows][used], atlas.barycentric[rows][used].clip(0)
-            barycentric /= barycentric.sum(axis=1, keepdims=True)
+            used, face, barycentric = atlas.points(rows)
             normals = unit(interpolate(barycentric, self.cells.given.shading_normals[face]))
             detail[rows][used] = self._normals(normals, face, barycentric)
         return super().textures(atlas) | {"normal": atlas.normal_map(self._mesh, detail)}

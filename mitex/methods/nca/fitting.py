@@ -57,7 +57,7 @@ def fit(
         )
     if config.motion:
         check_field(config.motion)
-    maps = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
+    maps = Exemplar.of(exemplar)
     origin: dict[str, Any] = {"exemplar": maps.name, "density": config.density}
     if "albedo" in maps.maps:
         origin["palette"] = Palette.of(maps.maps["albedo"]).record()

@@ -51,12 +51,6 @@ class MeshNCA(nn.Module):
         vertices = mesh.vertices if isinstance(mesh, Perception) else len(mesh.vertices)
         return self.fc1.weight.new_zeros(batch, vertices, self.channels)
 
-    def update(
-        self, state: torch.Tensor, mesh: Mesh | Perception, condition: torch.Tensor | None = None
-    ) -> torch.Tensor:
-        """What every cell would add to its state, (B, V, C): equation 3 without the mask (for grafting)."""
-        return self.step(state, mesh, None, condition) - state
-
     def step(
         self,
         state: torch.Tensor,

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mitex.errors import ConfigError
-from mitex.images import SUFFIXES, read_image
+from mitex.images import SUFFIXES, bilinear, read_image
 from mitex.mesh import Mesh
 from mitex.mesh.nearest import surface_points
 from mitex.mesh.vertex_files import read_array, read_properties
@@ -112,20 +112,14 @@ def _interpolated(mesh: Mesh, values: np.ndarray, name: str) -> Weights:
 
 
 def _painted(mesh: Mesh, path: Path) -> Weights:
-    from scipy.ndimage import map_coordinates
-
     uv = mesh.uv
     if uv is None:
         raise ConfigError(f"'{mesh.name}' has no UVs that '{path.name}' could be painted over", HELP)
-    image = read_image(path)[:, :, 0].astype(np.float64)
+    image = read_image(path)[:, :, :1].astype(np.float64)
 
     def at(points: np.ndarray) -> np.ndarray:
         face, barycentric = surface_points(mesh, points)
-        u, v = (barycentric[:, :, None] * uv[face]).sum(axis=1).T
-        height, width = image.shape
-        return _unit(
-            map_coordinates(image, [(1 - v) * height - 0.5, u * width - 0.5], order=1, mode="nearest")
-        )
+        return _unit(bilinear(image, (barycentric[:, :, None] * uv[face]).sum(axis=1))[:, 0])
 
     return at
 

@@ -55,8 +55,8 @@ def fit(
     """
     run = Run.of(PRESETS, out, **options)
     config = run.config
-    given = mesh if isinstance(mesh, Mesh) else Mesh.load(mesh)
-    loaded = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
+    given = Mesh.of(mesh)
+    loaded = Exemplar.of(exemplar)
     target, depth = with_depth(loaded, config.depth)
     run.check_inputs(inputs(target, given))
     run.control.check()

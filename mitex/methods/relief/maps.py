@@ -17,7 +17,7 @@ from mitex.methods.relief.config import ReliefConfig
 from mitex.methods.surface import SurfaceTexture
 from mitex.paths import cache_dir
 from mitex.training.control import Control
-from mitex.training.locate import CHECKPOINT, NAME
+from mitex.training.locate import NAME, has_checkpoint
 
 VERSION = "1"  # part of the keys; to be raised when the maps are synthesized in another way
 
@@ -43,7 +43,7 @@ def synthesized(
     key = content_key(VERSION, exemplar.key, mesh.vertices, mesh.faces, mesh.uv, keep_uvs, settings)
     place = cache_dir() / "relief" / key
     training = place.with_suffix(".run")
-    begun = keep and (training / CHECKPOINT).is_file()
+    begun = keep and has_checkpoint(training)
     options: dict[str, Any] = {"set": settings, "on_step": control.on_step, "cancel": control.cancel}
 
     def compute() -> SurfaceTexture:

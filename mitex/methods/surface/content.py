@@ -8,9 +8,8 @@ import numpy as np
 
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import unit
-from mitex.images import read_image
+from mitex.images import bilinear, read_image
 from mitex.methods.surface.domain import SurfaceDomain
-from mitex.methods.surface.pictures import picture_at
 
 AO = "ao"
 
@@ -33,4 +32,4 @@ def content_colours(content: str | Path, domain: SurfaceDomain) -> np.ndarray:
         normals = unit(interpolate(texels.barycentric, corners))
         return np.repeat(ambient_occlusion(mesh, texels.position, normals)[:, None], 3, axis=1)
     uv = interpolate(texels.barycentric, texels.uv[texels.face].astype(np.float64))
-    return picture_at(read_image(Path(content)), uv)
+    return bilinear(read_image(Path(content)), uv).astype(np.float32)

@@ -77,8 +77,7 @@ def fit(
     run = Run.of(presets, out, **options)
     if run.config.text is not None:
         raise ConfigError("the settings are for words, not for an exemplar", "call `fit_text` for words")
-    target = exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
-    return _synthesized(run, target, mesh, None, keep_uvs, content, orientation, scale_map)
+    return _synthesized(run, Exemplar.of(exemplar), mesh, None, keep_uvs, content, orientation, scale_map)
 
 
 def fit_text(
@@ -118,9 +117,9 @@ def fit_text(
     if exemplar is None and (orientation is not None or scale_map is not None):
         raise ConfigError("an orientation or a scale map turns and scales an exemplar", "give `exemplar` too")
     model = text_image_model(config.text_model)
-    given = mesh if isinstance(mesh, Mesh) else Mesh.load(mesh)
+    given = Mesh.of(mesh)
     model.encode_texts([config.prompt(given.name)])  # refuses unknown words before the mesh is unwrapped
-    target = exemplar if exemplar is None or isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)
+    target = None if exemplar is None else Exemplar.of(exemplar)
     return _synthesized(run, target, given, model, keep_uvs, content, orientation, scale_map)
 
 
@@ -141,7 +140,7 @@ def _synthesized(
             raise ConfigError("a tile takes no UVs, content, orientation or scale map", "leave them out")
         domain: SurfaceDomain = TileDomain.flat(config)
     else:
-        given = mesh if isinstance(mesh, Mesh) else Mesh.load(mesh)
+        given = Mesh.of(mesh)
         image = content is not None and str(content) != AO
         surface = with_layout(given, config.resolution, keep_uvs or image)
         if isinstance(orientation, str | Path):

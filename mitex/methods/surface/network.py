@@ -8,15 +8,13 @@ import torch
 
 from mitex.errors import ConfigError
 from mitex.features.frozen import FrozenStack, GramTap, Operation, Tap
-from mitex.features.layers import LAYERS, with_poolings
 from mitex.features.vgg import MEAN_RGB, Weights, convolutions
 from mitex.methods.surface.levels import Levels
 from mitex.methods.surface.operations import BilinearConv, SurfaceConv, SurfacePool
 from mitex.methods.surface.regions import bisect
-from mitex.runtime import bfloat16_is_fast
+from mitex.runtime import uses_bfloat16
 
 POOLED = tuple(f"pool{n}" for n in range(1, 6))
-ALL_LAYERS = with_poolings(LAYERS)
 
 
 class SurfaceVgg:
@@ -45,8 +43,7 @@ class SurfaceVgg:
         scale: int = 0,
         weights: Weights | None = None,
     ) -> None:
-        fast = precision == "bfloat16" or (precision == "auto" and bfloat16_is_fast())
-        self.dtype = torch.bfloat16 if fast else torch.float32
+        self.dtype = torch.bfloat16 if uses_bfloat16(precision) else torch.float32
         self.texels = len(levels.order)
         self.operations: list[Operation] = []
         self.index: dict[str, int] = {}
@@ -70,11 +67,6 @@ class SurfaceVgg:
     def features(self, texels: torch.Tensor, layers: Iterable[str]) -> dict[str, torch.Tensor]:
         """Layer -> (n, C) float32 of texel colours (N, 3), sRGB in [0, 1], in the order of `Levels`."""
         return self.read(texels, {name: Tap(self.place(name)) for name in layers})
-
-    def gram_matrices(self, texels: torch.Tensor, layers: Iterable[str]) -> dict[str, torch.Tensor]:
-        """Layer -> (C, C), mean outer products of the features, differentiable in `texels` (once)."""
-        grams = self.read(texels, {name: GramTap(self.place(name)) for name in layers})
-        return {name: gram[0] for name, gram in grams.items()}
 
     def read(self, texels: torch.Tensor, taps: Mapping[str, Tap | GramTap]) -> dict[str, torch.Tensor]:
         """What taps give of texel colours, under their names, in one pass."""

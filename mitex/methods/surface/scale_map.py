@@ -9,10 +9,9 @@ import numpy as np
 
 from mitex.errors import ConfigError
 from mitex.geometry.triangles import interpolate
-from mitex.images import read_image
+from mitex.images import bilinear, read_image
 from mitex.mesh import Mesh
 from mitex.mesh.vertex_files import read_array
-from mitex.methods.surface.pictures import picture_at
 from mitex.paths import expanded
 
 SMALLEST, LARGEST = 0.25, 4.0  # factors of the pattern's size
@@ -77,9 +76,8 @@ class ScaleMap:
         if self.uv is None:
             factors = interpolate(barycentric, self.values[mesh.faces[face]][..., None])[:, 0]
         else:
-            factors = picture_at(self.values, interpolate(barycentric, self.uv[face].astype(np.float64)))[
-                :, 0
-            ]
+            uv = interpolate(barycentric, self.uv[face].astype(np.float64))
+            factors = bilinear(self.values, uv)[:, 0].astype(np.float32)
         if factors.min() < SMALLEST - 1e-6 or factors.max() > LARGEST + 1e-6:
             raise ConfigError(
                 f"the scale map goes from {factors.min():.3g} to {factors.max():.3g} on '{mesh.name}'",

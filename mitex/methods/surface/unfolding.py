@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mitex.mesh import Mesh
-from mitex.mesh.topology import face_edges, welded
+from mitex.mesh.topology import paired_sides, welded
 from mitex.mesh.validate import degenerate_faces
 
 
@@ -61,12 +61,7 @@ def _glue(corners: np.ndarray) -> np.ndarray:
     faces = np.flatnonzero((corners != np.roll(corners, 1, axis=1)).all(axis=1))
     if not len(faces):
         return glued
-    _, edges = face_edges(corners[faces], int(corners.max()) + 1)
-    flat = edges.ravel()
-    order = np.argsort(flat, kind="stable")
-    count = np.bincount(flat)
-    pair = (np.cumsum(count) - count)[count == 2]
-    one, other = order[pair], order[pair + 1]
+    one, other = paired_sides(corners[faces], int(corners.max()) + 1).T
     start = corners[faces].ravel()
     same = (start[one] == start[other]).astype(np.int64)
     side = (3 * faces[:, None] + np.arange(3)).ravel()  # their sides in the numbers of all

@@ -5,7 +5,7 @@ import json
 import pytest
 import torch
 
-from mitex.errors import ConfigError, WeightsError
+from mitex.errors import ConfigError, ImageError, WeightsError
 from mitex.features.clip import Clip, cached_folder, named_folder
 from mitex.features.clip.folder import PUBLIC
 from mitex.features.text_model import text_image_model
@@ -56,7 +56,7 @@ def test_texts_of_no_use(whole, text):
 
 @pytest.mark.parametrize("shape", [(32, 32, 3), (1, 31, 32, 3), (1, 3, 32, 32)])
 def test_images_of_other_shapes(whole, shape):
-    with pytest.raises(ConfigError, match="give .K, 32, 32, 3"):
+    with pytest.raises(ImageError, match="give .K, 32, 32, 3"):
         Clip(whole).encode_images(torch.zeros(shape))
 
 

@@ -90,7 +90,7 @@ def test_bfloat16_where_processor_and_weights_allow_it(tmp_path, monkeypatch, fa
     """Not where attention is so sharp that its choice depends on the last bits."""
     from safetensors.torch import load_file, save_file
 
-    monkeypatch.setattr("mitex.features.clip.model.bfloat16_is_fast", lambda device: fast)
+    monkeypatch.setattr("mitex.runtime.precision.bfloat16_is_fast", lambda device: fast)
     path = write_folder(tmp_path / "clip", "wide", layers=6) / "model.safetensors"
     weights = load_file(path)
     save_file({name: sharp * w if "q_proj.weight" in name else w for name, w in weights.items()}, path)

@@ -64,7 +64,7 @@ def test_updates_are_mixed_by_the_weights_of_the_vertices(pair):
     with torch.no_grad():
         for _ in range(6):
             mask = torch.rand(1, len(state), generator=generator)[0] < 0.5
-            first, second = (texture.look.rule.update(state[None], operator)[0] for texture in pair)
+            first, second = (texture.look.rule.step(state[None], operator)[0] - state for texture in pair)
             update = (1 - share) * first + share * second
             state = torch.where(mask[:, None], state + update, state)
             state = torch.minimum(torch.maximum(state, -reach), reach)

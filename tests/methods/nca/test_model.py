@@ -111,12 +111,6 @@ def test_orientation_comes_with_the_perception(mesh, generator):
     assert (result[0] - expected).abs().max() < 1e-5
 
 
-def test_update_is_the_step_without_the_state(mesh, generator):
-    model = _model()
-    state = _state(mesh, generator)
-    assert torch.allclose(state + model.update(state, mesh), model.step(state, mesh), atol=1e-6)
-
-
 @pytest.mark.parametrize(
     ("options", "count"),
     [

@@ -133,7 +133,9 @@ def test_a_picture_and_a_mesh_come_out(texture, maps, tmp_path):
     distance = np.linalg.norm(asset.mesh.vertices, axis=1)
     reach = (applied.thickness + 2 / 96) * applied.similarity.scale  # a cell more
     assert np.abs(distance - 1).max() < reach
-    assert isinstance(Asset.load(asset.export(tmp_path / "ball.glb")), Asset)
+    again = Asset.load(asset.export(tmp_path / "ball.glb")).mesh
+    expected = asset.mesh.vertices[asset.mesh.faces]
+    np.testing.assert_allclose(again.vertices[again.faces], expected, atol=1e-5)
 
 
 def test_bad_requests_are_refused(texture, maps):

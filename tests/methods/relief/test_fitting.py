@@ -16,8 +16,10 @@ from mitex.methods.layout import layout_side, with_layout
 from mitex.methods.relief import ReliefConfig, ReliefTexture
 from mitex.methods.relief.start import Start
 from mitex.methods.relief.task import ReliefTask
+from mitex.paths import cache_dir
 from mitex.runtime import threads
 from mitex.training import Cancelled
+from mitex.training.locate import CHECKPOINT, PREVIOUS
 from tests.methods.relief.waves import AMPLITUDE, waves
 from tests.training.contract import (
     FAULTS,
@@ -151,8 +153,10 @@ class TestMaps:
         relief.fit(waves(*ALL, side=48), icosphere(4), set=WITH_MAPS, steps=1)
         assert len(results()) == before
 
-    def test_a_synthesis_that_was_stopped_goes_on(self, tmp_path):
-        inputs = waves(*ALL, side=40), icosphere(4), tmp_path / "run"
+    @pytest.mark.parametrize(("left", "side"), [(CHECKPOINT, 40), (PREVIOUS, 44)])
+    def test_a_synthesis_that_was_stopped_goes_on(self, left, side, tmp_path):
+        """Also if it was stopped while it saved, when the checkpoint has its other name."""
+        inputs = waves(*ALL, side=side), icosphere(4), tmp_path / "run"
         settings: Any = {"set": WITH_MAPS | {"surface_steps": 6}, "steps": 1}
         stop, steps = threading.Event(), []
 
@@ -164,6 +168,8 @@ class TestMaps:
         with pytest.raises(Cancelled):
             relief.fit(*inputs, **settings, on_step=on_step, cancel=stop)
         assert steps == [0, 1, 2, 3, 4] and not (tmp_path / "run").exists()
+        (training,) = (cache_dir() / "relief").glob("*.run")
+        (training / CHECKPOINT).rename(training / left)
         relief.fit(*inputs, **settings, on_step=lambda progress: steps.append(progress.step))
         assert steps[5:] == [4, 5, 6, 0, 1]
 

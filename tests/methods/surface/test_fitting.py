@@ -12,6 +12,7 @@ from mitex.asset import Asset
 from mitex.atlas import usable_uv
 from mitex.errors import CheckpointError, ConfigError
 from mitex.exemplar import Exemplar
+from mitex.features.layers import LAYERS, with_poolings
 from mitex.images import write_image
 from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods import surface
@@ -21,7 +22,6 @@ from mitex.methods.surface import METHOD
 from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.content import content_colours
 from mitex.methods.surface.domain import SurfaceDomain
-from mitex.methods.surface.network import ALL_LAYERS
 from mitex.methods.surface.task import VIEW, SurfaceTask
 from mitex.methods.surface.texels import charts
 from mitex.methods.surface.texture import SurfaceTexture
@@ -181,7 +181,7 @@ def test_settings_that_do_not_go_together(mesh, exemplar, tmp_path, settings, me
 def test_vgg19_compares_its_own_layers():
     config = resolve(PRESETS, None, None, ["weights=vgg19"])
     assert len(config.compared) == 21 and "relu5_4" in config.compared
-    assert resolve(PRESETS, None, None, []).compared == ALL_LAYERS
+    assert resolve(PRESETS, None, None, []).compared == with_poolings(LAYERS)
 
 
 def test_an_unknown_content_layer_is_named_as_such():

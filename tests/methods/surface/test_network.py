@@ -158,6 +158,10 @@ def test_gram_matrices_and_their_gradient(levels, image, regions):
     assert (a - b).norm() < 1e-4 * b.norm()
 
 
+def _grams(network, texels, layers):
+    return network.read(texels, {name: GramTap(network.place(name)) for name in layers})
+
+
 def test_finite_differences(levels, image):
     """Of the sum of all Gram matrices along a random direction."""
     ours = SurfaceVgg(levels, precision="float32")
@@ -165,7 +169,7 @@ def test_finite_differences(levels, image):
     x = image.view(-1, 3)[levels.order].clone().requires_grad_()
 
     def value(texels):
-        grams = ours.gram_matrices(texels, ("relu2_1", "pool3"))
+        grams = _grams(ours, texels, ("relu2_1", "pool3"))
         return torch.stack([gram.double().sum() for gram in grams.values()]).sum()
 
     (gradient,) = torch.autograd.grad(value(x), x)
@@ -181,13 +185,19 @@ def test_bfloat16_agrees(levels, image):
     results = []
     for precision in ("float32", "bfloat16"):
         x = texels.clone().requires_grad_()
-        grams = SurfaceVgg(levels, precision=precision).gram_matrices(x, ("relu1_2", "relu2_2", "relu3_3"))
+        network = SurfaceVgg(levels, precision=precision)
+        grams = _grams(network, x, ("relu1_2", "relu2_2", "relu3_3"))
         loss = torch.stack([gram.square().mean() for gram in grams.values()]).sum()
         results.append((grams, torch.autograd.grad(loss, x)[0]))
     (exact, gradient), (rounded, close) = results
     for name in exact:
         assert (exact[name] - rounded[name]).norm() < 1e-2 * exact[name].norm()
     assert torch.cosine_similarity(gradient.flatten(), close.flatten(), dim=0) > 0.999
+
+
+def test_an_unknown_precision_is_refused(levels):
+    with pytest.raises(ConfigError, match="unknown precision 'float16'"):
+        SurfaceVgg(levels, precision="float16")
 
 
 def test_random_weights_are_used_as_they_are(levels, image):

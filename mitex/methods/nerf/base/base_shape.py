@@ -10,21 +10,23 @@ import warnings
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from mitex.errors import MeshError, MeshWarning
 from mitex.geometry.vectors import orthonormal
 from mitex.mesh import Mesh, remesh
+from mitex.mesh.matrices import ring_means
 from mitex.mesh.remesh import simplified
 from mitex.mesh.topology import boundary_edges, components
 from mitex.methods.nerf.base.convex_parts import convex_parts, union
 from mitex.methods.nerf.base.isosurface import isosurface, without_cavities
 from mitex.methods.nerf.field.projection import Projection
 
+DENSE = 10.0  # density above which there is the object [1 / scene units]
 EDGE = 0.005  # of the bounding box's diagonal
 SMALL = 0.2  # of the largest component's faces: smaller components are dropped
 FACES = 5_000  # of the mesh that is cut into convex pieces
 CELLS = 2.0  # edges of the base shape that make a cell of the grid on which the pieces are united
+ROUNDS = 5  # of Laplacian smoothing
 FINE = 2.0  # edges may be so many times longer than asked for, or a given base mesh is remeshed
 PERCENTILE = 70.0  # of the scan's distances, see `shell_thickness`
 CUBE = 1.001  # the scene cube with a little room for rounding
@@ -33,43 +35,39 @@ CUBE = 1.001  # the scene cube with a little room for rounding
 def base_shape(
     density: np.ndarray,
     *,
-    threshold: float = 10.0,
     concavity: float = 0.1,
     edge: float = EDGE,
-    smooth: int = 5,
 ) -> Mesh:
     """The union of convex pieces of what is dense, smoothed and meshed evenly.
 
     Args:
         density: (R, R, R) float32, indexed by x, y, z, at the centres of R^3 cells of the scene cube
             [-1, 1]^3 [1 / scene units].
-        threshold: densities above are the object [1 / scene units].
         concavity: how far the pieces may be from the object, in (0, 1]; large ones smooth more.
         edge: length of the edges [diagonals of the object's bounding box].
-        smooth: rounds of Laplacian smoothing.
 
     Returns:
         A closed mesh in the scene cube with the bounding box of the object.
 
     Raises:
-        MeshError: the density is not finite or nowhere above the threshold, or a package of the extra
-            `nerf` is not installed.
+        MeshError: the density is not finite or nowhere above 10.
+        MissingPackage: a package of the extra `nerf` is not installed.
     """
     if not np.isfinite(density).all():
         raise MeshError("the coarse density is not finite", "lower the learning rate, or give `base_mesh`")
-    if not (density > threshold).any():
-        problem = f"the coarse density is nowhere above {threshold:g}"
+    if not (density > DENSE).any():
+        problem = f"the coarse density is nowhere above {DENSE:g}"
         raise MeshError(problem, "check masks and cameras, train it for longer, or give `base_mesh`")
     # Without the clipping, linear interpolation would put the surface at the outermost samples.
-    clipped = np.clip(density, 0.0, 2.0 * threshold)
+    clipped = np.clip(density, 0.0, 2.0 * DENSE)
     cell = 2.0 / len(density)
     low = np.full(3, 0.5 * cell - 1.0)
-    dense = isosurface(without_cavities(clipped, threshold), threshold, low=low, cell=cell, name="base")
+    dense = isosurface(without_cavities(clipped, DENSE), DENSE, low=low, cell=cell, name="base")
     dense = _large_components(dense)
     length = edge * _diagonal(dense)
     parts = convex_parts(simplified(dense, FACES) if len(dense.faces) > FACES else dense, concavity)
     rough = replace(union(parts, CELLS * length), name=dense.name)
-    return _even(_into_box(_laplacian(rough, smooth), dense), length)
+    return _even(_into_box(_smoothed(rough), dense), length)
 
 
 def given_base(mesh: Mesh, edge: float = EDGE) -> Mesh:
@@ -144,14 +142,11 @@ def _large_components(mesh: Mesh) -> Mesh:
     return Mesh(mesh.vertices[used], faces.reshape(-1, 3), name=mesh.name)
 
 
-def _laplacian(mesh: Mesh, rounds: int) -> Mesh:
+def _smoothed(mesh: Mesh) -> Mesh:
     """Laplacian smoothing: in each of some rounds, every vertex moves to the mean of its neighbours."""
-    edges = mesh.edges
-    size = (len(mesh.vertices),) * 2
-    matrix = csr_array((1.0 / edges.valence[edges.rows], edges.indices, edges.indptr), size)
-    vertices = mesh.vertices.astype(np.float64)
-    for _ in range(rounds):
-        vertices = matrix @ vertices
+    mean, vertices = ring_means(mesh), mesh.vertices.astype(np.float64)
+    for _ in range(ROUNDS):
+        vertices = mean @ vertices
     return mesh.with_vertices(vertices)
 
 

@@ -8,6 +8,7 @@ from scipy.spatial import ConvexHull, QhullError
 from mitex.errors import MeshError
 from mitex.mesh import Mesh
 from mitex.methods.nerf.base.isosurface import isosurface, without_cavities
+from mitex.optional import optional
 
 MARGIN = 3  # cells around the union
 GROWN = 0.25  # cells by which parts grow, so that those that only touch become one
@@ -22,12 +23,10 @@ def convex_parts(mesh: Mesh, concavity: float) -> list[np.ndarray]:
         concavity: how far the parts may be from the shape, in (0, 1]; 1 gives one or a few.
 
     Raises:
-        MeshError: CoACD is not installed, or finds nothing.
+        MeshError: CoACD finds nothing.
+        MissingPackage: CoACD is not installed.
     """
-    try:
-        import coacd
-    except ImportError as e:
-        raise MeshError("CoACD is not installed", "run `pip install 'mitex[nerf]'`") from e
+    coacd = optional("coacd", "nerf")
     coacd.set_log_level("error")
     dense = coacd.Mesh(mesh.vertices.astype(np.float64), mesh.faces)
     # A search a third as long as CoACD's default; the number of parts is about the same.

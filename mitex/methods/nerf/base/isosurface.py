@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from mitex.errors import MeshError
 from mitex.mesh import Mesh
+from mitex.optional import optional
 
 
 def isosurface(values: np.ndarray, level: float, *, low: np.ndarray, cell: float, name: str = "mesh") -> Mesh:
@@ -21,12 +21,9 @@ def isosurface(values: np.ndarray, level: float, *, low: np.ndarray, cell: float
         name: of the mesh.
 
     Raises:
-        MeshError: scikit-image is not installed.
+        MissingPackage: scikit-image is not installed.
     """
-    try:
-        from skimage.measure import marching_cubes
-    except ImportError as e:
-        raise MeshError("scikit-image is not installed", "run `pip install 'mitex[nerf]'`") from e
+    marching_cubes = optional("skimage.measure", "nerf").marching_cubes
     below = min(float(values.min()), level - 1.0)
     padded = np.pad(values, 1, constant_values=below)
     # "ascent" winds the faces around large values counter-clockwise as seen from outside.

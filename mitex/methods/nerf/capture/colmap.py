@@ -9,7 +9,6 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from mitex.cache import cached, content_key
 from mitex.errors import CaptureError, CaptureWarning
 from mitex.images import SUFFIXES, read_bytes
 from mitex.methods.nerf.capture.transforms import ONE_FILE, Frame, find_mask, no_mask, parse_frames
+from mitex.optional import optional
 from mitex.paths import cache_dir
 from mitex.progress import announce
 
@@ -55,8 +55,9 @@ def photo_frames(folder: Path) -> list[Frame]:
     photos. Nothing is written into the folder. Photos without a pose are left out with a warning.
 
     Raises:
-        CaptureError: too few photos, too few of them overlap, or pycolmap is not installed.
+        CaptureError: too few photos, or too few of them overlap.
         ImageError: a photo is damaged.
+        MissingPackage: pycolmap is not installed.
     """
     try:
         photos = _photos(folder)
@@ -97,8 +98,9 @@ def reconstruct(folder: Path, names: Sequence[str], masked: bool = False) -> Str
         masked: whether photos must have an alpha channel or a mask.
 
     Raises:
-        CaptureError: too few of them could be placed, one has no mask, or pycolmap is not installed.
+        CaptureError: too few of them could be placed, or one has no mask.
         ImageError: a photo is damaged.
+        MissingPackage: pycolmap is not installed.
     """
     announce("finding the cameras, some minutes")
     with tempfile.TemporaryDirectory(prefix="mitex-") as temporary:
@@ -134,7 +136,7 @@ def _copy(folder: Path, name: str, target: Path, masked: bool) -> tuple[int, int
 
 def _largest(work: Path, one_camera: bool) -> pycolmap.Reconstruction | None:
     """COLMAP's model with the most photos, or None; always the same for the same photos."""
-    colmap = _pycolmap()
+    colmap = optional("pycolmap", "nerf")
     level, colmap.logging.minloglevel = colmap.logging.minloglevel, colmap.logging.FATAL
     verification = colmap.TwoViewGeometryOptions()
     verification.ransac.random_seed = 0
@@ -201,14 +203,3 @@ def _read(place: Path) -> dict[str, Any]:
 
 def _write(place: Path, tree: Mapping[str, Any]) -> None:
     (place / ONE_FILE).write_text(json.dumps(tree, indent=1) + "\n")
-
-
-def _pycolmap() -> ModuleType:
-    try:
-        import pycolmap
-    except ImportError as error:
-        raise CaptureError(
-            "finding the cameras of photos needs pycolmap",
-            "install it with `pip install 'mitex[nerf]'`, or add a transforms.json",
-        ) from error
-    return pycolmap

@@ -111,7 +111,10 @@ def project(
 
 
 def looked_at(poses: np.ndarray) -> np.ndarray:
-    """The point nearest to all optical axes, in least squares; among the cameras if the axes are parallel."""
+    """The point (3,) nearest to all optical axes of poses (V, 3, 4), camera -> world, in least squares.
+
+    It is among the cameras if the axes are parallel.
+    """
     origin, axis = poses[:, :, 3], -poses[:, :, 2]
     across = np.eye(3) - axis[:, :, None] * axis[:, None, :]
     centre = origin.mean(axis=0)

@@ -13,9 +13,9 @@ from skimage.filters import threshold_otsu
 from mitex.errors import CaptureError
 from mitex.methods.nerf.capture.visual_hull import Hull, project, visual_hull
 from mitex.methods.nerf.footage.guess import Guess, in_box, in_middle, on_table
+from mitex.methods.nerf.footage.mask_method import MaskMethod
 from mitex.methods.nerf.footage.silhouette import disc, silhouette
 from mitex.methods.nerf.footage.site import Site
-from mitex.methods.nerf.footage.ways import Way
 from mitex.progress import counted
 
 ROUNDS = (400, 800)  # longer side of the pictures [pixels]; each within what the masks before agree on
@@ -25,16 +25,16 @@ DIFFERENT = (12.0, 40.0)  # distance in CIELAB from which a colour is not the ba
 AGREED = 0.5  # part of the silhouette of what all agree on that a mask must fill
 
 
-def cut_out(site: Site, pictures: Sequence[np.ndarray], way: Way) -> list[np.ndarray]:
+def cut_out(site: Site, pictures: Sequence[np.ndarray], method: MaskMethod) -> list[np.ndarray]:
     """Masks (H, W) bool of the object, one of each picture (H, W, 3) uint8; empty where none is to be had.
 
     Raises:
         CaptureError: there is no object to be found in that way.
     """
-    if way.kind == "colour":
-        masks = _by_colour([_shrunk(picture, ROUNDS[-1]) for picture in pictures], way.colour)
+    if method.kind == "colour":
+        masks = _by_colour([_shrunk(picture, ROUNDS[-1]) for picture in pictures], method.colour)
     else:
-        masks = _by_points(site, pictures, _guess(site, _shrunk(pictures[0], ROUNDS[0]), way))
+        masks = _by_points(site, pictures, _guess(site, _shrunk(pictures[0], ROUNDS[0]), method))
     hull = _agreed(site, masks)
     shown = [silhouette(hull, view, mask.shape) for view, mask in zip(site.views, masks, strict=True)]
     masks = [_cleaned(mask & _grown(region)) for mask, region in zip(masks, shown, strict=True)]
@@ -42,13 +42,13 @@ def cut_out(site: Site, pictures: Sequence[np.ndarray], way: Way) -> list[np.nda
     return [_enlarged(mask, view.mask.shape) for mask, view in zip(kept, site.views, strict=True)]
 
 
-def _guess(site: Site, first: np.ndarray, way: Way) -> Guess:
-    if way.kind == "plane":
+def _guess(site: Site, first: np.ndarray, method: MaskMethod) -> Guess:
+    if method.kind == "plane":
         return on_table(site)
-    if way.kind == "hull":
+    if method.kind == "hull":
         return in_middle(site)
     height, width = first.shape[:2]
-    left, top, wide, tall = np.round(np.array(way.box) * (width, height, width, height)).astype(int)
+    left, top, wide, tall = np.round(np.array(method.box) * (width, height, width, height)).astype(int)
     trimap = np.full((height, width), cv2.GC_BGD, np.uint8)
     trimap[top : top + tall, left : left + wide] = cv2.GC_PR_FGD
     mask = _grab_cut(first, trimap)

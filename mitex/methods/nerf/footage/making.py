@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,10 +19,11 @@ from mitex.methods.checks import in_range
 from mitex.methods.nerf.capture.capture import MIN_VIEWS, load_capture
 from mitex.methods.nerf.capture.transforms import ONE_FILE, Frame
 from mitex.methods.nerf.footage.coverage import advice
+from mitex.methods.nerf.footage.mask_method import mask_method
 from mitex.methods.nerf.footage.pictures import Footage, footage
 from mitex.methods.nerf.footage.sharpest import faults, reasons, sharpest
 from mitex.methods.nerf.footage.site import Site, find_site
-from mitex.methods.nerf.footage.ways import Way, way_of
+from mitex.optional import optional
 from mitex.paths import atomic_write, check_writable, expanded, missing_folders, writing
 from mitex.progress import counted
 
@@ -71,7 +72,7 @@ def make_capture(
     Args:
         source: a video of an object that stands still, or photos of it.
         out: folder to be made; it appears when it is complete.
-        mask: how the object is told from its surroundings, as `way_of` reads it.
+        mask: how the object is told from its surroundings, as `mask_method` reads it.
         frames: pictures to pick, at most, 8 to 1000.
         size: longer side of the pictures in the capture, at most [pixels].
 
@@ -79,18 +80,20 @@ def make_capture(
         CaptureError: no video or photos, too few that are sharp, have a camera or a mask.
         ConfigError: an option out of range.
         ImageError: a photo is damaged.
+        MissingPackage: the extra `nerf` is not installed.
         OutputError: `out` exists, or cannot be written.
     """
     in_range("`frames`", frames, MIN_VIEWS, 1000)
     in_range("`size`", size, 128, 8192)
-    way, cut_out = way_of(mask), _cut_out()
+    method = mask_method(mask)
+    cut_out = optional("mitex.methods.nerf.footage.cutting", "nerf").cut_out
     with _new_folder(expanded(out), expanded(source)) as folder:
         taken = footage(source, size)
         names, why = _picked(taken, frames, folder)
         site = find_site(folder, names)
-        if way.kind == "box" and site.frames[0].name != names[0]:
+        if method.kind == "box" and site.frames[0].name != names[0]:
             raise CaptureError("the first picture, which the box is in, got no camera", "mask in another way")
-        masks = cut_out(site, [read_bytes(frame.image) for frame in site.frames], way)
+        masks = cut_out(site, [read_bytes(frame.image) for frame in site.frames], method)
         kept = [k for k, one in enumerate(masks) if one.any()]
         if len(kept) < MIN_VIEWS:
             raise CaptureError(
@@ -102,27 +105,17 @@ def make_capture(
         return Report(taken.count, len(names), why, len(masks), len(kept), advice(views, middle))
 
 
-def _cut_out() -> Callable[[Site, Sequence[np.ndarray], Way], list[np.ndarray]]:
-    try:
-        from mitex.methods.nerf.footage.cutting import cut_out
-    except ImportError as error:
-        raise CaptureError(
-            f"cutting an object out needs {error.name}", "install it with `pip install 'mitex[nerf]'`"
-        ) from error
-    return cut_out
-
-
 def _picked(taken: Footage, frames: int, folder: Path) -> tuple[list[str], str]:
     """Writes the pictures to work with; their names, and why others were left out, in words."""
-    images, looks = [], []
+    images, qualities = [], []
     parts = min(frames, taken.count)
     work = counted("picking sharp pictures", sharpest(taken.read(), taken.count, parts), parts)
-    for picture, look in work:
+    for picture, quality in work:
         name = f"images/{picture.name}.jpg"
         write_image(folder / name, picture.pixels.astype(np.float32) / 255.0)
         images.append(name)
-        looks.append(look)
-    verdicts = faults(looks) if taken.video else [""] * len(looks)
+        qualities.append(quality)
+    verdicts = faults(qualities) if taken.video else [""] * len(qualities)
     names = [name for name, verdict in zip(images, verdicts, strict=True) if not verdict]
     why = reasons(verdicts)
     if len(names) < MIN_VIEWS:

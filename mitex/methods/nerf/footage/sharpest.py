@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from mitex.colour import LUMINANCE
 from mitex.images import resize
 from mitex.methods.nerf.footage.pictures import Picture
 
@@ -21,7 +22,7 @@ REASONS = {"blurred": "blurred", "exposure": "too dark or too bright", "alike": 
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class FrameQuality:
     """What a frame is judged by.
 
     Attributes:
@@ -35,40 +36,40 @@ class Look:
     thumbnail: np.ndarray
 
 
-def look(pixels: np.ndarray) -> Look:
+def frame_quality(pixels: np.ndarray) -> FrameQuality:
     """Judges a picture (H, W, 3) uint8."""
-    luma = (pixels.astype(np.float32) @ np.array([0.299, 0.587, 0.114], np.float32)) / 255.0
+    luma = (pixels.astype(np.float32) @ LUMINANCE) / 255.0
     smooth = ndimage.gaussian_filter(luma, 1.0)  # noise of the sensor is no sharpness
     rows, columns = np.gradient(smooth)
     brightness = float(luma.mean())
     small = resize(luma[..., None], THUMBNAIL, THUMBNAIL)[..., 0]
     thumbnail = (small - small.mean()) / max(float(small.std()), 1e-3)
     sharpness = float((rows**2 + columns**2).mean()) / max(brightness, 1e-3) ** 2
-    return Look(sharpness, brightness, thumbnail)
+    return FrameQuality(sharpness, brightness, thumbnail)
 
 
-def sharpest(pictures: Iterable[Picture], count: int, frames: int) -> Iterator[tuple[Picture, Look]]:
-    """The sharpest picture of each of `frames` equal parts of `count` pictures, with how it looks."""
-    best: tuple[Picture, Look] | None = None
+def sharpest(pictures: Iterable[Picture], count: int, frames: int) -> Iterator[tuple[Picture, FrameQuality]]:
+    """The sharpest picture of each of `frames` equal parts of `count` pictures, with its quality."""
+    best: tuple[Picture, FrameQuality] | None = None
     window = 0
     for number, picture in enumerate(pictures):
         if number * frames // count > window and best is not None:
             yield best
             best, window = None, number * frames // count
-        judged = look(picture.pixels)
-        if best is None or judged.sharpness > best[1].sharpness:
-            best = picture, judged
+        quality = frame_quality(picture.pixels)
+        if best is None or quality.sharpness > best[1].sharpness:
+            best = picture, quality
     if best is not None:
         yield best
 
 
-def faults(looks: Sequence[Look]) -> list[str]:
+def faults(qualities: Sequence[FrameQuality]) -> list[str]:
     """What speaks against each frame of a video: a key of `REASONS`, or "" for those to keep."""
-    sharp = np.array([one.sharpness for one in looks])
-    stops = np.log2([max(one.brightness, 1e-3) for one in looks])
+    sharp = np.array([one.sharpness for one in qualities])
+    stops = np.log2([max(one.brightness, 1e-3) for one in qualities])
     verdicts = []
     last = None
-    for k, one in enumerate(looks):
+    for k, one in enumerate(qualities):
         around = slice(max(k - NEIGHBOURS, 0), k + NEIGHBOURS + 1)
         if sharp[k] < BLURRED * np.median(sharp[around]):
             verdict = "blurred"

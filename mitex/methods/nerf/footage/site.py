@@ -62,7 +62,8 @@ def find_site(folder: Path, names: Sequence[str]) -> Site:
     """Cameras and points of pictures in a folder; takes minutes, and is kept in the user's cache.
 
     Raises:
-        CaptureError: too few of them could be placed, or pycolmap is not installed.
+        CaptureError: too few of them could be placed.
+        MissingPackage: pycolmap is not installed.
     """
     contents = [hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in names]
     place = cache_dir() / "captures" / content_key("site", VERSION, LONGER_SIDE, names, contents)
@@ -103,7 +104,7 @@ def _turned(frame: Frame, turn: np.ndarray) -> Frame:
 
 
 def _read(place: Path) -> Structure:
-    with np.load(place / "points.npz") as arrays:
+    with np.load(place / "points.npz", allow_pickle=False) as arrays:
         points, sightings = arrays["points"], arrays["sightings"]
     return Structure(_tree(place), points, sightings)
 

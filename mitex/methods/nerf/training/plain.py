@@ -23,8 +23,9 @@ from mitex.methods.nerf.training.radiance import RadianceTask, Rendered, schedul
 from mitex.runtime.jit import dr, mi
 from mitex.runtime.upload import upload
 from mitex.textures.march import Samples, sum_rays, weights_of
-from mitex.training import checkpoint, train
+from mitex.training import train
 from mitex.training.control import ALONE, Control
+from mitex.training.locate import has_checkpoint
 
 LEVELS, COARSEST, FINEST = 16, 16, 2048  # of the hash grid
 CODE = 15  # channels that the density network hands to that of the colour
@@ -145,7 +146,6 @@ def train_plain_field(
     Arguments are those of `RadianceTask` and of `train`.
     """
     task = PlainTask(config, capture, preview_view)
-    names = (checkpoint.NAME, checkpoint.PREVIOUS)
-    resume = folder is not None and any((folder / name).exists() for name in names)
+    resume = folder is not None and has_checkpoint(folder)
     train(task, config, folder, resume=resume, control=control, **schedule(config))
     return task

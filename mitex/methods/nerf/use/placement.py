@@ -70,9 +70,8 @@ def guided_side(mesh: Mesh, gap: float, patch: int) -> int:
     return texels
 
 
-@lru_cache(
-    maxsize=1
-)  # unwrapping takes seconds, and whether a texture is too fine is asked before it is made
+# Unwrapping takes seconds, and whether a texture is too fine is asked before it is made.
+@lru_cache(maxsize=1)
 def own_layout(mesh: Mesh, gap: float, size: int) -> tuple[Mesh, int | None]:
     """The mesh with UVs for a map on it, whatever UVs it has, and the side of the map [texels].
 

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from mitex.errors import MeshError
+from mitex.errors import MeshError, MissingPackage
 from mitex.mesh import Mesh, icosphere, quality
 from mitex.methods.nerf.base.convex_parts import GROWN, convex_parts, union
 
@@ -84,5 +84,5 @@ def test_coacd_is_silent(capfd):
 
 def test_names_the_extra_that_is_missing(monkeypatch):
     monkeypatch.setitem(sys.modules, "coacd", None)
-    with pytest.raises(MeshError, match=r"pip install 'mitex\[nerf\]'"):
+    with pytest.raises(MissingPackage, match=r"pip install 'mitex\[nerf\]'"):
         convex_parts(icosphere(2), 0.1)

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from mitex.errors import MeshError
+from mitex.errors import MissingPackage
 from mitex.mesh import quality
 from mitex.methods.nerf.base.isosurface import isosurface, without_cavities
 
@@ -53,5 +53,5 @@ def test_open_hollows_stay():
 
 def test_names_the_extra_that_is_missing(monkeypatch):
     monkeypatch.setitem(sys.modules, "skimage.measure", None)
-    with pytest.raises(MeshError, match=r"pip install 'mitex\[nerf\]'"):
+    with pytest.raises(MissingPackage, match=r"pip install 'mitex\[nerf\]'"):
         isosurface(balls(1.0), 0.0, low=LOW, cell=CELL)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mitex.errors import CaptureError, CaptureWarning
+from mitex.errors import CaptureError, CaptureWarning, MissingPackage
 from mitex.methods.nerf.capture import colmap
 from mitex.methods.nerf.capture.capture import load_capture
 
@@ -193,7 +193,8 @@ def test_a_folder_that_cannot_be_read(photos, monkeypatch):
 def test_without_pycolmap(photos, monkeypatch):
     monkeypatch.setattr(colmap, "VERSION", "not installed")
     monkeypatch.setitem(sys.modules, "pycolmap", None)
-    assert_refused(photos, "needs pycolmap; install it with `pip install 'mitex[nerf]'`")
+    with pytest.raises(MissingPackage, match=r"pycolmap.*pip install 'mitex\[nerf\]'"):
+        load_capture(photos)
 
 
 def assert_refused(folder, words):

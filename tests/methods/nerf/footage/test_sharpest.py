@@ -5,7 +5,7 @@ import pytest
 from scipy import ndimage
 
 from mitex.methods.nerf.footage.pictures import Picture
-from mitex.methods.nerf.footage.sharpest import faults, look, reasons, sharpest
+from mitex.methods.nerf.footage.sharpest import faults, frame_quality, reasons, sharpest
 
 NOISE = np.random.default_rng(0).normal(size=(120, 700))
 WAVES = ndimage.gaussian_filter(NOISE, 1.0) + 8 * ndimage.gaussian_filter(NOISE, 8.0)
@@ -21,10 +21,10 @@ def frame(shift=0, blur=0, gain=1.0, noise=2.0, seed=0):
 
 
 def test_blur_lowers_sharpness_and_exposure_does_not():
-    sharp = look(frame()).sharpness
-    blurred = [look(frame(blur=width)).sharpness for width in (3, 6, 12)]
+    sharp = frame_quality(frame()).sharpness
+    blurred = [frame_quality(frame(blur=width)).sharpness for width in (3, 6, 12)]
     assert sharp > blurred[0] > blurred[1] > blurred[2] and blurred[2] < 0.6 * sharp
-    assert look(frame(gain=0.6)).sharpness == pytest.approx(sharp, rel=0.1)
+    assert frame_quality(frame(gain=0.6)).sharpness == pytest.approx(sharp, rel=0.1)
 
 
 def test_the_sharpest_of_every_window_is_kept():
@@ -41,12 +41,12 @@ def test_flawed_frames_are_named():
     frames[3] = frame(72, blur=25)
     frames[6] = frame(144, gain=0.5)
     frames[10] = frame(217, seed=99)  # a pixel beside the one before, with other noise
-    verdicts = faults([look(one) for one in frames])
+    verdicts = faults([frame_quality(one) for one in frames])
     assert {k: v for k, v in enumerate(verdicts) if v} == {3: "blurred", 6: "exposure", 10: "alike"}
     assert reasons(verdicts) == "1 blurred, 1 too dark or too bright, 1 like the one before"
     assert reasons(["", ""]) == ""
 
 
 def test_drift_of_the_exposure_is_no_flaw():
-    looks = [look(frame(24 * k, gain=1.0 - 0.04 * k)) for k in range(14)]
-    assert not any(faults(looks))
+    qualities = [frame_quality(frame(24 * k, gain=1.0 - 0.04 * k)) for k in range(14)]
+    assert not any(faults(qualities))

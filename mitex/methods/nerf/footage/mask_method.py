@@ -1,4 +1,4 @@
-"""Ways to mask the object, as words of `--mask`."""
+"""Methods to mask the object, as words of `--mask`."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from mitex.errors import ConfigError
 
-WAYS = "plane, hull, box:X,Y,W,H or colour:#RRGGBB"
+METHODS = "plane, hull, box:X,Y,W,H or colour:#RRGGBB"
 
 
 @dataclass(frozen=True)
-class Way:
+class MaskMethod:
     """How the object is told from its surroundings.
 
     Attributes:
@@ -26,21 +26,21 @@ class Way:
     colour: tuple[int, int, int] = (0, 0, 0)
 
 
-def way_of(words: str) -> Way:
-    """The way that words of `--mask` name.
+def mask_method(words: str) -> MaskMethod:
+    """The method that words of `--mask` name.
 
     Raises:
         ConfigError: they name none, or the box is not inside of the picture.
     """
     kind, _, value = words.partition(":")
     if words in ("plane", "hull"):
-        return Way(words)
+        return MaskMethod(words)
     if kind == "colour" and re.fullmatch(r"#?[0-9a-fA-F]{6}", value):
         red, green, blue = bytes.fromhex(value.removeprefix("#"))
-        return Way("colour", colour=(red, green, blue))
+        return MaskMethod("colour", colour=(red, green, blue))
     if kind == "box" and re.fullmatch(r"[0-9.]+(,[0-9.]+){3}", value):
-        return Way("box", box=_box(value))
-    raise ConfigError(f"'{words}' is no way to mask", f"use {WAYS}")
+        return MaskMethod("box", box=_box(value))
+    raise ConfigError(f"'{words}' is no way to mask", f"use {METHODS}")
 
 
 def _box(value: str) -> tuple[float, float, float, float]:
