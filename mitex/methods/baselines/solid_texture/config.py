@@ -23,6 +23,11 @@ class SolidConfig(TrainingConfig):
     layers: tuple[str, ...] = key(
         ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "VGG-16's whose Gram matrices are compared"
     )
+    normalised: bool = key(
+        True,
+        "layers are divided by their mean activations, so that they count alike; the paper: not, and Gram "
+        "matrices are divided by how many channels there are",
+    )
     lr: float = key(0.1, "learning rate of Adam", 0)
     milestones: tuple[int, ...] = key((400, 500), "steps at which the learning rate falls", 0)
     decay: float = key(0.3, "factor of the learning rate at a milestone; the paper: 1", 0)
@@ -36,5 +41,5 @@ class SolidConfig(TrainingConfig):
 DEFAULT = SolidConfig()
 PRESETS = {
     DEFAULT.preset: DEFAULT,
-    "paper": replace(DEFAULT, preset="paper", steps=3000, slices=8, milestones=()),
+    "paper": replace(DEFAULT, preset="paper", steps=3000, slices=8, normalised=False, milestones=()),
 }
