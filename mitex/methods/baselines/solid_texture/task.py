@@ -9,12 +9,13 @@ import numpy as np
 import torch
 
 from mitex.exemplar import Exemplar
-from mitex.features import Vgg16
 from mitex.features.layers import CHANNELS
-from mitex.losses.gram import gram_loss, gram_matrix
+from mitex.features.vgg19 import named_vgg
+from mitex.losses.gram import gram_loss, gram_targets
 from mitex.methods.baselines.solid_texture.boxes import Box
 from mitex.methods.baselines.solid_texture.config import SolidConfig
 from mitex.methods.baselines.solid_texture.generator import NOISE, SCALES, Generator, noise_boxes
+from mitex.methods.exemplar_pictures import albedo, framed
 from mitex.runtime import keep_freed_memory
 from mitex.training import ParameterTask, Step
 
@@ -25,8 +26,8 @@ SHIFTS = 1 << (SCALES - 1)  # places of a slice among the voxels of the coarsest
 class SolidTask(ParameterTask):
     """A generator whose slices across the three axes shall have the Gram matrices of an exemplar.
 
-    The authors take VGG-19, here VGG-16 stands in its place, whose weights come with Mitex. They draw the
-    place of a slice along its axis alone, here it is drawn along all three.
+    The authors take VGG-19, for which VGG-16 stands in, whose weights come with Mitex. They draw the place of
+    a slice along its axis alone, here it is drawn along all three.
 
     Args:
         config: settings.
@@ -38,15 +39,11 @@ class SolidTask(ParameterTask):
         self.config, self.exemplar = config, exemplar
         self.generator = Generator.random(torch.Generator().manual_seed(config.seed))
         super().__init__(self.generator.tensors)
-        self.network = Vgg16(normalised=config.normalised)
+        self.network = named_vgg(config.network, normalised=config.normalised)
         # Published matrices are divided by the channels C, so that their squared distance is C^2 smaller.
         self.weights = None if config.normalised else {name: CHANNELS[name] ** -2 for name in config.layers}
-        features = self.network.features(self._picture[None], config.layers)
-        self.targets = {layer: gram_matrix(values.flatten(1, 2)[0]) for layer, values in features.items()}
-
-    @property
-    def _picture(self) -> torch.Tensor:
-        return torch.from_numpy(self.exemplar.resized(self.config.exemplar_size).maps["albedo"])
+        picture = albedo(exemplar, config.exemplar_size)
+        self.targets = gram_targets(self.network.features(picture[None], config.layers))
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
         """Gram matrices of slices across x, y and z; `commit` keeps the statistics of the channels."""
@@ -70,13 +67,10 @@ class SolidTask(ParameterTask):
     @torch.no_grad()
     def preview(self, step: int) -> np.ndarray:
         """The exemplar, and slices across x, y and z."""
-        side, generator = self.config.slice_size, torch.Generator().manual_seed(step)
-        beside = np.zeros((side, side, 3), np.float32)
-        picture = self._picture.numpy()[:side, :side]
-        beside[: len(picture), : picture.shape[1]] = picture
+        generator = torch.Generator().manual_seed(step)
         updated = {name: value.clone() for name, value in self.generator.statistics.items()}
         slices = [self._slice(axis, generator, updated).clamp(0, 1).numpy() for axis in range(3)]
-        return np.hstack([beside, *slices])
+        return np.hstack([framed(self.exemplar, self.config.exemplar_size, len(slices[0])), *slices])
 
     @torch.no_grad()
     def settled(self) -> Generator:
