@@ -21,7 +21,11 @@ class GatysConfig(TrainingConfig):
         256, "side that the exemplar's central square is resized to [px]; a pixel becomes a texel", 32, 2048
     )
     noise: float = key(
-        0.1, "of the start, in which the exemplar's mean colour has the rest; the paper: 1", 0, 1
+        0.1,
+        "of the start, in which the exemplar's mean colour has the rest; the paper's authors: as wide as "
+        "noise with a standard deviation of a level of 8 bits",
+        0,
+        1,
     )
     periodic: bool = key(True, "the picture goes on beyond its borders; the paper: zeros are around it")
     network: Literal["vgg16", "vgg19"] = key(
@@ -52,7 +56,7 @@ PRESETS = {
         preset="paper",
         steps=2000,
         size=256,
-        noise=1.0,
+        noise=0.0136,
         periodic=False,
         layers=("relu1_1", "pool1", "pool2", "pool3", "pool4"),
     ),
