@@ -16,15 +16,21 @@ def _names(counts: Sequence[int]) -> tuple[str, ...]:
 
 LAYERS = _names((2, 2, 3, 3, 3))  # of VGG-16
 LAYERS_19 = _names((2, 2, 4, 4, 4))
+NETWORKS = {"vgg16": LAYERS, "vgg19": LAYERS_19}
 CHANNELS = {name: WIDTHS[int(name[4]) - 1] for name in LAYERS_19}
 
 
-def check_layers(names: Sequence[str]) -> None:
-    """Raises a ConfigError if names are not some of VGG-16's layers."""
-    unknown = [name for name in names if name not in LAYERS]
+def halvings(name: str) -> int:
+    """How often the map of a layer is halved: 0 of relu1_2, 1 of pool1 and relu2_1."""
+    return int(name[4]) - name.startswith("relu")
+
+
+def check_layers(names: Sequence[str], known: Sequence[str] = LAYERS) -> None:
+    """Raises a ConfigError if names are not some of a network's layers, by default of VGG-16's."""
+    unknown = [name for name in names if name not in known]
     if unknown or not names:
         named = ", ".join(map(str, unknown)) or "none"
-        raise ConfigError(f"VGG-16's layers to compare are {named}", f"use some of {', '.join(LAYERS)}")
+        raise ConfigError(f"VGG's layers to compare are {named}", f"use some of {', '.join(known)}")
 
 
 def with_poolings(convolutions: Sequence[str]) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ import torch
 from mitex.errors import ConfigError
 from mitex.features import weights
 from mitex.features.frozen import FrozenConv, FrozenStack, Pool, Tap
-from mitex.features.layers import LAYERS
+from mitex.features.layers import LAYERS, halvings
 from mitex.runtime import uses_bfloat16
 
 Weights = Mapping[str, tuple[torch.Tensor, torch.Tensor]]  # layer -> weight (O, I, 3, 3), bias (O,)
@@ -61,7 +61,7 @@ class Vgg16:
 
         Args:
             images: (K, H, W, 3) sRGB in [0, 1] (values outside are passed on).
-            layers: names out of `LAYERS`.
+            layers: names out of `LAYERS`, or of poolings ("pool1" to "pool5").
 
         Returns:
             name -> (K, h, w, C) float32, differentiable in `images` (once).
@@ -69,9 +69,12 @@ class Vgg16:
         Raises:
             ConfigError: no or an unknown layer, images of another shape or too small for a layer.
         """
-        names = list(layers)
-        maps = self._run(images, names, [None] * len(names))
-        return {name: m.permute(0, 2, 3, 1) for name, m in zip(names, maps, strict=True)}
+        sources = {name: self._source(name) for name in layers}
+        names = list(dict.fromkeys(sources.values()))
+        maps = dict(zip(names, self._run(images, names, [None] * len(names)), strict=True))
+        pool = Pool(self.pool)
+        read = {n: maps[n] if n == source else pool.forward(maps[source]) for n, source in sources.items()}
+        return {name: m.permute(0, 2, 3, 1) for name, m in read.items()}
 
     def samples(self, images: torch.Tensor, positions: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
         """Features at chosen places only: what sampled losses need, without gradients on whole maps.
@@ -90,8 +93,12 @@ class Vgg16:
 
     def extent(self, layer: str, height: int, width: int) -> tuple[int, int]:
         """(h, w) of a layer's map for an image of (height, width)."""
-        halvings = int(layer[4]) - 1
-        return height >> halvings, width >> halvings
+        return height >> halvings(layer), width >> halvings(layer)
+
+    def _source(self, layer: str) -> str:
+        """The convolution that a layer is, or that it pools."""
+        block = layer.replace("pool", "relu") + "_"
+        return max((name for name in self.index if name.startswith(block)), default=layer)
 
     def _run(
         self, images: torch.Tensor, names: list[str], positions: Sequence[torch.Tensor | None]

@@ -11,12 +11,25 @@ from safetensors.torch import load_file
 
 from mitex.features.layers import CHANNELS, LAYERS_19
 from mitex.features.normalisation import SPREAD
-from mitex.features.vgg import Weights
+from mitex.features.vgg import Vgg16, Weights
 from mitex.features.weights import WeightsError
 from mitex.paths import cache_dir
 
 VARIABLE = "MITEX_VGG19"
 FILE = "vgg19.safetensors"
+
+
+def named_vgg(network: str, pool: str = "average", normalised: bool = True) -> Vgg16:
+    """The package's "vgg16", or "vgg19" of the user's file, whose layers cannot be normalised.
+
+    Args:
+        network: which one.
+        pool, normalised: as of `Vgg16`.
+
+    Raises:
+        WeightsError: there is no file, or it is not VGG-19's.
+    """
+    return Vgg16(pool, normalised=normalised, weights=vgg19_convolutions() if network == "vgg19" else None)
 
 
 def vgg19_path() -> Path:

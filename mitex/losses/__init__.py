@@ -3,7 +3,7 @@
 from mitex.losses.advection import advection_residual
 from mitex.losses.augmentation import Augmentation
 from mitex.losses.autocorrelation import autocorrelation_distance
-from mitex.losses.gram import gram_distance, gram_loss, gram_matrix
+from mitex.losses.gram import gram_distance, gram_loss, gram_matrix, gram_targets
 from mitex.losses.laplacian import laplacian_excess
 from mitex.losses.motion import MotionLoss, motion_loss
 from mitex.losses.overflow import overflow_loss
@@ -22,6 +22,7 @@ __all__ = [
     "gram_distance",
     "gram_loss",
     "gram_matrix",
+    "gram_targets",
     "laplacian_excess",
     "mean_direction",
     "moment_distance",

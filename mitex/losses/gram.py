@@ -12,6 +12,11 @@ def gram_matrix(features: torch.Tensor) -> torch.Tensor:
     return features.mT @ features / features.shape[-2]
 
 
+def gram_targets(maps: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    """Layer -> (C, C) Gram matrix of an exemplar whose maps are (1, h, w, C)."""
+    return {layer: gram_matrix(values[0].flatten(0, 1)) for layer, values in maps.items()}
+
+
 def gram_loss(
     features: Mapping[str, torch.Tensor],
     targets: Mapping[str, torch.Tensor],

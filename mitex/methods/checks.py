@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from mitex.errors import ConfigError
+from mitex.training.config import by_key
 from mitex.training.settings import LARGEST_SEED
 from mitex.training.values import number_text
 
@@ -45,6 +47,22 @@ def reject_unused(option: str, out: Path, condition: bool) -> None:
     if condition:
         kind = f"{out.suffix} files" if out.suffix else "folders"
         raise ConfigError(f"{option} means nothing for {kind}", "leave it out or change --out")
+
+
+def reject_idle(given: Mapping[str, Any] | Sequence[str], keys: Container[str], where: str) -> None:
+    """Refuses settings that would change nothing.
+
+    Args:
+        given: as `set` of `RunOptions`.
+        keys: of those that mean nothing.
+        where: such as "without words".
+
+    Raises:
+        ConfigError: one of them was given.
+    """
+    idle = [key for key in by_key(given) if key in keys]
+    if idle:
+        raise ConfigError(f"{', '.join(idle)} means nothing {where}", "leave it out")
 
 
 def merged_settings(groups: Sequence[Sequence[str]], **flags: object) -> list[str]:

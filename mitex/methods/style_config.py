@@ -33,6 +33,7 @@ class StyleConfig(WordsConfig, TrainingConfig):
         False, "compare the text with each picture; false: with their mean embedding (the paper)"
     )
     text_relief_weight: float = key(1.0, "of that of the close-ups without colours", 0)
+    text_relief_crop_area: float = key(0.1, "of a close-up without colours, as a share of the view", 1e-3, 1)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -59,6 +60,7 @@ EMBEDDED: dict[str, Any] = {
     "text_each": True,
     "text_crops": 4,
     "text_crop_area": 0.3,
+    "text_relief_crop_area": 0.3,
     "text_tilt": 0.0,
     "text_whole_weight": 0.0,
     "text_relief_weight": 0.0,

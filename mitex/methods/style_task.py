@@ -72,13 +72,14 @@ class StyleTask(ParameterTask):
         count, tilt = config.views, config.text_tilt
         whole = Augmentation.draw(generator, count, tilt=tilt)
         close = Augmentation.draw(generator, count, config.text_crops, config.text_crop_area, tilt)
-        terms = self._distances(
-            {
-                "whole": (config.text_whole_weight, whole, coloured),
-                "close": (config.text_close_weight, close, coloured),
-                "relief": (config.text_relief_weight, close, plain),
-            }
-        )
+        parts = {
+            "whole": (config.text_whole_weight, whole, coloured),
+            "close": (config.text_close_weight, close, coloured),
+        }
+        if config.text_relief_weight:
+            grey = Augmentation.draw(generator, count, config.text_crops, config.text_relief_crop_area, tilt)
+            parts["relief"] = config.text_relief_weight, grey, plain
+        terms = self._distances(parts)
         return Step(
             torch.stack(list(terms.values())).sum(),
             {name: float(value.detach()) for name, value in terms.items()},

@@ -119,3 +119,11 @@ class TestPlanFiles:
                     (tmp_path / text).parent.mkdir(exist_ok=True)
                     (tmp_path / text).touch()
         assert len(jobs_of(prepared(plan))) > 20
+
+    @pytest.mark.parametrize("name", presets())
+    def test_published_settings_are_those_of_all_methods_or_of_none(self, name, tmp_path):
+        """Beside the short forms; ours are not compared at length with baselines that are cut short."""
+        short, published = set(), set()
+        for part in preset_plan(name, tmp_path).methods:
+            (published if "paper" in part.fit.get("preset", "") else short).add((part.method, part.source))
+        assert published == (short if name in ("surface-fig4", "nca-fig10", "nca-fig11") else set())

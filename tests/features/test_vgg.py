@@ -4,6 +4,7 @@ import math
 
 import pytest
 import torch
+import torch.nn.functional as F
 
 from benchmarks.naive import vectors
 from mitex.errors import ConfigError
@@ -53,6 +54,25 @@ def test_every_layer_is_that_of_the_plain_network(networks, pictures, pool, prec
 
 def _extent(layer):
     return {"1": (49, 61), "2": (24, 30), "3": (12, 15), "4": (6, 7), "5": (3, 3)}[layer[4]]
+
+
+@pytest.mark.parametrize("pool", ["average", "max"])
+def test_poolings_and_their_gradient_are_those_of_the_plain_network(networks, pictures, pool):
+    """Beside the convolutions that they pool, and alone."""
+    reduce = F.avg_pool2d if pool == "average" else F.max_pool2d
+    images, reference = (pictures[:1, :49, :61].clone().requires_grad_() for _ in range(2))
+    network, sources = networks[pool, "float32"], ("relu1_2", "relu2_2", "relu4_3", "relu5_3")
+    ours = network.features(images, ["pool1", "relu2_1", "pool2", "pool4", "relu2_2", "pool5"])
+    plain = plain_vgg(reference, pool, MEAN_ACTIVATION[pool])
+    pooled = {f"pool{n[4]}": reduce(plain[n].permute(0, 3, 1, 2), 2).permute(0, 2, 3, 1) for n in sources}
+    expected = {name: (plain | pooled)[name] for name in ours}
+    for name, values in ours.items():
+        assert values.shape[1:3] == network.extent(name, 49, 61), name
+        assert relative_error(values, expected[name]) < 1e-5, name
+    for values in (ours, expected):
+        torch.stack([v.square().mean() for v in values.values()]).sum().backward()
+    assert images.grad is not None and reference.grad is not None
+    assert relative_error(images.grad, reference.grad) < 1e-4
 
 
 @pytest.mark.parametrize("pool", ["average", "max"])
@@ -182,6 +202,7 @@ def test_unknown_options(options, problem):
     [
         ((1, 32, 32, 3), ["relu6_1"], "no layer 'relu6_1'"),
         ((1, 32, 32, 3), ["conv1_1"], "no layer 'conv1_1'"),
+        ((1, 32, 32, 3), ["pool6"], "no layer 'pool6'"),
         ((1, 32, 32, 3), [], "no VGG-16 layer"),
         ((1, 15, 32, 3), ["relu1_1", "relu5_3"], r"\(15, 32\) are too small for relu5_3"),
         ((1, 3, 32, 32), ["relu1_1"], "shape"),

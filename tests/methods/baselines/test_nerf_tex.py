@@ -455,6 +455,12 @@ def test_every_setting_changes_the_first_step(box, change):
     assert first_loss(box, settings[0]) != first_loss(box, settings[1])
 
 
+def test_a_table_means_nothing_to_a_network_without_one(tmp_path):
+    """Which is said before the texture is read."""
+    with pytest.raises(ConfigError, match="table means nothing without a hash grid; leave it out"):
+        fit(tmp_path / "none", set=["table=9", "network=frequencies"])
+
+
 def test_patches_are_multiples_of_8():
     with pytest.raises(ConfigError, match="patch = 100 is no multiple of 8"):
         NerfTexConfig(patch=100)

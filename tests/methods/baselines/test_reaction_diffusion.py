@@ -148,6 +148,26 @@ class TestTask:
         threads(1)
         assert_third_step_leaves_no_trace(lambda: ReactionDiffusionTask(CONFIG, exemplar), CONFIG, fault)
 
+    def test_options_matter(self, exemplar):
+        """Of a step from a state that overflows, and of the start; the rest is the loop's."""
+
+        def value(**options) -> float:
+            task = ReactionDiffusionTask(replace(CONFIG, **options), exemplar)
+            task.pool.mul_(4)
+            return float(task.loss(1, torch.Generator().manual_seed(5)).value.detach())
+
+        plain = value()
+        for options in (
+            *({"overflow_weight": 1.0}, {"slowest": 0.05}, {"fastest": 0.06}, {"exemplar_size": 40}),
+            *({"layers": ("relu1_2",)}, {"channels": 7}, {"hidden": 9}, {"grid": 40}, {"seed": 1}),
+            *({"inject_every": 1}, {"min_steps": 3}, {"min_steps": 5, "max_steps": 6}, {"pool": 3}),
+        ):
+            assert value(**options) != plain, options
+
+    def test_the_width_of_a_fit_is_that_of_its_texture(self, exemplar):
+        texture = reaction_diffusion.fit(exemplar, set=[*SMALL, "width=0.3", "exemplar_size=40"], steps=1)
+        assert (texture.width, texture.cells) == (0.3, 40)
+
     def test_the_pool_goes_on_and_starts_anew(self, exemplar):
         task = ReactionDiffusionTask(replace(CONFIG, inject_every=4, pool=1), exemplar)
         generator, spreads = torch.Generator().manual_seed(0), []

@@ -11,9 +11,10 @@ from torch import nn
 
 from mitex.errors import CheckpointError, ConfigError, ImageError
 from mitex.exemplar import Exemplar
+from mitex.features import Vgg16
 from mitex.mesh import icosphere
 from mitex.methods.baselines import solid_texture
-from mitex.methods.baselines.solid_texture import SolidConfig, SolidTexture
+from mitex.methods.baselines.solid_texture import PRESETS, SolidConfig, SolidTexture
 from mitex.methods.baselines.solid_texture.boxes import Box, needed
 from mitex.methods.baselines.solid_texture.generator import (
     CHANNELS,
@@ -213,14 +214,45 @@ class TestTask:
         threads(1)
         assert_third_step_leaves_no_trace(lambda: SolidTask(CONFIG, exemplar), CONFIG, fault)
 
+    @torch.no_grad()
+    def test_the_published_loss_by_hand(self, exemplar):
+        """Raw features, matrices divided by h w c, and slices that are drawn and normalised one by one."""
+        config = replace(PRESETS["paper"], exemplar_size=32, slice_size=48, slices=2)
+        task, network = SolidTask(config, exemplar), Vgg16(precision="float32", normalised=False)
+
+        def grams(picture: torch.Tensor) -> list[torch.Tensor]:
+            maps = network.features(picture[None], config.layers).values()
+            rows = [values[0].flatten(0, 1).double() for values in maps]
+            return [torch.einsum("ni,nj->ij", r, r) / r.numel() for r in rows]
+
+        generator, expected = torch.Generator().manual_seed(5), 0.0
+        targets = grams(torch.from_numpy(exemplar.resized(32).maps["albedo"]))
+        statistics = {name: value.clone() for name, value in task.generator.statistics.items()}
+        for axis in (0, 0, 1, 1, 2, 2):
+            start = torch.randint(0, 32, (3,), generator=generator).tolist()
+            size = [48, 48, 48]
+            size[axis] = 1
+            box = Box(tuple(start), tuple(size))
+            noise = [torch.rand(1, NOISE, *b.size, generator=generator) for b in noise_boxes(box)]
+            colours = task.generator.colours(box, noise, statistics)[0]
+            picture = colours.select(1 + axis, 0).permute(1, 2, 0).contiguous()
+            for own, target in zip(grams(picture), targets, strict=True):
+                expected += float((own - target).square().mean()) / 6
+        step = task.loss(0, torch.Generator().manual_seed(5))
+        assert float(step.value) == pytest.approx(expected, rel=0.02)  # bfloat16 where that is fast
+        step.commit()
+        for name, value in task.generator.statistics.items():
+            torch.testing.assert_close(value, statistics[name])
+
     def test_options_matter(self, exemplar):
         def value(**options) -> float:
             task = SolidTask(replace(CONFIG, **options), exemplar)
             return float(task.loss(0, torch.Generator().manual_seed(5)).value.detach())
 
         plain = value()
-        for options in ({"slices": 2}, {"slice_size": 40}, {"exemplar_size": 40}, {"layers": ("relu1_1",)}):
-            assert value(**options) != plain
+        numbers = {"slices": 2}, {"slice_size": 40}, {"exemplar_size": 40}
+        for options in (*numbers, {"layers": ("relu1_1",)}, {"normalised": False}):
+            assert value(**options) != plain, options
         assert value(seed=3) != plain
 
 

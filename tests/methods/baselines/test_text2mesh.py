@@ -156,6 +156,8 @@ class TestRefused:
             ("--exemplar lava --text red", "--text and --exemplar contradict each other"),
             ("--exemplar lava --clip words", "--clip means nothing without --text"),
             ("--exemplar lava --preset text", "the preset text is for words, not for exemplars"),
+            ("--exemplar lava --set text_crops=3", "text_crops means nothing without words; leave it out"),
+            ("--text red --clip words --set samples=8", "samples means nothing without an exemplar"),
             ("--text red --preset paper", "the preset paper is for exemplars, not for words"),
             ("--text frobs --clip words", "does not know the word 'frobs'"),
             ("--text red --clip no/folder", "no/folder"),

@@ -93,8 +93,17 @@ def test_places_are_standardised():
     scores = places(points, mirror=False)
     assert torch.allclose(scores.mean(0), torch.zeros(3), atol=1e-5)
     assert torch.allclose(scores.std(0), torch.ones(3), atol=1e-5)
+
+
+def test_mirrored_places_are_folded_first_and_standardised_then():
+    """As the authors do: the fold is at z = 0, not at the mean, and the result is standardised."""
+    points = random(500, 3) + torch.tensor([5.0, -3.0, 0.7])
     mirrored = places(points, mirror=True)
-    assert torch.equal(mirrored[:, :2], scores[:, :2]) and torch.equal(mirrored[:, 2], scores[:, 2].abs())
+    folded = points[:, 2].abs()
+    assert torch.equal(mirrored[:, :2], places(points, mirror=False)[:, :2])
+    assert torch.allclose(mirrored[:, 2], (folded - folded.mean()) / folded.std(), atol=1e-6)
+    other_side = torch.cat([points[:, :2], -points[:, 2:]], 1)
+    assert torch.equal(places(other_side, mirror=True), mirrored)
 
 
 def test_both_gates_lie_between_trunk_and_heads():

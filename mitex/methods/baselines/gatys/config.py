@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from mitex.errors import ConfigError
-from mitex.features.layers import check_layers
+from mitex.features.layers import NETWORKS, check_layers, halvings, with_poolings
 from mitex.training.settings import TrainingConfig, key
 
 
@@ -21,11 +21,19 @@ class GatysConfig(TrainingConfig):
         256, "side that the exemplar's central square is resized to [px]; a pixel becomes a texel", 32, 2048
     )
     noise: float = key(
-        0.1, "of the start, in which the exemplar's mean colour has the rest; the paper: 1", 0, 1
+        0.1,
+        "of the start, in which the exemplar's mean colour has the rest; the paper's authors: as wide as "
+        "noise with a standard deviation of a level of 8 bits",
+        0,
+        1,
     )
     periodic: bool = key(True, "the picture goes on beyond its borders; the paper: zeros are around it")
+    network: Literal["vgg16", "vgg19"] = key(
+        "vgg16", "whose features are compared; vgg19 (the paper) is a file of yours (mitex.features.vgg19)"
+    )
     layers: tuple[str, ...] = key(
-        ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "VGG-16's that are compared"
+        ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"),
+        "its convolutions and poolings that are compared; the paper: the first, and four poolings",
     )
     optimizer: Literal["lbfgs", "adam"] = key("lbfgs", "L-BFGS (the paper) or Adam")
     lr: float = key(0.2, "of L-BFGS the largest change in a step; of Adam the learning rate", 0)
@@ -33,10 +41,23 @@ class GatysConfig(TrainingConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_layers(self.layers)
-        if self.size % 16:
-            raise ConfigError(f"a picture of {self.size} pixels", "use a multiple of 16, which can be halved")
+        check_layers(self.layers, with_poolings(NETWORKS[self.network]))
+        cell = 1 << max(map(halvings, self.layers))
+        if self.size % cell:
+            problem = f"a picture of {self.size} pixels"
+            raise ConfigError(problem, f"use a multiple of {cell}, which can be halved")
 
 
 DEFAULT = GatysConfig()
-PRESETS = {DEFAULT.preset: DEFAULT, "paper": replace(DEFAULT, preset="paper", noise=1.0, periodic=False)}
+PRESETS = {
+    DEFAULT.preset: DEFAULT,
+    "paper": replace(
+        DEFAULT,
+        preset="paper",
+        steps=2000,
+        size=256,
+        noise=0.0136,
+        periodic=False,
+        layers=("relu1_1", "pool1", "pool2", "pool3", "pool4"),
+    ),
+}

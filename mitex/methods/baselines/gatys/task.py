@@ -7,9 +7,11 @@ import torch
 from torch.nn.functional import pad
 
 from mitex.exemplar import Exemplar
-from mitex.features import Vgg16
-from mitex.losses.gram import gram_distance, gram_matrix
+from mitex.features.layers import halvings
+from mitex.features.vgg19 import named_vgg
+from mitex.losses.gram import gram_distance, gram_matrix, gram_targets
 from mitex.methods.baselines.gatys.config import GatysConfig
+from mitex.methods.exemplar_pictures import albedo, framed
 from mitex.runtime import keep_freed_memory
 from mitex.training import ParameterTask, Step
 
@@ -20,7 +22,8 @@ class GatysTask(ParameterTask):
     """Pixels, that start as noise.
 
     The paper takes VGG-19 with its weights scaled to a mean activation of one; here it is VGG-16, scaled
-    alike. Both pool by means.
+    alike, unless there is a file of VGG-19, whose layers are scaled by their means on the exemplar. All pool
+    by means. Colours stay in [0, 1], where the authors bound them by the exemplar's darkest and brightest.
 
     Args:
         config: settings.
@@ -31,12 +34,14 @@ class GatysTask(ParameterTask):
         keep_freed_memory()
         self.config, self.exemplar = config, exemplar
         generator = torch.Generator().manual_seed(config.seed)
-        picture = torch.from_numpy(exemplar.resized(config.exemplar_size).maps["albedo"])
+        picture = albedo(exemplar, config.exemplar_size)
         noise = torch.rand(config.size, config.size, 3, generator=generator)
         super().__init__({"image": picture.mean((0, 1)).lerp(noise, config.noise)})
-        self.network = Vgg16()
-        features = self.network.features(picture[None], config.layers)
-        self.targets = {layer: gram_matrix(values.flatten(1, 2)[0]) for layer, values in features.items()}
+        self.network = named_vgg(config.network)
+        maps = self.network.features(picture[None], config.layers)
+        self.targets = gram_targets(maps)
+        scaled = config.network == "vgg16"
+        self.weights = None if scaled else {layer: float(v.mean()) ** -4 for layer, v in maps.items()}
 
     @property
     def image(self) -> torch.Tensor:
@@ -51,14 +56,14 @@ class GatysTask(ParameterTask):
             planes = pad(image.permute(2, 0, 1)[None], (around,) * 4, mode="circular")
             image = planes[0].permute(1, 2, 0)
             for layer in inside:
-                border = around >> (int(layer[4]) - 1)
-                inside[layer] = slice(border, border + (self.config.size >> (int(layer[4]) - 1)))
+                border = around >> halvings(layer)
+                inside[layer] = slice(border, border + (self.config.size >> halvings(layer)))
         features = self.network.features(image[None], self.targets)
         grams = {}
         for layer, values in features.items():
             part = inside[layer]
             grams[layer] = gram_matrix(values[0, part, part].flatten(0, 1))
-        return Step(gram_distance(grams, self.targets) / 4, {}, self._clamp)
+        return Step(gram_distance(grams, self.targets, self.weights) / 4, {}, self._clamp)
 
     @torch.no_grad()
     def _clamp(self) -> None:
@@ -67,10 +72,7 @@ class GatysTask(ParameterTask):
     def preview(self, step: int) -> np.ndarray:
         """The exemplar, and the picture."""
         image = self.image.detach().numpy()
-        beside = np.zeros_like(image)
-        exemplar = self.exemplar.resized(self.config.exemplar_size).maps["albedo"][: len(image), : len(image)]
-        beside[: len(exemplar), : len(exemplar)] = exemplar
-        return np.hstack([beside, image])
+        return np.hstack([framed(self.exemplar, self.config.exemplar_size, len(image)), image])
 
     def metadata(self) -> dict[str, str]:
         return {"method": "gatys", "exemplar": self.exemplar.name, "exemplar_key": self.exemplar.key}

@@ -13,18 +13,17 @@ from mitex.cache import content_key
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
 from mitex.features.layers import CHANNELS
-from mitex.losses.gram import gram_matrix
+from mitex.losses.gram import gram_targets
 from mitex.mesh import Mesh
 from mitex.methods.baselines.multi_view_gram.config import MultiViewConfig
 from mitex.methods.baselines.multi_view_gram.gram_average import GramAverage, covered_gram
 from mitex.methods.baselines.multi_view_gram.spectrum import image_of, random_spectrum
 from mitex.methods.baselines.multi_view_gram.views import TextureViews, boxed, random_view
+from mitex.methods.exemplar_pictures import albedo, framed, side_in_view
 from mitex.methods.surface.texels import Texels
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, orbit
 from mitex.training import ParameterTask, Step
-
-LEAST = 32  # side of the exemplar beside a view [px], which five layers need
 
 
 class MultiViewTask(ParameterTask):
@@ -70,8 +69,7 @@ class MultiViewTask(ParameterTask):
         """Of the exemplar, so that a texel of it is as large as one on the mesh at the mean distance [px]."""
         config = self.config
         height = (config.nearest + config.farthest) * math.tan(0.5 * math.radians(config.fov))
-        side = config.exemplar_size * self.texels.size * config.view / height
-        return min(max(round(side), LEAST), 4 * config.view)
+        return side_in_view(config.exemplar_size * self.texels.size, config.view, height)
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
         """Mean absolute differences of averaged Gram matrices, and of the content's features if any."""
@@ -107,10 +105,7 @@ class MultiViewTask(ParameterTask):
         for start in (0, 180):
             camera = orbit(1, distance=distance, fov=config.fov, resolution=config.view, start=start)
             pictures.append(self.views.picture(self.texture.detach(), camera)[0].numpy())
-        beside = np.zeros_like(pictures[0])
-        picture = self.exemplar.resized(self.exemplar_side).maps["albedo"][: config.view, : config.view]
-        beside[: len(picture), : picture.shape[1]] = picture
-        return np.hstack([beside, *pictures])
+        return np.hstack([framed(self.exemplar, self.exemplar_side, config.view), *pictures])
 
     def metadata(self) -> dict[str, str]:
         exemplar = {"exemplar": self.exemplar.name, "exemplar_key": self.exemplar.key}
@@ -121,9 +116,8 @@ class MultiViewTask(ParameterTask):
 
     def _targets(self) -> Mapping[str, torch.Tensor]:
         """Layer -> (C, C) Gram matrix of the exemplar."""
-        picture = torch.from_numpy(self.exemplar.resized(self.exemplar_side).maps["albedo"])
-        features = self.network.features(picture[None], self.config.layers)
-        return {layer: gram_matrix(values.flatten(1, 2)[0]) for layer, values in features.items()}
+        picture = albedo(self.exemplar, self.exemplar_side)
+        return gram_targets(self.network.features(picture[None], self.config.layers))
 
     def _content_loss(self, features: Mapping[str, torch.Tensor], camera: Cameras) -> torch.Tensor:
         assert self.content is not None

@@ -45,6 +45,7 @@ PRESETS = {
         rays=1024,
         lr=5e-4,
         lr_steps=500_000,
+        average=0.0,
         network="frequencies",
         views=5_000,
         view=512,

@@ -9,6 +9,7 @@ from mitex.methods.baselines.nerf_tex.box import main_direction, picture_box, po
 from mitex.methods.baselines.nerf_tex.config import PRESETS
 from mitex.methods.baselines.nerf_tex.task import BoxTask
 from mitex.methods.baselines.nerf_tex.texture import SETTINGS, NerfTexTexture
+from mitex.methods.checks import reject_idle
 from mitex.methods.nerf.texture import NerfTexture
 from mitex.methods.nerf.training.radiance import schedule
 from mitex.runtime import init, keep_freed_memory
@@ -38,6 +39,8 @@ def fit(
     """
     run = Run.of(PRESETS, out, **options)
     config = run.config
+    if config.network == "frequencies":
+        reject_idle(options.get("set", ()), {"table"}, "without a hash grid")
     captured = texture if isinstance(texture, NerfTexture) else NerfTexture.load(texture)
     init(needs="ad")
     keep_freed_memory()

@@ -25,6 +25,11 @@ DARK = 1e-2  # added to the sum of both values that a relative difference is tak
 class BoxTask(RadianceTask[NerfTexConfig]):
     """Trains a field to look like a box.
 
+    What differs from the publication in the preset `paper`, too: the rays of a step are of all pictures, not
+    256 of each of four; places along a ray are 1/256 of the cube's diagonal apart and jittered together, not
+    256 between where it enters and leaves, each by itself; empty cells are left out; Adam's moments decay as
+    for the other radiance fields.
+
     Args:
         config: settings.
         pictures: of the box, in its cube.

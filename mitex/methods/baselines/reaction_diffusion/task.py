@@ -10,10 +10,11 @@ import torch
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
 from mitex.losses import overflow_loss
-from mitex.losses.gram import gram_loss, gram_matrix
+from mitex.losses.gram import gram_loss, gram_targets
 from mitex.methods.baselines.reaction_diffusion.config import ReactionDiffusionConfig
 from mitex.methods.baselines.reaction_diffusion.laplacian import grid_laplacian
 from mitex.methods.baselines.reaction_diffusion.reaction import BOUND, Reaction, colours, geometric_rates
+from mitex.methods.exemplar_pictures import albedo, framed
 from mitex.runtime import keep_freed_memory
 from mitex.sparse import LinearMap
 from mitex.training import ParameterTask, Step
@@ -39,9 +40,8 @@ class ReactionDiffusionTask(ParameterTask):
         self.laplacian = LinearMap(grid_laplacian(config.grid))
         self.pool = torch.stack([self._start(generator) for _ in range(config.pool)])
         self.network = Vgg16()
-        picture = torch.from_numpy(exemplar.resized(config.exemplar_size).maps["albedo"])
-        features = self.network.features(picture[None], config.layers)
-        self.targets = {layer: gram_matrix(values.flatten(1, 2)[0]) for layer, values in features.items()}
+        picture = albedo(exemplar, config.exemplar_size)
+        self.targets = gram_targets(self.network.features(picture[None], config.layers))
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
         """Gram matrices and overflow of a state of the pool after some time; `commit` puts it back."""
@@ -76,13 +76,9 @@ class ReactionDiffusionTask(ParameterTask):
     @torch.no_grad()
     def preview(self, step: int) -> np.ndarray:
         """The exemplar, and what grows from a new start."""
-        side = self.config.grid
         state = self._start(torch.Generator().manual_seed(step))
         grown = self._picture(self.reaction.evolve(state, self.laplacian, PREVIEW_STEPS)).clamp(0, 1).numpy()
-        beside = np.zeros_like(grown)
-        picture = self.exemplar.resized(self.config.exemplar_size).maps["albedo"][:side, :side]
-        beside[: len(picture), : picture.shape[1]] = picture
-        return np.hstack([beside, grown])
+        return np.hstack([framed(self.exemplar, self.config.exemplar_size, self.config.grid), grown])
 
     def metadata(self) -> dict[str, str]:
         exemplar = {"exemplar": self.exemplar.name, "exemplar_key": self.exemplar.key}

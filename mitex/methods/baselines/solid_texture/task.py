@@ -9,11 +9,13 @@ import numpy as np
 import torch
 
 from mitex.exemplar import Exemplar
-from mitex.features import Vgg16
-from mitex.losses.gram import gram_loss, gram_matrix
+from mitex.features.layers import CHANNELS
+from mitex.features.vgg19 import named_vgg
+from mitex.losses.gram import gram_loss, gram_targets
 from mitex.methods.baselines.solid_texture.boxes import Box
 from mitex.methods.baselines.solid_texture.config import SolidConfig
 from mitex.methods.baselines.solid_texture.generator import NOISE, SCALES, Generator, noise_boxes
+from mitex.methods.exemplar_pictures import albedo, framed
 from mitex.runtime import keep_freed_memory
 from mitex.training import ParameterTask, Step
 
@@ -24,7 +26,8 @@ SHIFTS = 1 << (SCALES - 1)  # places of a slice among the voxels of the coarsest
 class SolidTask(ParameterTask):
     """A generator whose slices across the three axes shall have the Gram matrices of an exemplar.
 
-    The authors take VGG-19, here VGG-16 stands in its place, whose weights come with Mitex.
+    The authors take VGG-19, for which VGG-16 stands in, whose weights come with Mitex. They draw the place of
+    a slice along its axis alone, here it is drawn along all three.
 
     Args:
         config: settings.
@@ -36,23 +39,22 @@ class SolidTask(ParameterTask):
         self.config, self.exemplar = config, exemplar
         self.generator = Generator.random(torch.Generator().manual_seed(config.seed))
         super().__init__(self.generator.tensors)
-        self.network = Vgg16()
-        features = self.network.features(self._picture[None], config.layers)
-        self.targets = {layer: gram_matrix(values.flatten(1, 2)[0]) for layer, values in features.items()}
-
-    @property
-    def _picture(self) -> torch.Tensor:
-        return torch.from_numpy(self.exemplar.resized(self.config.exemplar_size).maps["albedo"])
+        self.network = named_vgg(config.network, normalised=config.normalised)
+        # Published matrices are divided by the channels C, so that their squared distance is C^2 smaller.
+        self.weights = None if config.normalised else {name: CHANNELS[name] ** -2 for name in config.layers}
+        picture = albedo(exemplar, config.exemplar_size)
+        self.targets = gram_targets(self.network.features(picture[None], config.layers))
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
         """Gram matrices of slices across x, y and z; `commit` keeps the statistics of the channels."""
         updated = {name: value.clone() for name, value in self.generator.statistics.items()}
         total = torch.zeros(())
         for axis in range(3):
-            pictures = self._slices(axis, self.config.slice_size, generator, updated)
+            slices = [self._slice(axis, generator, updated) for _ in range(self.config.slices)]
+            pictures = torch.stack(slices)
             features = self.network.features(pictures, self.targets)
             vectors = {layer: values.flatten(1, 2) for layer, values in features.items()}
-            total = total + gram_loss(vectors, self.targets) / 3
+            total = total + gram_loss(vectors, self.targets, self.weights) / 3
         return Step(total, {}, partial(self._keep, updated))
 
     def state(self) -> dict[str, torch.Tensor]:
@@ -65,13 +67,10 @@ class SolidTask(ParameterTask):
     @torch.no_grad()
     def preview(self, step: int) -> np.ndarray:
         """The exemplar, and slices across x, y and z."""
-        side, generator = self.config.slice_size, torch.Generator().manual_seed(step)
-        beside = np.zeros((side, side, 3), np.float32)
-        picture = self._picture.numpy()[:side, :side]
-        beside[: len(picture), : picture.shape[1]] = picture
+        generator = torch.Generator().manual_seed(step)
         updated = {name: value.clone() for name, value in self.generator.statistics.items()}
-        slices = [self._slices(axis, side, generator, updated)[0].clamp(0, 1).numpy() for axis in range(3)]
-        return np.hstack([beside, *slices])
+        slices = [self._slice(axis, generator, updated).clamp(0, 1).numpy() for axis in range(3)]
+        return np.hstack([framed(self.exemplar, self.config.exemplar_size, len(slices[0])), *slices])
 
     @torch.no_grad()
     def settled(self) -> Generator:
@@ -80,7 +79,7 @@ class SolidTask(ParameterTask):
         updated = {name: value.clone() for name, value in self.generator.statistics.items()}
         for _ in range(SETTLING):
             for axis in range(3):
-                self._slices(axis, self.config.slice_size, generator, updated)
+                self._slice(axis, generator, updated)
         return replace(self.generator, statistics=updated)
 
     def metadata(self) -> dict[str, str]:
@@ -90,16 +89,15 @@ class SolidTask(ParameterTask):
             "exemplar_key": self.exemplar.key,
         }
 
-    def _slices(
-        self, axis: int, side: int, generator: torch.Generator, updated: dict[str, torch.Tensor]
-    ) -> torch.Tensor:
-        """(K, N, N, 3) sRGB slices of one voxel across an axis, at a random place; moves the statistics."""
+    def _slice(self, axis: int, generator: torch.Generator, updated: dict[str, torch.Tensor]) -> torch.Tensor:
+        """(N, N, 3) sRGB of one voxel's slice across an axis, at a random place, normalised by itself; moves
+        the statistics."""
+        side = self.config.slice_size
         start = torch.randint(0, SHIFTS, (3,), generator=generator).tolist()
         box = Box(tuple(start), tuple(1 if k == axis else side for k in range(3)))
-        shapes = [(self.config.slices, NOISE, *b.size) for b in noise_boxes(box)]
-        noise = [torch.rand(shape, generator=generator) for shape in shapes]
+        noise = [torch.rand(1, NOISE, *b.size, generator=generator) for b in noise_boxes(box)]
         colours = self.generator.colours(box, noise, updated)
-        return colours.squeeze(2 + axis).movedim(1, -1).contiguous()
+        return colours[0].squeeze(1 + axis).movedim(0, -1).contiguous()
 
     def _keep(self, statistics: dict[str, torch.Tensor]) -> None:
         for name, value in self.generator.statistics.items():

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from mitex.errors import ConfigError
-from mitex.features.layers import check_layers
+from mitex.features.layers import NETWORKS, check_layers
 from mitex.training.settings import TrainingConfig, key
 
 
@@ -30,8 +31,11 @@ class StyleMeshConfig(TrainingConfig):
         True, "pixels count by the cosine of the angle they are seen at, and small details where it is small"
     )
     frontal: float = key(30.0, "angle up to which small details of the exemplar are added [degrees]", 0, 90)
+    network: Literal["vgg16", "vgg19"] = key(
+        "vgg16", "whose features are compared; vgg19 (the paper) is a file of yours (mitex.features.vgg19)"
+    )
     layers: tuple[str, ...] = key(
-        ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "VGG-16's that are compared"
+        ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "its layers that are compared"
     )
     weights: tuple[float, ...] = key((0.1, 0.1, 0.001, 0.001, 0.1), "of the layers", 0)
     small_layers: tuple[str, ...] = key(
@@ -47,7 +51,7 @@ class StyleMeshConfig(TrainingConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_layers(self.layers)
+        check_layers(self.layers, NETWORKS[self.network])
         if len(self.weights) != len(self.layers):
             raise ConfigError(
                 f"{len(self.weights)} weights for {len(self.layers)} layers", "give one for each"

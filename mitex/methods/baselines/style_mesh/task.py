@@ -11,14 +11,15 @@ import torch
 
 from mitex.cache import content_key
 from mitex.exemplar import Exemplar
-from mitex.features import Vgg16
-from mitex.losses.gram import gram_distance, gram_matrix
+from mitex.features.vgg19 import named_vgg
+from mitex.losses.gram import gram_distance, gram_targets
 from mitex.mesh import Mesh
 from mitex.methods.baselines.multi_view_gram.gram_average import covered_gram
 from mitex.methods.baselines.multi_view_gram.views import TextureViews, boxed
 from mitex.methods.baselines.style_mesh.config import StyleMeshConfig
 from mitex.methods.baselines.style_mesh.layered import fine_energy, sum_of, zero_textures
 from mitex.methods.baselines.style_mesh.visible import Visible, cameras_around, shares
+from mitex.methods.exemplar_pictures import albedo, framed
 from mitex.methods.surface.texels import Texels
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras
@@ -31,8 +32,8 @@ LEAST = 1e-3  # share of a picture's pixels that must count for it to be compare
 class StyleMeshTask(ParameterTask):
     """Textures whose sum looks like the exemplar in all views, as large everywhere.
 
-    For objects: there are no photos whose content should be kept. The authors take VGG-19, here VGG-16 stands
-    in its place, whose weights come with Mitex.
+    For objects: there are no photos whose content should be kept. The authors take VGG-19, for which VGG-16
+    stands in, whose weights come with Mitex.
 
     Args:
         config: settings.
@@ -55,7 +56,7 @@ class StyleMeshTask(ParameterTask):
             TextureViews(self.box, charts, self._camera(0, k), config.antialias)
             for k in range(config.heights)
         ]
-        self.network = Vgg16("max", normalised=False)
+        self.network = named_vgg(config.network, "max", normalised=False)
         self.weights = dict(zip(config.layers, config.weights, strict=True))
         self.targets = self._grams(config.exemplar_size, config.layers)
         self.small_targets = self._grams(config.exemplar_size // 2, config.small_layers)
@@ -79,9 +80,7 @@ class StyleMeshTask(ParameterTask):
     def preview(self, step: int) -> np.ndarray:
         """The exemplar, and the mesh from two sides, unlit."""
         side = self.config.view
-        beside = np.zeros((side, side, 3), np.float32)
-        picture = self.exemplar.resized(min(self.config.exemplar_size, side)).maps["albedo"]
-        beside[: len(picture), : picture.shape[1]] = picture
+        beside = framed(self.exemplar, min(self.config.exemplar_size, side), side)
         texture, middle = self.texture, self.config.views // 2
         views = {middle, min(middle + 1, self.config.views - 1)}
         pictures = [self.pictures[0].picture(texture, self._camera(k, 0))[0].numpy() for k in sorted(views)]
@@ -133,6 +132,5 @@ class StyleMeshTask(ParameterTask):
 
     def _grams(self, side: int, layers: tuple[str, ...]) -> Mapping[str, torch.Tensor]:
         """Layer -> (C, C) Gram matrix of the exemplar."""
-        picture = torch.from_numpy(self.exemplar.resized(side).maps["albedo"])
-        features = self.network.features(picture[None], layers) if layers else {}
-        return {layer: gram_matrix(values.flatten(1, 2)[0]) for layer, values in features.items()}
+        picture = albedo(self.exemplar, side)
+        return gram_targets(self.network.features(picture[None], layers) if layers else {})

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import os
+from dataclasses import fields
 from pathlib import Path
 from typing import Unpack
 
 from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.mesh import Mesh
-from mitex.methods.baselines.text2mesh.config import PRESETS
+from mitex.methods.baselines.text2mesh.config import DEFAULT, PRESETS
 from mitex.methods.baselines.text2mesh.task import Text2MeshTask
 from mitex.methods.baselines.text2mesh.text_task import Text2MeshTextTask
 from mitex.methods.baselines.text2mesh.texture import Text2MeshTexture
+from mitex.methods.checks import reject_idle
 from mitex.methods.layout import with_layout
 from mitex.methods.style_fitting import fit_style
 from mitex.training.fit import Run
 from mitex.training.settings import RunOptions
+
+OF_WORDS = {field.name for field in fields(DEFAULT) if field.name.startswith("text_")}
+OF_EXEMPLARS = {"exemplar_size", "layers", "samples", "moment_weight"}
 
 
 def fit(
@@ -50,6 +55,7 @@ def fit(
         raise ConfigError(
             f"the preset {config.preset} is for words, not for exemplars", "use default or paper"
         )
+    reject_idle(options.get("set", ()), OF_WORDS, "without words")
     target = (exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)).of_albedo()
     given = mesh if isinstance(mesh, Mesh) else Mesh.load(mesh)
     surface = with_layout(given, config.resolution, keep_uvs)
@@ -87,5 +93,6 @@ def fit_text(
     Raises:
         MitexError, Cancelled, Interrupted: as `fit`.
     """
+    reject_idle(options.get("set", ()), OF_EXEMPLARS, "without an exemplar")
     kind = Text2MeshTextTask, Text2MeshTexture
     return fit_style(PRESETS, kind, text, mesh, out, clip, keep_uvs, **options)

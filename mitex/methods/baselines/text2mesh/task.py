@@ -11,6 +11,7 @@ from mitex.features import Vgg16
 from mitex.losses import moment_distance, relaxed_transport
 from mitex.mesh import Mesh
 from mitex.methods.baselines.text2mesh.config import Text2MeshConfig
+from mitex.methods.exemplar_pictures import albedo, framed, side_in_view
 from mitex.methods.style_cameras import cameras_of, frame_height
 from mitex.methods.style_field import colours, encoded, head, random_waves, trunk
 from mitex.methods.surface.texels import Texels
@@ -19,7 +20,6 @@ from mitex.scenes.cameras import Cameras, orbit
 from mitex.scenes.stage import Stage
 from mitex.training import ParameterTask, Step
 
-LEAST = 32  # side of the exemplar beside a view [px], which five layers need
 FULL = 0.999  # coverage from which on a feature shows the mesh alone
 CHUNK = 1 << 16  # places at a time
 BACKGROUND = 1.0  # white
@@ -50,7 +50,7 @@ class Text2MeshTask(ParameterTask):
         self.texels = Texels.rasterize(self.ball, mesh.uv, config.resolution)
         self.stage = Stage(self.ball)
         self.network = Vgg16()
-        picture = torch.from_numpy(exemplar.resized(self.exemplar_side).maps["albedo"])
+        picture = albedo(exemplar, self.exemplar_side)
         self.picture = picture.flatten(0, 1)
         features = self.network.features(picture[None], config.layers)
         self.targets = {layer: values[0].flatten(0, 1) for layer, values in features.items()}
@@ -59,8 +59,7 @@ class Text2MeshTask(ParameterTask):
     def exemplar_side(self) -> int:
         """Of the exemplar, so that a texel of it is as large as one on the mesh at the mean distance [px]."""
         config = self.config
-        side = config.exemplar_size * self.texels.size * config.view / frame_height(config)
-        return min(max(round(side), LEAST), 4 * config.view)
+        return side_in_view(config.exemplar_size * self.texels.size, config.view, frame_height(config))
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
         """Relaxed transport and moments of the features of some views, and of their colours."""
@@ -108,10 +107,7 @@ class Text2MeshTask(ParameterTask):
         config = self.config
         around = orbit(2, distance=config.distance, fov=config.fov, resolution=config.view)
         views = self.views(around)[0].numpy()
-        beside = np.zeros_like(views[0])
-        picture = self.exemplar.resized(self.exemplar_side).maps["albedo"][: config.view, : config.view]
-        beside[: len(picture), : picture.shape[1]] = picture
-        return np.hstack([beside, *views])
+        return np.hstack([framed(self.exemplar, self.exemplar_side, config.view), *views])
 
     def metadata(self) -> dict[str, str]:
         exemplar = {"exemplar": self.exemplar.name, "exemplar_key": self.exemplar.key}

@@ -22,6 +22,7 @@ class XMeshConfig(StyleConfig):
     text: str | None = "red dots on white"
     text_crops: int = 2
     text_crop_area: float = 0.4
+    text_relief_crop_area: float = 0.4
     mirror: bool = key(False, "the same on both sides of the plane z = 0 (the paper)")
     gate_width: int = key(32, "of the hidden layers of the gates", 1, 4096)
     rank: int = key(30, "of the gates' weights", 1, 4096)
@@ -42,6 +43,7 @@ PRESETS = {
         views=5,
         milestones=tuple(range(100, 1200, 100)),
         text_crops=4,
+        text_relief_crop_area=0.1,
         mirror=True,
         gate_start=0.0,
     ),

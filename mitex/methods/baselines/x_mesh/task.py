@@ -46,6 +46,6 @@ class XMeshTask(StyleTask):
 
 
 def places(points: torch.Tensor, mirror: bool) -> torch.Tensor:
-    """(V, 3) points less their mean, divided by their standard deviation; z without its sign if mirrored."""
-    scores = (points - points.mean(0)) / points.std(0).clamp_min(1e-6)
-    return torch.cat([scores[:, :2], scores[:, 2:].abs()], 1) if mirror else scores
+    """(V, 3) points, z without its sign if mirrored, less their mean, in their standard deviations."""
+    sides = torch.cat([points[:, :2], points[:, 2:].abs()], 1) if mirror else points
+    return (sides - sides.mean(0)) / sides.std(0).clamp_min(1e-6)
