@@ -76,16 +76,16 @@ def _longest(field: str) -> float:
 
 def learner(config: NcaConfig, look: Look) -> Look:
     """The look that a training starts from, whose cells are told a vector if the settings want it."""
-    return (
-        with_condition(look) if config.motion and config.motion_encoding and not look.rule.condition else look
-    )
+    return with_condition(look) if config.motion and config.motion_encoding else look
 
 
 def with_condition(look: Look) -> Look:
-    """A copy of a look whose cells are told a vector, which does not matter to them yet.
+    """A look whose cells are told a vector: a copy for which it does not matter yet, if they are not so far.
 
     The weights of the new inputs are zero, so that it grows bit for bit what the look grows.
     """
+    if look.rule.condition:
+        return look
     look, still = deepcopy(look), look.rule
     rule = MeshNCA(still.channels, still.hidden, WIDTH, still.degree)
     weights = still.state_dict()
