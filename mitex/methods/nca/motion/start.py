@@ -13,6 +13,7 @@ import torch
 from mitex.errors import ConfigError
 from mitex.mesh import icosphere
 from mitex.mesh.fields import vector_field
+from mitex.mesh.fields.files import SUFFIXES
 from mitex.methods.nca.config import PRESETS, NcaConfig
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.model import MeshNCA
@@ -52,9 +53,9 @@ def check_field(field: str) -> None:
     Raises:
         ConfigError: it is unknown, or of one mesh alone.
     """
-    if any(field.lower().endswith(suffix) for suffix in (".npy", ".ply")):
+    if field.lower().endswith(SUFFIXES):
         raise ConfigError(
-            f"'{field}' holds the vectors of one mesh, and the training has spheres of its own",
+            f"'{field}' is the field of one mesh, and the training has spheres of its own",
             "train with a name or a direction, and give the file as `field` when it is applied",
         )
     vector_field(icosphere(2), field)

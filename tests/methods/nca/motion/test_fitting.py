@@ -108,9 +108,12 @@ def test_another_preset_may_move_too(lava):
         ("0,0,0", "zero everywhere"),
         ("wind.npy", "one mesh"),
         ("wind.PLY", "one mesh"),
+        ("strokes.json", "one mesh"),
     ],
 )
-def test_fields_that_nothing_can_be_trained_with(tmp_path, lava, motion, problem):
+def test_fields_that_nothing_can_be_trained_with(tmp_path, monkeypatch, lava, motion, problem):
+    (tmp_path / "strokes.json").write_text('{"strokes": [[[0, 0, 1], [0, 0.5, 0.8]]]}')
+    monkeypatch.chdir(tmp_path)
     with pytest.raises(ConfigError, match=problem):
         nca.fit(lava, tmp_path / "run", motion=motion, set=TINY)
     assert not (tmp_path / "run").exists()
