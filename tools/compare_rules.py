@@ -38,6 +38,7 @@ VARIANTS = {
     "degree 2": ("degree=2",),
     "32 hidden": ("hidden=32",),
     "12 channels": ("channels=12",),
+    "24 channels": ("channels=24",),
     "32 channels": ("channels=32",),
 }
 PARENT = "ceramic"
