@@ -38,6 +38,7 @@ VARIANTS = {
     "degree 2": ("degree=2",),
     "32 hidden": ("hidden=32",),
     "12 channels": ("channels=12",),
+    "24 channels": ("channels=24",),
     "32 channels": ("channels=32",),
 }
 PARENT = "ceramic"
@@ -73,7 +74,7 @@ def closeup(texture: NcaTexture, mesh: Mesh) -> Cameras:
 @torch.no_grad()
 def albedo(texture: NcaTexture | Graft, mesh: Mesh, cameras: Cameras) -> np.ndarray:
     """What one camera sees of a grown texture's albedo (CELL, CELL, 3)."""
-    growth = texture.growth(Cells(mesh, 0, mesh))
+    growth = texture.growth_on(Cells(mesh, 0, mesh), mesh)
     state = growth.evolve(growth.seed(), texture.steps, torch.Generator().manual_seed(0))
     grown, hits = growth.shown(state), Stage(mesh).hits(cameras, 2)
     colours = np.zeros((len(hits.hit), 3), np.float32)

@@ -22,6 +22,23 @@ def interpolate(barycentric: np.ndarray, corners: np.ndarray) -> np.ndarray:
     return np.einsum("nk,nkc->nc", barycentric, corners)
 
 
+def scattered(areas: np.ndarray, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points of triangles, uniform over their areas.
+
+    Args:
+        areas: (F,) of the triangles.
+        numbers: (3, N) random, uniform in [0, 1).
+
+    Returns:
+        (N,) triangles, and (N, 3) barycentric coordinates in them.
+    """
+    choice, r, v = numbers
+    cumulative = np.cumsum(areas, dtype=np.float64)
+    face = np.searchsorted(cumulative, choice * cumulative[-1], side="right").clip(max=len(areas) - 1)
+    root = np.sqrt(r)
+    return face, np.stack([1 - root, root * (1 - v), root * v], axis=1)
+
+
 def barycentric_gradients(p: np.ndarray, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First corners (F, 2) and gradients (F, 4), (db1/dx, db1/dy, db2/dx, db2/dy), of triangles (F, 3, 2).
 

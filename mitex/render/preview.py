@@ -7,10 +7,9 @@ import math
 import numpy as np
 
 from mitex.colour import linear_to_srgb, srgb_to_linear
-from mitex.errors import ConfigError
 from mitex.mesh import Mesh
 from mitex.render.framing import FOV, fit_view, hull, rotation
-from mitex.render.renderer import check_elevation
+from mitex.render.renderer import check_elevation, check_resolution
 from mitex.render.studio import GROUND, SKY
 
 ANTIALIAS = 2  # n for n x n samples a pixel
@@ -41,8 +40,7 @@ class PreviewRenderer:
         from mitex.scenes.cameras import Cameras
         from mitex.scenes.stage import Stage
 
-        if not 16 <= resolution <= 4096:
-            raise ConfigError(f"a picture of {resolution} pixels is not possible", "use 16 to 4096")
+        check_resolution(resolution)
         check_elevation(elevation, floating=True)
         normalised, _ = mesh.normalised()
         self.resolution, self._turn = resolution, rotation(math.radians(azimuth))

@@ -69,8 +69,7 @@ class OrbitRenderer:
         from mitex.scenes.shapes import mesh_shape
 
         init(needs="ad_rgb")
-        if not 16 <= resolution <= 4096:
-            raise ConfigError(f"a picture of {resolution} pixels is not possible", "use 16 to 4096")
+        check_resolution(resolution)
         if not -0.5 <= displacement <= 0.5:
             raise ConfigError(f"displacement {displacement:g} is out of range", "use -0.5 to 0.5")
         if displacement and "height" not in asset.vertex_maps:
@@ -165,6 +164,18 @@ class OrbitRenderer:
         self._params.update()
 
 
+def check_resolution(resolution: int) -> None:
+    """Raises a ConfigError if a picture's side [px] is out of range."""
+    if not 16 <= resolution <= 4096:
+        raise ConfigError(f"a picture of {resolution} pixels is not possible", "use 16 to 4096")
+
+
+def check_samples(spp: int) -> None:
+    """Raises a ConfigError if the samples per pixel are out of range."""
+    if not 1 <= spp <= 65536:
+        raise ConfigError(f"{spp} samples per pixel are not possible", "use 1 to 65536")
+
+
 def check_elevation(elevation: float, floating: bool) -> None:
     """Raises a ConfigError if a camera at this elevation [degrees] would look from below the floor."""
     lowest = -85 if floating else 0
@@ -183,8 +194,7 @@ def accumulated(scene: mi.Scene, resolution: int, spp: int, seed: int) -> np.nda
     """
     from mitex.runtime.jit import mi
 
-    if not 1 <= spp <= 65536:
-        raise ConfigError(f"{spp} samples per pixel are not possible", "use 1 to 65536")
+    check_samples(spp)
     level = mi.log_level()
     mi.set_log_level(mi.LogLevel.Error)  # the sampler warns each time it rounds its count up
     per_pass = max(1, min(spp, SAMPLES_PER_PASS // resolution**2))

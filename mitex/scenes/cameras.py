@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from mitex.errors import ConfigError
-from mitex.geometry.triangles import interpolate
+from mitex.geometry.triangles import interpolate, scattered
 from mitex.geometry.vectors import unit
 
 if TYPE_CHECKING:
@@ -230,19 +230,9 @@ def patch_views(
     """
     import torch
 
-    def uniform(*size: int) -> Array:
-        return (
-            torch.rand(*size, generator=generator, dtype=torch.float64, device=generator.device).cpu().numpy()
-        )
-
-    corners = mesh.vertices[mesh.faces].astype(np.float64)
-    cumulative = np.cumsum(mesh.face_areas, dtype=np.float64)
-    face = np.searchsorted(cumulative, uniform(count) * cumulative[-1], side="right")
-    face = face.clip(max=len(corners) - 1)
-    root, v = uniform(2, count)
-    root = np.sqrt(root)
-    weight = np.stack((1 - root, root * (1 - v), root * v), axis=1)
-    point = interpolate(weight, corners[face])
+    numbers = torch.rand(3, count, generator=generator, dtype=torch.float64, device=generator.device)
+    face, weight = scattered(mesh.face_areas, numbers.cpu().numpy())
+    point = interpolate(weight, mesh.vertices[mesh.faces[face]].astype(np.float64))
     normal = unit(interpolate(weight, mesh.normals[mesh.faces[face]].astype(np.float64)))
 
     center = 0.5 * (mesh.vertices.min(0) + mesh.vertices.max(0)).astype(np.float64)

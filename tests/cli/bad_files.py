@@ -14,6 +14,15 @@ f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 2 3 7\nf 2 7 6\nf 3 4 8\
 """
 
 
+def fields(folder: Path, normals: np.ndarray) -> None:
+    """Files that are no vector fields of a mesh with these normals at its vertices."""
+    count = len(normals)
+    np.save(folder / "short.npy", np.ones((count - 1, 3)))
+    np.save(folder / "nan.npy", np.full((count, 3), np.nan))
+    np.save(folder / "zero.npy", np.zeros((count, 3)))
+    np.save(folder / "normal.npy", normals)
+
+
 def image(path: Path, size: tuple[int, int] = (32, 32), kind: str = "PNG", seed: int = 0) -> Path:
     """A noisy RGB image of any file format, whatever the name; size is (width, height)."""
     path.parent.mkdir(parents=True, exist_ok=True)

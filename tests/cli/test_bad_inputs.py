@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mitex.cli import main
+from mitex.mesh import Mesh
 from tests.cli import bad_files as bad
 from tests.cli.refusals import QUICK, apply, check_refused, fit
 
@@ -95,7 +96,7 @@ FITS = {
     "unknown device": (None, "--device tpu", "--device"),
     "unknown field": (None, "--motion rihgt", "did you mean right?"),
     "a field twice": (None, "--motion up --set motion=down", "motion is set to down and to up"),
-    "field of one mesh": (None, "--motion wind.npy", "holds the vectors of one mesh"),
+    "field of one mesh": (None, "--motion wind.npy", "is the field of one mesh"),
     "unknown init": (None, f"--init no_such_model {QUICK}", "no_such_model"),
     "damaged init": (
         lambda d: bad.text(d / "m.safetensors"),
@@ -387,13 +388,12 @@ class TestArchitectures:
             ("--field short.npy", "shape (8, 3)"),
             ("--field nan.npy", "NaN or infinite at 8 of 8 vertices"),
             ("--field zero.npy", "zero everywhere"),
+            ("--field normal.npy", "normal to the surface of 'good' everywhere"),
         ],
     )
     def test_fields_of_a_moving_texture(self, files, capsys, words, message):
         bad.model(files / "wind.safetensors", condition=3)
-        vectors = {"short": np.ones((7, 3)), "nan": np.full((8, 3), np.nan), "zero": np.zeros((8, 3))}
-        for name, values in vectors.items():
-            np.save(files / f"{name}.npy", values)
+        bad.fields(files, Mesh.load(files / "good.obj").normals)
         check_refused(files, apply(words, model="wind.safetensors"), message, capsys)
 
     def test_a_field_is_not_overwritten(self, files, capsys):

@@ -6,7 +6,9 @@ import pytest
 
 from mitex.asset import Asset
 from mitex.cli import main
-from mitex.methods.nca import NcaTexture
+from mitex.mesh import Mesh
+from mitex.methods.nca import Graft, NcaTexture
+from tests.cli import bad_files as bad
 from tests.cli.refusals import check_refused
 
 pytestmark = pytest.mark.usefixtures("own_cache")
@@ -21,8 +23,8 @@ def graft(words="--weights y", out="out/a.ply", mesh="good.obj", models="waffle 
     return f"graft {models} --mesh {mesh} --out {out} {words}".split()
 
 
-def pictures(files):
-    return np.stack([iio.imread(path) for path in sorted((files / "out" / "film").iterdir())]).astype(int)
+def pictures(files, name="film"):
+    return np.stack([iio.imread(path) for path in sorted((files / "out" / name).iterdir())]).astype(int)
 
 
 def test_a_film_of_each_kind(files, capsys):
@@ -48,6 +50,19 @@ def test_options_reach_the_film(files, monkeypatch):
     assert loop["loop"] == 0 and still["loop"] is None and still["renderer"] == "preview"
 
 
+def test_a_graft_is_filmed(files):
+    """Where the weight is 1, it is the second texture alone, as it moves."""
+    for out, more in (
+        ("both", "--graft lava --weights 1"),
+        ("first", "--graft lava --weights 0"),
+        ("film", ""),
+    ):
+        words = f"--start 8 --field right --speed 2 {more}"
+        assert main(animate(words, f"out/{out}/", model="lava" if out == "film" else "waffle")) == 0
+    both, first, alone = (pictures(files, name) for name in ("both", "first", "film"))
+    assert np.array_equal(both, alone) and np.abs(first - alone).max() > 3
+
+
 BAD_FILMS = {
     "no frames": (animate("--seconds 0"), "a video of 0 frames"),
     "another format": (animate(out="out/a.avi"), "use one of .mp4, .gif"),
@@ -62,6 +77,19 @@ BAD_FILMS = {
     "damage after the end": (animate("--damage y:0: --damage-at 1"), "choose a time within it"),
     "nothing to resume": (animate("--resume"), "start without --resume"),
     "many steps": (animate("--steps-per-frame 0"), "--steps-per-frame 0 is out of range"),
+    "a field of no name": (animate("--field rihgt"), "did you mean right?"),
+    "no field": (animate("--field none.npy"), "none.npy"),
+    "a short field": (animate("--field short.npy"), "give numbers of shape (8, 3)"),
+    "a field that is not finite": (animate("--field nan.npy"), "NaN or infinite at 8 of 8 vertices"),
+    "a field of zeros": (animate("--field zero.npy"), "zero everywhere"),
+    "a field across": (animate("--field normal.npy"), "normal to the surface of 'good' everywhere"),
+    "a speed of nothing": (animate("--speed 2"), "'waffle' stands still, so that a speed means nothing"),
+    "a great speed": (animate("--field up --speed 11"), "--speed 11 is out of range"),
+    "a graft of no weights": (animate("--graft lava"), "--graft means nothing without --weights"),
+    "weights of no graft": (animate("--weights y"), "--weights means nothing without --graft"),
+    "a graft of another method": (animate("--graft spikes --weights y"), "'spikes' is a geometric texture"),
+    "a graft of no model": (animate("--graft none --weights y"), "no model 'none'"),
+    "bad weights": (animate("--graft lava --weights w"), "says nothing about weights"),
     "no mesh": (animate(mesh="none.obj"), "none.obj"),
     "no model": (animate(model="none"), "no model 'none'"),
 }
@@ -69,6 +97,7 @@ BAD_FILMS = {
 
 @pytest.mark.parametrize("name", BAD_FILMS)
 def test_bad_films(files, name, capsys):
+    bad.fields(files, Mesh.load(files / "good.obj").normals)
     words, message = BAD_FILMS[name]
     check_refused(files, words, message, capsys)
 
@@ -88,6 +117,30 @@ def test_a_graft_is_written(files, capsys):
     assert "which can be grafted with each other: bricks, ceramic, " in capsys.readouterr().out
 
 
+def test_options_reach_the_graft(files, monkeypatch):
+    calls = []
+    apply = Graft.apply
+
+    def small(texture, mesh, **options):
+        calls.append(options)
+        return apply(texture, mesh, steps=1, subdivide=0, resolution=None)
+
+    monkeypatch.setattr(Graft, "apply", small)
+    words = "--weights y --seed 4 --steps 7 --subdivide 1 --orientation 6 --scale 2 --field up --speed 3"
+    assert main(graft(f"{words} --resolution 128", "out/a.glb")) == main(graft(out="out/b.glb")) == 0
+    assert main(graft("--weights y --vertex-colors", "out/c.glb")) == main(graft()) == 0
+    given, plain, coloured, ply = calls
+    assert given == {
+        **{"seed": 4, "steps": 7, "subdivide": 1, "orientation": 6, "scale": 2, "field": "up", "speed": 3},
+        **{"resolution": 128},
+    }
+    assert plain == {
+        **{"seed": 0, "steps": None, "subdivide": "auto", "orientation": 0, "scale": 1, "field": None},
+        **{"speed": 1, "resolution": 1024},
+    }
+    assert coloured == ply == {**plain, "resolution": None}
+
+
 BAD_GRAFTS = {
     "another method": (graft(models="waffle spikes"), "'spikes' is a geometric texture; graft nca textures"),
     "no second model": (graft(models="waffle"), "RUN|MODEL is missing"),
@@ -98,6 +151,11 @@ BAD_GRAFTS = {
     "a film": (graft(out="out/a.mp4"), "use one of .glb"),
     "colours in a folder": (graft("--weights y --vertex-colors", out="out/maps/"), "--vertex-colors means"),
     "its own weights": (graft("--weights short.ply", out="short.ply"), "is an input"),
+    "a field of no name": (graft("--weights y --field rihgt"), "did you mean right?"),
+    "a short field": (graft("--weights y --field short.npy"), "the vector field 'short.npy' is"),
+    "its own field": (graft("--weights y --field short.ply", out="short.ply"), "is an input"),
+    "a speed of nothing": (graft("--weights y --speed 2"), "stands still, so that a speed means nothing"),
+    "a great speed": (graft("--weights y --field up --speed 11"), "--speed 11 is out of range"),
     "steps": (graft("--weights y --steps 0"), "--steps 0 is out of range"),
 }
 

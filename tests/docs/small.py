@@ -39,7 +39,8 @@ EVERY_FIT = {"checkpoint_every": 1, "preview_every": 0}
 TINY: dict[str, dict[str, Any]] = {
     # Nothing of the architecture, which must be that of the model after `--init`.
     "nca": {"frequency": 4, "pool": 1, "view_count": 1, "zooms": 1, "min_steps": 2, "max_steps": 2}
-    | {"resolution": 32, "target_size": 32, "exemplar_size": 32, "layers": ("relu1_1",), "order_weight": 0.0},
+    | {"resolution": 32, "target_size": 32, "exemplar_size": 32, "layers": ("relu1_1",), "order_weight": 0.0}
+    | {"motion_start": 0},
     "surface": {"resolution": 32, "exemplar_size": 32, "scales": 0, "layers": ("relu1_1",)}
     | {"text_views": 1, "text_view": 24},
     "gatys": {"size": 32, "exemplar_size": 32, "layers": ("relu1_1",)},
@@ -85,8 +86,9 @@ def prepare(folder: Path) -> None:
     """Writes the files that pages name and that the user brings along, or has from a script."""
     write_folder(folder / "models" / "clip-b32")
     write_capture(tiny_capture(views=8, side=24, spp=1), folder / "captures" / "cobbles")
-    plan = next(block for block in blocks(ROOT / "docs" / "batch.md") if block.language == "toml")
-    (folder / "plan.toml").write_text(plan.text)
+    for name, page, language in (("plan.toml", "batch.md", "toml"), ("strokes.json", "flow.md", "json")):
+        block = next(block for block in blocks(ROOT / "docs" / page) if block.language == language)
+        (folder / name).write_text(block.text)
 
 
 def shrink(patch: pytest.MonkeyPatch) -> None:

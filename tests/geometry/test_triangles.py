@@ -1,12 +1,14 @@
 """Triangles against formulas and dense sampling."""
 
 import numpy as np
+import pytest
 
 from mitex.geometry.triangles import (
     barycentric_gradients,
     interpolate,
     nearest_on_border,
     nearest_on_triangles,
+    scattered,
     triangle_crosses,
     twice_area,
 )
@@ -21,6 +23,17 @@ def test_areas(rng):
     half = 0.5 * (a + b + c)
     heron = np.sqrt(half * (half - a) * (half - b) * (half - c))
     np.testing.assert_allclose(np.abs(twice_area(flat)), 2 * heron, rtol=1e-6)
+
+
+def test_scattered_points_are_uniform(rng):
+    """Over triangles by their areas, and over each of them: a quarter in the one between the middles."""
+    face, weights = scattered(np.array([1.0, 0.0, 3.0]), rng.random((3, 40_000)))
+    np.testing.assert_allclose(np.bincount(face) / 40_000, [0.25, 0, 0.75], atol=0.01)
+    np.testing.assert_allclose(weights.sum(1), 1)
+    assert weights.min() >= 0 and (weights < 0.5).all(1).mean() == pytest.approx(0.25, abs=0.01)
+    np.testing.assert_allclose((weights > 0.5).mean(0), 0.25, atol=0.01)
+    last, _ = scattered(np.ones(3), np.array([[np.nextafter(1, 0)], [0.5], [0.5]]))
+    assert last == 2
 
 
 def test_gradients_give_the_weights_that_interpolate_the_point(rng):

@@ -30,6 +30,7 @@ class Animate:
       mitex animate pebbles --mesh bunny.obj --out healing.mp4 --damage 0,0.5,0,0.3
       mitex animate pebbles --mesh bunny.obj --out frames/ --renderer path --spp 64
       mitex animate lava --mesh bunny.obj --out flow.mp4 --start 200 --field about-y --speed 1.5
+      mitex animate lava --mesh bunny.obj --out both.mp4 --graft shells --weights y
       mitex animate pebbles --mesh bunny.obj --out growth.mp4 --resume
     """
 
@@ -103,6 +104,12 @@ class Animate:
     speed: Annotated[float, arg(metavar="X")] = 1.0
     """Speed along --field. At 1, the mean is an edge of the automaton's mesh in 6 steps, or as trained."""
 
+    graft: Annotated[str | None, arg(metavar="RUN|MODEL", help_behavior_hint="")] = None
+    """A second texture of the same family, as of `mitex graft`."""
+
+    weights: Annotated[str | None, arg(metavar="W", help_behavior_hint="")] = None
+    """Where it is, as of `mitex graft`."""
+
     resume: Annotated[bool, arg(help_behavior_hint="")] = False
     """Go on with a film that was interrupted."""
 
@@ -120,15 +127,18 @@ class Animate:
 
         target = Shooting(**self._shooting()).recording(self.out, {}).target
         if target.suffix.lower() in VIDEOS:
-            prepare_output(
-                target,
-                inputs=[self.model, *mesh_files(self.mesh), *field_files(self.field, self.orientation)],
-            )
+            prepare_output(target, inputs=[*mesh_files(self.mesh), *self._inputs()])
         from mitex.mesh import Mesh
         from mitex.methods.nca import NcaTexture
+        from mitex.methods.nca.grafting import grafted
 
-        NcaTexture.load(self.model).animate(
-            Mesh.load(self.mesh),
+        mesh = Mesh.load(self.mesh)
+        if self.graft is None or self.weights is None:
+            texture = NcaTexture.load(self.model)
+        else:
+            texture = grafted(self.model, self.graft, mesh, self.weights)
+        texture.animate(
+            mesh,
             self.out,
             resume=self.resume,
             seed=self.seed,
@@ -160,9 +170,16 @@ class Animate:
             ("--spp", "--renderer path", self.spp is not None and self.renderer != "path"),
             ("--fade", "--loop", self.fade is not None and not self.loop),
             ("--damage-at", "--damage", self.damage_at is not None and self.damage is None),
+            ("--graft", "--weights", self.graft is not None and self.weights is None),
+            ("--weights", "--graft", self.weights is not None and self.graft is None),
         ):
             if alone:
                 raise ConfigError(f"{option} means nothing without {needed}", "give both or neither")
+
+    def _inputs(self) -> list[str]:
+        """Models, and the files that options name."""
+        named = (self.model, self.graft, self.weights)
+        return [*(name for name in named if name is not None), *field_files(self.field, self.orientation)]
 
     def _shooting(self) -> dict[str, Any]:
         """Arguments of `Shooting`."""

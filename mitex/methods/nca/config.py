@@ -13,6 +13,7 @@ from mitex.methods.nca.ranges import MOST_STEPS
 from mitex.methods.words_config import check_words
 from mitex.training.settings import DeviceConfig, key
 
+LEAST_SIDE = 32  # of pictures in which Lucas and Kanade's method can measure [px]
 SURFACES = ("even", "uneven", "flat")
 # Keys that shape the decoder -> attributes of its shape.
 DECODER_KEYS = {
@@ -146,13 +147,28 @@ class NcaConfig(DeviceConfig):
         unknown = [name for name in self.coordinates if name not in COORDINATES]
         if unknown:
             raise ConfigError(f"coordinates holds {unknown}", f"use some of {', '.join(COORDINATES)}")
-        if len(self.motion_speeds) != 2 or self.motion_speeds[0] > self.motion_speeds[1]:
-            raise ConfigError(f"motion_speeds holds {self.motion_speeds}", "give the least and the most")
+        self._check_motion()
         check_words(self, "text_whole_weight", "text_close_weight", "text_relief_weight")
         if not self.text_distances:
             raise ConfigError("text_distances holds nothing", "give one or more [normalised mesh units]")
         if not self.wave_frequencies:
             raise ConfigError("wave_frequencies holds nothing", "give one or more [cycles per edge]")
+
+    def _check_motion(self) -> None:
+        if len(self.motion_speeds) != 2 or self.motion_speeds[0] > self.motion_speeds[1]:
+            raise ConfigError(f"motion_speeds holds {self.motion_speeds}", "give the least and the most")
+        if not self.motion:
+            return
+        if self.motion_start and self.motion_start >= self.steps:
+            raise ConfigError(
+                f"motion_start = {self.motion_start} comes after the last of {self.steps} steps",
+                "choose less, or more steps",
+            )
+        if self.motion_estimator == "lucas-kanade" and self.resolution < LEAST_SIDE:
+            raise ConfigError(
+                f"lucas-kanade cannot measure in pictures of resolution = {self.resolution}",
+                f"choose {LEAST_SIDE} or more, or motion_estimator=advection",
+            )
 
     @property
     def schedule(self) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
@@ -27,6 +28,7 @@ from mitex.progress import announce
 from mitex.render import OrbitRenderer, tone
 from mitex.render.preview import PreviewRenderer
 from mitex.render.recording import Recording
+from mitex.render.renderer import check_elevation, check_resolution, check_samples
 from mitex.runtime import keep_freed_memory
 
 PADDING = 8  # of the charts of a baked frame [texels]
@@ -103,6 +105,13 @@ class Shooting:
         """Raises a ConfigError if a number is out of range that nothing else checks before work begins."""
         if self.renderer not in ("preview", "path"):
             raise ConfigError(f"there is no renderer '{self.renderer}'", "use preview or path")
+        for name in ("seconds", "damage_at", "azimuth"):
+            if not math.isfinite(getattr(self, name)):
+                raise ConfigError(f"{name} is {getattr(self, name)}", "give a number")
+        check_resolution(self.resolution)
+        check_elevation(self.elevation, floating=self.renderer == "preview")
+        if self.renderer == "path":
+            check_samples(self.spp)
         if not 1 <= self.steps_per_frame <= MOST_STEPS:
             raise ConfigError(f"{self.steps_per_frame} steps a frame", f"use 1 to {MOST_STEPS}")
         if self.start is not None and not 0 <= self.start <= MOST_STEPS:

@@ -1,8 +1,9 @@
 """Two textures that grow into each other on one mesh (MeshNCA, section 3.3.2).
 
 Both rules see the one state, and each cell's update is theirs mixed: u = (1 - a) u_S + a u_T, with the weight
-a of its vertex. The paper's maps are channels of the state. Ours have decoders, whose weights are mixed
-likewise: textures of one family are near enough for a decoder between two of them to be one.
+a of its vertex; where they move, so are their motions, each with its own field, speed and period. The paper's
+maps are channels of the state. Ours have decoders, whose weights are mixed likewise: textures of one family
+are near enough for a decoder between two of them to be one.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.decoder.surface import Points
 from mitex.methods.nca.growth import Growth, LookGrowth
-from mitex.methods.nca.look import held, traits
+from mitex.methods.nca.look import differing_traits, held
 from mitex.methods.nca.model import FIRE_RATE
-from mitex.methods.nca.motion.cell_motion import STILL, CellMotion
 from mitex.methods.nca.motion.condition import Field
-from mitex.methods.nca.orientation import Turn
+from mitex.methods.nca.motion.start import with_condition
+from mitex.methods.nca.orientation import Orientation
 from mitex.methods.nca.texture import GrowingTexture, NcaTexture
 from mitex.methods.nca.weights import Weights
 from mitex.progress import announce
@@ -65,18 +66,16 @@ class Graft(GrowingTexture):
         """As many as the slower of the two needs."""
         return max(self.first.steps, self.second.steps)
 
-    def motion(
+    def growth_on(
         self,
         cells: Cells,
-        field: Field | None,
-        speed: float,
-        orientation: Turn = 0.0,
-        given: Mesh | None = None,
-    ) -> CellMotion:
-        return self.first.motion(cells, field, speed, orientation, given)
-
-    def growth(self, cells: Cells, orientation: Turn = 0.0, motion: CellMotion = STILL) -> Growth:
-        first, second = (texture.growth(cells, orientation, motion) for texture in (self.first, self.second))
+        given: Mesh,
+        orientation: Orientation = 0.0,
+        field: Field | None = None,
+        speed: float = 1.0,
+    ) -> GraftedGrowth:
+        place = cells, given, orientation, field, speed
+        first, second = (texture.growth_on(*place) for texture in (self.first, self.second))
         return GraftedGrowth(first, second, self.weights(cells.mesh.vertices.astype(np.float64)))
 
 
@@ -88,8 +87,8 @@ def check_related(first: NcaTexture, second: NcaTexture) -> None:
             f"{names} are not of one family: their states do not mean the same",
             "train one from the other, or both from one model (fit nca with init=...)",
         )
-    theirs, ours = (traits(texture.look) for texture in (first, second))
-    differing = sorted(name for name in theirs | ours if theirs.get(name) != ours.get(name))
+    # Cells may be told a vector by one alone, as a still one's weights for it would be zero.
+    differing = differing_traits(*(with_condition(texture.look) for texture in (first, second)))
     if differing:
         raise ConfigError(f"{names} differ in {', '.join(differing)}", "graft textures that are alike in it")
 
@@ -137,19 +136,23 @@ class GraftedGrowth(Growth):
         """A step of both rules with one mask, each of the cells that have a share of it.
 
         The next states are mixed rather than the updates, which is the same but for rounding: with a weight
-        of 0 or 1, the state is exactly that of the single rule.
+        of 0 or 1, the state is exactly that of the single rule. So are what the two motions carry to a cell,
+        rather than their ways, which are a fraction of an edge.
         """
-        motion = self.first.motion
         mask = torch.rand(state.shape[:2], generator=generator) < FIRE_RATE
         parts = ((self.first, self._of_first), (self.second, self._of_second))
         first, second = (
-            growth.look.rule.step(state, growth.operator, mask & own, motion.condition)
+            growth.look.rule.step(state, growth.operator, mask & own, growth.motion.condition)
             if own.any()
             else state
             for growth, own in parts
         )
         mixed = held(torch.lerp(first, second, self._share[:, None]), self._low, self._high)
-        return mixed if motion.advection is None else motion.advection(mixed)
+        first, second = (
+            mixed if growth.motion.advection is None else growth.motion.advection(mixed)
+            for growth in (self.first, self.second)
+        )
+        return torch.lerp(first, second, self._share[:, None])
 
 
 class GraftedGrown(Grown):

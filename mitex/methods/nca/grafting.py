@@ -11,12 +11,14 @@ from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
 from mitex.methods.nca import METHOD
 from mitex.methods.nca.arguments import RESOLUTION, levels, oriented
-from mitex.methods.nca.ranges import MOST_STEPS
+from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS
 from mitex.methods.options import PICTURES, MeshOptions, field_files
 from mitex.methods.registry import method_of
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
+    from mitex.mesh import Mesh
+    from mitex.methods.nca.graft import Graft
 
 
 @dataclass(kw_only=True)
@@ -31,6 +33,7 @@ class Grafted(MeshOptions):
       mitex graft lava shells --mesh bunny.obj --weights 0,0.5,0.3,0.4 --out bunny.glb
       mitex graft lava shells --mesh bunny.obj --weights painted.png --out maps/
       mitex graft lava shells --mesh bunny.obj --weights weights.npy --out bunny.ply
+      mitex graft lava shells --mesh bunny.obj --weights y --out bunny.glb --field about-y
     """
 
     second: Annotated[Positional[str], arg(metavar="RUN|MODEL")]
@@ -51,11 +54,17 @@ class Grafted(MeshOptions):
     """How often to subdivide the automaton's copy of the mesh; auto: to the training's density."""
 
     orientation: Annotated[str, arg(metavar="DEG|FIELD")] = "0"
-    """Turns the textures on the surface [degrees], or lets their up follow a vector field: a name (up, right,
-    about-y, ...), a direction, or a file (.npy .ply .json)."""
+    """Turns the textures on the surface [degrees], or lets their up follow a vector field (as of --field)."""
 
     scale: Annotated[float, arg(metavar="X")] = 1.0
     """Size of the patterns."""
+
+    field: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="(default: the trainings')")] = None
+    """Vector field that the textures move along: a name (up, right, about-y, ...), a direction, or a file
+    (.npy .ply .json)."""
+
+    speed: Annotated[float, arg(metavar="X")] = 1.0
+    """Speed along --field. At 1, the mean is an edge of the automaton's mesh in 6 steps, or as trained."""
 
     resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {RESOLUTION})")] = None
     """Side of the baked textures [texels]."""
@@ -69,13 +78,14 @@ class Grafted(MeshOptions):
         in_range("--steps", self.steps, 1, MOST_STEPS)
         oriented(self.orientation)
         in_range("--scale", self.scale, 0.05, 20.0)
+        in_range("--speed", self.speed, *SPEEDS)
         in_range("--resolution", self.resolution, 64, 8192)
         mutually_exclusive(
             "--resolution", "--vertex-colors", self.resolution is not None and self.vertex_colors
         )
 
     def inputs(self) -> list:
-        return [*super().inputs(), self.second, self.weights, *field_files(self.orientation)]
+        return [*super().inputs(), self.second, self.weights, *field_files(self.field, self.orientation)]
 
     def check_output(self, out) -> None:
         suffix = out.suffix.lower()
@@ -89,21 +99,33 @@ class Grafted(MeshOptions):
 
         let_idle_threads_sleep()
         from mitex.mesh import Mesh
-        from mitex.methods.nca import Graft, NcaTexture
-        from mitex.methods.nca.weights import graft_weights
 
-        for model in (self.model, self.second):
-            if (method := method_of(model)) is not METHOD:
-                raise ConfigError(f"'{model}' is a {method.name} texture", f"graft {METHOD.name} textures")
         mesh = Mesh.load(self.mesh)
-        first, second = NcaTexture.load(self.model), NcaTexture.load(self.second)
         textures = out.suffix.lower() != ".ply" and not self.vertex_colors
-        return Graft(first, second, graft_weights(mesh, self.weights)).apply(
+        return grafted(self.model, self.second, mesh, self.weights).apply(
             mesh,
             seed=self.seed,
             steps=self.steps,
             subdivide=levels(self.subdivide),
             orientation=oriented(self.orientation),
             scale=self.scale,
+            field=self.field,
+            speed=self.speed,
             resolution=(self.resolution or RESOLUTION) if textures else None,
         )
+
+
+def grafted(first: str, second: str, mesh: Mesh, weights: str) -> Graft:
+    """Two models grafted, by the weights that an option names.
+
+    Raises:
+        ConfigError: a model of another method, or of another family; weights that say nothing on the mesh.
+        CheckpointError: there is no such model, or it is damaged.
+    """
+    from mitex.methods.nca import Graft, NcaTexture
+    from mitex.methods.nca.weights import graft_weights
+
+    for model in (first, second):
+        if (method := method_of(model)) is not METHOD:
+            raise ConfigError(f"'{model}' is a {method.name} texture", f"graft {METHOD.name} textures")
+    return Graft(NcaTexture.load(first), NcaTexture.load(second), graft_weights(mesh, weights))

@@ -15,6 +15,7 @@ from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.decoder.decoder import Decoder, Readout
 from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.methods.nca.model import MeshNCA
+from mitex.methods.nca.motion.condition import WIDTH
 from mitex.methods.nca.perception import Perception
 from mitex.methods.nca.targets import value_layout
 from mitex.progress import announce
@@ -65,7 +66,7 @@ class Look(nn.Module):
     @staticmethod
     def of(config: NcaConfig, maps: Sequence[str]) -> Look:
         """With the shapes of a config, and no weights yet."""
-        condition = 3 if config.motion and config.motion_encoding else 0
+        condition = WIDTH if config.motion and config.motion_encoding else 0
         rule = MeshNCA(config.channels, config.hidden, condition, config.degree)
         shape = config.decoder_shape if config.decoder else None
         return Look(rule, maps, shape, config.aggregation == "mean")
@@ -135,6 +136,12 @@ def traits(look: Look) -> dict[str, Any]:
     traits: dict[str, Any] = {"maps": look.maps, "aggregation": look.mean}
     traits |= {name: tuple(value.shape) for name, value in look.state_dict().items()}
     return traits | (asdict(look.decoder.shape) if isinstance(look.decoder, Decoder) else {})
+
+
+def differing_traits(one: Look, other: Look) -> list[str]:
+    """Names of the `traits` that two looks do not have in common, sorted."""
+    first, second = traits(one), traits(other)
+    return sorted(name for name in first | second if first.get(name) != second.get(name))
 
 
 def weights_key(look: Look) -> str:

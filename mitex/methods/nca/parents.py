@@ -7,7 +7,7 @@ from typing import Any
 
 from mitex.errors import CheckpointError
 from mitex.methods.nca.config import NcaConfig
-from mitex.methods.nca.look import Look, traits
+from mitex.methods.nca.look import Look, differing_traits
 from mitex.training.fit import Run
 from mitex.training.locate import CHECKPOINT, PREVIOUS, header
 
@@ -18,8 +18,7 @@ def fitting_lineage(parent: Look, about: Mapping[str, Any], look: Look) -> dict[
     Raises:
         CheckpointError: their traits differ.
     """
-    theirs, ours = traits(parent), traits(look)
-    differing = sorted(name for name in theirs | ours if theirs.get(name) != ours.get(name))
+    differing = differing_traits(parent, look)
     if differing:
         raise CheckpointError(
             f"model '{about['name']}' differs from the config in {', '.join(differing)}",

@@ -57,32 +57,6 @@ class GrowingTexture(ABC):
         return float(density) if isinstance(density, int | float) and density > 0 else DENSITY
 
     @abstractmethod
-    def motion(
-        self,
-        cells: Cells,
-        field: Field | None = None,
-        speed: float = 1.0,
-        orientation: Turn = 0.0,
-        given: Mesh | None = None,
-    ) -> CellMotion:
-        """How the cells move along a vector field.
-
-        Args:
-            cells: the automaton's mesh.
-            field: see `mitex.mesh.fields`; None for the one that the texture was trained with, if any.
-            speed: factor of the field, whose mean length is 1.
-            orientation: of the texture.
-            given: whose vertices the vectors of a file or an array belong to; None for `cells.given`.
-
-        Raises:
-            ConfigError: a field that the texture cannot follow, or that cannot be used on the mesh; a speed
-                of a texture that stands still.
-        """
-
-    @abstractmethod
-    def growth(self, cells: Cells, orientation: Turn = 0.0, motion: CellMotion = STILL) -> Growth:
-        """The automaton on a mesh, its texture turned, its cells moving."""
-
     def growth_on(
         self,
         cells: Cells,
@@ -92,8 +66,6 @@ class GrowingTexture(ABC):
         speed: float = 1.0,
     ) -> Growth:
         """The automaton on a mesh; options and errors as of `apply`, whose vectors are those of `given`."""
-        turn = cell_turns(orientation, cells.mesh, given)
-        return self.growth(cells, turn, self.motion(cells, field, speed, turn, given))
 
     def apply(
         self,
@@ -321,11 +293,36 @@ class NcaTexture(GrowingTexture):
         orientation: Turn = 0.0,
         given: Mesh | None = None,
     ) -> CellMotion:
+        """How the cells move along a vector field.
+
+        Args:
+            cells: the automaton's mesh.
+            field: see `mitex.mesh.fields`; None for the one that the texture was trained with, if any.
+            speed: factor of the field, whose mean length is 1.
+            orientation: of the texture.
+            given: whose vertices the vectors of a file or an array belong to; None for `cells.given`.
+
+        Raises:
+            ConfigError: a field that the texture cannot follow, or that cannot be used on the mesh; a speed
+                of a texture that stands still.
+        """
         return look_motion(self.look, self.about, given or cells.given, cells.mesh, field, speed, orientation)
 
     def growth(self, cells: Cells, orientation: Turn = 0.0, motion: CellMotion = STILL) -> LookGrowth:
+        """The automaton on a mesh, its texture turned, its cells moving."""
         relief = known_relief(self.about, self.look.maps)
         return LookGrowth(self.look, cells, orientation, self._palette, motion=motion, relief=relief)
+
+    def growth_on(
+        self,
+        cells: Cells,
+        given: Mesh,
+        orientation: Orientation = 0.0,
+        field: Field | None = None,
+        speed: float = 1.0,
+    ) -> LookGrowth:
+        turn = cell_turns(orientation, cells.mesh, given)
+        return self.growth(cells, turn, self.motion(cells, field, speed, turn, given))
 
     @property
     def steps(self) -> int:

@@ -5,8 +5,9 @@ from dataclasses import asdict, fields
 import pytest
 
 from mitex.errors import ConfigError
+from mitex.features.flow.lucas_kanade import LEAST_SIDE as MEASURABLE
 from mitex.methods.nca import PRESETS
-from mitex.methods.nca.config import DECODER_KEYS
+from mitex.methods.nca.config import DECODER_KEYS, LEAST_SIDE
 from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.training import resolve
 
@@ -124,13 +125,18 @@ def test_names_and_default():
         ("motion_period=0", "motion_period = 0"),
         ("motion_steps=0", "motion_steps = 0"),
         ("motion_weight=-1", "motion_weight = -1"),
+        ("motion=up motion_start=900", "motion_start = 900 comes after the last of 900 steps; choose less"),
+        (
+            "motion=up motion_estimator=lucas-kanade resolution=31",
+            "lucas-kanade .* resolution = 31; choose 32",
+        ),
         ("motion_estimator=raft", "motion_estimator cannot be 'raft'"),
         ("resolutoin=64", "resolutoin"),
     ],
 )
 def test_values_out_of_range(setting, problem):
     with pytest.raises(ConfigError, match=problem):
-        resolve(PRESETS, overrides=[setting])
+        resolve(PRESETS, overrides=setting.split(" "))
 
 
 @pytest.mark.parametrize("words", ["", "waves", "polynomials,barycentrics"])
@@ -186,6 +192,19 @@ def test_moving_looks_are_of_the_shape_of_still_ones():
     shape = ("channels", "hidden", "degree", "aggregation", "decoder", *DECODER_KEYS)
     assert all(getattr(PRESETS["patch"], key) == getattr(PRESETS["motion"], key) for key in shape)
     assert PRESETS["motion"].motion and not PRESETS["patch"].motion and not PRESETS["paper"].motion
+
+
+def test_what_the_settings_of_motion_need_is_asked_of_motion_alone():
+    """And no step at all is no schedule."""
+    for words in (
+        "motion=up motion_start=899",
+        "motion_start=900",
+        "motion=up steps=0",
+        "motion=up motion_estimator=lucas-kanade resolution=32",
+        "motion_estimator=lucas-kanade resolution=16",
+    ):
+        resolve(PRESETS, overrides=words.split())
+    assert LEAST_SIDE == MEASURABLE
 
 
 def test_equal_steps_are_a_range():

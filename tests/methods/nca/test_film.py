@@ -1,5 +1,6 @@
 """Films show the automaton's states in turn; every option changes what they show."""
 
+import math
 import signal
 
 import imageio.v3 as iio
@@ -111,6 +112,14 @@ def test_a_graft_is_filmed_too(texture, plain, tmp_path):
 
 BAD = {
     "another renderer": ({"renderer": "raster"}, "no renderer 'raster'"),
+    "a length that is no number": ({"seconds": math.nan}, "seconds is nan"),
+    "no end": ({"seconds": math.inf}, "seconds is inf"),
+    "a time that is no number": ({"damage": "y:0:", "damage_at": math.nan}, "damage_at is nan"),
+    "no way to look": ({"azimuth": math.nan}, "azimuth is nan"),
+    "no samples": ({"renderer": "path", "spp": 0}, "0 samples per pixel"),
+    "a steep view": ({"renderer": "path", "elevation": 999.0}, "elevation 999 degrees is out of range"),
+    "a view from below the floor": ({"renderer": "path", "elevation": -5.0}, "elevation -5 degrees"),
+    "pixels": ({"renderer": "path", "resolution": 8}, "a picture of 8 pixels"),
     "no steps": ({"steps_per_frame": 0}, "0 steps a frame"),
     "a negative start": ({"start": -1}, "a start after -1 steps"),
     "damage after the end": ({"damage": "y:0:", "damage_at": 2.0}, "choose a time within it"),

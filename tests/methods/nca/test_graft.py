@@ -1,5 +1,6 @@
 """Two textures on one mesh: each alone where the weight says so, and the published mixture in between."""
 
+import math
 from copy import deepcopy
 from typing import Any
 
@@ -13,6 +14,7 @@ from mitex.methods.nca import Graft, NcaTexture
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.growth import grown_state
+from mitex.methods.nca.motion.cell_motion import STILL
 from mitex.methods.nca.perception import perception
 from mitex.methods.nca.weights import graft_weights
 from tests.methods.nca import tiny
@@ -54,9 +56,64 @@ def test_at_either_end_it_is_the_single_texture_bit_for_bit(pair, weight):
         assert maps.keys() == others.keys() and all(np.array_equal(maps[k], others[k]) for k in maps)
 
 
+TRAINED = {"motion": "right", "motion_advection": True, "motion_period": 4.0, "motion_speed": 1.2}
+MOVING = {
+    "one that is still": {},
+    "another way, speed and period": {"motion": "up", "motion_advection": True, "motion_period": 8.0},
+    "one that moves by itself": {"motion": "about-y", "motion_advection": False},
+}
+
+
+def moving_pair(about):
+    """A moving texture, and another one, which has not learned to move if there is nothing about it."""
+    pair = relative(0, condition=3), relative(1, reach=0.5, condition=3 if about else 0)
+    return [
+        NcaTexture(one.look, {**one.about, **more}) for one, more in zip(pair, (TRAINED, about), strict=True)
+    ]
+
+
+@pytest.mark.filterwarnings("ignore::mitex.errors.TextureWarning")
+@pytest.mark.parametrize("weight", [0, 1])
+@pytest.mark.parametrize("motion", [{}, {"field": "about-x"}, {"field": "down", "speed": 0.5}], ids=str)
+@pytest.mark.parametrize("name", MOVING)
+def test_a_moving_one_is_at_either_end_as_it_moves_alone(name, motion, weight):
+    pair = moving_pair(MOVING[name])
+    grafted = graft(pair, weight).growth_on(CELLS, SPHERE, 30.0, **motion)
+    single = pair[weight].grow(SPHERE, seed=3, steps=6, orientation=30.0, **motion)
+    assert torch.equal(grown_state(grafted, 3, 6), single)
+    still = MOVING[name] == {} and weight == 1 and not motion
+    assert (pair[weight].motion(CELLS, **motion) is STILL) == still
+
+
+@pytest.mark.parametrize("periods", [(4.0, 4.0), (4.0, 8.0)])
+def test_in_between_a_pattern_goes_the_ways_mixed(periods):
+    """Around the y axis, with rules that change nothing."""
+    pair = []
+    for seed, period in enumerate(periods):
+        texture = relative(seed, maps=("albedo",), shape=None, reach=9.0)
+        for weight in texture.look.rule.parameters():
+            weight.data.zero_()
+        pair.append(NcaTexture(texture.look, {**texture.about, "motion_period": period}))
+    mesh = icosphere(16)
+    growth = graft(pair, "0.25").growth_on(Cells(mesh, 0, mesh), mesh, field="about-y", speed=1.5)
+    x, _, z = torch.tensor(mesh.vertices).T
+    state = torch.zeros_like(growth.seed())
+    state[:, 0], state[:, 1] = x, z
+    a, b, *_ = growth.evolve(state, 12, torch.Generator()).T
+    turned = math.atan2(x @ b - z @ a, x @ a + z @ b)
+    angle = 12 * (0.75 / periods[0] + 0.25 / periods[1]) * 1.5 * float(mesh.edge_lengths.mean()) * 4 / math.pi
+    assert turned == pytest.approx(angle, rel=0.02)
+
+
+@pytest.mark.filterwarnings("ignore::mitex.errors.TextureWarning")
+def test_a_speed_of_one_that_stands_still():
+    with pytest.raises(ConfigError, match="'tiny 1' stands still, so that a speed means nothing"):
+        graft(moving_pair({}), "x").apply(SPHERE, steps=200_000_000, speed=2.0)
+
+
 def test_updates_are_mixed_by_the_weights_of_the_vertices(pair):
     """Equation of section 3.3.2, with one mask for both, and within bounds that are mixed too."""
-    growth = graft(pair, "x").growth(CELLS)
+    growth = graft(pair, "x").growth_on(CELLS, SPHERE)
     share = torch.from_numpy(graft_weights(SPHERE, "x")(SPHERE.vertices.astype(np.float64)))[:, None]
     operator, generator = perception(SPHERE, 1, mean=True), torch.Generator().manual_seed(5)
     state = growth.seed()
@@ -75,7 +132,7 @@ def test_updates_are_mixed_by_the_weights_of_the_vertices(pair):
 def test_maps_are_those_of_a_decoder_mixed_by_the_weight_at_the_point():
     """Point by point, against a look whose weights are mixed by the weight there."""
     pair = [NcaTexture(texture.look, {"family": "one"}) for texture in (relative(0), relative(1))]
-    growth = graft(pair, "x").growth(CELLS)
+    growth = graft(pair, "x").growth_on(CELLS, SPHERE)
     state = grown_state(growth, 0, 5)
     face = np.arange(0, len(SPHERE.faces), 16, dtype=np.int32)
     barycentric = np.full((len(face), 3), 1 / 3, np.float32)
@@ -92,7 +149,7 @@ def test_maps_are_those_of_a_decoder_mixed_by_the_weight_at_the_point():
 
 def test_maps_that_are_channels_are_the_state(pair):
     plain = [NcaTexture(relative(seed, shape=None).look, {"family": "one"}) for seed in (0, 1)]
-    growth = graft(plain, "x").growth(CELLS)
+    growth = graft(plain, "x").growth_on(CELLS, SPHERE)
     state = grown_state(growth, 0, 5)
     albedo = growth.shown(state).at_vertices()["albedo"]
     assert np.allclose(albedo, np.clip(state[:, :3].numpy() + 0.5, 0, 1), atol=1e-6)
@@ -108,6 +165,8 @@ def test_only_one_family_can_be_grafted(pair):
         graft((pair[0], relative(2, family="another")), "x")
     with pytest.raises(ConfigError, match="differ in fc1, .*hidden|differ in .*rule.fc1"):
         graft((pair[0], relative(2, hidden=64)), "x")
+    with pytest.raises(ConfigError, match="differ in rule.fc1.weight"):
+        graft((relative(0, condition=3), relative(2, condition=5)), "x")
     with pytest.raises(ConfigError, match="differ in .*maps"):
         graft((pair[0], relative(2, maps=("albedo",))), "x")
 

@@ -38,29 +38,30 @@ def cell_vectors(
     cells: Mesh,
     field: Field,
     speed: float,
-    orientation: float | np.ndarray = 0.0,
     longest: float = math.inf,
 ) -> np.ndarray:
-    """(V, 3) float32 vectors of the cells.
+    """(V, 3) float32 vectors at the cells of a texture that is not turned; else see `told`.
 
     Args:
         given: the mesh whose vertices the vectors of a file or an array belong to.
         cells: V vertices; the same mesh, or one of nearly the same surface.
         field: see `Field`.
         speed: factor of the field, whose mean length is 1.
-        orientation: of the texture [rad], one or (V,). Cells take what is turned by it for upright, so their
-            vectors are turned back.
         longest: length of the longest vectors, see `slowed`.
 
     Raises:
         ConfigError: as of `vector_field`.
     """
-    vectors = slowed(speed * carried_field(given, cells, field).astype(np.float64), longest)
-    return told(vectors, cells, orientation)
+    return slowed(speed * carried_field(given, cells, field).astype(np.float64), longest).astype(np.float32)
 
 
 def told(vectors: np.ndarray, cells: Mesh, orientation: float | np.ndarray) -> np.ndarray:
-    """(V, 3) float32, vectors (V, 3) as cells take them whose texture is turned, see `cell_vectors`."""
+    """(V, 3) float32, vectors (V, 3) as the cells of a turned texture are told them.
+
+    Args:
+        orientation: of the texture [rad], one or (V,). Cells take what is turned by it for upright, so their
+            vectors are turned back.
+    """
     return rotate_about(vectors, cells.normals.astype(np.float64), -orientation).astype(np.float32)
 
 

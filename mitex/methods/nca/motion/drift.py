@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from mitex.geometry.triangles import interpolate
+from mitex.geometry.triangles import interpolate, scattered
 from mitex.mesh.fields import vector_field
 from mitex.mesh.mesh import Mesh
 from mitex.mesh.nearest import nearest_points
@@ -51,11 +51,8 @@ class Drift:
     def random_places(self, count: int, share: float, generator: torch.Generator) -> tuple[Points, Points]:
         """Random points of the surface, and where what is there was a share of the period before."""
         mesh = self._mesh
-        area = np.cumsum(mesh.face_areas, dtype=np.float64)
-        at = torch.rand(count, 3, generator=generator, dtype=torch.float64).numpy()
-        face = np.searchsorted(area, at[:, 0] * area[-1], side="right").clip(max=len(area) - 1)
-        root = np.sqrt(at[:, 1])
-        weights = np.stack([1 - root, root * (1 - at[:, 2]), root * at[:, 2]], axis=1)
+        numbers = torch.rand(count, 3, generator=generator, dtype=torch.float64).numpy()
+        face, weights = scattered(mesh.face_areas, numbers.T)
         corners = mesh.faces[face]
         field = self.field
         if isinstance(self.surface, TrainingPlane):

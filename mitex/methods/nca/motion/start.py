@@ -13,6 +13,7 @@ import torch
 from mitex.errors import ConfigError
 from mitex.mesh import icosphere
 from mitex.mesh.fields import vector_field
+from mitex.mesh.fields.files import SUFFIXES
 from mitex.methods.nca.config import PRESETS, NcaConfig
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.model import MeshNCA
@@ -52,9 +53,9 @@ def check_field(field: str) -> None:
     Raises:
         ConfigError: it is unknown, or of one mesh alone.
     """
-    if any(field.lower().endswith(suffix) for suffix in (".npy", ".ply")):
+    if field.lower().endswith(SUFFIXES):
         raise ConfigError(
-            f"'{field}' holds the vectors of one mesh, and the training has spheres of its own",
+            f"'{field}' is the field of one mesh, and the training has spheres of its own",
             "train with a name or a direction, and give the file as `field` when it is applied",
         )
     vector_field(icosphere(2), field)
@@ -76,16 +77,16 @@ def _longest(field: str) -> float:
 
 def learner(config: NcaConfig, look: Look) -> Look:
     """The look that a training starts from, whose cells are told a vector if the settings want it."""
-    return (
-        with_condition(look) if config.motion and config.motion_encoding and not look.rule.condition else look
-    )
+    return with_condition(look) if config.motion and config.motion_encoding else look
 
 
 def with_condition(look: Look) -> Look:
-    """A copy of a look whose cells are told a vector, which does not matter to them yet.
+    """A look whose cells are told a vector: a copy for which it does not matter yet, if they are not so far.
 
     The weights of the new inputs are zero, so that it grows bit for bit what the look grows.
     """
+    if look.rule.condition:
+        return look
     look, still = deepcopy(look), look.rule
     rule = MeshNCA(still.channels, still.hidden, WIDTH, still.degree)
     weights = still.state_dict()

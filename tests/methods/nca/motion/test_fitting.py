@@ -13,9 +13,12 @@ from mitex.exemplar import Exemplar
 from mitex.mesh import icosphere
 from mitex.mesh.fields import vector_field
 from mitex.methods import nca
-from mitex.methods.nca import NcaTexture, settling
+from mitex.methods.nca import Graft, NcaTexture, settling
+from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.growth import grown_state
 from mitex.methods.nca.motion.cell_motion import fastest
 from mitex.methods.nca.motion.condition import cell_vectors
+from mitex.methods.nca.weights import graft_weights
 from mitex.runtime import threads
 from tests.methods.nca.tiny import SETTINGS, config, texture
 from tests.training.contract import assert_same_checkpoint
@@ -52,6 +55,9 @@ def test_a_still_look_learns_to_move(tmp_path, lava):
     uncarried = NcaTexture(first.look, {**first.about, "motion_advection": False})
     assert torch.equal(uncarried.grow(sphere, steps=6, speed=1.5), still.grow(sphere, steps=6))
     assert (first.grow(sphere, steps=6, speed=1.5) - still.grow(sphere, steps=6)).abs().max() > 0.01
+    grafted = Graft(still, uncarried, graft_weights(sphere, "0.5"))  # of one family, and alike so far
+    state = grown_state(grafted.growth_on(Cells(sphere, 0, sphere), sphere), 0, 6)
+    assert torch.allclose(state, still.grow(sphere, steps=6), atol=1e-6)
     out = tmp_path / "run"
     moving = nca.fit(lava, out, init=path, motion="about-y", set=[*TINY, "steps=8"])
     again = NcaTexture.load(out)
@@ -102,9 +108,12 @@ def test_another_preset_may_move_too(lava):
         ("0,0,0", "zero everywhere"),
         ("wind.npy", "one mesh"),
         ("wind.PLY", "one mesh"),
+        ("strokes.json", "one mesh"),
     ],
 )
-def test_fields_that_nothing_can_be_trained_with(tmp_path, lava, motion, problem):
+def test_fields_that_nothing_can_be_trained_with(tmp_path, monkeypatch, lava, motion, problem):
+    (tmp_path / "strokes.json").write_text('{"strokes": [[[0, 0, 1], [0, 0.5, 0.8]]]}')
+    monkeypatch.chdir(tmp_path)
     with pytest.raises(ConfigError, match=problem):
         nca.fit(lava, tmp_path / "run", motion=motion, set=TINY)
     assert not (tmp_path / "run").exists()
