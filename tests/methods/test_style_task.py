@@ -55,7 +55,7 @@ class TestTask:
             *({"text_vertices": 300}, {"text_relief": 0.02}, {"text_crops": 3}, {"text_crop_area": 0.3}),
             *({"text_tilt": 0.3}, {"text_whole_weight": 2.0}, {"text_close_weight": 0.0}),
             *({"text_background": 0.5}, {"text_each": True}),
-            *({"text_relief_weight": 1.0}, {"text_relief_crop_area": 0.3}, *own),
+            *({"text_relief_weight": 1.0}, {"text_relief_crop_area": 0.5}, *own),
         ):
             assert value(**options) != plain, options
 
