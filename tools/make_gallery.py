@@ -26,7 +26,7 @@ from mitex.methods.nca import Graft, NcaTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.film import PreviewCamera, Shooting, States
 from mitex.methods.nca.growth import grown_state
-from mitex.methods.nca.orientation import Orientation, cell_turns
+from mitex.methods.nca.orientation import Orientation
 from mitex.methods.nca.region import region
 from mitex.methods.nca.surfaces import TrainingSphere
 from mitex.methods.nca.texture import GrowingTexture
@@ -148,7 +148,7 @@ def _grown(
 ) -> np.ndarray:
     """A preview (H, W, 3) of a texture on a mesh."""
     cells = Cells.of(mesh, 0, scale)
-    growth = texture.growth(cells, cell_turns(orientation, cells.mesh, mesh))
+    growth = texture.growth_on(cells, mesh, orientation)
     camera = PreviewCamera(mesh, Shooting(resolution=CELL, azimuth=azimuth))
     return camera.picture(growth.shown(grown_state(growth, 0, steps)))
 
