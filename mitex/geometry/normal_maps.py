@@ -84,6 +84,14 @@ def of_slopes(rises: np.ndarray) -> np.ndarray:
     return (0.5 + 0.5 * normals).astype(np.float32)
 
 
+def rotated(encoded: np.ndarray, angle: np.ndarray | float) -> np.ndarray:
+    """Map values (..., 3) of what is turned counter-clockwise in its plane by angles (...) [rad]."""
+    x, y = np.moveaxis(encoded[..., :2] - 0.5, -1, 0)
+    sine, cosine = np.sin(angle), np.cos(angle)
+    along = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
+    return np.concatenate([0.5 + along, encoded[..., 2:]], axis=-1)
+
+
 def decode(encoded: np.ndarray, tangent: np.ndarray, bitangent: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Unit object-space normals (..., 3) from map values (..., 3) in [0, 1] and the frame at each."""
     n = _upward(2.0 * encoded - 1.0)

@@ -14,7 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from mitex.geometry.triangles import triangle_crosses
-from mitex.geometry.vectors import orthonormal, unit_normals
+from mitex.geometry.vectors import dot, orthonormal, unit_normals
 from mitex.mesh import Mesh
 from mitex.mesh.connection import solver
 from mitex.mesh.frames import interpolate_frames
@@ -112,14 +112,25 @@ class Flattening:
             around = whole.within(part * reach, self.corners)
             faces = around.faces
             corners_away = around.away[self.corners[faces]]
-            close = faces[(corners_away < ROUND * part * reach).all(1) & (self.areas[faces] > 0)]
-            along = orthonormal(np.broadcast_to(self.right[face], (len(faces), 3)), self.normals[faces])
-            for right in (self.right[faces], along):
-                other = self._mapped(around, right, np.cross(self.normals[faces], right))
+            close = (corners_away < ROUND * part * reach).all(1) & (self.areas[faces] > 0)
+            field = self.right[faces]
+            along = orthonormal(np.broadcast_to(self.right[face], field.shape), self.normals[faces])
+            ahead = dot(along, field) > 0  # the others would be laid upside down, as beyond a rim
+            for right, wanted in ((field, np.ones_like(ahead)), (along, ahead)):
+                other = self._mapped(around, right, wanted)
                 result = max(result, other, key=lambda r: self.areas[r[0]].sum())
-                if np.isin(close, other[0]).all():
+                if np.isin(faces[close & wanted], other[0]).all():
                     return self._around_the_point(face, barycentric, *other)
         return self._around_the_point(face, barycentric, *result)
+
+    def turns(self, faces: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """(K,) [rad] from the field's right to the plane's on faces (K,) whose corners (K, 3, 2) are there.
+
+        Counter-clockwise, seen from outside.
+        """
+        axes = self._axes(faces, self.right[faces])
+        (a, b), (c, d) = self._jacobians(faces, place, axes).transpose(1, 2, 0)
+        return np.arctan2(b - c, a + d)
 
     def _surroundings(self, face: int, reach: float) -> _Surroundings:
         away, previous, _ = dijkstra(
@@ -134,17 +145,18 @@ class Flattening:
         return _Surroundings(face, faces[near[self.corners[faces]].all(1)], away, previous, reach)
 
     def _mapped(
-        self, around: _Surroundings, right: np.ndarray, up: np.ndarray
+        self, around: _Surroundings, right: np.ndarray, wanted: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Those of the N faces that fit into the plane, and their corners there, (K,) and (K, 3, 2).
 
         Args:
             around: the faces.
-            right, up: (N, 3) the field on them.
+            right: (N, 3) where the texture's right shall point on them.
+            wanted: (N,) bool, which of them to take.
         """
-        axes = np.stack([right, up], axis=2)
+        axes = self._axes(around.faces, right)
         points = self.points[around.faces]
-        whole = ~self._torn(around, (np.roll(points, -1, axis=1) - points) @ axes)
+        whole = wanted & ~self._torn(around, (np.roll(points, -1, axis=1) - points) @ axes)
         faces, axes = around.faces[whole], axes[whole]
         used, corners = np.unique(self.corners[faces], return_inverse=True)
         corners = corners.reshape(-1, 3)
@@ -152,9 +164,17 @@ class Flattening:
         stiffness = areas[:, None, None] * (hats @ hats.swapaxes(1, 2))
         load = areas[:, None, None] * (hats @ axes)
         place = _solution(corners, stiffness, load, len(used))[corners]
-        fits = _fits(np.einsum("fka,fkb->fab", place, hats @ axes)) & (areas > 0)
+        fits = _fits(self._jacobians(faces, place, axes)) & (areas > 0)
         fits &= _connected(corners, fits, int(faces.searchsorted(around.face)))
         return faces[fits], place[fits]
+
+    def _axes(self, faces: np.ndarray, right: np.ndarray) -> np.ndarray:
+        """(N, 3, 2) right (N, 3) and up on the faces."""
+        return np.stack([right, np.cross(self.normals[faces], right)], axis=2)
+
+    def _jacobians(self, faces: np.ndarray, place: np.ndarray, axes: np.ndarray) -> np.ndarray:
+        """(N, 2, 2) of the plane's coordinates (N, 3, 2) at corners, by those along the axes (N, 3, 2)."""
+        return np.einsum("fka,fkb->fab", place, self.hats[faces] @ axes)
 
     def _torn(self, around: _Surroundings, steps: np.ndarray) -> np.ndarray:
         """(N,) bool, which faces lie where ways around both sides of something meet.

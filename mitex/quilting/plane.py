@@ -32,12 +32,15 @@ class Quilt:
         patch: (H, W) int32 index of the patch.
         flip: (H, W) uint8 how it is mirrored: bit 0, its columns are in reverse order; bit 1, its rows.
         texel: (H, W, 2) int16 row and column in the patch as it was before mirroring.
+        angle: (H, W) float32 on a surface: from where the texture's right shall point to the patch's,
+            counter-clockwise seen from outside [rad].
     """
 
     features: np.ndarray
     patch: np.ndarray
     flip: np.ndarray
     texel: np.ndarray
+    angle: np.ndarray | float = 0.0
 
     def look_up(self, values: np.ndarray) -> np.ndarray:
         """What else the patches have per texel, (P, S, S, ...), in the texture: (H, W, ...)."""

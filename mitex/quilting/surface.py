@@ -78,6 +78,7 @@ class _Place:
     Attributes:
         texels: (M,).
         where: (M, 2) column and row in the patch.
+        angle: (M,) from where the texture's right shall point to the patch's [rad].
         known: (M,) bool, which have values already.
         cell: side of the cells [texels of a patch].
         counts: (G, G) texels in the cells; those that have values:
@@ -87,6 +88,7 @@ class _Place:
 
     texels: np.ndarray
     where: np.ndarray
+    angle: np.ndarray
     known: np.ndarray
     cell: int
     counts: np.ndarray
@@ -130,6 +132,7 @@ class _Canvas:
         self.features = np.zeros((count, shape[2]), np.float32)
         self.patch = np.full(count, -1, np.int32)
         self.texel = np.zeros((count, 2), np.int16)
+        self.angle = np.zeros(count, np.float32)
 
     def empty(self) -> Iterator[int]:
         """Texels without a value, until there are none."""
@@ -157,7 +160,7 @@ class _Canvas:
 
     def around(self, texel: int) -> _Place:
         """What a patch covers whose middle is there."""
-        texels, where = self.target.around(texel)
+        texels, where, angle = self.target.around(texel)
         known = self.patch[texels] >= 0
         cells = self.side // self.cell
         column, row = np.clip(np.rint(where).astype(np.int64) // self.cell, 0, cells - 1).T
@@ -169,6 +172,7 @@ class _Canvas:
         return _Place(
             texels,
             where,
+            angle,
             known,
             self.cell,
             counts.reshape(shape),
@@ -192,11 +196,13 @@ class _Canvas:
         shown = weights[:, 0] > 0.5
         self.patch[place.texels[shown]] = index
         self.texel[place.texels[shown]] = np.stack([row, column], axis=1)[shown]
+        self.angle[place.texels[shown]] = place.angle[shown]
 
     def result(self) -> Quilt:
         """The texture in the map."""
-        features, patch, texel = (self.target.map(v) for v in (self.features, self.patch, self.texel))
-        return Quilt(features, patch, np.zeros(patch.shape, np.uint8), texel)
+        kept = self.features, self.patch, self.texel, self.angle
+        features, patch, texel, angle = (self.target.map(values) for values in kept)
+        return Quilt(features, patch, np.zeros(patch.shape, np.uint8), texel, angle)
 
 
 def _nearest(patch: np.ndarray, where: np.ndarray) -> np.ndarray:

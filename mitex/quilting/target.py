@@ -30,12 +30,13 @@ class Target(Protocol):
         """Of a texel, in the mean [texels of a patch]."""
         ...
 
-    def around(self, texel: int) -> tuple[np.ndarray, np.ndarray]:
+    def around(self, texel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The texels that a patch covers whose middle lies on one of them.
 
         Returns:
-            (M,) texels, `texel` among them, and (M, 2) float column and row in the patch, in
-            [-0.5, patch - 0.5).
+            (M,) texels, `texel` among them; (M, 2) float column and row in the patch, in [-0.5, patch - 0.5);
+            and (M,) the angle from where the texture's right shall point there to the patch's right,
+            counter-clockwise seen from outside [rad].
         """
         ...
 
@@ -99,14 +100,15 @@ class SurfaceTarget:
         """See `Target`."""
         return float(self.mesh.face_areas.sum()) / (self.gap**2 * max(self.count, 1))
 
-    def around(self, texel: int) -> tuple[np.ndarray, np.ndarray]:
+    def around(self, texel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """See `Target`."""
         texels, half = self.texels, 0.5 * self.patch
         size = 1.0 if self.sizes is None else float(self.sizes[texel])
         faces, corners = self.flattening(int(texels.face[texel]), texels.barycentric[texel], size)
-        index, place = texels.of(faces, corners * np.array([1.0, -1.0]) / (size * self.gap))
+        index, row, place = texels.of(faces, corners * np.array([1.0, -1.0]) / (size * self.gap))
         inside = (np.abs(place + np.finfo(np.float32).eps) < half).all(1)
-        return index[inside], place[inside] + (half - 0.5)
+        angle = self.flattening.turns(faces, corners)[row]
+        return index[inside], place[inside] + (half - 0.5), angle[inside]
 
     def in_order(self) -> np.ndarray:
         """(N,) the texels, those that are near to where their part of the mesh begins first."""
@@ -141,13 +143,14 @@ class TileTarget:
         """N = side x side, row by row."""
         return self.side**2
 
-    def around(self, texel: int) -> tuple[np.ndarray, np.ndarray]:
+    def around(self, texel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """See `Target`."""
         row, column = np.divmod(np.arange(self.patch**2), self.patch)
         middle_row, middle_column = divmod(texel, self.side)
         rows = (middle_row - self.patch // 2 + row) % self.side
         columns = (middle_column - self.patch // 2 + column) % self.side
-        return rows * self.side + columns, np.stack([column, row], axis=1).astype(np.float64)
+        place = np.stack([column, row], axis=1).astype(np.float64)
+        return rows * self.side + columns, place, np.zeros(len(place))
 
     def in_order(self) -> np.ndarray:
         """(N,) the texels, row by row."""

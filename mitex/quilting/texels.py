@@ -45,9 +45,10 @@ class FaceTexels:
             np.concatenate([[0], np.cumsum(counts)]),
         )
 
-    def of(self, faces: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Which texels lie on K faces, (M,), and the corners' values (K, 3, C) there, (M, C)."""
+    def of(self, faces: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Which texels lie on K faces, (M,), on which of these, (M,), and what is given at their corners,
+        (K, 3, C), there, (M, C)."""
         counts = self.first[faces + 1] - self.first[faces]
         row = np.repeat(np.arange(len(faces)), counts)
         texel = np.arange(len(row)) + np.repeat(self.first[faces] - (np.cumsum(counts) - counts), counts)
-        return texel, interpolate(self.barycentric[texel], corners[row])
+        return texel, row, interpolate(self.barycentric[texel], corners[row])

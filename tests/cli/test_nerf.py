@@ -12,6 +12,7 @@ from mitex.cli import main
 from mitex.images import read_image
 from mitex.mesh import Mesh, icosphere, quality
 from mitex.methods.nerf import NerfTexture
+from mitex.methods.nerf.texture import SIZE
 from tests.cli import bad_files as bad
 from tests.cli.refusals import check_refused
 from tests.methods.fits import few_patches
@@ -153,12 +154,28 @@ def test_bad_fits(files, photos, capsys, name):
     check_refused(files, fit(**{key: value}), message, capsys)
 
 
-def test_a_guide_a_lift_and_a_light(files, run, monkeypatch):
+@pytest.fixture
+def asked(monkeypatch) -> list[dict]:
+    """The options that textures were applied with."""
+    calls, texture_apply = [], NerfTexture.apply
+
+    def recorded(self, mesh, **options):
+        calls.append(dict(options))
+        return texture_apply(self, mesh, **options)
+
+    monkeypatch.setattr(NerfTexture, "apply", recorded)
+    return calls
+
+
+def test_a_guide_a_lift_and_a_light(files, run, monkeypatch, asked):
     few_patches(monkeypatch)
     bad.image(files / "guide.png")
     words = "--scale 16 --guide guide.png --lift 0.5 --density 1000 --seed 2"
     assert main(apply(words)) == 0
     assert len(Mesh.load(files / "out" / "a.ply").faces) > 100
+    np.testing.assert_array_equal(asked[0].pop("guide"), read_image(files / "guide.png"))
+    numbers = {"scale": 16, "lift": 0.5, "density": 1000, "seed": 2}
+    assert asked[0] == {"size": SIZE, "quilting": None, **numbers}
     assert main(apply(f"{words} --resolution 64", out="out/a.png")) == 0
     own = read_image(files / "out" / "a.png")
     assert own.shape == (64, 64, 3)
@@ -166,10 +183,12 @@ def test_a_guide_a_lift_and_a_light(files, run, monkeypatch):
     assert np.abs(read_image(files / "out" / "lit.png") - own).max() > 0.1
 
 
-@pytest.mark.parametrize("words", ["", "--quilting surface", "--quilting plane"])
-def test_where_patches_are_joined(files, run, monkeypatch, words):
+@pytest.mark.parametrize("quilting", [None, "surface", "plane"])
+def test_where_patches_are_joined(files, run, monkeypatch, asked, quilting):
     few_patches(monkeypatch)
+    words = f"--quilting {quilting}" if quilting else ""
     assert main(apply(f"--size 128 --scale 16 --density 1000 {words}")) == 0
+    assert asked[0]["quilting"] == quilting and asked[0]["size"] == 128
     assert len(Mesh.load(files / "out" / "a.ply").faces) > 100
 
 

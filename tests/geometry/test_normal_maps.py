@@ -8,6 +8,7 @@ from mitex.geometry.normal_maps import (
     decode_at_vertices,
     encode,
     of_slopes,
+    rotated,
     slope_agreement,
     slopes,
 )
@@ -29,6 +30,15 @@ def test_decode_inverts_encode(rng):
     encoded = encode(detail, *frame)
     assert encoded.min() >= 0 and encoded.max() <= 1
     np.testing.assert_allclose(decode(encoded, *frame), detail, atol=2e-6)
+
+
+def test_rotated_normals_are_those_of_rotated_axes(rng):
+    t, b, n = np.eye(3)[:, None].repeat(500, 1)
+    encoded = encode(unit(rng.normal(size=(500, 3)) + [0, 0, 2]), t, b, n)
+    angle = rng.uniform(-np.pi, np.pi, 500)
+    cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    expected = decode(encoded, cosine * t + sine * b, cosine * b - sine * t, n)
+    np.testing.assert_allclose(decode(rotated(encoded, angle), t, b, n), expected, atol=1e-6)
 
 
 def test_eight_bits_cost_less_than_a_degree(rng):

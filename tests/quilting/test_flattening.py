@@ -8,7 +8,7 @@ import pytest
 from mitex.mesh import Mesh, grid, icosphere
 from mitex.mesh.frames import vertex_directions
 from mitex.quilting.flattening import STRETCH, Flattening, _fits
-from tests.quilting.tubes import joined, tube
+from tests.quilting.tubes import cup, joined, tube
 
 THIRD = np.full(3, 1 / 3)
 
@@ -47,6 +47,31 @@ def test_a_thin_tube_is_cut_on_the_far_side():
     faces, place = flattening(mesh, 1.0)(int(len(mesh.faces) / 2), THIRD)
     assert 0.8 * np.pi * 0.2 < np.abs(place[..., 0]).max() < 1.3 * np.pi * 0.2
     assert len(np.unique(faces)) == len(faces)
+
+
+@pytest.mark.parametrize("kind", ["fixed", "smooth"])
+@pytest.mark.parametrize("radius", [1.0, 0.9], ids=["outside", "inside"])
+def test_nothing_is_laid_upside_down_over_a_rim(kind: str, radius: float):
+    """There the field turns round: what lies on both walls is upright on both, so a patch ends."""
+    mesh = cup()
+    middle = mesh.vertices[mesh.faces].mean(1)
+    face = int(np.square(middle - np.array([0, 0.9, radius])).sum(1).argmin())
+    faces, place = flattening(mesh, 0.8, kind)(face, THIRD)
+    wall = np.abs(mesh.face_normals[faces, 1]) < 0.5
+    height = mesh.vertices[mesh.faces[faces[wall]]][..., 1]
+    up = place[wall, :, 1]
+    assert wall.sum() > 100
+    assert (((height - height.mean(1, keepdims=True)) * up).sum(1) > 0).all()
+
+
+def test_turns_are_counter_clockwise():
+    angle = 0.4
+    flat = flattening(grid(24, 24), 0.5)
+    faces, place = flat(600, THIRD)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    turned = place @ np.array([[cosine, -sine], [sine, cosine]])  # x grows along (cosine, sine)
+    np.testing.assert_allclose(flat.turns(faces, place), 0, atol=1e-6)
+    np.testing.assert_allclose(flat.turns(faces, turned), angle, atol=1e-6)
 
 
 def test_nothing_is_mirrored_or_stretched_too_much():

@@ -22,7 +22,7 @@ def square() -> Mesh:
 def covered(target: SurfaceTarget, row: int, column: int) -> tuple[np.ndarray, np.ndarray]:
     """Rows and columns of the map that a patch covers (M, 2), from the middle one, and where in the patch."""
     middle = int(np.flatnonzero(target.texels.index == row * SIDE + column)[0])
-    texels, place = target.around(middle)
+    texels, place, _ = target.around(middle)
     rows = np.stack(np.divmod(target.texels.index[texels], SIDE), axis=1)
     return rows - np.array([row, column]), place - 0.5 * (PATCH - 1)
 
@@ -40,6 +40,23 @@ def test_a_patch_lies_as_directions_say(square: Mesh, right: tuple, turned: np.n
     np.testing.assert_allclose(np.stack([place[:, 0], -place[:, 1]], axis=1), x_y @ turned.T, atol=1e-4)
 
 
+def test_angles_are_from_the_directions_to_the_patch(square: Mesh):
+    """Around a point they turn, and a patch cannot follow."""
+    x, y, _ = square.vertices.T
+    target = SurfaceTarget(square, SIDE, PATCH, GAP, np.stack([-y, x, 0 * x], 1))
+    texels, place, angle = target.around(int(np.flatnonzero(target.texels.index == 32 * SIDE + 44)[0]))
+    row, column = np.divmod(target.texels.index[texels], SIDE)
+    image = np.full((SIDE, SIDE, 2), np.nan)
+    image[row, column] = place * [1, -1]
+    a, c = np.asarray(np.gradient(image, axis=1))[row, column].T  # of the patch's x and y, by x
+    b, d = -np.asarray(np.gradient(image, axis=0))[row, column].T  # and by y
+    field = np.arctan2(column - 31.5, row - 31.5)
+    error = np.arctan2(b - c, a + d) - field - angle
+    inner = np.isfinite(error)
+    assert inner.sum() > 150 and np.ptp(angle[inner]) > 0.5
+    assert np.abs(np.sin(error[inner] / 2)).max() < 0.05
+
+
 def test_a_patch_covers_more_where_the_pattern_is_larger(square: Mesh):
     sizes = np.ones((SIDE, SIDE))
     sizes[:, SIDE // 2 :] = 2.0
@@ -54,7 +71,7 @@ def test_a_patch_on_a_tile_comes_in_at_the_opposite_side():
     target = TileTarget(SIDE, PATCH)
     assert np.array_equal(target.in_order(), np.arange(SIDE**2)) and target.count == SIDE**2
     for texel in (0, 5 * SIDE + 63, 40 * SIDE + 40):
-        texels, place = target.around(texel)
+        texels, place, _ = target.around(texel)
         assert texel in texels and len(np.unique(texels)) == PATCH**2
         row, column = np.divmod(texels, SIDE)
         origin = np.array(divmod(texel, SIDE)) - PATCH // 2

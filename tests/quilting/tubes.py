@@ -31,6 +31,18 @@ def tube(
     return Mesh(points[used], faces.reshape(-1, 3), name="tube"), angle[used]
 
 
+def cup(wall: float = 0.1) -> Mesh:
+    """A tube of radius 1 and height 2 that goes on over a level rim on top and down again inside."""
+    mesh, _ = tube(height=1.0, rows=80)
+    x, share, z = mesh.vertices.T
+    corners = np.cumsum([0, 2, wall, 2])
+    along = (share + 0.5) * corners[-1]
+    radius = np.interp(along, corners, [1, 1, 1 - wall, 1 - wall])
+    return mesh.with_vertices(
+        np.stack([radius * x, np.interp(along, corners, [-1, 1, 1, -1]), radius * z], 1)
+    )
+
+
 def joined(*meshes: Mesh) -> Mesh:
     """Several meshes as one, without UVs."""
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])

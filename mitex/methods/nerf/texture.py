@@ -213,8 +213,8 @@ class NerfTexture:
         squares = self.patches(rng, patches, pattern_rate)
         announce("laying the mesh flat around its points")
         target = SurfaceTarget(in_scene_cube(mesh)[0], side, PATCH, gap)
-        maps = self.maps(squares, quilt_on(self.source(squares), target, rng, evenness=evenness))
-        return mesh, replace(maps, angle=target.map(angles_of(target)))
+        layout = quilt_on(self.source(squares), target, rng, evenness=evenness)
+        return mesh, replace(self.maps(squares, layout), angle=target.map(angles_of(target)) + layout.angle)
 
     def source(self, squares: Patches) -> FeatureSource:
         """The features of patches, which are compared by f."""

@@ -7,12 +7,13 @@ patches do not fit. So patches are laid first, and the synthesis mends what lies
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 
 import numpy as np
 
 from mitex.atlas import spread
 from mitex.exemplar import Exemplar
+from mitex.geometry.normal_maps import rotated
 from mitex.methods.surface.config import SurfaceConfig
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.progress import announce
@@ -37,23 +38,26 @@ def patch_side(share: float, exemplar: int, texture: int) -> int:
 
 
 def joined_patches(
-    exemplar: Exemplar, maps: Iterable[str], domain: SurfaceDomain, config: SurfaceConfig
+    exemplar: Exemplar, layout: Mapping[str, tuple[int, ...]], domain: SurfaceDomain, config: SurfaceConfig
 ) -> np.ndarray:
     """(N, C) float32 in [0, 1] at the texels: patches of the exemplar, laid over the surface.
 
     Args:
         exemplar: a pixel of it becomes a texel.
-        maps: of the exemplar, in the order of the channels.
+        layout: the exemplar's maps, and their channels at the texels.
         domain: N texels.
         config: `patch`, the size of the pattern, and the seed of all choices.
     """
     announce("joining patches of the exemplar on the surface")
     side = config.exemplar_side(domain.mean_scale)
     images = exemplar.resized(side).maps
-    image = np.concatenate([images[name].reshape(side, side, -1) for name in maps], axis=2)
+    image = np.concatenate([images[name].reshape(side, side, -1) for name in layout], axis=2)
     size = patch_side(config.patch, side, config.resolution)
     source = PictureSource(image.astype(np.float32), size, max((side - size) // PLACES, 1))
     rng = np.random.default_rng(config.seed)
     quilt = quilt_on(source, domain.target(size), rng, interpolated=False)
+    if "normal" in layout:  # in the patches' frames, which are not quite the texels'
+        normal = list(layout["normal"])
+        quilt.features[..., normal] = rotated(quilt.features[..., normal], quilt.angle)
     texture = spread(quilt.features, quilt.patch >= 0, config.resolution)
     return texture.reshape(-1, image.shape[2])[domain.texels.index].clip(0.0, 1.0)

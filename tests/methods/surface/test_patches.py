@@ -8,7 +8,9 @@ from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.patches import joined_patches, patch_side
 from mitex.methods.surface.scale_map import ScaleMap
+from mitex.methods.surface.texture import texel_layout
 from mitex.methods.surface.tile import TileDomain
+from mitex.quilting.target import TileTarget
 from mitex.training import resolve
 from tests.methods.surface.grids import flat_square
 
@@ -35,7 +37,7 @@ def frequencies(image: np.ndarray) -> tuple[int, int]:
 
 
 def image_of(domain: SurfaceDomain, settings) -> np.ndarray:
-    values = joined_patches(stripes(), ["albedo", "height"], domain, settings)
+    values = joined_patches(stripes(), texel_layout(["albedo", "height"]), domain, settings)
     assert values.shape == (len(domain.texels.index), 4) and values.dtype == np.float32
     np.testing.assert_allclose(values[:, 0], values[:, 3], atol=1e-6)  # maps stay together
     image = np.full(domain.resolution**2, values[:, 0].mean())
@@ -68,6 +70,26 @@ def test_stripes_follow_a_field_and_a_map_of_sizes():
     assert abs(upper - PERIODS / 2) <= 1 and abs(lower - PERIODS * 2) <= 2
 
 
+class TurnedTarget(TileTarget):
+    """As if the texels' right were the patches' down."""
+
+    def around(self, texel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        texels, place, _ = super().around(texel)
+        return texels, place, np.full(len(texels), np.pi / 2)
+
+
+def test_normals_are_turned_as_patches_lie(monkeypatch):
+    chosen, layout = config(), texel_layout(["height", "normal"])
+    leaning = np.tile(np.array([0.8, 0.5, 0.9], np.float32), (SIDE, SIDE, 1))  # to the right
+    exemplar = Exemplar({"height": stripes().maps["height"], "normal": leaning})
+    monkeypatch.setattr(TileDomain, "target", lambda domain, patch: TurnedTarget(domain.resolution, patch))
+    values = joined_patches(exemplar, layout, TileDomain.flat(chosen), chosen)
+    np.testing.assert_allclose(
+        values[:, list(layout["normal"])], np.tile([0.5, 0.8, 0.9], (len(values), 1)), atol=1e-6
+    )
+    assert np.isin(values[:, 0], exemplar.maps["height"]).mean() > 0.4  # other maps stay as they are
+
+
 def test_a_tile_repeats():
     chosen = config()
     image = image_of(TileDomain.flat(chosen), chosen)
@@ -80,7 +102,7 @@ def test_chance_follows_the_seed():
     noise = Exemplar({"albedo": rng.random((SIDE, SIDE, 3), np.float32)}, "noise")
     domain = SurfaceDomain.of(flat_square(SIDE), config(), keep=False)
     first, same, other = (
-        joined_patches(noise, ["albedo"], domain, config(f"seed={seed}")) for seed in (0, 0, 1)
+        joined_patches(noise, texel_layout(["albedo"]), domain, config(f"seed={seed}")) for seed in (0, 0, 1)
     )
     assert np.array_equal(first, same) and not np.array_equal(first, other)
     # Colours are the exemplar's own, but where a seam is averaged.

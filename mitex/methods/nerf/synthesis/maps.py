@@ -174,8 +174,8 @@ def uv_frames(mesh: Mesh) -> np.ndarray:
 
 
 def angles_of(target: SurfaceTarget) -> np.ndarray:
-    """(N,) float32 [rad] from dP/du of the texels' charts to the texture's right, counter-clockwise seen from
-    outside."""
+    """(N,) float32 [rad] from dP/du of the texels' charts to where the texture's right shall point,
+    counter-clockwise seen from outside."""
     face = target.texels.face
     right, _ = interpolate_frames(target.mesh, face, target.texels.barycentric, target.directions)
     t, b = np.moveaxis(face_frames(target.mesh)[face, :2], 1, 0)

@@ -11,9 +11,12 @@ from mitex.atlas import usable_uv
 from mitex.errors import ConfigError, MeshError, MeshWarning
 from mitex.evaluation.seams import ratio_across
 from mitex.mesh import Mesh, icosphere
+from mitex.methods.nerf import texture as texture_module
 from mitex.methods.nerf.texture import NerfTexture
 from mitex.methods.nerf.use.applied import AppliedTexture
 from mitex.methods.nerf.use.placement import own_layout
+from mitex.quilting.plane import Quilt
+from mitex.quilting.target import SurfaceTarget
 from tests.methods.nerf.small import small_texture
 
 SCALE, SIZE = 4.0, 512
@@ -56,6 +59,23 @@ def test_features_are_those_of_the_patches(texture: NerfTexture, surface: Applie
     spread = captured.std(0)
     assert (np.abs(worn.mean(0) - captured.mean(0)) < spread).all()
     assert 0.6 < worn.std(0).mean() / spread.mean() < 1.3
+
+
+def test_normals_are_turned_as_patches_lie(texture: NerfTexture, monkeypatch):
+    def turned(angle: float) -> np.ndarray:
+        """The maps' angles where all patches lie so."""
+
+        def quilt(_, target: SurfaceTarget, *__: object, **___: object) -> Quilt:
+            none = np.zeros((target.texels.side,) * 2, np.int32)
+            features = np.zeros((*none.shape, 24), np.float32)
+            return Quilt(features, none, none, np.stack([none, none], -1), angle)
+
+        monkeypatch.setattr(texture_module, "quilt_on", quilt)
+        maps = texture.synthesize_on(icosphere(3), SIZE, scale=SCALE, patches=4)[1]
+        assert maps.angle is not None
+        return maps.angle
+
+    np.testing.assert_allclose(turned(0.5) - turned(0.0), 0.5, atol=1e-6)
 
 
 def test_the_option_says_where_patches_are_joined(texture: NerfTexture, monkeypatch):
