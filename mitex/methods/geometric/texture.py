@@ -17,11 +17,12 @@ from mitex.mesh import Mesh, subdivide_midpoint
 from mitex.mesh.fields import vector_field
 from mitex.mesh.untangling import untangled
 from mitex.methods.geometric import files
+from mitex.methods.geometric.config import Placement
 from mitex.methods.geometric.directions import spread
 from mitex.methods.geometric.hierarchy import Hierarchy, mean_edge
 from mitex.methods.geometric.model import grow
 from mitex.methods.geometric.network import FaceNetwork
-from mitex.methods.geometric.placement import Placement, bumps, placed
+from mitex.methods.geometric.placement import bumps, placed
 from mitex.progress import counted, listening
 from mitex.runtime import keep_freed_memory
 
