@@ -86,8 +86,8 @@ class GrowthOptions:
     or a file (.npy .ply .json)."""
 
     placement: Annotated[Placement, arg(metavar="even|none")] = "even"
-    """Spread bumps and dents that are larger than a triangle evenly, as densely as on the reference, or leave
-    that to the generators, as published."""
+    """Spread bumps and dents that are larger than a triangle evenly, as densely as on the reference, and draw
+    back dents that would meet in thin walls; or leave that to the generators, as published."""
 
     def check_growth(self, mesh: str) -> None:
         in_range("--start-level", self.start_level, 0, 6)
