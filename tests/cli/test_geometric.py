@@ -210,6 +210,7 @@ BAD_FILMS = {
     "odd size": (animate("--resolution 33", out="out/a.mp4"), "even size"),
     "level beyond": (animate("--end-level 5"), "this texture has the levels 0 to 1"),
     "missing mesh": (animate(mesh="none.obj"), "none.obj"),
+    "a remeshed template": (animate("--remesh 100", "template"), "--mesh template and --remesh contradict"),
     "meshes in a file": (animate("--meshes good.obj"), "good.obj"),
 }
 
@@ -299,6 +300,11 @@ def test_bad_fits(files, name, capsys):
 
 BAD_APPLIES = {
     "an untangled template": ("--untangle --mesh template", "leave it out"),
+    "a remeshed template": ("--remesh 100 --mesh template", "--mesh template and --remesh contradict"),
+    "an unplaced template": (
+        "--placement none --mesh template",
+        "--mesh template and --placement none contradict",
+    ),
     "level beyond": ("--end-level 5", "this texture has the levels 0 to 1"),
     "level below": ("--start-level -1", "--start-level"),
     "levels in reverse": ("--start-level 1 --end-level 0", "out of range"),

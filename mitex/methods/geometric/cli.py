@@ -5,12 +5,13 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import SEEDS, in_range, mutually_exclusive
+from mitex.methods.geometric.config import Placement
 from mitex.methods.options import DeviceOptions, MeshOptions, field_files
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ class Fit(DeviceOptions):
 
     reference: Annotated[str, arg(metavar="MESH|NAME")]
     """Mesh file (.obj .ply .stl .glb .gltf .off), or a reference by formula: spikes, scales, knobs, ridges,
-    craters, warts, cactus, shingles."""
+    craters, warts, cactus, shingles, woven."""
 
     preset: Annotated[str | None, arg(metavar="fast|paper", help_behavior_hint="(default: fast)")] = None
     """Settings to start from: `fast`, or `paper`, which follows the publication."""
@@ -71,7 +72,8 @@ class GrowthOptions:
     """How a geometric texture grows on a mesh."""
 
     start_level: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 2)")] = None
-    """The generator to begin with; low ones change the shape."""
+    """The generator to begin with; low ones change the shape. With --mesh template (default: 0), `apply`
+    rebuilds the levels below it without noise, and `animate` leaves them out."""
 
     end_level: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the last)")] = None
     """The last generator; each one after the first splits every face in four."""
@@ -83,15 +85,16 @@ class GrowthOptions:
     """Vector field on the mesh that a relief with a direction follows: a name (up, about-y ...), a direction,
     or a file (.npy .ply .json)."""
 
-    placement: Annotated[Literal["even", "none"], arg(metavar="even|none")] = "even"
-    """Spread bumps and dents that are larger than a triangle evenly, as densely as on the reference, or leave
-    that to the generators, as published."""
+    placement: Annotated[Placement, arg(metavar="even|none")] = "even"
+    """Spread bumps and dents that are larger than a triangle evenly, as densely as on the reference, and draw
+    back dents that would meet in thin walls; or leave that to the generators, as published."""
 
     def check_growth(self, mesh: str) -> None:
         in_range("--start-level", self.start_level, 0, 6)
         in_range("--end-level", self.end_level, 0, 6)
         in_range("--remesh", self.remesh, 12, 2_000_000)
-        mutually_exclusive("--mesh template", "--field", mesh == TEMPLATE and self.field is not None)
+        for option, given in (("--field", self.field), ("--remesh", self.remesh)):
+            mutually_exclusive("--mesh template", option, mesh == TEMPLATE and given is not None)
 
     def even_mesh(self, name: str) -> tuple[Mesh, np.ndarray | None]:
         """The mesh to be displaced, remeshed if that is asked for, and the field on it."""
@@ -131,6 +134,8 @@ class Apply(GrowthOptions, MeshOptions):
     def check(self) -> None:
         self.check_growth(self.mesh)
         in_range("--seed", self.seed, *SEEDS)
+        unplaced = self.mesh == TEMPLATE and self.placement == "none"
+        mutually_exclusive("--mesh template", "--placement none", unplaced)
         if self.untangle and self.mesh == TEMPLATE:
             raise ConfigError(
                 "--untangle draws back towards the mesh, and a template lies too deep", "leave it out"

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from mitex.errors import ConfigError
 from mitex.training.settings import DeviceConfig, key
 
 MAX_LEVELS = 7  # 0 to 6
+Placement = Literal["even", "none"]  # of bumps, before the first generator; see `placement`
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ class Hierarchy:
     """The connectivity of a mesh subdivided 0, 1, 2, ... times.
 
     Attributes:
-        meshes: the mesh on each level, of which only faces and UVs are used.
+        meshes: the mesh on each level; splitting it moves nothing.
         graphs: of each level.
         pairs: for each level but the last, (E, 2) int64, the ends of the edges that are split next.
     """

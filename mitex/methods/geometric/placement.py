@@ -10,7 +10,7 @@ these, evenly spread.
 from __future__ import annotations
 
 from heapq import heappop, heappush
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -19,8 +19,6 @@ from scipy.sparse.csgraph import connected_components
 from mitex.mesh import Mesh
 from mitex.mesh.connection import solver
 from mitex.mesh.matrices import edge_lengths, ring_means
-
-Placement = Literal["even", "none"]
 
 REACH = 3.0  # of the smoothing that tells bumps from the shape [edges]
 TOP = 0.97  # quantile of the heights that counts as the top; half of it divides bumps from the ground

@@ -98,6 +98,18 @@ def shingles() -> Mesh:
     return _sphere(0.16 * (down - row) * np.clip(gap / 0.15, 0, 1), "shingles")
 
 
+def woven() -> Mesh:
+    """A ball of 18 strands that go over and under each other, six by six on each side of a cube around it."""
+    points = icosphere(FREQUENCY).vertices.astype(np.float64)
+    axes = (np.abs(points).argmax(1)[:, None] + np.arange(3)) % 3
+    out, *sides = np.take_along_axis(points, axes, 1).T
+    place = 3 + 12 / np.pi * np.arctan(np.stack(sides) / out)  # from 0 to 6 across the strands, both ways
+    profile, wave = np.sqrt(1 - (2 * (place % 1) - 1) ** 2), np.sin(np.pi * place)
+    along = profile[1] * (1 + 0.6 * wave[0] * np.sign(wave[1]))
+    across = profile[0] * (1 - 0.6 * wave[1] * np.sign(wave[0]))
+    return _sphere(0.1 * np.maximum(along, across), "woven")
+
+
 REFERENCES: dict[str, Callable[[], Mesh]] = {
     "spikes": spikes,
     "scales": scales,
@@ -107,6 +119,7 @@ REFERENCES: dict[str, Callable[[], Mesh]] = {
     "warts": warts,
     "cactus": cactus,
     "shingles": shingles,
+    "woven": woven,
 }
 
 

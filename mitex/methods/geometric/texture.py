@@ -17,11 +17,13 @@ from mitex.mesh import Mesh, subdivide_midpoint
 from mitex.mesh.fields import vector_field
 from mitex.mesh.untangling import untangled
 from mitex.methods.geometric import files
+from mitex.methods.geometric.config import Placement
 from mitex.methods.geometric.directions import spread
 from mitex.methods.geometric.hierarchy import Hierarchy, mean_edge
 from mitex.methods.geometric.model import grow
 from mitex.methods.geometric.network import FaceNetwork
-from mitex.methods.geometric.placement import Placement, bumps, placed
+from mitex.methods.geometric.placement import bumps, placed
+from mitex.methods.geometric.thickness import shallow, thickness
 from mitex.progress import counted, listening
 from mitex.runtime import keep_freed_memory
 
@@ -93,8 +95,9 @@ class GeometricTexture:
             field: the vector field on the mesh that the relief follows, if it has learned to follow one; see
                 `mitex.mesh.fields`.
             placement: where bumps and dents go that are larger than a face of the first level: "even" spreads
-                them as densely as on the reference (`geometric.placement`); "none" leaves it to the
-                generators, as published. Reliefs of other kinds, and those that follow a field, have none.
+                them as densely as on the reference (`geometric.placement`) if a relief has such and follows
+                no field, and draws back dents that would meet in thin walls (`geometric.thickness`); "none"
+                leaves all to the generators, as published.
 
         Returns:
             The displaced mesh in light grey, in the mesh's own units and place; UVs are interpolated.
@@ -104,7 +107,7 @@ class GeometricTexture:
                 missing, wrong or of no use.
             MeshError: a face names a vertex twice.
         """
-        rollout = self.rollout(mesh, start_level, end_level, field)
+        rollout = self.rollout(mesh, start_level, end_level, field, placement)
         *_, last = rollout.run(rollout.noise(seed), self._placed(mesh, rollout.level, placement, seed))
         return clay(untangled(rollout.hierarchy.meshes[-1], last) if untangle else last)
 
@@ -126,7 +129,7 @@ class GeometricTexture:
             seeds: of the first and the last mesh.
             frames: number of meshes, at least 2.
         """
-        rollout = self.rollout(mesh, start_level, end_level, field)
+        rollout = self.rollout(mesh, start_level, end_level, field, placement)
         first, last = (rollout.noise(seed) for seed in seeds)
         start, stop = (self._placed(mesh, rollout.level, placement, seed) for seed in seeds)
         for t in np.linspace(0, 1, frames):
@@ -163,7 +166,7 @@ class GeometricTexture:
 
         Arguments as in `apply`. The last of a level's meshes is displaced by the whole of it.
         """
-        rollout = self.rollout(mesh, start_level, end_level, field)
+        rollout = self.rollout(mesh, start_level, end_level, field, placement)
         before, vertices = mesh, self._placed(mesh, rollout.level, placement, seed)
         for level, after in enumerate(rollout.run(rollout.noise(seed), vertices)):
             start = subdivide_midpoint(before) if level else before
@@ -192,10 +195,11 @@ class GeometricTexture:
         start_level: int | None,
         end_level: int | None,
         field: str | Path | np.ndarray | None = None,
+        placement: Placement = "none",
     ) -> Rollout:
         """The generators of a range of levels, ready to run on a mesh; arguments and errors as of `apply`.
 
-        The template has its own field.
+        The template has its own field, and dents of any depth.
         """
         start, end = self._range(start_level, end_level)
         faces = len(mesh.faces) * 4 ** (end - start)
@@ -208,7 +212,8 @@ class GeometricTexture:
         generators = self.generators[start : end + 1]
         hierarchy = self._directed(Hierarchy.of(mesh, len(generators)), mesh, field)
         noise, remeasure = float(self.about["noise"]), bool(self.about["remeasure"])
-        return Rollout(generators, hierarchy, start, noise, remeasure)
+        thick = None if placement == "none" or mesh is self.template else thickness(mesh)
+        return Rollout(generators, hierarchy, start, noise, remeasure, thick)
 
     def _placed(self, mesh: Mesh, level: int, placement: Placement, seed: int) -> np.ndarray:
         """Vertices (V, 3) of a mesh with bumps like those that the generators up to a level make."""
@@ -259,6 +264,7 @@ class Rollout:
         level: of the first generator.
         noise_scale: standard deviation of the noise [mean edges].
         remeasure: as in `generate`.
+        thick: (V,) the thickness of the mesh, beside which dents stay shallow; None for any depth.
     """
 
     generators: Sequence[FaceNetwork]
@@ -266,6 +272,7 @@ class Rollout:
     level: int
     noise_scale: float
     remeasure: bool
+    thick: np.ndarray | None
 
     def noise(self, seed: int) -> list[torch.Tensor]:
         """Noise (V, 3) for each level."""
@@ -286,10 +293,14 @@ class Rollout:
         given = mesh.vertices if vertices is None else vertices
         centred, start = (torch.from_numpy((v - centre).astype(np.float32)) for v in (mesh.vertices, given))
         unit = float(mean_edge(centred, graph))
-        steps = grow(self.generators, self.hierarchy, start / unit, noises, self.remeasure)
+        steps, thick = grow(self.generators, self.hierarchy, start / unit, noises, self.remeasure), self.thick
         for level, grown in enumerate(counted("growing levels", steps, len(self.generators))):
             positions = grown.numpy().astype(np.float64) * (unit / 2**level) + centre
-            yield self.hierarchy.meshes[level].with_vertices(positions)
+            before = self.hierarchy.meshes[level]
+            after = before.with_vertices(positions)
+            if thick is not None and level:
+                thick = np.concatenate([thick, thick[self.hierarchy.pairs[level - 1].numpy()].mean(1)])
+            yield after if thick is None else shallow(before, after, thick)
 
 
 def slerp(a: torch.Tensor, b: torch.Tensor, t: float) -> torch.Tensor:

@@ -125,10 +125,11 @@ def test_growth_begins_with_the_bumps_unless_told_otherwise(texture, monkeypatch
     assert np.allclose(seen[-1].numpy() * unit, raised - mesh.vertices.mean(0), atol=1e-3 * unit)
 
 
-def test_reliefs_without_bumps_and_those_that_follow_a_field_are_as_published(texture, monkeypatch):
+def test_reliefs_without_bumps_and_those_that_follow_a_field_start_as_published(texture, monkeypatch):
     mesh = icosphere(6)
     none = texture.apply(mesh, placement="none").mesh.vertices
     monkeypatch.setattr("mitex.methods.geometric.texture.bumps", lambda mesh, edge: None)
+    monkeypatch.setattr("mitex.methods.geometric.texture.shallow", lambda before, after, thick: after)
     assert np.array_equal(texture.apply(mesh).mesh.vertices, none)
     directed = replace(texture, about={**texture.about, "field": "vector"})
     monkeypatch.setattr("mitex.methods.geometric.texture.placed", None)

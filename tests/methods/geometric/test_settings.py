@@ -1,0 +1,83 @@
+"""Every setting of `GeometricConfig` changes what is learned: an ignored one fails here."""
+
+from dataclasses import fields
+from types import SimpleNamespace
+from unittest.mock import patch
+
+import pytest
+import torch
+
+from mitex.mesh import icosphere
+from mitex.methods import geometric
+from mitex.runtime import threads
+
+pytestmark = pytest.mark.usefixtures("own_cache")
+# Four levels, of which the last may start from the weights of the third.
+BASE = {
+    "steps": 10,
+    "level_steps": 3,
+    "fit_steps": 3,
+    "fit_samples": 100,
+    "checkpoint_every": 99,
+    "preview_every": 0,
+}
+UNCHANGED = {
+    "preset",
+    "device",
+    "checkpoint_every",
+    "preview_every",
+}  # tested with the loop and by test_device
+CASES = {
+    "steps": 11,
+    "seed": 1,
+    "level_steps": 4,
+    "critic_steps": 1,
+    "generator_steps": 1,
+    "noise": 0.2,
+    "reconstruction": 1,
+    "penalty": 1,
+    "lr": 1e-3,
+    "beta1": 0.9,
+    "beta2": 0.9,
+    "remeasure": "true",
+    "symmetric": "true",
+    "carried": 4,
+    "fit_steps": 4,
+    "fit_samples": 150,
+    "fit_lr": 0.01,
+    "fit_normals": 1,
+    "fit_uniform": 1,
+    "fit_entropy": 1,
+    "fit_smooth": 1,
+}
+
+
+def learned(**settings: object) -> list[torch.Tensor]:
+    """The weights after a short fit, without reports on its training meshes, which take twice as long."""
+    words = [f"{key}={value}" for key, value in (BASE | settings).items()]
+    threads(1)
+    with patch("mitex.methods.geometric.fitting.report", lambda *_: SimpleNamespace()):
+        texture = geometric.fit(icosphere(4), field="up", set=words)
+    return [p.detach() for generator in texture.generators for p in generator.parameters]
+
+
+def same(one: list[torch.Tensor], other: list[torch.Tensor]) -> bool:
+    return len(one) == len(other) and all(map(torch.equal, one, other))
+
+
+@pytest.fixture(scope="module")
+def base():
+    return learned()
+
+
+def test_every_setting_has_a_case():
+    assert {field.name for field in fields(geometric.GeometricConfig)} == {*CASES, *UNCHANGED}
+
+
+def test_the_same_settings_learn_the_same(base):
+    assert same(learned(), base)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_every_setting_changes_what_is_learned(base, name):
+    assert not same(learned(**{name: CASES[name]}), base)
