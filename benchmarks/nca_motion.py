@@ -70,8 +70,12 @@ class Motion:
         torch.autograd.grad(result.sum(), list(self.task.look.rule.parameters()))
 
     def loss(self, name: str) -> None:
-        self.task.estimator = load_estimator(name)
-        value = self.task.motion(self.states, self.drift, self.task.config.motion_steps, self._generator())
+        task, apart = self.task, self.task.config.motion_steps
+        task.estimator = load_estimator(name)
+        if task.estimator:
+            value = task.pictured(self.states, task.motion_views(self.drift, self._generator()), apart)
+        else:
+            value = task.carried(self.states, self.drift, apart, self._generator())
         torch.autograd.grad(value, self.states[-1])
 
     def step(self) -> None:
