@@ -21,12 +21,12 @@ def test_the_judge_is_told_and_another_one_measures_again(place):
         return result.numbers["mes"], json.loads((place / "out" / "report.json").read_text())["judge"]
 
     ours, name = scores("words")
-    assert name == "the embedded text-image model"
+    assert name == "the embedded vision-language model"
     assert name in (place / "out" / "report.html").read_text()
     theirs, name = scores(clip)
     assert theirs != pytest.approx(ours, abs=0.01) and name == "clip-x"
     assert "The judge: clip-x." in (place / "out" / "report.html").read_text()
-    assert scores("words") == (pytest.approx(ours, abs=0.001), "the embedded text-image model")
+    assert scores("words") == (pytest.approx(ours, abs=0.001), "the embedded vision-language model")
 
 
 def test_a_judge_that_is_not_there_is_refused_before_any_work(place):
