@@ -73,9 +73,9 @@ class Motion:
         task, apart = self.task, self.task.config.motion_steps
         task.estimator = load_estimator(name)
         if task.estimator:
-            value = task.pictured(self.states, task.motion_views(self.drift, self._generator()), apart)
+            value = task.picture_loss(self.states, task.motion_views(self.drift, self._generator()), apart)
         else:
-            value = task.carried(self.states, self.drift, apart, self._generator())
+            value = task.state_residual(self.states, self.drift, apart, self._generator())
         torch.autograd.grad(value, self.states[-1])
 
     def step(self) -> None:

@@ -77,7 +77,7 @@ class Compare(JobOptions):
         let_idle_threads_sleep()
         from mitex.comparison.run import compare
 
-        done = compare(
+        comparison = compare(
             plan,
             self.out,
             self.chosen_engine(),
@@ -86,12 +86,12 @@ class Compare(JobOptions):
             study=self.study,
             judge=self.judge,
         )
-        for line in done.failures:
+        for line in comparison.failures:
             print(f"failed   {line}")
-        print(done.report)
+        print(comparison.report)
         if self.study:
-            print(done.folder / "study.html")
-        refuse_missing(done.missing, done.total)
+            print(comparison.folder / "study.html")
+        refuse_missing(comparison.missing, comparison.total)
 
     def _plan(self) -> Plan:
         from mitex.comparison.plan import comparison_plan, prepared

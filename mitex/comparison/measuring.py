@@ -34,11 +34,11 @@ class Measurements:
     judge: str | None = None
 
 
-def measure(made: Sequence[Result], pair_of: Callable[[str, str], Pair], kept: Kept) -> Measurements:
+def measure(results: Sequence[Result], pair_of: Callable[[str, str], Pair], kept: Kept) -> Measurements:
     """Measures what was not measured before; a result that cannot be is a failure of its own.
 
     Args:
-        made: what the jobs have made.
+        results: without numbers, as the jobs have made them.
         pair_of: exemplar and mesh -> what results are measured with.
         kept: what was measured before.
 
@@ -47,31 +47,33 @@ def measure(made: Sequence[Result], pair_of: Callable[[str, str], Pair], kept: K
     """
     forget()
     measurements = Measurements()
-    for names in dict.fromkeys(result.pair for result in made):
-        _measure_pair(names, made, pair_of, kept, measurements)
+    for names in dict.fromkeys(result.pair for result in results):
+        _measure_pair(names, results, pair_of, kept, measurements)
     return measurements
 
 
 def _measure_pair(
     names: tuple[str, str],
-    made: Sequence[Result],
+    results: Sequence[Result],
     pair_of: Callable[[str, str], Pair],
     kept: Kept,
-    found: Measurements,
+    measurements: Measurements,
 ) -> None:
-    pair, known = None, {}
-    for result in (result for result in made if result.pair == names):
-        announce("measuring", len(found.known) + len(known) + len(found.failures), len(made))
+    pair, complete = None, {}
+    for result in (result for result in results if result.pair == names):
+        announce(
+            "measuring", len(measurements.known) + len(complete) + len(measurements.failures), len(results)
+        )
         try:
             pair = pair or pair_of(*names)
-            known[result.id] = kept.completed(result, pair) or kept.measured(result, pair)
+            complete[result.id] = kept.completed(result, pair) or kept.measured(result, pair)
         except OutputError:
             raise
         except MitexError as e:
-            found.failures.append(f"{result.id.rpartition('-')[0]} cannot be measured: {e}")
-    if pair is not None and known:
-        found.known.update(known)
-        found.judge = pair.judge
-        found.floors[names] = kept.floor(pair)
-        if names[0] not in found.exemplars:
-            found.exemplars[names[0]] = pair.image
+            measurements.failures.append(f"{result.id.rpartition('-')[0]} cannot be measured: {e}")
+    if pair is not None and complete:
+        measurements.known.update(complete)
+        measurements.judge = pair.judge
+        measurements.floors[names] = kept.floor(pair)
+        if names[0] not in measurements.exemplars:
+            measurements.exemplars[names[0]] = pair.image

@@ -94,9 +94,9 @@ def compare(
         check_study(plan)
     place = checked_folder(folder)
     report = run_plan(plan, place / BATCH, engine, threads=threads, retry=retry, on_event=on_event)
-    made = results_of(report, source_of(plan))
-    measurements = measure(made, partial(kind.pair_of, judge=judge), Kept(place / MEASURED))
-    comparison = _comparison(place, made, measurements, report, kind)
+    results = results_of(report, source_of(plan))
+    measurements = measure(results, partial(kind.pair_of, judge=judge), Kept(place / MEASURED))
+    comparison = _comparison(place, results, measurements, report, kind)
     _write(comparison, measurements, kind, Provenance.of(plan, comparison.results))
     if study:
         write_study(place, comparison.results, measurements.exemplars)
@@ -128,15 +128,15 @@ def _check_judge(kind: Kind, judge: str | None) -> None:
 
 
 def _comparison(
-    folder: Path, made: Sequence[Result], measurements: Measurements, report: Report, kind: Kind
+    folder: Path, everything: Sequence[Result], measurements: Measurements, report: Report, kind: Kind
 ) -> Comparison:
-    results = tuple(measurements.known[result.id] for result in made if result.id in measurements.known)
+    results = tuple(measurements.known[result.id] for result in everything if result.id in measurements.known)
     failures = (
         *(f"{row.job.name}: {row.record.get('error')}" for row in report.failures),
         *measurements.failures,
     )
     total = len(report.rows)
-    missing = total - report.count("done") + len(made) - len(results)
+    missing = total - report.count("done") + len(everything) - len(results)
     return Comparison(folder, results, tuple(summaries(results, kind.measures)), failures, missing, total)
 
 

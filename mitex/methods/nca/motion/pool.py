@@ -61,8 +61,11 @@ class MovingPool(PoolTask):
             states.append(grow(states[-1], apart))
         terms = {}
         if not seed and step >= config.motion_start:  # else there is no pattern yet that could move
-            bare = [state[0] for state in states]
-            loss = self.pictured(bare, views, apart) if views else self.carried(bare, drift, apart, generator)
+            sequence = [state[0] for state in states]
+            if views:
+                loss = self.picture_loss(sequence, views, apart)
+            else:
+                loss = self.state_residual(sequence, drift, apart, generator)
             terms = {"motion": config.motion_weight * loss}
         return Rollout(states[-1], terms, partial(self._keep, index, way))
 
@@ -94,7 +97,7 @@ class MovingPool(PoolTask):
         super().load_state(state)
         self.ways = state["pool.ways"]
 
-    def carried(
+    def state_residual(
         self, states: Sequence[torch.Tensor], drift: Drift, apart: int, generator: torch.Generator
     ) -> torch.Tensor:
         """How far states (V, C), each `apart` automaton steps from the next, are from moving with a drift."""
@@ -105,7 +108,7 @@ class MovingPool(PoolTask):
             states[-2], states[-1], drift, share, generator
         )
 
-    def pictured(self, states: Sequence[torch.Tensor], views: MotionViews, apart: int) -> torch.Tensor:
+    def picture_loss(self, states: Sequence[torch.Tensor], views: MotionViews, apart: int) -> torch.Tensor:
         """The same of the last two states, by what views show of them."""
         assert self.estimator is not None
         flow = self.estimator(views.grey(states[-2].detach()), views.grey(states[-1]))
