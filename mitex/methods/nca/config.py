@@ -232,6 +232,7 @@ PRESETS["motion"] = replace(
     lr=5e-4,
     milestones=(150, 240),
     motion="right",
+    motion_estimator="lucas-kanade",
     motion_weight=0.25,
     motion_period=6.0,
 )
