@@ -1,15 +1,15 @@
 """Draws docs/gallery/nca-flow.jpg, textures that flow, some moments one after the other, and a film of them.
 
-usage: python tools/make_flow_sheet.py MODEL [MODEL ...] [--out FILE] [--film FILE]
+usage: python tools/make_flow_sheet.py MODEL ... [--scenes FIELD=MESH ...] [--out FILE] [--film FILE]
 
-A MODEL is a bundled one, a file or a run folder. The sheet has a row for each model and field. The film has
-four parts, the first two models along each field.
+A MODEL is a bundled one, a file or a run folder; a MESH is `sphere`, one that ships or a file. The sheet has
+a row for each model and scene. The film is a square of as many models, side by side, as there are scenes.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import islice, product
 from pathlib import Path
 
@@ -17,7 +17,7 @@ import numpy as np
 import torch
 
 from mitex.images import write_image
-from mitex.mesh import embedded, icosphere
+from mitex.mesh import Mesh, icosphere
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.film import PreviewCamera, Shooting
@@ -25,14 +25,21 @@ from mitex.render import sheet
 from mitex.render.video import check_video, write_video
 
 SHEET = Path(__file__).parents[1] / "docs" / "gallery" / "nca-flow.jpg"
-MESHES = {"right": icosphere(26), "about-y": embedded("vase")}  # by field
+SCENES = ("right=sphere", "about-y=vase")
+FREQUENCY = 26  # of the sphere
 PICTURES, STEPS, CELL = 5, 12, 256  # in a row, between two of them, and their side [px]
 FRAMES, FPS, FILM_CELL = 72, 24, 192  # of the film, which has a step between two frames
 
 
-def moments(texture: NcaTexture, field: str, steps: int, side: int) -> Iterator[np.ndarray]:
+def meshes(scenes: list[str]) -> dict[str, Mesh]:
+    """The mesh of each field."""
+    pairs = (scene.rsplit("=", 1) for scene in scenes)
+    return {field: icosphere(FREQUENCY) if mesh == "sphere" else Mesh.load(mesh) for field, mesh in pairs}
+
+
+def moments(texture: NcaTexture, field: str, mesh: Mesh, steps: int, side: int) -> Iterator[np.ndarray]:
     """Pictures (side, side, 3) of a texture that follows a field, without an end, so many steps apart."""
-    mesh, generator = MESHES[field], torch.Generator().manual_seed(0)
+    generator = torch.Generator().manual_seed(0)
     cells = Cells.of(mesh, 0)
     growth = texture.growth(cells, 0.0, texture.motion(cells, field))
     camera = PreviewCamera(mesh, Shooting(resolution=side, azimuth=0.0))
@@ -42,32 +49,38 @@ def moments(texture: NcaTexture, field: str, steps: int, side: int) -> Iterator[
         state = growth.evolve(state, steps, generator)
 
 
-def write_sheet(textures: list[NcaTexture], path: Path) -> Path:
+def write_sheet(textures: list[NcaTexture], scenes: Mapping[str, Mesh], path: Path) -> Path:
     pictures, labels = [], []
-    for texture, field in product(textures, MESHES):
-        pictures += islice(moments(texture, field, STEPS, CELL), PICTURES)
+    for texture, (field, mesh) in product(textures, scenes.items()):
+        pictures += islice(moments(texture, field, mesh, STEPS, CELL), PICTURES)
         name = f"{texture.about['name']}, {field}"
         labels += [name, *(f"{k * STEPS} steps later" for k in range(1, PICTURES))]
     return write_image(path, sheet(pictures, columns=PICTURES, labels=labels, cell=CELL))
 
 
-def write_film(textures: list[NcaTexture], path: Path) -> Path:
-    target = check_video(path, FRAMES, FPS, 2 * FILM_CELL)
-    parts = [moments(texture, field, 1, FILM_CELL) for texture, field in product(textures[:2], MESHES)]
-    frames = (np.vstack([np.hstack([a, b]), np.hstack([c, d])]) for a, b, c, d in zip(*parts, strict=True))
-    return write_video(target, islice(frames, FRAMES), FRAMES, FPS, 2 * FILM_CELL)
+def write_film(textures: list[NcaTexture], scenes: Mapping[str, Mesh], path: Path) -> Path:
+    count = min(len(textures), len(scenes))
+    target = check_video(path, FRAMES, FPS, count * FILM_CELL)
+    rows = [
+        [moments(texture, field, mesh, 1, FILM_CELL) for texture in textures[:count]]
+        for field, mesh in islice(scenes.items(), count)
+    ]
+    frames = (np.vstack([np.hstack([next(part) for part in row]) for row in rows]) for _ in range(FRAMES))
+    return write_video(target, frames, FRAMES, FPS, count * FILM_CELL)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("models", nargs="+")
+    parser.add_argument("--scenes", nargs="+", default=SCENES, metavar="FIELD=MESH")
     parser.add_argument("--out", type=Path, default=SHEET)
     parser.add_argument("--film", type=Path)
     options = parser.parse_args()
     textures = [NcaTexture.load(model) for model in options.models]
-    print(write_sheet(textures, options.out))
+    scenes = meshes(options.scenes)
+    print(write_sheet(textures, scenes, options.out))
     if options.film:
-        print(write_film(textures, options.film))
+        print(write_film(textures, scenes, options.film))
 
 
 if __name__ == "__main__":
