@@ -24,6 +24,7 @@ log = logging.getLogger(__name__)
 # Synthesized here and now: exemplar, mesh, maps.
 EXEMPLAR, MESH = "hexagons", "vase"
 MAPS = ("albedo", "height", "normal")
+SETTINGS = ["steps=30", "milestones=20,25"]  # half of the default, hard to tell from the whole
 # Bundled models, and the meshes that they grow on.
 MODELS = {"ceramic": "octopus", "lava": "knot", "cobblestone": "shaderball"}
 RESOLUTION = 2048  # of what the models grow [texels]
@@ -121,7 +122,9 @@ def _synthesized(run: Path, seed: int, quiet: bool) -> SurfaceTexture:
     maps = Exemplar.load(EXEMPLAR).maps
     exemplar = Exemplar({name: maps[name] for name in MAPS}, EXEMPLAR)
     with nullcontext() if quiet else ProgressDisplay() as on_step:
-        return surface.fit(exemplar, MESH, run, seed=seed, resume=has_checkpoint(run), on_step=on_step)
+        return surface.fit(
+            exemplar, MESH, run, set=SETTINGS, seed=seed, resume=has_checkpoint(run), on_step=on_step
+        )
 
 
 def _grown(model: str, mesh: str, seed: int) -> tuple[Asset, str]:

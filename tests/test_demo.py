@@ -1,7 +1,5 @@
 """`mitex demo`, at toy size."""
 
-from functools import partial
-
 import pytest
 
 from mitex import demo
@@ -29,7 +27,8 @@ def test_it_leaves_assets_pictures_and_a_sheet(tmp_path, monkeypatch, capfd):
     """The second call goes on from the first, and gives the same pictures."""
     grow = NcaTexture.apply
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(surface, "fit", partial(surface.fit, set=TINY))
+    fit = surface.fit
+    monkeypatch.setattr(surface, "fit", lambda *a, set, **o: fit(*a, **o, set=[*set, *TINY]))
     monkeypatch.setattr(demo, "MESH", "mushrooms")
     monkeypatch.setattr(demo, "MODELS", {"lava": "knot"})
     monkeypatch.setattr(demo, "RESOLUTION", 64)
