@@ -54,6 +54,11 @@ def check_source(method: Method, source: str | None, label: str) -> None:
         raise ConfigError(f"source of methods.{label} cannot be '{source}'", suggestion(source, texts))
 
 
+def learns_from_paths(method: Method) -> bool:
+    """Whether what the method learns from is a file or folder, and never a name or words."""
+    return typing.get_type_hints(method.load_fit())[method.learns_from] is Path
+
+
 def fit_kinds(method: Method) -> dict[str, Any]:
     """The options of the method's fit that a plan may give: name -> type."""
     return _kinds(method.load_fit(), {method.learns_from, "seed"})
