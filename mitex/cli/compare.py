@@ -32,7 +32,7 @@ class Compare(JobOptions):
     """
 
     exemplar: Annotated[tuple[str, ...], arg(metavar="IMAGE|DIR|NAME ...")] = ()
-    """Images, folders of maps, patterns such as "photos/*.png", or names that ship with Mitex."""
+    """Images, folders of maps or captures, patterns such as "photos/*.png", or names that ship with Mitex."""
 
     mesh: Annotated[tuple[str, ...], arg(metavar="MESH|NAME ...")] = ()
     """Mesh files, patterns, or names that ship with Mitex."""

@@ -34,27 +34,41 @@ class Summary:
     """A table: methods by measures.
 
     Attributes:
-        pair: exemplar and mesh; None for means over all pairs.
+        pair: exemplar and mesh, or None for what was put on no mesh; None for means over all pairs.
         methods: labels, in the plan's order.
         measures: the columns.
         cells: (method, measure's key) -> cell; without those that were not measured.
     """
 
-    pair: tuple[str, str] | None
+    pair: tuple[str, str | None] | None
     methods: tuple[str, ...]
     measures: tuple[Measure, ...]
     cells: dict[tuple[str, str], Cell]
 
 
 def summaries(results: Sequence[Result], measures: tuple[Measure, ...]) -> list[Summary]:
-    """The tables of all pairs, then, if there are several, that of the means over pairs."""
-    pairs = list(dict.fromkeys(result.pair for result in results))
-    tables = [_summary(pair, [r for r in results if r.pair == pair], 1, measures) for pair in pairs]
-    return [*tables, _summary(None, results, len(pairs), measures)] if len(pairs) > 1 else tables
+    """The tables of all pairs, then, if there are several, that of the means over pairs.
+
+    What was put on no mesh stands beside the others on each mesh.
+    """
+    groups = _groups(results)
+    tables = [_summary(pair, group, 1, measures) for pair, group in groups.items()]
+    everything = [result for group in groups.values() for result in group]
+    return [*tables, _summary(None, everything, len(groups), measures)] if len(groups) > 1 else tables
+
+
+def _groups(results: Sequence[Result]) -> dict[tuple[str, str | None], list[Result]]:
+    pairs = dict.fromkeys(result.pair for result in results)
+    on_meshes = {exemplar for exemplar, mesh in pairs if mesh is not None}
+    return {
+        (exemplar, mesh): [r for r in results if r.exemplar == exemplar and r.mesh in (mesh, None)]
+        for exemplar, mesh in pairs
+        if mesh is not None or exemplar not in on_meshes
+    }
 
 
 def _summary(
-    pair: tuple[str, str] | None, results: Sequence[Result], pairs: int, measures: tuple[Measure, ...]
+    pair: tuple[str, str | None] | None, results: Sequence[Result], pairs: int, measures: tuple[Measure, ...]
 ) -> Summary:
     """Over seeds, the means over pairs; only seeds with which a method has done all pairs count."""
     methods = tuple(dict.fromkeys(result.method for result in results))

@@ -12,6 +12,7 @@ from mitex.comparison.answers import read_answers
 from mitex.comparison.measures import BY_KEY
 from mitex.comparison.page import Page
 from mitex.comparison.provenance import Provenance
+from mitex.comparison.results import LIT
 from mitex.comparison.study import Study, write_study
 from mitex.comparison.summary import summaries
 from tests.cli import bad_files as bad
@@ -30,7 +31,7 @@ def made(folder, methods, seeds=2):
             one = result(method, seed)
             picture = bad.image(folder / f"{one.id}.jpg", (8, 8), "JPEG", seed=10 * k + seed)
             numbers = {key: values[method][seed] for key, values in NUMBERS.items() if method in values}
-            yield replace(one, numbers=numbers, pictures={"picture": picture})
+            yield replace(one, numbers=numbers, pictures={LIT: picture})
 
 
 class TestReport:
