@@ -154,7 +154,7 @@ def _method(label: str, table: Any, common: Mapping[str, Any], folder: Path) -> 
         raise ConfigError(f"there is no method '{name}'", suggestion(name, methods()))
     fit = {key: value for key, value in table.items() if key not in (*OWN_KEYS, "apply")}
     check_options(methods()[name], fit, apply, label, folder)
-    check_source(methods()[name], own.get("source"), label)
+    check_source(methods()[name], own.get("source"), fit, label)
     plan = MethodPlan(label, name, fit=fit, apply=apply, **{"exemplars": (), **common, **own})
     _check_lists(plan)
     return plan
