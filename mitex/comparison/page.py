@@ -83,8 +83,8 @@ class Page:
     def _subtitle(self) -> str:
         exemplars = ", ".join(map(label, self.exemplars))
         meshes = ", ".join(dict.fromkeys(label(r.mesh) for r in self.results if r.mesh is not None))
-        inputs = f"{exemplars} on {meshes}" if meshes else exemplars
-        return f"{inputs}; {count_text(len(self.seeds), 'seed')}"
+        inputs = " on ".join(filter(None, (exemplars, meshes)))
+        return "; ".join(filter(None, (inputs, count_text(len(self.seeds), "seed"))))
 
     def _failures(self) -> str:
         return (

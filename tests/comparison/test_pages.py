@@ -34,6 +34,13 @@ def made(folder, methods, seeds=2):
             yield replace(one, numbers=numbers, pictures={LIT: picture})
 
 
+def test_a_report_of_nothing_says_so():
+    plan = Plan.of({"exemplars": ["lava"], "meshes": ["vase"], "methods": {"gatys": {}}})
+    html = Page((), (), {}, {}, ("gatys: it failed",), (), (), Provenance(plan, {})).html()
+    assert "<h1>Measuring nothing</h1>" in html and '<p class="soft">0 seeds</p>' in html
+    assert "<li>gatys: it failed</li>" in html
+
+
 class TestReport:
     @pytest.fixture
     def page(self, browser, tmp_path):
@@ -122,6 +129,27 @@ class TestStudy:
         ]
         assert picked == chosen and [one.question for one in answers] == [0, 1, 2]
         assert {entry["swapped"] for entry in json.loads(file.read_text())["answers"]} == {swapped}
+
+    def test_a_key_that_is_held_down_answers_once(self, ask):
+        page = ask("lava", False)
+        for _ in range(3):  # from the second on, the browser says that it repeats
+            page.keyboard.down("ArrowRight")
+        assert page.locator("#count").inner_text() == "2 of 3"
+
+    def test_answers_are_not_lost_unasked(self, ask):
+        """The page asks before it is left, from the first answer on, until they are saved."""
+        page = ask("lava", False)
+        leaves = """() => {
+            const event = new Event("beforeunload", { cancelable: true });
+            return window.dispatchEvent(event);
+        }"""
+        assert page.evaluate(leaves)
+        for _ in range(3):
+            page.keyboard.press("ArrowRight")
+            assert not page.evaluate(leaves)
+        with page.expect_download():
+            page.click("#save")
+        assert page.evaluate(leaves)
 
     def test_words_stand_in_the_place_of_the_texture(self, ask):
         page = ask("red bricks", False)
