@@ -141,6 +141,6 @@ def _squared(picture: np.ndarray) -> np.ndarray:
 
 
 def _named(distances: dict[float, float]) -> dict[str, float]:
-    """By the measures' keys, with their mean."""
+    """By the measures' keys, with their mean; nothing of photos that show no angle well enough."""
     numbers = {f"plane_{angle:g}": distance for angle, distance in distances.items()}
-    return numbers | {"planes": float(np.mean(list(distances.values())))}
+    return numbers | ({"planes": float(np.mean(list(numbers.values())))} if numbers else {})

@@ -70,6 +70,13 @@ def test_what_looks_like_the_photos_is_near(pair, monkeypatch, place):
     assert pair.floor().keys() == near.keys() and min(pair.floor().values()) > 0
 
 
+def test_photos_without_windows_have_no_planes(pair, monkeypatch, place):
+    """Rather than means of nothing, which no JSON file can hold."""
+    monkeypatch.setattr(capture_pair, "windows_of", lambda _: {})
+    monkeypatch.setattr(capture_pair, "load", lambda _: Photos(0.0))
+    assert pair.numbers(None, place) == pair.floor() == {}
+
+
 def test_views_are_measured_where_a_texture_was_captured(pair, monkeypatch, place):
     """Of the views that are held out, and of nothing else."""
     shown = []
