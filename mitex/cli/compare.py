@@ -49,7 +49,7 @@ class Compare(JobOptions):
     preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
     """In place of these lists, a paper's comparison, by name."""
 
-    data: Annotated[Path, arg(metavar="DIR")] = Path("../shared/data")
+    data: Annotated[Path, arg(metavar="DIR")] = Path()
     """Folder with what a paper's comparison needs that does not ship with Mitex."""
 
     set: Annotated[

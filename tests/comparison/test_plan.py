@@ -133,12 +133,13 @@ class TestPlanFiles:
             ("--preset nca-fog10", "there is no comparison 'nca-fog10'; did you mean nca-fig10?"),
             ("--preset nca-fig10 --mesh vase", "--preset and --mesh contradict each other"),
             ("--preset nca-fig10 --plan a.toml", "--plan and --preset contradict each other"),
-            ("--preset nca-fig10 --data .", "there is no exemplar 'exemplars/Abstract_008'"),
+            ("--preset nca-fig10", "exemplars/Abstract_008'; paths are relative to '{place}'"),
+            ("--preset nca-fig10 --data no", "exemplars/Abstract_008'; paths are relative to '{place}/no'"),
         ],
     )
     def test_broken_ones(self, words, message, place, capsys):
         assert main(["compare", *words.split(), "--out", "out", "--quiet"]) == 2
-        assert message in capsys.readouterr().err
+        assert message.format(place=place) in capsys.readouterr().err
         assert not (place / "out").exists()
 
     @pytest.mark.parametrize("name", presets())
