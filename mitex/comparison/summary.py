@@ -51,20 +51,21 @@ def summaries(results: Sequence[Result], measures: tuple[Measure, ...]) -> list[
 
     What was put on no mesh stands beside the others on each mesh.
     """
-    groups = _groups(results)
-    tables = [_summary(pair, group, 1, measures) for pair, group in groups.items()]
-    everything = [result for group in groups.values() for result in group]
-    return [*tables, _summary(None, everything, len(groups), measures)] if len(groups) > 1 else tables
+    pairs = _pairs(results)
+    tables = [_summary(pair, [r for r in results if _is_of(r, pair)], 1, measures) for pair in pairs]
+    everything = [result for result in results for pair in pairs if _is_of(result, pair)]
+    return [*tables, _summary(None, everything, len(pairs), measures)] if len(pairs) > 1 else tables
 
 
-def _groups(results: Sequence[Result]) -> dict[tuple[str, str | None], list[Result]]:
+def _pairs(results: Sequence[Result]) -> list[tuple[str, str | None]]:
+    """Without exemplars alone that there are results on meshes of."""
     pairs = dict.fromkeys(result.pair for result in results)
     on_meshes = {exemplar for exemplar, mesh in pairs if mesh is not None}
-    return {
-        (exemplar, mesh): [r for r in results if r.exemplar == exemplar and r.mesh in (mesh, None)]
-        for exemplar, mesh in pairs
-        if mesh is not None or exemplar not in on_meshes
-    }
+    return [pair for pair in pairs if pair[1] is not None or pair[0] not in on_meshes]
+
+
+def _is_of(result: Result, pair: tuple[str, str | None]) -> bool:
+    return result.exemplar == pair[0] and result.mesh in (pair[1], None)
 
 
 def _summary(

@@ -45,6 +45,7 @@ def test_what_is_put_on_no_mesh_stands_beside_the_others_on_each():
     assert [table.pair for table in tables] == [("lava", "ball"), ("lava", "vase"), None]
     means = [[table.cells[name, "gram"].mean for name in "ab"] for table in tables]
     assert means == [[1, 5], [3, 5], [2, 5]]
+    assert summaries([others[1], *others, plain])[-1].methods == ("a", "b")
     (alone,) = summaries([plain])
     assert alone.pair == ("lava", None) and alone.cells["b", "gram"].mean == 5
 
