@@ -85,6 +85,8 @@ def _jobs(part: MethodPlan, plan: Plan) -> Iterator[Job]:
             for mesh in meshes if method.fits_to_mesh else [None]:
                 fit = _fit(part, method, plan, exemplar, seed, mesh)
                 yield fit
+                if part.output == "none":
+                    continue
                 goals = [mesh] if mesh else meshes if method.applies_to_meshes else [None]
                 yield from (_apply(part, plan, fit, goal) for goal in goals)
 
@@ -153,9 +155,11 @@ def _plain(name: str) -> str:
 
 
 def _exemplar_names(method: Method) -> list[str] | None:
-    """The exemplars that ship with Mitex; None for methods that learn from something else."""
+    """The names that may stand for what a method learns from; None if they are not checked."""
     from mitex.exemplar import names
 
+    if options.learns_from_paths(method):
+        return []
     return names() if method.learns_from == "exemplar" else None
 
 

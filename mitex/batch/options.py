@@ -43,15 +43,22 @@ def check_options(
     resolve(method.load_presets(), fit.get("preset"), file, settings)
 
 
-def check_source(method: Method, source: str | None, label: str) -> None:
+def check_source(method: Method, source: str | None, fit: Mapping[str, Any], label: str) -> None:
     """Checks the option that a plan gives its exemplars to, if it is not the method's usual one.
 
     Raises:
-        ConfigError: The method's fit has no such option, or it takes no text.
+        ConfigError: The method's fit has no such option, it takes no text, or `fit` gives it another one.
     """
     texts = [name for name, kind in fit_kinds(method).items() if kind in (str, Union[str])]  # noqa: UP007
     if source is not None and source not in (*texts, method.learns_from):
         raise ConfigError(f"source of methods.{label} cannot be '{source}'", suggestion(source, texts))
+    if source in fit:
+        raise ConfigError(f"methods.{label} has '{source}' besides its exemplars", f"leave out `{source}`")
+
+
+def learns_from_paths(method: Method) -> bool:
+    """Whether what the method learns from is a file or folder, and never a name or words."""
+    return typing.get_type_hints(method.load_fit())[method.learns_from] is Path
 
 
 def fit_kinds(method: Method) -> dict[str, Any]:

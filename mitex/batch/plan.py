@@ -17,7 +17,7 @@ from mitex.training import values
 from mitex.training.settings import LARGEST_SEED
 
 MOST_BYTES = 1 << 20  # of a plan
-Output = Literal["glb", "obj", "ply", "exr", "png", "jpg", "maps"]
+Output = Literal["glb", "obj", "ply", "exr", "png", "jpg", "maps", "none"]
 LISTS = {"exemplars": tuple[str, ...], "meshes": tuple[str, ...], "seeds": tuple[int, ...]}
 KEYS = {**LISTS, "output": Output}
 OWN_KEYS = {
@@ -39,7 +39,7 @@ class MethodPlan:
         method: its name.
         exemplars, meshes: paths, patterns or names; relative ones belong to the plan's folder.
         seeds: of the fits, and of `apply` where it takes one; none for those of preset and `apply`.
-        output: what `apply` writes: a file of this format, or a folder of maps.
+        output: what `apply` writes: a file of this format, or a folder of maps; "none": there are fits alone.
         fit: options and settings of `mitex fit`, by name.
         apply: options of `mitex apply`, by name.
         source: option of `mitex fit` that the exemplars are given to, if not the method's usual one: "text".
@@ -57,6 +57,11 @@ class MethodPlan:
     apply: Mapping[str, Any] = field(default_factory=dict)
     source: str | None = None
     of: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.output == "none" and self.apply:
+            problem = f"methods.{self.label} is only fit, and has options of `mitex apply`"
+            raise ConfigError(problem, "leave these out")
 
     @property
     def learns_from(self) -> str:
@@ -149,7 +154,7 @@ def _method(label: str, table: Any, common: Mapping[str, Any], folder: Path) -> 
         raise ConfigError(f"there is no method '{name}'", suggestion(name, methods()))
     fit = {key: value for key, value in table.items() if key not in (*OWN_KEYS, "apply")}
     check_options(methods()[name], fit, apply, label, folder)
-    check_source(methods()[name], own.get("source"), label)
+    check_source(methods()[name], own.get("source"), fit, label)
     plan = MethodPlan(label, name, fit=fit, apply=apply, **{"exemplars": (), **common, **own})
     _check_lists(plan)
     return plan

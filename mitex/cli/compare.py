@@ -32,7 +32,7 @@ class Compare(JobOptions):
     """
 
     exemplar: Annotated[tuple[str, ...], arg(metavar="IMAGE|DIR|NAME ...")] = ()
-    """Images, folders of maps, patterns such as "photos/*.png", or names that ship with Mitex."""
+    """Images, folders of maps or captures, patterns such as "photos/*.png", or names that ship with Mitex."""
 
     mesh: Annotated[tuple[str, ...], arg(metavar="MESH|NAME ...")] = ()
     """Mesh files, patterns, or names that ship with Mitex."""
@@ -49,7 +49,7 @@ class Compare(JobOptions):
     preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
     """In place of these lists, a paper's comparison, by name."""
 
-    data: Annotated[Path, arg(metavar="DIR")] = Path("../shared/data")
+    data: Annotated[Path, arg(metavar="DIR")] = Path()
     """Folder with what a paper's comparison needs that does not ship with Mitex."""
 
     set: Annotated[

@@ -1,7 +1,9 @@
-"""A capture and a mesh: how near textures on planes come to the photos (Huang et al. 2023, table 2)."""
+"""A capture and a mesh: how near textures on planes come to the photos (Huang et al. 2023, table 2), and the
+captured object to photos that were held out (table 1)."""
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 from typing import Protocol, runtime_checkable
@@ -11,15 +13,16 @@ import numpy as np
 from mitex.asset import Asset
 from mitex.cache import content_key
 from mitex.comparison.inputs import CELL, lit, mesh_of, read_once
+from mitex.comparison.results import LIT, VIEW
 from mitex.evaluation.elevations import Renderer, photo_distances, plane_distances
-from mitex.evaluation.metrics import psnr, ssim
+from mitex.evaluation.views import view_quality
 from mitex.evaluation.windows import PLACES, WINDOW, Window, select_windows
 from mitex.methods.nerf.base.coarse import BaseShape, find_base
 from mitex.methods.nerf.capture.capture import Capture, load_capture
 from mitex.methods.nerf.capture.pixels import Pixels
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field.raycast import Raycaster
-from mitex.methods.nerf.field.rendering import render_views
+from mitex.methods.nerf.field.rendering import render_view, render_views
 from mitex.methods.nerf.synthesis.patches import principal_direction
 from mitex.methods.registry import load
 from mitex.runtime import init
@@ -39,8 +42,9 @@ class LaidFlat(Protocol):
 class Captured(Protocol):
     """A texture that can be looked at where it was captured."""
 
-    @property
-    def shell(self) -> RadianceField: ...
+    def in_place(self) -> RadianceField:
+        """The captured object, in the scene cube of the capture."""
+        ...
 
 
 @read_once
@@ -70,7 +74,7 @@ def windows_of(folder: str) -> dict[float, list[Window]]:
 
 
 class CapturePair:
-    """A capture and a mesh.
+    """A capture and a mesh, or a capture alone for what is put on no mesh.
 
     Args:
         exemplar: folder of the capture.
@@ -79,50 +83,64 @@ class CapturePair:
 
     judge = None
 
-    def __init__(self, exemplar: str, mesh: str) -> None:
-        self.folder, self.capture, self.mesh = exemplar, capture_of(exemplar), mesh_of(mesh)
+    def __init__(self, exemplar: str, mesh: str | None) -> None:
+        self.folder, self.capture = exemplar, capture_of(exemplar)
+        self.mesh = None if mesh is None else mesh_of(mesh)
 
     @property
     def key(self) -> str:
         """A hash of both."""
-        photos = self.capture.metadata()["capture_key"]
-        return content_key(photos, self.mesh.vertices, self.mesh.faces)
+        shape = () if self.mesh is None else (self.mesh.vertices, self.mesh.faces)
+        return content_key(self.capture.metadata()["capture_key"], *shape)
 
     @property
     def image(self) -> np.ndarray:
-        """The first photo, on a white square."""
-        batch, (height, width) = Pixels(self.capture).image(0, CELL)
-        photo = (batch.colours * batch.alpha + 1 - batch.alpha).numpy().reshape(height, width, 3)
-        square = np.ones((max(height, width),) * 2 + (3,), np.float32)
-        square[(len(square) - height) // 2 :, (len(square) - width) // 2 :][:height, :width] = photo
-        return square
+        """The first photo that is held out, on a white square."""
+        batch, shape = Pixels(self._held_out).image(0, CELL)
+        photo = batch.colours * batch.alpha + 1 - batch.alpha
+        return _squared(photo.numpy().reshape(*shape, 3))
 
-    def numbers(self, asset: Asset, run: Path) -> dict[str, float]:
+    def numbers(self, asset: Asset | None, run: Path) -> dict[str, float]:
         """Distances on planes, and likeness of views that were held out, as far as the texture has them."""
         texture, numbers = load(run), {}
         if isinstance(texture, LaidFlat):
             render = texture.on_plane(self._along)
             numbers |= _named(plane_distances(windows_of(self.folder), render))
         if isinstance(texture, Captured):
-            views = list(render_views(texture.shell, self.capture.split()[1]))
-            for name, measure in (("psnr", psnr), ("ssim", ssim)):
-                numbers[name] = float(np.mean([measure(*pair) for pair in views]))
+            numbers |= asdict(view_quality(render_views(texture.in_place(), self._held_out)))
         return numbers
 
     def floor(self) -> dict[str, float]:
-        """The distances of other photos: the least that is to be expected."""
-        return _named(photo_distances(windows_of(self.folder)))
+        """The distances of other photos: the least that is to be expected; nothing for a capture alone."""
+        return {} if self.mesh is None else _named(photo_distances(windows_of(self.folder)))
 
-    def picture(self, asset: Asset) -> np.ndarray:
-        """As of `mitex.comparison.inputs.lit`."""
-        return lit(asset, self.mesh)
+    def pictures(self, asset: Asset | None, run: Path) -> dict[str, np.ndarray]:
+        """The asset as of `mitex.comparison.inputs.lit`, and what is seen in place of the photo `image`."""
+        texture, pictures = load(run), {}
+        if asset is not None:
+            pictures[LIT] = lit(asset, self.mesh)
+        if isinstance(texture, Captured):
+            pictures[VIEW] = _squared(render_view(texture.in_place(), self._held_out, 0, CELL)[0])
+        return pictures
+
+    @property
+    def _held_out(self) -> Capture:
+        return self.capture.split()[1]
 
     @cached_property
     def _along(self) -> np.ndarray:
         return principal_direction(base_of(self.folder).mesh)
 
 
+def _squared(picture: np.ndarray) -> np.ndarray:
+    """A picture (H, W, 3) in the middle of a white square."""
+    height, width, _ = picture.shape
+    square = np.ones((max(height, width),) * 2 + (3,), np.float32)
+    square[(len(square) - height) // 2 :, (len(square) - width) // 2 :][:height, :width] = picture
+    return square
+
+
 def _named(distances: dict[float, float]) -> dict[str, float]:
-    """By the measures' keys, with their mean."""
+    """By the measures' keys, with their mean; nothing of photos that show no angle well enough."""
     numbers = {f"plane_{angle:g}": distance for angle, distance in distances.items()}
-    return numbers | {"planes": float(np.mean(list(distances.values())))}
+    return numbers | ({"planes": float(np.mean(list(numbers.values())))} if numbers else {})

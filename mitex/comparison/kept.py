@@ -12,25 +12,29 @@ from safetensors import safe_open
 
 from mitex.asset import Asset
 from mitex.comparison.kinds import Pair
-from mitex.comparison.results import Result
+from mitex.comparison.results import LIT, VIEW, Result
 from mitex.images import write_image
 from mitex.paths import atomic_write
 from mitex.training.locate import CHECKPOINT
 
-VERSION = 2  # of what is measured: numbers of another one are measured again
+VERSION = 3  # of what is measured: numbers of another one are measured again
 OPTIMIZED = ("optimizer/first/", "optimizer/point")  # tensors of a checkpoint, as large as what is optimized
+SUFFIXES = {LIT: ".jpg", VIEW: "-view.jpg"}  # of the files of pictures
 
 
 class Kept:
-    """A folder with numbers and a picture of each result, and the numbers of exemplars beside themselves."""
+    """A folder with numbers and pictures of each result, and the numbers of exemplars beside themselves."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
     def completed(self, result: Result, pair: Pair) -> Result | None:
         """The result with what is known of it; None if that is not all, or by another judge."""
-        picture, numbers = self._file(result, ".jpg"), _read(self._file(result, ".json"), pair.judge)
-        return None if numbers is None or not picture.is_file() else _with(result, numbers, picture)
+        files = {kind: self._file(result, suffix) for kind, suffix in SUFFIXES.items()}
+        pictures = {kind: file for kind, file in files.items() if file.is_file()}
+        numbers = _read(self._file(result, ".json"), pair.judge)
+        is_shown = (VIEW if result.asset is None else LIT) in pictures
+        return _with(result, numbers, pictures) if numbers is not None and is_shown else None
 
     def measured(self, result: Result, pair: Pair) -> Result:
         """The result, measured now and kept.
@@ -38,12 +42,15 @@ class Kept:
         Raises:
             MitexError: The asset cannot be read or measured, or the disk is full.
         """
-        asset = Asset.load(result.asset)
+        asset = None if result.asset is None else Asset.load(result.asset)
         numbers = pair.numbers(asset, result.run) | {"parameters": optimized_numbers(result.run)}
         known = {key: value for key, value in numbers.items() if math.isfinite(value)}
-        picture = write_image(self._file(result, ".jpg"), pair.picture(asset))
+        pictures = {
+            kind: write_image(self._file(result, SUFFIXES[kind]), picture)
+            for kind, picture in pair.pictures(asset, result.run).items()
+        }
         _write(self._file(result, ".json"), known, pair.judge)
-        return _with(result, known, picture)
+        return _with(result, known, pictures)
 
     def floor(self, pair: Pair) -> dict[str, float]:
         """That of a pair."""
@@ -84,5 +91,5 @@ def _write(path: Path, numbers: Mapping[str, float], judge: str | None) -> None:
         temporary.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 
-def _with(result: Result, numbers: Mapping[str, float], picture: Path) -> Result:
-    return replace(result, numbers={**result.numbers, **numbers}, pictures={"picture": picture})
+def _with(result: Result, numbers: Mapping[str, float], pictures: Mapping[str, Path]) -> Result:
+    return replace(result, numbers={**result.numbers, **numbers}, pictures=pictures)

@@ -15,7 +15,8 @@ from mitex.lazy import load
 
 
 class Pair(Protocol):
-    """What is learned from, and a mesh: all that results on them are measured with, whatever the method."""
+    """What is learned from, and a mesh, or none where `Kind.meshless`: all that results on them are measured
+    with, whatever the method."""
 
     @property
     def key(self) -> str:
@@ -32,17 +33,17 @@ class Pair(Protocol):
         """(S, S, 3) sRGB in [0, 1]: what is learned from; None if that has no picture."""
         ...
 
-    def numbers(self, asset: Asset, run: Path) -> dict[str, float]:
-        """What is measured of an asset and the run that it is from; NaN, or nothing, where that is not
-        possible."""
+    def numbers(self, asset: Asset | None, run: Path) -> dict[str, float]:
+        """What is measured of an asset, if there is a mesh, and the run that it is from; NaN, or nothing,
+        where that is not possible."""
         ...
 
     def floor(self) -> dict[str, float]:
         """The same of what is learned from beside itself, as far as that is known."""
         ...
 
-    def picture(self, asset: Asset) -> np.ndarray:
-        """(N, N, 3) sRGB in [0, 1]: the asset in light."""
+    def pictures(self, asset: Asset | None, run: Path) -> dict[str, np.ndarray]:
+        """(N, N, 3) sRGB in [0, 1] each: `LIT`, the asset in light, and `VIEW`, as far as there is one."""
         ...
 
 
@@ -55,18 +56,20 @@ class Kind:
         pair: reference to the class of its pairs.
         conditions: what was the same for all, besides inputs and pictures.
         judged: whether there is a choice of the model that judges.
+        meshless: whether something is measured of textures that are put on no mesh, too.
     """
 
     measures: tuple[Measure, ...]
     pair: str
     conditions: tuple[str, ...]
     judged: bool = False
+    meshless: bool = False
 
-    def pair_of(self, exemplar: str, mesh: str, judge: str | None = None) -> Pair:
+    def pair_of(self, exemplar: str, mesh: str | None, judge: str | None = None) -> Pair:
         """What results are measured with.
 
         Args:
-            exemplar, mesh: paths, names or words.
+            exemplar, mesh: paths, names or words; no mesh only where `meshless`.
             judge: CLIP folder, as of `mitex.features.text_model.text_image_model`, where there is a choice.
 
         Raises:
@@ -114,6 +117,10 @@ KINDS: Mapping[str, Kind] = {
             "count in both. The distance is not the paper's SIFID, whose network is another.",
             "The mesh is for the pictures alone: what is solid on it, in the light of the studio. There haze "
             "is left out, and what shines keeps the colour that it has from the front.",
+            "Views held out: every eighth photo, from which no method has learned, beside the captured "
+            "object as its camera sees it, at most 400 pixels wide and high. What is put on no mesh has "
+            "these numbers alone; they stand beside those of the others on each mesh.",
         ),
+        meshless=True,
     ),
 }

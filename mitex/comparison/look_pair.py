@@ -12,6 +12,7 @@ import numpy as np
 from mitex.asset import Asset, clay
 from mitex.cache import content_key
 from mitex.comparison.inputs import lit, mesh_of, read_once
+from mitex.comparison.results import LIT
 from mitex.errors import ImageError
 from mitex.evaluation.likeness import Vectors, exemplar_patches, likeness, patch_features
 from mitex.evaluation.patches import albedo_views, patch_cameras
@@ -85,9 +86,9 @@ class LookPair:
         except ImageError:
             return {}
 
-    def picture(self, asset: Asset) -> np.ndarray:
+    def pictures(self, asset: Asset, run: Path) -> dict[str, np.ndarray]:
         """As of `mitex.comparison.inputs.lit`."""
-        return lit(asset, self.mesh)
+        return {LIT: lit(asset, self.mesh)}
 
     def _likeness(self, asset: Asset) -> dict[str, float]:
         """Distances of patches; none on a mesh so thin that they show too little of it."""

@@ -174,6 +174,12 @@ CAPTURES = (
         _negative,
     ),
     Measure("ssim", "SSIM", TO_ONE, "Structural similarity of the same.", _off_one),
+    Measure(
+        "vgg",
+        "VGG distance",
+        LOWER,
+        "Distance of the same in features of VGG-16: in the place of LPIPS, whose weights are others.",
+    ),
 )
 COSTS = (
     Measure(

@@ -29,12 +29,14 @@ class Measurements:
 
     known: dict[str, Result] = field(default_factory=dict)
     exemplars: dict[str, np.ndarray | None] = field(default_factory=dict)
-    floors: dict[tuple[str, str], dict[str, float]] = field(default_factory=dict)
+    floors: dict[tuple[str, str | None], dict[str, float]] = field(default_factory=dict)
     failures: list[str] = field(default_factory=list)
     judge: str | None = None
 
 
-def measure(results: Sequence[Result], pair_of: Callable[[str, str], Pair], kept: Kept) -> Measurements:
+def measure(
+    results: Sequence[Result], pair_of: Callable[[str, str | None], Pair], kept: Kept
+) -> Measurements:
     """Measures what was not measured before; a result that cannot be is a failure of its own.
 
     Args:
@@ -53,9 +55,9 @@ def measure(results: Sequence[Result], pair_of: Callable[[str, str], Pair], kept
 
 
 def _measure_pair(
-    names: tuple[str, str],
+    names: tuple[str, str | None],
     results: Sequence[Result],
-    pair_of: Callable[[str, str], Pair],
+    pair_of: Callable[[str, str | None], Pair],
     kept: Kept,
     measurements: Measurements,
 ) -> None:

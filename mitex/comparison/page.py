@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 
 import numpy as np
 
 from mitex import __version__
-from mitex.comparison.html import count_text, items, jpeg, picture, template, text_of
+from mitex.comparison.html import DASH, count_text, items, jpeg, picture, template, text_of
 from mitex.comparison.measures import Measure
 from mitex.comparison.provenance import Provenance
-from mitex.comparison.results import Result, label
+from mitex.comparison.results import LIT, VIEW, Result, label, title_of
 from mitex.comparison.summary import Summary
 from mitex.comparison.tables import meaning_html, table_html
 
@@ -43,7 +43,7 @@ class Page:
     results: Sequence[Result]
     tables: Sequence[Summary]
     exemplars: Mapping[str, np.ndarray | None]
-    floors: Mapping[tuple[str, str], Mapping[str, float]]
+    floors: Mapping[tuple[str, str | None], Mapping[str, float]]
     failures: Sequence[str]
     measures: Sequence[Measure]
     conditions: Sequence[str]
@@ -81,9 +81,10 @@ class Page:
         return f"Comparing {', '.join(names)} and {last}" if names else f"Measuring {last}"
 
     def _subtitle(self) -> str:
-        meshes = list(dict.fromkeys(label(result.mesh) for result in self.results))
         exemplars = ", ".join(map(label, self.exemplars))
-        return f"{exemplars} on {', '.join(meshes)}; {count_text(len(self.seeds), 'seed')}"
+        meshes = ", ".join(dict.fromkeys(label(r.mesh) for r in self.results if r.mesh is not None))
+        inputs = " on ".join(filter(None, (exemplars, meshes)))
+        return "; ".join(filter(None, (inputs, count_text(len(self.seeds), "seed"))))
 
     def _failures(self) -> str:
         return (
@@ -102,35 +103,41 @@ class Page:
         return f'<p class="seeds"><span class="soft">Seed</span> {buttons}</p>'
 
     def _looks(self, exemplar: str) -> str:
-        """The pictures of an exemplar: a row for each mesh, a column for each method."""
+        """The pictures of an exemplar: a row for a view and for each mesh, a column for each method."""
         results = [result for result in self.results if result.exemplar == exemplar]
-        rows = []
-        for mesh in dict.fromkeys(result.mesh for result in results):
-            image = "" if rows else self._exemplar(exemplar)
-            cells = "".join(self._look(results, mesh, name) for name in self.methods)
-            rows.append(f"<tr><td>{image}</td><th>{escape(label(mesh))}</th>{cells}</tr>")
+        meshes = dict.fromkeys(result.mesh for result in results if result.mesh is not None)
+        rows = [self._row(label(m), LIT, [r for r in results if r.mesh in (m, None)]) for m in meshes]
+        if any(VIEW in result.pictures for result in results):
+            rows.insert(0, self._row("view held out", VIEW, results))
+        images = [self._exemplar(exemplar), *[""] * len(rows)]
+        body = "".join(f"<tr><td>{image}</td>{row}</tr>" for image, row in zip(images, rows, strict=False))
         heads = "".join(f"<th>{escape(name)}</th>" for name in self.methods)
         head = f"<tr><th>{escape(label(exemplar))}</th><th></th>{heads}</tr>"
-        content = f"<thead>{head}</thead><tbody>{''.join(rows)}</tbody>"
+        content = f"<thead>{head}</thead><tbody>{body}</tbody>"
         columns = f"--columns: {len(self.methods) + 1}"
         return f'<div class="wide"><table class="looks" style="{columns}">{content}</table></div>'
+
+    def _row(self, title: str, kind: str, results: Sequence[Result]) -> str:
+        cells = (self._look(kind, [r for r in results if r.method == name]) for name in self.methods)
+        return f"<th>{escape(title)}</th>{''.join(cells)}"
 
     def _exemplar(self, exemplar: str) -> str:
         image = self.exemplars[exemplar]
         return "" if image is None else picture(jpeg(image), f"exemplar {label(exemplar)}")
 
-    def _look(self, results: Iterable[Result], mesh: str, method: str) -> str:
-        """A cell with the picture of each seed, of which one is shown."""
+    def _look(self, kind: str, results: Sequence[Result]) -> str:
+        """A cell with a method's picture of each seed, of which one is shown."""
+        by_seed = {result.seed: result for result in reversed(results) if kind in result.pictures}
         images = [
             picture(
-                result.pictures["picture"].read_bytes(),
-                f"{label(result.exemplar)} on {label(mesh)} by {method}, seed {result.seed}",
-                f' data-seed="{result.seed}"' + (" hidden" if result.seed != self.seeds[0] else ""),
+                result.pictures[kind].read_bytes(),
+                _description(result, kind),
+                f' data-seed="{seed}"' + (" hidden" if seed != self.seeds[0] else ""),
             )
-            for result in results
-            if result.mesh == mesh and result.method == method and result.pictures
+            for seed, result in by_seed.items()
         ]
-        return f"<td>{''.join(images)}</td>" if images else '<td class="none">not done</td>'
+        content = "".join(images) or (DASH if results else "not done")
+        return f"<td>{content}</td>" if images else f'<td class="none">{content}</td>'
 
     def _note(self) -> str:
         if len(self.seeds) < 2:
@@ -148,3 +155,8 @@ class Page:
         ordered = sorted(self.tables, key=lambda table: table.pair is not None)
         floors = [self.floors.get(table.pair, {}) if table.pair else {} for table in ordered]
         return "".join(map(table_html, ordered, floors))
+
+
+def _description(result: Result, kind: str) -> str:
+    what = f"{label(result.exemplar)}, view held out," if kind == VIEW else title_of(*result.pair)
+    return f"{what} by {result.method}, seed {result.seed}"

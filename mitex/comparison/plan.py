@@ -9,7 +9,7 @@ from typing import Any
 
 from mitex.batch import MethodPlan, Plan
 from mitex.batch.options import apply_kinds, fit_kinds
-from mitex.comparison.kinds import KINDS
+from mitex.comparison.kinds import KINDS, Kind
 from mitex.errors import ConfigError
 from mitex.methods.layout import EXEMPLAR_WIDTH
 from mitex.methods.registry import methods
@@ -70,11 +70,11 @@ def prepared(plan: Plan, seeds: int | None = None) -> Plan:
         seeds: how many, in place of those of the plan.
 
     Raises:
-        ConfigError: Methods learn from different things, or from what is not compared; one is put on no mesh;
-            the output is no .glb.
+        ConfigError: Methods learn from different things, or from what is not compared; one is put on no mesh,
+            and nothing is measured then; the output is no .glb.
     """
-    source_of(plan)
-    parts = tuple(map(_prepared, plan.methods))
+    kind = KINDS[source_of(plan)]
+    parts = tuple(_prepared(part, kind) for part in plan.methods)
     if seeds is not None:
         parts = tuple(replace(part, seeds=tuple(range(seeds))) for part in parts)
     return replace(plan, methods=parts)
@@ -99,14 +99,18 @@ def source_of(plan: Plan) -> str:
     return first.learns_from
 
 
-def _prepared(part: MethodPlan) -> MethodPlan:
+def _prepared(part: MethodPlan, kind: Kind) -> MethodPlan:
     method = methods()[part.method]
+    output = "glb" if method.applies_to_meshes else "none"
+    if part.output not in ("glb", output):
+        problem = f"methods.{part.label} writes {part.output}"
+        raise ConfigError(problem, f'leave out `output`, or say "{output}"')
     if not method.applies_to_meshes:
-        raise ConfigError(f"textures of {method.name} are put on no mesh", "compare others")
+        if not kind.meshless:
+            raise ConfigError(f"textures of {method.name} are put on no mesh", "compare others")
+        return replace(part, output=output)
     if not part.meshes:
         raise ConfigError("there are no meshes to compare on", "name some")
-    if part.output != "glb":
-        raise ConfigError(f"methods.{part.label} writes {part.output}", 'leave out `output`, or say "glb"')
     sized = (
         part.learns_from == "exemplar"
         and WIDTH in apply_kinds(method)

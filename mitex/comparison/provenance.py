@@ -13,6 +13,7 @@ import tomli_w
 
 from mitex import __version__
 from mitex.batch import MethodPlan, Plan
+from mitex.comparison.html import DASH
 from mitex.comparison.results import Result
 from mitex.training.run import CONFIG
 
@@ -59,8 +60,8 @@ class Provenance:
 
 
 def _row(part: MethodPlan) -> str:
-    cells = "".join(f"<td>{_options(table)}</td>" for table in (part.fit, part.apply))
-    return f"<tr><td>{escape(part.label)}</td>{cells}</tr>"
+    applied = DASH if part.output == "none" else _options(part.apply)
+    return f"<tr><td>{escape(part.label)}</td><td>{_options(part.fit)}</td><td>{applied}</td></tr>"
 
 
 def _options(table: Mapping[str, Any]) -> str:

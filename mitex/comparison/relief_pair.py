@@ -11,6 +11,7 @@ import numpy as np
 from mitex.asset import CLAY, Asset, clay
 from mitex.cache import content_key
 from mitex.comparison.inputs import lit, mesh_of, read_once
+from mitex.comparison.results import LIT
 from mitex.errors import ImageError
 from mitex.evaluation.form import ReliefForm
 from mitex.evaluation.metrics import single_image_frechet
@@ -82,9 +83,9 @@ class ReliefPair:
         except ImageError:
             return {}
 
-    def picture(self, asset: Asset) -> np.ndarray:
+    def pictures(self, asset: Asset, run: Path) -> dict[str, np.ndarray]:
         """As of `mitex.comparison.inputs.lit`."""
-        return lit(asset)
+        return {LIT: lit(asset)}
 
     def _form_of(self, mesh: Mesh) -> dict[str, float]:
         """Distance and size; nothing for meshes so thin that patches show too little of them."""

@@ -6,38 +6,39 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from mitex.batch import Job, Report, Row
+
+LIT, VIEW = "lit", "view"  # pictures: on the mesh in light; where it was captured, of a view held out
 
 
 @dataclass(frozen=True)
 class Result:
-    """A texture on a mesh, by one method and seed.
+    """A texture on a mesh, or one that can be put on none, by one method and seed.
 
     Attributes:
         id: of the job that wrote it.
-        exemplar, mesh: paths or names.
+        exemplar, mesh: paths or names; None for no mesh.
         method: its label in the plan.
         seed: of the fit.
-        asset: the file.
+        asset: the file; None without a mesh.
         run: the run folder of the fit.
         numbers: key of a `Measure` -> value; without those that could not be measured.
-        pictures: kind -> file.
+        pictures: `LIT` and `VIEW`, as far as there are such -> file.
     """
 
     id: str
     exemplar: str
-    mesh: str
+    mesh: str | None
     method: str
     seed: int | None
-    asset: Path
+    asset: Path | None
     run: Path
     numbers: Mapping[str, float] = field(default_factory=dict)
     pictures: Mapping[str, Path] = field(default_factory=dict)
 
     @property
-    def pair(self) -> tuple[str, str]:
+    def pair(self) -> tuple[str, str | None]:
         """Exemplar and mesh."""
         return self.exemplar, self.mesh
 
@@ -50,48 +51,50 @@ def results_of(report: Report, source: str) -> list[Result]:
         source: option of the fits that names what they learn from.
     """
     rows = {row.job.id: row for row in report.rows}
+    needed = {row.job.needs for row in report.rows}
     return [
-        _result(report.folder, row, _needed(row, rows), source)
+        _result(report.folder, _chain(row, rows), source)
         for row in report.rows
-        if row.state == "done" and row.job.words[0] == "apply"
+        if row.state == "done" and row.job.id not in needed
     ]
 
 
-def _needed(row: Row, rows: Mapping[str, Row]) -> list[Row]:
-    """The fits that a result follows from, the last one first."""
-    fits: list[Row] = []
-    while row.job.needs is not None:
-        row = rows[row.job.needs]
-        fits.append(row)
-    return fits
+def _chain(row: Row, rows: Mapping[str, Row]) -> list[Row]:
+    """A job and those that it follows from, the first one last."""
+    chain = [row]
+    while (needs := chain[-1].job.needs) is not None:
+        chain.append(rows[needs])
+    return chain
 
 
-def _result(folder: Path, row: Row, fits: Sequence[Row], source: str) -> Result:
-    job = row.job
+def _result(folder: Path, chain: Sequence[Row], source: str) -> Result:
+    job, applied = chain[0].job, chain[0].job.words[0] == "apply"
+    fits = chain[1:] if applied else chain
     return Result(
         id=job.id,
         exemplar=_argument(fits[-1].job, source),
-        mesh=_argument(job, "mesh"),
+        mesh=_argument(job, "mesh") if applied else None,
         method=str(job.about["method"]),
         seed=job.about["seed"],
-        asset=folder / _argument(job, "out"),
+        asset=folder / _argument(job, "out") if applied else None,
         run=folder / fits[0].job.result,
-        numbers=_costs(row.record, [fit.record for fit in fits]),
+        numbers={
+            "fit_seconds": float(sum(fit.record["seconds"] for fit in fits)),
+            "memory": float(max(row.record["memory"] for row in chain)),
+        }
+        | ({"apply_seconds": float(chain[0].record["seconds"])} if applied else {}),
     )
-
-
-def _costs(applied: Mapping[str, Any], fitted: Sequence[Mapping[str, Any]]) -> dict[str, float]:
-    return {
-        "fit_seconds": float(sum(fit["seconds"] for fit in fitted)),
-        "apply_seconds": float(applied["seconds"]),
-        "memory": float(max(record["memory"] for record in (applied, *fitted))),
-    }
 
 
 def _argument(job: Job, option: str) -> str:
     """The value of an option in the words of a job."""
     words: Sequence[str] = job.words
     return words[words.index(f"--{option}") + 1]
+
+
+def title_of(exemplar: str, mesh: str | None) -> str:
+    """What people call a pair."""
+    return label(exemplar) if mesh is None else f"{label(exemplar)} on {label(mesh)}"
 
 
 def label(text: str) -> str:

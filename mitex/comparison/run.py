@@ -182,11 +182,12 @@ def _write_csv(path: Path, results: Sequence[Result], kind: Kind) -> None:
 
 def _flat(result: Result, folder: Path) -> dict[str, Any]:
     names = {key: getattr(result, key) for key in NAMES}
-    places = {key: os.path.relpath(getattr(result, key), folder) for key in PLACES}
-    return {**names, **result.numbers, **places}
+    places = {key: getattr(result, key) for key in PLACES}
+    relative = {key: place and os.path.relpath(place, folder) for key, place in places.items()}
+    return {**names, **result.numbers, **relative}
 
 
-def _record(table: Summary, floors: Mapping[tuple[str, str], Mapping[str, float]]) -> dict[str, Any]:
+def _record(table: Summary, floors: Mapping[tuple[str, str | None], Mapping[str, float]]) -> dict[str, Any]:
     cells = [
         {"method": method, "measure": key} | {k: v if v == v else None for k, v in asdict(cell).items()}
         for (method, key), cell in table.cells.items()

@@ -19,7 +19,7 @@ import numpy as np
 
 from mitex.batch import Plan
 from mitex.comparison.html import jpeg, template, text_of
-from mitex.comparison.results import Result
+from mitex.comparison.results import LIT, Result
 from mitex.errors import ConfigError
 from mitex.paths import atomic_write, expanded
 
@@ -73,10 +73,11 @@ def check_study(plan: Plan) -> None:
     """Checks, before any work, that there will be something to ask about.
 
     Raises:
-        ConfigError: There is one method alone.
+        ConfigError: There is one method alone that is put on meshes.
     """
-    if len(plan.methods) < 2:
-        raise ConfigError("a study of one method asks nothing", "name more methods, or leave out `study`")
+    if sum(part.output != "none" for part in plan.methods) < 2:
+        problem = "a study of one method that is put on meshes asks nothing"
+        raise ConfigError(problem, "name more methods, or leave out `study`")
 
 
 def write_study(folder: Path, results: Sequence[Result], exemplars: Mapping[str, np.ndarray | None]) -> Path:
@@ -94,15 +95,15 @@ def write_study(folder: Path, results: Sequence[Result], exemplars: Mapping[str,
         ConfigError: There are no two methods to compare.
         OutputError: The folder cannot be written to.
     """
-    shown = {(*result.pair, result.method): result for result in reversed(results) if result.pictures}
+    shown = {(*result.pair, result.method): result for result in reversed(results) if LIT in result.pictures}
     pictures: dict[str, bytes] = {}
     asked: list[tuple[Question, list[str]]] = []
-    for exemplar, mesh in dict.fromkeys(result.pair for result in results):
+    for exemplar, mesh in dict.fromkeys((r.exemplar, r.mesh) for r in results if r.mesh is not None):
         methods = sorted({method for one, other, method in shown if (one, other) == (exemplar, mesh)})
         if (image := exemplars[exemplar]) is not None:
             pictures.setdefault(exemplar, jpeg(image))
         for pair in combinations(methods, 2):
-            files = [shown[exemplar, mesh, method].pictures["picture"] for method in pair]
+            files = [shown[exemplar, mesh, method].pictures[LIT] for method in pair]
             pictures |= {str(file): file.read_bytes() for file in files}
             asked.append((Question(exemplar, mesh, pair), list(map(str, files))))
     if not asked:

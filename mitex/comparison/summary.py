@@ -34,27 +34,42 @@ class Summary:
     """A table: methods by measures.
 
     Attributes:
-        pair: exemplar and mesh; None for means over all pairs.
+        pair: exemplar and mesh, or None for what was put on no mesh; None for means over all pairs.
         methods: labels, in the plan's order.
         measures: the columns.
         cells: (method, measure's key) -> cell; without those that were not measured.
     """
 
-    pair: tuple[str, str] | None
+    pair: tuple[str, str | None] | None
     methods: tuple[str, ...]
     measures: tuple[Measure, ...]
     cells: dict[tuple[str, str], Cell]
 
 
 def summaries(results: Sequence[Result], measures: tuple[Measure, ...]) -> list[Summary]:
-    """The tables of all pairs, then, if there are several, that of the means over pairs."""
-    pairs = list(dict.fromkeys(result.pair for result in results))
-    tables = [_summary(pair, [r for r in results if r.pair == pair], 1, measures) for pair in pairs]
-    return [*tables, _summary(None, results, len(pairs), measures)] if len(pairs) > 1 else tables
+    """The tables of all pairs, then, if there are several, that of the means over pairs.
+
+    What was put on no mesh stands beside the others on each mesh.
+    """
+    pairs = _pairs(results)
+    tables = [_summary(pair, [r for r in results if _is_of(r, pair)], 1, measures) for pair in pairs]
+    everything = [result for result in results for pair in pairs if _is_of(result, pair)]
+    return [*tables, _summary(None, everything, len(pairs), measures)] if len(pairs) > 1 else tables
+
+
+def _pairs(results: Sequence[Result]) -> list[tuple[str, str | None]]:
+    """Without exemplars alone that there are results on meshes of."""
+    pairs = dict.fromkeys(result.pair for result in results)
+    on_meshes = {exemplar for exemplar, mesh in pairs if mesh is not None}
+    return [pair for pair in pairs if pair[1] is not None or pair[0] not in on_meshes]
+
+
+def _is_of(result: Result, pair: tuple[str, str | None]) -> bool:
+    return result.exemplar == pair[0] and result.mesh in (pair[1], None)
 
 
 def _summary(
-    pair: tuple[str, str] | None, results: Sequence[Result], pairs: int, measures: tuple[Measure, ...]
+    pair: tuple[str, str | None] | None, results: Sequence[Result], pairs: int, measures: tuple[Measure, ...]
 ) -> Summary:
     """Over seeds, the means over pairs; only seeds with which a method has done all pairs count."""
     methods = tuple(dict.fromkeys(result.method for result in results))

@@ -7,7 +7,7 @@ from html import escape
 
 from mitex.comparison.html import DASH, number_text
 from mitex.comparison.measures import Measure
-from mitex.comparison.results import label
+from mitex.comparison.results import title_of
 from mitex.comparison.summary import Cell, Summary
 
 
@@ -18,7 +18,7 @@ def table_html(table: Summary, floor: Mapping[str, float]) -> str:
         table: means and spreads.
         floor: measure -> value of the exemplar beside itself, for the last row; empty for none.
     """
-    title = "Means over all of them" if table.pair is None else " on ".join(map(label, table.pair))
+    title = "Means over all of them" if table.pair is None else title_of(*table.pair)
     head = "<tr><th><button>method</button></th>" + "".join(map(_head, table.measures)) + "</tr>"
     rows = "".join(_row(table, method) for method in table.methods)
     foot = f"<tfoot><tr><td>exemplar beside itself</td>{_floor(table, floor)}</tr></tfoot>" if floor else ""

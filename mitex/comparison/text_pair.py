@@ -11,6 +11,7 @@ import torch
 from mitex.asset import Asset, clay
 from mitex.cache import content_key
 from mitex.comparison.inputs import lit, mesh_of, read_once
+from mitex.comparison.results import LIT
 from mitex.evaluation.text import text_scores
 from mitex.features.text_image import TextImageModel, object_prompt
 from mitex.features.text_model import text_image_model
@@ -61,9 +62,9 @@ class TextPair:
         """Words have no texture of their own."""
         return {}
 
-    def picture(self, asset: Asset) -> np.ndarray:
+    def pictures(self, asset: Asset, run: Path) -> dict[str, np.ndarray]:
         """As of `mitex.comparison.inputs.lit`."""
-        return lit(asset, self.mesh)
+        return {LIT: lit(asset, self.mesh)}
 
     @cached_property
     def _bare(self) -> torch.Tensor:

@@ -76,6 +76,14 @@ class TestExpansion:
         assert names(every)[::2] == ["fit-wide-b", "fit-stripes-a"]
         assert every[0].words[-4:-2] == ("--set", "width=2.5") and every[0].words[1] == "stripes"
 
+    def test_fits_alone(self, jobs, workshop):
+        """Also of methods that are fit to a mesh, or whose textures need none."""
+        tables = {"stripes": {}, "inlay": {}, "plain_field": {"exemplars": ["captured"]}}
+        (workshop.folder / "captured").mkdir()
+        fits = ["fit-stripes-a", "fit-inlay-a-m", "fit-plain_field-captured"]
+        assert names(jobs(tables, output="none")) == fits
+        assert len(jobs(tables)) == 6
+
     def test_names_of_what_ships_with_mitex(self, jobs):
         fit, apply = jobs(exemplars=["lava"], meshes=["vase"])
         assert fit.words[3:5] == ("--exemplar", "lava") and "vase" in apply.words

@@ -34,6 +34,18 @@ PLANS = {
     "out of range": (GOOD + "width = 99.0", "width = 99 is out of range"),
     "a seed out of range": ("seeds = [-1]\n" + GOOD, "seed -1 is out of range"),
     "unknown output": ('output = "fbx"\n' + GOOD, "output of the plan cannot be 'fbx'"),
+    "a text besides those that are its exemplars": (
+        GOOD + 'source = "salt"\nsalt = "pepper"',
+        "methods.stripes has 'salt' besides its exemplars; leave out `salt`",
+    ),
+    "fits alone that are put on meshes": (
+        'output = "none"\n' + GOOD + "[methods.stripes.apply]\nturn = 3.0",
+        "methods.stripes is only fit, and has options of `mitex apply`",
+    ),
+    "a name for a folder": (
+        'exemplars = ["lava"]\n[methods.plain_field]',
+        "there is no exemplar 'lava'; paths are relative",
+    ),
     "no table": ('exemplars = ["a.png"]\nmethods = 3', "methods of the plan cannot be 3"),
     "a method that is no table": (
         'exemplars = ["a.png"]\n[methods]\nstripes = 3',

@@ -12,6 +12,7 @@ from mitex.comparison.answers import read_answers
 from mitex.comparison.measures import BY_KEY
 from mitex.comparison.page import Page
 from mitex.comparison.provenance import Provenance
+from mitex.comparison.results import LIT
 from mitex.comparison.study import Study, write_study
 from mitex.comparison.summary import summaries
 from tests.cli import bad_files as bad
@@ -30,7 +31,14 @@ def made(folder, methods, seeds=2):
             one = result(method, seed)
             picture = bad.image(folder / f"{one.id}.jpg", (8, 8), "JPEG", seed=10 * k + seed)
             numbers = {key: values[method][seed] for key, values in NUMBERS.items() if method in values}
-            yield replace(one, numbers=numbers, pictures={"picture": picture})
+            yield replace(one, numbers=numbers, pictures={LIT: picture})
+
+
+def test_a_report_of_nothing_says_so():
+    plan = Plan.of({"exemplars": ["lava"], "meshes": ["vase"], "methods": {"gatys": {}}})
+    html = Page((), (), {}, {}, ("gatys: it failed",), (), (), Provenance(plan, {})).html()
+    assert "<h1>Measuring nothing</h1>" in html and '<p class="soft">0 seeds</p>' in html
+    assert "<li>gatys: it failed</li>" in html
 
 
 class TestReport:
@@ -121,6 +129,27 @@ class TestStudy:
         ]
         assert picked == chosen and [one.question for one in answers] == [0, 1, 2]
         assert {entry["swapped"] for entry in json.loads(file.read_text())["answers"]} == {swapped}
+
+    def test_a_key_that_is_held_down_answers_once(self, ask):
+        page = ask("lava", False)
+        for _ in range(3):  # from the second on, the browser says that it repeats
+            page.keyboard.down("ArrowRight")
+        assert page.locator("#count").inner_text() == "2 of 3"
+
+    def test_answers_are_not_lost_unasked(self, ask):
+        """The page asks before it is left, from the first answer on, until they are saved."""
+        page = ask("lava", False)
+        leaves = """() => {
+            const event = new Event("beforeunload", { cancelable: true });
+            return window.dispatchEvent(event);
+        }"""
+        assert page.evaluate(leaves)
+        for _ in range(3):
+            page.keyboard.press("ArrowRight")
+            assert not page.evaluate(leaves)
+        with page.expect_download():
+            page.click("#save")
+        assert page.evaluate(leaves)
 
     def test_words_stand_in_the_place_of_the_texture(self, ask):
         page = ask("red bricks", False)

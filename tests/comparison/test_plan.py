@@ -1,12 +1,16 @@
 """From the command line's lists to jobs; what cannot be compared is refused: code 2, one line, no file."""
 
+from dataclasses import replace
+
 import pytest
 
 from mitex.batch import Plan
 from mitex.batch.jobs import jobs_of
 from mitex.cli import main
+from mitex.comparison.kinds import KINDS
 from mitex.comparison.plan import comparison_plan, prepared
 from mitex.comparison.presets import preset_plan, presets
+from mitex.errors import ConfigError
 
 GOOD = {"--exemplar": "a.png", "--mesh": "ball.obj", "--methods": "image-quilting", "--out": "out"}
 
@@ -20,6 +24,22 @@ BROKEN = {
     "methods of two kinds": (
         {"--methods": "gatys,geometric"},
         "gatys learns from exemplar, and geometric from reference",
+    ),
+    "a plain field and a method for pictures": (
+        {"--methods": "gatys,plain-field"},
+        "gatys learns from exemplar, and plain_field from capture",
+    ),
+    "a plain field of an exemplar": (
+        {"--exemplar": "lava", "--methods": "plain-field"},
+        "there is no exemplar 'lava'",
+    ),
+    "a plain field on a mesh": (
+        {"--methods": "plain-field", "--set": "plain-field:apply.density=2"},
+        "plain_field is only fit, and has options of `mitex apply`",
+    ),
+    "a study of one method and a plain field": (
+        {"--methods": "nerf,plain-field", "--study": ""},
+        "a study of one method that is put on meshes asks nothing",
     ),
     "methods of a kind without measures": (
         {"--methods": "quilted"},
@@ -36,7 +56,7 @@ BROKEN = {
         {"--set": "image-quilting:apply.scale=big"},
         "scale of image_quilting cannot be 'big'; give a finite number",
     ),
-    "a study of one method": ({"--study": ""}, "a study of one method asks nothing"),
+    "a study of one method": ({"--study": ""}, "a study of one method that is put on meshes asks nothing"),
     "no seeds": ({"--seeds": "0"}, "--seeds 0 is out of range"),
     "a folder of something else": ({"--out": "."}, "'.' holds other files"),
     "an address without Dask": ({"--address": "tcp://a:1"}, "--address means nothing without Dask"),
@@ -75,6 +95,17 @@ def test_settings_reach_fit_and_apply(place):
     assert "--resolution=256" in applied.words
 
 
+def test_a_plain_field_is_fit_alone_and_for_equal_time_if_that_is_asked_for(place, monkeypatch):
+    (place / "photos").mkdir()
+    plan = comparison_plan(["photos"], ["vase"], ["plain_field"], settings=["plain-field:seconds=600"])
+    (fit,) = jobs_of(plan)
+    assert fit.words[:2] == ("fit", "plain_field") and "seconds=600" in fit.words
+    assert prepared(Plan.of(plan.content(), place)) == plan
+    monkeypatch.setitem(KINDS, "capture", replace(KINDS["capture"], meshless=False))
+    with pytest.raises(ConfigError, match="textures of plain_field are put on no mesh"):
+        prepared(plan)
+
+
 def test_patterns_are_as_large_for_all_unless_their_size_is_given(place):
     def words(*settings):
         plan = comparison_plan(["lava"], ["vase"], ["nca", "gatys"], settings=settings)
@@ -102,12 +133,13 @@ class TestPlanFiles:
             ("--preset nca-fog10", "there is no comparison 'nca-fog10'; did you mean nca-fig10?"),
             ("--preset nca-fig10 --mesh vase", "--preset and --mesh contradict each other"),
             ("--preset nca-fig10 --plan a.toml", "--plan and --preset contradict each other"),
-            ("--preset nca-fig10 --data .", "there is no exemplar 'exemplars/Abstract_008'"),
+            ("--preset nca-fig10", "exemplars/Abstract_008'; paths are relative to '{place}'"),
+            ("--preset nca-fig10 --data no", "exemplars/Abstract_008'; paths are relative to '{place}/no'"),
         ],
     )
     def test_broken_ones(self, words, message, place, capsys):
         assert main(["compare", *words.split(), "--out", "out", "--quiet"]) == 2
-        assert message in capsys.readouterr().err
+        assert message.format(place=place) in capsys.readouterr().err
         assert not (place / "out").exists()
 
     @pytest.mark.parametrize("name", presets())

@@ -5,6 +5,7 @@ import json
 import re
 import time
 import tomllib
+from dataclasses import replace
 from html import unescape
 from types import SimpleNamespace
 from typing import cast
@@ -93,6 +94,10 @@ def test_numbers_of_another_version_or_judge_are_measured_again(tmp_path):
     kept, one = Kept(tmp_path), result("a", 0)
     clip, none = (cast(Pair, SimpleNamespace(judge=judge)) for judge in ("clip", None))
     assert kept.completed(one, none) is None
+    bad.image(tmp_path / f"{one.id}-view.jpg", kind="JPEG")  # which is not all
+    (tmp_path / f"{one.id}.json").write_text(json.dumps({"version": VERSION, "numbers": {}}))
+    assert kept.completed(one, none) is None
+    assert kept.completed(replace(one, asset=None), none) is not None
     bad.image(tmp_path / f"{one.id}.jpg", kind="JPEG")
     file = tmp_path / f"{one.id}.json"
     record = {"version": VERSION, "numbers": {"gram": 2.5}}

@@ -13,6 +13,7 @@ import scipy.stats
 from mitex.cli import main
 from mitex.comparison import compare
 from mitex.comparison.answers import Answer, evaluate, holm, read_answers
+from mitex.comparison.results import LIT, VIEW
 from mitex.comparison.study import KEY, PAGE, Question, Study, write_study
 from mitex.errors import ConfigError
 from tests.cli import bad_files as bad
@@ -33,12 +34,14 @@ def study(tmp_path):
         for seed in (0, 1):
             one = result(method, seed, mesh)
             picture = bad.image(tmp_path / f"{one.id}.jpg", (8, 8), "JPEG", seed=10 * k + seed)
-            results.append(replace(one, pictures={"picture": picture}))
-    write_study(tmp_path, results, EXEMPLARS)
+            results.append(replace(one, pictures={LIT: picture}))
+    views = [replace(result(name, 0, None), pictures={VIEW: tmp_path / "none.jpg"}) for name in "de"]
+    write_study(tmp_path, [*results, *views], EXEMPLARS)
     return Study.load(tmp_path)
 
 
 def test_all_pairs_of_what_was_made_are_asked_about(study):
+    """On meshes, and not where something was captured."""
     asked = sorted((question.mesh, question.methods) for question in study.questions)
     assert asked == [("ball", ("a", "b")), ("ball", ("a", "c")), ("ball", ("b", "c")), ("vase", ("a", "b"))]
 
@@ -69,7 +72,7 @@ def test_words_are_shown_themselves(tmp_path):
     """Whatever stands in them."""
     words = "</script>$style red bricks"
     picture = bad.image(tmp_path / "a.jpg", (8, 8), "JPEG")
-    made = [replace(result(m, 0), exemplar=words, pictures={"picture": picture}) for m in "ab"]
+    made = [replace(result(m, 0), exemplar=words, pictures={LIT: picture}) for m in "ab"]
     data = page_data(write_study(tmp_path, made, {words: None}).read_text())
     assert [asked["exemplar"] for asked in data["questions"]] == [words] and len(data["pictures"]) == 1
     assert Study.load(tmp_path).questions == (Question(words, "ball", ("a", "b")),)

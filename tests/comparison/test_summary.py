@@ -11,7 +11,7 @@ from mitex.comparison.results import Result
 from mitex.comparison.summary import Cell, best
 
 
-def result(method, seed, mesh="ball", **numbers):
+def result(method, seed, mesh: str | None = "ball", **numbers):
     return Result(f"{method}-{seed}-{mesh}", "lava", mesh, method, seed, Path("a"), Path("b"), numbers)
 
 
@@ -35,6 +35,19 @@ def test_the_overall_spread_is_that_of_means_over_pairs():
     cell = tables[-1].cells["a", "gram"]
     assert (cell.mean, cell.count) == (52.0, 2)
     assert cell.spread == pytest.approx(math.sqrt(2))
+
+
+def test_what_is_put_on_no_mesh_stands_beside_the_others_on_each():
+    """And counts as done on all of them; alone, it has a table of its own."""
+    plain = result("b", 0, None, gram=5.0)
+    others = [result("a", 0, mesh, gram=value) for mesh, value in (("ball", 1.0), ("vase", 3.0))]
+    tables = summaries([*others, plain])
+    assert [table.pair for table in tables] == [("lava", "ball"), ("lava", "vase"), None]
+    means = [[table.cells[name, "gram"].mean for name in "ab"] for table in tables]
+    assert means == [[1, 5], [3, 5], [2, 5]]
+    assert summaries([others[1], *others, plain])[-1].methods == ("a", "b")
+    (alone,) = summaries([plain])
+    assert alone.pair == ("lava", None) and alone.cells["b", "gram"].mean == 5
 
 
 class TestBest:

@@ -264,6 +264,10 @@ class NerfTexture:
         field = self.apply(plane(), self.synthesize(size, seed, tileable=True), scale=SCALE, lift=0.0)
         return TextureOnPlane(field, np.array(self.light), along)
 
+    def in_place(self) -> Shell:
+        """What shows the captured object in the photos' cameras: `shell`."""
+        return self.shell
+
     def on_base_shape(self, size: int = SIZE) -> AppliedTexture:
         """The captured texture as maps of `size` texels on its own base shape, in the scene cube."""
         mesh, maps = self_maps(self.model.base.mesh, self.model.frames, self.features, size)

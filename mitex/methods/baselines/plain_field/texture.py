@@ -78,6 +78,10 @@ class PlainFieldTexture:
         mask = upload(mi.TensorXu8, self.occupied)
         return PlainField.of(self.parameters, hash_grid(self.config), mask, render_step(self.config))
 
+    def in_place(self) -> PlainField:
+        """What shows the object in the photos' cameras: `field`."""
+        return self.field
+
     @property
     def similarity(self) -> Similarity:
         """The capture's world -> scene cube."""
