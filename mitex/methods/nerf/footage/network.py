@@ -107,7 +107,7 @@ def half(low: float, high: float) -> float:
     """
     if low < -SURE:
         return 0.0
-    return 0.5 * max(high, 1.0) if high > 1.0 + SURE else 0.5
+    return 0.5 * high if high > 1.0 + SURE else 0.5
 
 
 def _try(path: Path, output: str, size: tuple[int, int]) -> None:

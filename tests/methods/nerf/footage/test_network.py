@@ -136,7 +136,7 @@ BAD = {
     "a class": (onnx.redness(last="GlobalMaxPool", masks=5), "gives 1 x 5 x 1 x 1 numbers, no mask"),
     "not finite": (onnx.redness(last="Log"), "gives values that are not finite"),
     "unknown operation": (onnx.redness(last="Foo"), "OpenCV cannot run"),
-    "a name that is no text": (REDNESS.replace(b"Sigmoid", b"Sigm\xe9id"), "makes OpenCV crash"),
+    "a name that is no text": (REDNESS.replace(b"Sigmoid", b"Sigm\xe9id"), "OpenCV"),
 }
 
 
@@ -148,6 +148,12 @@ def test_files_that_cannot_be_used(tmp_path, name, capfd):
     assert message in str(caught.value) and "a.onnx'" in str(caught.value)
     assert "\n" not in str(caught.value) and str(caught.value).endswith(networks.NEED)
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_file_that_makes_opencv_crash(tmp_path, monkeypatch):
+    monkeypatch.setattr(networks, "TRIAL", "import os; os.abort()")
+    with pytest.raises(WeightsError, match="a.onnx' makes OpenCV crash; name a network"):
+        read(tmp_path, REDNESS)
 
 
 def test_places_without_a_file(tmp_path, monkeypatch):
