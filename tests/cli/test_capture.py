@@ -14,7 +14,7 @@ from mitex.methods.nerf import load_capture
 from mitex.methods.nerf.footage import site
 from tests.cli import bad_files as bad
 from tests.cli.refusals import check_refused, tree
-from tests.methods.nerf.footage import stage
+from tests.methods.nerf.footage import onnx_files, stage
 from tests.methods.nerf.footage.films import write_film, write_photos, write_sound
 
 pytestmark = pytest.mark.usefixtures("own_cache")
@@ -74,6 +74,16 @@ def test_a_film_becomes_a_capture(cameras, tmp_path, capsys):
     assert np.allclose(backs[:, 2, 2], [pose[2, 2] for pose in stage.POSES], atol=0.01)
 
 
+def test_masks_by_a_network(cameras, tmp_path, capsys):
+    write_photos(tmp_path / "photos", PICTURES)
+    network = onnx_files.write(tmp_path / "red.onnx", onnx_files.redness(limit=0.2, size=(1, 3, 96, 96)))
+    words = ["capture", str(tmp_path / "photos"), "--out", str(tmp_path / "a"), "--quiet"]
+    assert main([*words, "--mask", f"network:{network}"]) == 0
+    assert f"{stage.VIEWS} of those got a mask" in capsys.readouterr().out
+    for image, (_, mask) in zip(load_capture(tmp_path / "a").images, SHOTS, strict=True):
+        assert stage.overlap(image[..., 3] > 127, mask) > 0.95
+
+
 def shots(folder):
     return write_photos(folder / "photos", PICTURES)
 
@@ -114,6 +124,36 @@ BAD = {
     "no such way": (shots, "photos", "--mask magic", "'magic' is no way to mask"),
     "a box outside": (shots, "photos", "--mask box:80,0,40,10", "not inside the picture"),
     "a colour that is nowhere": (shots, "photos", "--mask colour:#ff00ff", "have the background's colour"),
+    "a network that is missing": (
+        shots,
+        "photos",
+        "--mask network:no.onnx",
+        "no.onnx' cannot be used (No such",
+    ),
+    "a network that is none": (
+        lambda d: [shots(d), bad.text(d / "a.onnx")],
+        "photos",
+        "--mask network:a.onnx",
+        "a.onnx' cannot be used (it is not protobuf)",
+    ),
+    "a network that OpenCV cannot run": (
+        lambda d: [shots(d), onnx_files.write(d / "a.onnx", onnx_files.redness(last="Foo"))],
+        "photos",
+        "--mask network:a.onnx",
+        "a.onnx' ((-2:Unspecified error) Can't create layer",
+    ),
+    "a network for other pictures": (
+        lambda d: [shots(d), onnx_files.write(d / "a.onnx", onnx_files.redness(size=(1, 3, 64, 64)))],
+        "photos",
+        "--mask network:a.onnx,320",
+        "a.onnx' takes pictures of 64 x 64 only",
+    ),
+    "a network that masks nothing": (
+        lambda d: [shots(d), onnx_files.write(d / "a.onnx", onnx_files.redness(limit=0.9))],
+        "photos",
+        "--mask network:a.onnx",
+        "the network takes 0.0 % of the pictures for the object",
+    ),
     "few frames asked for": (shots, "photos", "--frames 3", "--frames 3 is out of range"),
     "huge pictures asked for": (shots, "photos", "--size 99999", "--size 99999 is out of range"),
     "into a folder that exists": (
@@ -145,7 +185,7 @@ def test_photos_that_do_not_overlap(monkeypatch, files, capsys):
 
 def test_without_opencv(cameras, monkeypatch, files, capsys):
     monkeypatch.setitem(sys.modules, "cv2", None)
-    for module in ("cutting", "silhouette"):
+    for module in ("cutting", "network", "silhouette"):
         monkeypatch.delitem(sys.modules, f"mitex.methods.nerf.footage.{module}", raising=False)
     shots(files)
     message = "import of cv2 halted; None in sys.modules); run `pip install 'mitex[nerf]'`"

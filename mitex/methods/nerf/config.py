@@ -60,6 +60,7 @@ class NerfConfig(RadianceConfig):
     repulsion: float = key(0.05, "pseudo-distance that keeps projections from the nearest vertex", 1e-6)
     neighbours: int = key(8, "vertices whose normals make the coarse normal", 1, 64)
     refine_cameras: bool = key(False, "optimize the poses too")
+    exposures: bool = key(False, "learn how bright each photo was taken too, for films whose exposure drifts")
     base_steps: int = key(1_000, "of the coarse field that the base shape is taken from", 1)
     concavity: float = key(
         0.3,

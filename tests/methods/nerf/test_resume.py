@@ -34,6 +34,7 @@ SMALL = (
     "interior_weight=0.01",
     "learn_light=true",
     "refine_cameras=true",
+    "exposures=true",
 )
 # The occupancy is refreshed and the mean updated before and after an interruption, and the inside counts
 # from step 20 on, before a fit of 30 steps ends.
@@ -83,10 +84,18 @@ def metrics(folder: Path) -> list[dict[str, float]]:
 
 def test_the_comparison_covers_what_a_fit_holds(whole):
     state, optimizer, _, model = tensors(whole)
-    kinds = {"parameters/tables/f", "parameters/poses", "parameters/light", "mean/weights/0", "occupancy"}
-    assert kinds <= state.keys() and {"tables/f", "light", "occupied"} <= model.keys()
+    kinds = {"parameters/tables/f", "parameters/poses", "parameters/exposures", "parameters/light"}
+    assert (
+        kinds | {"mean/weights/0", "occupancy"} <= state.keys()
+        and {"tables/f", "light", "occupied"} <= model.keys()
+    )
     assert int(state["refreshes"]) == 1 + (STEPS - 1) // REFRESH
-    for name in ("tables/f", "light", "poses"):  # all of these have moved, so that a lost one would show
+    for name in (
+        "tables/f",
+        "light",
+        "poses",
+        "exposures",
+    ):  # all of these have moved, so that a lost one would show
         assert not torch.equal(state[f"mean/{name}"], state[f"parameters/{name}"])
     assert all(value.abs().max() > 0 for name, value in optimizer.items() if name.startswith("first"))
     assert "interior" in metrics(whole)[-1]

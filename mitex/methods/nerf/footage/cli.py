@@ -21,6 +21,7 @@ class MakeCapture:
     examples:
       mitex capture vase.mp4 --out captures/vase
       mitex capture vase.mp4 --out captures/vase --mask box:30,20,40,70
+      mitex capture vase.mp4 --out captures/vase --mask network:u2net.onnx
       mitex capture photos/ --out captures/vase --mask colour:#1e8f3c --frames 60
     """
 
@@ -30,10 +31,12 @@ class MakeCapture:
     out: Annotated[Path, arg(metavar="CAPTURE")]
     """Folder to make."""
 
-    mask: Annotated[str, arg(metavar="plane|hull|box:X,Y,W,H|colour:#RRGGBB")] = "plane"
+    mask: Annotated[str, arg(metavar="plane|hull|box:X,Y,W,H|colour:#RRGGBB|network:FILE")] = "plane"
     """What the object is. plane: what stands on a table in the middle. hull: what all pictures have in their
     middle. box: what is in a box of the first picture, by its left and upper edge, width and height [per cent
-    of the picture]. colour: what differs from the background, which has that colour."""
+    of the picture]. colour: what differs from the background, which has that colour. network: what a network
+    of yours takes for it, an ONNX file such as U2-Net; network:FILE.onnx,PX,MEAN,STD if the pictures that it
+    takes are not as the file says, or not normalised by ImageNet's mean and standard deviation."""
 
     frames: Annotated[int, arg(metavar="N")] = 80
     """Pictures to pick, at most."""

@@ -14,6 +14,7 @@ from mitex.errors import CaptureError
 from mitex.methods.nerf.capture.visual_hull import Hull, project, visual_hull
 from mitex.methods.nerf.footage.guess import Guess, in_box, in_middle, on_table
 from mitex.methods.nerf.footage.mask_method import MaskMethod
+from mitex.methods.nerf.footage.network import Network, half
 from mitex.methods.nerf.footage.silhouette import disc, silhouette
 from mitex.methods.nerf.footage.site import Site
 from mitex.progress import counted
@@ -25,13 +26,23 @@ DIFFERENT = (12.0, 40.0)  # distance in CIELAB from which a colour is not the ba
 AGREED = 0.5  # part of the silhouette of what all agree on that a mask must fill
 
 
-def cut_out(site: Site, pictures: Sequence[np.ndarray], method: MaskMethod) -> list[np.ndarray]:
+def cut_out(
+    site: Site, pictures: Sequence[np.ndarray], method: MaskMethod, network: Network | None = None
+) -> list[np.ndarray]:
     """Masks (H, W) bool of the object, one of each picture (H, W, 3) uint8; empty where none is to be had.
+
+    Args:
+        site: the pictures' cameras.
+        pictures: to be masked.
+        method: how.
+        network: that is asked, for the method "network".
 
     Raises:
         CaptureError: there is no object to be found in that way.
     """
-    if method.kind == "colour":
+    if network is not None:
+        masks = _by_network(network, pictures)
+    elif method.kind == "colour":
         masks = _by_colour([_shrunk(picture, ROUNDS[-1]) for picture in pictures], method.colour)
     else:
         masks = _by_points(site, pictures, _guess(site, _shrunk(pictures[0], ROUNDS[0]), method))
@@ -131,6 +142,23 @@ def _by_colour(pictures: Sequence[np.ndarray], colour: tuple[int, int, int]) -> 
             "read the colour off a picture, beside the object",
         )
     return [_cleaned(distance > limit) for distance in distances]
+
+
+def _by_network(network: Network, pictures: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """What a network takes for the object, in pictures that it sees one by one."""
+    answers = [
+        _shrunk(network(picture), ROUNDS[-1])
+        for picture in counted("cutting the object out", pictures, len(pictures))
+    ]
+    limit = half(min(float(a.min()) for a in answers), max(float(a.max()) for a in answers))
+    masks = [answer > limit for answer in answers]
+    share = float(np.mean([mask.mean() for mask in masks]))
+    if not 0.001 < share < 0.97:
+        raise CaptureError(
+            f"the network takes {100.0 * share:.1f} % of the pictures for the object",
+            "give it the size and the colours that it was trained with, or mask in another way",
+        )
+    return [_cleaned(mask) for mask in masks]
 
 
 def _agreed(site: Site, masks: Sequence[np.ndarray]) -> Hull:

@@ -82,18 +82,22 @@ def make_capture(
         ImageError: a photo is damaged.
         MissingPackage: the extra `nerf` is not installed.
         OutputError: `out` exists, or cannot be written.
+        WeightsError: the network that is to mask cannot be used.
     """
     in_range("`frames`", frames, MIN_VIEWS, 1000)
     in_range("`size`", size, 128, 8192)
     method = mask_method(mask)
     cut_out = optional("mitex.methods.nerf.footage.cutting", "nerf").cut_out
+    network = None
+    if method.network is not None:
+        network = optional("mitex.methods.nerf.footage.network", "nerf").read_network(method.network)
     with _new_folder(expanded(out), expanded(source)) as folder:
         taken = footage(source, size)
         names, why = _picked(taken, frames, folder)
         site = find_site(folder, names)
         if method.kind == "box" and site.frames[0].name != names[0]:
             raise CaptureError("the first picture, which the box is in, got no camera", "mask in another way")
-        masks = cut_out(site, [read_bytes(frame.image) for frame in site.frames], method)
+        masks = cut_out(site, [read_bytes(frame.image) for frame in site.frames], method, network)
         kept = [k for k, one in enumerate(masks) if one.any()]
         if len(kept) < MIN_VIEWS:
             raise CaptureError(

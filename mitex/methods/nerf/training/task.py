@@ -11,6 +11,7 @@ import torch
 
 from mitex.bridge import call
 from mitex.cache import content_key
+from mitex.colour import linear_to_srgb, srgb_to_linear
 from mitex.mesh import Mesh
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.pixels import Batch
@@ -45,7 +46,7 @@ SURFACE = 0.5  # compositing weight from which on a sample is the visible surfac
 INTERIOR_RAYS = 0.25  # share of the rays below whose surface the interior is evaluated
 BURIED = 0.25  # of the shell's thickness on one side: what has so much matter around it, no photo sees
 AROUND = (0, 0, 0), (0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)  # where matter is looked for
-LEAST = 1e-3  # opacity of rays whose normals are compared
+LEAST = 1e-3  # opacity of rays whose normals are compared, and whose colours are exposed
 # Fine normals start near those of the faces: under random ones k_d learns the shades first.
 FLAT = 1e-2
 POSE = 1e-2  # unit of the cameras' corrections [rad, scene units]
@@ -121,6 +122,7 @@ class TextureTask(RadianceTask[NerfConfig]):
         networks = [v for name, v in self.named.items() if name.startswith(("tables/", "weights/"))]
         results = call(run, foot, distance, along, self.named["light"], *networks)
         colour, transmittance, weights, fine, target, interior = results
+        colour = self._exposed(colour, 1 - transmittance, batch.view)
         rendered = Rendered(colour, transmittance, weights, samples)
         valid = target.norm(dim=1) > LEAST
         if valid.any():
@@ -174,6 +176,18 @@ class TextureTask(RadianceTask[NerfConfig]):
         t = torch.from_numpy(np.array(samples.t))
         points = (torch.from_numpy(batch.origins) + shift)[ray] + directions[ray] * t[:, None]
         return *attach(points, projections), directions[ray]
+
+    def _exposed(self, colour: torch.Tensor, opacity: torch.Tensor, view: np.ndarray) -> torch.Tensor:
+        """Colours (R, 3), in display values times opacity (R,), as photos `view` (R,) were exposed.
+
+        Gains are factors of linear light. Their geometric mean is 1, or the light could be any.
+        """
+        if not self.config.exposures:
+            return colour
+        logarithms = self.named["exposures"]
+        gain = (logarithms - logarithms.mean()).exp()[view, None]
+        straight = colour / opacity[:, None].clamp(min=LEAST)
+        return opacity[:, None] * linear_to_srgb(gain * srgb_to_linear(straight))
 
     def _normals(
         self,
@@ -293,6 +307,8 @@ def _initial_parameters(
     parameters["centres"] = uniform((len(encoding.levels(0)), CLUSTERS, 2), -1e-4, 1e-4)
     if config.refine_cameras:
         parameters["poses"] = torch.zeros(len(capture), 6)
+    if config.exposures:
+        parameters["exposures"] = torch.zeros(len(capture))  # logarithms
     for name, value in parameters.items():
         value.requires_grad_(config.learn_light or name != "light")
     return parameters
