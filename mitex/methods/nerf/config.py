@@ -17,7 +17,7 @@ class RadianceConfig(TrainingConfig):
     rays: int = key(4096, "rays in a step", 1, 1 << 20)
     rays_across: int = key(
         1,
-        "the mean of so many by so many rays is compared with a pixel; 1: one ray, through its centre",
+        "a pixel is compared with the mean of so many by so many rays; 1: one, through its centre",
         1,
         8,
     )

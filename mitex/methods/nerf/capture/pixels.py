@@ -53,7 +53,8 @@ class Pixels:
     def draw(self, count: int, one_view: bool, generator: torch.Generator, across: int = 1) -> Batch:
         """`count` rays through pixels of one image or of all, each as likely as the others.
 
-        A pixel has `across` x `across` rays, each at a random place of its own part, or one through its centre.
+        A pixel has `across` x `across` rays, each at a random place of its own part; a single one goes
+        through its centre.
         """
         starts = np.concatenate([[0], self._ends[:-1]])
         first, last = 0, int(self._ends[-1])
