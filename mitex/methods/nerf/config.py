@@ -15,6 +15,12 @@ class RadianceConfig(TrainingConfig):
     preset: str = "fast"
     steps: int = 6_000
     rays: int = key(4096, "rays in a step", 1, 1 << 20)
+    rays_across: int = key(
+        1,
+        "a pixel is compared with the mean of so many by so many rays; 1: one, through its centre",
+        1,
+        8,
+    )
     one_view: bool = key(False, "all rays of a step from one photo (the paper), instead of from all")
     ray_steps: int = key(512, "steps of a ray along the diagonal of the scene cube", 16, 8192)
     table: int = key(17, "binary logarithm of the entries of a level's hash table", 8, 24)
@@ -27,6 +33,14 @@ class RadianceConfig(TrainingConfig):
     occupancy: int = key(128, "cells of the occupancy grid along a side", 8, 512)
     checkpoint_every: int = 500
     preview_every: int = 1_000
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.rays < self.rays_across**2:
+            raise ConfigError(
+                f"rays = {self.rays} are fewer than {self.rays_across} x {self.rays_across} of one pixel",
+                "raise rays, or lower rays_across",
+            )
 
 
 @dataclass(frozen=True)

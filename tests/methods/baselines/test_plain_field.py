@@ -188,7 +188,16 @@ def test_refusals(ball):
 
 @pytest.mark.parametrize(
     "change",
-    ["rays=512", "one_view=true", "ray_steps=96", "distortion=1", "occupancy=24", "table=12", "seed=1"],
+    [
+        "rays=512",
+        "one_view=true",
+        "rays_across=2",
+        "ray_steps=96",
+        "distortion=1",
+        "occupancy=24",
+        "table=12",
+        "seed=1",
+    ],
 )
 def test_every_setting_changes_the_first_step(change):
     losses = []

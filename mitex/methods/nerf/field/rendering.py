@@ -17,6 +17,7 @@ from mitex.textures.march import DIAGONAL, RadianceField, composite
 CHUNK = 1 << 16  # rays marched at a time
 REFINEMENT = 2  # steps of a picture for one of the training; the durian gains 0.4 dB by it
 LONGEST = 400  # side of rendered photos [pixels]
+ACROSS = 2  # rays across a pixel of them, in both directions
 
 
 def render_step(config: RadianceConfig) -> float:
@@ -53,13 +54,13 @@ def render_rays(
 
 
 def render_batch(field: RadianceField, batch: Batch) -> np.ndarray:
-    """Display colours (R, 3) in [0, 1] of the batch's rays, on white."""
+    """Display colours (P, 3) in [0, 1] of the batch's pixels, on white."""
     colour, transmittance = render_rays(field, batch.origins, batch.directions)
-    return np.clip(colour + transmittance[:, None], 0, 1)
+    return np.clip(batch.pixel_mean(colour + transmittance[:, None]), 0, 1)
 
 
 def render_view(
-    field: RadianceField, capture: Capture, view: int, longest: int = LONGEST
+    field: RadianceField, capture: Capture, view: int, longest: int = LONGEST, across: int = ACROSS
 ) -> tuple[np.ndarray, np.ndarray]:
     """A view of the field and its photo, (H, W, 3) sRGB in [0, 1], on white.
 
@@ -68,8 +69,9 @@ def render_view(
         capture: the photos.
         view: index of one.
         longest: side that the photo is thinned out to [pixels].
+        across: rays across a pixel, in both directions.
     """
-    batch, shape = Pixels(capture).image(view, longest)
+    batch, shape = Pixels(capture).image(view, longest, across)
     photo = (batch.colours * batch.alpha + 1 - batch.alpha).numpy()
     return render_batch(field, batch).reshape(*shape, 3), photo.reshape(*shape, 3)
 

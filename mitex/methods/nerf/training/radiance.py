@@ -93,7 +93,7 @@ class RadianceTask(ABC, Generic[Config]):
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
         """The error of rays before a random background, and the field's own terms."""
-        batch = self.with_cameras(self.pixels.draw(self.config.rays, self.config.one_view, generator))
+        batch = self.with_cameras(self._draw(generator))
         jitter = torch.rand(len(batch.view), generator=generator)
         rays = batch_rays(batch)
         samples = march(*rays, self.occupancy.mask, self.step_length, upload(mi.Float, jitter.numpy()))
@@ -102,6 +102,7 @@ class RadianceTask(ABC, Generic[Config]):
             raise ValueError("no ray meets an occupied cell")
         samples = visible(samples, *rays, lambda points: upload(mi.Float, self.density(rows(points))))
         rendered = self.render(step, batch, samples, generator)
+        rendered.average(batch.pixel_mean)
         error = self.error(rendered, batch, background)
         total = error + sum(rendered.terms.values())
         if self.config.distortion:
@@ -117,10 +118,14 @@ class RadianceTask(ABC, Generic[Config]):
         return Step(total, metrics, self._average)
 
     def error(self, rendered: Rendered, batch: Batch, background: torch.Tensor) -> torch.Tensor:
-        """How far rays are from their pixels: L1 of colours before a background (R, 3)."""
+        """How far the means of rays are from their pixels: L1 of colours before a background (P, 3)."""
         colour = rendered.colour + rendered.transmittance[:, None] * background
         target = batch.colours * batch.alpha + background * (1 - batch.alpha)
         return (colour - target).abs().mean()
+
+    def _draw(self, generator: torch.Generator) -> Batch:
+        config = self.config
+        return self.pixels.draw(config.rays, config.one_view, generator, config.rays_across)
 
     def _average(self) -> None:
         """Every `REFRESH` updates the mean parameters move towards the current ones."""
@@ -186,3 +191,7 @@ class Rendered:
         self.t = torch.from_numpy(np.array(samples.t))
         self.ray = torch.from_numpy(np.array(samples.ray).astype(np.int64))
         self.terms: dict[str, torch.Tensor] = {}
+
+    def average(self, pixel_mean: Callable[[torch.Tensor], torch.Tensor]) -> None:
+        """Puts means over the rays of each pixel in the place of the rays' colours and transmittances."""
+        self.colour, self.transmittance = pixel_mean(self.colour), pixel_mean(self.transmittance)

@@ -39,6 +39,36 @@ def test_drawn_pixels_are_those_that_their_rays_go_through():
         np.testing.assert_allclose(torch.cat([batch.colours[k], batch.alpha[k]]), rgba, rtol=1e-6)
 
 
+def test_a_pixel_has_a_ray_through_each_of_its_parts():
+    """At random places when drawn, through the centres in a whole image."""
+    photos = capture()
+    drawn = Pixels(photos).draw(40, False, torch.Generator().manual_seed(0), across=2)
+    image, shape = Pixels(photos).image(1, 5, across=2)
+    assert len(drawn.colours) == 10 and len(image.colours) == 10 and shape == (5, 2)
+    for batch in (drawn, image):
+        for pixel in range(10):
+            rays = slice(4 * pixel, 4 * pixel + 4)
+            (view,) = set(batch.view[rays].tolist())
+            places, _ = photos.project(view, batch.directions[rays].astype(np.float64))
+            column, row = np.floor(places[0]).astype(int)
+            rgba = photos.images[view][row, column] / np.float32(255)
+            np.testing.assert_allclose(torch.cat([batch.colours[pixel], batch.alpha[pixel]]), rgba, rtol=1e-6)
+            parts = 2 * (places - [column, row])
+            assert np.floor(parts + 1e-4).astype(int).tolist() == [[0, 0], [1, 0], [0, 1], [1, 1]]
+            centred = np.allclose(parts % 1, 0.5, atol=1e-4)
+            assert centred == (batch is image)
+
+
+def test_means_of_the_rays_of_each_pixel():
+    photos = capture()
+    batch, _ = Pixels(photos).image(0, 4, across=3)
+    values = np.arange(12 * 9 * 2, dtype=np.float32).reshape(-1, 2)
+    expected = [values[9 * k : 9 * k + 9].mean(0) for k in range(12)]
+    np.testing.assert_allclose(batch.pixel_mean(values), expected)
+    np.testing.assert_allclose(batch.pixel_mean(torch.from_numpy(values)), expected)
+    np.testing.assert_allclose(batch.pixel_mean(values[:, 0]), np.array(expected)[:, 0])
+
+
 def test_one_view_is_one_view():
     batch = Pixels(capture()).draw(50, True, torch.Generator().manual_seed(0))
     assert len(set(batch.view.tolist())) == 1

@@ -42,7 +42,14 @@ def plain() -> np.ndarray:
 
 @pytest.mark.parametrize(
     "change",
-    ["one_view=true", "cluster_entries=16", "normal_rays=0.5", "detach_normals=true", "fresnel=false"],
+    [
+        "one_view=true",
+        "rays_across=2",
+        "cluster_entries=16",
+        "normal_rays=0.5",
+        "detach_normals=true",
+        "fresnel=false",
+    ],
 )
 def test_a_setting_changes_the_first_step(plain, change):
     changed = first_step(change)
