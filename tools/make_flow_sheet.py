@@ -27,7 +27,7 @@ from mitex.render.video import check_video, write_video
 SHEET = Path(__file__).parents[1] / "docs" / "gallery" / "nca-flow.jpg"
 SCENES = ("right=sphere", "about-y=vase")
 FREQUENCY = 26  # of the sphere
-PICTURES, STEPS, CELL = 5, 12, 256  # in a row, between two of them, and their side [px]
+PICTURES, STEPS, CELL = 5, 12, 160  # in a row, between two of them, and their side [px]
 FRAMES, FPS, FILM_CELL = 72, 24, 192  # of the film, which has a step between two frames
 
 
