@@ -17,7 +17,6 @@ from mitex.textures.march import DIAGONAL, RadianceField, composite
 CHUNK = 1 << 16  # rays marched at a time
 REFINEMENT = 2  # steps of a picture for one of the training; the durian gains 0.4 dB by it
 LONGEST = 400  # side of rendered photos [pixels]
-ACROSS = 2  # rays across a pixel of them, in both directions
 
 
 def render_step(config: RadianceConfig) -> float:
@@ -60,7 +59,7 @@ def render_batch(field: RadianceField, batch: Batch) -> np.ndarray:
 
 
 def render_view(
-    field: RadianceField, capture: Capture, view: int, longest: int = LONGEST, across: int = ACROSS
+    field: RadianceField, capture: Capture, view: int, longest: int = LONGEST, across: int = 1
 ) -> tuple[np.ndarray, np.ndarray]:
     """A view of the field and its photo, (H, W, 3) sRGB in [0, 1], on white.
 
@@ -69,7 +68,7 @@ def render_view(
         capture: the photos.
         view: index of one.
         longest: side that the photo is thinned out to [pixels].
-        across: rays across a pixel, in both directions.
+        across: a pixel is the mean of so many by so many rays; 1: that of one, through its centre.
     """
     batch, shape = Pixels(capture).image(view, longest, across)
     photo = (batch.colours * batch.alpha + 1 - batch.alpha).numpy()
