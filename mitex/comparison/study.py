@@ -18,9 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from mitex.batch import Plan
-from mitex.comparison.html import jpeg, template, text_of
+from mitex.comparison.html import QUALITY, template, text_of
 from mitex.comparison.results import Result
 from mitex.errors import ConfigError
+from mitex.page import jpeg
 from mitex.paths import atomic_write, expanded
 
 PAGE, KEY = "study.html", "study.json"
@@ -100,7 +101,7 @@ def write_study(folder: Path, results: Sequence[Result], exemplars: Mapping[str,
     for exemplar, mesh in dict.fromkeys(result.pair for result in results):
         methods = sorted({method for one, other, method in shown if (one, other) == (exemplar, mesh)})
         if (image := exemplars[exemplar]) is not None:
-            pictures.setdefault(exemplar, jpeg(image))
+            pictures.setdefault(exemplar, jpeg(image, QUALITY))
         for pair in combinations(methods, 2):
             files = [shown[exemplar, mesh, method].pictures["picture"] for method in pair]
             pictures |= {str(file): file.read_bytes() for file in files}
