@@ -55,10 +55,14 @@ class PlanarOptions(MeshOptions):
         in_range("--scale", self.scale, 0.05, 20.0)
         in_range("--resolution", self.resolution, 16, 8192)
 
+    def further(self) -> dict[str, object]:
+        """What a method's `apply` takes beside that."""
+        return {}
+
     def applied(self, out: Path) -> Applied:
         from mitex.mesh import Mesh
         from mitex.methods.registry import load
 
         texture, mesh = load(self.model), Mesh.load(self.mesh)
         options = {"scale": self.scale, "resolution": self.resolution, "keep_uvs": self.keep_uvs}
-        return texture.apply(mesh, **options)
+        return texture.apply(mesh, **options, **self.further())

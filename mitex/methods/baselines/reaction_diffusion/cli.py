@@ -12,7 +12,7 @@ from mitex.methods.checks import SEEDS, in_range
 from mitex.methods.planar_options import PlanarFitOptions, PlanarOptions
 
 if TYPE_CHECKING:
-    from mitex.asset import Asset
+    from mitex.methods.interface import Applied
 
 
 @dataclass(kw_only=True)
@@ -51,17 +51,11 @@ class Apply(PlanarOptions):
         in_range("--seed", self.seed, *SEEDS)
         in_range("--steps", self.steps, 0, 10_000)
 
-    def applied(self, out: Path) -> Asset:
-        from mitex.mesh import Mesh
-        from mitex.methods.baselines.reaction_diffusion import ReactionDiffusionTexture
+    def further(self) -> dict[str, object]:
+        return {"seed": self.seed, "steps": self.steps}
+
+    def applied(self, out: Path) -> Applied:
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()
-        return ReactionDiffusionTexture.load(self.model).apply(
-            Mesh.load(self.mesh),
-            seed=self.seed,
-            steps=self.steps,
-            scale=self.scale,
-            resolution=self.resolution,
-            keep_uvs=self.keep_uvs,
-        )
+        return super().applied(out)
