@@ -19,8 +19,8 @@ from mitex.geometry.triangles import interpolate, twice_area
 from mitex.geometry.vectors import scatter_add, unit
 from mitex.mesh import Mesh
 from mitex.progress import announce
+from mitex.ranges import TEXELS
 
-MAX_RESOLUTION = 8192
 LARGE = 40_000  # meshes of more faces are unwrapped in pieces
 HUGE = 150_000  # meshes of more faces are projected: unwrapping takes a minute from here on
 ROUGHNESS = 0.03  # by which vertices are moved before unwrapping [edge lengths], see `_rough`
@@ -141,10 +141,9 @@ class Atlas:
         Raises:
             ConfigError: resolution or padding out of range.
         """
-        if not 16 <= resolution <= MAX_RESOLUTION:
-            raise ConfigError(
-                f"texture resolution {resolution} is out of range", f"use 16 to {MAX_RESOLUTION}"
-            )
+        least, most = TEXELS
+        if not least <= resolution <= most:
+            raise ConfigError(f"texture resolution {resolution} is out of range", f"use {least} to {most}")
         if not 1 <= padding <= resolution // 8:
             raise ConfigError(f"padding {padding} is out of range", f"use 1 to {resolution // 8} texels")
         uv = laid_out(mesh, resolution, padding).uv if layout is None else layout

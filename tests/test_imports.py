@@ -52,6 +52,7 @@ ORDER = [
     "progress",
     "paths",
     "reading",
+    "ranges",
     "suggestions",
     "optional",
     "errors",

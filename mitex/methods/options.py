@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from mitex.methods.checks import SEEDS, in_range, merged_settings, reject_unused
+from mitex.methods.checks import in_range, merged_settings, reject_unused
+from mitex.ranges import RELIEFS, SEEDS
 from mitex.training.settings import RunSettings
 
 if TYPE_CHECKING:
@@ -231,7 +232,7 @@ class ReliefOptions(OptionalMeshOptions):
     mesh]; 0.05 is much."""
 
     def check(self) -> None:
-        in_range("--relief", self.relief, -0.5, 0.5)
+        in_range("--relief", self.relief, *RELIEFS)
 
     def finished(self, applied: Applied) -> Applied:
         if self.relief is None:

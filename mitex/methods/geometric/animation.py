@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
-from mitex.methods.checks import SEEDS, in_range
+from mitex.methods.checks import in_range
 from mitex.methods.geometric.cli import TEMPLATE, GrowthOptions
 from mitex.methods.options import field_files
+from mitex.ranges import FRAME_RATES, FRAMES, PIXELS, SAMPLES, SEEDS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -68,10 +69,10 @@ class Animate(GrowthOptions):
         self.check_growth(self.mesh)
         in_range("--seed", self.seed, *SEEDS)
         in_range("--to-seed", self.to_seed, *SEEDS)
-        in_range("--frames", self.frames, 2, 3600)
-        in_range("--resolution", self.resolution, 16, 4096)
-        in_range("--spp", self.spp, 1, 65536)
-        in_range("--fps", self.fps, 1, 60)
+        in_range("--frames", self.frames, *FRAMES)
+        in_range("--resolution", self.resolution, *PIXELS)
+        in_range("--spp", self.spp, *SAMPLES)
+        in_range("--fps", self.fps, *FRAME_RATES)
         from mitex.mesh.files import mesh_files
         from mitex.paths import check_writable, prepare_folder, prepare_output
         from mitex.render import VIDEO_SUFFIXES, check_video, film

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import arg
 
-from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
+from mitex.methods.checks import in_range, mutually_exclusive, reject_unused
+from mitex.methods.nerf.ranges import DENSITIES, LIFTS
 from mitex.methods.options import PICTURES, FieldOptions, MeshOptions, TrainingOptions
 from mitex.paths import expanded
+from mitex.ranges import SCALES, SEEDS
 
 if TYPE_CHECKING:
     from mitex.methods.nerf.use.applied import AppliedTexture
@@ -94,10 +96,10 @@ class Apply(FieldOptions, MeshOptions):
     def check(self) -> None:
         super().check()
         in_range("--seed", self.seed, *SEEDS)
-        in_range("--scale", self.scale, 0.05, 20.0)
+        in_range("--scale", self.scale, *SCALES)
         in_range("--size", self.size, 128, 8192)
-        in_range("--density", self.density, 0.001, 1000.0)
-        in_range("--lift", self.lift, 0.0, 1.0)
+        in_range("--density", self.density, *DENSITIES)
+        in_range("--lift", self.lift, *LIFTS)
         on_surface = self.quilting == "surface"
         mutually_exclusive("--quilting surface", "--guide", on_surface and self.guide is not None)
         mutually_exclusive("--size", "--guide", self.size is not None and self.guide is not None)

@@ -12,15 +12,16 @@ import numpy as np
 import torch
 
 from mitex.asset import Asset
-from mitex.atlas import MAX_RESOLUTION, laid_out
-from mitex.errors import ConfigError
+from mitex.atlas import laid_out
 from mitex.evaluation.elevations import FlatTexture
 from mitex.export.common import asset_from_textures
 from mitex.mesh import Mesh
 from mitex.methods.baselines.quilted import METHOD
+from mitex.methods.checks import in_range
 from mitex.methods.nerf.training.light_estimate import brightness
 from mitex.methods.nerf.use.placement import UNWRAP_SIZE, in_scene_cube, uv_unit_length
 from mitex.methods.planar import repeated
+from mitex.ranges import SCALES, TEXELS
 from mitex.training import model_file
 
 
@@ -93,11 +94,8 @@ class QuiltedTexture:
             MeshError: the mesh has no area.
             ConfigError: a number is out of range.
         """
-        if not 0.05 <= scale <= 20 or not 16 <= resolution <= MAX_RESOLUTION:
-            raise ConfigError(
-                f"a texture of {scale:g} times the size and {resolution} texels",
-                f"use sizes from 0.05 to 20, and 16 to {MAX_RESOLUTION} texels",
-            )
+        in_range("`scale`", scale, *SCALES)
+        in_range("`resolution`", resolution, *TEXELS)
         mesh = laid_out(mesh, UNWRAP_SIZE)
         assert mesh.uv is not None
         unit_length = uv_unit_length(in_scene_cube(mesh)[0])

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import arg
 
-from mitex.methods.checks import SEEDS, in_range
+from mitex.methods.baselines.reaction_diffusion.ranges import MOST_STEPS
+from mitex.methods.checks import in_range
 from mitex.methods.planar_options import PlanarFitOptions, PlanarOptions
+from mitex.ranges import SEEDS
 
 if TYPE_CHECKING:
     from mitex.methods.interface import Applied
@@ -49,7 +51,7 @@ class Apply(PlanarOptions):
     def check(self) -> None:
         super().check()
         in_range("--seed", self.seed, *SEEDS)
-        in_range("--steps", self.steps, 0, 10_000)
+        in_range("--steps", self.steps, 0, MOST_STEPS)
 
     def further(self) -> dict[str, object]:
         return {"seed": self.seed, "steps": self.steps}

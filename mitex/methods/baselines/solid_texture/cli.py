@@ -7,8 +7,9 @@ from typing import Annotated, ClassVar
 
 from tyro.conf import arg
 
-from mitex.methods.checks import SEEDS, in_range
+from mitex.methods.checks import in_range
 from mitex.methods.planar_options import PlanarFitOptions, PlanarOptions
+from mitex.ranges import SEEDS
 
 
 @dataclass(kw_only=True)
