@@ -117,11 +117,11 @@ def _write(folder: Path, asked: Sequence[tuple[Question, list[str]]], pictures: 
     shuffle = random.Random(id)
     asked = shuffle.sample(asked, len(asked))
     names = shuffle.sample(list(pictures), len(pictures))  # so that their places tell nothing either
-    place = {name: k for k, name in enumerate(names)}
+    number = {name: k for k, name in enumerate(names)}
     questions = [
         {
-            "exemplar": place.get(question.exemplar, question.exemplar),
-            "choices": [place[name] for name in choices],
+            "exemplar": number.get(question.exemplar, question.exemplar),
+            "choices": [number[name] for name in choices],
         }
         for question, choices in asked
     ]

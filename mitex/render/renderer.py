@@ -78,13 +78,13 @@ class OrbitRenderer:
             raise ConfigError("displacement needs a height map", "leave it out or use a model with height")
         self.resolution = resolution
         self._floating, self._ao = floating, ao
-        _, place = (like or asset.mesh).normalised()
+        _, similarity = (like or asset.mesh).normalised()
         if asset.atlas is None:  # a vertex for each normal, and for each UV
             split = split_at_hard_edges(asset.mesh)
         else:
             split = split_at_seams(asset.mesh, asset.atlas.uv)
-        self._positions, self._normals, self._detail = _surface(asset, split, place, displacement)
-        framed = self._positions if like is None else place.apply(like.vertices)
+        self._positions, self._normals, self._detail = _surface(asset, split, similarity, displacement)
+        framed = self._positions if like is None else similarity.apply(like.vertices)
         self._hull, self._floor = hull(framed), float(framed[:, 1].min())
         material = {"type": "twosided", "bsdf": _bsdf(asset, split, ao)}
         self._scene, self._params = self._build(mesh_shape(asset.mesh, material, smooth=True, split=split))
@@ -217,10 +217,10 @@ def accumulated(scene: mi.Scene, resolution: int, spp: int, seed: int) -> np.nda
 
 
 def _surface(
-    asset: Asset, split: HardSplit, place: Similarity, displacement: float
+    asset: Asset, split: HardSplit, similarity: Similarity, displacement: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Positions in the scene, normals and detail normals of the split vertices, (N, 3) float64 each."""
-    mesh, normals = asset.mesh.with_vertices(place.apply(asset.mesh.vertices)), split.normals
+    mesh, normals = asset.mesh.with_vertices(similarity.apply(asset.mesh.vertices)), split.normals
     textured = asset.texture_maps is not None  # relief is the material's then
     detail = normals if textured else asset.detail_normals(split)
     if displacement:

@@ -71,7 +71,7 @@ def shell_still(
 
     centre = outline.mean(0)
     radius = float(np.linalg.norm(outline - centre, axis=1).max())
-    place = Similarity((similarity.center - centre) / radius, similarity.scale / radius)
+    framed = Similarity((similarity.center - centre) / radius, similarity.scale / radius)
     turn = rotation(math.radians(azimuth))
     points = (outline - centre) / radius @ turn.T
     view = fit_view(hull(points), math.radians(elevation))
@@ -80,7 +80,7 @@ def shell_still(
         "type": "scene",
         "integrator": {
             "type": INTEGRATORS[light],
-            "field": shell_field(field, place, turn),
+            "field": shell_field(field, framed, turn),
             "max_depth": MAX_DEPTH,
             "hide_emitters": True,
         },

@@ -134,7 +134,7 @@ class SurfaceTask(ParameterTask):
         comparison = self.comparisons[scale] if self.comparisons else None
         taps = dict(comparison.taps(network, generator)) if comparison else {}
         if self.content:
-            taps[CONTENT] = Tap(network.place(self.config.content_layer))
+            taps[CONTENT] = Tap(network.index_of(self.config.content_layer))
         features, cost = network.read(colours, taps), torch.zeros(())
         if self.content:
             difference = features.pop(CONTENT) - self.content[scale]

@@ -189,10 +189,10 @@ class Texels:
 
 def charts(mesh: Mesh, uv: np.ndarray) -> np.ndarray:
     """(F,) int32 UV chart of each face of a layout (F, 3, 2), numbered by their first faces; see `Texels`."""
-    place = welded(mesh.vertices)[mesh.faces].ravel()
+    vertex = welded(mesh.vertices)[mesh.faces].ravel()
     pairs = np.ascontiguousarray(uv.reshape(-1, 2) + np.float32(0.0)).view(np.int64)[:, 0]  # -0.0 becomes 0.0
     distinct, point = np.unique(pairs, return_inverse=True)
-    _, corner = np.unique(place * len(distinct) + point, return_inverse=True)
+    _, corner = np.unique(vertex * len(distinct) + point, return_inverse=True)
     edges, sides = face_edges(corner.reshape(-1, 3), int(corner.max()) + 1)
     count = len(mesh.faces)
     face = np.repeat(np.arange(count), 3)
