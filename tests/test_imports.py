@@ -53,6 +53,7 @@ ORDER = [
     "paths",
     "reading",
     "ranges",
+    "suffixes",
     "suggestions",
     "optional",
     "errors",

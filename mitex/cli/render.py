@@ -10,9 +10,7 @@ from tyro.conf import Positional, arg
 
 from mitex.methods.checks import in_range, reject_unused
 from mitex.ranges import DISPLACEMENTS, EXPOSURES, FRAME_RATES, FRAMES, PIXELS, SAMPLES, TURNS, elevations
-
-STILLS = (".png", ".jpg", ".jpeg", ".exr")
-MOVIES = (".mp4", ".gif")
+from mitex.suffixes import STILLS, VIDEOS
 
 
 @dataclass
@@ -68,8 +66,8 @@ class Render:
         from mitex.mesh.files import mesh_files
         from mitex.paths import prepare_output
 
-        out = prepare_output(self.out, STILLS + MOVIES, inputs=mesh_files(self.asset))
-        moving = out.suffix.lower() in MOVIES
+        out = prepare_output(self.out, STILLS + VIDEOS, inputs=mesh_files(self.asset))
+        moving = out.suffix.lower() in VIDEOS
         reject_unused("--frames", out, not moving and self.frames is not None)
         reject_unused("--fps", out, not moving and self.fps is not None)
         reject_unused("--azimuth", out, moving and self.azimuth is not None)

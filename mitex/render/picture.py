@@ -17,8 +17,8 @@ from mitex.paths import prepare_output
 from mitex.ranges import EXPOSURES
 from mitex.render.renderer import OrbitRenderer
 from mitex.render.video import check_video, write_video
+from mitex.suffixes import STILLS as STILL_SUFFIXES
 
-STILL_SUFFIXES = (".png", ".jpg", ".jpeg", ".exr")
 AZIMUTH, ELEVATION = 25.0, 18.0  # [degrees]
 
 

@@ -19,10 +19,10 @@ from mitex.render.picture import AZIMUTH, ELEVATION, check_exposure, tone
 from mitex.render.renderer import MAX_DEPTH, accumulated, check_elevation, paper_sweep, sensor
 from mitex.render.studio import lights
 from mitex.runtime.jit import mi
+from mitex.suffixes import PICTURES
 from mitex.textures.march import RadianceField
 
 INTEGRATORS = {"own": "shell", "scene": "lit_shell"}  # by whose light falls on the field
-PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
 def shell_still(
@@ -110,6 +110,6 @@ def render_shell(
         OutputError: unknown suffix or unwritable place, before anything is rendered.
         ConfigError: an option out of range.
     """
-    target = prepare_output(path, PICTURE_SUFFIXES)
+    target = prepare_output(path, PICTURES)
     check_exposure(exposure)
     return write_image(target, tone(shell_still(field, similarity, outline, **options), exposure))

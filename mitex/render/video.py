@@ -18,8 +18,8 @@ from mitex.images import to_bytes
 from mitex.paths import atomic_write, prepare_output
 from mitex.progress import counted
 from mitex.ranges import FRAME_RATES, FRAMES
+from mitex.suffixes import VIDEOS as VIDEO_SUFFIXES
 
-VIDEO_SUFFIXES = (".mp4", ".gif")
 QUALITY = 15  # of H.264: the constant rate factor, of which lower ones look better
 
 

@@ -14,6 +14,7 @@ from mitex.methods.checks import in_range
 from mitex.methods.geometric.cli import TEMPLATE, GrowthOptions
 from mitex.methods.options import field_files
 from mitex.ranges import FRAME_RATES, FRAMES, PIXELS, SAMPLES, SEEDS
+from mitex.suffixes import VIDEOS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -75,10 +76,10 @@ class Animate(GrowthOptions):
         in_range("--fps", self.fps, *FRAME_RATES)
         from mitex.mesh.files import mesh_files
         from mitex.paths import check_writable, prepare_folder, prepare_output
-        from mitex.render import VIDEO_SUFFIXES, check_video, film
+        from mitex.render import check_video, film
 
         inputs = [self.model, *mesh_files(self.mesh), *field_files(self.field)]
-        out = prepare_output(self.out, VIDEO_SUFFIXES, inputs)
+        out = prepare_output(self.out, VIDEOS, inputs)
         check_video(out, self.frames, self.fps, self.resolution)
         if self.meshes is not None:
             check_writable(self.meshes)

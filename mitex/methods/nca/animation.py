@@ -13,10 +13,10 @@ from mitex.methods.nca.arguments import levels, oriented
 from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS
 from mitex.methods.options import field_files
 from mitex.ranges import FRAME_RATES, PIXELS, SAMPLES, SCALES, SEEDS, TURNS, elevations
+from mitex.suffixes import VIDEOS
 
 FADE = 12  # frames over which a loop fades
 SPP = 32  # of the path tracer
-VIDEOS = (".mp4", ".gif")
 
 
 @dataclass(kw_only=True)

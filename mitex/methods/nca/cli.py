@@ -12,9 +12,10 @@ from mitex.errors import ConfigError
 from mitex.methods.checks import in_range, mutually_exclusive, reject_unused
 from mitex.methods.nca.arguments import RESOLUTION, levels, oriented
 from mitex.methods.nca.ranges import BAKED, MOST_STEPS, SPEEDS, TILE_CELLS
-from mitex.methods.options import EXPORTS, PICTURES, DeviceOptions, ReliefOptions, field_files
+from mitex.methods.options import DeviceOptions, ReliefOptions, field_files
 from mitex.methods.words_options import ExemplarOrWordsOptions
 from mitex.ranges import SCALES, SEEDS, TEXELS
+from mitex.suffixes import ASSETS, PICTURES
 from mitex.training.settings import RunSettings
 
 if TYPE_CHECKING:
@@ -220,7 +221,7 @@ class Apply(ReliefOptions):
         for option, used in others.items():
             mutually_exclusive("--tile", option, used)
         place = Path(self.out)
-        reject_unused("--tile", place, place.suffix.lower() in EXPORTS + PICTURES)
+        reject_unused("--tile", place, place.suffix.lower() in ASSETS + PICTURES)
 
     def inputs(self) -> list[Path | str]:
         return [*super().inputs(), *self._looks, *field_files(self.field, self.orientation)]

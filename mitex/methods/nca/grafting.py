@@ -12,9 +12,10 @@ from mitex.methods.checks import in_range, mutually_exclusive, reject_unused
 from mitex.methods.nca import METHOD
 from mitex.methods.nca.arguments import RESOLUTION, levels, oriented
 from mitex.methods.nca.ranges import BAKED, MOST_STEPS, SPEEDS
-from mitex.methods.options import PICTURES, MeshOptions, field_files
+from mitex.methods.options import MeshOptions, field_files
 from mitex.methods.registry import method_of
 from mitex.ranges import SCALES, SEEDS
+from mitex.suffixes import PICTURES
 
 if TYPE_CHECKING:
     from mitex.asset import Asset

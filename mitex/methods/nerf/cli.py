@@ -10,9 +10,10 @@ from tyro.conf import arg
 
 from mitex.methods.checks import in_range, mutually_exclusive, reject_unused
 from mitex.methods.nerf.ranges import DENSITIES, LIFTS
-from mitex.methods.options import PICTURES, FieldOptions, MeshOptions, TrainingOptions
+from mitex.methods.options import FieldOptions, MeshOptions, TrainingOptions
 from mitex.paths import expanded
 from mitex.ranges import SCALES, SEEDS
+from mitex.suffixes import PICTURES
 
 if TYPE_CHECKING:
     from mitex.methods.nerf.use.applied import AppliedTexture
