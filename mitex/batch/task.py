@@ -20,9 +20,8 @@ from mitex.batch.folder import DONE, FAILED, LOG, STARTS, BatchFolder
 from mitex.batch.jobs import Job
 from mitex.batch.process import Process, environment
 from mitex.paths import writing
-from mitex.training.locate import checkpoints
+from mitex.training.locate import METRICS, checkpoints
 
-METRICS = "metrics.jsonl"
 BEAT = 0.5  # between two looks at claim and driver [s]
 RETRIES = 3  # of a job that a signal ended
 INTERRUPTED = 130  # exit code

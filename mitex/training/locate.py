@@ -12,6 +12,7 @@ from mitex.suggestions import suggestion
 
 NAME = "texture.safetensors"  # the result of a fit, in its run folder
 CHECKPOINT = "checkpoint.safetensors"
+METRICS = "metrics.jsonl"
 PREVIOUS = "checkpoint.previous.safetensors"
 BUNDLED = Path(__file__).parents[1] / "data" / "models"
 

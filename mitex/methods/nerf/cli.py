@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tyro.conf import arg
 
 from mitex.methods.checks import in_range, mutually_exclusive, reject_unused
-from mitex.methods.nerf.ranges import DENSITIES, LIFTS
+from mitex.methods.nerf.ranges import DENSITIES, LIFTS, SIZE
 from mitex.methods.options import FieldOptions, MeshOptions, TrainingOptions
 from mitex.paths import expanded
 from mitex.ranges import SCALES, SEEDS
@@ -17,8 +17,6 @@ from mitex.suffixes import PICTURES
 
 if TYPE_CHECKING:
     from mitex.methods.nerf.use.applied import AppliedTexture
-
-SIZE = 2048  # of the synthesized texture [texels]
 
 
 @dataclass(kw_only=True)

@@ -12,7 +12,7 @@ import numpy as np
 import torch
 
 from mitex.asset import Asset
-from mitex.atlas import Atlas, spread
+from mitex.atlas import PADDING, Atlas, spread
 from mitex.geometry.normal_maps import decode
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import rotate_about, unit_normals
@@ -25,8 +25,6 @@ from mitex.methods.surface.domain import SurfaceDomain
 from mitex.training import model_file
 from mitex.training.config import of_record
 from mitex.triples import map_layout
-
-PADDING = 8  # texels by which charts are continued outwards
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +59,7 @@ class SurfaceTexture:
         """
         check_mesh(mesh, self.mesh)
         texels, layout = self.domain.texels, map_layout(self.maps)
-        atlas = Atlas.from_uv(self.domain.uv, texels.resolution, PADDING)
+        atlas = Atlas.from_uv(self.domain.uv, texels.resolution)
         used = texels.image(np.ones((len(self.values), 1), np.float32))[..., 0] > 0
         textures = {}
         for name, channels in layout.items():

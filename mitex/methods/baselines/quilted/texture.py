@@ -75,7 +75,7 @@ class QuiltedTexture:
             along: (3,) direction in the scene that the planes' x follows.
         """
         light = self.about.get("light")
-        shine = None if light is None else partial(_brightness, np.array(light, np.float64))
+        shine = None if light is None else partial(plane_brightness, np.array(light, np.float64))
         return FlatTexture(self.image, self.gap, along, brightness=shine)
 
     def apply(self, mesh: Mesh, *, scale: float = 1.0, resolution: int = 1024) -> Asset:
@@ -103,6 +103,6 @@ class QuiltedTexture:
         return asset_from_textures(mesh, mesh.uv, {"albedo": albedo}, mesh.name)
 
 
-def _brightness(light: np.ndarray, normal: np.ndarray) -> float:
+def plane_brightness(light: np.ndarray, normal: np.ndarray) -> float:
     """How bright a light (16,) makes a plane with this normal (3,)."""
     return float(brightness(light, normal[None])[0])
