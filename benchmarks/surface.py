@@ -79,7 +79,7 @@ def measure(mesh: Mesh, resolution: int, repetitions: int) -> Result:
 
 def _step(network: SurfaceVgg, values: torch.Tensor) -> float:
     start = time.perf_counter()
-    grams = network.read(values, {name: GramTap(network.place(name)) for name in with_poolings(LAYERS)})
+    grams = network.read(values, {name: GramTap(network.index_of(name)) for name in with_poolings(LAYERS)})
     torch.stack([gram.square().mean() for gram in grams.values()]).sum().backward()
     values.grad = None
     return time.perf_counter() - start

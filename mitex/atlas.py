@@ -19,8 +19,9 @@ from mitex.geometry.triangles import interpolate, twice_area
 from mitex.geometry.vectors import scatter_add, unit
 from mitex.mesh import Mesh
 from mitex.progress import announce
+from mitex.ranges import TEXELS
 
-MAX_RESOLUTION = 8192
+PADDING = 8  # texels by which charts are continued outwards, unless something else is said
 LARGE = 40_000  # meshes of more faces are unwrapped in pieces
 HUGE = 150_000  # meshes of more faces are projected: unwrapping takes a minute from here on
 ROUGHNESS = 0.03  # by which vertices are moved before unwrapping [edge lengths], see `_rough`
@@ -127,7 +128,7 @@ class Atlas:
 
     @staticmethod
     def build(
-        mesh: Mesh, resolution: int = 1024, padding: int = 8, layout: np.ndarray | None = None
+        mesh: Mesh, resolution: int = 1024, padding: int = PADDING, layout: np.ndarray | None = None
     ) -> Atlas:
         """Unwraps a mesh, or takes its own UVs if they are usable (`usable_uv`), and rasterizes the texels.
 
@@ -141,10 +142,9 @@ class Atlas:
         Raises:
             ConfigError: resolution or padding out of range.
         """
-        if not 16 <= resolution <= MAX_RESOLUTION:
-            raise ConfigError(
-                f"texture resolution {resolution} is out of range", f"use 16 to {MAX_RESOLUTION}"
-            )
+        least, most = TEXELS
+        if not least <= resolution <= most:
+            raise ConfigError(f"texture resolution {resolution} is out of range", f"use {least} to {most}")
         if not 1 <= padding <= resolution // 8:
             raise ConfigError(f"padding {padding} is out of range", f"use 1 to {resolution // 8} texels")
         uv = laid_out(mesh, resolution, padding).uv if layout is None else layout
@@ -152,7 +152,7 @@ class Atlas:
         return Atlas.from_uv(uv, resolution, padding)
 
     @staticmethod
-    def from_uv(uv: np.ndarray, resolution: int, padding: int = 8) -> Atlas:
+    def from_uv(uv: np.ndarray, resolution: int, padding: int = PADDING) -> Atlas:
         """Rasterizes a given layout; where faces overlap, one of them wins.
 
         Args:
@@ -266,7 +266,7 @@ def _rough(mesh: Mesh) -> np.ndarray:
     return (mesh.vertices + shift * length * mesh.normals).astype(np.float32)
 
 
-def laid_out(mesh: Mesh, resolution: int, padding: int = 8) -> Mesh:
+def laid_out(mesh: Mesh, resolution: int, padding: int = PADDING) -> Mesh:
     """The mesh with UVs that can carry a map: its own if they are usable (`usable_uv`), else new ones.
 
     A mesh that is going to be subdivided is best laid out before: subdivision keeps the UVs, and the coarse

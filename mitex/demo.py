@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from mitex.methods.checks import SEEDS, in_range
+from mitex.methods.checks import in_range
+from mitex.ranges import SEEDS
 
 if TYPE_CHECKING:
     import numpy as np

@@ -13,9 +13,9 @@ from PIL import Image, ImageOps
 
 from mitex.errors import ImageError
 from mitex.paths import atomic_write, prepare_output
+from mitex.suffixes import PICTURES as SUFFIXES
 
 MAX_PIXELS = 64_000_000
-SUFFIXES = (".png", ".jpg", ".jpeg")
 
 # First bytes of what people rename to .png, so that the message can say what it really is.
 _SIGNATURES = (

@@ -6,7 +6,7 @@ the exemplar only if those maps are in register, which ties them together.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,15 @@ MIXES = 12
 CYCLE = ("albedo", "normal", "grey", "mix")
 
 Layout = Mapping[str, tuple[int, ...]]  # name of a map -> its channels in a field
+
+
+def map_layout(maps: Iterable[str]) -> Layout:
+    """The layout of a field whose channels are those of the maps, one map after another."""
+    layout, first = {}, 0
+    for name in maps:
+        layout[name] = tuple(range(first, first + MAPS[name]))
+        first += MAPS[name]
+    return layout
 
 
 @dataclass(frozen=True)

@@ -43,9 +43,9 @@ def zigzag(position: np.ndarray) -> np.ndarray:
     t = BANDS * position[..., 1] + 0.8 * np.abs((TEETH * turn) % 1 - 0.5)
     band, across = np.floor(t).astype(int) % len(PALETTE), t % 1
     relief = np.sqrt(np.sin(np.pi * across).clip(0, 1))  # rounded bands with grooves between them
-    color = PALETTE[band] * (0.35 + 0.65 * relief[..., None])
+    colour = PALETTE[band] * (0.35 + 0.65 * relief[..., None])
     roughness = np.array((0.2, 0.6, 0.35))[band]
-    return np.concatenate((color, roughness[..., None], 0.025 * relief[..., None]), axis=-1)
+    return np.concatenate((colour, roughness[..., None], 0.025 * relief[..., None]), axis=-1)
 
 
 def load_vase() -> mi.Mesh:

@@ -47,8 +47,8 @@ def channels(angles: np.ndarray) -> np.ndarray:
     along, side = np.where(over, (u % 1, v % 1), (v % 1, u % 1))
     height = 0.03 * (0.2 + 0.8 * np.sin(np.pi * along)) * np.sin(np.pi * side) ** 0.4
     strand = np.where(over[:, None], (0.86, 0.55, 0.24), (0.16, 0.42, 0.47))
-    color = strand * (0.3 + 0.7 * (height / height.max())[:, None])
-    return np.column_stack((color, np.where(over, 0.25, 0.6), height)).astype(np.float32)
+    colour = strand * (0.3 + 0.7 * (height / height.max())[:, None])
+    return np.column_stack((colour, np.where(over, 0.25, 0.6), height)).astype(np.float32)
 
 
 def load_ring() -> mi.Mesh:

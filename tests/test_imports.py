@@ -52,6 +52,8 @@ ORDER = [
     "progress",
     "paths",
     "reading",
+    "ranges",
+    "suffixes",
     "suggestions",
     "optional",
     "errors",

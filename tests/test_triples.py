@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mitex.exemplar import Exemplar
-from mitex.triples import ChannelTriple, channel_triples, triple_images
+from mitex.triples import ChannelTriple, channel_triples, map_layout, triple_images
 
 LAYOUT = {
     "albedo": (0, 1, 2),
@@ -17,6 +17,19 @@ LAYOUT = {
 
 def layout(*maps):
     return {name: LAYOUT[name] for name in maps}
+
+
+def test_channels_of_one_map_after_another():
+    packed = map_layout(LAYOUT)
+    assert list(packed) == list(LAYOUT)
+    assert packed == {
+        "albedo": (0, 1, 2),
+        "ambient_occlusion": (3,),
+        "height": (4,),
+        "normal": (5, 6, 7),
+        "roughness": (8,),
+    }
+    assert map_layout(["height", "albedo"]) == {"height": (0,), "albedo": (1, 2, 3)}
 
 
 def test_pictures_of_the_paper():

@@ -30,7 +30,7 @@ from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.surfaces import TrainingSphere
 from mitex.render import sheet
 from mitex.scenes.cameras import patch_views
-from mitex.training import checkpoint
+from mitex.training.locate import has_checkpoint
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 KINDS = {
@@ -50,7 +50,7 @@ def main() -> None:
     cells, labels = [], []
     for name, own in KINDS.items():
         run = runs / name.replace(", ", "-").replace(" ", "-")
-        resume = (run / checkpoint.NAME).is_file()
+        resume = has_checkpoint(run)
         texture = fit(exemplar, run, set=[*settings, *own], resume=resume)
         wide, close = views(texture)
         print(f"| {name} | " + " | ".join(row(texture, run, exemplar, wide)) + " |", flush=True)

@@ -21,7 +21,7 @@ from mitex.methods.baselines.quilted.elevations import compare_elevations
 from mitex.methods.nerf import NerfTexture, load_capture
 from mitex.methods.nerf.field.rendering import render_view, render_views
 from mitex.render import sheet
-from mitex.training import checkpoint
+from mitex.training.locate import has_checkpoint
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 CELL = 320  # side of a picture [px]
@@ -41,7 +41,7 @@ def main() -> None:
             folder,
             preset=about["preset"],
             set=[f"seconds={about['seconds']}"],
-            resume=(folder / checkpoint.NAME).exists(),
+            resume=has_checkpoint(folder),
         )
         held_out = capture.split()[1]
         fields = {"ours": texture.shell, "plain": plain.field}

@@ -29,7 +29,7 @@ from mitex.methods.nca.weights import graft_weights
 from mitex.render import sheet
 from mitex.scenes.cameras import Cameras, patch_views
 from mitex.scenes.stage import Stage
-from mitex.training import checkpoint
+from mitex.training.locate import has_checkpoint
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 VARIANTS = {
@@ -52,7 +52,7 @@ def main() -> None:
     cells, labels = [target], [name]
     for label, own in VARIANTS.items():
         run = runs / label.replace(" ", "-")
-        texture = fit(name, run, set=[*settings, *own], resume=(run / checkpoint.NAME).is_file())
+        texture = fit(name, run, set=[*settings, *own], resume=has_checkpoint(run))
         picture = albedo(texture, mesh, closeup(texture, mesh))
         print(f"| {label} | " + " | ".join(row(texture, run, target, picture)) + " |", flush=True)
         cells.append(picture)

@@ -19,7 +19,8 @@ from mitex.images import write_image
 from mitex.mesh import embedded
 from mitex.methods.nca import PRESETS, NcaTexture, fit
 from mitex.render import still, tone
-from mitex.training import checkpoint, resolve
+from mitex.training import resolve
+from mitex.training.locate import has_checkpoint
 
 RUNS = Path("runs/models")
 MODELS = Path(__file__).parents[1] / "mitex" / "data" / "models"
@@ -82,7 +83,7 @@ def train(name: str, exemplars: Path) -> NcaTexture:
         run,
         set=recipe.settings,
         init=MODELS / f"{recipe.parent}.safetensors" if recipe.parent else None,
-        resume=(run / checkpoint.NAME).is_file(),
+        resume=has_checkpoint(run),
     )
     return NcaTexture(texture.look, {**texture.about, "name": name})
 

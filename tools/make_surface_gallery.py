@@ -33,8 +33,7 @@ from mitex.mesh import Mesh, embedded_names, grid, remesh, subdivide_midpoint, t
 from mitex.mesh.topology import welded
 from mitex.methods import surface
 from mitex.render import sheet, still, tone
-from mitex.training import checkpoint
-from mitex.training.locate import NAME
+from mitex.training.locate import NAME, has_checkpoint
 
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 SIDES = {"scene": (25, 65)}  # azimuths [degrees]
@@ -110,7 +109,7 @@ def texture(exemplar: Exemplar, mesh: Mesh, run: Path, settings: dict[str, str])
     if ends is not None:
         height = mesh.vertices[:, 1]
         scale_map = np.interp(height, (height.min(), height.max()), [float(end) for end in ends.split(":")])
-    resume = (run / checkpoint.NAME).is_file()
+    resume = has_checkpoint(run)
     return surface.fit(
         exemplar, mesh, run, set=overrides, content=content, scale_map=scale_map, resume=resume
     )

@@ -37,7 +37,7 @@ NOISE = 0.04  # that is added to the pieces
 COLUMNS = 6
 
 
-def optimised(model: WordsModel, text: str, seed: int = 0) -> np.ndarray:
+def optimized(model: WordsModel, text: str, seed: int = 0) -> np.ndarray:
     """A picture for a text, (96, 96, 3) sRGB in [0, 1], from noise, by the cosine of random pieces and text.
 
     Its tile is a sum of grids of several sizes, so that the gradient may change what is large as well.
@@ -100,7 +100,7 @@ def main() -> None:
     pictures = []
     for text in options.texts:
         print(text, flush=True)
-        pictures.append(optimised(words_model(), text))
+        pictures.append(optimized(words_model(), text))
     write_image(options.out, sheet(pictures))
 
 

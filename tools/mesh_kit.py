@@ -24,9 +24,9 @@ def smooth_cut(a: np.ndarray, b: np.ndarray, radius: float) -> np.ndarray:
     return -smooth_union(-a, b, radius)
 
 
-def ellipsoid(p: np.ndarray, center: tuple, radii: tuple) -> np.ndarray:
+def ellipsoid(p: np.ndarray, centre: tuple, radii: tuple) -> np.ndarray:
     """First-order distance to an axis-aligned ellipsoid."""
-    q = (p - center) / radii
+    q = (p - centre) / radii
     length = np.linalg.norm(q, axis=1)
     slope = np.linalg.norm(q / radii, axis=1)
     return length * (length - 1.0) / np.maximum(slope, 1e-9)
@@ -56,9 +56,9 @@ def tube(path: np.ndarray, radii: np.ndarray, closed: bool = False) -> Field:
     return field
 
 
-def disc(p: np.ndarray, center: tuple, radius: float, half_height: float, rounding: float) -> np.ndarray:
+def disc(p: np.ndarray, centre: tuple, radius: float, half_height: float, rounding: float) -> np.ndarray:
     """An upright cylinder with rounded edges."""
-    q = p - center
+    q = p - centre
     across = np.hypot(q[:, 0], q[:, 2]) - radius + rounding
     up = np.abs(q[:, 1]) - half_height + rounding
     outside = np.hypot(np.maximum(across, 0.0), np.maximum(up, 0.0))

@@ -12,9 +12,9 @@ from mitex.batch.options import check_options, check_source
 from mitex.errors import ConfigError
 from mitex.methods.registry import methods
 from mitex.paths import expanded
+from mitex.ranges import SEEDS
 from mitex.suggestions import suggestion
 from mitex.training import values
-from mitex.training.settings import LARGEST_SEED
 
 MOST_BYTES = 1 << 20  # of a plan
 Output = Literal["glb", "obj", "ply", "exr", "png", "jpg", "maps", "none"]
@@ -184,9 +184,10 @@ def _check_lists(plan: MethodPlan) -> None:
         raise ConfigError(f"methods.{plan.label} has no exemplars", "name some in the list `exemplars`")
     if method.fits_to_mesh and not plan.meshes:
         raise ConfigError(f"{plan.method} needs meshes", "name some in the list `meshes`")
+    least, most = SEEDS
     for seed in plan.seeds:
-        if not 0 <= seed <= LARGEST_SEED:
-            raise ConfigError(f"seed {seed} is out of range", f"choose from 0 to {LARGEST_SEED}")
+        if not least <= seed <= most:
+            raise ConfigError(f"seed {seed} is out of range", f"choose from {least} to {most}")
 
 
 def _check_first(part: MethodPlan, parts: Sequence[MethodPlan]) -> None:

@@ -20,9 +20,8 @@ from mitex.batch.folder import DONE, FAILED, LOG, STARTS, BatchFolder
 from mitex.batch.jobs import Job
 from mitex.batch.process import Process, environment
 from mitex.paths import writing
-from mitex.training.locate import CHECKPOINT, PREVIOUS
+from mitex.training.locate import METRICS, checkpoints
 
-METRICS = "metrics.jsonl"
 BEAT = 0.5  # between two looks at claim and driver [s]
 RETRIES = 3  # of a job that a signal ended
 INTERRUPTED = 130  # exit code
@@ -101,9 +100,8 @@ class Task:
 
     def _saved(self) -> float | None:
         """When the checkpoint was written from which the job goes on; None if it begins anew."""
-        folder = self.folder.result(self.job)
-        files = [folder / name for name in (CHECKPOINT, PREVIOUS)] if self.job.resumed else []
-        return max((file.stat().st_mtime for file in files if file.is_file()), default=None)
+        files = checkpoints(self.folder.result(self.job)) if self.job.resumed else []
+        return max((file.stat().st_mtime for file in files), default=None)
 
     def _run(self, claim: Claim, resumes: bool) -> tuple[int, int]:
         """Exit code and memory of the job's command, which begins anew without what an earlier one left."""

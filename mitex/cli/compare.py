@@ -10,12 +10,10 @@ from tyro.conf import Positional, UseAppendAction, arg
 
 from mitex.cli.engines import JobOptions, refuse_missing
 from mitex.errors import ConfigError
-from mitex.methods.checks import in_range, mutually_exclusive
+from mitex.methods.checks import mutually_exclusive
 
 if TYPE_CHECKING:
     from mitex.batch import Plan
-
-MOST_SEEDS = 1000
 
 
 @dataclass(kw_only=True)
@@ -70,7 +68,6 @@ class Compare(JobOptions):
 
     def run(self) -> None:
         self.check_jobs()
-        in_range("--seeds", self.seeds, 1, MOST_SEEDS)
         plan = self._plan()
         from mitex.runtime import let_idle_threads_sleep
 
@@ -112,7 +109,9 @@ class Compare(JobOptions):
                 raise ConfigError(f"{option} is missing", "see `mitex compare --help`")
         names = [name for name in (self.methods or "").split(",") if name.strip()]
         settings = [word for words in self.set for word in words]
-        return comparison_plan(self.exemplar, self.mesh, names, seeds=self.seeds or 1, settings=settings)
+        return comparison_plan(
+            self.exemplar, self.mesh, names, seeds=1 if self.seeds is None else self.seeds, settings=settings
+        )
 
     def _named_plan(self) -> Plan:
         if self.plan is not None:

@@ -9,9 +9,8 @@ from typing import Annotated, Any
 from tyro.conf import Positional, arg
 
 from mitex.methods.checks import in_range, reject_unused
-
-STILLS = (".png", ".jpg", ".jpeg", ".exr")
-MOVIES = (".mp4", ".gif")
+from mitex.ranges import DISPLACEMENTS, EXPOSURES, FRAME_RATES, FRAMES, PIXELS, SAMPLES, TURNS, elevations
+from mitex.suffixes import STILLS, VIDEOS
 
 
 @dataclass
@@ -67,8 +66,8 @@ class Render:
         from mitex.mesh.files import mesh_files
         from mitex.paths import prepare_output
 
-        out = prepare_output(self.out, STILLS + MOVIES, inputs=mesh_files(self.asset))
-        moving = out.suffix.lower() in MOVIES
+        out = prepare_output(self.out, STILLS + VIDEOS, inputs=mesh_files(self.asset))
+        moving = out.suffix.lower() in VIDEOS
         reject_unused("--frames", out, not moving and self.frames is not None)
         reject_unused("--fps", out, not moving and self.fps is not None)
         reject_unused("--azimuth", out, moving and self.azimuth is not None)
@@ -90,14 +89,14 @@ class Render:
         print(self.out)
 
     def _check_ranges(self) -> None:
-        in_range("--resolution", self.resolution, 16, 4096)
-        in_range("--spp", self.spp, 1, 65536)
-        in_range("--azimuth", self.azimuth, -360.0, 360.0)
-        in_range("--elevation", self.elevation, -85.0 if self.floating else 0.0, 85.0)
-        in_range("--displacement", self.displacement, -0.5, 0.5)
-        in_range("--exposure", self.exposure, -10.0, 10.0)
-        in_range("--frames", self.frames, 2, 3600)
-        in_range("--fps", self.fps, 1, 60)
+        in_range("--resolution", self.resolution, *PIXELS)
+        in_range("--spp", self.spp, *SAMPLES)
+        in_range("--azimuth", self.azimuth, *TURNS)
+        in_range("--elevation", self.elevation, *elevations(self.floating))
+        in_range("--displacement", self.displacement, *DISPLACEMENTS)
+        in_range("--exposure", self.exposure, *EXPOSURES)
+        in_range("--frames", self.frames, *FRAMES)
+        in_range("--fps", self.fps, *FRAME_RATES)
 
     def _options(self) -> dict[str, Any]:
         """Keyword arguments of `still` and `turntable`; what was not given is left to their defaults."""

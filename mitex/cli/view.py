@@ -84,8 +84,8 @@ class View:
 
     def _texture(self, contents: Callable[..., Content]) -> tuple[Callable[[], Content], Callable[[], Any]]:
         from mitex.mesh import Mesh, icosphere
+        from mitex.training.locate import METRICS
         from mitex.training.metrics import losses
-        from mitex.training.run import METRICS
 
         meshes = [Mesh.load(self.mesh or "vase"), icosphere(SPHERE)]
         run = Path(self.source)

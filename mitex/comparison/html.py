@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import base64
-import io
 from collections.abc import Iterable
 from html import escape
 from importlib.resources import files
 from string import Template
 
-import numpy as np
-from PIL import Image
+from mitex.page import data_url
 
 DASH = "–"
+QUALITY = 92  # of the exemplars' JPEGs
 
 
 def template(name: str) -> Template:
@@ -23,18 +21,6 @@ def template(name: str) -> Template:
 def text_of(name: str) -> str:
     """The text of a file of this package's pages."""
     return files("mitex.comparison").joinpath("pages", name).read_text(encoding="utf-8")
-
-
-def jpeg(image: np.ndarray) -> bytes:
-    """An image (H, W, 3), sRGB in [0, 1], as the bytes of a JPEG file."""
-    stream = io.BytesIO()
-    Image.fromarray(np.round(image.clip(0, 1) * 255).astype(np.uint8)).save(stream, "JPEG", quality=92)
-    return stream.getvalue()
-
-
-def data_url(content: bytes) -> str:
-    """The bytes of a JPEG file as the source of an image."""
-    return f"data:image/jpeg;base64,{base64.b64encode(content).decode()}"
 
 
 def picture(content: bytes, description: str, attributes: str = "") -> str:

@@ -10,12 +10,13 @@ from html import escape
 import numpy as np
 
 from mitex import __version__
-from mitex.comparison.html import DASH, count_text, items, jpeg, picture, template, text_of
+from mitex.comparison.html import DASH, QUALITY, count_text, items, picture, template, text_of
 from mitex.comparison.measures import Measure
 from mitex.comparison.provenance import Provenance
 from mitex.comparison.results import LIT, VIEW, Result, label, title_of
 from mitex.comparison.summary import Summary
 from mitex.comparison.tables import meaning_html, table_html
+from mitex.page import jpeg
 
 FIRST = "Exemplars, meshes and seeds: every method has made the same ones, but where a cell is empty."
 LAST = (
@@ -123,7 +124,7 @@ class Page:
 
     def _exemplar(self, exemplar: str) -> str:
         image = self.exemplars[exemplar]
-        return "" if image is None else picture(jpeg(image), f"exemplar {label(exemplar)}")
+        return "" if image is None else picture(jpeg(image, QUALITY), f"exemplar {label(exemplar)}")
 
     def _look(self, kind: str, results: Sequence[Result]) -> str:
         """A cell with a method's picture of each seed, of which one is shown."""

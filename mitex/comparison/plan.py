@@ -11,6 +11,7 @@ from mitex.batch import MethodPlan, Plan
 from mitex.batch.options import apply_kinds, fit_kinds
 from mitex.comparison.kinds import KINDS, Kind
 from mitex.errors import ConfigError
+from mitex.methods.checks import in_range
 from mitex.methods.layout import EXEMPLAR_WIDTH
 from mitex.methods.registry import methods
 from mitex.suggestions import suggestion
@@ -18,6 +19,7 @@ from mitex.training import values
 
 WIDTH = "exemplar_width"  # option of `mitex apply` of methods whose pattern has another size without it
 SCALES = (WIDTH, "scale")
+MOST_SEEDS = 1000
 
 
 def comparison_plan(
@@ -42,8 +44,6 @@ def comparison_plan(
     Raises:
         ConfigError: An unknown method or key, a value that does not fit, or nothing to do.
     """
-    if not 1 <= seeds <= 1000:
-        raise ConfigError(f"{seeds} seeds", "use 1 to 1000")
     tables: dict[str, dict[str, Any]] = {}
     for name in (name.strip().replace("-", "_") for name in names):
         if name not in methods():
@@ -56,7 +56,7 @@ def comparison_plan(
     content = {
         "exemplars": list(exemplars),
         "meshes": list(meshes),
-        "seeds": list(range(seeds)),
+        "seeds": list(_first_seeds(seeds)),
         "methods": tables,
     }
     return prepared(Plan.of(content, folder))
@@ -76,7 +76,7 @@ def prepared(plan: Plan, seeds: int | None = None) -> Plan:
     kind = KINDS[source_of(plan)]
     parts = tuple(_prepared(part, kind) for part in plan.methods)
     if seeds is not None:
-        parts = tuple(replace(part, seeds=tuple(range(seeds))) for part in parts)
+        parts = tuple(replace(part, seeds=_first_seeds(seeds)) for part in parts)
     return replace(plan, methods=parts)
 
 
@@ -97,6 +97,11 @@ def source_of(plan: Plan) -> str:
         problem = f"methods that learn from a {first.learns_from} are not compared"
         raise ConfigError(problem, f"name some that learn from: {', '.join(KINDS)}")
     return first.learns_from
+
+
+def _first_seeds(count: int) -> tuple[int, ...]:
+    in_range("`seeds`", count, 1, MOST_SEEDS)
+    return tuple(range(count))
 
 
 def _prepared(part: MethodPlan, kind: Kind) -> MethodPlan:

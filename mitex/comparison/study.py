@@ -18,9 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from mitex.batch import Plan
-from mitex.comparison.html import jpeg, template, text_of
+from mitex.comparison.html import QUALITY, template, text_of
 from mitex.comparison.results import LIT, Result
 from mitex.errors import ConfigError
+from mitex.page import jpeg
 from mitex.paths import atomic_write, expanded
 
 PAGE, KEY = "study.html", "study.json"
@@ -101,7 +102,7 @@ def write_study(folder: Path, results: Sequence[Result], exemplars: Mapping[str,
     for exemplar, mesh in dict.fromkeys((r.exemplar, r.mesh) for r in results if r.mesh is not None):
         methods = sorted({method for one, other, method in shown if (one, other) == (exemplar, mesh)})
         if (image := exemplars[exemplar]) is not None:
-            pictures.setdefault(exemplar, jpeg(image))
+            pictures.setdefault(exemplar, jpeg(image, QUALITY))
         for pair in combinations(methods, 2):
             files = [shown[exemplar, mesh, method].pictures[LIT] for method in pair]
             pictures |= {str(file): file.read_bytes() for file in files}
@@ -117,11 +118,11 @@ def _write(folder: Path, asked: Sequence[tuple[Question, list[str]]], pictures: 
     shuffle = random.Random(id)
     asked = shuffle.sample(asked, len(asked))
     names = shuffle.sample(list(pictures), len(pictures))  # so that their places tell nothing either
-    place = {name: k for k, name in enumerate(names)}
+    number = {name: k for k, name in enumerate(names)}
     questions = [
         {
-            "exemplar": place.get(question.exemplar, question.exemplar),
-            "choices": [place[name] for name in choices],
+            "exemplar": number.get(question.exemplar, question.exemplar),
+            "choices": [number[name] for name in choices],
         }
         for question, choices in asked
     ]

@@ -20,6 +20,7 @@ from mitex.page import write_still
 from mitex.paths import expanded, prepare_output
 from mitex.progress import announce
 from mitex.reading import reading
+from mitex.suffixes import ASSETS as SUFFIXES
 
 __all__ = [
     "Format",
@@ -43,7 +44,6 @@ __all__ = [
     "write_views",
 ]
 
-SUFFIXES = (".glb", ".obj", ".ply", ".exr", ".html")
 SLASHES = tuple(filter(None, (os.sep, os.altsep)))
 _WRITERS = {
     ".glb": write_glb,

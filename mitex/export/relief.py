@@ -15,8 +15,8 @@ from mitex.geometry.triangles import twice_area
 from mitex.geometry.vectors import scatter_add
 from mitex.images import bilinear
 from mitex.mesh import Mesh, subdivide_midpoint
+from mitex.ranges import RELIEFS
 
-DEEPEST = 0.5  # relief [radii of the mesh]
 BUMPS = ("height", "normal")  # maps that are on the mesh then
 FACES = 400_000  # that the mesh is split into, about, where its texels are as fine
 
@@ -37,8 +37,9 @@ def embossed(asset: Asset, relief: float, faces: int = FACES) -> Asset:
     Raises:
         ConfigError: there is no height map, or the relief is too deep.
     """
-    if not abs(relief) <= DEEPEST:
-        raise ConfigError(f"a relief of {relief:g} radii", f"use {-DEEPEST:g} to {DEEPEST:g}")
+    least, most = RELIEFS
+    if not least <= relief <= most:
+        raise ConfigError(f"a relief of {relief:g} radii", f"use {least} to {most}")
     asset = asset if asset.texture_maps is not None else asset.baked()
     mesh, height = vertex_heights(asset, faces)
     assert mesh.uv is not None and asset.texture_maps is not None

@@ -65,8 +65,8 @@ def vgg19_convolutions(path: Path | None = None) -> Weights:
     torchvision = "features.0.weight" in tensors
     layers: dict[str, tuple[torch.Tensor, torch.Tensor]] = {}
     inputs = 3
-    for name, place in zip(LAYERS_19, _places(), strict=True):
-        key = f"features.{place}" if torchvision else name.replace("relu", "conv")
+    for name, number in zip(LAYERS_19, _numbers(), strict=True):
+        key = f"features.{number}" if torchvision else name.replace("relu", "conv")
         outputs = CHANNELS[f"{name[:5]}_1"]
         weight, bias = tensors.get(f"{key}.weight"), tensors.get(f"{key}.bias")
         if (
@@ -84,12 +84,12 @@ def vgg19_convolutions(path: Path | None = None) -> Weights:
     return layers
 
 
-def _places() -> list[int]:
+def _numbers() -> list[int]:
     """Numbers of the convolutions in torchvision's list, which counts ReLUs and poolings too."""
-    places, place = [], 0
+    numbers, number = [], 0
     for name in LAYERS_19:
         if name.endswith("_1") and name != "relu1_1":
-            place += 1
-        places.append(place)
-        place += 2
-    return places
+            number += 1
+        numbers.append(number)
+        number += 2
+    return numbers

@@ -22,7 +22,7 @@ class Vertex:
     """Where paths are scattered, and how they go on; all of one width.
 
     Attributes:
-        place: from where.
+        interaction: from where.
         light: that falls on it straight from a source and is reflected along the path.
         direction: in which the path goes on, unit, in the world.
         weight: of what comes from there.
@@ -30,7 +30,7 @@ class Vertex:
         delta: no light source can be drawn in that direction.
     """
 
-    place: mi.Interaction3f
+    interaction: mi.Interaction3f
     light: mi.Spectrum
     direction: mi.Vector3f
     weight: mi.Spectrum
@@ -107,7 +107,7 @@ class LitShellIntegrator(FieldPaths):
                 _replace(vertex, self._in_matter(scene, sampler, ray, t, matter), matter)
             radiance += throughput * vertex.light
             throughput *= dr.select(surface | matter, vertex.weight, 0)
-            start, pdf, delta = vertex.place, vertex.pdf, vertex.delta
+            start, pdf, delta = vertex.interaction, vertex.pdf, vertex.delta
             ray = start.spawn_ray(vertex.direction)
             alive = mi.Bool(dr.max(throughput) > 0)
             dr.eval(ray, radiance, throughput, alive, start, pdf, delta, valid)
@@ -139,23 +139,23 @@ class LitShellIntegrator(FieldPaths):
         """Scattering by the field's reflection at the distances t along rays."""
         solid, phong = self.field.reflection(ray(t), ray.d, active)
         lifted = ray(t) + mi.Point3f(phong.normal * (LIFT * self.field.world_step))
-        place = mi.Interaction3f(t, ray.time, ray.wavelengths, lifted, mi.Normal3f(phong.normal))
+        interaction = mi.Interaction3f(t, ray.time, ray.wavelengths, lifted, mi.Normal3f(phong.normal))
 
         def reflected(direction: mi.Vector3f) -> tuple[mi.Spectrum, mi.Float]:
             value, pdf = phong.eval_pdf(ray.d, direction)
             return mi.Spectrum(value), pdf
 
-        light = self._light(scene, sampler, place, reflected, solid)
+        light = self._light(scene, sampler, interaction, reflected, solid)
         direction = phong.sample(ray.d, sampler.next_1d(solid), sampler.next_2d(solid))
         value, pdf = reflected(direction)
         weight = dr.select(solid & (pdf > 0), value / pdf, 0)
-        return Vertex(place, light, direction, weight, pdf, dr.zeros(mi.Bool, dr.width(solid)))
+        return Vertex(interaction, light, direction, weight, pdf, dr.zeros(mi.Bool, dr.width(solid)))
 
     def _light(
         self,
         scene: mi.Scene,
         sampler: mi.Sampler,
-        place: mi.Interaction3f,
+        interaction: mi.Interaction3f,
         reflected: Callable[[mi.Vector3f], tuple[mi.Spectrum, mi.Float]],
         active: mi.Bool,
     ) -> mi.Spectrum:
@@ -163,7 +163,7 @@ class LitShellIntegrator(FieldPaths):
             t = self.field.flight(ray, sampler.next_1d(active), sampler.next_1d(active), active)
             return dr.select(t < dr.inf, mi.Float(0), 1)
 
-        return sampled_light(scene, place, sampler.next_2d(active), reflected, passing, active)
+        return sampled_light(scene, interaction, sampler.next_2d(active), reflected, passing, active)
 
 
 def _replace(vertex: Vertex, other: Vertex, where: mi.Bool) -> None:

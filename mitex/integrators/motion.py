@@ -124,8 +124,8 @@ class MotionIntegrator(GridIntegrator):
 
 
 def _check_attribute(shape: mi.Mesh, name: str) -> None:
-    places = shape.vertex_count() if name.startswith("vertex_") else shape.face_count()
-    size = dr.width(shape.attribute_buffer(name)) // places
+    count = shape.vertex_count() if name.startswith("vertex_") else shape.face_count()
+    size = dr.width(shape.attribute_buffer(name)) // count
     if size != 3:
         raise ConfigError(
             f"motion: the attribute '{name}' of mesh '{shape.id()}' has {size} numbers each", "give it 3"

@@ -9,7 +9,7 @@ from mitex.runtime.jit import dr, mi
 
 def sampled_light(
     scene: mi.Scene,
-    place: mi.Interaction3f,
+    interaction: mi.Interaction3f,
     sample: mi.Point2f,
     reflected: Callable[[mi.Vector3f], tuple[mi.Spectrum, mi.Float]],
     passing: Callable[[mi.Ray3f, mi.Bool], mi.Float],
@@ -19,18 +19,18 @@ def sampled_light(
 
     Args:
         scene: whose sources and shapes count.
-        place: the vertices.
+        interaction: the vertices.
         sample: uniform numbers in [0, 1).
         reflected: of unit directions towards a source the reflection times the cosine, and the density with
             which it draws them.
         passing: the share of the light that the field lets pass on rays to the source.
         active: which of the vertices get any.
     """
-    ds, weight = scene.sample_emitter_direction(place, sample, True, active)
+    ds, weight = scene.sample_emitter_direction(interaction, sample, True, active)
     active = active & (ds.pdf > 0)
     value, density = reflected(ds.d)
     share = dr.select(ds.delta, 1, power_heuristic(ds.pdf, density))
-    return dr.select(active, value * weight * share * passing(place.spawn_ray_to(ds.p), active), 0)
+    return dr.select(active, value * weight * share * passing(interaction.spawn_ray_to(ds.p), active), 0)
 
 
 def source_met(

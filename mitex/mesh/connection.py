@@ -53,8 +53,8 @@ def connection_laplacian(edges: np.ndarray, carried: np.ndarray, weights: np.nda
     i, j = edges.T
     off, own = -weights * carried[used], np.arange(count)
     values = [off, off.conj(), np.bincount(edges.ravel(), np.repeat(weights, 2), count)]
-    places = np.concatenate([i, j, own]), np.concatenate([j, i, own])
-    return coo_array((np.concatenate(values), places), (count, count)).tocsc()
+    indices = np.concatenate([i, j, own]), np.concatenate([j, i, own])
+    return coo_array((np.concatenate(values), indices), (count, count)).tocsc()
 
 
 def solver(matrix: Any) -> Callable[[np.ndarray], np.ndarray]:

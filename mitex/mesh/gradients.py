@@ -35,5 +35,5 @@ def values_and_gradients(mesh: Mesh) -> Any:
     columns = np.broadcast_to(faces[:, None, :, None], weighted.shape)
     own = np.arange(count)
     entries = np.concatenate([np.ones(count), weighted.ravel()])
-    place = np.concatenate([4 * own, rows.ravel()]), np.concatenate([own, columns.ravel()])
-    return scipy.sparse.csr_array((entries, place), shape=(4 * count, count))
+    indices = np.concatenate([4 * own, rows.ravel()]), np.concatenate([own, columns.ravel()])
+    return scipy.sparse.csr_array((entries, indices), shape=(4 * count, count))

@@ -14,6 +14,7 @@ from mitex.mesh.subdivide import subdivide_midpoint
 from mitex.mesh.validate import validate
 from mitex.optional import optional
 from mitex.progress import announce
+from mitex.ranges import EVEN_VERTICES
 
 ROUNDS = 4  # tries to meet the number of vertices
 CLOSE_ENOUGH = 0.03  # of it, as a logarithm
@@ -41,8 +42,9 @@ def remesh(mesh: Mesh, vertices: int, feature_angle: float = 60.0) -> Mesh:
         MeshError: PyMeshLab failed, or too few vertices are asked for.
         MissingPackage: PyMeshLab is not installed.
     """
-    if vertices < 12:
-        raise MeshError(f"{vertices} vertices are too few for remeshing", "ask for 12 or more")
+    fewest = EVEN_VERTICES[0]
+    if vertices < fewest:
+        raise MeshError(f"{vertices} vertices are too few for remeshing", f"ask for {fewest} or more")
     area = float(mesh.face_areas.sum(dtype=np.float64))
     length = math.sqrt(2.0 * area / (math.sqrt(3.0) * vertices)) / LONGER
     source = mesh

@@ -9,10 +9,7 @@ from typing import Any
 
 from mitex.errors import ConfigError
 from mitex.training.config import by_key
-from mitex.training.settings import LARGEST_SEED
 from mitex.training.values import number_text
-
-SEEDS = (0, LARGEST_SEED)
 
 
 def in_range(option: str, value: float | None, low: float, high: float = math.inf) -> None:

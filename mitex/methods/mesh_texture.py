@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from mitex.asset import Asset
-from mitex.atlas import spread
+from mitex.atlas import PADDING, spread
 from mitex.export.common import asset_from_textures
 from mitex.geometry.conservative import cover
 from mitex.geometry.raster import texel_space
@@ -19,8 +19,6 @@ from mitex.mesh import Mesh
 from mitex.mesh.arrays import mesh_arrays, mesh_of_arrays
 from mitex.methods.layout import check_mesh
 from mitex.training import model_file
-
-PADDING = 8  # texels by which charts are continued outwards
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,22 +9,21 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from mitex.methods.checks import SEEDS, in_range, merged_settings, reject_unused
+from mitex.methods.checks import in_range, merged_settings, reject_unused
+from mitex.ranges import RELIEFS, SEEDS
+from mitex.suffixes import ASSETS, FIELDS, PICTURES
 from mitex.training.settings import RunSettings
 
 if TYPE_CHECKING:
     from mitex.methods.interface import Applied
     from mitex.training.progress import ProgressDisplay
 
-EXPORTS = (".glb", ".obj", ".ply", ".exr", ".html")
-PICTURES = (".png", ".jpg", ".jpeg")
 PICTURE_RESOLUTION = 512  # of a radiance field [pixels]
-FIELD_FILES = (".npy", ".ply", ".json")
 
 
 def field_files(*fields: str | None) -> list[str]:
     """The files that options for vector fields name, if they do."""
-    return [field for field in fields if field and Path(field).suffix.lower() in FIELD_FILES]
+    return [field for field in fields if field and Path(field).suffix.lower() in FIELDS]
 
 
 @dataclass(kw_only=True)
@@ -160,7 +159,7 @@ class ApplyOptions:
         """--out as an absolute path, once it is sure that it can be written."""
         from mitex.export import is_folder, prepare_export
 
-        out = prepare_export(self.out, EXPORTS + PICTURES, self.inputs(), self.maps_format)
+        out = prepare_export(self.out, ASSETS + PICTURES, self.inputs(), self.maps_format)
         reject_unused("--maps-format", out, self.maps_format == "exr" and not is_folder(self.out))
         return out
 
@@ -231,7 +230,7 @@ class ReliefOptions(OptionalMeshOptions):
     mesh]; 0.05 is much."""
 
     def check(self) -> None:
-        in_range("--relief", self.relief, -0.5, 0.5)
+        in_range("--relief", self.relief, *RELIEFS)
 
     def finished(self, applied: Applied) -> Applied:
         if self.relief is None:

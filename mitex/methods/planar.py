@@ -11,13 +11,13 @@ import numpy as np
 import torch
 
 from mitex.asset import Asset
-from mitex.atlas import MAX_RESOLUTION
 from mitex.colour import linear_to_srgb, srgb_to_linear
-from mitex.errors import ConfigError
 from mitex.export.common import asset_from_textures
 from mitex.mesh import Mesh
+from mitex.methods.checks import in_range
 from mitex.methods.layout import with_layout
 from mitex.mip_map import MipMap
+from mitex.ranges import SCALES, TEXELS
 from mitex.training import model_file
 
 CHUNK = 1 << 18  # texels looked up at a time
@@ -82,11 +82,8 @@ class PlanarTexture:
         Raises:
             ConfigError: a number is out of range, or the mesh has no UVs that can be kept.
         """
-        if not 0.05 <= scale <= 20 or not 16 <= resolution <= MAX_RESOLUTION:
-            raise ConfigError(
-                f"a texture of {scale:g} times the size and {resolution} texels",
-                f"use sizes from 0.05 to 20, and 16 to {MAX_RESOLUTION} texels",
-            )
+        in_range("`scale`", scale, *SCALES)
+        in_range("`resolution`", resolution, *TEXELS)
         unwrapped = with_layout(mesh, self.texels, keep_uvs)
         assert unwrapped.uv is not None
         albedo = repeated(self.image, self.texels / scale, resolution)

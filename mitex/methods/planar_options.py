@@ -11,6 +11,7 @@ from tyro.conf import arg
 from mitex.lazy import load
 from mitex.methods.checks import in_range
 from mitex.methods.options import ExemplarOptions, MeshOptions
+from mitex.ranges import SCALES, TEXELS
 
 if TYPE_CHECKING:
     from mitex.methods.interface import Applied
@@ -52,8 +53,12 @@ class PlanarOptions(MeshOptions):
     """Use the mesh's own UVs, which must not overlap."""
 
     def check(self) -> None:
-        in_range("--scale", self.scale, 0.05, 20.0)
-        in_range("--resolution", self.resolution, 16, 8192)
+        in_range("--scale", self.scale, *SCALES)
+        in_range("--resolution", self.resolution, *TEXELS)
+
+    def further(self) -> dict[str, object]:
+        """What a method's `apply` takes beside that."""
+        return {}
 
     def applied(self, out: Path) -> Applied:
         from mitex.mesh import Mesh
@@ -61,4 +66,4 @@ class PlanarOptions(MeshOptions):
 
         texture, mesh = load(self.model), Mesh.load(self.mesh)
         options = {"scale": self.scale, "resolution": self.resolution, "keep_uvs": self.keep_uvs}
-        return texture.apply(mesh, **options)
+        return texture.apply(mesh, **options, **self.further())

@@ -11,8 +11,6 @@ from mitex.atlas import Atlas
 from mitex.export.common import asset_from_textures
 from mitex.mesh import Mesh
 
-PADDING = 8  # texels by which charts are continued outwards
-
 
 def with_colours(
     mesh: Mesh, resolution: int, colours: Callable[[np.ndarray], np.ndarray], name: str
@@ -26,7 +24,7 @@ def with_colours(
         name: of the asset.
     """
     assert mesh.uv is not None
-    atlas = Atlas.from_uv(mesh.uv, resolution, PADDING)
+    atlas = Atlas.from_uv(mesh.uv, resolution)
     used = atlas.face >= 0
     at_texels = colours(atlas.interpolate(mesh.vertices[mesh.faces])[used])
     albedo = np.empty((resolution, resolution, 3), np.float32)

@@ -52,10 +52,10 @@ class Content:
         return replace(self, data={**self.data, **values})
 
 
-def jpeg(picture: np.ndarray) -> bytes:
-    """A picture (H, W, 3), sRGB in [0, 1], as JPEG."""
+def jpeg(picture: np.ndarray, quality: int = QUALITY) -> bytes:
+    """A picture (H, W, 3), sRGB in [0, 1], as the bytes of a JPEG file."""
     buffer = io.BytesIO()
-    Image.fromarray(to_bytes(picture)).save(buffer, "JPEG", quality=QUALITY)
+    Image.fromarray(to_bytes(picture)).save(buffer, "JPEG", quality=quality)
     return buffer.getvalue()
 
 

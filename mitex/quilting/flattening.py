@@ -67,8 +67,8 @@ class Flattening:
     def __init__(self, mesh: Mesh, directions: np.ndarray, reach: float) -> None:
         self.reach = reach
         self.points = mesh.vertices[mesh.faces].astype(np.float64)
-        place = welded(mesh.vertices)
-        self.corners, self.count = place[mesh.faces], int(place.max()) + 1
+        vertex = welded(mesh.vertices)
+        self.corners, self.count = vertex[mesh.faces], int(vertex.max()) + 1
         centre = np.full((len(mesh.faces), 3), 1 / 3)
         self.right, self.up = interpolate_frames(mesh, np.arange(len(mesh.faces)), centre, directions)
         crosses = triangle_crosses(self.points)
@@ -80,9 +80,9 @@ class Flattening:
         # (F, 3, 3) gradients of the functions that are 1 at one corner and 0 at the others.
         self.hats = np.where(solid[:, None, None], hats, 0.0)
         self.around = _vertex_faces(self.corners, self.count)
-        place_of = np.empty((self.count, 3))
-        place_of[place] = mesh.vertices
-        self.graph = edge_lengths(self.corners, place_of)
+        positions = np.empty((self.count, 3))
+        positions[vertex] = mesh.vertices
+        self.graph = edge_lengths(self.corners, positions)
 
     def distances(self) -> np.ndarray:
         """(F,) of the faces from the first face of their connected part, along edges [mesh units]."""
@@ -123,13 +123,13 @@ class Flattening:
                     return self._around_the_point(face, barycentric, *other)
         return self._around_the_point(face, barycentric, *result)
 
-    def turns(self, faces: np.ndarray, place: np.ndarray) -> np.ndarray:
+    def turns(self, faces: np.ndarray, flat: np.ndarray) -> np.ndarray:
         """(K,) [rad] from the field's right to the plane's on faces (K,) whose corners (K, 3, 2) are there.
 
         Counter-clockwise, seen from outside.
         """
         axes = self._axes(faces, self.right[faces])
-        (a, b), (c, d) = self._jacobians(faces, place, axes).transpose(1, 2, 0)
+        (a, b), (c, d) = self._jacobians(faces, flat, axes).transpose(1, 2, 0)
         return np.arctan2(b - c, a + d)
 
     def _surroundings(self, face: int, reach: float) -> _Surroundings:
@@ -163,18 +163,18 @@ class Flattening:
         hats, areas = self.hats[faces], self.areas[faces]
         stiffness = areas[:, None, None] * (hats @ hats.swapaxes(1, 2))
         load = areas[:, None, None] * (hats @ axes)
-        place = _solution(corners, stiffness, load, len(used))[corners]
-        fits = _fits(self._jacobians(faces, place, axes)) & (areas > 0)
+        flat = _solution(corners, stiffness, load, len(used))[corners]
+        fits = _fits(self._jacobians(faces, flat, axes)) & (areas > 0)
         fits &= _connected(corners, fits, int(faces.searchsorted(around.face)))
-        return faces[fits], place[fits]
+        return faces[fits], flat[fits]
 
     def _axes(self, faces: np.ndarray, right: np.ndarray) -> np.ndarray:
         """(N, 3, 2) right (N, 3) and up on the faces."""
         return np.stack([right, np.cross(self.normals[faces], right)], axis=2)
 
-    def _jacobians(self, faces: np.ndarray, place: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    def _jacobians(self, faces: np.ndarray, flat: np.ndarray, axes: np.ndarray) -> np.ndarray:
         """(N, 2, 2) of the plane's coordinates (N, 3, 2) at corners, by those along the axes (N, 3, 2)."""
-        return np.einsum("fka,fkb->fab", place, self.hats[faces] @ axes)
+        return np.einsum("fka,fkb->fab", flat, self.hats[faces] @ axes)
 
     def _torn(self, around: _Surroundings, steps: np.ndarray) -> np.ndarray:
         """(N,) bool, which faces lie where ways around both sides of something meet.
@@ -208,15 +208,15 @@ class Flattening:
         return (jumps > TORN * around.reach).any(1) & (around.faces != around.face)
 
     def _around_the_point(
-        self, face: int, barycentric: np.ndarray, faces: np.ndarray, place: np.ndarray
+        self, face: int, barycentric: np.ndarray, faces: np.ndarray, flat: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """The map with the point at 0; the point's own face as it is, if it did not fit."""
         own = np.flatnonzero(faces == face)
         if not len(own):
             axes = np.stack([self.right[face], self.up[face]], axis=1)
-            faces, place = np.array([face]), (self.points[face] @ axes)[None]
+            faces, flat = np.array([face]), (self.points[face] @ axes)[None]
             own = [0]
-        return faces, place - barycentric @ place[own[0]]
+        return faces, flat - barycentric @ flat[own[0]]
 
 
 def _fits(jacobians: np.ndarray) -> np.ndarray:
@@ -247,8 +247,8 @@ def _solution(corners: np.ndarray, stiffness: np.ndarray, load: np.ndarray, coun
     own = np.arange(count)
     pin = PIN * stiffness.trace(axis1=1, axis2=2).mean()
     entries = np.concatenate([stiffness.ravel(), np.full(count, max(pin, np.finfo(np.float64).tiny))])
-    places = np.concatenate([rows, own]), np.concatenate([columns, own])
-    solve = solver(coo_array((entries, places), shape=(count,) * 2).tocsc())
+    indices = np.concatenate([rows, own]), np.concatenate([columns, own])
+    solve = solver(coo_array((entries, indices), shape=(count,) * 2).tocsc())
     sums = [np.bincount(corners.ravel(), load[..., k].ravel(), count) for k in (0, 1)]
     return np.stack([solve(total) for total in sums], axis=1)
 

@@ -37,19 +37,18 @@ def hull(points: np.ndarray) -> np.ndarray:
         return points
 
 
-def fit_view(points: np.ndarray, elevation: float, fov: float = FOV) -> View:
+def fit_view(points: np.ndarray, elevation: float) -> View:
     """A square view along -z, from `elevation` above, in which all points lie within the margin and touch it.
 
     Args:
         points: (N, 3).
         elevation: of the camera [rad].
-        fov: field of view [rad].
     """
     forward = np.array([0.0, -math.sin(elevation), -math.cos(elevation)])
     up = np.array([0.0, math.cos(elevation), -math.sin(elevation)])
     # Camera coordinates: right, up, and towards the camera.
     local = points.astype(np.float64) @ np.stack([[1.0, 0.0, 0.0], up, -forward], axis=1)
-    slope = math.tan(0.5 * fov) * (1.0 - MARGIN)
+    slope = math.tan(0.5 * FOV) * (1.0 - MARGIN)
     # A point is in the frame if |x - cx| <= slope (d - z). Each side of the frame is therefore one plane, and
     # the outermost point of each fixes two of them per axis: cx and the distance that this axis needs.
     centre, distance = np.zeros(2), np.zeros(2)

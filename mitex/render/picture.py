@@ -14,10 +14,11 @@ from mitex.errors import ConfigError
 from mitex.export.exr import write_exr
 from mitex.images import write_image
 from mitex.paths import prepare_output
+from mitex.ranges import EXPOSURES
 from mitex.render.renderer import OrbitRenderer
 from mitex.render.video import check_video, write_video
+from mitex.suffixes import STILLS as STILL_SUFFIXES
 
-STILL_SUFFIXES = (".png", ".jpg", ".jpeg", ".exr")
 AZIMUTH, ELEVATION = 25.0, 18.0  # [degrees]
 
 
@@ -33,8 +34,9 @@ def tone(linear: np.ndarray, exposure: float = 0.0) -> np.ndarray:
 
 def check_exposure(exposure: float) -> None:
     """Raises a ConfigError if `tone` would refuse an exposure [stops], before anything is rendered."""
-    if not -10.0 <= exposure <= 10.0:
-        raise ConfigError(f"exposure {exposure:g} is out of range", "use -10 to 10 stops")
+    least, most = EXPOSURES
+    if not least <= exposure <= most:
+        raise ConfigError(f"exposure {exposure:g} is out of range", f"use {least:g} to {most:g} stops")
 
 
 def still(

@@ -23,6 +23,7 @@ from mitex.runtime import raise_causes
 
 if TYPE_CHECKING:
     from mitex.runtime.jit import mi
+from mitex.ranges import DISPLACEMENTS, PIXELS, SAMPLES, elevations
 from mitex.runtime.upload import upload
 
 MIN_ROUGHNESS = 0.05
@@ -70,19 +71,20 @@ class OrbitRenderer:
 
         init(needs="ad_rgb")
         check_resolution(resolution)
-        if not -0.5 <= displacement <= 0.5:
-            raise ConfigError(f"displacement {displacement:g} is out of range", "use -0.5 to 0.5")
+        least, most = DISPLACEMENTS
+        if not least <= displacement <= most:
+            raise ConfigError(f"displacement {displacement:g} is out of range", f"use {least} to {most}")
         if displacement and "height" not in asset.vertex_maps:
             raise ConfigError("displacement needs a height map", "leave it out or use a model with height")
         self.resolution = resolution
         self._floating, self._ao = floating, ao
-        _, place = (like or asset.mesh).normalised()
+        _, similarity = (like or asset.mesh).normalised()
         if asset.atlas is None:  # a vertex for each normal, and for each UV
             split = split_at_hard_edges(asset.mesh)
         else:
             split = split_at_seams(asset.mesh, asset.atlas.uv)
-        self._positions, self._normals, self._detail = _surface(asset, split, place, displacement)
-        framed = self._positions if like is None else place.apply(like.vertices)
+        self._positions, self._normals, self._detail = _surface(asset, split, similarity, displacement)
+        framed = self._positions if like is None else similarity.apply(like.vertices)
         self._hull, self._floor = hull(framed), float(framed[:, 1].min())
         material = {"type": "twosided", "bsdf": _bsdf(asset, split, ao)}
         self._scene, self._params = self._build(mesh_shape(asset.mesh, material, smooth=True, split=split))
@@ -166,23 +168,25 @@ class OrbitRenderer:
 
 def check_resolution(resolution: int) -> None:
     """Raises a ConfigError if a picture's side [px] is out of range."""
-    if not 16 <= resolution <= 4096:
-        raise ConfigError(f"a picture of {resolution} pixels is not possible", "use 16 to 4096")
+    least, most = PIXELS
+    if not least <= resolution <= most:
+        raise ConfigError(f"a picture of {resolution} pixels is not possible", f"use {least} to {most}")
 
 
 def check_samples(spp: int) -> None:
     """Raises a ConfigError if the samples per pixel are out of range."""
-    if not 1 <= spp <= 65536:
-        raise ConfigError(f"{spp} samples per pixel are not possible", "use 1 to 65536")
+    least, most = SAMPLES
+    if not least <= spp <= most:
+        raise ConfigError(f"{spp} samples per pixel are not possible", f"use {least} to {most}")
 
 
 def check_elevation(elevation: float, floating: bool) -> None:
     """Raises a ConfigError if a camera at this elevation [degrees] would look from below the floor."""
-    lowest = -85 if floating else 0
-    if not lowest <= elevation <= 85:
+    lowest, highest = elevations(floating)
+    if not lowest <= elevation <= highest:
         raise ConfigError(
             f"camera elevation {elevation:.0f} degrees is out of range",
-            f"use {lowest} to 85" + ("" if floating else ", or `floating=True`"),
+            f"use {lowest:g} to {highest:g}" + ("" if floating else ", or `floating=True`"),
         )
 
 
@@ -190,7 +194,7 @@ def accumulated(scene: mi.Scene, resolution: int, spp: int, seed: int) -> np.nda
     """(N, N, 3) linear radiance of a scene with a film of `sensor`, over white where it is transparent.
 
     Raises:
-        ConfigError: the samples per pixel are not 1 to 65536.
+        ConfigError: the samples per pixel are out of range.
     """
     from mitex.runtime.jit import mi
 
@@ -213,10 +217,10 @@ def accumulated(scene: mi.Scene, resolution: int, spp: int, seed: int) -> np.nda
 
 
 def _surface(
-    asset: Asset, split: HardSplit, place: Similarity, displacement: float
+    asset: Asset, split: HardSplit, similarity: Similarity, displacement: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Positions in the scene, normals and detail normals of the split vertices, (N, 3) float64 each."""
-    mesh, normals = asset.mesh.with_vertices(place.apply(asset.mesh.vertices)), split.normals
+    mesh, normals = asset.mesh.with_vertices(similarity.apply(asset.mesh.vertices)), split.normals
     textured = asset.texture_maps is not None  # relief is the material's then
     detail = normals if textured else asset.detail_normals(split)
     if displacement:

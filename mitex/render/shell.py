@@ -19,10 +19,10 @@ from mitex.render.picture import AZIMUTH, ELEVATION, check_exposure, tone
 from mitex.render.renderer import MAX_DEPTH, accumulated, check_elevation, paper_sweep, sensor
 from mitex.render.studio import lights
 from mitex.runtime.jit import mi
+from mitex.suffixes import PICTURES
 from mitex.textures.march import RadianceField
 
 INTEGRATORS = {"own": "shell", "scene": "lit_shell"}  # by whose light falls on the field
-PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
 def shell_still(
@@ -71,7 +71,7 @@ def shell_still(
 
     centre = outline.mean(0)
     radius = float(np.linalg.norm(outline - centre, axis=1).max())
-    place = Similarity((similarity.center - centre) / radius, similarity.scale / radius)
+    framed = Similarity((similarity.center - centre) / radius, similarity.scale / radius)
     turn = rotation(math.radians(azimuth))
     points = (outline - centre) / radius @ turn.T
     view = fit_view(hull(points), math.radians(elevation))
@@ -80,7 +80,7 @@ def shell_still(
         "type": "scene",
         "integrator": {
             "type": INTEGRATORS[light],
-            "field": shell_field(field, place, turn),
+            "field": shell_field(field, framed, turn),
             "max_depth": MAX_DEPTH,
             "hide_emitters": True,
         },
@@ -110,6 +110,6 @@ def render_shell(
         OutputError: unknown suffix or unwritable place, before anything is rendered.
         ConfigError: an option out of range.
     """
-    target = prepare_output(path, PICTURE_SUFFIXES)
+    target = prepare_output(path, PICTURES)
     check_exposure(exposure)
     return write_image(target, tone(shell_still(field, similarity, outline, **options), exposure))

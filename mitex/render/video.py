@@ -17,8 +17,9 @@ from mitex.errors import ConfigError, OutputError
 from mitex.images import to_bytes
 from mitex.paths import atomic_write, prepare_output
 from mitex.progress import counted
+from mitex.ranges import FRAME_RATES, FRAMES
+from mitex.suffixes import VIDEOS as VIDEO_SUFFIXES
 
-VIDEO_SUFFIXES = (".mp4", ".gif")
 QUALITY = 15  # of H.264: the constant rate factor, of which lower ones look better
 
 
@@ -30,9 +31,11 @@ def check_video(path: str | os.PathLike[str], frames: int, fps: int, resolution:
         ConfigError: a number out of range, or an odd side [px] for .mp4.
     """
     target = prepare_output(path, VIDEO_SUFFIXES)
-    if not 2 <= frames <= 3600 or not 1 <= fps <= 60:
+    (fewest, most), (slowest, fastest) = FRAMES, FRAME_RATES
+    if not fewest <= frames <= most or not slowest <= fps <= fastest:
         raise ConfigError(
-            f"a video of {frames} frames at {fps} per second is not possible", "use 2 to 3600 at 1 to 60"
+            f"a video of {frames} frames at {fps} per second is not possible",
+            f"use {fewest} to {most} at {slowest} to {fastest}",
         )
     if target.suffix.lower() == ".mp4" and resolution % 2:
         raise ConfigError(f"MP4 needs an even size, not {resolution}", f"use {resolution + 1}")

@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from mitex.errors import ConfigError
+from mitex.ranges import SEEDS
 
 if TYPE_CHECKING:
     import torch
@@ -18,8 +19,9 @@ def seed_everything(seed: int) -> torch.Generator:
     Raises:
         ConfigError: `seed` is not in [0, 2**32).
     """
-    if not 0 <= seed < 2**32:
-        raise ConfigError(f"seed {seed} is out of range", "use a whole number from 0 to 4294967295")
+    least, most = SEEDS
+    if not least <= seed <= most:
+        raise ConfigError(f"seed {seed} is out of range", f"use a whole number from {least} to {most}")
     torch = import_module("torch")
     random.seed(seed)
     import_module("numpy").random.seed(seed)

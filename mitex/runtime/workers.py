@@ -62,7 +62,7 @@ def let_idle_threads_sleep() -> None:
 def use_one_blas_thread() -> None:
     """Lets OpenBLAS, which NumPy and SciPy multiply with, use one thread.
 
-    Its threads spin until all have done their part of a product. A sparse factorization has many small
+    Its threads spin until all have done their part of a product. A sparse factorisation has many small
     products: beside another program on two cores, one of 165,199 unknowns took 206 s instead of 5. Alone it
     gains nothing from a second thread. Large products are torch's here.
     To be called before NumPy is imported, later it has no effect; OPENBLAS_NUM_THREADS and OMP_NUM_THREADS

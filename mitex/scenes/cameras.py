@@ -235,10 +235,10 @@ def patch_views(
     point = interpolate(weight, mesh.vertices[mesh.faces[face]].astype(np.float64))
     normal = unit(interpolate(weight, mesh.normals[mesh.faces[face]].astype(np.float64)))
 
-    center = 0.5 * (mesh.vertices.min(0) + mesh.vertices.max(0)).astype(np.float64)
-    radius = np.linalg.norm(mesh.vertices - center, axis=1).max()
+    centre = 0.5 * (mesh.vertices.min(0) + mesh.vertices.max(0)).astype(np.float64)
+    radius = np.linalg.norm(mesh.vertices - centre, axis=1).max()
     # Beyond the bounding sphere whatever the normal is, and not much further: float32 depth stays precise.
-    distance = np.linalg.norm(point - center, axis=1) + 1.01 * radius + 1e-3
+    distance = np.linalg.norm(point - centre, axis=1) + 1.01 * radius + 1e-3
     near_pole = np.abs(normal[:, 1]) > math.cos(math.radians(1))
     up = np.where(near_pole[:, None], (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     if directions is not None:

@@ -29,7 +29,7 @@ class Visibility:
     empty in the background.
 
     The barycentrics are those of the ray's hit point on the triangle, that is, perspective-correct. The
-    authors' rasteriser interpolates affinely in the image; the two differ by the relative depth range of a
+    authors' rasterizer interpolates affinely in the image; the two differ by the relative depth range of a
     triangle (under 1 % of a pixel's weights on the training sphere) and agree for orthographic cameras.
 
     Attributes:

@@ -89,7 +89,7 @@ class TexelField(FieldMethods):
             callback.put("charts", self.charts, mi.ParamFlags.NonDifferentiable)
 
     def parameters_changed(self, keys: Sequence[str] = ()) -> None:
-        if not keys or "charts" in keys:  # not for every step of an optimisation
+        if not keys or "charts" in keys:  # not for every step of an optimization
             self._chart = self._charts()
         self._check()
 

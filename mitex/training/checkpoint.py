@@ -19,7 +19,7 @@ from mitex.paths import atomic_write
 from mitex.reading import reading
 from mitex.training import model_file
 from mitex.training.locate import CHECKPOINT as NAME
-from mitex.training.locate import PREVIOUS
+from mitex.training.locate import PREVIOUS, checkpoints
 
 FORMAT = "1"
 
@@ -95,10 +95,7 @@ def load(folder: Path) -> Checkpoint:
         CheckpointError: There is none, or none is readable.
     """
     problems = []
-    for name in (NAME, PREVIOUS):
-        path = folder / name
-        if not path.exists():
-            continue
+    for path in checkpoints(folder):
         try:
             checkpoint = read(path)
         except CheckpointError as e:

@@ -9,8 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from mitex.errors import CheckpointError
-from mitex.training import checkpoint
-from mitex.training.locate import header
+from mitex.training.locate import checkpoints, header
 
 KEY = "_key"
 
@@ -25,8 +24,8 @@ def check_inputs(folder: Path, metadata: Mapping[str, str]) -> None:
     Raises:
         CheckpointError: as `refuse_other_inputs`.
     """
-    for name in (checkpoint.NAME, checkpoint.PREVIOUS):
-        if head := header(folder / name):
+    for path in checkpoints(folder):
+        if head := header(path):
             _, texts = head
             start = "task."
             return refuse_other_inputs(

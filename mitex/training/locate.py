@@ -12,6 +12,7 @@ from mitex.suggestions import suggestion
 
 NAME = "texture.safetensors"  # the result of a fit, in its run folder
 CHECKPOINT = "checkpoint.safetensors"
+METRICS = "metrics.jsonl"
 PREVIOUS = "checkpoint.previous.safetensors"
 BUNDLED = Path(__file__).parents[1] / "data" / "models"
 
@@ -21,9 +22,14 @@ def bundled_files() -> dict[str, Path]:
     return {path.stem: path for path in sorted(BUNDLED.glob("*.safetensors"))}
 
 
+def checkpoints(folder: Path) -> list[Path]:
+    """The checkpoints in a run folder, the newest first."""
+    return [folder / name for name in (CHECKPOINT, PREVIOUS) if (folder / name).is_file()]
+
+
 def has_checkpoint(folder: Path) -> bool:
     """Whether the run in a folder can go on: one killed as it saves leaves only the previous checkpoint."""
-    return any((folder / name).is_file() for name in (CHECKPOINT, PREVIOUS))
+    return bool(checkpoints(folder))
 
 
 def locate(source: str | Path) -> list[Path]:
@@ -35,7 +41,8 @@ def locate(source: str | Path) -> list[Path]:
     path = expanded(source)
     try:
         if path.is_dir():
-            files = [path / name for name in (NAME, CHECKPOINT, PREVIOUS) if (path / name).is_file()]
+            texture = path / NAME
+            files = [*([texture] if texture.is_file() else []), *checkpoints(path)]
             if not files:
                 raise CheckpointError(
                     f"there is no model in '{source}'", "name a run folder that has a checkpoint"

@@ -13,13 +13,12 @@ from typing import Any
 from mitex import __version__
 from mitex.errors import CheckpointError, OutputError
 from mitex.paths import atomic_write, check_writable, expanded, is_temporary, missing_folders, prepare_folder
+from mitex.training.locate import METRICS, has_checkpoint
 from mitex.training.locate import NAME as RESULT
-from mitex.training.locate import has_checkpoint
 from mitex.training.metrics import Metrics
 from mitex.training.toml import to_toml
 
 CONFIG = "config.toml"
-METRICS = "metrics.jsonl"
 PREVIEWS = "previews"
 DIVERGED = "diverged.json"
 

@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypedDict, get_args, get_origin
 
 from mitex.errors import ConfigError
+from mitex.ranges import SEEDS
 from mitex.training import values
 from mitex.training.control import Cancel, Progress
-
-LARGEST_SEED = 2**32 - 1
 
 
 class RunSettings(TypedDict, total=False):
@@ -70,7 +69,7 @@ class FitConfig:
     """
 
     preset: str = key("default", "the preset that the settings started from")
-    seed: int = key(0, "of all randomness", 0, LARGEST_SEED)
+    seed: int = key(0, "of all randomness", *SEEDS)
 
     def __post_init__(self) -> None:
         kinds = typing.get_type_hints(type(self))

@@ -66,7 +66,7 @@ def test_damaged_files(damage, picture, tmp_path):
 
 @pytest.mark.parametrize("options", [{"scale": 0.01}, {"scale": 21}, {"resolution": 8}, {"resolution": 9000}])
 def test_numbers_out_of_range(options, picture):
-    with pytest.raises(ConfigError, match="use sizes from"):
+    with pytest.raises(ConfigError, match=f"`{next(iter(options))}` .* is out of range"):
         GatysTexture(picture, 8).apply(icosphere(4), **options)
 
 

@@ -223,8 +223,8 @@ def test_slope_of_the_nearest_texel_is_zero(mi, rng, uv):
 
 def ramp(slope: tuple[float, float], side: int = 64) -> np.ndarray:
     """(N, N, 1) slope . (x, y) on the quad of the tests, where u = (x + 1) / 2."""
-    center = (np.arange(side) + 0.5) / side * 2 - 1
-    return (slope[0] * center[None, :] - slope[1] * center[:, None])[..., None]
+    centre = (np.arange(side) + 0.5) / side * 2 - 1
+    return (slope[0] * centre[None, :] - slope[1] * centre[:, None])[..., None]
 
 
 def test_reflectance_decodes_srgb(mi, points):
@@ -312,8 +312,8 @@ def feature_scene(mi, texture: dict, antialias: int, size: int = 12):
 def test_feature_images_all_channels_with_their_adjoint(mi, rng, charts, antialias: int):
     """Through the bridge: picture and gradient equal the averaged slow weights and their transpose."""
     size, n = 12, antialias
-    center = (np.arange(size * n) + 0.5) / (size * n)
-    u, v = np.meshgrid(center, 1 - center)
+    centre = (np.arange(size * n) + 0.5) / (size * n)
+    u, v = np.meshgrid(centre, 1 - centre)
     weights = slow_weights((6, 9), np.stack((u, v), axis=-1).reshape(-1, 2), charts)
     weights = weights.reshape(size, n, size, n, 54).mean(axis=(1, 3))
     data = rng.uniform(0, 1, (6, 9, 5))

@@ -16,6 +16,7 @@ from mitex.batch.engines import Engine, WorkerLost
 from mitex.batch.process import cores
 from mitex.batch.task import Outcome, Task
 from mitex.errors import ConfigError, RuntimeUnavailable
+from mitex.optional import optional
 
 PATIENCE = 10.0  # with a scheduler that does not answer [s]
 NO_LIMIT = 1_000_000
@@ -38,14 +39,8 @@ class Dask(Engine):
         self.threads = max(1, cores() // jobs)
 
     def __enter__(self) -> Dask:
-        try:
-            import dask.config
-            import distributed
-        except ImportError as e:
-            raise RuntimeUnavailable(
-                f"Dask is not installed ({e})", "run `pip install 'mitex[cluster]'`"
-            ) from e
-        dask.config.set(SETTINGS)
+        optional("dask.config", "cluster").set(SETTINGS)
+        distributed = optional("distributed", "cluster")
         self._cluster = None if self._address else self._local_cluster(distributed)
         try:
             self._client = distributed.Client(self._cluster or self._address, timeout=PATIENCE)

@@ -15,6 +15,7 @@ from typing import Any
 from mitex.batch.engines import Engine, WorkerLost
 from mitex.batch.task import Outcome, Task, end_processes
 from mitex.errors import ConfigError, RuntimeUnavailable
+from mitex.optional import optional
 
 FOLDER = "slurm"  # of what submitit keeps, in the batch folder
 MINUTES = 24 * 60  # that a job may take, if nobody says otherwise
@@ -52,13 +53,7 @@ class Slurm(Engine):
         return _Queued(self._executor.submit(Requeueable(task)))
 
     def _opened(self, folder: Path) -> Any:
-        try:
-            import submitit
-        except ImportError as e:
-            raise RuntimeUnavailable(
-                f"submitit is not installed ({e})", "run `pip install 'mitex[cluster]'`"
-            ) from e
-        executor = submitit.AutoExecutor(folder, cluster=self._cluster)
+        executor = optional("submitit", "cluster").AutoExecutor(folder, cluster=self._cluster)
         try:
             executor.update_parameters(
                 timeout_min=MINUTES, cpus_per_task=self.threads, stderr_to_stdout=True, **self._options

@@ -11,8 +11,8 @@ from mitex.mesh.fields.strokes import read_strokes, stroke_vectors
 from mitex.mesh.mesh import Mesh
 from mitex.mesh.vertex_files import read_array, read_properties
 from mitex.paths import expanded
+from mitex.suffixes import FIELDS as SUFFIXES
 
-SUFFIXES = (".npy", ".ply", ".json")
 PROPERTIES = (("vx", "vy", "vz"), ("fx", "fy", "fz"), ("u", "v", "w"))  # of a PLY file's vertices
 MEANING = "vectors"
 

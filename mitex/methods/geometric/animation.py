@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
-from mitex.methods.checks import SEEDS, in_range
+from mitex.methods.checks import in_range
 from mitex.methods.geometric.cli import TEMPLATE, GrowthOptions
 from mitex.methods.options import field_files
+from mitex.ranges import FRAME_RATES, FRAMES, PIXELS, SAMPLES, SEEDS
+from mitex.suffixes import VIDEOS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -68,16 +70,16 @@ class Animate(GrowthOptions):
         self.check_growth(self.mesh)
         in_range("--seed", self.seed, *SEEDS)
         in_range("--to-seed", self.to_seed, *SEEDS)
-        in_range("--frames", self.frames, 2, 3600)
-        in_range("--resolution", self.resolution, 16, 4096)
-        in_range("--spp", self.spp, 1, 65536)
-        in_range("--fps", self.fps, 1, 60)
+        in_range("--frames", self.frames, *FRAMES)
+        in_range("--resolution", self.resolution, *PIXELS)
+        in_range("--spp", self.spp, *SAMPLES)
+        in_range("--fps", self.fps, *FRAME_RATES)
         from mitex.mesh.files import mesh_files
         from mitex.paths import check_writable, prepare_folder, prepare_output
-        from mitex.render import VIDEO_SUFFIXES, check_video, film
+        from mitex.render import check_video, film
 
         inputs = [self.model, *mesh_files(self.mesh), *field_files(self.field)]
-        out = prepare_output(self.out, VIDEO_SUFFIXES, inputs)
+        out = prepare_output(self.out, VIDEOS, inputs)
         check_video(out, self.frames, self.fps, self.resolution)
         if self.meshes is not None:
             check_writable(self.meshes)

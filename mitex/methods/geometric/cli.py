@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import arg
 
 from mitex.errors import ConfigError
-from mitex.methods.checks import SEEDS, in_range, mutually_exclusive
-from mitex.methods.geometric.config import Placement
+from mitex.methods.checks import in_range, mutually_exclusive
+from mitex.methods.geometric.config import MAX_LEVELS, Placement
 from mitex.methods.options import DeviceOptions, MeshOptions, field_files
+from mitex.ranges import EVEN_VERTICES, SEEDS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -90,9 +91,9 @@ class GrowthOptions:
     back dents that would meet in thin walls; or leave that to the generators, as published."""
 
     def check_growth(self, mesh: str) -> None:
-        in_range("--start-level", self.start_level, 0, 6)
-        in_range("--end-level", self.end_level, 0, 6)
-        in_range("--remesh", self.remesh, 12, 2_000_000)
+        in_range("--start-level", self.start_level, 0, MAX_LEVELS - 1)
+        in_range("--end-level", self.end_level, 0, MAX_LEVELS - 1)
+        in_range("--remesh", self.remesh, *EVEN_VERTICES)
         for option, given in (("--field", self.field), ("--remesh", self.remesh)):
             mutually_exclusive("--mesh template", option, mesh == TEMPLATE and given is not None)
 

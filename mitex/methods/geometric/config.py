@@ -31,7 +31,7 @@ class GeometricConfig(DeviceConfig):
     symmetric: bool = key(False, "whether the relief looks alike from both ends of its field")
     # Levels 0 to 2 have networks of different widths, see `model.WIDTHS`.
     carried: int = key(3, "first level whose networks start from those of the level before", 3, MAX_LEVELS)
-    fit_steps: int = key(600, "of the optimisation of each training mesh", 1)
+    fit_steps: int = key(600, "of the optimization of each training mesh", 1)
     fit_samples: int = key(3_000, "points on each surface, times the level's number + 1", 100, 1_000_000)
     fit_lr: float = key(0.02, "how far a step moves a vertex [mean edges]", 0, 1)
     fit_normals: float = key(0.1, "weight of the normals beside the distances, in both directions", 0)

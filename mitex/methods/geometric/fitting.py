@@ -68,7 +68,7 @@ def fit(
     run = Run.of(PRESETS, out, **options)
     config = run.config
     shape = reference if isinstance(reference, Mesh) else find_reference(reference)
-    template = Mesh.load(template) if isinstance(template, str | Path) else template
+    template = None if template is None else Mesh.of(template)
     if field is None and config.symmetric:
         raise ConfigError("a relief without a `field` has no ends that look alike", "leave `symmetric` out")
     vectors = None if field is None else vector_field(shape, field)

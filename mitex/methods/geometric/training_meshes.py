@@ -40,7 +40,7 @@ def fit_level(
 
 
 class Fitting:
-    """The optimisation of one level.
+    """The optimization of one level.
 
     Args:
         graph: of the faces of the mesh that is fitted.

@@ -8,14 +8,15 @@ from typing import Annotated, Any, Literal
 from tyro.conf import Positional, arg
 
 from mitex.errors import ConfigError
-from mitex.methods.checks import SEEDS, in_range
+from mitex.methods.checks import in_range
 from mitex.methods.nca.arguments import levels, oriented
 from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS
 from mitex.methods.options import field_files
+from mitex.ranges import FRAME_RATES, PIXELS, SAMPLES, SCALES, SEEDS, TURNS, elevations
+from mitex.suffixes import VIDEOS
 
 FADE = 12  # frames over which a loop fades
 SPP = 32  # of the path tracer
-VIDEOS = (".mp4", ".gif")
 
 
 @dataclass(kw_only=True)
@@ -154,17 +155,17 @@ class Animate:
     def _check(self) -> None:
         levels(self.subdivide)
         in_range("--seconds", self.seconds, 0.0, 3600.0)
-        in_range("--fps", self.fps, 1, 60)
+        in_range("--fps", self.fps, *FRAME_RATES)
         in_range("--steps-per-frame", self.steps_per_frame, 1, MOST_STEPS)
         in_range("--start", self.start, 0, MOST_STEPS)
-        in_range("--resolution", self.resolution, 16, 4096)
-        in_range("--spp", self.spp, 1, 65536)
-        in_range("--azimuth", self.azimuth, -360.0, 360.0)
-        in_range("--elevation", self.elevation, -85.0 if self.renderer == "preview" else 0.0, 85.0)
+        in_range("--resolution", self.resolution, *PIXELS)
+        in_range("--spp", self.spp, *SAMPLES)
+        in_range("--azimuth", self.azimuth, *TURNS)
+        in_range("--elevation", self.elevation, *elevations(self.renderer == "preview"))
         in_range("--damage-at", self.damage_at, 0.0, 3600.0)
         in_range("--seed", self.seed, *SEEDS)
         oriented(self.orientation)
-        in_range("--scale", self.scale, 0.05, 20.0)
+        in_range("--scale", self.scale, *SCALES)
         in_range("--speed", self.speed, *SPEEDS)
         for option, needed, alone in (
             ("--spp", "--renderer path", self.spp is not None and self.renderer != "path"),

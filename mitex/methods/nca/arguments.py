@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import in_range
+from mitex.ranges import TURNS
 
 RESOLUTION = 1024  # of baked textures [texels]
 
@@ -18,7 +19,7 @@ def oriented(orientation: str) -> float | str:
         angle = float(orientation)
     except ValueError:
         return orientation
-    in_range("--orientation", angle, -360.0, 360.0)
+    in_range("--orientation", angle, *TURNS)
     return angle
 
 

@@ -16,7 +16,9 @@ from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh, remesh, subdivide_loop, subdivide_midpoint
 from mitex.mesh.nearest import nearest_points
 from mitex.mesh.subdivide import child_points
+from mitex.methods.checks import in_range
 from mitex.methods.layout import RESOLUTION, layout_side, with_layout
+from mitex.ranges import EVEN_VERTICES, SCALES
 
 ENOUGH_VERTICES = 8_000  # "auto" subdivides until a mesh has them: the training has 10,242
 MOST_LEVELS = 6
@@ -44,7 +46,7 @@ class Cells:
         fine = subdivide_midpoint(mesh, levels)
         if scale == 1.0:
             return Cells(fine, levels, mesh)
-        return Cells(remesh(fine, max(int(len(fine.vertices) / scale**2), 12)), None, mesh)
+        return Cells(remesh(fine, max(int(len(fine.vertices) / scale**2), EVEN_VERTICES[0])), None, mesh)
 
     @staticmethod
     def dense(mesh: Mesh, subdivide: int | str = "auto", scale: float = 1.0) -> Cells:
@@ -52,7 +54,7 @@ class Cells:
         levels = check(mesh, subdivide, scale)
         fine = subdivide_loop(mesh, levels)
         if scale != 1.0:
-            fine = remesh(fine, max(int(len(fine.vertices) / scale**2), 12))
+            fine = remesh(fine, max(int(len(fine.vertices) / scale**2), EVEN_VERTICES[0]))
         return Cells(fine, 0, fine)
 
     def locate(self, face: np.ndarray, barycentric: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -94,8 +96,7 @@ def check(mesh: Mesh, subdivide: int | str, scale: float) -> int:
         levels = subdivide if isinstance(subdivide, int) else -1
     if not 0 <= levels <= MOST_LEVELS:
         raise ConfigError(f"subdivide = {subdivide}", f"use 'auto' or 0 to {MOST_LEVELS}")
-    if not 0.05 <= scale <= 20:
-        raise ConfigError(f"scale = {scale:g}", "use 0.05 to 20")
+    in_range("`scale`", scale, *SCALES)
     if len(mesh.vertices) * 4**levels * max(1 / scale**2, 1) > MOST_VERTICES:
         raise ConfigError(f"a mesh of more than {MOST_VERTICES:,} vertices", "subdivide less")
     return levels

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from tyro.conf import arg
 
 from mitex.errors import ConfigError
-from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
+from mitex.methods.checks import in_range, mutually_exclusive, reject_unused
 from mitex.methods.nca.arguments import RESOLUTION, levels, oriented
-from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS, TILE_CELLS, TILE_SIDES
-from mitex.methods.options import EXPORTS, PICTURES, DeviceOptions, ReliefOptions, field_files
+from mitex.methods.nca.ranges import BAKED, MOST_STEPS, SPEEDS, TILE_CELLS
+from mitex.methods.options import DeviceOptions, ReliefOptions, field_files
 from mitex.methods.words_options import ExemplarOrWordsOptions
+from mitex.ranges import SCALES, SEEDS, TEXELS
+from mitex.suffixes import ASSETS, PICTURES
 from mitex.training.settings import RunSettings
 
 if TYPE_CHECKING:
@@ -180,11 +182,11 @@ class Apply(ReliefOptions):
         in_range("--seed", self.seed + self.variants - 1, *SEEDS)
         in_range("--steps", self.steps, 1, MOST_STEPS)
         oriented(self.orientation)
-        in_range("--scale", self.scale, 0.05, 20.0)
+        in_range("--scale", self.scale, *SCALES)
         in_range("--exemplar-width", self.exemplar_width, 1e-3, 100.0)
         mutually_exclusive("--exemplar-width", "--scale", self.exemplar_width is not None and self.scale != 1)
         in_range("--speed", self.speed, *SPEEDS)
-        in_range("--resolution", self.resolution, 64, 8192)
+        in_range("--resolution", self.resolution, *BAKED)
         mutually_exclusive(
             "--resolution", "--vertex-colors", self.resolution is not None and self.vertex_colors
         )
@@ -200,7 +202,7 @@ class Apply(ReliefOptions):
             if self.tile_cells is not None:
                 raise ConfigError("--tile-cells means nothing without --tile", "give both or neither")
             return
-        in_range("--tile", self.tile, *TILE_SIDES)
+        in_range("--tile", self.tile, *TEXELS)
         in_range("--tile-cells", self.tile_cells, *TILE_CELLS)
         others = {
             "--mesh": self.mesh is not None,
@@ -219,7 +221,7 @@ class Apply(ReliefOptions):
         for option, used in others.items():
             mutually_exclusive("--tile", option, used)
         place = Path(self.out)
-        reject_unused("--tile", place, place.suffix.lower() in EXPORTS + PICTURES)
+        reject_unused("--tile", place, place.suffix.lower() in ASSETS + PICTURES)
 
     def inputs(self) -> list[Path | str]:
         return [*super().inputs(), *self._looks, *field_files(self.field, self.orientation)]

@@ -31,7 +31,6 @@ from mitex.render.recording import Recording
 from mitex.render.renderer import check_elevation, check_resolution, check_samples
 from mitex.runtime import keep_freed_memory
 
-PADDING = 8  # of the charts of a baked frame [texels]
 OF_THE_FILM = ("seconds", "loop")  # what no single picture follows from
 
 
@@ -231,7 +230,7 @@ class TracedCamera:
 
     def __init__(self, mesh: Mesh, shooting: Shooting) -> None:
         self._shooting = shooting
-        self._atlas = Atlas.build(mesh, shooting.texels, PADDING, mesh.uv)
+        self._atlas = Atlas.build(mesh, shooting.texels, layout=mesh.uv)
         self._renderer: OrbitRenderer | None = None
 
     def picture(self, grown: Grown) -> np.ndarray:

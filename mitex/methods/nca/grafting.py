@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, arg
 
 from mitex.errors import ConfigError
-from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
+from mitex.methods.checks import in_range, mutually_exclusive, reject_unused
 from mitex.methods.nca import METHOD
 from mitex.methods.nca.arguments import RESOLUTION, levels, oriented
-from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS
-from mitex.methods.options import PICTURES, MeshOptions, field_files
+from mitex.methods.nca.ranges import BAKED, MOST_STEPS, SPEEDS
+from mitex.methods.options import MeshOptions, field_files
 from mitex.methods.registry import method_of
+from mitex.ranges import SCALES, SEEDS
+from mitex.suffixes import PICTURES
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
@@ -77,9 +79,9 @@ class Grafted(MeshOptions):
         in_range("--seed", self.seed, *SEEDS)
         in_range("--steps", self.steps, 1, MOST_STEPS)
         oriented(self.orientation)
-        in_range("--scale", self.scale, 0.05, 20.0)
+        in_range("--scale", self.scale, *SCALES)
         in_range("--speed", self.speed, *SPEEDS)
-        in_range("--resolution", self.resolution, 64, 8192)
+        in_range("--resolution", self.resolution, *BAKED)
         mutually_exclusive(
             "--resolution", "--vertex-colors", self.resolution is not None and self.vertex_colors
         )

@@ -17,9 +17,9 @@ from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.motion.condition import WIDTH
 from mitex.methods.nca.perception import Perception
-from mitex.methods.nca.targets import value_layout
 from mitex.progress import announce
 from mitex.textures.interpolation import Kind
+from mitex.triples import map_layout
 
 RATE = 0.02  # at which the bounds follow a step's
 MARGIN = 0.05  # of the bounds' distance, which states of other meshes may have beyond
@@ -53,7 +53,7 @@ class Look(nn.Module):
     ) -> None:
         super().__init__()
         self.rule, self.maps, self.mean = rule, tuple(maps), mean
-        self.layout = value_layout(maps)
+        self.layout = map_layout(maps)
         # Between which a trained rule's states stay; the authors' demo holds them in [-1, 1].
         self.register_buffer("low", torch.full((rule.channels,), -1.0))
         self.register_buffer("high", torch.full((rule.channels,), 1.0))

@@ -9,7 +9,7 @@ from mitex.errors import CheckpointError
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.look import Look, differing_traits
 from mitex.training.fit import Run
-from mitex.training.locate import CHECKPOINT, PREVIOUS, header
+from mitex.training.locate import checkpoints, header
 
 
 def fitting_lineage(parent: Look, about: Mapping[str, Any], look: Look) -> dict[str, str]:
@@ -31,6 +31,6 @@ def resumed_lineage(run: Run[NcaConfig]) -> dict[str, str]:
     """What a run that is resumed has begun from."""
     if not run.resume or run.folder is None:
         return {}
-    heads = [head for name in (CHECKPOINT, PREVIOUS) if (head := header(run.folder / name))]
+    heads = [head for path in checkpoints(run.folder) if (head := header(path))]
     texts = heads[0][1] if heads else {}
     return {key: texts[f"task.{key}"] for key in ("parent", "family") if f"task.{key}" in texts}

@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 import torch
 import torch.nn.functional as F
 
-from mitex.exemplar import MAPS, Exemplar
+from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
 from mitex.triples import ChannelTriple, Layout, triple_images
 
 MOST = 1 << 15  # feature vectors kept of a picture and layer
-
-
-def value_layout(maps: Iterable[str]) -> dict[str, tuple[int, ...]]:
-    """Where the values of decoded points hold the maps: name -> columns, in the maps' order."""
-    layout, column = {}, 0
-    for name in maps:
-        layout[name] = tuple(range(column, column + MAPS[name]))
-        column += MAPS[name]
-    return layout
 
 
 class Targets:

@@ -14,12 +14,13 @@ from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.surface import decoder_units
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.palette import Palette
-from mitex.methods.nca.ranges import TILE_CELLS, TILE_SIDES
+from mitex.methods.nca.ranges import TILE_CELLS
+from mitex.ranges import TEXELS
 
 
 def flat_cells(cells: int, resolution: int) -> Lattice:
     """The lattice of an automaton for maps of a resolution; arguments and errors as of `NcaTexture.tile`."""
-    for name, value, (low, high) in (("cells", cells, TILE_CELLS), ("pixels", resolution, TILE_SIDES)):
+    for name, value, (low, high) in (("cells", cells, TILE_CELLS), ("pixels", resolution, TEXELS)):
         if not low <= value <= high:
             raise ConfigError(f"a tile of {value} {name} along a side", f"use {low} to {high}")
     return Lattice.of(cells)

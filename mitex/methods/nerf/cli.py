@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import arg
 
-from mitex.methods.checks import SEEDS, in_range, mutually_exclusive, reject_unused
-from mitex.methods.options import PICTURES, FieldOptions, MeshOptions, TrainingOptions
+from mitex.methods.checks import in_range, mutually_exclusive, reject_unused
+from mitex.methods.nerf.ranges import DENSITIES, LIFTS, SIZE
+from mitex.methods.options import FieldOptions, MeshOptions, TrainingOptions
 from mitex.paths import expanded
+from mitex.ranges import SCALES, SEEDS
+from mitex.suffixes import PICTURES
 
 if TYPE_CHECKING:
     from mitex.methods.nerf.use.applied import AppliedTexture
-
-SIZE = 2048  # of the synthesized texture [texels]
 
 
 @dataclass(kw_only=True)
@@ -94,10 +95,10 @@ class Apply(FieldOptions, MeshOptions):
     def check(self) -> None:
         super().check()
         in_range("--seed", self.seed, *SEEDS)
-        in_range("--scale", self.scale, 0.05, 20.0)
+        in_range("--scale", self.scale, *SCALES)
         in_range("--size", self.size, 128, 8192)
-        in_range("--density", self.density, 0.001, 1000.0)
-        in_range("--lift", self.lift, 0.0, 1.0)
+        in_range("--density", self.density, *DENSITIES)
+        in_range("--lift", self.lift, *LIFTS)
         on_surface = self.quilting == "surface"
         mutually_exclusive("--quilting surface", "--guide", on_surface and self.guide is not None)
         mutually_exclusive("--size", "--guide", self.size is not None and self.guide is not None)

@@ -53,9 +53,8 @@ def fit(
     run = Run.of(PRESETS, out, **options)
     config = run.config
     photos = capture if isinstance(capture, Capture) else load_capture(capture)
-    if isinstance(base_mesh, str | Path):
-        base_mesh = Mesh.load(base_mesh)
     if base_mesh is not None:
+        base_mesh = Mesh.of(base_mesh)
         base_mesh = base_mesh.with_vertices(photos.similarity.apply(base_mesh.vertices))
     init(needs="ad")
     keep_freed_memory()

@@ -21,6 +21,7 @@ from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.field.rendering import render_step
 from mitex.methods.nerf.field.shell import CapturedLatents, Shell
 from mitex.methods.nerf.field.tensors import channels
+from mitex.methods.nerf.ranges import SIZE
 from mitex.methods.nerf.synthesis.maps import LatentMaps, angles_of, latent_maps
 from mitex.methods.nerf.synthesis.patch_images import render_patches
 from mitex.methods.nerf.synthesis.patches import (
@@ -52,7 +53,6 @@ from mitex.runtime import init
 from mitex.runtime.jit import mi
 from mitex.runtime.upload import upload
 
-SIZE = 2048  # side of a synthesized texture [texels]
 BLOCK = PATCH // 16  # a guide is compared with patches in 16 x 16 blocks
 DEEPEST = 2.0  # percentile of the scan's distances that counts as the ground
 

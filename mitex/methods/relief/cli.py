@@ -10,6 +10,7 @@ from tyro.conf import arg
 
 from mitex.methods.checks import in_range
 from mitex.methods.options import ExemplarOptions, OptionalMeshOptions
+from mitex.ranges import SCALES
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
@@ -47,7 +48,7 @@ class Fit(ExemplarOptions):
     """Use the mesh's own UVs, which must not overlap."""
 
     def run(self) -> None:
-        in_range("--scale", self.scale, 0.05, 20.0)
+        in_range("--scale", self.scale, *SCALES)
         in_range("--depth", self.depth, 0.0, 1.0)
         options = self.run_options(scale=self.scale, depth=self.depth)
         from mitex.exemplar import Exemplar

@@ -8,6 +8,7 @@ from typing import Any, Literal
 from mitex.features.layers import check_layers
 from mitex.methods.surface.config import DEFAULT as SURFACE
 from mitex.methods.surface.config import SurfaceConfig
+from mitex.ranges import SCALES
 from mitex.training.settings import TrainingConfig, key
 
 
@@ -21,7 +22,7 @@ class ReliefConfig(TrainingConfig):
         "begin with maps that surface synthesizes, or with the mesh as it is, without colours",
     )
     resolution: int = key(SURFACE.resolution, "side of the maps [texels]", 16, 4096)
-    scale: float = key(1.0, "size of the pattern, as of surface", 0.05, 20)
+    scale: float = key(1.0, "size of the pattern, as of surface", *SCALES)
     surface_steps: int = key(SURFACE.steps, "steps of surface", 1)
     faces: int = key(200_000, "of the relief, about; at most twice as many", 1, 2_000_000)
     depth: float = key(

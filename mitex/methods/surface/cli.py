@@ -12,6 +12,7 @@ from mitex.errors import ConfigError
 from mitex.methods.checks import in_range, mutually_exclusive
 from mitex.methods.options import ReliefOptions
 from mitex.methods.words_options import ExemplarOrWordsOptions
+from mitex.ranges import SCALES
 from mitex.training.settings import RunSettings
 
 if TYPE_CHECKING:
@@ -132,7 +133,7 @@ class Fit(ExemplarOrWordsOptions):
 
     def _check_tile(self) -> None:
         in_range("--tile", self.tile, *TILE_SIDES)
-        in_range("--scale", self.scale, 0.05, 20.0)
+        in_range("--scale", self.scale, *SCALES)
         if self.mesh is None and self.tile is None:
             raise ConfigError("--mesh is missing", "give --mesh MESH, or --tile N for a texture that repeats")
         others = {

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 
 from mitex.exemplar import Exemplar
+from mitex.triples import Layout
 
 TYPICAL_SPREAD = 0.15  # standard deviation of an exemplar's channels
 MIN_SPREAD = 0.1  # of the largest: so much is left to directions in which the exemplar does not vary
@@ -31,7 +31,7 @@ class ColourSpace:
     basis: torch.Tensor
 
     @staticmethod
-    def of(exemplar: Exemplar, layout: Mapping[str, tuple[int, ...]]) -> ColourSpace:
+    def of(exemplar: Exemplar, layout: Layout) -> ColourSpace:
         """Principal components of an exemplar's pixels, as long as their standard deviations."""
         size = sum(map(len, layout.values()))
         pixels = np.empty((size, np.prod(exemplar.size)))

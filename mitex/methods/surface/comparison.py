@@ -82,7 +82,9 @@ class GramComparison:
         ]
 
     def taps(self, network: SurfaceVgg, generator: torch.Generator) -> dict[str, GramTap]:
-        return {layer: GramTap(network.place(layer), self._regions(network, layer)) for layer in self.layers}
+        return {
+            layer: GramTap(network.index_of(layer), self._regions(network, layer)) for layer in self.layers
+        }
 
     def _regions(self, network: SurfaceVgg, layer: str) -> list[torch.Tensor] | None:
         if self.region is None:
@@ -127,7 +129,7 @@ class TransportComparison:
 
     def taps(self, network: SurfaceVgg, generator: torch.Generator) -> dict[str, Tap]:
         return {
-            layer: Tap(network.place(layer), self._places(network.counts[layer], generator)[None])
+            layer: Tap(network.index_of(layer), self._places(network.counts[layer], generator)[None])
             for layer in self.layers
         }
 

@@ -10,6 +10,7 @@ from mitex.features.layers import LAYERS, LAYERS_19, with_poolings
 from mitex.methods.layout import EXEMPLAR_WIDTH
 from mitex.methods.wording import CLIP, EMBEDDED
 from mitex.methods.words_config import WordsConfig, check_words
+from mitex.ranges import SCALES
 from mitex.training.settings import TrainingConfig, key
 
 WORDS = (CLIP, EMBEDDED)  # presets for words
@@ -24,7 +25,7 @@ class TexelConfig(TrainingConfig):
     steps: int = 60
     resolution: int = key(512, "side of the texture [texels]", 1, 4096)
     scale: float = key(
-        1.0, "size of the pattern, beside that at which exemplar_size is the exemplar's side", 0.05, 20
+        1.0, "size of the pattern, beside that at which exemplar_size is the exemplar's side", *SCALES
     )
     exemplar_size: int = key(
         0,

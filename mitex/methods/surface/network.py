@@ -66,7 +66,7 @@ class SurfaceVgg:
 
     def features(self, texels: torch.Tensor, layers: Iterable[str]) -> dict[str, torch.Tensor]:
         """Layer -> (n, C) float32 of texel colours (N, 3), sRGB in [0, 1], in the order of `Levels`."""
-        return self.read(texels, {name: Tap(self.place(name)) for name in layers})
+        return self.read(texels, {name: Tap(self.index_of(name)) for name in layers})
 
     def read(self, texels: torch.Tensor, taps: Mapping[str, Tap | GramTap]) -> dict[str, torch.Tensor]:
         """What taps give of texel colours, under their names, in one pass."""
@@ -77,7 +77,7 @@ class SurfaceVgg:
         centred = texels * 255 - torch.tensor(MEAN_RGB)
         return dict(zip(taps, FrozenStack.apply(centred, self.operations[:depth], outputs), strict=True))
 
-    def place(self, layer: str) -> int:
+    def index_of(self, layer: str) -> int:
         """The operation that gives a layer.
 
         Raises:

@@ -7,8 +7,6 @@ patches do not fit. So patches are laid first, and the synthesis mends what lies
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from mitex.atlas import spread
@@ -20,6 +18,7 @@ from mitex.progress import announce
 from mitex.quilting.matching import BLOCK
 from mitex.quilting.picture import PictureSource
 from mitex.quilting.surface import quilt_on
+from mitex.triples import Layout
 
 PLACES = 40  # that patches are taken from, along a side of the exemplar, about
 STEP = 2 * BLOCK  # sides of patches are multiples of it [px]
@@ -38,7 +37,7 @@ def patch_side(share: float, exemplar: int, texture: int) -> int:
 
 
 def joined_patches(
-    exemplar: Exemplar, layout: Mapping[str, tuple[int, ...]], domain: SurfaceDomain, config: SurfaceConfig
+    exemplar: Exemplar, layout: Layout, domain: SurfaceDomain, config: SurfaceConfig
 ) -> np.ndarray:
     """(N, C) float32 in [0, 1] at the texels: patches of the exemplar, laid over the surface.
 

@@ -23,7 +23,6 @@ from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.palette import Palette
 from mitex.methods.surface.patches import joined_patches
-from mitex.methods.surface.texture import texel_layout
 from mitex.methods.surface.views import Views
 from mitex.methods.surface.weights import network_weights
 from mitex.methods.surface.words import Words
@@ -32,7 +31,7 @@ from mitex.runtime import keep_freed_memory
 from mitex.sparse import csr_tensor
 from mitex.training import ParameterTask, Step
 from mitex.training.optim import multistep
-from mitex.triples import CYCLE, channel_triples, triple_images
+from mitex.triples import CYCLE, channel_triples, map_layout, triple_images
 
 VIEW = 384  # side of a preview's images [px]
 CONTENT = "content"
@@ -77,9 +76,9 @@ class SurfaceTask(ParameterTask):
         keep_freed_memory()
         self.config, self.exemplar, self.domain, self.levels = config, exemplar, domain, domain.levels
         self.inputs, self.views, self.words = dict(inputs or {}), Views(domain, VIEW), words
-        maps = ["albedo"] if exemplar is None else list(exemplar.maps)
+        maps = ["albedo"] if exemplar is None else sorted(exemplar.maps)
         _check_maps(config, maps, content is not None, words is not None)
-        self.layout = texel_layout(maps)
+        self.layout = map_layout(maps)
         self.triples = channel_triples(self.layout, True, config.seed)
         generator = torch.Generator().manual_seed(config.seed)
         self.space = self._space()
@@ -135,7 +134,7 @@ class SurfaceTask(ParameterTask):
         comparison = self.comparisons[scale] if self.comparisons else None
         taps = dict(comparison.taps(network, generator)) if comparison else {}
         if self.content:
-            taps[CONTENT] = Tap(network.place(self.config.content_layer))
+            taps[CONTENT] = Tap(network.index_of(self.config.content_layer))
         features, cost = network.read(colours, taps), torch.zeros(())
         if self.content:
             difference = features.pop(CONTENT) - self.content[scale]

@@ -15,13 +15,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from mitex.atlas import MAX_RESOLUTION
 from mitex.errors import ConfigError, MeshError
 from mitex.geometry.conservative import FLAT, cover, nearest_points
 from mitex.geometry.raster import texel_space
 from mitex.geometry.triangles import interpolate, twice_area
 from mitex.mesh import Mesh
 from mitex.mesh.topology import face_edges, welded
+from mitex.ranges import TEXELS
 
 CHUNK = 1 << 17  # points that are looked at together: a megabyte per array stays in the cache
 NO_WEIGHT = 1e-6  # bilinear weights below are rounding: a point on a texel centre reads that texel alone
@@ -189,10 +189,10 @@ class Texels:
 
 def charts(mesh: Mesh, uv: np.ndarray) -> np.ndarray:
     """(F,) int32 UV chart of each face of a layout (F, 3, 2), numbered by their first faces; see `Texels`."""
-    place = welded(mesh.vertices)[mesh.faces].ravel()
+    vertex = welded(mesh.vertices)[mesh.faces].ravel()
     pairs = np.ascontiguousarray(uv.reshape(-1, 2) + np.float32(0.0)).view(np.int64)[:, 0]  # -0.0 becomes 0.0
     distinct, point = np.unique(pairs, return_inverse=True)
-    _, corner = np.unique(place * len(distinct) + point, return_inverse=True)
+    _, corner = np.unique(vertex * len(distinct) + point, return_inverse=True)
     edges, sides = face_edges(corner.reshape(-1, 3), int(corner.max()) + 1)
     count = len(mesh.faces)
     face = np.repeat(np.arange(count), 3)
@@ -202,8 +202,9 @@ def charts(mesh: Mesh, uv: np.ndarray) -> np.ndarray:
 
 
 def _check(mesh: Mesh, uv: np.ndarray, resolution: int) -> None:
-    if not 1 <= resolution <= MAX_RESOLUTION:
-        raise ConfigError(f"texture resolution {resolution} is out of range", f"use 1 to {MAX_RESOLUTION}")
+    most = TEXELS[1]
+    if not 1 <= resolution <= most:
+        raise ConfigError(f"texture resolution {resolution} is out of range", f"use 1 to {most}")
     if uv.shape != (len(mesh.faces), 3, 2):
         problem = f"UVs of shape {uv.shape} for {len(mesh.faces)} faces"
         raise ConfigError(problem, "give one pair per face corner, (F, 3, 2)")

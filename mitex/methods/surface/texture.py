@@ -12,8 +12,7 @@ import numpy as np
 import torch
 
 from mitex.asset import Asset
-from mitex.atlas import Atlas, spread
-from mitex.exemplar import MAPS
+from mitex.atlas import PADDING, Atlas, spread
 from mitex.geometry.normal_maps import decode
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import rotate_about, unit_normals
@@ -25,17 +24,7 @@ from mitex.methods.surface.config import SurfaceConfig
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.training import model_file
 from mitex.training.config import of_record
-
-PADDING = 8  # texels by which charts are continued outwards
-
-
-def texel_layout(maps: list[str]) -> dict[str, tuple[int, ...]]:
-    """Where texels hold the maps: name -> channels, in alphabetical order."""
-    layout, first = {}, 0
-    for name in sorted(maps):
-        layout[name] = tuple(range(first, first + MAPS[name]))
-        first += MAPS[name]
-    return layout
+from mitex.triples import map_layout
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +33,8 @@ class SurfaceTexture:
 
     Attributes:
         domain: the mesh with the UVs of the texture, and its texels.
-        values: (N, C) float32 in [0, 1], the maps' channels by `texel_layout`, in the order of the texels.
-        maps: their names.
+        values: (N, C) float32 in [0, 1], the channels of one map after another, in the order of the texels.
+        maps: their names, in that order.
         about: how it was made; the domain's `resolution`, `frames` and `angle` [degrees] at least.
     """
 
@@ -69,8 +58,8 @@ class SurfaceTexture:
             ConfigError: it is another mesh: a surface texture belongs to the mesh it was synthesized on.
         """
         check_mesh(mesh, self.mesh)
-        texels, layout = self.domain.texels, texel_layout(list(self.maps))
-        atlas = Atlas.from_uv(self.domain.uv, texels.resolution, PADDING)
+        texels, layout = self.domain.texels, map_layout(self.maps)
+        atlas = Atlas.from_uv(self.domain.uv, texels.resolution)
         used = texels.image(np.ones((len(self.values), 1), np.float32))[..., 0] > 0
         textures = {}
         for name, channels in layout.items():
@@ -111,7 +100,7 @@ class SurfaceTexture:
             orientation = arrays.get("orientation")
             domain = SurfaceDomain(mesh, config.resolution, config.frames, config.angle, orientation)
             values, maps = arrays["values"].astype(np.float32), tuple(about["maps"])
-            channels = sum(map(len, texel_layout(list(maps)).values()))
+            channels = sum(map(len, map_layout(maps).values()))
             if values.shape != (len(domain.texels.index), channels):
                 raise ValueError("texels or channels are missing")
             return cls(domain, values, maps, about)

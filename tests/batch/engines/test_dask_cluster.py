@@ -9,7 +9,7 @@ import pytest
 
 from mitex.batch import Event, status
 from mitex.batch.engines.dask_cluster import Dask
-from mitex.errors import RuntimeUnavailable
+from mitex.errors import MissingPackage, RuntimeUnavailable
 
 CLUSTER = """
 import time
@@ -74,3 +74,9 @@ def test_the_scheduler_is_killed(workshop, plan, wait_for, monkeypatch):
             workshop.run(plan, engine=engine, on_event=on_event)
     assert workshop.run(plan).count("done") == 4
     check_all_is_there(workshop, plan, monkeypatch)
+
+
+def test_without_dask(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(MissingPackage, match=r"distributed.*; run `pip install 'mitex\[cluster\]'`"), Dask():
+        pass

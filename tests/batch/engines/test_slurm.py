@@ -2,11 +2,12 @@
 
 import os
 import signal
+import sys
 
 import pytest
 
 from mitex.batch.engines.slurm import Slurm
-from mitex.errors import ConfigError, RuntimeUnavailable
+from mitex.errors import ConfigError, MissingPackage, RuntimeUnavailable
 
 STEPS = 8
 
@@ -36,6 +37,12 @@ def test_options_are_those_of_sbatch(monkeypatch, tmp_path):
     assert (parameters["partition"], parameters["time"], parameters["cpus_per_task"]) == ("cpu", 90, 3)
     with pytest.raises(ConfigError, match="submitit refuses"):
         Slurm(["partitoin=cpu"])._opened(tmp_path)
+
+
+def test_without_submitit(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "submitit", None)
+    with pytest.raises(MissingPackage, match=r"submitit.*; run `pip install 'mitex\[cluster\]'`"):
+        Slurm()._opened(tmp_path)
 
 
 def test_without_slurm(workshop):

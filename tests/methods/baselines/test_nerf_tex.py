@@ -403,12 +403,12 @@ def test_what_is_solid_is_around_the_mesh(run_folder):
 @pytest.mark.parametrize(
     ("options", "why"),
     [
-        ({"scale": 0.01}, "of 0.01 times the size"),
-        ({"scale": math.nan}, "times the size"),
-        ({"spacing": 0.05}, "0.05 sides apart"),
-        ({"tilt": 50.0}, "leaning by 50 degrees"),
-        ({"lift": 2.0}, "lifted by 2"),
-        ({"density": 0.0}, "of 0 times the density"),
+        ({"scale": 0.01}, "`scale` 0.01 is out of range"),
+        ({"scale": math.nan}, "`scale` nan is out of range"),
+        ({"spacing": 0.05}, "`spacing` 0.05 is out of range"),
+        ({"tilt": 50.0}, "`tilt` 50 is out of range"),
+        ({"lift": 2.0}, "`lift` 2 is out of range"),
+        ({"density": 0.0}, "`density` 0 is out of range"),
     ],
 )
 def test_options_out_of_range_are_refused(run_folder, options, why):

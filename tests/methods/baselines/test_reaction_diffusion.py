@@ -252,7 +252,7 @@ class TestTexture:
         "options", [{"scale": 0.01}, {"resolution": 8}, {"steps": -1}, {"steps": 20_000}]
     )
     def test_numbers_out_of_range(self, options):
-        with pytest.raises(ConfigError, match="use sizes from"):
+        with pytest.raises(ConfigError, match=f"`{next(iter(options))}` .* is out of range"):
             texture().apply(icosphere(4), **options)
 
     def test_too_many_cells(self):

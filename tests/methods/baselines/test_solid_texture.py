@@ -290,7 +290,7 @@ class TestRefused:
 
     def test_numbers(self, generator):
         texture = SolidTexture(generator, 32, 0.5)
-        with pytest.raises(ConfigError, match="sizes from"):
+        with pytest.raises(ConfigError, match="`scale` .* is out of range"):
             texture.apply(icosphere(2), scale=100)
         with pytest.raises(ConfigError, match="larger scale"):
             texture.at(np.random.default_rng(0).uniform(0, 1e6, (30_000, 3)))

@@ -9,8 +9,8 @@ from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
 from mitex.features.vgg import MEAN_ACTIVATION
 from mitex.methods.nca.appearance import Appearance, _places
-from mitex.methods.nca.targets import Targets, value_layout
-from mitex.triples import channel_triples, triple_images
+from mitex.methods.nca.targets import Targets
+from mitex.triples import channel_triples, map_layout, triple_images
 from tests.losses import authors
 from tests.methods.nca.tiny import config
 
@@ -34,14 +34,14 @@ def albedo(exemplar):
 
 
 def _appearance(exemplar, network, settings):
-    layout = value_layout(sorted(exemplar.maps))
+    layout = map_layout(sorted(exemplar.maps))
     pictures = channel_triples(layout, settings.blend, 0)
     return Appearance(settings, Targets(exemplar, pictures, layout, network, settings.layers), network)
 
 
 def _pictures(appearance, exemplar):
     """What the features of the targets are of, (P, H, W, 3)."""
-    layout = value_layout(sorted(exemplar.maps))
+    layout = map_layout(sorted(exemplar.maps))
     return torch.from_numpy(triple_images(exemplar, appearance.targets.pictures, layout))
 
 

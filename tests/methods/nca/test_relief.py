@@ -6,9 +6,9 @@ import torch
 
 from mitex.exemplar import Exemplar
 from mitex.methods.nca.relief import Relief
-from mitex.methods.nca.targets import value_layout
+from mitex.triples import map_layout
 
-LAYOUT = value_layout(["albedo", "height", "normal"])
+LAYOUT = map_layout(["albedo", "height", "normal"])
 
 
 @pytest.fixture(scope="module")

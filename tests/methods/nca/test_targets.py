@@ -11,8 +11,8 @@ from mitex.methods.nca.decoder.decoder import Readout
 from mitex.methods.nca.decoder.surface import Points, Surface
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.model import MeshNCA
-from mitex.methods.nca.targets import MOST, Targets, enlarged, value_layout
-from mitex.triples import channel_triples
+from mitex.methods.nca.targets import MOST, Targets, enlarged
+from mitex.triples import channel_triples, map_layout
 
 ALL = ["albedo", "ambient_occlusion", "height", "normal", "roughness"]
 
@@ -25,20 +25,6 @@ def network():
 @pytest.fixture(scope="module")
 def scales():
     return Exemplar.load("scales").resized(32)
-
-
-def test_columns_of_the_values():
-    """One after another, in the order of the maps."""
-    layout = value_layout(ALL)
-    assert list(layout) == ALL
-    assert layout == {
-        "albedo": (0, 1, 2),
-        "ambient_occlusion": (3,),
-        "height": (4,),
-        "normal": (5, 6, 7),
-        "roughness": (8,),
-    }
-    assert value_layout(["height", "albedo"]) == {"height": (0,), "albedo": (1, 2, 3)}
 
 
 def test_values_of_a_state_without_a_decoder():
@@ -56,7 +42,7 @@ def test_values_of_a_state_without_a_decoder():
 
 
 def test_targets_read_the_features_of_the_pictures(network, scales):
-    layout = value_layout(ALL)
+    layout = map_layout(ALL)
     pictures = channel_triples(layout, True, 0)[:4]
     targets = Targets(scales, pictures, layout, network, ("relu1_1", "relu3_1"))
     grey = torch.from_numpy(
@@ -78,7 +64,7 @@ def test_of_a_large_exemplar_some_vectors_are_kept(network):
     """Each once, from everywhere."""
     side = 192
     ramp = np.arange(side * side, dtype=np.float32).reshape(side, side, 1) / side**2
-    layout = value_layout(["height"])
+    layout = map_layout(["height"])
     targets = Targets(
         Exemplar({"height": ramp}), channel_triples(layout, True, 0), layout, network, ("relu1_1",)
     )

@@ -5,7 +5,7 @@ import torch
 
 from mitex.exemplar import Exemplar
 from mitex.methods.surface.colour_space import MIN_SPREAD, ColourSpace
-from mitex.methods.surface.texture import texel_layout
+from mitex.triples import map_layout
 
 
 def exemplar():
@@ -18,7 +18,7 @@ def exemplar():
 
 def test_the_exemplar_is_white_but_for_the_floor():
     picture = exemplar()
-    layout = texel_layout(list(picture.maps))
+    layout = map_layout(list(picture.maps))
     space = ColourSpace.of(picture, layout)
     pixels = torch.from_numpy(np.concatenate([picture.maps[name] for name in layout], 2)).view(-1, 4)
     coordinates = space.coordinates(pixels)
@@ -33,7 +33,7 @@ def test_the_exemplar_is_white_but_for_the_floor():
 def test_round_trips():
     picture = exemplar()
     x = torch.rand(7, 4, generator=torch.Generator().manual_seed(0))
-    known = ColourSpace.of(picture, texel_layout(list(picture.maps)))
+    known = ColourSpace.of(picture, map_layout(list(picture.maps)))
     for space in (known, ColourSpace.plain(4), ColourSpace.around_grey(4)):
         assert torch.allclose(space.values(space.coordinates(x)), x, atol=1e-5)
     assert torch.equal(ColourSpace.plain(4).values(x), x)

@@ -143,7 +143,7 @@ def test_gram_matrices_and_their_gradient(levels, image, regions):
     names = ("relu1_1", "pool1", "relu2_2", "relu3_1")
     texels = image.view(-1, 3)[levels.order].clone().requires_grad_()
     parts = {name: None if regions == 1 else ours.regions(name, regions) for name in names}
-    grams = ours.read(texels, {name: GramTap(ours.place(name), parts[name]) for name in names})
+    grams = ours.read(texels, {name: GramTap(ours.index_of(name), parts[name]) for name in names})
     features = ours.features(texels, names)
     total, expected = torch.zeros(()), torch.zeros(())
     for k, name in enumerate(names):
@@ -159,7 +159,7 @@ def test_gram_matrices_and_their_gradient(levels, image, regions):
 
 
 def _grams(network, texels, layers):
-    return network.read(texels, {name: GramTap(network.place(name)) for name in layers})
+    return network.read(texels, {name: GramTap(network.index_of(name)) for name in layers})
 
 
 def test_finite_differences(levels, image):

@@ -8,10 +8,10 @@ from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.patches import joined_patches, patch_side
 from mitex.methods.surface.scale_map import ScaleMap
-from mitex.methods.surface.texture import texel_layout
 from mitex.methods.surface.tile import TileDomain
 from mitex.quilting.target import TileTarget
 from mitex.training import resolve
+from mitex.triples import map_layout
 from tests.methods.surface.grids import flat_square
 
 SIDE, PERIODS = 64, 8  # stripes along the exemplar
@@ -37,7 +37,7 @@ def frequencies(image: np.ndarray) -> tuple[int, int]:
 
 
 def image_of(domain: SurfaceDomain, settings) -> np.ndarray:
-    values = joined_patches(stripes(), texel_layout(["albedo", "height"]), domain, settings)
+    values = joined_patches(stripes(), map_layout(["albedo", "height"]), domain, settings)
     assert values.shape == (len(domain.texels.index), 4) and values.dtype == np.float32
     np.testing.assert_allclose(values[:, 0], values[:, 3], atol=1e-6)  # maps stay together
     image = np.full(domain.resolution**2, values[:, 0].mean())
@@ -79,7 +79,7 @@ class TurnedTarget(TileTarget):
 
 
 def test_normals_are_turned_as_patches_lie(monkeypatch):
-    chosen, layout = config(), texel_layout(["height", "normal"])
+    chosen, layout = config(), map_layout(["height", "normal"])
     leaning = np.tile(np.array([0.8, 0.5, 0.9], np.float32), (SIDE, SIDE, 1))  # to the right
     exemplar = Exemplar({"height": stripes().maps["height"], "normal": leaning})
     monkeypatch.setattr(TileDomain, "target", lambda domain, patch: TurnedTarget(domain.resolution, patch))
@@ -102,7 +102,7 @@ def test_chance_follows_the_seed():
     noise = Exemplar({"albedo": rng.random((SIDE, SIDE, 3), np.float32)}, "noise")
     domain = SurfaceDomain.of(flat_square(SIDE), config(), keep=False)
     first, same, other = (
-        joined_patches(noise, texel_layout(["albedo"]), domain, config(f"seed={seed}")) for seed in (0, 0, 1)
+        joined_patches(noise, map_layout(["albedo"]), domain, config(f"seed={seed}")) for seed in (0, 0, 1)
     )
     assert np.array_equal(first, same) and not np.array_equal(first, other)
     # Colours are the exemplar's own, but where a seam is averaged.

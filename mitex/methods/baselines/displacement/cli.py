@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
+from mitex.methods.baselines.displacement.config import LEVELS
 from mitex.methods.checks import in_range
 from mitex.methods.options import FitOptions, MeshOptions
+from mitex.ranges import SCALES
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
@@ -56,8 +58,8 @@ class Apply(MeshOptions):
     """How often every face is split in four first."""
 
     def check(self) -> None:
-        in_range("--scale", self.scale, 0.05, 20.0)
-        in_range("--levels", self.levels, 0, 6)
+        in_range("--scale", self.scale, *SCALES)
+        in_range("--levels", self.levels, *LEVELS)
 
     def applied(self, out: Path) -> Asset:
         from mitex.mesh import Mesh

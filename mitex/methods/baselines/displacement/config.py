@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from mitex.training.settings import FitConfig, key
 
+LEVELS = (0, 6)  # in which every face of a mesh is split in four
+
 
 @dataclass(frozen=True)
 class DisplacementConfig(FitConfig):

@@ -22,6 +22,9 @@ from mitex.errors import ConfigError
 from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh, subdivide_midpoint
 from mitex.methods.baselines.displacement import METHOD
+from mitex.methods.baselines.displacement.config import LEVELS
+from mitex.methods.checks import in_range
+from mitex.ranges import SCALES
 from mitex.runtime import init
 from mitex.runtime.jit import mi
 from mitex.scenes.shapes import mesh_shape
@@ -115,11 +118,8 @@ class DisplacementMap:
             MeshError: the mesh has no area.
             ConfigError: a number is out of range.
         """
-        if not 0.05 <= scale <= 20 or not 0 <= levels <= 6:
-            raise ConfigError(
-                f"a relief of {scale:g} times the size, on faces split {levels} times",
-                "use sizes from 0.05 to 20, and 0 to 6 splits",
-            )
+        in_range("`scale`", scale, *SCALES)
+        in_range("`levels`", levels, *LEVELS)
         fine = subdivide_midpoint(laid_out(mesh, ATLAS), levels)
         assert fine.uv is not None
         area = float(fine.face_areas.sum(dtype=np.float64))

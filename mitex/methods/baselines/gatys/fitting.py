@@ -34,7 +34,7 @@ def fit(
         Interrupted: by Ctrl-C, likewise.
     """
     run = Run.of(PRESETS, out, **options)
-    target = (exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)).of_albedo()
+    target = Exemplar.of(exemplar).of_albedo()
     task = GatysTask(run.config, target)
     return run.train(
         task,

@@ -34,7 +34,7 @@ def fit(
         MitexError: bad input of any kind; nothing has been written then.
     """
     run = Run.of(PRESETS, out, **options)
-    source = (exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)).of_albedo()
+    source = Exemplar.of(exemplar).of_albedo()
     config = run.config
 
     def quilted(about: dict[str, Any]) -> QuiltedPicture:

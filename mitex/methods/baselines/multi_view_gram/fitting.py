@@ -47,9 +47,9 @@ def fit(
         Interrupted: by Ctrl-C, likewise.
     """
     run = Run.of(PRESETS, out, **options)
-    target = (exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)).of_albedo()
+    target = Exemplar.of(exemplar).of_albedo()
     side = run.config.resolution
-    given = mesh if isinstance(mesh, Mesh) else Mesh.load(mesh)
+    given = Mesh.of(mesh)
     surface = with_layout(given, side, keep_uvs or content is not None)
     original: np.ndarray | None = None
     if content is not None:

@@ -11,9 +11,8 @@ from mitex.errors import ConfigError, MeshError
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import orthonormal, unit
 from mitex.mesh import Mesh
+from mitex.methods.nerf.synthesis.patches import DENSITY, SATURATED
 
-DENSITY = 30  # random points for each anchor
-SATURATED = 0.6  # area per anchor over squared distance when no further one fits, nearly
 MOST = 50_000  # anchors
 
 

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from mitex.methods.checks import SEEDS, in_range
+from mitex.methods.baselines.nerf_tex.ranges import SPACINGS, TILTS
+from mitex.methods.checks import in_range
+from mitex.methods.nerf.ranges import DENSITIES, LIFTS
 from mitex.methods.options import FieldOptions, MeshOptions, TrainingOptions
+from mitex.ranges import SCALES, SEEDS
 
 if TYPE_CHECKING:
     from mitex.methods.baselines.plain_field.applied import AppliedField
@@ -83,11 +86,11 @@ class Apply(FieldOptions, MeshOptions):
 
     def check(self) -> None:
         super().check()
-        in_range("--scale", self.scale, 0.05, 20.0)
-        in_range("--spacing", self.spacing, 0.1, 2.0)
-        in_range("--tilt", self.tilt, 0.0, 45.0)
-        in_range("--lift", self.lift, 0.0, 1.0)
-        in_range("--density", self.density, 0.001, 1000.0)
+        in_range("--scale", self.scale, *SCALES)
+        in_range("--spacing", self.spacing, *SPACINGS)
+        in_range("--tilt", self.tilt, *TILTS)
+        in_range("--lift", self.lift, *LIFTS)
+        in_range("--density", self.density, *DENSITIES)
         in_range("--seed", self.seed, *SEEDS)
 
     def applied(self, out: Path) -> AppliedField:

@@ -21,11 +21,15 @@ from mitex.methods.baselines.nerf_tex.config import NerfTexConfig
 from mitex.methods.baselines.nerf_tex.instances import InstancedField
 from mitex.methods.baselines.nerf_tex.networks import Evaluator, network_of
 from mitex.methods.baselines.nerf_tex.on_plane import BoxesOnPlane
+from mitex.methods.baselines.nerf_tex.ranges import SPACINGS, TILTS
 from mitex.methods.baselines.plain_field.applied import AppliedField
+from mitex.methods.checks import in_range
 from mitex.methods.nerf.field.occupancy import packed_cells, unpacked_cells
 from mitex.methods.nerf.field.rendering import render_step
+from mitex.methods.nerf.ranges import DENSITIES, LIFTS
 from mitex.methods.nerf.use.on_plane import SCALE, plane
 from mitex.methods.nerf.use.placement import EXTENT, in_scene_cube
+from mitex.ranges import SCALES
 from mitex.runtime import init
 from mitex.textures.march import DIAGONAL
 from mitex.training import model_file
@@ -130,16 +134,11 @@ class NerfTexTexture:
             MeshError: the mesh has no area.
             ConfigError: a number is out of range, the boxes are more than 50,000, or they are empty.
         """
-        if not (0.05 <= scale <= 20 and 0.1 <= spacing <= 2 and 0 <= tilt <= 45):
-            raise ConfigError(
-                f"boxes of {scale:g} times the size, {spacing:g} sides apart, leaning by {tilt:g} degrees",
-                "use sizes from 0.05 to 20, 0.1 to 2 sides and 0 to 45 degrees",
-            )
-        if not (0 <= lift <= 1 and 0 < density <= 1000):
-            raise ConfigError(
-                f"boxes lifted by {lift:g}, of {density:g} times the density",
-                "use lifts from 0 to 1 and densities up to 1000",
-            )
+        in_range("`scale`", scale, *SCALES)
+        in_range("`spacing`", spacing, *SPACINGS)
+        in_range("`tilt`", tilt, *TILTS)
+        in_range("`lift`", lift, *LIFTS)
+        in_range("`density`", density, *DENSITIES)
         if not self.occupied.any():
             raise ConfigError(f"the box of '{self.about['name']}' is empty", "train it for longer")
         placed, similarity = in_scene_cube(mesh)

@@ -10,6 +10,7 @@ from tyro.conf import arg
 
 from mitex.methods.checks import in_range
 from mitex.methods.options import FitOptions, MeshOptions
+from mitex.ranges import SCALES, TEXELS
 
 if TYPE_CHECKING:
     from mitex.asset import Asset
@@ -56,8 +57,8 @@ class Apply(MeshOptions):
     """Side of the albedo texture [texels]."""
 
     def check(self) -> None:
-        in_range("--scale", self.scale, 0.05, 20.0)
-        in_range("--resolution", self.resolution, 16, 8192)
+        in_range("--scale", self.scale, *SCALES)
+        in_range("--resolution", self.resolution, *TEXELS)
 
     def applied(self, out: Path) -> Asset:
         from mitex.mesh import Mesh

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
 from mitex.evaluation.elevations import Elevation, FlatTexture, elevation_table
 from mitex.evaluation.windows import PLACES, WINDOW
 from mitex.methods.baselines.quilted.albedo import in_even_light, quilted_albedo
+from mitex.methods.baselines.quilted.texture import plane_brightness
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.field.raycast import Raycaster
 from mitex.methods.nerf.synthesis.patch_images import render_patches
 from mitex.methods.nerf.synthesis.patches import principal_direction
 from mitex.methods.nerf.texture import NerfTexture
-from mitex.methods.nerf.training.light_estimate import brightness
 from mitex.methods.nerf.use.on_plane import SCALE, CapturedRenderer, TextureOnPlane, plane
 
 SYNTHESES = 3
@@ -78,9 +78,7 @@ def compare_elevations(
     light, along = np.array(texture.light), principal_direction(base)
     relit = in_even_light(squares, pictures, base, light)
 
-    def shine(normal: np.ndarray) -> float:
-        """How bright the light makes a plane with this normal (3,)."""
-        return float(brightness(light, normal[None])[0])
+    shine = partial(plane_brightness, light)
 
     def renderers(number: int) -> tuple[TextureOnPlane, dict[str, FlatTexture]]:
         maps = texture.synthesize(size, number, patches=patches, tileable=True)

@@ -12,15 +12,16 @@ import numpy as np
 import torch
 
 from mitex.asset import Asset
-from mitex.atlas import MAX_RESOLUTION, laid_out
-from mitex.errors import ConfigError
+from mitex.atlas import laid_out
 from mitex.evaluation.elevations import FlatTexture
 from mitex.export.common import asset_from_textures
 from mitex.mesh import Mesh
 from mitex.methods.baselines.quilted import METHOD
+from mitex.methods.checks import in_range
 from mitex.methods.nerf.training.light_estimate import brightness
 from mitex.methods.nerf.use.placement import UNWRAP_SIZE, in_scene_cube, uv_unit_length
 from mitex.methods.planar import repeated
+from mitex.ranges import SCALES, TEXELS
 from mitex.training import model_file
 
 
@@ -74,7 +75,7 @@ class QuiltedTexture:
             along: (3,) direction in the scene that the planes' x follows.
         """
         light = self.about.get("light")
-        shine = None if light is None else partial(_brightness, np.array(light, np.float64))
+        shine = None if light is None else partial(plane_brightness, np.array(light, np.float64))
         return FlatTexture(self.image, self.gap, along, brightness=shine)
 
     def apply(self, mesh: Mesh, *, scale: float = 1.0, resolution: int = 1024) -> Asset:
@@ -93,11 +94,8 @@ class QuiltedTexture:
             MeshError: the mesh has no area.
             ConfigError: a number is out of range.
         """
-        if not 0.05 <= scale <= 20 or not 16 <= resolution <= MAX_RESOLUTION:
-            raise ConfigError(
-                f"a texture of {scale:g} times the size and {resolution} texels",
-                f"use sizes from 0.05 to 20, and 16 to {MAX_RESOLUTION} texels",
-            )
+        in_range("`scale`", scale, *SCALES)
+        in_range("`resolution`", resolution, *TEXELS)
         mesh = laid_out(mesh, UNWRAP_SIZE)
         assert mesh.uv is not None
         unit_length = uv_unit_length(in_scene_cube(mesh)[0])
@@ -105,6 +103,6 @@ class QuiltedTexture:
         return asset_from_textures(mesh, mesh.uv, {"albedo": albedo}, mesh.name)
 
 
-def _brightness(light: np.ndarray, normal: np.ndarray) -> float:
+def plane_brightness(light: np.ndarray, normal: np.ndarray) -> float:
     """How bright a light (16,) makes a plane with this normal (3,)."""
     return float(brightness(light, normal[None])[0])

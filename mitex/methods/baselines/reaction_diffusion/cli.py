@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import arg
 
-from mitex.methods.checks import SEEDS, in_range
+from mitex.methods.baselines.reaction_diffusion.ranges import MOST_STEPS
+from mitex.methods.checks import in_range
 from mitex.methods.planar_options import PlanarFitOptions, PlanarOptions
+from mitex.ranges import SEEDS
 
 if TYPE_CHECKING:
-    from mitex.asset import Asset
+    from mitex.methods.interface import Applied
 
 
 @dataclass(kw_only=True)
@@ -49,19 +51,13 @@ class Apply(PlanarOptions):
     def check(self) -> None:
         super().check()
         in_range("--seed", self.seed, *SEEDS)
-        in_range("--steps", self.steps, 0, 10_000)
+        in_range("--steps", self.steps, 0, MOST_STEPS)
 
-    def applied(self, out: Path) -> Asset:
-        from mitex.mesh import Mesh
-        from mitex.methods.baselines.reaction_diffusion import ReactionDiffusionTexture
+    def further(self) -> dict[str, object]:
+        return {"seed": self.seed, "steps": self.steps}
+
+    def applied(self, out: Path) -> Applied:
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()
-        return ReactionDiffusionTexture.load(self.model).apply(
-            Mesh.load(self.mesh),
-            seed=self.seed,
-            steps=self.steps,
-            scale=self.scale,
-            resolution=self.resolution,
-            keep_uvs=self.keep_uvs,
-        )
+        return super().applied(out)

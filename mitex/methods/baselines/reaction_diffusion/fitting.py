@@ -33,7 +33,7 @@ def fit(
     """
     run = Run.of(PRESETS, out, **options)
     config = run.config
-    target = (exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)).of_albedo()
+    target = Exemplar.of(exemplar).of_albedo()
     task = ReactionDiffusionTask(config, target)
     return run.train(
         task,

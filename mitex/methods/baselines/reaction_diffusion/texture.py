@@ -11,23 +11,24 @@ import numpy as np
 import torch
 
 from mitex.asset import Asset
-from mitex.atlas import MAX_RESOLUTION
 from mitex.errors import ConfigError
 from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh, remesh
 from mitex.mesh.nearest import surface_points
 from mitex.methods.baselines.reaction_diffusion import METHOD
 from mitex.methods.baselines.reaction_diffusion.laplacian import mesh_laplacian
+from mitex.methods.baselines.reaction_diffusion.ranges import MOST_STEPS
 from mitex.methods.baselines.reaction_diffusion.reaction import BOUND, Reaction, colours
+from mitex.methods.checks import in_range
 from mitex.methods.layout import RESOLUTION, layout_side, with_layout
 from mitex.methods.point_colours import with_colours
 from mitex.progress import announce
+from mitex.ranges import SCALES, TEXELS
 from mitex.runtime import keep_freed_memory
 from mitex.sparse import LinearMap
 from mitex.training import model_file
 
 STEPS = 500  # of time, after which patterns are in order
-MOST_STEPS = 10_000
 PERIOD = 16  # steps after which states are held within their bounds
 MOST_CELLS = 500_000
 
@@ -106,11 +107,9 @@ class ReactionDiffusionTexture:
             ConfigError: a number is out of range, or there would be too many cells.
             MeshError: PyMeshLab is missing or fails.
         """
-        if not 0.05 <= scale <= 20 or not 16 <= resolution <= MAX_RESOLUTION or not 0 <= steps <= MOST_STEPS:
-            raise ConfigError(
-                f"a texture of {scale:g} times the size, {steps} steps and {resolution} texels",
-                f"use sizes from 0.05 to 20, up to {MOST_STEPS} steps, and 16 to {MAX_RESOLUTION} texels",
-            )
+        in_range("`scale`", scale, *SCALES)
+        in_range("`resolution`", resolution, *TEXELS)
+        in_range("`steps`", steps, 0, MOST_STEPS)
         unwrapped = with_layout(mesh, RESOLUTION, keep_uvs)
         cells = even_cells(unwrapped, scale * self.width / self.cells)
         keep_freed_memory()

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 from tyro.conf import arg
 
-from mitex.methods.checks import SEEDS, in_range
+from mitex.methods.checks import in_range
 from mitex.methods.planar_options import PlanarFitOptions, PlanarOptions
-
-if TYPE_CHECKING:
-    from mitex.asset import Asset
+from mitex.ranges import SEEDS
 
 
 @dataclass(kw_only=True)
@@ -47,14 +44,5 @@ class Apply(PlanarOptions):
         super().check()
         in_range("--seed", self.seed, *SEEDS)
 
-    def applied(self, out: Path) -> Asset:
-        from mitex.mesh import Mesh
-        from mitex.methods.baselines.solid_texture import SolidTexture
-
-        return SolidTexture.load(self.model).apply(
-            Mesh.load(self.mesh),
-            seed=self.seed,
-            scale=self.scale,
-            resolution=self.resolution,
-            keep_uvs=self.keep_uvs,
-        )
+    def further(self) -> dict[str, object]:
+        return {"seed": self.seed}

@@ -12,7 +12,6 @@ import numpy as np
 import torch
 
 from mitex.asset import Asset
-from mitex.atlas import MAX_RESOLUTION
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh
 from mitex.methods.baselines.solid_texture import METHOD
@@ -25,9 +24,11 @@ from mitex.methods.baselines.solid_texture.generator import (
     statistic_shapes,
 )
 from mitex.methods.baselines.solid_texture.noise import hashed_noise
+from mitex.methods.checks import in_range
 from mitex.methods.layout import RESOLUTION, layout_side, with_layout
 from mitex.methods.point_colours import with_colours
 from mitex.progress import counted
+from mitex.ranges import SCALES, TEXELS
 from mitex.runtime import keep_freed_memory
 from mitex.training import model_file
 
@@ -100,11 +101,8 @@ class SolidTexture:
         Raises:
             ConfigError: a number is out of range, or too much of the solid would be needed.
         """
-        if not 0.05 <= scale <= 20 or not 16 <= resolution <= MAX_RESOLUTION:
-            raise ConfigError(
-                f"a texture of {scale:g} times the size and {resolution} texels",
-                f"use sizes from 0.05 to 20, and 16 to {MAX_RESOLUTION} texels",
-            )
+        in_range("`scale`", scale, *SCALES)
+        in_range("`resolution`", resolution, *TEXELS)
         unwrapped = with_layout(mesh, RESOLUTION, keep_uvs)
         edge = scale * self.width * layout_side(unwrapped) / self.voxels
         low = unwrapped.vertices.min(0)

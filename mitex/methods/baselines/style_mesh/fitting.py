@@ -42,8 +42,8 @@ def fit(
     """
     run = Run.of(PRESETS, out, **options)
     config = run.config
-    target = (exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)).of_albedo()
-    given = mesh if isinstance(mesh, Mesh) else Mesh.load(mesh)
+    target = Exemplar.of(exemplar).of_albedo()
+    given = Mesh.of(mesh)
     surface = with_layout(given, config.resolution, keep_uvs)
     run.control.check()
     task = StyleMeshTask(config, target, surface)

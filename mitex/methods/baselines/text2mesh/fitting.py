@@ -56,8 +56,8 @@ def fit(
             f"the preset {config.preset} is for words, not for exemplars", "use default or paper"
         )
     reject_idle(options.get("set", ()), OF_WORDS, "without words")
-    target = (exemplar if isinstance(exemplar, Exemplar) else Exemplar.load(exemplar)).of_albedo()
-    given = mesh if isinstance(mesh, Mesh) else Mesh.load(mesh)
+    target = Exemplar.of(exemplar).of_albedo()
+    given = Mesh.of(mesh)
     surface = with_layout(given, config.resolution, keep_uvs)
     run.control.check()
     task = Text2MeshTask(config, target, surface)

@@ -17,12 +17,12 @@ from mitex.methods.style_field import colours, encoded, head, random_waves, trun
 from mitex.methods.surface.texels import Texels
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, orbit
+from mitex.scenes.shaded import BACKGROUND
 from mitex.scenes.stage import Stage
 from mitex.training import ParameterTask, Step
 
 FULL = 0.999  # coverage from which on a feature shows the mesh alone
 CHUNK = 1 << 16  # places at a time
-BACKGROUND = 1.0  # white
 
 
 class Text2MeshTask(ParameterTask):

@@ -15,6 +15,7 @@ from mitex.errors import ConfigError
 from mitex.export import Format, prepare_export
 from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh
+from mitex.methods.checks import in_range
 from mitex.methods.nerf.config import NerfConfig
 from mitex.methods.nerf.field.decoder import Decoder
 from mitex.methods.nerf.field.lighting import COEFFICIENTS
@@ -23,10 +24,12 @@ from mitex.methods.nerf.field.projection import Projection
 from mitex.methods.nerf.field.rendering import render_step
 from mitex.methods.nerf.field.shell import Shell, ShellCoords, shell_cells, shell_reach
 from mitex.methods.nerf.field.tensors import channels
+from mitex.methods.nerf.ranges import DENSITIES, LIFTS
 from mitex.methods.nerf.synthesis.maps import LatentMaps, MappedLatents
 from mitex.methods.nerf.use.extract import extract_mesh
 from mitex.methods.nerf.use.placement import in_scene_cube
 from mitex.progress import announce
+from mitex.ranges import SCALES
 from mitex.runtime.jit import mi
 from mitex.runtime.upload import upload
 from mitex.textures.march import DIAGONAL
@@ -38,11 +41,9 @@ FINEST = 2048  # steps across the scene cube, at most
 
 def check_ranges(scale: float, density: float, lift: float) -> None:
     """Raises a ConfigError if one of these numbers of `NerfTexture.apply` is out of range."""
-    if not 0.05 <= scale <= 20 or not 0 < density <= 1000 or not 0 <= lift <= 1:
-        raise ConfigError(
-            f"a texture of {scale:g} times the size, {density:g} times the density and lifted by {lift:g}",
-            "use sizes from 0.05 to 20, densities up to 1000 and lifts from 0 to 1",
-        )
+    in_range("`scale`", scale, *SCALES)
+    in_range("`density`", density, *DENSITIES)
+    in_range("`lift`", lift, *LIFTS)
 
 
 def checked_light(light: np.ndarray) -> mi.TensorXf:

@@ -38,11 +38,11 @@ def test_textures_that_are_not_square_keep_their_proportions(mesh, rows, columns
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"scale": 0.0}, "0 times the size"),
-        ({"scale": math.nan}, "nan times the size"),
-        ({"scale": 0.0, "guide": np.zeros((4, 4, 3))}, "0 times the size"),
-        ({"density": 0.0}, "0 times the density"),
-        ({"lift": 1.5}, "lifted by 1.5"),
+        ({"scale": 0.0}, "`scale` 0 is out of range"),
+        ({"scale": math.nan}, "`scale` nan is out of range"),
+        ({"scale": 0.0, "guide": np.zeros((4, 4, 3))}, "`scale` 0 is out of range"),
+        ({"density": 0.0}, "`density` 0 is out of range"),
+        ({"lift": 1.5}, "`lift` 1.5 is out of range"),
         ({"light": np.zeros(9)}, r"a light of shape \(9,\)"),
         ({"light": np.full(16, np.inf)}, "a light"),
     ],
@@ -55,5 +55,5 @@ def test_options_are_checked_before_a_texture_is_synthesized(options, message, m
 
 
 def test_the_side_under_a_guide_needs_a_scale():
-    with pytest.raises(ConfigError, match="0 times the size"):
+    with pytest.raises(ConfigError, match="`scale` 0 is out of range"):
         small_texture().covering(icosphere(2), scale=0.0)

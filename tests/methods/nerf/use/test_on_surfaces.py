@@ -118,7 +118,7 @@ def test_too_fine_for_the_surface_it_is_quilted_in_the_plane(texture: NerfTextur
         ({"quilting": "sphere"}, "unknown quilting"),
         ({"quilting": "surface", "guide": np.zeros((4, 4, 3))}, 'quilting="plane"'),
         ({"scale": 0.05, "size": 128, "quilting": "surface"}, "blurs them"),
-        ({"scale": 0.0}, "0 times the size"),
+        ({"scale": 0.0}, "`scale` 0 is out of range"),
     ],
 )
 def test_refusals(options: dict, message: str):
