@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from mitex.errors import ConfigError
 from mitex.training.settings import TrainingConfig, key
@@ -22,6 +23,9 @@ class RadianceConfig(TrainingConfig):
         8,
     )
     one_view: bool = key(False, "all rays of a step from one photo (the paper), instead of from all")
+    colour_loss: Literal["l1", "l2"] = key(
+        "l1", "differences of colours count as they are (the paper), or by their squares: for thin blades"
+    )
     ray_steps: int = key(512, "steps of a ray along the diagonal of the scene cube", 16, 8192)
     table: int = key(17, "binary logarithm of the entries of a level's hash table", 8, 24)
     lr: float = key(1e-2, "learning rate", 0, 1)

@@ -330,7 +330,8 @@ def test_pictures_show_the_box_under_turned_lights(box):
     assert (again.images[3] == pictures.images[3]).all() and np.abs(turned - lights).max() > 0.1
 
 
-def test_colours_are_compared_where_something_is():
+@pytest.mark.parametrize(("loss", "relative"), [("l1", 0.2 / 0.61), ("l2", 5 * (0.2 / 0.61) ** 2)])
+def test_colours_are_compared_where_something_is(loss, relative):
     """Relative differences where alpha is above 0, squared ones of the opacity everywhere."""
     colour = torch.tensor([[0.5, 0.2, 0.0], [0.3, 0.3, 0.3]])
     batch: Any = type("Batch", (), {})()
@@ -340,8 +341,10 @@ def test_colours_are_compared_where_something_is():
     )
     rendered: Any = object.__new__(Rendered)
     rendered.colour, rendered.transmittance = colour, torch.tensor([0.5, 0.8])
-    error = BoxTask.error(object.__new__(BoxTask), rendered, batch, torch.zeros(2, 3))
-    assert error.item() == pytest.approx(0.2 / 0.61 / 3 + (0.5**2 + 0.2**2) / 2)
+    task = object.__new__(BoxTask)
+    task.config = NerfTexConfig(colour_loss=loss)
+    error = task.error(rendered, batch, torch.zeros(2, 3))
+    assert error.item() == pytest.approx(relative / 3 + (0.5**2 + 0.2**2) / 2)
 
 
 @pytest.fixture(scope="module")

@@ -69,7 +69,7 @@ class BoxTask(RadianceTask[NerfTexConfig]):
         """Relative difference of colours where there is something, and squared one of opacity
         (Baatz et al. 2022)."""
         colours, target = rendered.colour, batch.colours * batch.alpha
-        relative = (colours - target).abs() / (colours.abs() + target + DARK)
+        relative = self.magnitude((colours - target) / (colours.abs() + target + DARK))
         opacity = (1 - rendered.transmittance - batch.alpha[:, 0]).square().mean()
         return relative[batch.alpha[:, 0] > 0].sum() / max(int((batch.alpha > 0).sum()) * 3, 1) + opacity
 

@@ -26,6 +26,7 @@ from mitex.training.optim import Adam, Optimizer
 
 REFRESH = 16  # steps between refreshes of the occupancy, and between updates of the mean parameters
 BETAS, EPSILON = (0.9, 0.99), 1e-15  # of Adam
+L2_WEIGHT = 5.0  # a difference of 0.1, as is usual, has the slope that it has in L1
 PREVIEW = 160  # pixels along the longest side
 
 Config = TypeVar("Config", bound=RadianceConfig)
@@ -118,10 +119,16 @@ class RadianceTask(ABC, Generic[Config]):
         return Step(total, metrics, self._average)
 
     def error(self, rendered: Rendered, batch: Batch, background: torch.Tensor) -> torch.Tensor:
-        """How far the means of rays are from their pixels: L1 of colours before a background (P, 3)."""
+        """How far the means of rays are from their pixels: of colours before a background (P, 3)."""
         colour = rendered.colour + rendered.transmittance[:, None] * background
         target = batch.colours * batch.alpha + background * (1 - batch.alpha)
-        return (colour - target).abs().mean()
+        return self.magnitude(colour - target).mean()
+
+    def magnitude(self, differences: torch.Tensor) -> torch.Tensor:
+        """How much differences of colours count."""
+        if self.config.colour_loss == "l1":
+            return differences.abs()
+        return L2_WEIGHT * differences.square()
 
     def _draw(self, generator: torch.Generator) -> Batch:
         config = self.config

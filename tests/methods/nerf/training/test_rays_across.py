@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Literal
+
 import numpy as np
+import pytest
 import torch
 
 from mitex.methods.nerf.capture.pixels import Pixels
@@ -15,13 +19,14 @@ from tests.methods.nerf.tiny import tiny_capture
 init()
 
 
-def task() -> PlainTask:
+def task(loss: Literal["l1", "l2"] = "l1") -> PlainTask:
     config = RadianceConfig(rays=64, rays_across=2, ray_steps=64, table=10, occupancy=24, distortion=0.0)
-    return PlainTask(config, tiny_capture(), (tiny_capture(), 0))
+    return PlainTask(replace(config, colour_loss=loss), tiny_capture(), (tiny_capture(), 0))
 
 
-def test_the_mean_of_rays_is_compared_with_their_pixel(monkeypatch):
-    training, rays, pixels = task(), [], []
+@pytest.mark.parametrize("name", ["l1", "l2"])
+def test_the_mean_of_rays_is_compared_with_their_pixel(name, monkeypatch):
+    training, rays, pixels = task(name), [], []
     render, error = training.render, training.error
 
     def rendered(*arguments):
@@ -42,7 +47,8 @@ def test_the_mean_of_rays_is_compared_with_their_pixel(monkeypatch):
     assert means[1].std() > 0.01 and colours.view(16, 4, 3).std(1).max() > 1e-4
     shown = means[0] + means[1][:, None] * background
     photo = batch.colours * batch.alpha + background * (1 - batch.alpha)
-    torch.testing.assert_close(loss, (shown - photo).abs().mean())
+    differences = (shown - photo).abs()
+    torch.testing.assert_close(loss, differences.mean() if name == "l1" else 5 * (differences**2).mean())
 
 
 def test_a_picture_shows_the_mean_of_rays():

@@ -45,6 +45,7 @@ def plain() -> np.ndarray:
     [
         "one_view=true",
         "rays_across=2",
+        "colour_loss=l2",
         "cluster_entries=16",
         "normal_rays=0.5",
         "detach_normals=true",
