@@ -128,11 +128,11 @@ class Mesh:
             MeshError: All vertices are at one point.
         """
         positions = self.vertices.astype(np.float64)
-        center = positions.mean(axis=0)
-        scale = float(np.linalg.norm(positions - center, axis=1).max())
+        centre = positions.mean(axis=0)
+        scale = float(np.linalg.norm(positions - centre, axis=1).max())
         if scale == 0.0:
             raise MeshError(f"all vertices of {self.name} are at one point", "check how it was exported")
-        similarity = Similarity(center, scale)
+        similarity = Similarity(centre, scale)
         return self.with_vertices(similarity.apply(positions)), similarity
 
     def with_vertices(self, vertices: np.ndarray) -> Mesh:
@@ -158,14 +158,14 @@ class Mesh:
 
 @dataclass(frozen=True, eq=False)
 class Similarity:
-    """The map p -> (p - center) / scale.
+    """The map p -> (p - centre) / scale.
 
     Attributes:
-        center: (3,) float64 [mesh units].
+        centre: (3,) float64 [mesh units].
         scale: Positive [mesh units].
     """
 
-    center: np.ndarray
+    centre: np.ndarray
     scale: float
 
     @staticmethod
@@ -175,18 +175,18 @@ class Similarity:
         Raises:
             KeyError, TypeError, ValueError: they are missing, or no three numbers and a positive one.
         """
-        center, scale = np.array(record["centre"], np.float64), float(record["scale"])
-        if center.shape != (3,) or not (np.isfinite([*center, scale]).all() and scale > 0):
+        centre, scale = np.array(record["centre"], np.float64), float(record["scale"])
+        if centre.shape != (3,) or not (np.isfinite([*centre, scale]).all() and scale > 0):
             raise ValueError("a centre or a scale that is none")
-        return Similarity(center, scale)
+        return Similarity(centre, scale)
 
     def apply(self, points: np.ndarray) -> np.ndarray:
         """Maps points (..., 3) in mesh units to normalised ones, float64."""
-        return (np.asarray(points, np.float64) - self.center) / self.scale
+        return (np.asarray(points, np.float64) - self.centre) / self.scale
 
     def inverse(self, points: np.ndarray) -> np.ndarray:
         """Maps normalised points (..., 3) back to mesh units, float64."""
-        return np.asarray(points, np.float64) * self.scale + self.center
+        return np.asarray(points, np.float64) * self.scale + self.centre
 
 
 def _are_similar(before: np.ndarray, after: np.ndarray) -> bool:

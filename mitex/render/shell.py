@@ -71,7 +71,7 @@ def shell_still(
 
     centre = outline.mean(0)
     radius = float(np.linalg.norm(outline - centre, axis=1).max())
-    framed = Similarity((similarity.center - centre) / radius, similarity.scale / radius)
+    framed = Similarity((similarity.centre - centre) / radius, similarity.scale / radius)
     turn = rotation(math.radians(azimuth))
     points = (outline - centre) / radius @ turn.T
     view = fit_view(hull(points), math.radians(elevation))

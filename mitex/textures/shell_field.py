@@ -53,7 +53,7 @@ class ShellField:
     def bbox(self) -> mi.ScalarBoundingBox3f:
         """Of the cube, in the world."""
         corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-        corners = (corners * self.similarity.scale + self.similarity.center) @ self.turn.T
+        corners = (corners * self.similarity.scale + self.similarity.centre) @ self.turn.T
         return mi.ScalarBoundingBox3f(corners.min(0).tolist(), corners.max(0).tolist())
 
     def max_value(self) -> float:
@@ -133,7 +133,7 @@ class ShellField:
         """Indices of active rays, at most `CHUNK` at a time, and the rays in the field's cube: their origins,
         directions and ends."""
         scale = float(self.similarity.scale)
-        centre = mi.Vector3f(np.asarray(self.similarity.center, np.float32).tolist())
+        centre = mi.Vector3f(np.asarray(self.similarity.centre, np.float32).tolist())
         rays = mi.UInt32(dr.compress(active & dr.full(mi.Bool, True, count)))
         for start in range(0, dr.width(rays), CHUNK):
             part = dr.arange(mi.UInt32, start, min(start + CHUNK, dr.width(rays)))

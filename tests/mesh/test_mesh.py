@@ -138,7 +138,7 @@ def test_normalised_is_centred_and_has_radius_one():
     small, similarity = mesh.normalised()
     np.testing.assert_allclose(small.vertices.mean(axis=0), 0.0, atol=1e-6)
     np.testing.assert_allclose(np.linalg.norm(small.vertices, axis=1).max(), 1.0, rtol=1e-6)
-    np.testing.assert_allclose(similarity.center, [100.0, -3.0, 5.0], rtol=1e-6)
+    np.testing.assert_allclose(similarity.centre, [100.0, -3.0, 5.0], rtol=1e-6)
     assert similarity.scale == pytest.approx(7.0)
 
 

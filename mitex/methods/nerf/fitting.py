@@ -67,7 +67,7 @@ def fit(
     projection = Projection(base.mesh, neighbours=config.neighbours, repulsion=config.repulsion, reach=reach)
     task = TextureTask(config, training, (held_out, 0), projection, frames, base.thickness)
     origin: dict[str, Any] = {key: getattr(config, key) for key in files.SETTINGS}
-    origin |= {"centre": photos.similarity.center.tolist(), "scale": float(photos.similarity.scale)}
+    origin |= {"centre": photos.similarity.centre.tolist(), "scale": float(photos.similarity.scale)}
     return run.train(
         task,
         photos.name,

@@ -165,7 +165,7 @@ def test_pictures_show_the_occupied_part_of_the_world(ball, tmp_path, monkeypatc
     assert applied.render(tmp_path / "ball.png", resolution=64, azimuth=1.0).is_file()
     ((field, similarity, outline, options),) = calls
     assert field is applied and options == {"resolution": 64, "azimuth": 1.0}
-    assert similarity.scale == 4.0 and similarity.center.tolist() == [10.0, 0.0, -3.0]
+    assert similarity.scale == 4.0 and similarity.centre.tolist() == [10.0, 0.0, -3.0]
     low, high = outline.min(0), outline.max(0)
     np.testing.assert_allclose(high - low, 4.0 * 2 * 15 / 16)
     np.testing.assert_allclose((low + high) / 2, [10.0, 0.0, -3.0], atol=1e-6)

@@ -55,7 +55,7 @@ def fit(
     config = training_run.config
     task = PlainTask(config, training, (held_out, 0))
     origin: dict[str, Any] = {key: getattr(config, key) for key in SETTINGS}
-    origin |= {"centre": photos.similarity.center.tolist(), "scale": float(photos.similarity.scale)}
+    origin |= {"centre": photos.similarity.centre.tolist(), "scale": float(photos.similarity.scale)}
     return training_run.train(
         task,
         photos.name,

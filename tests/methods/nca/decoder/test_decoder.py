@@ -127,7 +127,7 @@ def test_units_are_those_of_the_default_training():
     """On its sphere they change next to nothing."""
     sphere = icosphere(32)
     assert decoder_units(sphere).scale == pytest.approx(1, abs=2e-4)
-    assert np.abs(decoder_units(sphere).center).max() < 1e-6
+    assert np.abs(decoder_units(sphere).centre).max() < 1e-6
 
 
 def test_a_mesh_at_one_point_has_units():
