@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
@@ -34,7 +34,8 @@ class Batch:
 
     def pixel_mean(self, values: Array) -> Array:
         """Means (P, ...) of values (R, ...) of the rays of each pixel."""
-        return values.reshape(len(self.colours), -1, *values.shape[1:]).mean(1)
+        by_pixel: Any = values.reshape(len(self.colours), -1, *values.shape[1:])
+        return by_pixel.mean(1)
 
 
 class Pixels:
