@@ -1,5 +1,7 @@
 """`mitex demo`, at toy size."""
 
+from dataclasses import replace
+
 import pytest
 
 from mitex import demo
@@ -7,7 +9,7 @@ from mitex.cli import main
 from mitex.exemplar import Exemplar
 from mitex.exemplar import names as exemplar_names
 from mitex.images import read_image
-from mitex.mesh import embedded_names
+from mitex.mesh import embedded_names, icosphere
 from mitex.methods import surface
 from mitex.methods.nca import NcaTexture
 from mitex.training.locate import CHECKPOINT, PREVIOUS
@@ -24,11 +26,12 @@ def test_what_it_shows_is_there():
 
 
 def test_it_leaves_assets_pictures_and_a_sheet(tmp_path, monkeypatch, capfd):
-    """The second call goes on from the first, and gives the same pictures."""
+    """The second call goes on from the first, and gives the same pictures; balls stand in for the meshes."""
     grow = NcaTexture.apply
     monkeypatch.chdir(tmp_path)
     fit = surface.fit
     monkeypatch.setattr(surface, "fit", lambda *a, set, **o: fit(*a, **o, set=[*set, *TINY]))
+    monkeypatch.setattr("mitex.mesh.load.embedded", lambda name: replace(icosphere(6), name=name))
     monkeypatch.setattr(demo, "MESH", "mushrooms")
     monkeypatch.setattr(demo, "MODELS", {"lava": "knot"})
     monkeypatch.setattr(demo, "RESOLUTION", 64)

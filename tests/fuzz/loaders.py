@@ -68,6 +68,7 @@ from tests.mesh.examples import (
 from tests.methods.nerf.capture.test_capture import write as write_capture
 
 BALL = icosphere(2)
+RESULT = "cache/method/" + "0" * 32  # a cache of its own, which is trimmed to its limit
 
 
 @dataclass(frozen=True)
@@ -285,8 +286,8 @@ LOADERS = {
     "plan": Loader("plan.toml", _data(PLAN), Plan.read),
     "capture": Loader("transforms.json", _capture, _read_capture),
     "photo": Loader("photos/images/000.png", _photos, _read_photos),
-    "cache": Loader("0" * 32 + "/values.npy", _cached, _cached),
-    "manifest": Loader("0" * 32 + "/manifest.json", _cached, _cached),
+    "cache": Loader(RESULT + "/values.npy", _cached, _cached),
+    "manifest": Loader(RESULT + "/manifest.json", _cached, _cached),
     "asset glb": Loader("a.glb", SMALL.export, Asset.load),
     "baked glb": Loader("a.glb", SMALL.baked(16).export, Asset.load),
     "asset ply": Loader("a.ply", SMALL.export, Asset.load),

@@ -37,6 +37,7 @@ def run(name: str, first: int, count: int) -> dict:
         loader.read(path)
         for number in range(first, first + count):
             path.parent.mkdir(exist_ok=True)
+            path.unlink(missing_ok=True)  # to truncate it would wait for the disk
             path.write_bytes(mutated(valid, np.random.default_rng([zlib.crc32(name.encode()), number])))
             outcome = _case(loader, path)
             if outcome in report:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from filelock import FileLock
 
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nerf import NerfTexture, fit
@@ -14,6 +15,7 @@ from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.field.occupancy import hull_cells
 from mitex.methods.nerf.synthesis.maps import LatentMaps
 from mitex.methods.nerf.training import plain, task
+from mitex.training.locate import NAME
 from tests.methods.nerf.tiny import SETTINGS, tiny_capture
 
 HULLS: dict[tuple[str, int], np.ndarray] = {}
@@ -42,12 +44,14 @@ def base() -> Mesh:
 
 
 @pytest.fixture(scope="session")
-def run(tmp_path_factory, base) -> Path:
-    folder = tmp_path_factory.mktemp("nerf")
-    patch = pytest.MonkeyPatch()
-    patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
-    fit(tiny_capture(), folder / "run", base_mesh=base, set=SETTINGS)
-    patch.undo()
+def run(tmp_path_factory, base, worker_id) -> Path:
+    """Fitted by the first process that asks, where tests run in several."""
+    own = tmp_path_factory.getbasetemp()
+    folder = (own if worker_id == "master" else own.parent) / "nerf"
+    with FileLock(folder.with_suffix(".lock")), pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+        if not (folder / "run" / NAME).is_file():
+            fit(tiny_capture(), folder / "run", base_mesh=base, set=SETTINGS)
     return folder / "run"
 
 
