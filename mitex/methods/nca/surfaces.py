@@ -14,7 +14,7 @@ import torch
 
 from mitex.geometry.vectors import rotate_about
 from mitex.mesh import Lattice, Mesh, icosphere, scattered_sphere
-from mitex.methods.nca.config import NcaConfig
+from mitex.methods.nca.config import LEAST_SIDE, NcaConfig
 from mitex.methods.nca.decoder.surface import Points, Surface
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.perception import Perception, lattice_perception, perception
@@ -24,7 +24,6 @@ from mitex.scenes.cameras import Cameras, orbit, patch_views
 from mitex.scenes.stage import Stage
 
 WIDEST = 0.65  # half the side of a patch of the unit sphere: wider ones would look past it
-LEAST = 16  # pixels along a view
 
 
 @dataclass(frozen=True)
@@ -44,8 +43,8 @@ class CloseUps:
     antialias: int = 1
 
     def pixels(self, share: float) -> int:
-        """Along a picture of a share of the width, but as many as the features need."""
-        return max(round(share * self.resolution), min(LEAST, self.resolution))
+        """Along a picture of a share of the width, but as many as features and estimators of motion need."""
+        return max(round(share * self.resolution), min(LEAST_SIDE, self.resolution))
 
 
 @dataclass(frozen=True, eq=False)

@@ -139,6 +139,14 @@ def test_estimators_of_pictures_see_the_last_states(exemplar, monkeypatch):
         assert gradient is not None and gradient[:, -3:].any()
 
 
+@pytest.mark.parametrize("surface", ["even", "flat"])
+def test_patterns_wider_than_the_surface_are_measured(exemplar, surface):
+    """Views show less of them then, in fewer pixels, but in as many as Lucas and Kanade's method needs."""
+    wide = (*MOVING, f"surfaces={surface}", "motion_estimator=lucas-kanade", "density=512", "resolution=48")
+    task = _grown(MotionTask(config(*wide), exemplar))
+    assert 0 < _metrics(task)["motion"] < math.inf
+
+
 def test_cells_may_know_nothing_of_the_field(exemplar):
     """The paper's ablation: the same loss, but no condition."""
     task = _grown(MotionTask(config(*MOVING, "motion_encoding=false"), exemplar))
