@@ -14,7 +14,7 @@ import torch
 
 from mitex.geometry.vectors import rotate_about
 from mitex.mesh import Lattice, Mesh, icosphere, scattered_sphere
-from mitex.methods.nca.config import LEAST_SIDE, NcaConfig
+from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.decoder.surface import Points, Surface
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.perception import Perception, lattice_perception, perception
@@ -24,6 +24,7 @@ from mitex.scenes.cameras import Cameras, orbit, patch_views
 from mitex.scenes.stage import Stage
 
 WIDEST = 0.65  # half the side of a patch of the unit sphere: wider ones would look past it
+LEAST = 16  # pixels along a view, which the features need
 
 
 @dataclass(frozen=True)
@@ -35,16 +36,18 @@ class CloseUps:
         count: K.
         resolution: height and width of each [px].
         antialias: n for n x n samples in each pixel.
+        least: pixels that are not fewer even where less is shown.
     """
 
     width: float
     count: int
     resolution: int
     antialias: int = 1
+    least: int = LEAST
 
     def pixels(self, share: float) -> int:
-        """Along a picture of a share of the width, but as many as features and estimators of motion need."""
-        return max(round(share * self.resolution), min(LEAST_SIDE, self.resolution))
+        """Along a picture of a share of the width."""
+        return max(round(share * self.resolution), min(self.least, self.resolution))
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from mitex.methods.nca.look import Look
 from mitex.methods.nca.pool import PoolTask, initial_look
 from mitex.methods.nca.relief import Relief
 from mitex.methods.nca.surfaces import (
+    LEAST,
     CloseUps,
     TrainingPlane,
     TrainingSphere,
@@ -95,17 +96,20 @@ class NcaTask(PoolTask):
             return surface.views(self.look, state, self.cameras(surface, size, generator))
         return surface.patches(self.look, state, self.closeups(size), generator)
 
-    def cameras(self, sphere: TrainingSphere, size: int, generator: torch.Generator) -> Cameras:
+    def cameras(
+        self, sphere: TrainingSphere, size: int, generator: torch.Generator, least: int = LEAST
+    ) -> Cameras:
         """The cameras of `views`."""
         config = self.config
         if config.views == "full":
             return random_views(generator, config.view_count, config.distance, config.fov, config.resolution)
-        return sphere.cameras(self.closeups(size), generator)
+        return sphere.cameras(self.closeups(size, least), generator)
 
-    def closeups(self, size: int) -> CloseUps:
+    def closeups(self, size: int, least: int = LEAST) -> CloseUps:
         """Those of one step in which the exemplar is `size` [px] wide."""
         config = self.config
-        return CloseUps(config.density * config.resolution / size, config.view_count, config.resolution)
+        width = config.density * config.resolution / size
+        return CloseUps(width, config.view_count, config.resolution, least=least)
 
     @torch.no_grad()
     def preview(self, step: int) -> np.ndarray:

@@ -276,8 +276,7 @@ class NerfTexture:
 
     @cached_property
     def ground(self) -> float:
-        """How far the deepest parts of the captured surface are from the base shape, negative inside [scene
-        units]."""
+        """How far the deepest captured parts are from the base shape, negative inside [scene units]."""
         projections = self.shell.projection(self.model.base.scan)
         return float(np.percentile(projections.distance[projections.hit], DEEPEST))
 

@@ -283,9 +283,9 @@ def test_the_operator_of_a_mesh_is_built_once(texture, sphere):
         ({"subdivide": 7}, "subdivide = 7"),
         ({"subdivide": "much"}, "subdivide = much"),
         ({"subdivide": 1.5}, "subdivide = 1.5"),
-        ({"scale": 0.0, "subdivide": 0}, "scale = 0"),
-        ({"scale": math.nan, "subdivide": 0}, "scale = nan"),
-        ({"scale": 21, "subdivide": 0}, "scale = 21"),
+        ({"scale": 0.0, "subdivide": 0}, "`scale` 0 is"),
+        ({"scale": math.nan, "subdivide": 0}, "`scale` nan is"),
+        ({"scale": 21, "subdivide": 0}, "`scale` 21 is"),
         ({"orientation": math.nan, "subdivide": 0}, "not finite"),
     ],
 )
