@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import torch
 
+from mitex.methods.nca.config import LEAST_SIDE
 from mitex.methods.nca.motion.drift import Drift
 from mitex.methods.nca.motion.pool import MovingPool
 from mitex.methods.nca.motion.views import MotionViews, sphere_views
@@ -16,7 +17,8 @@ class MovingTextTask(MovingPool, TextTask):
     """Trains a look to be what words say, and to move along a vector field; arguments as of `TextTask`."""
 
     def motion_views(self, drift: Drift, generator: torch.Generator) -> MotionViews:
-        """Like those that the vision-language model sees."""
+        """Like those that the vision-language model sees, as large as estimators need."""
         sphere = drift.surface
         assert isinstance(sphere, TrainingSphere)
-        return sphere_views(self.look, drift, training_cameras(self.config, sphere, generator))
+        cameras = training_cameras(self.config, sphere, generator, LEAST_SIDE)
+        return sphere_views(self.look, drift, cameras)

@@ -11,17 +11,20 @@ from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.decoder.surface import Points
 from mitex.methods.nca.displacement import Displacement
 from mitex.methods.nca.look import Look
-from mitex.methods.nca.surfaces import CloseUps, TrainingSphere
+from mitex.methods.nca.surfaces import LEAST, CloseUps, TrainingSphere
 from mitex.scenes.cameras import Cameras, random_views
 from mitex.scenes.shaded import GREY, lamps_of_pixels, pictured, shading
 from mitex.sparse import Weights
 
 
-def training_cameras(config: NcaConfig, sphere: TrainingSphere, generator: torch.Generator) -> Cameras:
-    """Random views of a step: of the whole surface, or of patches as wide as the density."""
+def training_cameras(
+    config: NcaConfig, sphere: TrainingSphere, generator: torch.Generator, least: int = LEAST
+) -> Cameras:
+    """Random views of a step: of the whole surface, or of patches as wide as the density, of `least` pixels
+    a side or more."""
     count, resolution = config.view_count, config.resolution
     if config.views == "patch":
-        return sphere.cameras(CloseUps(config.density, count, resolution), generator)
+        return sphere.cameras(CloseUps(config.density, count, resolution, least=least), generator)
     distances = config.text_distances
     distance = distances[int(torch.randint(len(distances), (), generator=generator))]
     return random_views(generator, count, distance, config.fov, resolution)

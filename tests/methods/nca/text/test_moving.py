@@ -1,6 +1,7 @@
 """Textures from words that move: both losses in one step, and a model that follows fields."""
 
 import json
+import math
 
 import pytest
 import torch
@@ -31,6 +32,12 @@ def test_a_step_has_both_losses(estimator):
     assert first["motion"] > 1e-6 and second["motion"] == pytest.approx(3 * first["motion"], rel=1e-4)
     still = loss(grown(task("resolution=32"))).metrics
     assert first.keys() == still.keys() | {"motion"}
+
+
+def test_patterns_wider_than_the_surface_are_measured():
+    """In views of as many pixels as Lucas and Kanade's method needs."""
+    wide = ("views=patch", "density=512", "resolution=48", "motion_estimator=lucas-kanade")
+    assert 0 < loss(moving(*wide)).metrics["motion"] < math.inf
 
 
 def test_a_texture_from_words_learns_to_move(tmp_path):
