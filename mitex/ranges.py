@@ -4,7 +4,6 @@ SEEDS = (0, 2**32 - 1)
 TEXELS = (16, 8192)  # along the side of a map
 SCALES = (0.05, 20)  # of a pattern
 TURNS = (-360, 360)  # of a camera, or of a pattern on a surface [degrees]
-RELIEFS = (-0.5, 0.5)  # of a height map that becomes geometry [radii of the mesh]
 EVEN_VERTICES = (12, 2_000_000)  # of a mesh that is remeshed
 
 # Of path-traced pictures and films.

@@ -15,7 +15,7 @@ from mitex.geometry.triangles import twice_area
 from mitex.geometry.vectors import scatter_add
 from mitex.images import bilinear
 from mitex.mesh import Mesh, subdivide_midpoint
-from mitex.ranges import RELIEFS
+from mitex.ranges import DISPLACEMENTS
 
 BUMPS = ("height", "normal")  # maps that are on the mesh then
 FACES = 400_000  # that the mesh is split into, about, where its texels are as fine
@@ -37,7 +37,7 @@ def embossed(asset: Asset, relief: float, faces: int = FACES) -> Asset:
     Raises:
         ConfigError: there is no height map, or the relief is too deep.
     """
-    least, most = RELIEFS
+    least, most = DISPLACEMENTS
     if not least <= relief <= most:
         raise ConfigError(f"a relief of {relief:g} radii", f"use {least} to {most}")
     asset = asset if asset.texture_maps is not None else asset.baked()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from tyro.conf import Positional, UseAppendAction, arg
 
 from mitex.methods.checks import in_range, merged_settings, reject_unused
-from mitex.ranges import RELIEFS, SEEDS
+from mitex.ranges import DISPLACEMENTS, SEEDS
 from mitex.suffixes import ASSETS, FIELDS, PICTURES
 from mitex.training.settings import RunSettings
 
@@ -230,7 +230,7 @@ class ReliefOptions(OptionalMeshOptions):
     mesh]; 0.05 is much."""
 
     def check(self) -> None:
-        in_range("--relief", self.relief, *RELIEFS)
+        in_range("--relief", self.relief, *DISPLACEMENTS)
 
     def finished(self, applied: Applied) -> Applied:
         if self.relief is None:
