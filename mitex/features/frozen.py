@@ -142,8 +142,8 @@ class GramTap:
 class FrozenStack(torch.autograd.Function):
     """Runs operations in turn and returns what the taps ask for; differentiable in the images only.
 
-    Images (K, 3, H, W); a whole tap gives (K, C, h, w), a sampled one (K, n, C), a Gram tap (C, C), float32
-    all. Operations on surfaces take and give (n, C) instead.
+    Images (K, 3, H, W); a whole tap gives (K, C, h, w), a sampled one (K, n, C), a Gram tap (regions, C, C),
+    float32 all. Operations on surfaces take and give (n, C) instead.
     """
 
     @staticmethod
@@ -180,7 +180,7 @@ class FrozenStack(torch.autograd.Function):
 
 def _gram(parts: Iterable[torch.Tensor], rows: torch.Tensor) -> torch.Tensor:
     """(C, C) float32 mean outer product of the vectors (n, C) in some parts of `rows`."""
-    total, count = torch.zeros(rows.shape[1], rows.shape[1]), 0
+    total, count = torch.zeros(rows.shape[1], rows.shape[1], device=rows.device), 0
     for part in parts:
         total += part.t() @ part
         count += len(part)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from functools import cache
 
 import torch
 
 from mitex.errors import ConfigError
 from mitex.features import weights
-from mitex.features.frozen import FrozenConv, FrozenStack, Pool, Tap
-from mitex.features.layers import LAYERS, halvings
+from mitex.features.frozen import FrozenConv, FrozenStack, GramTap, Operation, Pool, Tap
+from mitex.features.layers import LAYERS, WIDTHS, halvings
 from mitex.runtime import uses_bfloat16
 
 Weights = Mapping[str, tuple[torch.Tensor, torch.Tensor]]  # layer -> weight (O, I, 3, 3), bias (O,)
@@ -45,16 +45,16 @@ class Vgg16:
             raise ConfigError(f"unknown pooling {pool!r}", "use 'average' or 'max'")
         self.pool, self.normalised, self.device = pool, normalised, device
         self.dtype = torch.bfloat16 if uses_bfloat16(precision, device) else torch.float32
-        self.operations: list[FrozenConv | Pool] = []
-        self.index: dict[str, int] = {}
+        self.operations: list[Operation] = []
+        self._names: list[str] = []  # of what the operations give
         self._mean = torch.tensor(MEAN_RGB, device=device)
         for name, (weight, bias) in (weights or convolutions(pool, normalised)).items():
             if name.endswith("_1") and name != "relu1_1":
-                self.operations.append(Pool(pool))
+                self._append(f"pool{halvings(name)}", Pool(pool))
             # The first layer reads 3 channels: float32 costs nothing there and keeps the image exact.
             dtype = torch.float32 if name == "relu1_1" else self.dtype
-            self.index[name] = len(self.operations)
-            self.operations.append(FrozenConv(weight.to(device), bias.to(device), dtype, self.dtype))
+            self._append(name, FrozenConv(weight.to(device), bias.to(device), dtype, self.dtype))
+        self._append(f"pool{len(WIDTHS)}", Pool(pool))
 
     def features(self, images: torch.Tensor, layers: Iterable[str]) -> dict[str, torch.Tensor]:
         """Whole feature maps.
@@ -69,12 +69,8 @@ class Vgg16:
         Raises:
             ConfigError: no or an unknown layer, images of another shape or too small for a layer.
         """
-        sources = {name: self._source(name) for name in layers}
-        names = list(dict.fromkeys(sources.values()))
-        maps = dict(zip(names, self._run(images, names, [None] * len(names)), strict=True))
-        pool = Pool(self.pool)
-        read = {n: maps[n] if n == source else pool.forward(maps[source]) for n, source in sources.items()}
-        return {name: m.permute(0, 2, 3, 1) for name, m in read.items()}
+        maps = self.read(images, {name: Tap(self.index_of(name)) for name in layers})
+        return {name: m.permute(0, 2, 3, 1) for name, m in maps.items()}
 
     def samples(self, images: torch.Tensor, positions: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
         """Features at chosen places only: what sampled losses need, without gradients on whole maps.
@@ -89,50 +85,54 @@ class Vgg16:
         Raises:
             ConfigError: as in `features`, or positions of another shape or outside a map.
         """
-        return dict(zip(positions, self._run(images, list(positions), list(positions.values())), strict=True))
+        for name, where in positions.items():
+            self._check_positions(images, name, where)
+        return self.read(images, {name: Tap(self.index_of(name), p) for name, p in positions.items()})
+
+    def read(self, images: torch.Tensor, taps: Mapping[str, Tap | GramTap]) -> dict[str, torch.Tensor]:
+        """What taps give of images (as in `features`), under their names, in one pass."""
+        if not taps:
+            raise ConfigError("no VGG-16 layer is asked for", f"name some of {', '.join(LAYERS)}")
+        if images.ndim != 4 or images.shape[3] != 3 or not len(images):
+            raise ConfigError(f"images of shape {tuple(images.shape)}", "give (K, H, W, 3), K at least 1")
+        outputs = list(taps.values())
+        deepest = max(tap.index for tap in outputs)
+        name = self._names[deepest]
+        if min(self.extent(name, images.shape[1], images.shape[2])) < 1:
+            raise ConfigError(
+                f"images of {tuple(images.shape[1:3])} are too small for {name}", "render larger"
+            )
+        centred = images.permute(0, 3, 1, 2) * 255 - self._mean[:, None, None]
+        centred = centred.contiguous(memory_format=torch.channels_last)
+        values = FrozenStack.apply(centred, self.operations[: deepest + 1], outputs)
+        return dict(zip(taps, values, strict=True))
+
+    def index_of(self, layer: str) -> int:
+        """The operation that gives a layer or a pooling.
+
+        Raises:
+            ConfigError: there is no such layer.
+        """
+        if layer not in self._names:
+            raise ConfigError(f"VGG-16 has no layer {layer!r}", f"use one of {', '.join(LAYERS)}")
+        return self._names.index(layer)
 
     def extent(self, layer: str, height: int, width: int) -> tuple[int, int]:
         """(h, w) of a layer's map for an image of (height, width)."""
         return height >> halvings(layer), width >> halvings(layer)
 
-    def _source(self, layer: str) -> str:
-        """The convolution that a layer is, or that it pools."""
-        block = layer.replace("pool", "relu") + "_"
-        return max((name for name in self.index if name.startswith(block)), default=layer)
+    def _append(self, name: str, operation: Operation) -> None:
+        self._names.append(name)
+        self.operations.append(operation)
 
-    def _run(
-        self, images: torch.Tensor, names: list[str], positions: Sequence[torch.Tensor | None]
-    ) -> tuple[torch.Tensor, ...]:
-        self._check(images, names, positions)
-        taps = [Tap(self.index[name], where) for name, where in zip(names, positions, strict=True)]
-        depth = max(tap.index for tap in taps) + 1
-        centred = images.permute(0, 3, 1, 2) * 255 - self._mean[:, None, None]
-        centred = centred.contiguous(memory_format=torch.channels_last)
-        return FrozenStack.apply(centred, self.operations[:depth], taps)
-
-    def _check(
-        self, images: torch.Tensor, names: list[str], positions: Sequence[torch.Tensor | None]
-    ) -> None:
-        if not names:
-            raise ConfigError("no VGG-16 layer is asked for", f"name some of {', '.join(LAYERS)}")
-        if images.ndim != 4 or images.shape[3] != 3 or not len(images):
-            raise ConfigError(f"images of shape {tuple(images.shape)}", "give (K, H, W, 3), K at least 1")
-        for name, where in zip(names, positions, strict=True):
-            if name not in self.index:
-                raise ConfigError(f"VGG-16 has no layer {name!r}", f"use one of {', '.join(LAYERS)}")
-            places = math.prod(self.extent(name, images.shape[1], images.shape[2]))
-            if places < 1:
-                raise ConfigError(
-                    f"images of {tuple(images.shape[1:3])} are too small for {name}", "render larger"
-                )
-            if where is None:
-                continue
-            if where.ndim != 2 or len(where) != len(images):
-                raise ConfigError(
-                    f"positions of shape {tuple(where.shape)} in {name}", f"give ({len(images)}, n) indices"
-                )
-            if where.numel() and (where.min() < 0 or where.max() >= places):
-                raise ConfigError(f"positions outside the map of {name}", f"give indices below {places}")
+    def _check_positions(self, images: torch.Tensor, name: str, where: torch.Tensor) -> None:
+        if where.ndim != 2 or len(where) != len(images):
+            raise ConfigError(
+                f"positions of shape {tuple(where.shape)} in {name}", f"give ({len(images)}, n) indices"
+            )
+        places = math.prod(self.extent(name, images.shape[1], images.shape[2]))
+        if where.numel() and (where.min() < 0 or where.max() >= places):
+            raise ConfigError(f"positions outside the map of {name}", f"give indices below {places}")
 
 
 def convolutions(pool: str, normalised: bool) -> Weights:

@@ -9,6 +9,7 @@ import torch.nn.functional as F
 from benchmarks.naive import vectors
 from mitex.errors import ConfigError
 from mitex.features import LAYERS, Vgg16
+from mitex.features.frozen import GramTap
 from mitex.features.layers import CHANNELS
 from mitex.features.vgg import MEAN_ACTIVATION
 from mitex.losses import gram_loss, gram_matrix, moment_distance, relaxed_transport
@@ -161,6 +162,28 @@ def test_gradient_of_samples_is_that_of_the_maps(networks, pictures):
         assert x.grad is not None
         gradients.append(x.grad)
     assert relative_error(*gradients) < 1e-5
+
+
+@pytest.mark.parametrize(("precision", "tolerance"), [("float32", 1e-5), ("bfloat16", 5e-3)])
+def test_gram_matrices_of_regions_are_those_of_the_maps(networks, pictures, precision, tolerance):
+    network, gradients = networks["max", precision], []
+    regions = {"relu1_1": None, "relu3_2": [torch.arange(100), torch.tensor([7, 200, 7])], "pool4": None}
+    taps = {name: GramTap(network.index_of(name), parts) for name, parts in regions.items()}
+
+    def of_maps(images):
+        maps = {name: m[0].flatten(0, 1) for name, m in network.features(images, taps).items()}
+        parts = {name: regions[name] or [torch.arange(len(rows))] for name, rows in maps.items()}
+        return {name: torch.stack([gram_matrix(rows[p]) for p in parts[name]]) for name, rows in maps.items()}
+
+    for read in (lambda x: network.read(x, taps), of_maps):
+        x = pictures[:1].clone().requires_grad_()
+        grams = read(x)
+        torch.stack([gram.square().sum() for gram in grams.values()]).sum().backward()
+        gradients.append(x.grad)
+    for name, gram in network.read(pictures[:1], taps).items():
+        assert gram.shape[0] == len(regions[name] or [None]) and gram.dtype == torch.float32
+        assert relative_error(gram, of_maps(pictures[:1])[name]) < tolerance
+    assert relative_error(*gradients) < tolerance
 
 
 def test_images_of_a_batch_do_not_touch_each_other(networks, pictures):

@@ -13,7 +13,7 @@ from mitex.images import write_image
 from mitex.mesh import Mesh, grid, icosphere
 from mitex.methods.baselines import multi_view_gram
 from mitex.methods.baselines.multi_view_gram import MultiViewConfig, MultiViewTexture
-from mitex.methods.baselines.multi_view_gram.gram_average import GramAverage, covered_gram
+from mitex.methods.baselines.multi_view_gram.gram_average import GramAverage, covered
 from mitex.methods.baselines.multi_view_gram.spectrum import COLOURS, CONTRAST, image_of, random_spectrum
 from mitex.methods.baselines.multi_view_gram.task import MultiViewTask
 from mitex.methods.baselines.multi_view_gram.views import TextureViews, boxed, random_view
@@ -111,13 +111,12 @@ class TestGramAverage:
         assert gram.grad is not None and torch.equal(gram.grad, torch.ones(2, 2))
 
     def test_what_shows_the_background_is_left_out(self):
-        features, coverage = torch.rand(4, 4, 3), torch.ones(8, 8)
+        coverage = torch.ones(8, 8)
         coverage[:3] = 0
-        rows = features[2:].reshape(-1, 3)
-        assert torch.allclose(covered_gram(features, coverage), rows.T @ rows / len(rows))
-        whole = features.reshape(-1, 3)
-        assert torch.allclose(covered_gram(features, None), whole.T @ whole / 16)
-        assert torch.allclose(covered_gram(features, 0 * coverage), whole.T @ whole / 16)
+        assert covered(coverage, (4, 4)).tolist() == list(range(8, 16))
+        coverage[7, 7] = 0.5
+        assert covered(coverage, (4, 4)).tolist() == list(range(8, 15))
+        assert covered(0 * coverage, (4, 4)).tolist() == list(range(16))
 
 
 class TestViews:

@@ -51,7 +51,7 @@ def test_its_layers_are_compared(name, exemplar, tmp_path, monkeypatch):
     own = task(name, exemplar)
     assert tuple(own.targets) == LAYERS and own.targets["relu3_4"].shape == (256, 256)
     expected = vgg19_convolutions(path)["relu3_4"][1]
-    bias = own.network.operations[own.network.index["relu3_4"]].bias
+    bias = own.network.operations[own.network.index_of("relu3_4")].bias
     assert torch.equal(bias, expected.to(bias.dtype))
     assert own.loss(0, torch.Generator().manual_seed(0)).value.isfinite()
 

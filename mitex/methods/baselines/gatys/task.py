@@ -7,9 +7,10 @@ import torch
 from torch.nn.functional import pad
 
 from mitex.exemplar import Exemplar
+from mitex.features.frozen import GramTap
 from mitex.features.layers import halvings
 from mitex.features.vgg19 import named_vgg
-from mitex.losses.gram import gram_distance, gram_matrix, gram_targets
+from mitex.losses.gram import gram_distance, gram_targets
 from mitex.methods.baselines.gatys.config import GatysConfig
 from mitex.methods.exemplar_pictures import albedo, framed
 from mitex.runtime import keep_freed_memory
@@ -50,20 +51,23 @@ class GatysTask(ParameterTask):
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
         """A quarter of the squared distance of the Gram matrices (equation 4)."""
-        image, inside = self.image, {layer: slice(None) for layer in self.targets}
-        if self.config.periodic:
-            around = min(AROUND, self.config.size)
+        image, around = self.image, AROUND if self.config.periodic else 0
+        around = min(around, self.config.size)
+        if around:
             planes = pad(image.permute(2, 0, 1)[None], (around,) * 4, mode="circular")
             image = planes[0].permute(1, 2, 0)
-            for layer in inside:
-                border = around >> halvings(layer)
-                inside[layer] = slice(border, border + (self.config.size >> halvings(layer)))
-        features = self.network.features(image[None], self.targets)
-        grams = {}
-        for layer, values in features.items():
-            part = inside[layer]
-            grams[layer] = gram_matrix(values[0, part, part].flatten(0, 1))
+        taps = {layer: self._tap(layer, around) for layer in self.targets}
+        grams = {layer: gram[0] for layer, gram in self.network.read(image[None], taps).items()}
         return Step(gram_distance(grams, self.targets, self.weights) / 4, {}, self._clamp)
+
+    def _tap(self, layer: str, around: int) -> GramTap:
+        """Gram matrix of a layer, without the features of a border of `around` pixels."""
+        operation = self.network.index_of(layer)
+        if not around:
+            return GramTap(operation)
+        border, side = around >> halvings(layer), self.config.size >> halvings(layer)
+        row = torch.arange(border, border + side)
+        return GramTap(operation, [(row[:, None] * (side + 2 * border) + row).flatten()])
 
     @torch.no_grad()
     def _clamp(self) -> None:

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 
 import torch
 
-from mitex.losses.gram import gram_matrix
-
 FULL = 0.999  # coverage from which on a feature shows the mesh alone
 
 
@@ -57,17 +55,12 @@ class GramAverage:
         return self.decay * self.sums[layer] + (1 - self.decay) * gram
 
 
-def covered_gram(features: torch.Tensor, coverage: torch.Tensor | None) -> torch.Tensor:
-    """(C, C) Gram matrix of a view's features (h, w, C).
+def covered(coverage: torch.Tensor, size: tuple[int, int]) -> torch.Tensor:
+    """Indices of a view's features that see nothing but the mesh at their own place; all if there are none.
 
     Args:
-        features: of one layer.
-        coverage: (H, W) how much of each pixel shows the mesh. Features that see anything else at their own
-            place are left out; None takes all.
+        coverage: (H, W) how much of each pixel shows the mesh.
+        size: (h, w) of the layer's map, whose places are counted row by row.
     """
-    rows = features.reshape(-1, features.shape[2])
-    if coverage is None:
-        return gram_matrix(rows)
-    size = features.shape[0], features.shape[1]
     inside = torch.nn.functional.adaptive_avg_pool2d(coverage[None], size)[0] > FULL
-    return gram_matrix(rows[inside.flatten()]) if inside.any() else gram_matrix(rows)
+    return inside.flatten().nonzero()[:, 0] if inside.any() else torch.arange(inside.numel())

@@ -12,11 +12,12 @@ import torch
 from mitex.cache import content_key
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
+from mitex.features.frozen import GramTap, Tap
 from mitex.features.layers import CHANNELS
 from mitex.losses.gram import gram_targets
 from mitex.mesh import Mesh
 from mitex.methods.baselines.multi_view_gram.config import MultiViewConfig
-from mitex.methods.baselines.multi_view_gram.gram_average import GramAverage, covered_gram
+from mitex.methods.baselines.multi_view_gram.gram_average import GramAverage, covered
 from mitex.methods.baselines.multi_view_gram.spectrum import image_of, random_spectrum
 from mitex.methods.baselines.multi_view_gram.views import TextureViews, boxed, random_view
 from mitex.methods.exemplar_pictures import albedo, framed, side_in_view
@@ -24,6 +25,8 @@ from mitex.methods.surface.texels import Texels
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, orbit
 from mitex.training import ParameterTask, Step
+
+CONTENT = "content"  # name of what is read for it
 
 
 class MultiViewTask(ParameterTask):
@@ -75,18 +78,17 @@ class MultiViewTask(ParameterTask):
         """Mean absolute differences of averaged Gram matrices, and of the content's features if any."""
         camera = self.cameras(generator, self.config.nearest, self.config.farthest)
         picture, coverage = self.views.picture(self.texture, camera)
-        layers = dict.fromkeys((*self.config.layers, self.config.content_layer))
-        if self.content is None:
-            layers = dict.fromkeys(self.config.layers)
-        features = self.network.features(picture[None], layers)
-        mask = coverage if self.config.masked else None
-        grams = {layer: covered_gram(features[layer][0], mask) for layer in self.config.layers}
+        taps: dict[str, Tap | GramTap] = {n: self._gram_tap(n, coverage) for n in self.config.layers}
+        if self.content is not None:
+            taps[CONTENT] = self._content_tap
+        values = self.network.read(picture[None], taps)
+        grams = {layer: values[layer][0] for layer in self.config.layers}
         blended = self.average.blended(grams)
         total = torch.zeros(())
         for layer, target in self.targets.items():
             total = total + (blended[layer] - target).abs().mean()
         if self.content is not None:
-            total = total + self.config.content_weight * self._content_loss(features, camera)
+            total = total + self.config.content_weight * self._content_loss(values[CONTENT], camera)
         kept = {layer: gram.detach() for layer, gram in grams.items()}
         return Step(total, {}, partial(self.average.add, kept))
 
@@ -119,10 +121,19 @@ class MultiViewTask(ParameterTask):
         picture = albedo(self.exemplar, self.exemplar_side)
         return gram_targets(self.network.features(picture[None], self.config.layers))
 
-    def _content_loss(self, features: Mapping[str, torch.Tensor], camera: Cameras) -> torch.Tensor:
+    def _gram_tap(self, layer: str, coverage: torch.Tensor) -> GramTap:
+        size = self.network.extent(layer, *coverage.shape)
+        regions = [covered(coverage, size)] if self.config.masked else None
+        return GramTap(self.network.index_of(layer), regions)
+
+    @property
+    def _content_tap(self) -> Tap:
+        return Tap(self.network.index_of(self.config.content_layer))
+
+    def _content_loss(self, features: torch.Tensor, camera: Cameras) -> torch.Tensor:
+        """How far the features (1, C, h, w) of a picture are from those of the content, seen likewise."""
         assert self.content is not None
-        layer = self.config.content_layer
         with torch.no_grad():
             original = self.views.picture(self.content, camera)[0]
-            expected = self.network.features(original[None], [layer])[layer]
-        return (features[layer] - expected).abs().mean()
+            expected = self.network.read(original[None], {CONTENT: self._content_tap})[CONTENT]
+        return (features - expected).abs().mean()

@@ -11,10 +11,11 @@ import torch
 
 from mitex.cache import content_key
 from mitex.exemplar import Exemplar
+from mitex.features.frozen import GramTap
 from mitex.features.vgg19 import named_vgg
 from mitex.losses.gram import gram_distance, gram_targets
 from mitex.mesh import Mesh
-from mitex.methods.baselines.multi_view_gram.gram_average import covered_gram
+from mitex.methods.baselines.multi_view_gram.gram_average import covered
 from mitex.methods.baselines.multi_view_gram.views import TextureViews, boxed
 from mitex.methods.baselines.style_mesh.config import StyleMeshConfig
 from mitex.methods.baselines.style_mesh.layered import fine_energy, sum_of, zero_textures
@@ -101,14 +102,20 @@ class StyleMeshTask(ParameterTask):
         picture, coverage = self.pictures[k].picture(texture, camera)
         if picture.requires_grad:
             picture.register_hook(lambda gradient: gradient * weight[..., None])
-        features = self.network.features(picture[None], self.config.layers)
-        grams = {layer: covered_gram(features[layer][0], coverage) for layer in self.config.layers}
-        total = gram_distance(grams, self.targets, self.weights)
+        masks, small = [coverage], ()
         if self.config.by_angle and self.small_targets:
-            frontal = coverage * torch.from_numpy(visible.cosine > self._frontal).float()
-            if frontal.mean() > LEAST:
-                small = {n: covered_gram(features[n][0], frontal) for n in self.small_targets}
-                total = total + gram_distance(small, self.small_targets, self.weights)
+            masks.append(coverage * torch.from_numpy(visible.cosine > self._frontal).float())
+            small = self.small_targets if masks[1].mean() > LEAST else ()
+        taps = {}
+        for layer in self.config.layers:
+            size = self.network.extent(layer, *coverage.shape)
+            regions = [covered(mask, size) for mask in masks[: 2 if layer in small else 1]]
+            taps[layer] = GramTap(self.network.index_of(layer), regions)
+        grams = self.network.read(picture[None], taps)
+        total = gram_distance({n: gram[0] for n, gram in grams.items()}, self.targets, self.weights)
+        if small:
+            frontal = {layer: grams[layer][1] for layer in small}
+            total = total + gram_distance(frontal, self.small_targets, self.weights)
         return total
 
     def _weight(self, visible: Visible, k: int) -> torch.Tensor:
