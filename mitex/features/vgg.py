@@ -89,6 +89,22 @@ class Vgg16:
             self._check_positions(images, name, where)
         return self.read(images, {name: Tap(self.index_of(name), p) for name, p in positions.items()})
 
+    def grams(self, images: torch.Tensor, layers: Iterable[str]) -> dict[str, torch.Tensor]:
+        """Gram matrices of each image's features, divided by their number.
+
+        Args:
+            images, layers: as in `features`.
+
+        Returns:
+            name -> (K, C, C) float32, differentiable in `images` (once).
+        """
+        taps = {}
+        for name in layers:
+            places = math.prod(self.extent(name, images.shape[1], images.shape[2]))
+            regions = torch.arange(len(images) * places).split(places) if len(images) > 1 else None
+            taps[name] = GramTap(self.index_of(name), regions)
+        return self.read(images, taps)
+
     def read(self, images: torch.Tensor, taps: Mapping[str, Tap | GramTap]) -> dict[str, torch.Tensor]:
         """What taps give of images (as in `features`), under their names, in one pass."""
         if not taps:

@@ -186,6 +186,14 @@ def test_gram_matrices_of_regions_are_those_of_the_maps(networks, pictures, prec
     assert relative_error(*gradients) < tolerance
 
 
+def test_gram_matrices_are_of_each_image(networks, pictures):
+    network, layers = networks["average", "float32"], ("relu2_1", "relu4_2")
+    for count in (1, 3):
+        grams = network.grams(pictures[:count], layers)
+        for name, maps in network.features(pictures[:count], layers).items():
+            assert relative_error(grams[name], gram_matrix(maps.flatten(1, 2))) < 1e-5
+
+
 def test_images_of_a_batch_do_not_touch_each_other(networks, pictures):
     network = networks["average", "float32"]
     together = network.features(pictures, ["relu4_3"])["relu4_3"]

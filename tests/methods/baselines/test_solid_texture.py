@@ -16,6 +16,7 @@ from mitex.mesh import icosphere
 from mitex.methods.baselines import solid_texture
 from mitex.methods.baselines.solid_texture import PRESETS, SolidConfig, SolidTexture
 from mitex.methods.baselines.solid_texture.boxes import Box, needed
+from mitex.methods.baselines.solid_texture.convolution import convolve
 from mitex.methods.baselines.solid_texture.generator import (
     CHANNELS,
     KERNELS,
@@ -140,6 +141,20 @@ class TestGenerator:
         assert not torch.equal(updated["up0/variance"], generator.statistics["up0/variance"])
 
 
+@pytest.mark.parametrize("size", [(3, 9, 8), (9, 4, 8), (7, 8, 5), (6, 6, 6)])
+@pytest.mark.parametrize("kernel", [1, 3])
+def test_convolutions_are_those_of_torch(size, kernel):
+    generator = torch.Generator().manual_seed(6)
+    shapes = (2, 5, *size), (4, 5, kernel, kernel, kernel), (4,)
+    inputs = values, weight, bias = [torch.randn(s, generator=generator, requires_grad=True) for s in shapes]
+    expected, actual = nn.functional.conv3d(values, weight, bias), convolve(values, weight, bias)
+    assert actual.shape == expected.shape and torch.allclose(actual, expected, atol=1e-5)
+    factors = torch.randn(expected.shape, generator=generator)
+    theirs, ours = (torch.autograd.grad((factors * v).sum(), inputs) for v in (expected, actual))
+    for a, b in zip(ours, theirs, strict=True):
+        assert torch.allclose(a, b, rtol=1e-4, atol=1e-4)
+
+
 class TestNoise:
     def test_it_is_uniform_and_uncorrelated(self):
         values = hashed_noise(Box((-20, 5, 1000), (40, 40, 40)), 3, 2, 7).astype(np.float64)
@@ -259,9 +274,9 @@ class TestTask:
 def test_a_flat_colour_is_learned(tmp_path):
     """On slices as they are trained; statistics of so few voxels are too uneven for the whole volume."""
     red = Exemplar({"albedo": np.full((32, 32, 3), (0.8, 0.3, 0.1), np.float32)}, "red")
-    settings = SMALL | {"preview_every": 20, "layers": ("relu1_1",)}
-    solid_texture.fit(red, tmp_path / "run", set=settings, steps=20)
-    with Image.open(tmp_path / "run" / "previews" / "000020.png") as picture:
+    settings = SMALL | {"preview_every": 30, "layers": ("relu1_1",), "milestones": (15, 20, 25)}
+    solid_texture.fit(red, tmp_path / "run", set=settings, steps=30)
+    with Image.open(tmp_path / "run" / "previews" / "000030.png") as picture:
         slices = np.asarray(picture)[:, 32:] / 255
     assert slices.shape == (32, 96, 3)
     np.testing.assert_allclose(slices.mean((0, 1)), (0.8, 0.3, 0.1), atol=0.15)

@@ -10,6 +10,7 @@ import torch.nn.functional as F
 
 from mitex.features.normalisation import MEAN
 from mitex.methods.baselines.solid_texture.boxes import Box, needed
+from mitex.methods.baselines.solid_texture.convolution import convolve
 
 SCALES = 6
 NOISE = 3  # channels of the noise at each scale
@@ -68,7 +69,7 @@ class Generator:
             own = self._block(f"noise{scale}", noise[scale], updated)
             features = self._block(f"join{scale}", torch.cat([features, own], 1), updated)
         # In steps of an 8-bit level, as published, so that the published learning rate fits.
-        levels = F.conv3d(features, self.tensors["colour/weight"], self.tensors["colour/bias"])
+        levels = convolve(features, self.tensors["colour/weight"], self.tensors["colour/bias"])
         return levels / 255 + levels.new_tensor(MEAN).view(1, 3, 1, 1, 1)
 
     def _block(
@@ -76,7 +77,7 @@ class Generator:
     ) -> torch.Tensor:
         for k in range(len(KERNELS)):
             layer = f"{name}/{k}"
-            values = F.conv3d(values, self.tensors[f"{layer}/weight"], self.tensors[f"{layer}/bias"])
+            values = convolve(values, self.tensors[f"{layer}/weight"], self.tensors[f"{layer}/bias"])
             values = F.leaky_relu(self._normalised(layer, values, updated), SLOPE)
         return values
 

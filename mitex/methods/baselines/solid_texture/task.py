@@ -11,7 +11,7 @@ import torch
 from mitex.exemplar import Exemplar
 from mitex.features.layers import CHANNELS
 from mitex.features.vgg19 import named_vgg
-from mitex.losses.gram import gram_loss, gram_targets
+from mitex.losses.gram import gram_distance, gram_targets
 from mitex.methods.baselines.solid_texture.boxes import Box
 from mitex.methods.baselines.solid_texture.config import SolidConfig
 from mitex.methods.baselines.solid_texture.generator import NOISE, SCALES, Generator, noise_boxes
@@ -51,10 +51,8 @@ class SolidTask(ParameterTask):
         total = torch.zeros(())
         for axis in range(3):
             slices = [self._slice(axis, generator, updated) for _ in range(self.config.slices)]
-            pictures = torch.stack(slices)
-            features = self.network.features(pictures, self.targets)
-            vectors = {layer: values.flatten(1, 2) for layer, values in features.items()}
-            total = total + gram_loss(vectors, self.targets, self.weights) / 3
+            grams = self.network.grams(torch.stack(slices), self.targets)
+            total = total + gram_distance(grams, self.targets, self.weights) / 3
         return Step(total, {}, partial(self._keep, updated))
 
     def state(self) -> dict[str, torch.Tensor]:
