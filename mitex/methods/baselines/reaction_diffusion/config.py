@@ -15,7 +15,7 @@ STABLE = 0.125  # rate of diffusion up to which no explicit step overshoots, see
 class ReactionDiffusionConfig(TrainingConfig):
     """Everything that shapes a training; every key can be set from a TOML file or with `--set`."""
 
-    steps: int = 1000
+    steps: int = 1500
     channels: int = key(32, "chemicals; the first three are red, green and blue", 3, 256)
     hidden: int = key(128, "width of the hidden layer of the reaction", 1, 4096)
     slowest: float = key(0.008, "rate of diffusion of the first chemical [cells^2 a step]", 0, STABLE)
@@ -34,7 +34,7 @@ class ReactionDiffusionConfig(TrainingConfig):
     )
     overflow_weight: float = key(100.0, "of the overflow loss", 0)
     lr: float = key(4e-3, "learning rate of Adam", 0)
-    milestones: tuple[int, ...] = key((700, 900), "steps at which the learning rate falls", 0)
+    milestones: tuple[int, ...] = key((500, 1000, 1300), "steps at which the learning rate falls", 0)
     decay: float = key(0.3, "factor of the learning rate at a milestone", 0)
 
     def __post_init__(self) -> None:
