@@ -8,6 +8,7 @@ the angle in the whole window, and windows in which the photo shows it in few pi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -129,9 +130,8 @@ def elevation_table(
         places: windows for each angle that are rendered; as many again tell how much photos differ.
     """
     windows = select_windows(photos, surfaces, np.random.default_rng(seed), window, places)
-    tables = []
-    for ours, flat in syntheses:
-        tables.append([_compare(group, angle, captured, ours, flat) for angle, group in windows.items()])
+    references = [_Reference(angle, *_halves(group), captured) for angle, group in windows.items()]
+    tables = [[one.compared(ours, flat) for one in references] for ours, flat in syntheses]
     return [_mean(rows) for rows in zip(*tables, strict=True)]
 
 
@@ -152,17 +152,28 @@ def photo_distances(windows: Mapping[float, list[Window]]) -> dict[float, float]
     return {angle: _distance(_photos(others), first) for angle, (first, others) in halves.items()}
 
 
-def _compare(
-    windows: list[Window], angle: float, captured: Renderer, ours: Renderer, flat: Mapping[str, Renderer]
-) -> Elevation:
-    """The first half of the windows is rendered, the other one tells how much photos differ."""
-    first, others = _halves(windows)
-    strips = [_strip(list(map(render, first))) for render in (captured, ours, *flat.values())]
-    of_captured, of_ours, *of_flat = (_distance(strip, first) for strip in strips)
-    of_photos = _distance(_photos(others), first)
-    picture = np.concatenate([_photos(first)[0], strips[0][0], strips[1][0], strips[-1][0]])
-    by_name = dict(zip(flat, of_flat, strict=True))
-    return Elevation(angle, of_captured, of_ours, by_name, of_photos, picture)
+class _Reference:
+    """What all syntheses are compared with under one angle, and what does not depend on them.
+
+    Args:
+        angle: between the view and the normal [degrees].
+        windows: that are rendered.
+        others: tell how much photos differ.
+        captured: shows the model where it was captured.
+    """
+
+    def __init__(self, angle: float, windows: list[Window], others: list[Window], captured: Renderer) -> None:
+        self.windows, strip = windows, _strip(list(map(captured, windows)))
+        picture = np.concatenate([_photos(windows)[0], strip[0]])
+        distances = _distance(strip, windows), _distance(_photos(others), windows)
+        self.row = Elevation(angle, distances[0], math.nan, {}, distances[1], picture)
+
+    def compared(self, ours: Renderer, flat: Mapping[str, Renderer]) -> Elevation:
+        """The row of a synthesis."""
+        strips = [_strip(list(map(render, self.windows))) for render in (ours, *flat.values())]
+        of_ours, *of_flat = (_distance(strip, self.windows) for strip in strips)
+        picture = np.concatenate([self.row.picture, strips[0][0], strips[-1][0]])
+        return replace(self.row, ours=of_ours, flat=dict(zip(flat, of_flat, strict=True)), picture=picture)
 
 
 def _halves(windows: list[Window]) -> tuple[list[Window], list[Window]]:
