@@ -101,8 +101,8 @@ class Vgg16:
         taps = {}
         for name in layers:
             places = math.prod(self.extent(name, images.shape[1], images.shape[2]))
-            regions = torch.arange(len(images) * places).split(places) if len(images) > 1 else None
-            taps[name] = GramTap(self.index_of(name), regions)
+            each = torch.arange(len(images) * places, device=images.device).split(places)
+            taps[name] = GramTap(self.index_of(name), each if len(images) > 1 else None)
         return self.read(images, taps)
 
     def read(self, images: torch.Tensor, taps: Mapping[str, Tap | GramTap]) -> dict[str, torch.Tensor]:

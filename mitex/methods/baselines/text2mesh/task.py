@@ -8,6 +8,7 @@ import torch
 from mitex.cache import content_key
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
+from mitex.features.frozen import Tap
 from mitex.losses import moment_distance, relaxed_transport
 from mitex.mesh import Mesh
 from mitex.methods.baselines.text2mesh.config import Text2MeshConfig
@@ -64,18 +65,8 @@ class Text2MeshTask(ParameterTask):
     def loss(self, step: int, generator: torch.Generator) -> Step:
         """Relaxed transport and moments of the features of some views, and of their colours."""
         views, masks = self.views(cameras_of(self.config, generator))
-        total = torch.zeros(())
-        features = self.network.features(views, self.config.layers)
-        for k in range(len(views)):
-            for layer, values in features.items():
-                inside = torch.nn.functional.adaptive_avg_pool2d(
-                    masks[k][None].float(), (values.shape[1], values.shape[2])
-                )
-                total = total + self._distance(
-                    values[k][inside[0] > FULL], self.targets[layer], generator, False
-                )
-            total = total + self._distance(views[k][masks[k]], self.picture, generator, True)
-        return Step(total / len(views), {})
+        losses = [self._view_loss(*pair, generator) for pair in zip(views, masks, strict=True)]
+        return Step(torch.stack(losses).mean(), {})
 
     def views(self, cameras: Cameras) -> tuple[torch.Tensor, torch.Tensor]:
         """Pictures (K, S, S, 3) sRGB on white, and (K, S, S) bool, which pixels show the mesh."""
@@ -114,12 +105,33 @@ class Text2MeshTask(ParameterTask):
         key = content_key(self.mesh.vertices, self.mesh.faces, self.mesh.uv)
         return {"method": "text2mesh", "mesh": self.mesh.name, "mesh_key": key} | exemplar
 
-    def _distance(
-        self, ours: torch.Tensor, theirs: torch.Tensor, generator: torch.Generator, euclidean: bool
+    def _view_loss(
+        self, picture: torch.Tensor, mask: torch.Tensor, generator: torch.Generator
     ) -> torch.Tensor:
-        """Of random vectors (n, C) and (m, C), as many of both."""
+        """Of a picture (S, S, 3) and where it shows the mesh, (S, S) bool."""
+        taps, targets = {}, {}
+        for layer, theirs in self.targets.items():
+            size = self.network.extent(layer, *mask.shape)
+            inside = torch.nn.functional.adaptive_avg_pool2d(mask[None].float(), size)[0] > FULL
+            ours, targets[layer] = self._samples(inside.flatten().nonzero()[:, 0], theirs, generator)
+            taps[layer] = Tap(self.network.index_of(layer), ours[None])
+        values = self.network.read(picture[None], taps)
+        total = self._distance(*self._samples(picture[mask], self.picture, generator), True)
+        for layer, theirs in targets.items():
+            total = total + self._distance(values[layer][0], theirs, False)
+        return total
+
+    def _samples(
+        self, ours: torch.Tensor, theirs: torch.Tensor, generator: torch.Generator
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Random ones of both, as many."""
         count = min(len(ours), len(theirs), self.config.samples)
-        if count < 2:
+        a, b = (rows[torch.randperm(len(rows), generator=generator)[:count]] for rows in (ours, theirs))
+        return a, b
+
+    def _distance(self, ours: torch.Tensor, theirs: torch.Tensor, euclidean: bool) -> torch.Tensor:
+        """Of vectors (n, C), as many of both; 0 if they are too few."""
+        if len(ours) < 2:
             return torch.zeros(())
-        a, b = (rows[torch.randperm(len(rows), generator=generator)[:count]][None] for rows in (ours, theirs))
+        a, b = ours[None], theirs[None]
         return (relaxed_transport(a, b, euclidean) + self.config.moment_weight * moment_distance(a, b)).sum()
