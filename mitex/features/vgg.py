@@ -106,7 +106,19 @@ class Vgg16:
         return self.read(images, taps)
 
     def read(self, images: torch.Tensor, taps: Mapping[str, Tap | GramTap]) -> dict[str, torch.Tensor]:
-        """What taps give of images (as in `features`), under their names, in one pass."""
+        """What taps give of images, under their names, in one pass.
+
+        Args:
+            images: as in `features`.
+            taps: of operations by `index_of`.
+
+        Returns:
+            name -> float32 values, differentiable in `images` (once): (K, C, h, w) of a whole tap, (K, n, C)
+            of a sampled one, (regions, C, C) of a Gram tap.
+
+        Raises:
+            ConfigError: no taps, images of another shape or too small for a layer.
+        """
         if not taps:
             raise ConfigError("no VGG-16 layer is asked for", f"name some of {', '.join(LAYERS)}")
         if images.ndim != 4 or images.shape[3] != 3 or not len(images):

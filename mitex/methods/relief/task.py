@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-import torch.nn.functional as F
 
 from mitex.cache import content_key
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
+from mitex.features.coverage import fully_covered
 from mitex.losses import gram_matrix, moment_distance, relaxed_transport
 from mitex.mesh import Mesh
 from mitex.methods.relief.config import ReliefConfig
@@ -18,7 +18,6 @@ from mitex.methods.relief.start import Start
 from mitex.runtime import keep_freed_memory
 from mitex.training import ParameterTask, Step
 
-FULL = 0.999  # coverage from which on a feature shows pixels that count alone
 LEAST = 32  # side of the exemplar beside a close-up [px], which four layers need
 LARGEST = 8  # side of the exemplar [close-ups]
 
@@ -71,11 +70,10 @@ class ReliefTask(ParameterTask):
         pictures, counts = self.views(offsets, cameras)
         total = 0 * offsets.sum()  # close-ups may see nothing that counts
         for layer, values in self.network.features(pictures.flatten(0, 1), config.layers).items():
-            size = values.shape[1], values.shape[2]
-            shares = F.adaptive_avg_pool2d(counts[:, None].float(), size)[:, 0]
+            inside = fully_covered(counts, (values.shape[1], values.shape[2]))
             by_kind = values.unflatten(0, pictures.shape[:2]).transpose(0, 1)
             for kind in range(self.pictures.kinds):
-                total = total + self._distance(by_kind[kind][shares > FULL], layer, kind, generator)
+                total = total + self._distance(by_kind[kind][inside], layer, kind, generator)
         return Step(total, {"seen": float(counts.float().mean())})
 
     def _distance(

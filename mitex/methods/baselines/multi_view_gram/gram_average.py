@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import torch
 
-FULL = 0.999  # coverage from which on a feature shows the mesh alone
+from mitex.features.coverage import fully_covered
 
 
 class GramAverage:
@@ -62,5 +62,5 @@ def covered(coverage: torch.Tensor, size: tuple[int, int]) -> torch.Tensor:
         coverage: (H, W) how much of each pixel shows the mesh.
         size: (h, w) of the layer's map, whose places are counted row by row.
     """
-    inside = torch.nn.functional.adaptive_avg_pool2d(coverage[None], size)[0] > FULL
+    inside = fully_covered(coverage[None], size)[0]
     return inside.flatten().nonzero()[:, 0] if inside.any() else torch.arange(inside.numel())

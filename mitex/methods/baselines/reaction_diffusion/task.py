@@ -10,7 +10,7 @@ import torch
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
 from mitex.losses import overflow_loss
-from mitex.losses.gram import gram_loss, gram_targets
+from mitex.losses.gram import gram_distance, gram_targets
 from mitex.methods.baselines.reaction_diffusion.config import ReactionDiffusionConfig
 from mitex.methods.baselines.reaction_diffusion.laplacian import grid_laplacian
 from mitex.methods.baselines.reaction_diffusion.reaction import BOUND, Reaction, colours, geometric_rates
@@ -52,9 +52,8 @@ class ReactionDiffusionTask(ParameterTask):
         state = self.reaction.evolve(state, self.laplacian, steps)
         # An overflowing state would outweigh all else, by the fourth power of its values.
         picture = self._picture(state.clamp(-1, 1))
-        features = self.network.features(picture[None], self.targets)
-        vectors = {layer: values.flatten(1, 2) for layer, values in features.items()}
-        terms = {"gram": gram_loss(vectors, self.targets), "overflow": overflow_loss(state)}
+        grams = self.network.grams(picture[None], self.targets)
+        terms = {"gram": gram_distance(grams, self.targets), "overflow": overflow_loss(state)}
         return Step(
             terms["gram"] + config.overflow_weight * terms["overflow"],
             {name: value.item() for name, value in terms.items()},

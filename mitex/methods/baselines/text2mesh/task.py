@@ -8,6 +8,7 @@ import torch
 from mitex.cache import content_key
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
+from mitex.features.coverage import fully_covered
 from mitex.features.frozen import Tap
 from mitex.losses import moment_distance, relaxed_transport
 from mitex.mesh import Mesh
@@ -22,7 +23,6 @@ from mitex.scenes.shaded import BACKGROUND
 from mitex.scenes.stage import Stage
 from mitex.training import ParameterTask, Step
 
-FULL = 0.999  # coverage from which on a feature shows the mesh alone
 CHUNK = 1 << 16  # places at a time
 
 
@@ -112,7 +112,7 @@ class Text2MeshTask(ParameterTask):
         taps, targets = {}, {}
         for layer, theirs in self.targets.items():
             size = self.network.extent(layer, *mask.shape)
-            inside = torch.nn.functional.adaptive_avg_pool2d(mask[None].float(), size)[0] > FULL
+            inside = fully_covered(mask[None], size)[0]
             ours, targets[layer] = self._samples(inside.flatten().nonzero()[:, 0], theirs, generator)
             taps[layer] = Tap(self.network.index_of(layer), ours[None])
         values = self.network.read(picture[None], taps)
