@@ -20,7 +20,17 @@ METHOD = Method(
     },
 )
 
-__all__ = ["METHOD", "PRESETS", "Capture", "NerfConfig", "NerfTexture", "fit", "load_capture", "make_capture"]
+__all__ = [
+    "METHOD",
+    "PRESETS",
+    "Capture",
+    "NerfConfig",
+    "NerfTexture",
+    "fit",
+    "load_capture",
+    "make_capture",
+    "project_environment",
+]
 
 __getattr__ = attributes(
     __name__,
@@ -32,12 +42,14 @@ __getattr__ = attributes(
         "fit": "mitex.methods.nerf.fitting",
         "load_capture": "mitex.methods.nerf.capture.capture",
         "make_capture": "mitex.methods.nerf.footage.making",
+        "project_environment": "mitex.methods.nerf.field.lighting",
     },
 )
 
 if TYPE_CHECKING:
     from mitex.methods.nerf.capture.capture import Capture, load_capture
     from mitex.methods.nerf.config import PRESETS, NerfConfig
+    from mitex.methods.nerf.field.lighting import project_environment
     from mitex.methods.nerf.fitting import fit
     from mitex.methods.nerf.footage.making import make_capture
     from mitex.methods.nerf.texture import NerfTexture

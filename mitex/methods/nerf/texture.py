@@ -305,7 +305,7 @@ class NerfTexture:
             density: factor of the density.
             lift: 1 puts the mesh under the texture's ground, 0 where the base shape was, as published: there
                 the texture is carved into the mesh, and thin parts of this leave no room for its ground.
-            light: (16,) or (16, 3) spherical harmonics, see `lighting`, in place of the capture's light.
+            light: (16,) or (16, 3) spherical harmonics in place of the capture's (`project_environment`).
             guide: without `maps`, a picture that lies once over the unit square of the mesh's UVs, as of
                 `synthesize`; `size` is then as the mesh and `scale` ask.
             quilting: without `maps`, "surface" joins patches on the mesh itself, "plane" in the plane, as

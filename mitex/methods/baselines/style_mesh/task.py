@@ -102,21 +102,24 @@ class StyleMeshTask(ParameterTask):
         picture, coverage = self.pictures[k].picture(texture, camera)
         if picture.requires_grad:
             picture.register_hook(lambda gradient: gradient * weight[..., None])
-        masks, small = [coverage], ()
-        if self.config.by_angle and self.small_targets:
-            masks.append(coverage * torch.from_numpy(visible.cosine > self._frontal).float())
-            small = self.small_targets if masks[1].mean() > LEAST else ()
-        taps = {}
-        for layer in self.config.layers:
-            size = self.network.extent(layer, *coverage.shape)
-            regions = [covered(mask, size) for mask in masks[: 2 if layer in small else 1]]
-            taps[layer] = GramTap(self.network.index_of(layer), regions)
-        grams = self.network.read(picture[None], taps)
-        total = gram_distance({n: gram[0] for n, gram in grams.items()}, self.targets, self.weights)
+        frontal = coverage * torch.from_numpy(visible.cosine > self._frontal).float()
+        small = self.small_targets if self.config.by_angle and frontal.mean() > LEAST else {}
+        masks = {layer: [coverage, frontal][: 1 + (layer in small)] for layer in self.config.layers}
+        grams = self._masked_grams(picture, masks)
+        total = gram_distance({layer: gram[0] for layer, gram in grams.items()}, self.targets, self.weights)
         if small:
-            frontal = {layer: grams[layer][1] for layer in small}
-            total = total + gram_distance(frontal, self.small_targets, self.weights)
+            total = total + gram_distance({layer: grams[layer][1] for layer in small}, small, self.weights)
         return total
+
+    def _masked_grams(
+        self, picture: torch.Tensor, masks: Mapping[str, list[torch.Tensor]]
+    ) -> dict[str, torch.Tensor]:
+        """For each layer the Gram matrices of a picture (H, W, 3) within its masks (H, W)."""
+        taps = {}
+        for layer, regions in masks.items():
+            size = self.network.extent(layer, *picture.shape[:2])
+            taps[layer] = GramTap(self.network.index_of(layer), [covered(mask, size) for mask in regions])
+        return self.network.read(picture[None], taps)
 
     def _weight(self, visible: Visible, k: int) -> torch.Tensor:
         """(H, W) what pixels count for."""
