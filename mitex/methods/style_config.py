@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from mitex.methods.words_config import WordsConfig, check_words
-from mitex.training.settings import TrainingConfig, key
+from mitex.training.settings import ScheduledConfig, key
 
 
 @dataclass(frozen=True)
-class StyleConfig(WordsConfig, TrainingConfig):
+class StyleConfig(WordsConfig, ScheduledConfig):
     """What shapes the training of a network of colours, and from words of offsets too."""
 
     resolution: int = key(512, "side of the texture that the colours are baked into [texels]", 16, 4096)
@@ -24,9 +24,9 @@ class StyleConfig(WordsConfig, TrainingConfig):
     view: int = key(224, "side of a picture [px]", 32, 2048)
     fov: float = key(60.0, "field of view [degrees]", 1, 120)
     distance: float = key(2.0, "of the cameras [radii]", 1.01, 1000)
-    lr: float = key(5e-4, "learning rate of Adam", 0)
-    milestones: tuple[int, ...] = key((100, 200, 300), "steps at which the learning rate falls", 0)
-    decay: float = key(0.9, "factor of the learning rate at a milestone", 0)
+    lr: float = 5e-4
+    milestones: tuple[int, ...] = (100, 200, 300)
+    decay: float = 0.9
     text_vertices: int = key(10_000, "that a mesh has at least, else its faces are split", 1, 1_000_000)
     text_relief: float = key(0.1, "that a vertex is moved by at most [radii]", 0, 1)
     text_each: bool = key(
@@ -38,11 +38,6 @@ class StyleConfig(WordsConfig, TrainingConfig):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_words(self, "text_whole_weight", "text_close_weight", "text_relief_weight")
-
-    @property
-    def schedule(self) -> dict[str, Any]:
-        """How the loop takes its steps."""
-        return {"lr": self.lr, "milestones": self.milestones, "decay": self.decay}
 
 
 # For the model that ships with the package: it knows patterns that fill small pictures, but no reliefs.

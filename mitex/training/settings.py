@@ -89,6 +89,20 @@ class TrainingConfig(FitConfig):
 
 
 @dataclass(frozen=True)
+class ScheduledConfig(TrainingConfig):
+    """What the configs of methods have whose learning rate falls at some steps."""
+
+    lr: float = key(1e-3, "learning rate of Adam", 0)
+    milestones: tuple[int, ...] = key((), "steps at which the learning rate falls", 0)
+    decay: float = key(0.1, "factor of the learning rate at a milestone", 0)
+
+    @property
+    def schedule(self) -> dict[str, Any]:
+        """Options of `train` for the learning rate."""
+        return {"lr": self.lr, "milestones": self.milestones, "decay": self.decay}
+
+
+@dataclass(frozen=True)
 class DeviceConfig(TrainingConfig):
     """What the configs of methods have that can train on a graphics card."""
 

@@ -11,7 +11,7 @@ from mitex.features.text_image import PROMPT
 from mitex.methods.nca.decoder.shape import COORDINATES, DecoderShape
 from mitex.methods.nca.ranges import MOST_STEPS
 from mitex.methods.words_config import check_words
-from mitex.training.settings import DeviceConfig, key
+from mitex.training.settings import DeviceConfig, ScheduledConfig, key
 
 LEAST_SIDE = 32  # of pictures in which Lucas and Kanade's method can measure [px]
 SURFACES = ("even", "uneven", "flat")
@@ -29,7 +29,7 @@ DECODER_KEYS = {
 
 
 @dataclass(frozen=True)
-class NcaConfig(DeviceConfig):
+class NcaConfig(DeviceConfig, ScheduledConfig):
     """Everything that shapes a training; every key can be set from a TOML file or with `--set`."""
 
     preset: str = "patch"
@@ -89,9 +89,8 @@ class NcaConfig(DeviceConfig):
     decoder_width: int = key(32, "of the decoder's hidden layers", 1, 1024)
     decoder_depth: int = key(3, "number of the decoder's hidden layers", 1, 16)
     omega: float = key(10.0, "factor in the decoder's sines", 0)
-    lr: float = key(1e-3, "Adam's learning rate", 0)
-    milestones: tuple[int, ...] = key((500, 750), "steps at which the learning rate falls", 0)
-    decay: float = key(0.3, "factor of the learning rate at a milestone", 0)
+    milestones: tuple[int, ...] = (500, 750)
+    decay: float = 0.3
     normalise_gradients: bool = key(True, "divide each parameter tensor's gradient by its norm")
     motion: str | None = key(None, "vector field that the texture moves along, by name or direction")
     motion_encoding: bool = key(True, "whether cells know the field at their place (MPE)")
@@ -172,13 +171,8 @@ class NcaConfig(DeviceConfig):
 
     @property
     def schedule(self) -> dict[str, Any]:
-        """How the loop takes its steps."""
-        return {
-            "lr": self.lr,
-            "milestones": self.milestones,
-            "decay": self.decay,
-            "normalise_gradients": self.normalise_gradients,
-        }
+        """Options of `train` for the learning rate and the gradients."""
+        return super().schedule | {"normalise_gradients": self.normalise_gradients}
 
     @property
     def decoder_shape(self) -> DecoderShape:

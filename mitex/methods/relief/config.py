@@ -9,11 +9,11 @@ from mitex.features.layers import check_layers
 from mitex.methods.surface.config import DEFAULT as SURFACE
 from mitex.methods.surface.config import SurfaceConfig
 from mitex.ranges import SCALES
-from mitex.training.settings import TrainingConfig, key
+from mitex.training.settings import ScheduledConfig, key
 
 
 @dataclass(frozen=True)
-class ReliefConfig(TrainingConfig):
+class ReliefConfig(ScheduledConfig):
     """Everything that shapes a fit; every key can be set from a TOML file or with `--set`."""
 
     steps: int = 100
@@ -51,8 +51,7 @@ class ReliefConfig(TrainingConfig):
     sideways: float = key(1.0, "how easily vertices move along the surface; 0: along normals only", 0, 10)
     smoothing: float = key(16.0, "how far a vertex takes others along (Nicolet et al. 2021, lambda)", 0, 1e4)
     lr: float = key(1e-3, "learning rate of Adam [widths of the exemplar]", 0)
-    milestones: tuple[int, ...] = key((75,), "steps at which the learning rate falls", 0)
-    decay: float = key(0.1, "factor of the learning rate at a milestone", 0)
+    milestones: tuple[int, ...] = (75,)
     checkpoint_every: int = 50
     preview_every: int = 50
 

@@ -77,8 +77,6 @@ def fit(
         task,
         target.name,
         texture,
-        lr=config.lr,
-        milestones=config.milestones,
-        decay=config.decay,
+        **config.schedule,
         optimizer=partial(Adam, shared=True),
     )

@@ -11,14 +11,14 @@ from mitex.methods.layout import EXEMPLAR_WIDTH
 from mitex.methods.wording import CLIP, EMBEDDED
 from mitex.methods.words_config import WordsConfig, check_words
 from mitex.ranges import SCALES
-from mitex.training.settings import TrainingConfig, key
+from mitex.training.settings import ScheduledConfig, key
 
 WORDS = (CLIP, EMBEDDED)  # presets for words
 SIDES = (16, 2048)  # of the exemplar [px]
 
 
 @dataclass(frozen=True)
-class TexelConfig(TrainingConfig):
+class TexelConfig(ScheduledConfig):
     """What shapes a synthesis from an exemplar."""
 
     preset: str = "fast"
@@ -101,8 +101,8 @@ class TexelConfig(TrainingConfig):
         "adam", "Adam (the paper), or L-BFGS, for one map, one scale and Gram matrices"
     )
     lr: float = key(0.05, "learning rate; of L-BFGS the largest change in a step", 0)
-    milestones: tuple[int, ...] = key((40, 50), "steps at which the learning rate falls", 0)
-    decay: float = key(0.5, "factor of the learning rate at a milestone", 0)
+    milestones: tuple[int, ...] = (40, 50)
+    decay: float = 0.5
     shared_moment: bool = key(
         True,
         "Adam's second moment is one number for the whole texture, which leaves noise alone that the "

@@ -163,9 +163,7 @@ def _synthesized(
         task,
         str(config.text) if exemplar is None else exemplar.name,
         lambda about: SurfaceTexture(domain, task.in_texel_order(), tuple(task.layout), about | origin),
-        lr=config.lr,
-        milestones=config.milestones,
-        decay=config.decay,
+        **config.schedule,
         optimizer=Lbfgs if config.optimizer == "lbfgs" else partial(Adam, shared=config.shared_moment),
     )
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 from mitex.errors import ConfigError
 from mitex.features.layers import check_layers
-from mitex.training.settings import TrainingConfig, key
+from mitex.training.settings import ScheduledConfig, key
 
 STABLE = 0.125  # rate of diffusion up to which no explicit step overshoots, see `laplacian`
 
 
 @dataclass(frozen=True)
-class ReactionDiffusionConfig(TrainingConfig):
+class ReactionDiffusionConfig(ScheduledConfig):
     """Everything that shapes a training; every key can be set from a TOML file or with `--set`."""
 
     steps: int = 1500
@@ -33,9 +33,9 @@ class ReactionDiffusionConfig(TrainingConfig):
         ("relu1_1", "relu2_1", "relu3_1", "relu4_1"), "VGG-16's whose Gram matrices are compared"
     )
     overflow_weight: float = key(100.0, "of the overflow loss", 0)
-    lr: float = key(4e-3, "learning rate of Adam", 0)
-    milestones: tuple[int, ...] = key((500, 1000, 1300), "steps at which the learning rate falls", 0)
-    decay: float = key(0.3, "factor of the learning rate at a milestone", 0)
+    lr: float = 4e-3
+    milestones: tuple[int, ...] = (500, 1000, 1300)
+    decay: float = 0.3
 
     def __post_init__(self) -> None:
         super().__post_init__()

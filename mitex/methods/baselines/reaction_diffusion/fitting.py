@@ -39,8 +39,6 @@ def fit(
         task,
         target.name,
         lambda about: ReactionDiffusionTexture(task.reaction, config.exemplar_size, config.width, about),
-        lr=config.lr,
-        milestones=config.milestones,
-        decay=config.decay,
+        **config.schedule,
         normalise_gradients=True,
     )

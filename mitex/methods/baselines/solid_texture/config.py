@@ -8,11 +8,11 @@ from typing import Literal
 from mitex.errors import ConfigError
 from mitex.features.layers import NETWORKS, check_layers
 from mitex.methods.layout import EXEMPLAR_WIDTH
-from mitex.training.settings import TrainingConfig, key
+from mitex.training.settings import ScheduledConfig, key
 
 
 @dataclass(frozen=True)
-class SolidConfig(TrainingConfig):
+class SolidConfig(ScheduledConfig):
     """Everything that shapes a training; every key can be set from a TOML file or with `--set`."""
 
     steps: int = 600
@@ -33,8 +33,8 @@ class SolidConfig(TrainingConfig):
         "layers are divided by their mean activations, so that they count alike; the paper: not, and Gram "
         "matrices are divided by how many channels there are",
     )
-    lr: float = key(0.1, "learning rate of Adam", 0)
-    milestones: tuple[int, ...] = key((400, 500), "steps at which the learning rate falls", 0)
+    lr: float = 0.1
+    milestones: tuple[int, ...] = (400, 500)
     decay: float = key(0.3, "factor of the learning rate at a milestone; the paper: 1", 0)
     preview_every: int = 50
 

@@ -39,7 +39,5 @@ def fit(
         task,
         target.name,
         lambda about: SolidTexture(task.settled(), config.exemplar_size, config.width, about),
-        lr=config.lr,
-        milestones=config.milestones,
-        decay=config.decay,
+        **config.schedule,
     )

@@ -7,11 +7,11 @@ from typing import Literal
 
 from mitex.errors import ConfigError
 from mitex.features.layers import NETWORKS, check_layers
-from mitex.training.settings import TrainingConfig, key
+from mitex.training.settings import ScheduledConfig, key
 
 
 @dataclass(frozen=True)
-class StyleMeshConfig(TrainingConfig):
+class StyleMeshConfig(ScheduledConfig):
     """Everything that shapes a synthesis; every key can be set from a TOML file or with `--set`."""
 
     steps: int = 480
@@ -45,8 +45,7 @@ class StyleMeshConfig(TrainingConfig):
         3.25e8, "how much finer textures are held near zero, so that coarse ones take what they can", 0
     )
     lr: float = key(0.01, "learning rate of Adam [of the colours' range]; the paper: a level of 8 bits", 0)
-    milestones: tuple[int, ...] = key((206, 411), "steps at which the learning rate falls", 0)
-    decay: float = key(0.1, "factor of the learning rate at a milestone", 0)
+    milestones: tuple[int, ...] = (206, 411)
     preview_every: int = 60
 
     def __post_init__(self) -> None:

@@ -51,7 +51,5 @@ def fit(
         task,
         target.name,
         lambda about: StyleMeshTexture(surface, task.texture.detach().numpy(), about),
-        lr=config.lr,
-        milestones=config.milestones,
-        decay=config.decay,
+        **config.schedule,
     )
