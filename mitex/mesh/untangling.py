@@ -46,7 +46,9 @@ def untangled(before: Mesh, after: Mesh) -> Mesh:
             weight = np.maximum(weight, ring @ weight)
         share *= 1 - BACK * weight
         mesh = after.with_vertices(before.vertices + share[:, None] * move)
-        pairs = piercing_pairs(mesh)
+        moved = np.flatnonzero(weight[after.faces].any(1))
+        still = pairs[~np.isin(pairs, moved).any(1)]
+        pairs = np.concatenate([still, piercing_pairs(mesh, moved)])
     log.info(
         "pairs of faces that pierce each other: %d, before %d, on the mesh itself %d",
         len(pairs),

@@ -89,3 +89,14 @@ def test_one_large_face_among_small_ones():
     crossing = np.flatnonzero((heights.min(1) < 0) & (heights.max(1) > 0.02))
     assert set(crossing.tolist()) <= set(pairs[:, 0].tolist())
     assert len(pairs) <= ((heights.min(1) < 0.02) & (heights.max(1) > 0)).sum()
+
+
+def test_pairs_with_some_faces_are_those_of_all_pairs(rng):
+    """Of triangles of many sizes, thrown together."""
+    corners = rng.normal(size=(300, 1, 3)) + rng.uniform(0.02, 1, (300, 1, 1)) * rng.normal(size=(300, 3, 3))
+    mesh = Mesh(corners.reshape(-1, 3).astype(np.float32), np.arange(900, dtype=np.int32).reshape(-1, 3))
+    pairs, faces = piercing_pairs(mesh), rng.choice(300, 40, replace=False)
+    among = np.isin(pairs, faces).any(1)
+    assert 0 < among.sum() < len(pairs)
+    np.testing.assert_array_equal(piercing_pairs(mesh, faces), pairs[among])
+    assert len(piercing_pairs(mesh, faces[:0])) == 0
