@@ -27,9 +27,8 @@ def piercing_pairs(mesh: Mesh, faces: np.ndarray | None = None) -> np.ndarray:
         (P, 2) int64 faces, the lower one first, sorted.
     """
     corners = mesh.vertices[mesh.faces].astype(np.float64)
-    wanted = np.ones(len(corners), bool)
+    wanted = np.full(len(corners), faces is None)
     if faces is not None:
-        wanted[:] = False
         wanted[faces] = True
     blocks = [_piercing(corners, pairs) for pairs in _near(corners, wanted)]
     return np.unique(np.concatenate([np.empty((0, 2), np.int64), *blocks]), axis=0)

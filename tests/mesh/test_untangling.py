@@ -47,3 +47,14 @@ def test_a_mesh_that_pierces_itself_keeps_its_own():
     own, more = len(piercing_pairs(before)), len(piercing_pairs(after))
     assert 0 < own <= more <= 2 * own
     assert untangled(before, after) is after
+
+
+def test_what_stays_after_some_rounds_is_counted_anew(caplog, monkeypatch):
+    """Only pairs with faces that moved are looked for in a round."""
+    monkeypatch.setattr("mitex.mesh.untangling.ROUNDS", 2)
+    before = plates(0.1)
+    after = dented(before, 0.4)
+    with caplog.at_level(logging.INFO):
+        result = untangled(before, after)
+    left = len(piercing_pairs(result))
+    assert 0 < left < len(piercing_pairs(after)) and f": {left}, before" in caplog.text

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,14 +12,8 @@ import numpy as np
 
 from mitex.atlas import laid_out
 from mitex.errors import MeshWarning
-from mitex.mesh import Mesh, Similarity
+from mitex.mesh import Mesh
 from mitex.methods.nerf import files
-from mitex.methods.nerf.field.decoder import Decoder
-from mitex.methods.nerf.field.encoding import Encoding
-from mitex.methods.nerf.field.projection import Projection
-from mitex.methods.nerf.field.rendering import render_step
-from mitex.methods.nerf.field.shell import CapturedLatents, Shell
-from mitex.methods.nerf.field.tensors import channels
 from mitex.methods.nerf.ranges import SIZE
 from mitex.methods.nerf.synthesis.maps import LatentMaps, angles_of, latent_maps
 from mitex.methods.nerf.synthesis.patch_images import render_patches
@@ -33,6 +26,7 @@ from mitex.methods.nerf.synthesis.patches import (
 )
 from mitex.methods.nerf.synthesis.patches import SIZE as PATCH
 from mitex.methods.nerf.use.applied import AppliedTexture, check_ranges, checked_light, joined_on_surface
+from mitex.methods.nerf.use.captured import Captured
 from mitex.methods.nerf.use.on_plane import SCALE, TextureOnPlane, plane
 from mitex.methods.nerf.use.placement import (
     EXTENT,
@@ -49,24 +43,16 @@ from mitex.quilting.plane import Quilt, quilt
 from mitex.quilting.repetition import EVENNESS
 from mitex.quilting.surface import quilt_on
 from mitex.quilting.target import SurfaceTarget
-from mitex.runtime import init
-from mitex.runtime.jit import mi
-from mitex.runtime.upload import upload
 
 BLOCK = PATCH // 16  # a guide is compared with patches in 16 x 16 blocks
-DEEPEST = 2.0  # percentile of the scan's distances that counts as the ground
 
 
-class NerfTexture:
+class NerfTexture(Captured):
     """A texture with meso-structure, captured by `fit`.
 
     Attributes:
         model: features, networks, light and base shape.
     """
-
-    def __init__(self, model: files.Model) -> None:
-        init(needs="ad")
-        self.model = model
 
     @property
     def about(self) -> Mapping[str, Any]:
@@ -89,51 +75,6 @@ class NerfTexture:
             OutputError: the place is not writable.
         """
         return files.save(Path(path), self.model)
-
-    @cached_property
-    def shell(self) -> Shell:
-        """The texture on the shape that it was captured on, in the scene cube, ready to be marched."""
-        model, config = self.model, self.model.config
-        projection = Projection(
-            model.base.mesh,
-            neighbours=config.neighbours,
-            repulsion=config.repulsion,
-            reach=model.base.thickness,
-        )
-        return Shell(
-            projection,
-            self.latents,
-            self.decoder,
-            self.light,
-            model.base.thickness,
-            mask=upload(mi.TensorXu8, model.occupied),
-            step=render_step(config),
-        )
-
-    @cached_property
-    def latents(self) -> CapturedLatents:
-        """Features on the captured base shape."""
-        tables = [upload(mi.Float, table.numpy()) for table in self.model.tables]
-        return CapturedLatents(Encoding(self.model.config), tables, self.model.frames)
-
-    @cached_property
-    def decoder(self) -> Decoder:
-        """The networks, packed."""
-        return self._new_decoder()
-
-    def _new_decoder(self) -> Decoder:
-        """With matrices of its own, which may change."""
-        return Decoder([upload(mi.TensorXf, weight.numpy()) for weight in self.model.weights], packed=True)
-
-    @property
-    def light(self) -> mi.TensorXf:
-        """`mi.TensorXf` (16,), the light of the capture: estimated from its photos, or learned."""
-        return upload(mi.TensorXf, self.model.light.numpy())
-
-    @property
-    def similarity(self) -> Similarity:
-        """The capture's world -> scene cube."""
-        return self.model.similarity
 
     def synthesize(
         self,
@@ -243,13 +184,6 @@ class NerfTexture:
             base.mesh, rng, count=count, pattern_rate=pattern_rate, scan=base.scan, thickness=base.thickness
         )
 
-    def features(self, points: np.ndarray) -> np.ndarray:
-        """f and f-hat, (N, 24), at points (N, 3) of the base shape."""
-        place = channels(mi.Point3f, points)
-        encoding, tables = self.latents.encoding, self.latents.tables
-        values = [row for k in range(2) for row in encoding(k, place, tables[k])]
-        return np.stack([np.array(value) for value in values], axis=1)
-
     def maps(self, patches: Patches, layout: Quilt) -> LatentMaps:
         """Latent maps of a quilt of these patches."""
         return latent_maps(patches, layout, self.model.frames)
@@ -264,21 +198,11 @@ class NerfTexture:
         field = self.apply(plane(), self.synthesize(size, seed, tileable=True), scale=SCALE, lift=0.0)
         return TextureOnPlane(field, np.array(self.light), along)
 
-    def in_place(self) -> Shell:
-        """What shows the captured object in the photos' cameras: `shell`."""
-        return self.shell
-
     def on_base_shape(self, size: int = SIZE) -> AppliedTexture:
         """The captured texture as maps of `size` texels on its own base shape, in the scene cube."""
         mesh, maps = self_maps(self.model.base.mesh, self.model.frames, self.features, size)
         low, high = mesh.vertices.min(0), mesh.vertices.max(0)
         return self.apply(mesh, maps, scale=2 * EXTENT / float((high - low).max()), lift=0.0)
-
-    @cached_property
-    def ground(self) -> float:
-        """How far the deepest captured parts are from the base shape, negative inside [scene units]."""
-        projections = self.shell.projection(self.model.base.scan)
-        return float(np.percentile(projections.distance[projections.hit], DEEPEST))
 
     def apply(
         self,
@@ -335,7 +259,7 @@ class NerfTexture:
         return AppliedTexture(
             mesh,
             maps,
-            self._new_decoder(),
+            self.new_decoder(),
             light_coefficients,
             self.model.config,
             thickness=self.model.base.thickness,
