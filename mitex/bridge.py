@@ -19,6 +19,7 @@ from mitex.scenes.stage import Visibility, background_values
 from mitex.sparse import transposed_product
 from mitex.suggestions import suggestion
 from mitex.textures.field import Field
+from mitex.textures.variant import on_llvm, require_variant
 
 
 def lookup(
@@ -126,8 +127,10 @@ def call(function: Callable[..., Any], *tensors: torch.Tensor) -> Any:
         The same as torch tensors; no second derivatives.
 
     Raises:
+        ConfigError: the variant is no llvm one: Dr.Jit takes a tensor on the CPU for one of LLVM's arrays.
         Exception: what the function raises, also inside Dr.Jit's custom operations and loops.
     """
+    require_variant("torch's gradients through Dr.Jit", on_llvm(), "an llvm one")
     # Dr.Jit does not convert an nn.Parameter, a view of it is a plain tensor with the same gradient.
     views = (tensor_with_room(tensor) for tensor in tensors)
     with raise_causes():

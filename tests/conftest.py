@@ -16,6 +16,17 @@ from tests.firefox import Firefox
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--variant", help="Mitsuba's variant in tests that set none (default: llvm_ad_rgb)")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if variant := config.getoption("--variant"):
+        from mitex.runtime import init
+
+        init(variant)
+
+
 @pytest.fixture(autouse=True)
 def _leave_no_trace() -> Iterator[None]:
     """Gives back the variant, thread counts and Dr.Jit memory, so that no test leaks into another."""

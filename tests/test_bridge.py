@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 import torch
 
-from mitex.bridge import lookup, render
+from mitex.bridge import call, lookup, render
 from mitex.errors import ConfigError
 from mitex.features import Vgg16
 from mitex.features.flow import lucas_kanade
 from mitex.losses import gram_loss, gram_matrix, motion_loss, relaxed_transport
 from mitex.mesh import Mesh, icosphere
+from mitex.runtime.jit import dr
 from mitex.runtime.upload import upload
 from mitex.scenes import Cameras, random_views
 from mitex.scenes.stage import Stage
@@ -304,6 +305,13 @@ def test_gradients_of_an_earlier_picture_of_traced_light(mi, lit):
     render(lit, {BALL: kept}, spp=16)
     early.sum().backward()
     np.testing.assert_allclose(np.ravel(mi.traverse(lit)[BALL]), kept, rtol=1e-6)
+
+
+def test_torch_s_tensors_become_arrays_of_llvm(field, monkeypatch):
+    """In another variant Dr.Jit would mix the two, or end the process where there is no LLVM."""
+    monkeypatch.setattr(dr, "backend_v", lambda _: dr.JitBackend.CUDA)
+    with pytest.raises(ConfigError, match="torch's gradients through Dr.Jit: .* use an llvm one"):
+        call(lambda array: array, field)
 
 
 def test_seeds_are_other_noise(lit):

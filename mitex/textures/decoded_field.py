@@ -17,7 +17,7 @@ from mitex.textures.interpolation import Corners, linear, smooth
 from mitex.textures.local_coordinates import BARYCENTRIC, Waves
 from mitex.textures.sine_network import SineNetwork
 from mitex.textures.triangle import TrianglePoints, edges, solve, triangle_points
-from mitex.textures.variant import for_variant, option, require_variant
+from mitex.textures.variant import for_variant, on_llvm, option, require_variant
 from mitex.textures.vertex_rows import VertexRows
 
 INTERPOLATIONS = {"smooth": smooth, "linear": linear}
@@ -102,7 +102,7 @@ class DecodedField(VertexRows):
     plugin = "decoded_field"
 
     def __init__(self, props: mi.Properties) -> None:
-        require_variant(self.plugin, dr.backend_v(mi.Float) == dr.JitBackend.LLVM, "an llvm one")
+        require_variant(self.plugin, on_llvm(), "an llvm one")
         self._read(props)
         self.interpolation = option(props, "interpolation", "smooth")
         if self.interpolation not in INTERPOLATIONS:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 from mitex.errors import ConfigError
-from mitex.runtime.jit import mi
+from mitex.runtime.jit import dr, mi
 
 B = TypeVar("B")
 T = TypeVar("T", bool, int, float, str)
@@ -41,6 +41,11 @@ def require_variant(plugin: str, works: bool, variants: str) -> None:
             f"{plugin}: it does not work in the variant '{mi.variant()}'",
             f"use {variants}: mi.set_variant('llvm_ad_rgb') before the scene is loaded",
         )
+
+
+def on_llvm() -> bool:
+    """Whether the current variant compiles for the processor."""
+    return dr.backend_v(mi.Float) == dr.JitBackend.LLVM
 
 
 def option(props: mi.Properties, name: str, default: T) -> T:

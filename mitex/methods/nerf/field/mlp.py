@@ -20,6 +20,7 @@ import torch
 
 from mitex.methods.nerf.field.tensors import as_torch, stack_rows, unstack_rows
 from mitex.runtime.jit import dr, mi
+from mitex.textures.variant import on_llvm, require_variant
 
 T = TypeVar("T")
 Weights = Sequence[torch.Tensor]
@@ -140,7 +141,12 @@ def weight_bound(shape: tuple[int, int]) -> float:
 
 
 def packed_networks(*nets: Sequence[mi.TensorXf]) -> list[dr.nn.Module]:
-    """Networks that are evaluated as cooperative vectors, given the matrices (out, in) of each."""
+    """Networks that are evaluated as cooperative vectors, given the matrices (out, in) of each.
+
+    Raises:
+        ConfigError: the variant is no llvm one; on graphics cards Dr.Jit packs half precision alone.
+    """
+    require_variant("a field of networks", on_llvm(), "an llvm one")
     modules = []
     for weights in nets:
         layers: list[dr.nn.Module] = []

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from mitex.errors import ConfigError
 from mitex.methods.nerf.field import mlp
 from mitex.runtime import init, threads
 from mitex.runtime.jit import dr, mi
@@ -45,6 +46,15 @@ def test_values_and_gradients_are_those_of_autograd(arguments, learning, chunk, 
     _close(dr.grad(ours), values.grad)
     for matrix, weight in zip(matrices, weights, strict=True):
         _close(dr.grad(matrix), weight.grad if learning else torch.zeros_like(weight))
+
+
+def test_networks_are_packed_for_processors_alone(arguments, monkeypatch):
+    """On a graphics card Dr.Jit packs half precision only, and says so without a word of variants."""
+    weights = [upload(mi.TensorXf, value.detach().numpy()) for value in arguments[1:]]
+    mlp.packed_networks(weights)
+    monkeypatch.setattr(dr, "backend_v", lambda _: dr.JitBackend.CUDA)
+    with pytest.raises(ConfigError, match="a field of networks: it does not work .* use an llvm one"):
+        mlp.packed_networks(weights)
 
 
 def _close(actual, expected):
