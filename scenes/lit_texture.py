@@ -42,6 +42,7 @@ mi.set_variant("llvm_ad_rgb")
 
 TEXTURE = "vase.bsdf.base_color.data"
 LAYERS = ("relu1_1", "relu2_1", "relu3_1", "relu4_1")
+LOSSES = ("transport", "gram", "motion")
 VIEWS = 4
 PIXELS = 1.0  # that the texture shall move
 
@@ -162,6 +163,8 @@ def main(
     spp: int = 16,
 ) -> None:
     """Fits the texture and writes exemplar, start and result side by side."""
+    if name not in LOSSES:
+        raise SystemExit(f"error: there is no loss '{name}'; name one of {', '.join(LOSSES)}")
     torch.manual_seed(0)
     exemplar = Exemplar.load("scales" if name == "motion" else "lava")
     vase = with_layout(embedded("vase").normalised()[0], resolution)
@@ -199,5 +202,4 @@ def main(
 
 
 if __name__ == "__main__":
-    out, name = [*sys.argv[1:], *("lit.png", "transport")[len(sys.argv) - 1 :]]
-    main(out, name)
+    main(*sys.argv[1:3])

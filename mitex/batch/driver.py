@@ -15,7 +15,7 @@ from mitex.batch.engines.local import Local
 from mitex.batch.folder import FAILED, BatchFolder
 from mitex.batch.jobs import Job, jobs_of
 from mitex.batch.plan import Plan
-from mitex.batch.report import Report, status
+from mitex.batch.report import Report, report_of
 from mitex.batch.task import RETRIES, Outcome, Task
 from mitex.progress import announce
 from mitex.runtime.signals import StopSignals
@@ -85,7 +85,7 @@ def run_plan(
                 place.forget_failure(job)
         run = _Run(jobs, place, workers, name, threads or workers.threads, on_event)
         stopped = run.loop(signals)
-    summary = status(place.path)
+    summary = report_of(place, jobs)
     summary.write_csv()
     if stopped:
         raise KeyboardInterrupt(

@@ -111,7 +111,8 @@ class BatchFolder:
     def start(self, job: Job, driver: str, saved: float | None) -> dict[str, Any]:
         """Writes down that a job begins, and returns it: driver, count, time, seconds and memory.
 
-        `count` is how often it has been started for the driver, this time included, whether or not it ended.
+        `count` is how often it has been started for the driver, this time included, but for attempts that
+        were told to stop.
         `seconds` and `memory` are of the attempts before whose work it goes on with, up to their checkpoints;
         of one whose end nobody saw, the memory [bytes] is not known.
 

@@ -103,7 +103,9 @@ def _fit(
     given = options.fit_words(method, part.fit, plan.folder)
     about = {"method": part.label, "exemplar": exemplar.label, "seed": seed}
     about |= {"mesh": mesh.label} if mesh else {}
-    id = _id("fit", about, [*words, *inputs, *given])
+    from_text = part.learns_from == "text"
+    implied = options.implied_inputs(method, part.fit, plan.folder, from_text=from_text)
+    id = _id("fit", about, [*words, *inputs, *given, *implied])
     out = ("--out", f"{RESULTS}/{id}")
     command = (*words, *(one.text for one in [*inputs, *given]), *out)
     later = {key: value for key, value in part.fit.items() if key not in method.load_fit().only_at_start}
@@ -128,7 +130,9 @@ def _apply(part: MethodPlan, plan: Plan, fit: Job, mesh: Input | None) -> Job:
 
 
 def _exemplars(part: MethodPlan, plan: Plan) -> list[Input]:
-    if part.source is not None:  # which may be words as well as files
+    if part.learns_from == "text":
+        return [Input(text, None) for text in part.exemplars]
+    if part.source is not None:  # which may be names as well as files
         return [Input.of(text, plan.folder) for text in part.exemplars]
     return find(part.exemplars, plan.folder, "exemplar", _exemplar_names(methods()[part.method]))
 

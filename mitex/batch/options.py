@@ -16,6 +16,7 @@ from mitex.suggestions import suggestion
 from mitex.training import values
 from mitex.training.config import resolve
 
+NAMES = {"preset", "text", "subdivide"}  # options whose texts never name files
 PLANNED = {"out", "mesh", "model", "quiet", "resume", "set", "settings"}  # what a plan says otherwise
 
 
@@ -38,9 +39,7 @@ def check_options(
         if name not in kinds:
             raise ConfigError(f"methods.{label}.apply has no key '{name}'", suggestion(name, kinds))
         _check(name, value, kinds[name], f"{label}.apply")
-    settings = {name: value for name, value in fit.items() if name in keys}
-    file = None if "config" not in fit else Path(Input.of(fit["config"], folder).text)
-    resolve(method.load_presets(), fit.get("preset"), file, settings)
+    _config(method, fit, folder)
 
 
 def check_source(method: Method, source: str | None, fit: Mapping[str, Any], label: str) -> None:
@@ -71,6 +70,28 @@ def apply_kinds(method: Method) -> dict[str, Any]:
     return _kinds(method.load_apply(), set())
 
 
+def implied_inputs(method: Method, fit: Mapping[str, Any], folder: Path, *, from_text: bool) -> list[Input]:
+    """Files that a fit reads although no option names them: the CLIP model of words, and VGG-19.
+
+    Args:
+        method: which is fit.
+        fit: its options and settings.
+        folder: of the plan.
+        from_text: whether it learns from words.
+
+    Raises:
+        WeightsError: The CLIP model that the environment names, or VGG-19, is not there.
+    """
+    from mitex.features.text_model import model_folder
+    from mitex.features.vgg19 import vgg19_path
+
+    paths = [
+        model_folder() if from_text and "clip" in fit_kinds(method) and "clip" not in fit else None,
+        vgg19_path() if getattr(_config(method, fit, folder), "network", None) == "vgg19" else None,
+    ]
+    return [Input(str(path), path) for path in paths if path is not None]
+
+
 def fit_words(method: Method, fit: Mapping[str, Any], folder: Path) -> list[Input]:
     """The words of the options and settings of a fit; those that name files are absolute paths."""
     options = fit_kinds(method)
@@ -84,6 +105,13 @@ def apply_words(apply: Mapping[str, Any], folder: Path) -> list[Input]:
     return list(_words(apply, folder))
 
 
+def _config(method: Method, fit: Mapping[str, Any], folder: Path) -> Any:
+    """The settings of a fit."""
+    settings = {name: value for name, value in fit.items() if name in _keys(method)}
+    file = None if "config" not in fit else Path(Input.of(fit["config"], folder).text)
+    return resolve(method.load_presets(), fit.get("preset"), file, settings)
+
+
 def _words(options: Mapping[str, Any], folder: Path) -> Iterator[Input]:
     for name, value in options.items():
         option = f"--{name.replace('_', '-')}"
@@ -92,7 +120,8 @@ def _words(options: Mapping[str, Any], folder: Path) -> Iterator[Input]:
         elif value is not False:
             # A value that begins with a dash is one word with its option.
             if isinstance(value, str) and not value.startswith("-"):
-                yield from (Input(option, None), Input.of(value, folder))
+                yield Input(option, None)
+                yield Input(value, None) if name in NAMES else Input.of(value, folder)
             else:
                 yield Input(f"{option}={_text(value)}", None)
 

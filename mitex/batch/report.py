@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -90,8 +90,13 @@ def status(path: str | Path) -> Report:
         ConfigError: `mitex batch` has not written the folder.
     """
     folder = BatchFolder.existing(path)
+    return report_of(folder, folder.jobs())
+
+
+def report_of(folder: BatchFolder, jobs: Iterable[Job]) -> Report:
+    """How far some jobs of a folder are, each after those that it needs."""
     rows: dict[str, Row] = {}
-    for job in folder.jobs():
+    for job in jobs:
         rows[job.id] = _row(job, folder, rows)
     return Report(folder.path, tuple(rows.values()))
 

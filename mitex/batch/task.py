@@ -86,17 +86,26 @@ class Task:
             start = self.folder.start(self.job, self.driver, saved)
             if start["count"] > 1 + RETRIES:
                 return self._failure(f"started {1 + RETRIES} times; {why}")
-            code, memory = self._run(claim, saved is not None)
+            try:
+                code, memory = self._run(claim, saved is not None)
+            except SystemExit:  # of the engine: Slurm wants the machine back
+                self._excuse(start)
+                raise
             start["memory"] = max(start["memory"], memory)
             if code == 0:
                 return self._success(start)
-            self.folder.write(self.job, STARTS, start)
             if code == INTERRUPTED:
+                self._excuse(start)
                 break
+            self.folder.write(self.job, STARTS, start)
             if code > 0:
                 return self._failure(_complaint(self.folder.of(self.job) / LOG), code)
             why = f"ended by {_signal_name(code)}"
         return Outcome("interrupted")
+
+    def _excuse(self, start: dict[str, Any]) -> None:
+        """Writes down an attempt that was told to stop, and so does not count as a crash."""
+        self.folder.write(self.job, STARTS, start | {"count": start["count"] - 1})
 
     def _saved(self) -> float | None:
         """When the checkpoint was written from which the job goes on; None if it begins anew."""

@@ -47,8 +47,8 @@ class Compare(JobOptions):
     preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
     """In place of these lists, a paper's comparison, by name."""
 
-    data: Annotated[Path, arg(metavar="DIR")] = Path()
-    """Folder with what a paper's comparison needs that does not ship with Mitex."""
+    data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None
+    """Folder with what the comparison of --preset needs and does not ship with Mitex; by default this one."""
 
     set: Annotated[
         tuple[tuple[str, ...], ...],
@@ -99,6 +99,8 @@ class Compare(JobOptions):
             "--methods": self.methods,
             "--set": self.set,
         }
+        if self.data is not None and self.preset is None:
+            raise ConfigError("--data means nothing without --preset", "leave it out, or name a preset")
         if self.plan is not None or self.preset is not None:
             mutually_exclusive("--plan", "--preset", self.plan is not None and self.preset is not None)
             for option, values in lists.items():
@@ -120,7 +122,7 @@ class Compare(JobOptions):
             return Plan.read(self.plan)
         from mitex.comparison.presets import preset_plan
 
-        return preset_plan(str(self.preset), self.data)
+        return preset_plan(str(self.preset), self.data or Path())
 
 
 @dataclass

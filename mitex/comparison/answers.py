@@ -169,11 +169,22 @@ def _total(counter: Mapping[tuple[str, str], float], method: str) -> float:
 
 
 def _preference(method: str, shares: Sequence[float], wins: float, count: int) -> Preference:
-    interval = scipy.stats.binomtest(round(wins), count).proportion_ci(method="wilson")
     spread = float(np.std(shares, ddof=1)) if len(shares) > 1 else math.nan
     return Preference(
-        method, wins, count, (float(interval.low), float(interval.high)), float(np.mean(shares)), spread
+        method, wins, count, wilson_interval(wins / count, count), float(np.mean(shares)), spread
     )
+
+
+def wilson_interval(share: float, count: int) -> tuple[float, float]:
+    """The 95 % interval of a probability in [0, 1] of which a share of `count` trials was seen (Wilson 1927).
+
+    The share may count trials by halves.
+    """
+    z = float(scipy.stats.norm.ppf(0.975))
+    middle = share + z * z / (2 * count)
+    reach = z * math.sqrt(share * (1 - share) / count + z * z / (4 * count * count))
+    low, high = ((middle + sign * reach) / (1 + z * z / count) for sign in (-1, 1))
+    return max(low, 0.0), min(high, 1.0)
 
 
 def _tests(shares: Mapping[str, Sequence[float]]) -> tuple[float, float, dict[tuple[str, str], float]]:

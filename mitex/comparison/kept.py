@@ -29,10 +29,10 @@ class Kept:
         self.folder = folder
 
     def completed(self, result: Result, pair: Pair) -> Result | None:
-        """The result with what is known of it; None if that is not all, or by another judge."""
+        """The result with what is known of it; None if that is not all, or of another judge or making."""
         files = {kind: self._file(result, suffix) for kind, suffix in SUFFIXES.items()}
         pictures = {kind: file for kind, file in files.items() if file.is_file()}
-        numbers = _read(self._file(result, ".json"), pair.judge)
+        numbers = _read(self._file(result, ".json"), pair.judge, result.time)
         is_shown = (VIEW if result.asset is None else LIT) in pictures
         return _with(result, numbers, pictures) if numbers is not None and is_shown else None
 
@@ -49,7 +49,7 @@ class Kept:
             kind: write_image(self._file(result, SUFFIXES[kind]), picture)
             for kind, picture in pair.pictures(asset, result.run).items()
         }
-        _write(self._file(result, ".json"), known, pair.judge)
+        _write(self._file(result, ".json"), known, pair.judge, result.time)
         return _with(result, known, pictures)
 
     def floor(self, pair: Pair) -> dict[str, float]:
@@ -74,19 +74,21 @@ def optimized_numbers(run: Path) -> int:
         return sum(math.prod(file.get_slice(name).get_shape()) for name in names)
 
 
-def _read(path: Path, judge: str | None) -> dict[str, float] | None:
-    """Numbers that were kept; None if there are none, or if another version or judge has measured them."""
+def _read(path: Path, judge: str | None, time: str | None = None) -> dict[str, float] | None:
+    """Numbers that were kept; None if there are none, or if another version or judge has measured them, or
+    they are of a result that was made at another time."""
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
-        if (record["version"], record.get("judge")) != (VERSION, judge):
+        if (record["version"], record.get("judge"), record.get("time")) != (VERSION, judge, time):
             return None
         return {key: float(value) for key, value in record["numbers"].items()}
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return None
 
 
-def _write(path: Path, numbers: Mapping[str, float], judge: str | None) -> None:
-    record = {"version": VERSION, "numbers": dict(numbers)} | ({"judge": judge} if judge else {})
+def _write(path: Path, numbers: Mapping[str, float], judge: str | None, time: str | None = None) -> None:
+    about = {key: value for key, value in (("judge", judge), ("time", time)) if value}
+    record = {"version": VERSION, "numbers": dict(numbers), **about}
     with atomic_write(path) as temporary:
         temporary.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 

@@ -85,7 +85,7 @@ class ReliefPair:
 
     def pictures(self, asset: Asset, run: Path) -> dict[str, np.ndarray]:
         """As of `mitex.comparison.inputs.lit`."""
-        return {LIT: lit(asset)}
+        return {LIT: lit(asset, self.mesh)}
 
     def _form_of(self, mesh: Mesh) -> dict[str, float]:
         """Distance and size; nothing for meshes so thin that patches show too little of them."""

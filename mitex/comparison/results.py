@@ -25,6 +25,7 @@ class Result:
         run: the run folder of the fit.
         numbers: key of a `Measure` -> value; without those that could not be measured.
         pictures: `LIT` and `VIEW`, as far as there are such -> file.
+        time: when the job that wrote it began, as its record says.
     """
 
     id: str
@@ -36,6 +37,7 @@ class Result:
     run: Path
     numbers: Mapping[str, float] = field(default_factory=dict)
     pictures: Mapping[str, Path] = field(default_factory=dict)
+    time: str | None = None
 
     @property
     def pair(self) -> tuple[str, str | None]:
@@ -78,6 +80,7 @@ def _result(folder: Path, chain: Sequence[Row], source: str) -> Result:
         seed=job.about["seed"],
         asset=folder / _argument(job, "out") if applied else None,
         run=folder / fits[0].job.result,
+        time=chain[0].record.get("time"),
         numbers={
             "fit_seconds": float(sum(fit.record["seconds"] for fit in fits)),
             "memory": float(max(row.record["memory"] for row in chain)),

@@ -113,8 +113,9 @@ def write_study(folder: Path, results: Sequence[Result], exemplars: Mapping[str,
 
 
 def _write(folder: Path, asked: Sequence[tuple[Question, list[str]]], pictures: dict[str, bytes]) -> Path:
-    digest = hashlib.sha256(b"".join(hashlib.sha256(content).digest() for content in pictures.values()))
-    id = digest.hexdigest()[:16]
+    hashes = [hashlib.sha256(content).hexdigest() for content in pictures.values()]
+    subject = json.dumps([hashes, [asdict(question) for question, _ in asked]])
+    id = hashlib.sha256(subject.encode("utf-8", "surrogateescape")).hexdigest()[:16]
     shuffle = random.Random(id)
     asked = shuffle.sample(asked, len(asked))
     names = shuffle.sample(list(pictures), len(pictures))  # so that their places tell nothing either

@@ -83,6 +83,19 @@ class TestOneAfterTheOther:
         report = workshop.run(workshop.plan())
         assert report.count("done") == 4 and len(workshop.told("start")) == 4
 
+    def test_the_report_is_of_ones_own_plan(self, workshop):
+        """Another command with another plan has begun on the folder meanwhile."""
+        once = []
+
+        def begin_another(event: Event):
+            if not once:
+                once.append(event)
+                workshop.run(workshop.plan(("b.png",)))
+
+        report = workshop.run(workshop.plan(("a.png",)), on_event=begin_another)
+        assert [row.job.name for row in report.rows] == ["fit-stripes-a", "apply-stripes-a-m"]
+        assert status(report.folder).rows[0].job.name == "fit-stripes-b"
+
     def test_a_result_that_is_gone_is_made_again(self, workshop):
         report = workshop.run(workshop.plan(("a.png",)))
         before = workshop.files()

@@ -112,6 +112,17 @@ class TestCommands:
             *("--out", f"{apply.result}/m/"),
         )
 
+    def test_names_and_words_stay_even_where_files_are_called_like_them(self, jobs, workshop):
+        for name in ("paper", "bricks", "red bricks"):
+            (workshop.folder / name).mkdir()
+        texts = ["bricks", "red bricks", "v2.0 bricks?"]
+        table = {"exemplars": texts, "meshes": ["vase"]}
+        pictures = {"exemplars": ["lava"], "preset": "paper"}
+        methods = {"nca": table | {"source": "text"}, "x_mesh": table, "gatys": pictures}
+        *fits, last = jobs(methods, output="none")
+        assert [fit.words[4] for fit in fits] == texts * 2
+        assert last.words[last.words.index("--preset") + 1] == "paper"
+
     @pytest.mark.parametrize(("value", "words"), [(True, ["--keep-uvs"]), (False, [])])
     def test_flags(self, jobs, value, words):
         fit, _ = jobs({"surface": {"exemplars": ["lava"], "meshes": ["vase"], "keep_uvs": value}})
@@ -179,6 +190,23 @@ class TestIds:
                 (maps / "x").write_text(change)
             ids.add(jobs(exemplars=["maps"])[0].id)
         assert len(ids) == 3
+
+    def test_models_that_the_environment_names_count(self, jobs, workshop, monkeypatch):
+        """A CLIP model for words, and VGG-19's weights where it is asked for."""
+        file = workshop.folder / "weights"
+        monkeypatch.setenv("MITEX_VGG19", str(file))
+        monkeypatch.setattr("mitex.features.text_model.model_folder", lambda: file)
+        tables = {
+            "words": {"method": "nca", "source": "text", "exemplars": ["moss"]},
+            "named": {"method": "nca", "source": "text", "exemplars": ["moss"], "clip": "words"},
+            "gatys": {"network": "vgg19", "exemplars": ["lava"]},
+            "other": {"method": "gatys", "exemplars": ["lava"]},
+        }
+        ids = []
+        for content in ("1", "2"):
+            file.write_text(content)
+            ids.append([job.id for job in jobs(tables, output="none")])
+        assert [old != new for old, new in zip(*ids, strict=True)] == [True, False, True, False]
 
     def test_the_same_job_twice_is_refused(self, jobs):
         with pytest.raises(ConfigError, match="the job fit-stripes-a twice"):

@@ -7,7 +7,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from mitex.batch.task import INTERRUPTED
+from mitex.batch.folder import BatchFolder
+from mitex.batch.jobs import jobs_of
+from mitex.batch.task import INTERRUPTED, RETRIES, Task
 from mitex.training.locate import CHECKPOINT
 
 
@@ -15,7 +17,8 @@ from mitex.training.locate import CHECKPOINT
 def scripted(monkeypatch):
     """Lets the attempts at a job go as a list says, by a clock of their own.
 
-    Each is: seconds until its last checkpoint, or None without one; seconds until its end, exit code, memory.
+    Each is: seconds until its last checkpoint, or None without one; seconds until its end, exit code or what
+    is raised, memory.
     """
 
     def go(*attempts):
@@ -24,18 +27,26 @@ def scripted(monkeypatch):
 
         class Scripted:
             pid = os.getpid()
+            stopped = False
 
             def __init__(self, words, folder, *_):
                 self.result = Path(folder, words[words.index("--out") + 1])
 
             def wait(self):
+                if self.stopped:
+                    return INTERRUPTED, 0
                 saved, seconds, code, memory = left.pop(0)
                 self.result.mkdir(parents=True, exist_ok=True)
                 if saved is not None:
                     (self.result / CHECKPOINT).touch()
                     os.utime(self.result / CHECKPOINT, (now[0] + saved,) * 2)
                 now[0] += seconds
+                if isinstance(code, BaseException):
+                    raise code
                 return code, memory
+
+            def stop(self):
+                self.stopped = True
 
         monkeypatch.setattr("mitex.batch.task.Process", Scripted)
         for module in ("folder", "task"):
@@ -67,3 +78,17 @@ def test_attempts_add_up(name, workshop, scripted):
     fit, apply = (row.record for row in report.rows)
     assert (fit["seconds"], fit["memory"]) == (seconds, memory)
     assert (apply["seconds"], apply["memory"]) == (3, 1)
+
+
+def test_an_attempt_that_was_told_to_stop_is_no_crash(workshop, scripted):
+    """However often the engine wants the machine back; crashes among them still count."""
+    (job, _) = jobs_of(workshop.plan(("a.png",)))
+    folder = BatchFolder(workshop.folder / "out")
+    returns = [(10, 20, SystemExit(-1), 5)] * (3 * RETRIES)
+    with folder.driven([job]) as name:
+        task = Task(job, folder, name, 1)
+        scripted(*returns, (10, 20, -9, 5), LAST)
+        for _ in returns:
+            with pytest.raises(SystemExit):
+                task()
+        assert task().state == "done"

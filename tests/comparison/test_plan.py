@@ -59,6 +59,7 @@ BROKEN = {
     "a study of one method": ({"--study": ""}, "a study of one method that is put on meshes asks nothing"),
     "no seeds": ({"--seeds": "0"}, "--seeds 0 is out of range"),
     "a folder of something else": ({"--out": "."}, "'.' holds other files"),
+    "data without a preset": ({"--data": "."}, "--data means nothing without --preset"),
     "an address without Dask": ({"--address": "tcp://a:1"}, "--address means nothing without Dask"),
 }
 

@@ -88,7 +88,7 @@ def check_provenance(folder, record, rows):
     assert tomllib.loads(unescape(text)) == record["plan"]
 
 
-def test_numbers_of_another_version_or_judge_are_measured_again(tmp_path):
+def test_numbers_of_another_version_judge_or_result_are_measured_again(tmp_path):
     from tests.comparison.test_summary import result
 
     kept, one = Kept(tmp_path), result("a", 0)
@@ -109,6 +109,9 @@ def test_numbers_of_another_version_or_judge_are_measured_again(tmp_path):
     for content in ({"version": VERSION - 1, "numbers": {}}, [], {"version": VERSION}):
         file.write_text(json.dumps(content))
         assert kept.completed(one, none) is None
+    file.write_text(json.dumps(record | {"time": "2026-11-01"}))
+    assert kept.completed(replace(one, time="2026-11-01"), none) is not None
+    assert kept.completed(replace(one, time="2026-11-02"), none) is None
     file.write_text("{")
     assert kept.completed(one, none) is None
 

@@ -12,7 +12,7 @@ import scipy.stats
 
 from mitex.cli import main
 from mitex.comparison import compare
-from mitex.comparison.answers import Answer, evaluate, holm, read_answers
+from mitex.comparison.answers import Answer, evaluate, holm, read_answers, wilson_interval
 from mitex.comparison.results import LIT, VIEW
 from mitex.comparison.study import KEY, PAGE, Question, Study, write_study
 from mitex.errors import ConfigError
@@ -60,6 +60,17 @@ def test_the_page_shows_the_pictures_and_names_nothing(study, tmp_path):
             shown = base64.b64decode(data["pictures"][choice])
             assert shown == (tmp_path / f"{method}-0-{question.mesh}.jpg").read_bytes()
     assert "http" not in page and "lava" not in page and "vase" not in page
+
+
+def test_other_names_of_the_same_pictures_are_another_study(tmp_path):
+    """Their questions come in another order."""
+    picture = bad.image(tmp_path / "a.jpg", (8, 8), "JPEG")
+    ids = set()
+    for names in ("ab", "ac"):
+        results = [replace(result(name, 0, "ball"), pictures={LIT: picture}) for name in names]
+        write_study(tmp_path, results, EXEMPLARS)
+        ids.add(Study.load(tmp_path).id)
+    assert len(ids) == 2
 
 
 def test_one_method_is_nothing_to_ask_about(tmp_path):
@@ -114,9 +125,14 @@ class TestEvaluation:
         assert (first.method, first.wins, first.count) == ("a", 4.5, 6)
         assert second.share == 0.25
         low, high = first.interval
-        z = scipy.stats.norm.ppf(0.975)  # Wilson's interval solves |p - 4 / 6| = z sqrt(p (1 - p) / 6)
+        z = scipy.stats.norm.ppf(0.975)  # Wilson's interval solves |p - 4.5 / 6| = z sqrt(p (1 - p) / 6)
         for p in (low, high):
-            assert abs(p - 4 / 6) == pytest.approx(z * np.sqrt(p * (1 - p) / 6), rel=1e-6)
+            assert abs(p - 4.5 / 6) == pytest.approx(z * np.sqrt(p * (1 - p) / 6), rel=1e-6)
+
+    @pytest.mark.parametrize(("wins", "count"), [(0, 5), (3, 7), (5, 5), (40, 41)])
+    def test_the_interval_is_scipys_where_nothing_is_halved(self, wins, count):
+        expected = scipy.stats.binomtest(wins, count).proportion_ci(method="wilson")
+        assert wilson_interval(wins / count, count) == pytest.approx((expected.low, expected.high), abs=1e-12)
 
     def test_the_spread_is_over_cases_and_the_tests_take_them_as_samples(self):
         """a was preferred by all on the ball, by half on the vase and the knot."""

@@ -19,6 +19,7 @@ from mitex.optional import optional
 
 FOLDER = "slurm"  # of what submitit keeps, in the batch folder
 MINUTES = 24 * 60  # that a job may take, if nobody says otherwise
+MOST_RETURNS = 10_000  # of a job into the queue; each goes on from a checkpoint
 
 
 class Slurm(Engine):
@@ -53,7 +54,9 @@ class Slurm(Engine):
         return _Queued(self._executor.submit(Requeueable(task)))
 
     def _opened(self, folder: Path) -> Any:
-        executor = optional("submitit", "cluster").AutoExecutor(folder, cluster=self._cluster)
+        executor = optional("submitit", "cluster").AutoExecutor(
+            folder, cluster=self._cluster, slurm_max_num_timeout=MOST_RETURNS
+        )
         try:
             executor.update_parameters(
                 timeout_min=MINUTES, cpus_per_task=self.threads, stderr_to_stdout=True, **self._options

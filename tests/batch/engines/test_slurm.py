@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from mitex.batch.engines.slurm import Slurm
+from mitex.batch.engines.slurm import MOST_RETURNS, Slurm
 from mitex.errors import ConfigError, MissingPackage, RuntimeUnavailable
 
 STEPS = 8
@@ -35,6 +35,7 @@ def test_options_are_those_of_sbatch(monkeypatch, tmp_path):
     executor = Slurm(["partition=cpu", "time=90"], threads=3)._opened(tmp_path)
     parameters = executor._executor.parameters
     assert (parameters["partition"], parameters["time"], parameters["cpus_per_task"]) == ("cpu", 90, 3)
+    assert executor._executor.max_num_timeout == MOST_RETURNS
     with pytest.raises(ConfigError, match="submitit refuses"):
         Slurm(["partitoin=cpu"])._opened(tmp_path)
 
