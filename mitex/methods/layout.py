@@ -21,14 +21,15 @@ def with_layout(mesh: Mesh, resolution: int, keep_uvs: bool = False) -> Mesh:
 
     Args:
         mesh: any mesh.
-        resolution: side of the map that new charts are packed for [texels].
+        resolution: side of the map that new charts are packed for [texels]; above `RESOLUTION` the layout
+            stays that of `RESOLUTION`, so that more texels make nothing smaller.
         keep_uvs: use the mesh's own UVs.
 
     Raises:
         ConfigError: its own are wanted but missing, out of range or overlapping.
     """
     if not keep_uvs:
-        return replace(mesh, uv=unwrap(mesh, resolution, PADDING))
+        return replace(mesh, uv=unwrap(mesh, min(resolution, RESOLUTION), PADDING))
     if mesh.uv is None:
         raise ConfigError(f"mesh '{mesh.name}' has no UVs to keep", "leave out `keep_uvs`")
     if not usable_uv(mesh, mesh.uv):
@@ -51,6 +52,24 @@ def layout_side(mesh: Mesh) -> float:
     if not solid.any():
         raise ConfigError(f"mesh '{mesh.name}' has no area in its layout", "unwrap it again")
     return float(np.median(np.sqrt(area[solid] / in_layout[solid])))
+
+
+def layout_ratio(mesh: Mesh, own: Mesh, resolution: int) -> float:
+    """How much longer the side of a layout is on the surface than that of the layout of `RESOLUTION`.
+
+    In smaller maps the gaps between charts take a larger part of the square.
+
+    Args:
+        mesh: before it was unwrapped.
+        own: unwrapped by `with_layout`.
+        resolution: that its charts were packed for.
+
+    Raises:
+        ConfigError: as `layout_side`.
+    """
+    if resolution >= RESOLUTION:
+        return 1.0
+    return layout_side(own) / layout_side(with_layout(mesh, RESOLUTION))
 
 
 def check_mesh(mesh: Mesh | None, own: Mesh) -> None:

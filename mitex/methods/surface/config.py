@@ -129,16 +129,19 @@ class TexelConfig(ScheduledConfig):
         """The layers that are compared, by name."""
         return self.layers or with_poolings(LAYERS_19 if self.weights == "vgg19" else LAYERS)
 
-    def exemplar_side(self, factor: float = 1.0) -> int:
+    def exemplar_side(self, factor: float = 1.0, layout_ratio: float = 1.0) -> int:
         """Side that the exemplar's central square is resized to [px]; a pixel becomes a texel.
 
         Args:
             factor: of the pattern's size, beside `scale`.
+            layout_ratio: of the mesh's layout, as `mitex.methods.layout.layout_ratio` tells; texels that
+                `exemplar_size` asks for stay as many.
 
         Raises:
             ConfigError: it is not from 16 to 2048.
         """
-        side = round(self.scale * factor * (self.exemplar_size or EXEMPLAR_WIDTH * self.resolution))
+        usual = EXEMPLAR_WIDTH * self.resolution / layout_ratio
+        side = round(self.scale * factor * (self.exemplar_size or usual))
         least, most = SIDES
         if least <= side <= most:
             return side

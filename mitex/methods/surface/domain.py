@@ -18,6 +18,7 @@ from mitex.methods.surface.cache import VERSION, cached_levels
 from mitex.methods.surface.config import SurfaceConfig
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.levels import POOLS, Levels
+from mitex.methods.surface.palette import square_depth
 from mitex.methods.surface.scale_map import ScaleMap
 from mitex.methods.surface.taps import Surroundings, build
 from mitex.methods.surface.texels import Texels
@@ -38,6 +39,7 @@ class SurfaceDomain:
         correct, continued: how levels are computed, see `SurfaceConfig`.
         scale_map: where the pattern's size varies, its factors.
         depth: number of levels.
+        layout_ratio: of the layout's size on the surface, as `mitex.methods.layout.layout_ratio` tells.
         keep: whether levels that had to be computed are kept in the cache on disk.
     """
 
@@ -51,6 +53,7 @@ class SurfaceDomain:
     scale_map: ScaleMap | None = None
     depth: int = POOLS
     keep: bool = True
+    layout_ratio: float = 1.0
 
     @staticmethod
     def of(
@@ -59,6 +62,7 @@ class SurfaceDomain:
         orientation: np.ndarray | None = None,
         scale_map: ScaleMap | None = None,
         keep: bool = True,
+        layout_ratio: float = 1.0,
     ) -> SurfaceDomain:
         """The domain that a synthesis with these settings works on."""
         return SurfaceDomain(
@@ -70,8 +74,9 @@ class SurfaceDomain:
             config.correct,
             config.continued,
             scale_map,
-            POOLS + config.scales,
+            max(POOLS + config.scales, square_depth(config.exemplar_side())),
             keep,
+            layout_ratio,
         )
 
     @property
@@ -113,6 +118,14 @@ class SurfaceDomain:
     def steps(self) -> np.ndarray | None:
         """(N,) steps of the taps at the texels, 1 in the mean [texels]; None where all are 1."""
         return None if self.factors is None else self.factors / self.mean_scale
+
+    def exemplar_side(self, config: SurfaceConfig) -> int:
+        """Side of the exemplar [px], a pixel of which becomes a texel where the pattern has its mean size.
+
+        Raises:
+            ConfigError: it is too small or too large.
+        """
+        return config.exemplar_side(self.mean_scale, self.layout_ratio)
 
     def target(self, patch: int) -> Target:
         """What `mitex.quilting.quilt_on` covers with patches of `patch` texels, which lie as the taps do."""

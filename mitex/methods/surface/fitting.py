@@ -18,7 +18,7 @@ from mitex.features.text_model import text_image_model
 from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh
 from mitex.mesh.fields import read_vectors
-from mitex.methods.layout import with_layout
+from mitex.methods.layout import layout_ratio, with_layout
 from mitex.methods.surface.config import PRESETS, WORDS, SurfaceConfig
 from mitex.methods.surface.content import AO, content_colours
 from mitex.methods.surface.domain import SurfaceDomain
@@ -142,13 +142,15 @@ def _synthesized(
     else:
         given = Mesh.of(mesh)
         image = content is not None and str(content) != AO
-        surface = with_layout(given, config.resolution, keep_uvs or image)
+        keeps = keep_uvs or image
+        surface = with_layout(given, config.resolution, keeps)
+        ratio = 1.0 if keeps else layout_ratio(given, surface, config.resolution)
         if isinstance(orientation, str | Path):
             orientation = read_vectors(surface, orientation).astype(np.float32)
         sizes = None if scale_map is None else ScaleMap.of(scale_map, given)
-        domain = SurfaceDomain.of(surface, config, orientation, sizes, keep=run.folder is not None)
+        domain = SurfaceDomain.of(surface, config, orientation, sizes, run.folder is not None, ratio)
     run.control.check()
-    config.exemplar_side(domain.mean_scale)
+    domain.exemplar_side(config)  # refuses a size that the exemplar cannot have
     check_memory(domain.mesh, config, 1 if exemplar is None else len(exemplar.maps), domain.steps)
     start = None if content is None else content_colours(content, domain)
     inputs = {"content_key": content_key(start), "orientation_key": content_key(domain.orientation)}

@@ -44,16 +44,19 @@ class Palette:
         levels: of the surface.
         images: (P, H, H, 3) the exemplar's channel triples on that scale.
         scale: how often texels were pooled to be compared with pixels of the images.
+        steps: (n,) how far apart the taps of texels are, if that varies.
     """
 
-    def __init__(self, levels: Levels, images: torch.Tensor, scale: int = 0) -> None:
+    def __init__(
+        self, levels: Levels, images: torch.Tensor, scale: int = 0, steps: torch.Tensor | None = None
+    ) -> None:
         planes = images.permute(0, 3, 1, 2)
-        depth = round(math.log2(max(images.shape[1] / SQUARES, 1)))
-        self.groups = [_groups(levels, scale)]
+        depth = min(square_depth(images.shape[1]), len(levels.levels) - scale)
+        self.groups = [_groups(levels, scale, steps)]
         self.targets, self.axes = [planes.flatten(2).mT], []
         spreads = [float(_components(colours)[0][-1]) for colours in planes.flatten(2)]
         self.axes.append(torch.stack([DIRECTIONS / spread for spread in spreads]))
-        squares = _groups(levels, scale + depth)
+        squares = _groups(levels, scale + depth, steps)
         if depth and len(squares[1]) >= LEAST:
             means = F.avg_pool2d(planes, 1 << depth, max((1 << depth) // 4, 1)).flatten(2)
             self.groups.append(squares)
@@ -75,6 +78,11 @@ class Palette:
             means = _means(colours, parent)[whole]
             total = total + sliced_distance(means @ axes[k], targets[k] @ axes[k])
         return total
+
+
+def square_depth(side: int) -> int:
+    """How often texels are pooled to the squares of an exemplar of `side` pixels."""
+    return round(math.log2(max(side / SQUARES, 1)))
 
 
 def sliced_distance(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
@@ -99,12 +107,17 @@ def _whitening(colours: torch.Tensor, largest: float) -> torch.Tensor:
     return directions / spread.clamp(min=FAINT * largest) @ DIRECTIONS
 
 
-def _groups(levels: Levels, depth: int) -> tuple[torch.Tensor, torch.Tensor]:
-    """(n,) the group of each texel after `depth` poolings, and the groups that are whole."""
-    parent = torch.arange(len(levels.order))
-    for level in levels.levels[:depth]:
-        parent = torch.repeat_interleave(torch.from_numpy(level.sizes.astype("int64")))[parent]
-    count, full = torch.bincount(parent), 4.0**depth
+def _groups(
+    levels: Levels, depth: int, steps: torch.Tensor | None = None
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """(n,) the group of each texel after `depth` poolings, and the groups that are whole.
+
+    Groups are as many times larger as the `steps` (n,) of the taps.
+    """
+    parent = torch.from_numpy(levels.groups(depth))
+    count, full = torch.bincount(parent), torch.tensor(4.0**depth)
+    if steps is not None and depth:
+        full = (full * _means(steps.square()[:, None], parent)[:, 0]).clamp(min=1.0)
     return parent, torch.nonzero((count >= WHOLE[0] * full) & (count <= WHOLE[1] * full))[:, 0]
 
 

@@ -48,7 +48,7 @@ def joined_patches(
         config: `patch`, the size of the pattern, and the seed of all choices.
     """
     announce("joining patches of the exemplar on the surface")
-    side = config.exemplar_side(domain.mean_scale)
+    side = domain.exemplar_side(config)
     images = exemplar.resized(side).maps
     image = np.concatenate([images[name].reshape(side, side, -1) for name in layout], axis=2)
     size = patch_side(config.patch, side, config.resolution)

@@ -236,11 +236,17 @@ class SurfaceTask(ParameterTask):
         config, network = self.config, Vgg16(self.config.pooling, weights=weights)
         comparisons = []
         for scale in range(config.scales + 1):
-            size = max(config.exemplar_side(self.domain.mean_scale) >> scale, 16)
+            size = max(self.domain.exemplar_side(config) >> scale, 16)
             images = torch.from_numpy(triple_images(exemplar.resized(size), self.triples, self.layout))
-            palette = Palette(self.levels, images, scale) if config.colours else None
+            palette = Palette(self.levels, images, scale, self._steps) if config.colours else None
             comparisons.append(_comparison(config, network, images, palette))
         return comparisons
+
+    @property
+    def _steps(self) -> torch.Tensor | None:
+        """(n,) steps of the taps at the elements; None where all are 1."""
+        steps = self.domain.steps
+        return None if steps is None else torch.from_numpy(steps[self.levels.order].astype(np.float32))
 
     def _start(self, generator: torch.Generator, content: np.ndarray | None, resumed: bool) -> torch.Tensor:
         """The coordinates before the first step, of a content (N, 3) or of what the settings say."""

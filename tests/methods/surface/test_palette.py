@@ -1,10 +1,16 @@
 """Distributions of colours, of pixels and of whole stones."""
 
+import numpy as np
 import pytest
 import torch
 
+from mitex.mesh import grid
+from mitex.methods.surface.config import PRESETS
+from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.palette import DIRECTIONS, Palette, sliced_distance
 from mitex.methods.surface.tile import tile_levels
+from mitex.training import resolve
+from tests.methods.surface.test_scale import square_levels
 
 SIDE, STONE = 256, 40  # [px]; a sixteenth of the side is compared, wherever it lies
 
@@ -76,3 +82,23 @@ def test_its_gradient_leads_to_the_colours(levels):
     step = 0.1 * before.detach() / gradient.square().sum()
     after = palette.distance((colours - step * gradient).detach(), 0)
     assert float(after) == pytest.approx(0.9 * float(before.detach()), rel=0.02)
+
+
+def test_squares_of_a_large_exemplar_need_deeper_levels():
+    """A sixteenth of 1,024 texels is six poolings wide: with five, squares are a thirty-second."""
+    image = torch.rand(1024, 1024, 3, generator=torch.Generator().manual_seed(0))
+    for depth, squares in ((5, 32**2), (6, 16**2)):
+        texels, whole = Palette(tile_levels(1024, depth), image[None]).groups[1]
+        assert len(whole) == squares and int(texels.max()) + 1 == squares
+    assert SurfaceDomain.of(grid(1, 1), resolve(PRESETS, None, None, ["resolution=2048"])).depth == 6
+
+
+@pytest.mark.parametrize("step", [0.5, 1.0, 2.0])
+def test_squares_are_whole_where_the_pattern_is_larger_or_smaller(step):
+    """On a flat square whose taps are `step` texels apart, most groups count as whole."""
+    texels, widths, levels = square_levels(lambda position: np.full(len(position), step))
+    image = torch.rand(64, 64, 3, generator=torch.Generator().manual_seed(0))
+    palette = Palette(levels, image[None], 0, torch.from_numpy(widths.astype(np.float32)))
+    parent, whole = palette.groups[1]
+    share = torch.isin(parent, whole).float().mean()
+    assert share > 0.8 and len(palette.groups[0][1]) == texels.size

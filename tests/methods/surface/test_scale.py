@@ -8,9 +8,10 @@ import pytest
 from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.images import write_image
-from mitex.mesh import Mesh, icosphere
+from mitex.mesh import Mesh, embedded, icosphere
 from mitex.mesh.frames import tangent_frames
 from mitex.methods import surface
+from mitex.methods.layout import layout_ratio, layout_side, with_layout
 from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.exponential import GeodesicTracer
@@ -40,6 +41,34 @@ def test_the_exemplar_is_as_wide_on_the_mesh_at_every_resolution():
     for words in (["scale=0.05"], ["scale=20"], ["resolution=16"]):
         with pytest.raises(ConfigError, match=r"texels wide with a scale of .*; change scale, resolution or"):
             config(words)
+
+
+@pytest.mark.parametrize("resolution", [96, 256, 1024])
+def test_the_pattern_is_as_wide_on_a_mesh_at_every_resolution(resolution):
+    """Charts with gaps of two texels between them take less of the square the smaller it is."""
+    mesh = embedded("vase")
+    wanted = config([f"resolution={resolution}"])
+    unwrapped = with_layout(mesh, resolution)
+    ratio = layout_ratio(mesh, unwrapped, resolution)
+    domain = SurfaceDomain.of(unwrapped, wanted, keep=False, layout_ratio=ratio)
+    width = domain.exemplar_side(wanted) / resolution * layout_side(unwrapped)
+    assert width == pytest.approx(0.5 * layout_side(with_layout(mesh, 512)), rel=0.5 / (0.4 * resolution))
+    own = layout_side(unwrapped) / layout_side(with_layout(mesh, 512))
+    assert ratio == pytest.approx(own) and (resolution != 96 or own > 1.1)
+    assert wanted.exemplar_side(1.0, ratio) != wanted.exemplar_side() or resolution == 1024
+    asked = config([f"resolution={resolution}", "exemplar_size=77"])
+    assert domain.exemplar_side(asked) == 77
+
+
+def test_a_fit_reads_the_exemplar_at_that_width(monkeypatch):
+    sides = []
+    resized = Exemplar.resized
+    monkeypatch.setattr(Exemplar, "resized", lambda self, side: sides.append(side) or resized(self, side))
+    small = {"resolution": 96, "steps": 1, "layers": "relu1_1", "start": "noise"}
+    mesh = icosphere(4)
+    surface.fit(Exemplar.load("cobblestone").of_albedo(), mesh, set=small)
+    ratio = layout_ratio(mesh, with_layout(mesh, 96), 96)
+    assert ratio > 1.05 and round(48 / ratio) in sides and 48 not in sides
 
 
 def square_levels(steps):

@@ -10,6 +10,7 @@ from typing import Generic, TypedDict, TypeVar
 import numpy as np
 import torch
 
+from mitex.errors import ConfigError
 from mitex.methods.nerf.capture.capture import Capture
 from mitex.methods.nerf.capture.pixels import Batch, Pixels
 from mitex.methods.nerf.config import RadianceConfig
@@ -93,14 +94,18 @@ class RadianceTask(ABC, Generic[Config]):
         return Change(undo, {"density": self.occupancy.refresh(self.density, generator)})
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
-        """The error of rays before a random background, and the field's own terms."""
+        """The error of rays before a random background, and the field's own terms.
+
+        Raises:
+            ConfigError: nothing is left of the field.
+        """
         batch = self.with_cameras(self._draw(generator))
         jitter = torch.rand(len(batch.view), generator=generator)
         rays = batch_rays(batch)
         samples = march(*rays, self.occupancy.mask, self.step_length, upload(mi.Float, jitter.numpy()))
         background = torch.rand(batch.colours.shape, generator=generator)
         if not len(samples):
-            raise ValueError("no ray meets an occupied cell")
+            return self._unseen(batch, background)
         samples = visible(samples, *rays, lambda points: upload(mi.Float, self.density(rows(points))))
         rendered = self.render(step, batch, samples, generator)
         rendered.average(batch.pixel_mean)
@@ -117,6 +122,18 @@ class RadianceTask(ABC, Generic[Config]):
         }
         metrics |= {name: value.item() for name, value in rendered.terms.items()}
         return Step(total, metrics, self._average)
+
+    def _unseen(self, batch: Batch, background: torch.Tensor) -> Step:
+        """A step whose rays pass through empty space alone, from which nothing is learned."""
+        if not self.occupancy.share:
+            raise ConfigError(
+                "the field has become empty",
+                "lower `lr`, and see that the masks show the object, not its ground",
+            )
+        error = self.magnitude((background - batch.colours) * batch.alpha).mean()
+        still = sum((0.0 * value.sum() for value in self.parameters), torch.zeros(()))
+        metrics = {"colour": error.item(), "samples": 0.0, "occupied": self.occupancy.share}
+        return Step(error + still, metrics, self._average)
 
     def error(self, rendered: Rendered, batch: Batch, background: torch.Tensor) -> torch.Tensor:
         """How far the means of rays are from their pixels: of colours before a background (P, 3)."""
