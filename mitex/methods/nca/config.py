@@ -154,8 +154,9 @@ class NcaConfig(DeviceConfig, ScheduledConfig):
             raise ConfigError("wave_frequencies holds nothing", "give one or more [cycles per edge]")
 
     def _check_motion(self) -> None:
-        if len(self.motion_speeds) != 2 or self.motion_speeds[0] > self.motion_speeds[1]:
-            raise ConfigError(f"motion_speeds holds {self.motion_speeds}", "give the least and the most")
+        speeds = self.motion_speeds
+        if len(speeds) != 2 or speeds[0] > speeds[1] or not speeds[1]:
+            raise ConfigError(f"motion_speeds holds {speeds}", "give the least, and the most above 0")
         if not self.motion:
             return
         if self.motion_start and self.motion_start >= self.steps:

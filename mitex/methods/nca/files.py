@@ -22,6 +22,7 @@ from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.methods.nca.look import STATE_CHANNELS, Look, weights_key
 from mitex.methods.nca.model import MeshNCA
+from mitex.methods.nca.motion.start import motion_record
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import HARMONICS
 from mitex.paths import expanded
@@ -81,8 +82,14 @@ def _read(path: Path, source: str | Path) -> tuple[Look, dict[str, Any]]:
 def _from_checkpoint(state: checkpoint.Checkpoint, path: Path) -> tuple[Look, dict[str, Any]]:
     maps = state.metadata.get("maps", "albedo").split(",")
     about: dict[str, Any] = {"name": state.metadata.get("exemplar", path.parent.name), "maps": maps}
-    about |= {"steps": state.step, "preset": state.config.get("preset")}
-    look = Look.of(of_record(NcaConfig, state.config), maps)
+    config = of_record(NcaConfig, state.config)
+    about |= {
+        "steps": state.step,
+        "preset": config.preset,
+        "density": config.density,
+        **motion_record(config),
+    }
+    look = Look.of(config, maps)
     _fill(look, {k[6:]: v for k, v in state.task.items() if k.startswith("model.")}, path)
     return look, {"family": state.metadata.get("family", weights_key(look))} | about
 

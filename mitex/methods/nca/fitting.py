@@ -9,7 +9,14 @@ from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.methods.nca import files
 from mitex.methods.nca.look import Look, weights_key
-from mitex.methods.nca.motion.start import check_field, learner, motion_record, moving, presets_from
+from mitex.methods.nca.motion.start import (
+    check_field,
+    check_seen,
+    learner,
+    motion_record,
+    moving,
+    presets_from,
+)
 from mitex.methods.nca.motion.task import MotionTask
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.parents import fitting_lineage, resumed_lineage
@@ -58,6 +65,7 @@ def fit(
     if config.motion:
         check_field(config.motion)
     maps = Exemplar.of(exemplar)
+    check_seen(config, maps.maps)
     origin: dict[str, Any] = {"exemplar": maps.name, "density": config.density}
     if "albedo" in maps.maps:
         origin["palette"] = Palette.of(maps.maps["albedo"]).record()

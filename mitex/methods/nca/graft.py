@@ -8,6 +8,7 @@ are near enough for a decoder between two of them to be one.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -60,6 +61,11 @@ class Graft(GrowingTexture):
     def about(self) -> Mapping[str, Any]:
         first, second = (texture.about.get("name") for texture in (self.first, self.second))
         return {"name": f"{first} and {second}", "family": self.first.family}
+
+    @property
+    def density(self) -> float:
+        """Of the two, the geometric mean."""
+        return math.sqrt(self.first.density * self.second.density)
 
     @property
     def steps(self) -> int:

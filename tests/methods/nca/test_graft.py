@@ -160,6 +160,16 @@ def test_it_needs_as_many_steps_as_the_slower_one(pair):
     assert Graft(pair[0], slow, graft_weights(SPHERE, 0)).steps == 500
 
 
+def test_its_pattern_is_as_wide_as_asked_for(pair):
+    """An exemplar's width over cells of the mean density of the two, which ships with some models."""
+    first, second = (
+        NcaTexture(one.look, {**one.about, "density": d}) for one, d in zip(pair, (16, 36), strict=True)
+    )
+    grafted = Graft(first, second, lambda points: np.zeros(len(points), np.float32))
+    assert grafted.density == 24
+    assert Graft(*pair, grafted.weights).density == 32
+
+
 def test_only_one_family_can_be_grafted(pair):
     with pytest.raises(ConfigError, match="'tiny 0' and 'tiny 2' are not of one family"):
         graft((pair[0], relative(2, family="another")), "x")

@@ -96,9 +96,9 @@ def test_squares_of_a_large_exemplar_need_deeper_levels():
 @pytest.mark.parametrize("step", [0.5, 1.0, 2.0])
 def test_squares_are_whole_where_the_pattern_is_larger_or_smaller(step):
     """On a flat square whose taps are `step` texels apart, most groups count as whole."""
-    texels, widths, levels = square_levels(lambda position: np.full(len(position), step))
+    _, widths, levels = square_levels(lambda position: np.full(len(position), step))
     image = torch.rand(64, 64, 3, generator=torch.Generator().manual_seed(0))
     palette = Palette(levels, image[None], 0, torch.from_numpy(widths.astype(np.float32)))
     parent, whole = palette.groups[1]
     share = torch.isin(parent, whole).float().mean()
-    assert share > 0.8 and len(palette.groups[0][1]) == texels.size
+    assert share > 0.8 and len(palette.groups[0][1]) == len(widths)

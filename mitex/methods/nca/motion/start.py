@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from dataclasses import replace
 from typing import Any
@@ -28,8 +28,10 @@ def moving(options: RunOptions, field: str) -> RunOptions:
     """Options of a fit whose texture moves along a field; the preset is `PRESET` where nothing else tells.
 
     Raises:
-        ConfigError: the settings name another field.
+        ConfigError: the settings name another field, or it is called "none".
     """
+    if field.strip().lower() in ("", "none"):
+        raise ConfigError(f"'{field}' is no field to move along", "leave out `motion` for a still texture")
     settings = by_key(options.get("set", ()))
     if settings.setdefault("motion", field) != field:
         raise ConfigError(f"motion is set to {settings['motion']} and to {field}", "give it once")
@@ -59,6 +61,19 @@ def check_field(field: str) -> None:
             "train with a name or a direction, and give the file as `field` when it is applied",
         )
     vector_field(icosphere(2), field)
+
+
+def check_seen(config: NcaConfig, maps: Iterable[str]) -> None:
+    """Refuses a training that looks at the motion of pictures without an albedo, which they show.
+
+    Raises:
+        ConfigError: there is none among the maps.
+    """
+    if config.motion and config.motion_estimator != "advection" and "albedo" not in maps:
+        raise ConfigError(
+            "motion is measured in pictures of the albedo, which the exemplar does not have",
+            "add one, or set motion_estimator=advection",
+        )
 
 
 def motion_record(config: NcaConfig) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from mitex.scenes.cameras import Cameras
 from mitex.scenes.screen import screen_motion
 
 STILL = 1e-6  # [px] in a period
+RIM = 4  # pixels along a silhouette, where an estimator's windows see the background, which stands still
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +27,7 @@ class MotionViews:
     Attributes:
         grey: of a state (V, C), its luminance (K, 1, H, W), differentiable in the state.
         target: (K, 2, H, W) the drift in the motion's period [px]; x to the right, y down.
-        mask: (K, H, W) bool, where the surface is.
+        mask: (K, H, W) bool, where the surface is, but for a margin along silhouettes.
     """
 
     grey: Callable[[torch.Tensor], torch.Tensor]
@@ -56,8 +57,14 @@ def sphere_views(look: Look, drift: Drift, cameras: Cameras) -> MotionViews:
     return MotionViews(
         lambda state: _grey(look, sphere.views(look, state, cameras)),
         target.to(look.device),
-        hits.hit.view(size).to(look.device),
+        without_rim(hits.hit.view(size)).to(look.device),
     )
+
+
+def without_rim(mask: torch.Tensor) -> torch.Tensor:
+    """(K, H, W) bool: where a mask is true as far as `RIM` pixels to all sides, inside the picture."""
+    outside = torch.nn.functional.max_pool2d((~mask)[:, None].float(), 2 * RIM + 1, 1, RIM)
+    return outside[:, 0] == 0
 
 
 def plane_views(look: Look, drift: Drift, windows: Windows) -> MotionViews:

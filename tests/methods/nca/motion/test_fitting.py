@@ -13,11 +13,12 @@ from mitex.exemplar import Exemplar
 from mitex.mesh import icosphere
 from mitex.mesh.fields import vector_field
 from mitex.methods import nca
-from mitex.methods.nca import Graft, NcaTexture, settling
+from mitex.methods.nca import Graft, NcaTexture, files, settling
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.growth import grown_state
 from mitex.methods.nca.motion.cell_motion import fastest
 from mitex.methods.nca.motion.condition import cell_vectors
+from mitex.methods.nca.page import contents
 from mitex.methods.nca.weights import graft_weights
 from mitex.runtime import threads
 from tests.methods.nca.tiny import SETTINGS, config, texture
@@ -109,6 +110,8 @@ def test_another_preset_may_move_too(lava):
         ("wind.npy", "one mesh"),
         ("wind.PLY", "one mesh"),
         ("strokes.json", "one mesh"),
+        ("", "'' is no field to move along; leave out `motion`"),
+        ("None", "'None' is no field to move along"),
     ],
 )
 def test_fields_that_nothing_can_be_trained_with(tmp_path, monkeypatch, lava, motion, problem):
@@ -117,6 +120,33 @@ def test_fields_that_nothing_can_be_trained_with(tmp_path, monkeypatch, lava, mo
     with pytest.raises(ConfigError, match=problem):
         nca.fit(lava, tmp_path / "run", motion=motion, set=TINY)
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("estimator", ["flow", "lucas-kanade"])
+def test_motion_in_pictures_needs_an_albedo(tmp_path, estimator):
+    """Without one, states alone can tell it."""
+    heights = Exemplar({"height": np.random.default_rng(0).random((64, 64, 1), np.float32)}, "heights")
+    words = [*TINY, "steps=0"]
+    with pytest.raises(ConfigError, match="of the albedo, which the exemplar does not have; add one, or set"):
+        nca.fit(heights, tmp_path / "run", motion="up", set=[*words, f"motion_estimator={estimator}"])
+    assert not (tmp_path / "run").exists()
+    assert nca.fit(heights, motion="up", set=[*words, "motion_estimator=advection"]).look.maps == ("height",)
+
+
+def test_a_run_that_is_stopped_knows_its_field(tmp_path, lava):
+    """It is read from its checkpoint, and moves as the texture that is trained to the end."""
+    out, settings = (
+        tmp_path / "run",
+        [*TINY, "steps=3", "motion_speeds=0,1.5", "motion_period=5", "density=9"],
+    )
+    whole = nca.fit(lava, out, motion="about-y", set=settings)
+    (out / files.NAME).unlink()
+    stopped = NcaTexture.load(out)
+    for key in ("motion", "motion_period", "motion_advection", "motion_speed", "density", "preset"):
+        assert stopped.about[key] == whole.about[key], key
+    sphere = icosphere(4)
+    assert torch.equal(stopped.grow(sphere, steps=4), whole.grow(sphere, steps=4))
+    assert contents([out], [sphere]).data["field"] == "about-y"
 
 
 def test_a_parent_must_fit_but_for_the_condition(tmp_path, lava):

@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.ndimage
 import torch
 
 from mitex.mesh import icosphere
 from mitex.methods.nca.motion.drift import Drift, turned_field
-from mitex.methods.nca.motion.views import MotionViews, plane_views, sphere_views
+from mitex.methods.nca.motion.views import RIM, MotionViews, plane_views, sphere_views
 from mitex.methods.nca.surfaces import CloseUps, TrainingPlane, TrainingSphere
 from mitex.scenes.cameras import random_views
 from tests.methods.nca.tiny import SHAPE, texture
@@ -70,6 +71,16 @@ def test_views_of_a_sphere(look, views):
     seen = sphere_views(look, drift, cameras)
     _assert_moving(seen, drift, state, (2, 40, 40))
     assert seen.mask.all() == (views == "patch")
+    if views == "full":
+        _assert_without_rim(seen.mask.numpy(), sphere.stage.hits(cameras).hit.view(2, 40, 40).numpy())
+
+
+def _assert_without_rim(mask: np.ndarray, surface: np.ndarray) -> None:
+    """All that the surface covers, but for what is within `RIM` pixels of the background, row or column."""
+    for shown, covered in zip(mask, surface, strict=True):
+        distance = scipy.ndimage.distance_transform_cdt(np.pad(covered, RIM, "edge"), "chessboard")
+        assert np.array_equal(shown, distance[RIM:-RIM, RIM:-RIM] > RIM)
+        assert 0 < shown.sum() < covered.sum()
 
 
 @pytest.mark.parametrize(
