@@ -16,7 +16,7 @@ from mitex.textures.field import Field
 from mitex.textures.variant import for_variant, option
 
 STEP = 4e-3  # of the differences of rays, of the film: their errors are near 1e-5 then
-CELL = 0.45  # of a sample's cell, at most
+CELL = 0.45  # of a sample's cell, at most, where a `batch` has views side by side
 
 
 class MotionIntegrator(GridIntegrator):
@@ -25,7 +25,8 @@ class MotionIntegrator(GridIntegrator):
     The channels are the motion to the right and downwards [pixels per unit time], the depth and the coverage:
 
     - A point of the surface moves with the field's vector, in world space [scene units per unit time]. The
-      motion is the derivative of its place on the film, to 1e-4 of it; the field need not be tangent.
+      motion is the derivative of its place on the film, to 1e-4 of it (to 1e-3 in `batch` sensors of 2,048
+      samples to a side); the field need not be tangent.
     - The depth is the distance along the camera's ray [scene units] from where the ray begins, as in
       Mitsuba's `depth` integrator: the near plane of perspective and orthographic sensors.
     - The coverage, in [0, 1], is the share of a pixel's samples that see a surface with vectors. Motion and
@@ -150,12 +151,12 @@ def _screen_axes(
 def _slope(camera: mi.Sensor, position: mi.Point2f, n: int, axis: int, distance: mi.Float) -> mi.Vector3f:
     """Derivative of points at a distance on the rays along an axis of the film [scene units per pixel].
 
-    By central differences, since Dr.Jit cannot differentiate the `batch` sensor. Steps stay within a sample's
-    cell, so that they end in the same view of a `batch`.
+    By central differences, since Dr.Jit cannot differentiate the `batch` sensor. Of that one, steps stay
+    within a sample's cell, so that they end in the same view; on a large film their errors are larger.
     """
     size = camera.film().crop_size()[axis]
     step = mi.Vector2f(0)
-    step[axis] = min(STEP, CELL / (n * size))
+    step[axis] = min(STEP, CELL / (n * size)) if camera.class_name() == "BatchSensor" else STEP
     after, before = (mi.Point2f(mi.Vector2f(position) + sign * step) for sign in (1, -1))
     end, start = (camera_ray(camera, place)(distance) for place in (after, before))
     return mi.Vector3f(end - start) / ((after[axis] - before[axis]) * size)

@@ -107,6 +107,16 @@ def test_a_turning_sphere_in_orthographic_view(mi):
     np.testing.assert_array_equal(picture[..., 3], x**2 + y**2 < 1)
 
 
+def test_it_is_as_exact_on_a_large_film(mi, vectors):
+    """A strip of 2,048 pixels: the differences of rays must not shrink with them."""
+    views = front_camera("orthographic", 2.5, half_width=1.1 / 1024, width=2048, height=2)
+    picture = image(mi, views.sensors()[0], {}, ball=moving(vectors))
+    expected = reference(BALL, views, vectors, 1)
+    inside = (picture[..., 3] == 1) & (expected[..., 2] == 1)
+    error = np.abs(picture[..., :2] - expected[..., :2])[inside] / np.abs(expected[inside][:, :2]).max()
+    assert inside.mean() > 0.5 and np.percentile(error[:, 0], 95) < 5e-6
+
+
 def test_a_turning_sphere_in_perspective(mi):
     ball, distance, slope = icosphere(24), 2.5, np.tan(np.radians(30))
     axis = np.array([0.5, 1.0, -0.25])
