@@ -17,6 +17,7 @@ from mitex.mesh import Mesh, subdivide_midpoint
 from mitex.mesh.fields import vector_field
 from mitex.mesh.untangling import untangled
 from mitex.methods.geometric import files
+from mitex.methods.geometric.borders import REACH, with_borders
 from mitex.methods.geometric.config import Placement
 from mitex.methods.geometric.directions import spread
 from mitex.methods.geometric.hierarchy import Hierarchy, mean_edge
@@ -82,6 +83,8 @@ class GeometricTexture:
         placement: Placement = "even",
     ) -> Asset:
         """Grows the texture on a mesh; every level after the first splits each face in four.
+
+        The borders of an open mesh stay where they are.
 
         The size of the texture follows the mesh's mean edge, whatever its connectivity and genus.
 
@@ -282,7 +285,7 @@ class Rollout:
 
     @torch.no_grad()
     def run(self, noises: Sequence[torch.Tensor], vertices: np.ndarray | None = None) -> Iterator[Mesh]:
-        """The mesh after each level, in its own units and place.
+        """The mesh after each level, in its own units and place; its borders, if any, have not moved.
 
         Args:
             noises: (V, 3) of each level [mean edges].
@@ -300,7 +303,8 @@ class Rollout:
             after = before.with_vertices(positions)
             if thick is not None and level:
                 thick = np.concatenate([thick, thick[self.hierarchy.pairs[level - 1].numpy()].mean(1)])
-            yield after if thick is None else shallow(before, after, thick)
+            after = after if thick is None else shallow(before, after, thick)
+            yield with_borders(before, after, REACH * unit)
 
 
 def slerp(a: torch.Tensor, b: torch.Tensor, t: float) -> torch.Tensor:
