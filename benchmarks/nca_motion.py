@@ -53,6 +53,7 @@ class Motion:
         self.task.pool.copy_(0.2 * torch.randn(self.task.pool.shape, generator=self._generator()))
         self.drift = self.draw()
         self.states = [state.requires_grad_() for state in self._states()]
+        self.estimators = {name: load_estimator(name) for name in ESTIMATORS}
 
     @staticmethod
     def _generator() -> torch.Generator:
@@ -71,7 +72,7 @@ class Motion:
 
     def loss(self, name: str) -> None:
         task, apart = self.task, self.task.config.motion_steps
-        task.estimator = load_estimator(name)
+        task.estimator = self.estimators[name]
         if task.estimator:
             value = task.picture_loss(self.states, task.motion_views(self.drift, self._generator()), apart)
         else:
@@ -79,7 +80,7 @@ class Motion:
         torch.autograd.grad(value, self.states[-1])
 
     def step(self) -> None:
-        self.task.estimator = load_estimator(self.task.config.motion_estimator)
+        self.task.estimator = self.estimators[self.task.config.motion_estimator]
         torch.autograd.grad(self.task.loss(1, self._generator()).value, self.task.parameters)
 
 

@@ -240,9 +240,10 @@ class TestInterruptions:
         process.send_signal(signal.SIGTERM)
         assert process.wait(200) == 130 and not workshop.told("step")
 
-    def test_the_driver_is_killed(self, workshop, driver, wait_for, monkeypatch):
+    @pytest.mark.parametrize("engine", ["local", "dask"])
+    def test_the_driver_is_killed(self, engine, workshop, driver, wait_for, monkeypatch):
         """Its fits save their checkpoints. The next command waits until they have ended."""
-        process = driver("--jobs", "2")
+        process = driver("--jobs", "2", "--engine", engine)
         wait_for(lambda: len(set(workshop.told("step"))) == 2)
         process.kill()
         process.wait(200)
@@ -258,8 +259,9 @@ class TestInterruptions:
             os.kill(int(next(workshop.folder.rglob("claim.0")).read_text().split(":")[-2]), signal.SIGTERM)
             assert [row.state for row in report.result().rows] == ["interrupted", "waiting"]
 
-    def test_two_drivers(self, workshop, driver, monkeypatch):
-        processes = [driver("--quiet", "--jobs", "2") for _ in range(2)]
+    @pytest.mark.parametrize("engine", ["local", "dask"])
+    def test_two_drivers(self, engine, workshop, driver, monkeypatch):
+        processes = [driver("--quiet", "--jobs", "2", "--engine", engine) for _ in range(2)]
         assert [process.wait(200) for process in processes] == [0, 0]
         assert sorted(workshop.told("start")) == sorted(set(workshop.told("start")))
         self.check_the_rest(workshop, driver, monkeypatch)
