@@ -15,6 +15,7 @@ Run it as
 and look at lit.png: the exemplar, and the scene before and after, in a minute or two.
 """
 
+import argparse
 import sys
 from collections.abc import Callable
 
@@ -161,8 +162,8 @@ def main(
     side: int = 160,
     resolution: int = 256,
     spp: int = 16,
-) -> None:
-    """Fits the texture and writes exemplar, start and result side by side."""
+) -> list[float]:
+    """Fits the texture, writes exemplar, start and result side by side, and returns the loss of each step."""
     if name not in LOSSES:
         raise SystemExit(f"error: there is no loss '{name}'; name one of {', '.join(LOSSES)}")
     torch.manual_seed(0)
@@ -188,18 +189,27 @@ def main(
         before = [picture(view, 0, 8 * spp) for view in range(VIEWS)]
     loss = turning_loss(scene, vase, before, masks) if name == "motion" else look_loss(name, exemplar, masks)
     optimizer = torch.optim.Adam([values], lr=0.05 if name == "motion" else 0.15)
+    losses = []
     for step in range(steps):
         optimizer.zero_grad()
         value = loss(picture(step % VIEWS, step + 1), step % VIEWS)
         value.backward()
         optimizer.step()
-        print(f"step {step + 1}/{steps}, loss {value.item():.4g}", file=sys.stderr)
+        losses.append(value.item())
+        print(f"step {step + 1}/{steps}, loss {losses[-1]:.4g}", file=sys.stderr)
     with torch.no_grad():
         after = picture(0, 0, 8 * spp)
     shown = torch.from_numpy(exemplar.resized(side).maps["albedo"])
     write_image(out, torch.hstack([shown, before[0], after]).numpy())
     print(out)
+    return losses
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:3])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("out", nargs="?", default="lit.png", metavar="OUT.png")
+    parser.add_argument("loss", nargs="?", default="transport", choices=LOSSES)
+    options = parser.parse_args()
+    main(options.out, options.loss)

@@ -86,6 +86,27 @@ def test_fit_apply_render(folder, capsys):
     assert getattr(Image.open("a.gif"), "n_frames", 1) == 3
 
 
+@pytest.mark.parametrize("out", ["tile/", "page.html"])
+def test_a_field_and_its_speed_reach_tiles_and_pages(folder, monkeypatch, out):
+    given = []
+
+    class Reached(Exception):
+        """Work would begin now."""
+
+    def stop(*_, **options):
+        given.append(options)
+        raise Reached
+
+    bad_files.model(folder / "m.safetensors")
+    monkeypatch.setattr("mitex.methods.nca.NcaTexture.tile", stop)
+    monkeypatch.setattr("mitex.methods.nca.living_page", stop)
+    words = "--tile 32" if out == "tile/" else "--mesh cube.obj"
+    for speed in (1.0, 2.5):
+        with pytest.raises(Reached):
+            main(f"apply m.safetensors {words} --out {out} --field up --speed {speed}".split())
+        assert (given[-1]["field"], given[-1]["speed"]) == ("up", speed)
+
+
 def test_options_reach_the_library(folder, monkeypatch, capsys):
     """Degrees become radians; what is not given keeps the library's default."""
     options = {}

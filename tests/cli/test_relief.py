@@ -48,6 +48,18 @@ def test_fit_resume_apply_render(files, capsys):
     assert main(["render", "out/a.glb", "--out", "out/a.png", "--resolution", "32", "--spp", "1"]) == 0
 
 
+def test_untangling_starts_from_the_mesh_without_its_relief(files, monkeypatch):
+    """As far as that mesh, in place of which `untangled` would have a part of the relief."""
+    maps(files / "maps", "height", "normal")
+    assert main(fit("--set start=flat")) == 0
+    monkeypatch.setattr("mitex.methods.relief.texture.untangled", lambda before, after: before)
+    texture = ReliefTexture.load(files / "out" / "run")
+    for words, mesh in (([], texture.moved), (["--untangle"], texture.plain)):
+        assert main(["apply", "out/run", "--mesh", "good.obj", "--out", "out/a.ply", *words]) == 0
+        assert np.abs(Asset.load("out/a.ply").mesh.vertices - mesh.vertices).max() < 1e-4
+    assert np.abs(texture.moved.vertices - texture.plain.vertices).max() > 1e-2
+
+
 def test_scale_and_depth_reach_the_fit(files):
     maps(files / "maps", "height", "normal")
     for out, words in (("a", ""), ("b", "--scale 2"), ("c", "--depth 0.3")):

@@ -158,9 +158,17 @@ def test_relief_and_colour(tmp_path: Path):
 def test_lit_texture_script(mi, tmp_path: Path, loss: str):
     """The exemplar, and the vase before and after: what is seen of it has changed, the floor has not."""
     script = load("lit_texture")
-    script.main(str(tmp_path / "a.png"), loss, steps=2, side=64, resolution=64, spp=4)
+    losses = script.main(str(tmp_path / "a.png"), loss, steps=8, side=64, resolution=64, spp=4)
+    assert sum(losses[4:]) < sum(losses[:4])  # of as many views
     picture = read_image(tmp_path / "a.png")
     assert picture.shape == (64, 192, 3)
     before, after = picture[:, 64:128], picture[:, 128:]
     change = np.abs(after - before).mean(2)
     assert change[24:40, 24:40].mean() > 10 * change[-8:, :8].mean()  # the floor in front
+
+
+def test_lit_texture_script_knows_its_losses(tmp_path: Path):
+    with pytest.raises(
+        SystemExit, match="no loss 'gramm'; name one of transport, gram, motion"
+    ):
+        load("lit_texture").main(str(tmp_path / "a.png"), "gramm")

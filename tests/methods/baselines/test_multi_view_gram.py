@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 import torch
 
+from mitex.asset import clay
+from mitex.cli import main
 from mitex.errors import CheckpointError, ConfigError, ImageError
 from mitex.exemplar import Exemplar
 from mitex.images import write_image
 from mitex.mesh import Mesh, grid, icosphere
 from mitex.methods.baselines import multi_view_gram
-from mitex.methods.baselines.multi_view_gram import MultiViewConfig, MultiViewTexture
+from mitex.methods.baselines.multi_view_gram import MultiViewConfig, MultiViewTexture, fitting
 from mitex.methods.baselines.multi_view_gram.gram_average import GramAverage, covered
 from mitex.methods.baselines.multi_view_gram.spectrum import COLOURS, CONTRAST, image_of, random_spectrum
 from mitex.methods.baselines.multi_view_gram.task import MultiViewTask
@@ -217,6 +219,36 @@ def test_the_texture_comes_near(tmp_path):
     assert (tmp_path / "run" / "previews" / "000060.png").is_file()
     again = MultiViewTexture.load(tmp_path / "run")
     assert np.abs(again.image - texture.image).max() < 1e-3 and again.about["mesh"] == "icosphere4"
+
+
+def test_a_content_is_read_on_the_mesh_s_own_uvs(tmp_path, monkeypatch):
+    """From the command line: a picture twice as large as the texture, red above and blue below."""
+    given = []
+
+    class Reached(Exception):
+        """Work would begin now."""
+
+    def task(config, target, surface, content):
+        given.extend((surface, content))
+        raise Reached
+
+    picture = np.zeros((64, 64, 3))
+    picture[:32, :, 0] = picture[32:, :, 2] = 1
+    write_image(tmp_path / "a.png", picture)
+    square = flat_square(2)
+    clay(square).export(tmp_path / "square.obj")
+    monkeypatch.setattr(fitting, "MultiViewTask", task)
+    monkeypatch.chdir(tmp_path)
+    words = (
+        "fit multi_view_gram --exemplar lava --mesh square.obj --content a.png --out run"
+    )
+    with pytest.raises(Reached):
+        main([*words.split(), "--quiet", "--set", "resolution=32"])
+    surface, content = given
+    assert content.shape == (32, 32, 3) and surface.uv is not None
+    np.testing.assert_allclose(content[:15], np.broadcast_to([1, 0, 0], (15, 32, 3)), atol=0.02)
+    np.testing.assert_allclose(content[17:], np.broadcast_to([0, 0, 1], (15, 32, 3)), atol=0.02)
+    np.testing.assert_allclose(surface.uv, Mesh.load("square.obj").uv, atol=1e-6)
 
 
 def test_resuming_changes_nothing(exemplar, tmp_path):
