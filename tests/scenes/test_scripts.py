@@ -154,12 +154,12 @@ def test_relief_and_colour(tmp_path: Path):
     assert chroma[0] < 0.015 and chroma[1] > 2 * chroma[0]
 
 
-@pytest.mark.parametrize("loss", ["transport", "gram", "motion"])
-def test_lit_texture_script(mi, tmp_path: Path, loss: str):
+@pytest.mark.parametrize(("loss", "steps"), [("transport", 8), ("gram", 8), ("motion", 16)])
+def test_lit_texture_script(mi, tmp_path: Path, loss: str, steps: int):
     """The exemplar, and the vase before and after: what is seen of it has changed, the floor has not."""
     script = load("lit_texture")
-    losses = script.main(str(tmp_path / "a.png"), loss, steps=8, side=64, resolution=64, spp=4)
-    assert sum(losses[4:]) < sum(losses[:4])  # of as many views
+    losses = script.main(str(tmp_path / "a.png"), loss, steps=steps, side=64, resolution=64, spp=4)
+    assert sum(losses[-4:]) < 0.95 * sum(losses[:4])  # of the same views
     picture = read_image(tmp_path / "a.png")
     assert picture.shape == (64, 192, 3)
     before, after = picture[:, 64:128], picture[:, 128:]
