@@ -26,7 +26,7 @@ def text_image_model(
 
     Raises:
         WeightsError: the named folder is not there, incomplete or damaged.
-        ConfigError: a CLIP model needs the package tokenizers.
+        MissingPackage: a CLIP model needs the package tokenizers.
     """
     folder = model_folder(clip)
     return Clip(folder, device=device) if folder else words_model(device)

@@ -78,6 +78,9 @@ def vertex_directions(mesh: Mesh, kind: str = "smooth", field: np.ndarray | None
     """(V, 3) float64 unit vectors across the vertex normals: where right points; see `tangent_frames`.
 
     Vertices at one place have one normal and one direction.
+
+    Raises:
+        ConfigError: an unknown kind, or a field of another shape or with numbers that are not finite.
     """
     if kind not in KINDS:
         raise ConfigError(f"unknown tangent frames {kind!r}", f"use one of {', '.join(KINDS)}")

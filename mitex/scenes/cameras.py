@@ -34,8 +34,8 @@ class Cameras:
         target: points looked at, (K, 3) float32.
         up: vectors that point up in the image, (K, 3) float32; need not be orthogonal to the view direction.
         fov: vertical field of view [degrees]; perspective only.
-        half_width: half of the image's height [mesh units]; orthographic only. A square image spans
-            2 half_width on both axes.
+        half_width: half of what a square image spans on both axes [mesh units]; of other images, half of
+            their height. Orthographic only.
         width, height: image size [px].
 
     Raises:

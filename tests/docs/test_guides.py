@@ -80,3 +80,8 @@ def test_every_sheet_of_the_gallery_is_shown():
 def test_every_texture_of_others_that_a_page_names_is_attributed():
     named = {name for page in PAGES for name in NAMED_TEXTURE.findall(read(page))}
     assert named and named <= set(NAMED_TEXTURE.findall(read(DOCS / "attributions.md")))
+
+
+def test_the_reference_has_every_method():
+    headings = re.findall(r"^## mitex\.methods\.(\S+)$", read(DOCS / "reference" / "methods.md"), re.MULTILINE)
+    assert sorted(name.rpartition(".")[2] for name in headings) == sorted(methods())

@@ -168,7 +168,5 @@ def test_lit_texture_script(mi, tmp_path: Path, loss: str, steps: int):
 
 
 def test_lit_texture_script_knows_its_losses(tmp_path: Path):
-    with pytest.raises(
-        SystemExit, match="no loss 'gramm'; name one of transport, gram, motion"
-    ):
+    with pytest.raises(SystemExit, match="no loss 'gramm'; name one of transport, gram, motion"):
         load("lit_texture").main(str(tmp_path / "a.png"), "gramm")

@@ -18,6 +18,8 @@ from mitex.ranges import SCALES, SEEDS
 from mitex.suffixes import PICTURES
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from mitex.asset import Asset
     from mitex.mesh import Mesh
     from mitex.methods.nca.graft import Graft
@@ -89,14 +91,14 @@ class Grafted(MeshOptions):
     def inputs(self) -> list:
         return [*super().inputs(), self.second, self.weights, *field_files(self.field, self.orientation)]
 
-    def check_output(self, out) -> None:
+    def check_output(self, out: Path) -> None:
         suffix = out.suffix.lower()
         reject_unused(
             "--vertex-colors", out, self.vertex_colors and suffix not in (".glb", ".ply", *PICTURES)
         )
         reject_unused("--resolution", out, self.resolution is not None and suffix == ".ply")
 
-    def applied(self, out) -> Asset:
+    def applied(self, out: Path) -> Asset:
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()

@@ -239,9 +239,7 @@ def test_a_content_is_read_on_the_mesh_s_own_uvs(tmp_path, monkeypatch):
     clay(square).export(tmp_path / "square.obj")
     monkeypatch.setattr(fitting, "MultiViewTask", task)
     monkeypatch.chdir(tmp_path)
-    words = (
-        "fit multi_view_gram --exemplar lava --mesh square.obj --content a.png --out run"
-    )
+    words = "fit multi_view_gram --exemplar lava --mesh square.obj --content a.png --out run"
     with pytest.raises(Reached):
         main([*words.split(), "--quiet", "--set", "resolution=32"])
     surface, content = given

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import arg
 
-from mitex.methods.baselines.reaction_diffusion.ranges import MOST_STEPS
+from mitex.methods.baselines.reaction_diffusion.ranges import MOST_STEPS, STEPS
 from mitex.methods.checks import in_range
 from mitex.methods.planar_options import PlanarFitOptions, PlanarOptions
 from mitex.ranges import SEEDS
@@ -45,7 +45,7 @@ class Apply(PlanarOptions):
     seed: Annotated[int, arg(metavar="N")] = 0
     """Random seed: another seed, another variant of the texture."""
 
-    steps: Annotated[int, arg(metavar="N")] = 500
+    steps: Annotated[int, arg(metavar="N")] = STEPS
     """Steps of time."""
 
     def check(self) -> None:

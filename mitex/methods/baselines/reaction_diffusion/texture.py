@@ -17,7 +17,7 @@ from mitex.mesh import Mesh, remesh
 from mitex.mesh.nearest import surface_points
 from mitex.methods.baselines.reaction_diffusion import METHOD
 from mitex.methods.baselines.reaction_diffusion.laplacian import mesh_laplacian
-from mitex.methods.baselines.reaction_diffusion.ranges import MOST_STEPS
+from mitex.methods.baselines.reaction_diffusion.ranges import MOST_STEPS, STEPS
 from mitex.methods.baselines.reaction_diffusion.reaction import BOUND, Reaction, colours
 from mitex.methods.checks import in_range
 from mitex.methods.layout import RESOLUTION, layout_side, with_layout
@@ -28,7 +28,6 @@ from mitex.runtime import keep_freed_memory
 from mitex.sparse import LinearMap
 from mitex.training import model_file
 
-STEPS = 500  # of time, after which patterns are in order
 PERIOD = 16  # steps after which states are held within their bounds
 MOST_CELLS = 500_000
 

@@ -27,5 +27,9 @@ def sum_of(textures: Sequence[torch.Tensor]) -> torch.Tensor:
 
 
 def fine_energy(textures: Sequence[torch.Tensor]) -> torch.Tensor:
-    """Weighted mean squares of the finer textures, which shall show what coarser ones cannot."""
+    """Weighted mean squares of the finer textures, which shall show what coarser ones cannot: a scalar.
+
+    Args:
+        textures: (3, s, s) each, the finest first.
+    """
     return sum((w * t.square().mean() for w, t in zip(FALL, textures, strict=False)), torch.zeros(()))

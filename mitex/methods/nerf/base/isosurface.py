@@ -32,7 +32,7 @@ def isosurface(values: np.ndarray, level: float, *, low: np.ndarray, cell: float
 
 
 def without_cavities(values: np.ndarray, level: float) -> np.ndarray:
-    """The values, raised to their maximum in the hollows that are enclosed by what is above the level."""
+    """The values (X, Y, Z), raised to their maximum in the hollows that what is above the level encloses."""
     solid = values > level
     hollow = np.asarray(ndimage.binary_fill_holes(solid)) & ~solid
     return np.where(hollow, values.max(), values)

@@ -28,7 +28,12 @@ def distort(points: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
 def undistort(points: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
     """The inverse of `distort` by fixed-point iteration; not meaningful where the lens folds the image.
 
-    Arguments and result as of `distort`, but from distorted points to ideal ones.
+    Args:
+        points: (..., 2) places behind the lens, in the units of `distort`.
+        coefficients: as of `distort`.
+
+    Returns:
+        Ideal points, of the same shape, float64.
     """
     points, coefficients = np.asarray(points, np.float64), np.asarray(coefficients, np.float64)
     if not coefficients.any():
