@@ -16,24 +16,30 @@ class StyleConfig(WordsConfig, ScheduledConfig):
     resolution: int = key(512, "side of the texture that the colours are baked into [texels]", 16, 4096)
     frequencies: int = key(256, "random waves of the place that the network reads", 1, 4096)
     sigma: float = key(12.0, "spread of their frequencies [cycles a radius]", 0.01, 1000)
-    width: int = key(256, "of the network's layers", 1, 4096)
+    width: int = key(256, "width of the network's layers", 1, 4096)
     views: int = key(2, "pictures in a step", 1, 64)
     cameras: Literal["around", "anchored"] = key(
         "around", "uniformly in all directions, or around the front (the paper)"
     )
     view: int = key(224, "side of a picture [px]", 32, 2048)
     fov: float = key(60.0, "field of view [degrees]", 1, 120)
-    distance: float = key(2.0, "of the cameras [radii]", 1.01, 1000)
+    distance: float = key(2.0, "distance of the cameras [radii]", 1.01, 1000)
     lr: float = 5e-4
     milestones: tuple[int, ...] = (100, 200, 300)
     decay: float = 0.9
-    text_vertices: int = key(10_000, "that a mesh has at least, else its faces are split", 1, 1_000_000)
-    text_relief: float = key(0.1, "that a vertex is moved by at most [radii]", 0, 1)
+    text_vertices: int = key(
+        10_000, "least number of vertices; faces of meshes with fewer are split", 1, 1_000_000
+    )
+    text_relief: float = key(0.1, "largest displacement of a vertex [radii]", 0, 1)
     text_each: bool = key(
         False, "compare the text with each picture; false: with their mean embedding (the paper)"
     )
-    text_relief_weight: float = key(1.0, "of that of the close-ups without colours", 0)
-    text_relief_crop_area: float = key(0.1, "of a close-up without colours, as a share of the view", 1e-3, 1)
+    text_relief_weight: float = key(
+        1.0, "weight of the distance of close-ups without colours from the text", 0
+    )
+    text_relief_crop_area: float = key(
+        0.1, "area of a close-up without colours, as a share of the view", 1e-3, 1
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

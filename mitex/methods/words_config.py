@@ -16,14 +16,16 @@ class WordsConfig:
 
     text: str | None = key(None, "what the mesh is made of, in words")
     text_object: str | None = key(None, "what the mesh is; by default its name")
-    text_prompt: str = key(PROMPT, "that the vision-language model reads")
+    text_prompt: str = key(PROMPT, "sentence that the vision-language model reads")
     text_model: str | None = key(None, "CLIP folder, or words for the small embedded model")
     text_background: float = key(1.0, "around the mesh [sRGB]; the papers: white", 0, 1)
     text_crops: int = key(4, "close-ups that are cut out of a view", 1, 64)
-    text_crop_area: float = key(0.1, "of a close-up, as a share of the view", 1e-3, 1)
-    text_tilt: float = key(0.5, "of what the model sees: the corners' way outwards [half sides]", 0, 2)
-    text_whole_weight: float = key(1.0, "of the distance of whole views from the text", 0)
-    text_close_weight: float = key(1.0, "of that of the close-ups", 0)
+    text_crop_area: float = key(0.1, "area of a close-up, as a share of the view", 1e-3, 1)
+    text_tilt: float = key(
+        0.5, "perspective tilt of what the model sees: how far corners move [half sides]", 0, 2
+    )
+    text_whole_weight: float = key(1.0, "weight of whole views' distance from the text", 0)
+    text_close_weight: float = key(1.0, "weight of the close-ups' distance from the text", 0)
 
     def prompt(self, name: str) -> str:
         """What the vision-language model reads of the mesh of that name."""

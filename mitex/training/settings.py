@@ -69,7 +69,7 @@ class FitConfig:
     """
 
     preset: str = key("default", "the preset that the settings started from")
-    seed: int = key(0, "of all randomness", *SEEDS)
+    seed: int = key(0, "number that all random choices follow from", *SEEDS)
 
     def __post_init__(self) -> None:
         kinds = typing.get_type_hints(type(self))
@@ -106,7 +106,9 @@ class ScheduledConfig(TrainingConfig):
 class DeviceConfig(TrainingConfig):
     """What the configs of methods have that can train on a graphics card."""
 
-    device: Literal["cpu", "cuda"] = key("cpu", "that trains: the processor, or the first CUDA graphics card")
+    device: Literal["cpu", "cuda"] = key(
+        "cpu", "where the training runs: the processor, or the first CUDA graphics card"
+    )
 
 
 def meaning(config: type[FitConfig], one: Field) -> str:

@@ -83,5 +83,7 @@ def test_every_texture_of_others_that_a_page_names_is_attributed():
 
 
 def test_the_reference_has_every_method():
-    headings = re.findall(r"^## mitex\.methods\.(\S+)$", read(DOCS / "reference" / "methods.md"), re.MULTILINE)
+    headings = re.findall(
+        r"^## mitex\.methods\.(\S+)$", read(DOCS / "reference" / "methods.md"), re.MULTILINE
+    )
     assert set(methods()) <= {name.rpartition(".")[2] for name in headings}

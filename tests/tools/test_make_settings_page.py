@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from mitex.methods.registry import methods
+from mitex.training.settings import rows
 
 ROOT = Path(__file__).parents[2]
 
@@ -44,3 +45,10 @@ def test_another_preset_shows_only_what_differs(script):
 
 def test_a_bar_does_not_end_a_cell(script):
     assert script.line(["a|b", "c"]) == r"| a\|b | c |"
+
+
+def test_meanings_stand_alone():
+    """They are read in a table and under `--settings`, far from the name of what they are of."""
+    for method in methods().values():
+        for row in rows(next(iter(method.load_presets().values()))):
+            assert not row.meaning.startswith(("of ", "that ", "its ", "as ")), f"{method.name}: {row.name}"

@@ -18,7 +18,7 @@ class GeometricConfig(DeviceConfig):
 
     preset: str = "fast"
     steps: int = key(10_000, "steps of the generators, all levels together; more add levels", 1)
-    level_steps: int = key(2_000, "of these for each level", 1)
+    level_steps: int = key(2_000, "steps on each level", 1)
     critic_steps: int = key(2, "steps of a critic", 1, 100)
     generator_steps: int = key(3, "steps of a generator that take turns with them", 1, 100)
     noise: float = key(0.1, "standard deviation of what is added to the vertices [mean edges]", 0, 10)
@@ -31,7 +31,7 @@ class GeometricConfig(DeviceConfig):
     symmetric: bool = key(False, "whether the relief looks alike from both ends of its field")
     # Levels 0 to 2 have networks of different widths, see `model.WIDTHS`.
     carried: int = key(3, "first level whose networks start from those of the level before", 3, MAX_LEVELS)
-    fit_steps: int = key(600, "of the optimization of each training mesh", 1)
+    fit_steps: int = key(600, "steps of fitting each training mesh to the reference", 1)
     fit_samples: int = key(3_000, "points on each surface, times the level's number + 1", 100, 1_000_000)
     fit_lr: float = key(0.02, "how far a step moves a vertex [mean edges]", 0, 1)
     fit_normals: float = key(0.1, "weight of the normals beside the distances, in both directions", 0)

@@ -38,14 +38,17 @@ class NcaConfig(DeviceConfig, ScheduledConfig):
     hidden: int = key(128, "width of the hidden layer", 1, 4096)
     degree: int = key(1, "highest degree of the spherical harmonics of the perception", 0, 2)
     gain: float = key(0.1, "gain of the initial weights of the last layer (the authors: 1.2)", 0)
-    frequency: int = key(32, "of the icosphere that is trained on; 10 f^2 + 2 vertices", 1, 4096)
+    frequency: int = key(
+        32, "frequency f of the icosphere that is trained on, which has 10 f^2 + 2 vertices", 1, 4096
+    )
     surfaces: tuple[str, ...] = key(
         ("even", "flat", "uneven", "flat"),
-        "that states grow on in turns: even (icosphere), uneven (scattered sphere), flat (square)",
+        "surfaces that states grow on in turns: even (icosphere), uneven (scattered sphere), flat (square)",
     )
     pool: int = key(64, "states kept between steps", 1, 4096)
     aggregation: Literal["mean", "sum"] = key(
-        "mean", "of what a cell perceives of its neighbours: six times the mean, or the sum (the paper)"
+        "mean",
+        "how a cell sums up what it perceives of its neighbours: six times the mean, or the sum (the paper)",
     )
     inject_every: int = key(16, "steps after which the drawn state is replaced by the seed", 1, 4096)
     min_steps: int = key(24, "fewest automaton steps in a training step", 1, 4096)
@@ -56,7 +59,7 @@ class NcaConfig(DeviceConfig, ScheduledConfig):
     view_count: int = key(4, "views in a step, of each zoom", 1, 4096)
     resolution: int = key(128, "side of a view [px]", 16, 2048)
     zooms: int = key(4, "sizes at which views are compared, each half of the next", 1, 6)
-    distance: float = key(2.5, "of the camera of a full view [normalised mesh units]", 1.01, 100)
+    distance: float = key(2.5, "distance of the camera of a full view [normalised mesh units]", 1.01, 100)
     fov: float = key(60.0, "field of view of a full view [degrees]", 1, 170)
     density: float = key(32.0, "vertices along the exemplar's width in a patch: the size on a mesh", 4, 4096)
     exemplar_size: int = key(1024, "side that a larger exemplar is resized to [px]", 16, 2048)
@@ -64,29 +67,37 @@ class NcaConfig(DeviceConfig, ScheduledConfig):
     blend: bool = key(
         True, "a view shows one picture of several maps, mixed, so that they are learned in register"
     )
-    layers: tuple[str, ...] = key(("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "of VGG-16")
-    pooling: Literal["average", "max"] = key("max", "of VGG-16")
-    samples: int = key(1024, "feature vectors compared in each layer and view, at most", 1, 4096)
-    colour_weight: float = key(1.0, "of the comparison of colours, beside the layers", 0)
-    colour_histogram: bool = key(True, "compare the histograms of the channels too")
-    moment_weight: float = key(0.1, "of the moment terms, beside the transport terms", 0)
-    order_weight: float = key(10.0, "of the autocorrelation of the coarsest views, for regular patterns", 0)
-    relief_weight: float = key(
-        1.0, "of normals that follow from the height as far as the exemplar's do; on flat surfaces", 0
+    layers: tuple[str, ...] = key(
+        ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "pooling of VGG-16"
     )
-    appearance_weight: float = key(2.0, "of the appearance loss", 0)
-    overflow_weight: float = key(100.0, "of the overflow loss", 0)
+    pooling: Literal["average", "max"] = key("max", "pooling of VGG-16")
+    samples: int = key(1024, "feature vectors compared in each layer and view, at most", 1, 4096)
+    colour_weight: float = key(1.0, "weight of the comparison of colours, beside the layers", 0)
+    colour_histogram: bool = key(True, "compare the histograms of the channels too")
+    moment_weight: float = key(0.1, "weight of the moment terms, beside the transport terms", 0)
+    order_weight: float = key(
+        10.0, "weight of the autocorrelation of the coarsest views, for regular patterns", 0
+    )
+    relief_weight: float = key(
+        1.0, "weight of normals that follow from the height as far as the exemplar's do; on flat surfaces", 0
+    )
+    appearance_weight: float = key(2.0, "weight of the appearance loss", 0)
+    overflow_weight: float = key(100.0, "weight of the overflow loss", 0)
     decoder: bool = key(
         True, "decode the maps from the states; false: they are channels of the state (the paper)"
     )
-    interpolation: Literal["smooth", "linear"] = key("smooth", "of the states between the vertices")
+    interpolation: Literal["smooth", "linear"] = key(
+        "smooth", "interpolation of the states between the vertices"
+    )
     coordinates: tuple[str, ...] = key(
         ("waves",), "local coordinates, of waves, barycentrics, polynomials; or none"
     )
     waves: int = key(12, "number of waves of the solid noise", 1, 256)
-    wave_frequencies: tuple[float, ...] = key((1.7, 2.3, 3.1), "of the waves [cycles per edge]", 0)
-    wave_amplitude: float = key(0.3, "of the waves", 0)
-    decoder_width: int = key(32, "of the decoder's hidden layers", 1, 1024)
+    wave_frequencies: tuple[float, ...] = key(
+        (1.7, 2.3, 3.1), "frequencies of the waves that the decoder is told [cycles per edge]", 0
+    )
+    wave_amplitude: float = key(0.3, "amplitude of these waves", 0)
+    decoder_width: int = key(32, "width of the decoder's hidden layers", 1, 1024)
     decoder_depth: int = key(3, "number of the decoder's hidden layers", 1, 16)
     omega: float = key(10.0, "factor in the decoder's sines", 0)
     milestones: tuple[int, ...] = (500, 750)
@@ -98,8 +109,8 @@ class NcaConfig(DeviceConfig, ScheduledConfig):
     motion_estimator: Literal["advection", "flow", "lucas-kanade"] = key(
         "advection", "what tells how it moves: the states themselves, or pictures of the albedo"
     )
-    motion_gamma: float = key(1.5, "of the direction in the loss of pictures", 0)
-    motion_weight: float = key(2.0, "of the motion loss (lambda)", 0)
+    motion_gamma: float = key(1.5, "weight of the direction in the motion loss of pictures", 0)
+    motion_weight: float = key(2.0, "weight of the motion loss (lambda)", 0)
     motion_period: float = key(12.0, "automaton steps in which a vector of length 1 is one edge (T)", 1)
     motion_steps: int = key(12, "automaton steps between the states that are compared", 1, 4096)
     motion_start: int = key(0, "training step from which on motion counts", 0)
@@ -107,7 +118,7 @@ class NcaConfig(DeviceConfig, ScheduledConfig):
     motion_speeds: tuple[float, ...] = key((0.0, 2.0), "least and most factor of the field in a step", 0)
     text: str | None = key(None, "what the texture is made of, in words, instead of an exemplar")
     text_object: str | None = key(None, "what has the texture; by default a sphere, or the mesh's name")
-    text_prompt: str = key(PROMPT, "that the vision-language model reads")
+    text_prompt: str = key(PROMPT, "sentence that the vision-language model reads")
     text_model: str | None = key(None, "CLIP folder, or words for the small embedded model")
     text_parent: str | None = key(None, "model that training starts from if no other is given")
     text_directional: bool = key(
@@ -115,17 +126,21 @@ class NcaConfig(DeviceConfig, ScheduledConfig):
     )
     text_growth_steps: int = key(200, "automaton steps after which it is taken for grown", 1, MOST_STEPS)
     text_bank: int = key(64, "sets of views, drawn once, of which a step sees one", 1, 65_536)
-    text_distances: tuple[float, ...] = key((2.5,), "of the cameras, one for each set", 1.01, 100)
+    text_distances: tuple[float, ...] = key((2.5,), "distances of the cameras, one for each set", 1.01, 100)
     text_crops: int = key(2, "close-ups that are cut out of a view", 1, 64)
-    text_crop_area: float = key(0.1, "of a close-up, as a share of the view", 1e-3, 1)
-    text_tilt: float = key(0.5, "of what the model sees: the corners' way outwards [half sides]", 0, 2)
-    text_whole_weight: float = key(1.0, "of the distance of whole views from the text", 0)
-    text_close_weight: float = key(1.0, "of that of the close-ups", 0)
-    text_relief_weight: float = key(1.0, "of that of the close-ups without colours", 0)
-    text_relief: float = key(2.5, "that the surface is moved by at most [edges]", 0, 100)
-    text_roughness: float = key(0.01, "of the relief that costs nothing (xi)", 0)
-    text_smooth_weight: float = key(1.0, "of the relief's roughness beyond that", 0)
-    text_range_weight: float = key(10.0, "of values outside of what maps can hold", 0)
+    text_crop_area: float = key(0.1, "area of a close-up, as a share of the view", 1e-3, 1)
+    text_tilt: float = key(
+        0.5, "perspective tilt of what the model sees: how far corners move [half sides]", 0, 2
+    )
+    text_whole_weight: float = key(1.0, "weight of whole views' distance from the text", 0)
+    text_close_weight: float = key(1.0, "weight of the close-ups' distance from the text", 0)
+    text_relief_weight: float = key(
+        1.0, "weight of the distance of close-ups without colours from the text", 0
+    )
+    text_relief: float = key(2.5, "largest displacement of the surface [edges]", 0, 100)
+    text_roughness: float = key(0.01, "roughness of the relief that costs nothing (xi)", 0)
+    text_smooth_weight: float = key(1.0, "weight of the relief's roughness beyond that", 0)
+    text_range_weight: float = key(10.0, "weight of values outside of what maps can hold", 0)
 
     def __post_init__(self) -> None:
         super().__post_init__()

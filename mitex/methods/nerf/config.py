@@ -79,7 +79,7 @@ class NerfConfig(RadianceConfig):
     neighbours: int = key(8, "vertices whose normals make the coarse normal", 1, 64)
     refine_cameras: bool = key(False, "optimize the poses too")
     exposures: bool = key(False, "learn how bright each photo was taken too, for films whose exposure drifts")
-    base_steps: int = key(1_000, "of the coarse field that the base shape is taken from", 1)
+    base_steps: int = key(1_000, "steps of the coarse field that the base shape is taken from", 1)
     concavity: float = key(
         0.3,
         "CoACD's threshold of the base shape: more than the height of the meso-structure beside the object, "

@@ -24,11 +24,11 @@ class ReliefConfig(ScheduledConfig):
     resolution: int = key(SURFACE.resolution, "side of the maps [texels]", 16, 4096)
     scale: float = key(1.0, "size of the pattern, as of surface", *SCALES)
     surface_steps: int = key(SURFACE.steps, "steps of surface", 1)
-    faces: int = key(200_000, "of the relief, about; at most twice as many", 1, 2_000_000)
+    faces: int = key(200_000, "faces of the relief, about; at most twice as many", 1, 2_000_000)
     depth: float = key(
         0.0,
-        "of the relief, from the lowest to the highest point of the height map [widths of the exemplar]; "
-        "0: what the exemplar's normals say",
+        "depth of the relief, from the lowest to the highest point of the height map [widths of the exemplar]"
+        "; 0: what the exemplar's normals say",
         0,
         1,
     )
@@ -36,8 +36,8 @@ class ReliefConfig(ScheduledConfig):
     view: int = key(128, "side of a close-up [px]", 32, 2048)
     width: float = key(
         0.0,
-        "of what a close-up shows [widths of the exemplar]; 0: as many edges of the relief as it has pixels, "
-        "since vertices cannot follow finer detail",
+        "width of what a close-up shows [widths of the exemplar]; 0: as many edges of the relief as it has "
+        "pixels, since vertices cannot follow finer detail",
         0,
         16,
     )

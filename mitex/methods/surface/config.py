@@ -48,7 +48,7 @@ class TexelConfig(ScheduledConfig):
     weights: Literal["vgg16", "vgg19", "random"] = key(
         "vgg16", "vgg19 is a file of yours (mitex.features.vgg19), random the ablation of figure 5"
     )
-    pooling: Literal["average", "max"] = key("average", "of the network")
+    pooling: Literal["average", "max"] = key("average", "pooling of the network")
     loss: Literal["gram", "transport"] = key(
         "gram", "Gram matrices (the paper), or MeshNCA's relaxed optimal transport and moments"
     )
@@ -70,7 +70,7 @@ class TexelConfig(ScheduledConfig):
     content_layer: str = key("relu4_2", "style transfer: the layer whose features stay the content's")
     content_weight: float = key(1000.0, "style transfer: how much that counts", 0)
     scales: int = key(0, "coarser pyramids of texels matched first, each half as fine", 0, 3)
-    coarse_share: float = key(0.4, "of the steps, spent on the coarser scales together", 0, 0.95)
+    coarse_share: float = key(0.4, "share of the steps that is spent on the coarser scales together", 0, 0.95)
     triples: int = key(2, "triples of channels compared in a step, for several maps", 1, 16)
     whitened: bool = key(
         True,
@@ -157,8 +157,8 @@ class SurfaceConfig(WordsConfig, TexelConfig):
 
     text_weight: float = key(
         1.0,
-        "of the words, beside an exemplar or a content: with 1, pictures that have nothing of the text cost "
-        "as much as a surface that has no features",
+        "weight of the words, beside an exemplar or a content: with 1, pictures that have nothing of the "
+        "text cost as much as a surface that has no features",
         0,
     )
     text_directional: bool = key(
@@ -167,8 +167,10 @@ class SurfaceConfig(WordsConfig, TexelConfig):
     text_bank: int = key(64, "sets of views, drawn once, of which a step sees one", 1, 65_536)
     text_views: int = key(4, "views in a set", 1, 64)
     text_view: int = key(224, "side of a view [px]", 16, 2048)
-    text_distance: float = key(2.0, "of the cameras of views of the whole mesh [radii]", 1.01, 100)
-    text_width: float = key(0.0, "of what a view shows at scale 1 [radii]; 0: views of the whole mesh", 0, 2)
+    text_distance: float = key(2.0, "distance of the cameras of views of the whole mesh [radii]", 1.01, 100)
+    text_width: float = key(
+        0.0, "width of what a view shows at scale 1 [radii]; 0: views of the whole mesh", 0, 2
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -22,8 +22,8 @@ class GatysConfig(TrainingConfig):
     )
     noise: float = key(
         0.1,
-        "of the start, in which the exemplar's mean colour has the rest; the paper's authors: as wide as "
-        "noise with a standard deviation of a level of 8 bits",
+        "share of noise in the start, in which the exemplar's mean colour has the rest; the paper's authors: "
+        "as wide as noise with a standard deviation of a level of 8 bits",
         0,
         1,
     )
@@ -33,10 +33,10 @@ class GatysConfig(TrainingConfig):
     )
     layers: tuple[str, ...] = key(
         ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"),
-        "its convolutions and poolings that are compared; the paper: the first, and four poolings",
+        "convolutions and poolings that are compared; the paper: the first, and four poolings",
     )
     optimizer: Literal["lbfgs", "adam"] = key("lbfgs", "L-BFGS (the paper) or Adam")
-    lr: float = key(0.2, "of L-BFGS the largest change in a step; of Adam the learning rate", 0)
+    lr: float = key(0.2, "the largest change in a step of L-BFGS, or the learning rate of Adam", 0)
     preview_every: int = 50
 
     def __post_init__(self) -> None:

@@ -32,7 +32,7 @@ class ReactionDiffusionConfig(ScheduledConfig):
     layers: tuple[str, ...] = key(
         ("relu1_1", "relu2_1", "relu3_1", "relu4_1"), "VGG-16's whose Gram matrices are compared"
     )
-    overflow_weight: float = key(100.0, "of the overflow loss", 0)
+    overflow_weight: float = key(100.0, "weight of the overflow loss", 0)
     lr: float = 4e-3
     milestones: tuple[int, ...] = (500, 1000, 1300)
     decay: float = 0.3

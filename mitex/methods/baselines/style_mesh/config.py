@@ -23,7 +23,7 @@ class StyleMeshConfig(ScheduledConfig):
     views: int = key(24, "cameras, evenly around the mesh", 1, 10_000)
     view: int = key(256, "height of the lowest pictures [px]", 64, 2048)
     heights: int = key(2, "heights of pictures, each twice as high as the one before; the paper: 4", 1, 5)
-    distance: float = key(2.5, "of the cameras [half extents of the mesh]", 1.01, 1000)
+    distance: float = key(2.5, "distance of the cameras [half extents of the mesh]", 1.01, 1000)
     fov: float = key(60.0, "field of view [degrees]", 1, 120)
     antialias: int = key(2, "n for n x n rays per pixel; the paper: 1", 1, 8)
     by_depth: bool = key(True, "a pixel counts in the pictures in which it is as large as a texel")
@@ -35,9 +35,9 @@ class StyleMeshConfig(ScheduledConfig):
         "vgg16", "whose features are compared; vgg19 (the paper) is a file of yours (mitex.features.vgg19)"
     )
     layers: tuple[str, ...] = key(
-        ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "its layers that are compared"
+        ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "layers of the network that are compared"
     )
-    weights: tuple[float, ...] = key((0.1, 0.1, 0.001, 0.001, 0.1), "of the layers", 0)
+    weights: tuple[float, ...] = key((0.1, 0.1, 0.001, 0.001, 0.1), "weights of the layers", 0)
     small_layers: tuple[str, ...] = key(
         ("relu4_1", "relu5_1"), "layers that are compared with the exemplar at half its size, too"
     )

@@ -24,8 +24,8 @@ class XMeshConfig(StyleConfig):
     text_crop_area: float = 0.4
     text_relief_crop_area: float = 0.4
     mirror: bool = key(False, "the same on both sides of the plane z = 0 (the paper)")
-    gate_width: int = key(32, "of the hidden layers of the gates", 1, 4096)
-    rank: int = key(30, "of the gates' weights", 1, 4096)
+    gate_width: int = key(32, "width of the hidden layers of the gates", 1, 4096)
+    rank: int = key(30, "rank of the gates' weights", 1, 4096)
     gate_start: float = key(
         0.1, "spread of their hidden layers' factor at first; 0 (the paper): they never learn", 0
     )
