@@ -246,7 +246,7 @@ def test_a_content_is_read_on_the_mesh_s_own_uvs(tmp_path, monkeypatch):
     assert content.shape == (32, 32, 3) and surface.uv is not None
     np.testing.assert_allclose(content[:15], np.broadcast_to([1, 0, 0], (15, 32, 3)), atol=0.02)
     np.testing.assert_allclose(content[17:], np.broadcast_to([0, 0, 1], (15, 32, 3)), atol=0.02)
-    np.testing.assert_allclose(surface.uv, Mesh.load("square.obj").uv, atol=1e-6)
+    np.testing.assert_allclose(surface.uv, np.asarray(Mesh.load("square.obj").uv), atol=1e-6)
 
 
 def test_resuming_changes_nothing(exemplar, tmp_path):

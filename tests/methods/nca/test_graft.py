@@ -167,7 +167,7 @@ def test_its_pattern_is_as_wide_as_asked_for(pair):
     )
     grafted = Graft(first, second, lambda points: np.zeros(len(points), np.float32))
     assert grafted.density == 24
-    assert Graft(*pair, grafted.weights).density == 32
+    assert Graft(pair[0], pair[1], grafted.weights).density == 32
 
 
 def test_only_one_family_can_be_grafted(pair):

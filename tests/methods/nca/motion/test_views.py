@@ -78,7 +78,8 @@ def test_views_of_a_sphere(look, views):
 def _assert_without_rim(mask: np.ndarray, surface: np.ndarray) -> None:
     """All that the surface covers, but for what is within `RIM` pixels of the background, row or column."""
     for shown, covered in zip(mask, surface, strict=True):
-        distance = scipy.ndimage.distance_transform_cdt(np.pad(covered, RIM, "edge"), "chessboard")
+        padded = np.pad(covered, RIM, "edge")
+        distance = np.asarray(scipy.ndimage.distance_transform_cdt(padded, "chessboard"))
         assert np.array_equal(shown, distance[RIM:-RIM, RIM:-RIM] > RIM)
         assert 0 < shown.sum() < covered.sum()
 
