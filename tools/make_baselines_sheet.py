@@ -1,50 +1,42 @@
 """Draws docs/gallery/baselines.jpg: one exemplar on one mesh, by methods and what they are compared with.
 
-    python tools/make_baselines_sheet.py lava vase runs/surface lava runs/quilted ...
+    python tools/make_baselines_sheet.py --exemplar lava --mesh vase --methods surface nca ... -- out/lava ...
 
-The arguments are an exemplar, a mesh, and models. The pattern is as large in all pictures: the exemplar is
-half as wide as the side of the layout that surface textures have.
+The last arguments are folders that `mitex compare` wrote, from whose pictures the sheet is put together.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
-from mitex.exemplar import Exemplar
+from make_comparison_sheet import GALLERY, rows_of
+
+from mitex.comparison.look_pair import picture_of
+from mitex.comparison.results import label
 from mitex.images import read_image, write_image
-from mitex.mesh import Mesh
-from mitex.methods.interface import Applied
-from mitex.methods.layout import EXEMPLAR_WIDTH
-from mitex.methods.nca import NcaTexture
-from mitex.methods.registry import load, method_of
 from mitex.render import sheet
 
-SHEET = Path(__file__).parents[1] / "docs" / "gallery" / "baselines.jpg"
-CELL, SPP = 384, 96  # side of a picture [px], and rays of each pixel
-
-
-def applied(model: str, mesh: Mesh) -> Applied:
-    """A model's texture on the mesh."""
-    texture = load(model)
-    if isinstance(texture, NcaTexture):
-        return texture.apply(mesh, exemplar_width=EXEMPLAR_WIDTH)
-    return texture.apply(mesh)
+CELL = 384  # side of a picture [px]
 
 
 def main() -> None:
-    exemplar, mesh, *models = sys.argv[1:]
-    surface = Mesh.load(mesh)
-    pictures, labels = [Exemplar.load(exemplar).resized(CELL).maps["albedo"]], ["exemplar"]
-    with TemporaryDirectory() as folder:
-        for model in models:
-            path = Path(folder) / "a.png"
-            applied(model, surface).render(path, resolution=CELL, spp=SPP)
-            pictures.append(read_image(path))
-            labels.append(method_of(model).name)
-    write_image(SHEET, sheet(pictures, columns=4, labels=labels, cell=CELL))
-    print(SHEET)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--exemplar", required=True)
+    parser.add_argument("--mesh", required=True)
+    parser.add_argument("--methods", nargs="+", required=True, help="in this order")
+    parser.add_argument("folders", nargs="+", type=Path)
+    arguments = parser.parse_args()
+    pair = arguments.exemplar, arguments.mesh
+    rows = [row for folder in arguments.folders for row in rows_of(folder)]
+    first = {
+        row["method"]: row for row in reversed(rows) if (label(row["exemplar"]), label(row["mesh"])) == pair
+    }
+    pictures = [picture_of(arguments.exemplar)]
+    pictures += [read_image(Path(first[method]["picture"])) for method in arguments.methods]
+    labels = ["exemplar", *arguments.methods]
+    path = write_image(GALLERY / "baselines.jpg", sheet(pictures, columns=5, labels=labels, cell=CELL))
+    print(path)
 
 
 if __name__ == "__main__":

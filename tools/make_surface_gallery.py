@@ -144,8 +144,9 @@ def main() -> None:
             cells.append(exemplar.resized(side).maps["albedo"])
             labels.append(f"exemplar {exemplar.name}")
         cells += pictures(result, 1 if several else 2, side)
-        words = own if variants else [mesh.name, *own[:1]]
-        labels += [" ".join(words) or "default", *["the other side"] * (not several)]
+        common = [f"{key}={value}" for key, value in shared.items() if key not in INPUTS]
+        words = own or common or ["default"] if variants else [mesh.name, *own[:1]]
+        labels += [" ".join(words), *["the other side"] * (not several)]
         last = exemplar_name
     write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=columns, labels=labels, cell=side))
 
