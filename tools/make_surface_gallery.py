@@ -144,7 +144,7 @@ def main() -> None:
             cells.append(exemplar.resized(side).maps["albedo"])
             labels.append(f"exemplar {exemplar.name}")
         cells += pictures(result, 1 if several else 2, side)
-        common = [f"{key}={value}" for key, value in shared.items() if key not in INPUTS]
+        common = [f"{key}={value}" for key, value in shared.items() if key not in {*INPUTS, "maps"}]
         words = own or common or ["default"] if variants else [mesh.name, *own[:1]]
         labels += [" ".join(words), *["the other side"] * (not several)]
         last = exemplar_name
