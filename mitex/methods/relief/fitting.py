@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Unpack
@@ -9,7 +10,7 @@ from typing import Unpack
 from mitex.exemplar import Exemplar
 from mitex.mesh import Mesh
 from mitex.mesh.self_intersections import piercing_pairs
-from mitex.methods.layout import with_layout
+from mitex.methods.layout import layout_ratio, with_layout
 from mitex.methods.relief.config import PRESETS
 from mitex.methods.relief.depth import with_depth
 from mitex.methods.relief.maps import synthesized
@@ -65,7 +66,8 @@ def fit(
     else:
         keep = run.folder is not None
         start = Start.of_maps(synthesized(target, given, config, keep_uvs, run.control, keep), config)
-    task = ReliefTask(config, target, depth, start)
+    ratio = 1.0 if keep_uvs else layout_ratio(given, start.mesh, config.resolution)
+    task = ReliefTask(config, target, depth, replace(start, layout_ratio=ratio))
 
     def texture(about: dict) -> ReliefTexture:
         announce("looking for faces that pierce each other")

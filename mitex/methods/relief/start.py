@@ -30,6 +30,7 @@ class Start:
         heights: (W,) from -1 to 1, in depths of the relief, 0 in the mean.
         colours: (W, 3) sRGB in [0, 1]; None without.
         textures: maps that the relief is worn with, name -> (R, R, c).
+        layout_ratio: of the mesh's layout, as `mitex.methods.layout.layout_ratio` tells.
     """
 
     mesh: Mesh
@@ -38,6 +39,7 @@ class Start:
     heights: np.ndarray
     colours: np.ndarray | None
     textures: Mapping[str, np.ndarray]
+    layout_ratio: float = 1.0
 
     @staticmethod
     def of_maps(texture: SurfaceTexture, config: ReliefConfig) -> Start:
@@ -61,4 +63,5 @@ class Start:
 
     def exemplar_width(self, config: ReliefConfig) -> float:
         """How wide the exemplar is on the mesh [mesh units]."""
-        return layout_side(self.mesh) * config.exemplar_side / config.resolution
+        side = layout_side(self.mesh) / self.layout_ratio
+        return side * config.exemplar_side / config.resolution

@@ -140,11 +140,10 @@ class TexelConfig(ScheduledConfig):
         Raises:
             ConfigError: it is not from 16 to 2048.
         """
-        usual = EXEMPLAR_WIDTH * self.resolution / layout_ratio
-        side = round(self.scale * factor * (self.exemplar_size or usual))
+        side = round(self.scale * factor * (self.exemplar_size or EXEMPLAR_WIDTH * self.resolution))
         least, most = SIDES
         if least <= side <= most:
-            return side
+            return side if self.exemplar_size else max(round(side / layout_ratio), least)
         raise ConfigError(
             f"the exemplar would be {side} texels wide with a scale of {self.scale * factor:g}",
             f"change scale, resolution or exemplar_size so that it is {least} to {most}",

@@ -71,6 +71,13 @@ def test_a_fit_reads_the_exemplar_at_that_width(monkeypatch):
     assert ratio > 1.05 and round(48 / ratio) in sides and 48 not in sides
 
 
+def test_the_smallest_exemplar_is_wide_enough_for_the_network():
+    """Half of 32 texels are 16 pixels, which gaps in the layout make no fewer."""
+    small = config(["resolution=32"])
+    assert small.exemplar_side() == small.exemplar_side(1.0, 1.6) == 16
+    assert config(["resolution=64"]).exemplar_side(1.0, 1.6) == 20
+
+
 def square_levels(steps):
     """Texels and levels of a flat square of 64 x 64 texels, whose taps are `steps` of the texels apart."""
     mesh = flat_square(8)
