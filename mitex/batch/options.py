@@ -5,12 +5,13 @@ from __future__ import annotations
 import types
 import typing
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, Union
 
 from mitex.batch.inputs import Input
-from mitex.errors import ConfigError
+from mitex.errors import ConfigError, WeightsError
 from mitex.methods.method import Method
 from mitex.suggestions import suggestion
 from mitex.training import values
@@ -79,16 +80,19 @@ def implied_inputs(method: Method, fit: Mapping[str, Any], folder: Path, *, from
         folder: of the plan.
         from_text: whether it learns from words.
 
-    Raises:
-        WeightsError: The CLIP model that the environment names, or VGG-19, is not there.
+    Returns:
+        Those that are here; what another machine must have is missed by the job itself.
     """
     from mitex.features.text_model import model_folder
     from mitex.features.vgg19 import vgg19_path
 
-    paths = [
-        model_folder() if from_text and "clip" in fit_kinds(method) and "clip" not in fit else None,
-        vgg19_path() if getattr(_config(method, fit, folder), "network", None) == "vgg19" else None,
-    ]
+    paths: list[Path | None] = []
+    with suppress(WeightsError):
+        if from_text and "clip" in fit_kinds(method) and "clip" not in fit:
+            paths.append(model_folder())
+    with suppress(WeightsError):
+        if getattr(_config(method, fit, folder), "network", None) == "vgg19":
+            paths.append(vgg19_path())
     return [Input(str(path), path) for path in paths if path is not None]
 
 

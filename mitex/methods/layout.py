@@ -54,20 +54,19 @@ def layout_side(mesh: Mesh) -> float:
     return float(np.median(np.sqrt(area[solid] / in_layout[solid])))
 
 
-def layout_ratio(mesh: Mesh, own: Mesh, resolution: int) -> float:
+def layout_ratio(mesh: Mesh, own: Mesh, resolution: int, keep_uvs: bool = False) -> float:
     """How much longer the side of a layout is on the surface than that of the layout of `RESOLUTION`.
 
     In smaller maps the gaps between charts take a larger part of the square.
 
     Args:
         mesh: before it was unwrapped.
-        own: unwrapped by `with_layout`.
-        resolution: that its charts were packed for.
+        own, resolution, keep_uvs: of `with_layout`: its result, and what it was told.
 
     Raises:
         ConfigError: as `layout_side`.
     """
-    if resolution >= RESOLUTION:
+    if keep_uvs or resolution >= RESOLUTION:
         return 1.0
     return layout_side(own) / layout_side(with_layout(mesh, RESOLUTION))
 

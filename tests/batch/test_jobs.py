@@ -207,6 +207,8 @@ class TestIds:
             file.write_text(content)
             ids.append([job.id for job in jobs(tables, output="none")])
         assert [old != new for old, new in zip(*ids, strict=True)] == [True, False, True, False]
+        file.unlink()  # which only the machine that fits must have
+        assert len(jobs({"gatys": tables["gatys"]}, output="none")) == 1
 
     def test_the_same_job_twice_is_refused(self, jobs):
         with pytest.raises(ConfigError, match="the job fit-stripes-a twice"):

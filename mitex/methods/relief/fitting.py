@@ -66,7 +66,7 @@ def fit(
     else:
         keep = run.folder is not None
         start = Start.of_maps(synthesized(target, given, config, keep_uvs, run.control, keep), config)
-    ratio = 1.0 if keep_uvs else layout_ratio(given, start.mesh, config.resolution)
+    ratio = layout_ratio(given, start.mesh, config.resolution, keep_uvs)
     task = ReliefTask(config, target, depth, replace(start, layout_ratio=ratio))
 
     def texture(about: dict) -> ReliefTexture:

@@ -144,7 +144,7 @@ def _synthesized(
         image = content is not None and str(content) != AO
         keeps = keep_uvs or image
         surface = with_layout(given, config.resolution, keeps)
-        ratio = 1.0 if keeps else layout_ratio(given, surface, config.resolution)
+        ratio = layout_ratio(given, surface, config.resolution, keeps)
         if isinstance(orientation, str | Path):
             orientation = read_vectors(surface, orientation).astype(np.float32)
         sizes = None if scale_map is None else ScaleMap.of(scale_map, given)

@@ -55,6 +55,7 @@ def test_the_pattern_is_as_wide_on_a_mesh_at_every_resolution(resolution):
     assert width == pytest.approx(0.5 * layout_side(with_layout(mesh, 512)), rel=0.5 / (0.4 * resolution))
     own = layout_side(unwrapped) / layout_side(with_layout(mesh, 512))
     assert ratio == pytest.approx(own) and (resolution != 96 or own > 1.1)
+    assert layout_ratio(mesh, unwrapped, resolution, keep_uvs=True) == 1.0
     assert wanted.exemplar_side(1.0, ratio) != wanted.exemplar_side() or resolution == 1024
     asked = config([f"resolution={resolution}", "exemplar_size=77"])
     assert domain.exemplar_side(asked) == 77
