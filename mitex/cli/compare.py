@@ -42,10 +42,10 @@ class Compare(JobOptions):
     """Fits of each method with another seed; from 2 on, the spread is known."""
 
     plan: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None
-    """In place of these lists, a plan as of `mitex batch`."""
+    """A plan as of `mitex batch`; the options above then name what of it is compared: by default, all."""
 
     preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
-    """In place of these lists, a paper's comparison, by name."""
+    """A paper's comparison, by name; the options above then name what of it is compared: by default, all."""
 
     data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None
     """Folder with what the comparison of --preset needs and does not ship with Mitex; by default this one."""
@@ -91,26 +91,23 @@ class Compare(JobOptions):
         refuse_missing(comparison.missing, comparison.total)
 
     def _plan(self) -> Plan:
+        from mitex.comparison.narrowing import narrowed
         from mitex.comparison.plan import comparison_plan, prepared
 
-        lists = {
-            "--exemplar": self.exemplar,
-            "--mesh": self.mesh,
-            "--methods": self.methods,
-            "--set": self.set,
-        }
+        names = [name for name in (self.methods or "").split(",") if name.strip()]
+        settings = [word for words in self.set for word in words]
         if self.data is not None and self.preset is None:
             raise ConfigError("--data means nothing without --preset", "leave it out, or name a preset")
         if self.plan is not None or self.preset is not None:
             mutually_exclusive("--plan", "--preset", self.plan is not None and self.preset is not None)
-            for option, values in lists.items():
-                mutually_exclusive("--plan" if self.plan else "--preset", option, bool(values))
-            return prepared(self._named_plan(), self.seeds)
+            part = narrowed(
+                self._named_plan(), exemplars=self.exemplar, meshes=self.mesh, labels=names, settings=settings
+            )
+            return prepared(part, self.seeds)
+        lists = {"--exemplar": self.exemplar, "--mesh": self.mesh, "--methods": self.methods}
         for option, values in lists.items():
-            if not values and option != "--set":
+            if not values:
                 raise ConfigError(f"{option} is missing", "see `mitex compare --help`")
-        names = [name for name in (self.methods or "").split(",") if name.strip()]
-        settings = [word for words in self.set for word in words]
         return comparison_plan(
             self.exemplar, self.mesh, names, seeds=1 if self.seeds is None else self.seeds, settings=settings
         )

@@ -52,7 +52,7 @@ def comparison_plan(
             raise ConfigError(f"method '{name}' is named twice", "name it once")
         tables[name] = {}
     for setting in settings:
-        _add(tables, setting)
+        add_setting(tables, setting)
     content = {
         "exemplars": list(exemplars),
         "meshes": list(meshes),
@@ -124,8 +124,12 @@ def _prepared(part: MethodPlan, kind: Kind) -> MethodPlan:
     return replace(part, apply={**part.apply, WIDTH: EXEMPLAR_WIDTH}) if sized else part
 
 
-def _add(tables: Mapping[str, dict[str, Any]], setting: str) -> None:
-    """Puts `METHOD:KEY=VALUE` into the method's table."""
+def add_setting(tables: Mapping[str, dict[str, Any]], setting: str) -> None:
+    """Puts `LABEL:KEY=VALUE` into the table of a plan's method, or `LABEL:apply.KEY=VALUE` into its `apply`.
+
+    Raises:
+        ConfigError: It is no setting, of no method of the plan, or the value does not fit.
+    """
     name, colon, rest = setting.partition(":")
     key, equals, text = rest.partition("=")
     if not (colon and equals and key.strip()):
@@ -133,7 +137,8 @@ def _add(tables: Mapping[str, dict[str, Any]], setting: str) -> None:
     label = name.strip().replace("-", "_")
     if label not in tables:
         raise ConfigError(f"'{setting}' is of no method that is compared", suggestion(label, tables))
-    key, method, table = key.strip().replace("-", "_"), methods()[label], tables[label]
+    key, table = key.strip().replace("-", "_"), tables[label]
+    method = methods()[table.get("method", label)]
     if key.startswith("apply."):
         key, table = key.removeprefix("apply."), table.setdefault("apply", {})
         table[key] = _value(key, text.strip(), apply_kinds(method), label)

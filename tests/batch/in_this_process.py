@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from contextlib import chdir
+from contextlib import chdir, suppress
 from pathlib import Path
 
 from mitex.cli import main
+
+# A PyMeshLab that a thread loads first aborts the process at its exit.
+with suppress(ImportError):
+    import pymeshlab  # noqa: F401
 
 
 class InThisProcess:

@@ -9,8 +9,10 @@ import pytest
 
 from mitex.asset import clay
 from mitex.batch import Plan
+from mitex.comparison import capture_pair
 from mitex.comparison.plan import prepared
 from mitex.mesh import Mesh, icosphere
+from mitex.methods.nerf import NerfTexture
 from tests.batch.in_this_process import InThisProcess
 from tests.cli import bad_files as bad
 
@@ -31,6 +33,30 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     values = {"look_pair.PATCHES": 2, "look_pair.WINDOWS": 1, "inputs.CELL": 16, "inputs.SPP": 1}
     for name, value in values.items():
         monkeypatch.setattr(f"mitex.comparison.{name}", value)
+
+
+@pytest.fixture
+def few_patches_of_relief(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reliefs are judged by one picture and two patches of one size."""
+    values = {
+        "comparison.relief_pair.VIEWS": 1,
+        "comparison.relief_pair.SIDE": 48,
+        "evaluation.form.PATCHES": 2,
+        "evaluation.form.SIZES": (1.0,),
+        "evaluation.form.LAYERS": ("relu2_2",),
+    }
+    for name, value in values.items():
+        monkeypatch.setattr(f"mitex.{name}", value)
+
+
+@pytest.fixture
+def planes_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Captured textures on planes are neither rendered nor measured: all are as far from the photos."""
+    monkeypatch.setattr(NerfTexture, "on_plane", lambda *_: None)
+    monkeypatch.setattr(capture_pair.CapturePair, "_along", None)
+    for name, distance in (("plane_distances", 2.0), ("photo_distances", 1.0)):
+        monkeypatch.setattr(capture_pair, name, lambda *_, distance=distance: {0: distance})
+    monkeypatch.setattr(capture_pair, "windows_of", lambda _: {})
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import pytest
 from mitex.asset import Asset, clay
 from mitex.batch import Plan
 from mitex.batch.jobs import jobs_of
-from mitex.comparison import relief_pair, text_pair
+from mitex.comparison import text_pair
 from mitex.comparison.measures import BY_KEY, RELIEFS, TEXTS
 from mitex.comparison.plan import prepared, source_of
 from mitex.comparison.relief_pair import ReliefPair
@@ -16,12 +16,8 @@ from mitex.mesh import Mesh
 from tests.methods.nca.text.tiny_text import MeanColour
 
 
-def test_a_surface_beside_itself_is_nearer_than_a_rough_one(place, monkeypatch):
-    monkeypatch.setattr(relief_pair, "VIEWS", 1)
-    monkeypatch.setattr(relief_pair, "SIDE", 48)
-    monkeypatch.setattr("mitex.evaluation.form.PATCHES", 2)
-    monkeypatch.setattr("mitex.evaluation.form.SIZES", (1.0,))
-    monkeypatch.setattr("mitex.evaluation.form.LAYERS", ("relu2_2",))
+@pytest.mark.usefixtures("few_patches_of_relief")
+def test_a_surface_beside_itself_is_nearer_than_a_rough_one(place):
     pair, ball = ReliefPair("ball.obj", "ball.obj"), Mesh.load("ball.obj")
     noise = np.random.default_rng(0).normal(1, 0.05, (len(ball.vertices), 1))
     same, rough = (

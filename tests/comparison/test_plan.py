@@ -132,7 +132,7 @@ class TestPlanFiles:
         [
             ("--plan no.toml", "there is no such file"),
             ("--preset nca-fog10", "there is no comparison 'nca-fog10'; did you mean nca-fig10?"),
-            ("--preset nca-fig10 --mesh vase", "--preset and --mesh contradict each other"),
+            ("--preset nca-fig10 --mesh vase", "the comparison has no mesh 'vase'"),
             ("--preset nca-fig10 --plan a.toml", "--plan and --preset contradict each other"),
             ("--preset nca-fig10", "exemplars/Abstract_008'; paths are relative to '{place}'"),
             ("--preset nca-fig10 --data no", "exemplars/Abstract_008'; paths are relative to '{place}/no'"),

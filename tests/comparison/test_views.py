@@ -9,14 +9,11 @@ import numpy as np
 import pytest
 
 from mitex.cli import main
-from mitex.comparison import capture_pair
-from mitex.comparison.capture_pair import CapturePair
 from mitex.comparison.kept import Kept
 from mitex.comparison.measures import CAPTURES, COSTS
 from mitex.evaluation.views import view_quality
 from mitex.images import read_image
 from mitex.methods.baselines.plain_field import PlainFieldTexture
-from mitex.methods.nerf import NerfTexture
 from mitex.methods.nerf.capture.capture import load_capture
 from mitex.methods.nerf.field.rendering import render_view, render_views
 from tests.methods.fits import few_patches, prepare
@@ -28,16 +25,11 @@ OF_PLAIN = {"psnr", "ssim", "vgg", "parameters", "fit_seconds", "memory"}
 
 
 @pytest.fixture
-def compared(small, own_cache, tmp_path, monkeypatch):
+def compared(small, planes_alike, own_cache, tmp_path, monkeypatch):
     """The folder of a comparison of both on two meshes, in which all planes are alike."""
     prepare(tmp_path)
     monkeypatch.chdir(tmp_path)
     few_patches(monkeypatch)
-    monkeypatch.setattr(NerfTexture, "on_plane", lambda *_: None)
-    monkeypatch.setattr(CapturePair, "_along", None)
-    for name, distance in (("plane_distances", 2.0), ("photo_distances", 1.0)):
-        monkeypatch.setattr(capture_pair, name, lambda *_, distance=distance: {0: distance})
-    monkeypatch.setattr(capture_pair, "windows_of", lambda _: {})
     compare()
     return tmp_path / "out"
 

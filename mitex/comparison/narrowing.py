@@ -1,0 +1,58 @@
+"""A part of a comparison: some of its exemplars, meshes and methods, perhaps with other settings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from mitex.batch import Plan
+from mitex.comparison.plan import add_setting
+from mitex.errors import ConfigError
+from mitex.suggestions import suggestion
+
+
+def narrowed(
+    plan: Plan,
+    *,
+    exemplars: Sequence[str] = (),
+    meshes: Sequence[str] = (),
+    labels: Sequence[str] = (),
+    settings: Sequence[str] = (),
+) -> Plan:
+    """Those jobs of a plan that are asked for. They keep their ids unless their settings change.
+
+    Args:
+        plan: of all.
+        exemplars, meshes: which of its own, as the plan has them or by name without folder and suffix; all if
+            none are given.
+        labels: of its methods; dashes stand for underscores; all if none are given.
+        settings: `LABEL:KEY=VALUE`, as of `comparison_plan`.
+
+    Raises:
+        ConfigError: The plan has none of that name, or a setting does not fit.
+    """
+    tables: dict[str, dict[str, Any]] = plan.content()["methods"]
+    if labels:
+        names = [label.strip().replace("-", "_") for label in labels]
+        tables = {label: tables[label] for label in _picked(list(tables), names, "method")}
+    for setting in settings:
+        add_setting(tables, setting)
+    for key, names in (("exemplars", exemplars), ("meshes", meshes)):
+        if names:
+            kind = "exemplar" if key == "exemplars" else "mesh"
+            own = list(dict.fromkeys(text for table in tables.values() for text in table.get(key, ())))
+            picked = _picked(own, names, kind)
+            for table in tables.values():
+                table[key] = [text for text in table.get(key, ()) if text in picked]
+    return Plan.of({"methods": tables}, plan.folder)
+
+
+def _picked(own: Sequence[str], names: Sequence[str], kind: str) -> list[str]:
+    """The texts that are named, in their own order."""
+    known = {text: text for text in own} | {Path(text).stem: text for text in own}
+    for name in names:
+        if name not in known:
+            raise ConfigError(f"the comparison has no {kind} '{name}'", suggestion(name, sorted(known)))
+    wanted = {known[name] for name in names}
+    return [text for text in own if text in wanted]
