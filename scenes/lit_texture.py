@@ -35,9 +35,9 @@ from mitex.losses import gram_loss, gram_matrix, motion_loss, relaxed_transport
 from mitex.mesh import Mesh, embedded
 from mitex.mesh.fields import vector_field
 from mitex.methods.layout import with_layout
-from mitex.methods.surface.texels import Texels
 from mitex.runtime.upload import upload
 from mitex.scenes import mesh_shape
+from mitex.texels import Texels
 
 mi.set_variant("llvm_ad_rgb")
 

@@ -35,6 +35,7 @@ ORDER = [
     "features",
     "losses",
     "atlas",
+    "texels",
     "flat_charts",
     "mesh",
     "triples",
@@ -74,9 +75,7 @@ LAZY = {
 IMPORTED = {
     "relief": {"surface"},
     "displacement": {"geometric"},
-    "multi_view_gram": {"surface"},
-    "style_mesh": {"surface", "multi_view_gram"},
-    "text2mesh": {"surface"},
+    "style_mesh": {"multi_view_gram"},
     "quilted": {"nerf"},
     "plain_field": {"nerf"},
     "nerf_tex": {"nerf", "plain_field"},

@@ -17,7 +17,7 @@ from mitex.geometry.raster import texel_space
 from mitex.geometry.triangles import barycentric_gradients, interpolate, twice_area
 from mitex.mesh import Mesh
 from mitex.methods.surface.exponential import GeodesicTracer
-from mitex.methods.surface.texels import Texels
+from mitex.texels import Texels
 
 ROUNDS = 24  # of following border texels that read each other
 FAINT = 1e-3  # smaller shares are left out

@@ -21,9 +21,9 @@ from mitex.methods.surface.levels import POOLS, Levels
 from mitex.methods.surface.palette import square_depth
 from mitex.methods.surface.scale_map import ScaleMap
 from mitex.methods.surface.taps import Surroundings, build
-from mitex.methods.surface.texels import Texels
 from mitex.progress import announce
 from mitex.quilting.target import SurfaceTarget, Target
+from mitex.texels import Texels
 
 
 @dataclass(frozen=True, eq=False)

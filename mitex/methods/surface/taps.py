@@ -18,8 +18,8 @@ from mitex.geometry.vectors import scatter_add
 from mitex.methods.surface.borders import Border
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.levels import POOLS, Level, Levels
-from mitex.methods.surface.texels import Texels
 from mitex.progress import announce
+from mitex.texels import Texels
 
 BACKWARD = 8  # samples along a geodesic that is walked back
 ROUNDING = 1e-6  # of steps that are meant to be 1

@@ -9,7 +9,7 @@ from mitex.mesh.frames import tangent_frames
 from mitex.methods.surface.borders import Border
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.taps import Surroundings, build
-from mitex.methods.surface.texels import Texels
+from mitex.texels import Texels
 
 
 def folded() -> tuple[Mesh, np.ndarray]:

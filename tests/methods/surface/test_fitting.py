@@ -23,9 +23,9 @@ from mitex.methods.surface.config import PRESETS
 from mitex.methods.surface.content import content_colours
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.task import VIEW, SurfaceTask
-from mitex.methods.surface.texels import charts
 from mitex.methods.surface.texture import SurfaceTexture
 from mitex.runtime import threads
+from mitex.texels import charts
 from mitex.training import resolve
 from mitex.training.locate import NAME
 from tests.methods.surface.grids import flat_square

@@ -16,8 +16,8 @@ from mitex.methods.surface.levels import Level
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.operations import Neighbourhood, SurfaceConv, SurfacePool
 from mitex.methods.surface.taps import Surroundings, build
-from mitex.methods.surface.texels import Texels
 from mitex.methods.surface.weights import random_weights
+from mitex.texels import Texels
 from tests.methods.surface.grids import flat_square, grid_levels
 
 SIDE = 224

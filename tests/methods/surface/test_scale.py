@@ -17,7 +17,7 @@ from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.scale_map import ScaleMap
 from mitex.methods.surface.taps import Surroundings, build
-from mitex.methods.surface.texels import Texels
+from mitex.texels import Texels
 from mitex.training import resolve
 from tests.methods.surface.grids import flat_square
 

@@ -15,7 +15,7 @@ from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.levels import Levels
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.taps import Surroundings, build, representatives
-from mitex.methods.surface.texels import Texels
+from mitex.texels import Texels
 
 
 def surroundings(mesh: Mesh, uv: np.ndarray, resolution: int, **options) -> Surroundings:

@@ -21,9 +21,9 @@ from mitex.methods.baselines.multi_view_gram.gram_average import GramAverage, co
 from mitex.methods.baselines.multi_view_gram.spectrum import image_of, random_spectrum
 from mitex.methods.baselines.multi_view_gram.views import TextureViews, boxed, random_view
 from mitex.methods.exemplar_pictures import albedo, framed, side_in_view
-from mitex.methods.surface.texels import Texels
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, orbit
+from mitex.texels import Texels
 from mitex.training import ParameterTask, Step
 
 CONTENT = "content"  # name of what is read for it

@@ -21,10 +21,10 @@ from mitex.methods.baselines.style_mesh.config import StyleMeshConfig
 from mitex.methods.baselines.style_mesh.layered import fine_energy, sum_of, zero_textures
 from mitex.methods.baselines.style_mesh.visible import Visible, cameras_around, shares
 from mitex.methods.exemplar_pictures import albedo, framed
-from mitex.methods.surface.texels import Texels
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras
 from mitex.scenes.stage import Stage
+from mitex.texels import Texels
 from mitex.training import ParameterTask, Step
 
 LEAST = 1e-3  # share of a picture's pixels that must count for it to be compared

@@ -16,11 +16,11 @@ from mitex.methods.baselines.text2mesh.config import Text2MeshConfig
 from mitex.methods.exemplar_pictures import albedo, framed, side_in_view
 from mitex.methods.style_cameras import cameras_of, frame_height
 from mitex.methods.style_field import colours, encoded, head, random_waves, trunk
-from mitex.methods.surface.texels import Texels
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, orbit
 from mitex.scenes.shaded import BACKGROUND
 from mitex.scenes.stage import Stage
+from mitex.texels import Texels
 from mitex.training import ParameterTask, Step
 
 CHUNK = 1 << 16  # places at a time

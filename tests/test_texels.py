@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mitex import texels as module
 from mitex.atlas import unwrap
 from mitex.errors import ConfigError, MeshError
 from mitex.mesh import Mesh, grid, icosphere
-from mitex.methods.surface import texels as module
-from mitex.methods.surface.texels import Texels, charts
+from mitex.texels import Texels, charts
 
 SQUARE = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], np.float32)
 
