@@ -75,12 +75,13 @@ LAZY = {
 IMPORTED = {
     "relief": {"surface"},
     "displacement": {"geometric"},
-    "style_mesh": {"multi_view_gram"},
     "quilted": {"nerf"},
     "plain_field": {"nerf"},
     "nerf_tex": {"nerf", "plain_field"},
 }
-SHARED = {"baselines", *(file.stem for file in (ROOT / "mitex" / "methods").glob("*.py"))}
+SHARED = {"baselines", "neural_style", "words"} | {
+    file.stem for file in (ROOT / "mitex" / "methods").glob("*.py")
+}
 
 
 class Import(NamedTuple):

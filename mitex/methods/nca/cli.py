@@ -13,7 +13,7 @@ from mitex.methods.checks import in_range, mutually_exclusive, reject_unused
 from mitex.methods.nca.arguments import RESOLUTION, levels, oriented
 from mitex.methods.nca.ranges import BAKED, MOST_STEPS, SPEEDS, TILE_CELLS
 from mitex.methods.options import DeviceOptions, ReliefOptions, field_files
-from mitex.methods.words_options import ExemplarOrWordsOptions
+from mitex.methods.words.options import ExemplarOrWordsOptions
 from mitex.ranges import SCALES, SEEDS, TEXELS
 from mitex.suffixes import ASSETS, PICTURES
 from mitex.training.settings import RunSettings

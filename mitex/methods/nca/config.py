@@ -10,7 +10,7 @@ from mitex.features.layers import check_layers
 from mitex.features.text_image import PROMPT
 from mitex.methods.nca.decoder.shape import COORDINATES, DecoderShape
 from mitex.methods.nca.ranges import MOST_STEPS
-from mitex.methods.words_config import check_words
+from mitex.methods.words.config import check_words
 from mitex.training.settings import DeviceConfig, ScheduledConfig, key
 
 LEAST_SIDE = 32  # of pictures in which Lucas and Kanade's method can measure [px]

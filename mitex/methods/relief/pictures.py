@@ -11,8 +11,8 @@ import torch.nn.functional as F
 from mitex.bridge import lookup
 from mitex.exemplar import Exemplar
 from mitex.mesh import Mesh
+from mitex.methods.neural_style.figure import smooth_normals
 from mitex.methods.relief.shape import Shape
-from mitex.methods.style_figure import smooth_normals
 from mitex.scenes.cameras import Cameras, patch_views
 from mitex.scenes.stage import Stage
 

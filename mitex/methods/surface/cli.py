@@ -11,7 +11,7 @@ from tyro.conf import arg
 from mitex.errors import ConfigError
 from mitex.methods.checks import in_range, mutually_exclusive
 from mitex.methods.options import ReliefOptions
-from mitex.methods.words_options import ExemplarOrWordsOptions
+from mitex.methods.words.options import ExemplarOrWordsOptions
 from mitex.ranges import SCALES
 from mitex.training.settings import RunSettings
 

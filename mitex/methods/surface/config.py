@@ -8,8 +8,8 @@ from typing import Literal
 from mitex.errors import ConfigError
 from mitex.features.layers import LAYERS, LAYERS_19, with_poolings
 from mitex.methods.layout import EXEMPLAR_WIDTH
-from mitex.methods.wording import CLIP, EMBEDDED
-from mitex.methods.words_config import WordsConfig, check_words
+from mitex.methods.words.config import WordsConfig, check_words
+from mitex.methods.words.wording import CLIP, EMBEDDED
 from mitex.ranges import SCALES
 from mitex.training.settings import ScheduledConfig, key
 

@@ -27,7 +27,7 @@ from mitex.methods.surface.task import SurfaceTask
 from mitex.methods.surface.texture import SurfaceTexture
 from mitex.methods.surface.tile import TileDomain
 from mitex.methods.surface.words import Words
-from mitex.methods.wording import check_text, worded
+from mitex.methods.words.wording import check_text, worded
 from mitex.runtime import available_memory
 from mitex.training.fit import Run
 from mitex.training.lbfgs import Lbfgs

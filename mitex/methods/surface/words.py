@@ -8,7 +8,7 @@ import torch.nn.functional as F
 from mitex.features.text_image import TextImageModel
 from mitex.methods.surface.config import SurfaceConfig
 from mitex.methods.surface.domain import SurfaceDomain
-from mitex.methods.words_distance import Part, SightBank, WordsDistance
+from mitex.methods.words.distance import Part, SightBank, WordsDistance
 from mitex.scenes.cameras import Cameras, patch_views, random_views
 from mitex.scenes.shaded import GREY, lamps_of_pixels, pictured, shading
 from mitex.scenes.stage import Hits, Stage

@@ -15,11 +15,11 @@ from mitex.images import write_image
 from mitex.mesh import Mesh, grid, icosphere
 from mitex.methods.baselines import multi_view_gram
 from mitex.methods.baselines.multi_view_gram import MultiViewConfig, MultiViewTexture, fitting
-from mitex.methods.baselines.multi_view_gram.gram_average import GramAverage, covered
+from mitex.methods.baselines.multi_view_gram.gram_average import GramAverage
 from mitex.methods.baselines.multi_view_gram.spectrum import COLOURS, CONTRAST, image_of, random_spectrum
 from mitex.methods.baselines.multi_view_gram.task import MultiViewTask
-from mitex.methods.baselines.multi_view_gram.views import TextureViews, boxed, random_view
 from mitex.methods.layout import with_layout
+from mitex.methods.texture_views import TextureViews, boxed, random_view
 from mitex.runtime import threads
 from tests.methods.surface.grids import flat_square
 from tests.training.contract import (
@@ -111,14 +111,6 @@ class TestGramAverage:
         average.add({"a": torch.rand(2, 2)})
         average.blended({"a": gram})["a"].sum().backward()
         assert gram.grad is not None and torch.equal(gram.grad, torch.ones(2, 2))
-
-    def test_what_shows_the_background_is_left_out(self):
-        coverage = torch.ones(8, 8)
-        coverage[:3] = 0
-        assert covered(coverage, (4, 4)).tolist() == list(range(8, 16))
-        coverage[7, 7] = 0.5
-        assert covered(coverage, (4, 4)).tolist() == list(range(8, 15))
-        assert covered(0 * coverage, (4, 4)).tolist() == list(range(16))
 
 
 class TestViews:

@@ -15,7 +15,7 @@ from mitex.methods.baselines import text2mesh
 from mitex.methods.baselines.text2mesh import Text2MeshConfig, Text2MeshTexture
 from mitex.methods.baselines.text2mesh.task import Text2MeshTask
 from mitex.methods.layout import with_layout
-from mitex.methods.style_cameras import cameras_of
+from mitex.methods.neural_style.cameras import cameras_of
 from mitex.runtime import threads
 from mitex.scenes.cameras import orbit
 from tests.cli import bad_files

@@ -8,8 +8,8 @@ import torch
 from mitex.methods.baselines.x_mesh.config import PRESETS
 from mitex.methods.baselines.x_mesh.gates import DynamicLayer, Gate
 from mitex.methods.baselines.x_mesh.task import places
-from mitex.methods.style_field import head, trunk
-from tests.methods.styles import tiny
+from mitex.methods.neural_style.field import head, trunk
+from tests.methods.neural_style.tiny import tiny
 
 TEXT, WIDTH, HIDDEN, RANK, COUNT = 3, 4, 2, 5, 6
 

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 
 import torch
 
-from mitex.features.coverage import fully_covered
-
 
 class GramAverage:
     """m <- decay m + (1 - decay) G, divided by 1 - decay^t after t steps, so that the start does not count.
@@ -53,14 +51,3 @@ class GramAverage:
 
     def _next(self, layer: str, gram: torch.Tensor) -> torch.Tensor:
         return self.decay * self.sums[layer] + (1 - self.decay) * gram
-
-
-def covered(coverage: torch.Tensor, size: tuple[int, int]) -> torch.Tensor:
-    """Indices of a view's features that see nothing but the mesh at their own place; all if there are none.
-
-    Args:
-        coverage: (H, W) how much of each pixel shows the mesh.
-        size: (h, w) of the layer's map, whose places are counted row by row.
-    """
-    inside = fully_covered(coverage[None], size)[0]
-    return inside.flatten().nonzero()[:, 0] if inside.any() else torch.arange(inside.numel())

@@ -12,15 +12,16 @@ import torch
 from mitex.cache import content_key
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
+from mitex.features.coverage import covered_places
 from mitex.features.frozen import GramTap, Tap
 from mitex.features.layers import CHANNELS
 from mitex.losses.gram import gram_targets
 from mitex.mesh import Mesh
 from mitex.methods.baselines.multi_view_gram.config import MultiViewConfig
-from mitex.methods.baselines.multi_view_gram.gram_average import GramAverage, covered
+from mitex.methods.baselines.multi_view_gram.gram_average import GramAverage
 from mitex.methods.baselines.multi_view_gram.spectrum import image_of, random_spectrum
-from mitex.methods.baselines.multi_view_gram.views import TextureViews, boxed, random_view
 from mitex.methods.exemplar_pictures import albedo, framed, side_in_view
+from mitex.methods.texture_views import TextureViews, boxed, random_view
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, orbit
 from mitex.texels import Texels
@@ -123,7 +124,7 @@ class MultiViewTask(ParameterTask):
 
     def _gram_tap(self, layer: str, coverage: torch.Tensor) -> GramTap:
         size = self.network.extent(layer, *coverage.shape)
-        regions = [covered(coverage, size)] if self.config.masked else None
+        regions = [covered_places(coverage, size)] if self.config.masked else None
         return GramTap(self.network.index_of(layer), regions)
 
     @property

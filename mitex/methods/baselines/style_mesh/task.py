@@ -11,16 +11,16 @@ import torch
 
 from mitex.cache import content_key
 from mitex.exemplar import Exemplar
+from mitex.features.coverage import covered_places
 from mitex.features.frozen import GramTap
 from mitex.features.vgg19 import named_vgg
 from mitex.losses.gram import gram_distance, gram_targets
 from mitex.mesh import Mesh
-from mitex.methods.baselines.multi_view_gram.gram_average import covered
-from mitex.methods.baselines.multi_view_gram.views import TextureViews, boxed
 from mitex.methods.baselines.style_mesh.config import StyleMeshConfig
 from mitex.methods.baselines.style_mesh.layered import fine_energy, sum_of, zero_textures
 from mitex.methods.baselines.style_mesh.visible import Visible, cameras_around, shares
 from mitex.methods.exemplar_pictures import albedo, framed
+from mitex.methods.texture_views import TextureViews, boxed
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras
 from mitex.scenes.stage import Stage
@@ -118,7 +118,9 @@ class StyleMeshTask(ParameterTask):
         taps = {}
         for layer, regions in masks.items():
             size = self.network.extent(layer, *picture.shape[:2])
-            taps[layer] = GramTap(self.network.index_of(layer), [covered(mask, size) for mask in regions])
+            taps[layer] = GramTap(
+                self.network.index_of(layer), [covered_places(mask, size) for mask in regions]
+            )
         return self.network.read(picture[None], taps)
 
     def _weight(self, visible: Visible, k: int) -> torch.Tensor:

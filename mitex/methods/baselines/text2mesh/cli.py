@@ -10,7 +10,7 @@ from tyro.conf import arg
 
 from mitex.methods.checks import mutually_exclusive
 from mitex.methods.mesh_texture_options import MeshTextureOptions
-from mitex.methods.words_options import ExemplarOrWordsOptions
+from mitex.methods.words.options import ExemplarOrWordsOptions
 from mitex.training.settings import RunSettings
 
 

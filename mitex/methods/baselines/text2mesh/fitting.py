@@ -16,7 +16,7 @@ from mitex.methods.baselines.text2mesh.text_task import Text2MeshTextTask
 from mitex.methods.baselines.text2mesh.texture import Text2MeshTexture
 from mitex.methods.checks import reject_idle
 from mitex.methods.layout import with_layout
-from mitex.methods.style_fitting import fit_style
+from mitex.methods.neural_style.fitting import fit_style
 from mitex.training.fit import Run
 from mitex.training.settings import RunOptions
 

@@ -14,8 +14,8 @@ from mitex.losses import moment_distance, relaxed_transport
 from mitex.mesh import Mesh
 from mitex.methods.baselines.text2mesh.config import Text2MeshConfig
 from mitex.methods.exemplar_pictures import albedo, framed, side_in_view
-from mitex.methods.style_cameras import cameras_of, frame_height
-from mitex.methods.style_field import colours, encoded, head, random_waves, trunk
+from mitex.methods.neural_style.cameras import cameras_of, frame_height
+from mitex.methods.neural_style.field import colours, encoded, head, random_waves, trunk
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, orbit
 from mitex.scenes.shaded import BACKGROUND

@@ -5,8 +5,8 @@ from __future__ import annotations
 import torch
 
 from mitex.methods.baselines.text2mesh import METHOD
-from mitex.methods.style_field import colours, encoded, head, random_waves, trunk
-from mitex.methods.style_task import StyleTask
+from mitex.methods.neural_style.field import colours, encoded, head, random_waves, trunk
+from mitex.methods.neural_style.task import StyleTask
 
 
 class Text2MeshTextTask(StyleTask):

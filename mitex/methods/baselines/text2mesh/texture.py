@@ -1,7 +1,7 @@
 """`Text2MeshTexture`: the network's colours as a texture, and its offsets as a shape."""
 
 from mitex.methods.baselines.text2mesh import METHOD
-from mitex.methods.styled_mesh import StyledMesh
+from mitex.methods.neural_style.styled_mesh import StyledMesh
 
 
 class Text2MeshTexture(StyledMesh):

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 from tyro.conf import arg
 
 from mitex.methods.mesh_texture_options import MeshTextureOptions
-from mitex.methods.words_options import WordsOptions
+from mitex.methods.words.options import WordsOptions
 
 
 @dataclass(kw_only=True)

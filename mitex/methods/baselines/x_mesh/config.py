@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from mitex.methods.style_config import EMBEDDED, StyleConfig
+from mitex.methods.neural_style.config import EMBEDDED, StyleConfig
 from mitex.training.settings import key
 
 

@@ -10,7 +10,7 @@ from mitex.mesh import Mesh
 from mitex.methods.baselines.x_mesh.config import PRESETS
 from mitex.methods.baselines.x_mesh.task import XMeshTask
 from mitex.methods.baselines.x_mesh.texture import XMeshTexture
-from mitex.methods.style_fitting import fit_style
+from mitex.methods.neural_style.fitting import fit_style
 from mitex.training.settings import RunOptions
 
 

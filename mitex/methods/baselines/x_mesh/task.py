@@ -9,8 +9,8 @@ import torch
 from mitex.methods.baselines.x_mesh import METHOD
 from mitex.methods.baselines.x_mesh.config import XMeshConfig
 from mitex.methods.baselines.x_mesh.gates import Gate
-from mitex.methods.style_field import colours, encoded, head, random_waves, trunk
-from mitex.methods.style_task import StyleTask
+from mitex.methods.neural_style.field import colours, encoded, head, random_waves, trunk
+from mitex.methods.neural_style.task import StyleTask
 
 
 class XMeshTask(StyleTask):

@@ -1,7 +1,7 @@
 """`XMeshTexture`: the network's colours as a texture, and its offsets as a shape."""
 
 from mitex.methods.baselines.x_mesh import METHOD
-from mitex.methods.styled_mesh import StyledMesh
+from mitex.methods.neural_style.styled_mesh import StyledMesh
 
 
 class XMeshTexture(StyledMesh):

@@ -17,7 +17,7 @@ from mitex.methods.nca.text.moving import MovingTextTask
 from mitex.methods.nca.text.task import TextTask
 from mitex.methods.nca.text.wording import MAPS, check, with_maps
 from mitex.methods.nca.texture import NcaTexture
-from mitex.methods.wording import worded
+from mitex.methods.words.wording import worded
 from mitex.training.fit import Run
 from mitex.training.settings import RunOptions
 

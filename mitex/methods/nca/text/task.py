@@ -19,7 +19,7 @@ from mitex.methods.nca.pool import PoolTask, initial_look
 from mitex.methods.nca.surfaces import TrainingSphere, TrainingSurface, training_surfaces
 from mitex.methods.nca.text.views import Figure, training_cameras
 from mitex.methods.nca.text.wording import MAPS, prompts
-from mitex.methods.words_distance import Negative, Part, Sight, SightBank, WordsDistance
+from mitex.methods.words.distance import Negative, Part, Sight, SightBank, WordsDistance
 from mitex.progress import announce
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import orbit

@@ -12,7 +12,7 @@ from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.motion.start import check_field
-from mitex.methods.wording import check_text
+from mitex.methods.words.wording import check_text
 
 MAPS = ("albedo", "height")
 

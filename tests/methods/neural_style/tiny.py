@@ -12,8 +12,8 @@ from mitex.methods.baselines.text2mesh.text_task import Text2MeshTextTask
 from mitex.methods.baselines.x_mesh.config import PRESETS as X_MESH
 from mitex.methods.baselines.x_mesh.task import XMeshTask
 from mitex.methods.layout import with_layout
-from mitex.methods.style_config import StyleConfig
-from mitex.methods.style_task import StyleTask
+from mitex.methods.neural_style.config import StyleConfig
+from mitex.methods.neural_style.task import StyleTask
 from tests.methods.nca.text.tiny_text import MeanColour
 
 SMALL: dict[str, Any] = {

@@ -11,13 +11,13 @@ from mitex.errors import CheckpointError, ConfigError, WeightsError
 from mitex.losses import Augmentation
 from mitex.mesh import icosphere
 from mitex.methods.baselines import text2mesh, x_mesh
+from mitex.methods.neural_style.cameras import cameras_of
+from mitex.methods.neural_style.styled_mesh import StyledMesh
 from mitex.methods.registry import load
-from mitex.methods.style_cameras import cameras_of
-from mitex.methods.styled_mesh import StyledMesh
 from mitex.runtime import threads
 from mitex.training import train
 from tests.methods.nca.text.tiny_text import MeanColour
-from tests.methods.styles import BALL, KINDS, SMALL, maker, shaken, tiny
+from tests.methods.neural_style.tiny import BALL, KINDS, SMALL, maker, shaken, tiny
 from tests.training.contract import (
     FAULTS,
     assert_loss_is_pure,
@@ -119,7 +119,7 @@ def test_the_exported_mesh_is_the_one_that_was_trained(name, tmp_path, monkeypat
     mesh = icosphere(2)
     mesh = mesh.with_vertices(3 * mesh.vertices + np.array([5, 0, -2], np.float32))
     tasks = []
-    trained = "mitex.methods.style_fitting.text_image_model"
+    trained = "mitex.methods.neural_style.fitting.text_image_model"
     monkeypatch.setattr(trained, lambda clip: MeanColour())
     initial = KINDS[name][1].initial
 

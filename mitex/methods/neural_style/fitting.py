@@ -10,10 +10,10 @@ from typing import TypeVar, Unpack
 from mitex.features.text_model import text_image_model
 from mitex.mesh import Mesh
 from mitex.methods.layout import with_layout
-from mitex.methods.style_config import StyleConfig
-from mitex.methods.style_task import StyleTask
-from mitex.methods.styled_mesh import StyledMesh
-from mitex.methods.wording import check_text, worded
+from mitex.methods.neural_style.config import StyleConfig
+from mitex.methods.neural_style.styled_mesh import StyledMesh
+from mitex.methods.neural_style.task import StyleTask
+from mitex.methods.words.wording import check_text, worded
 from mitex.training.fit import Run
 from mitex.training.settings import RunOptions
 

@@ -5,7 +5,7 @@ import math
 import torch
 from torch import nn
 
-from mitex.methods.style_field import HEAD, TRUNK, Layers, colours, encoded, head, random_waves, trunk
+from mitex.methods.neural_style.field import HEAD, TRUNK, Layers, colours, encoded, head, random_waves, trunk
 
 FEW = torch.Generator().manual_seed(0)
 

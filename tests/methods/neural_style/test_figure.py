@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from mitex.mesh import icosphere
-from mitex.methods.style_figure import Figure, smooth_normals
+from mitex.methods.neural_style.figure import Figure, smooth_normals
 from mitex.scenes.cameras import orbit
 from mitex.scenes.shaded import GREY
 

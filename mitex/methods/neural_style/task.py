@@ -13,9 +13,9 @@ from mitex.cache import content_key
 from mitex.features.text_image import TextImageModel
 from mitex.losses import Augmentation, embedding_distance, mean_direction, text_distance
 from mitex.mesh import Mesh, subdivide_midpoint
-from mitex.methods.style_cameras import cameras_of
-from mitex.methods.style_config import StyleConfig
-from mitex.methods.style_figure import Figure
+from mitex.methods.neural_style.cameras import cameras_of
+from mitex.methods.neural_style.config import StyleConfig
+from mitex.methods.neural_style.figure import Figure
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import orbit
 from mitex.training import ParameterTask, Step

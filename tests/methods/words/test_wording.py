@@ -3,7 +3,7 @@
 import pytest
 
 from mitex.errors import ConfigError
-from mitex.methods.wording import check_text, worded
+from mitex.methods.words.wording import check_text, worded
 from tests.features.clip.folders import write_folder
 
 

@@ -6,7 +6,7 @@ import math
 
 import torch
 
-from mitex.methods.style_config import StyleConfig
+from mitex.methods.neural_style.config import StyleConfig
 from mitex.scenes.cameras import Cameras, random_views
 
 FRONT = (90.0, 0.0)  # azimuth and elevation of the anchor [degrees]: +z

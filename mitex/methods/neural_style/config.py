@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from mitex.methods.words_config import WordsConfig, check_words
+from mitex.methods.words.config import WordsConfig, check_words
 from mitex.training.settings import ScheduledConfig, key
 
 
