@@ -9,10 +9,9 @@ from tyro.conf import Positional, arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import in_range
-from mitex.methods.nca.arguments import levels, oriented
-from mitex.methods.nca.ranges import MOST_STEPS, SPEEDS
-from mitex.methods.options import field_files
-from mitex.ranges import FRAME_RATES, PIXELS, SAMPLES, SCALES, SEEDS, TURNS, elevations
+from mitex.methods.nca.growth_options import GrowthOptions
+from mitex.methods.nca.ranges import MOST_STEPS
+from mitex.ranges import FRAME_RATES, PIXELS, SAMPLES, TURNS, elevations
 from mitex.suffixes import VIDEOS
 
 FADE = 12  # frames over which a loop fades
@@ -20,7 +19,7 @@ SPP = 32  # of the path tracer
 
 
 @dataclass(kw_only=True)
-class Animate:
+class Animate(GrowthOptions):
     """Film a texture as it grows on a mesh, goes on changing (--start), or heals (--damage).
 
     Frames are kept in a hidden folder beside the film until it is whole: Ctrl-C keeps them, --resume goes on.
@@ -87,24 +86,6 @@ class Animate:
     damage_at: Annotated[float | None, arg(metavar="S", help_behavior_hint="(default: 0.5)")] = None
     """When [seconds]."""
 
-    seed: Annotated[int, arg(metavar="N")] = 0
-    """Random seed."""
-
-    subdivide: Annotated[str, arg(metavar="auto|N")] = "auto"
-    """How often to subdivide the automaton's copy of the mesh; auto: to the training's density."""
-
-    orientation: Annotated[str, arg(metavar="DEG|FIELD")] = "0"
-    """Turns the texture on the surface [degrees], or lets its up follow a vector field (as of --field)."""
-
-    scale: Annotated[float, arg(metavar="X")] = 1.0
-    """Size of the pattern."""
-
-    field: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="(default: the training's)")] = None
-    """Vector field that the texture moves along: a name, a direction, or a file (.npy .ply .json)."""
-
-    speed: Annotated[float, arg(metavar="X")] = 1.0
-    """Speed along --field. At 1, the mean is an edge of the automaton's mesh in 6 steps, or as trained."""
-
     graft: Annotated[str | None, arg(metavar="RUN|MODEL", help_behavior_hint="")] = None
     """A second texture of the same family, as of `mitex graft`."""
 
@@ -143,17 +124,13 @@ class Animate:
             self.out,
             resume=self.resume,
             seed=self.seed,
-            subdivide=levels(self.subdivide),
-            orientation=oriented(self.orientation),
-            scale=self.scale,
-            field=self.field,
-            speed=self.speed,
+            **self.growth(),
             **self._shooting(),
         )
         print(self.out)
 
     def _check(self) -> None:
-        levels(self.subdivide)
+        self.check_growth()
         in_range("--seconds", self.seconds, 0.0, 3600.0)
         in_range("--fps", self.fps, *FRAME_RATES)
         in_range("--steps-per-frame", self.steps_per_frame, 1, MOST_STEPS)
@@ -163,10 +140,6 @@ class Animate:
         in_range("--azimuth", self.azimuth, *TURNS)
         in_range("--elevation", self.elevation, *elevations(self.renderer == "preview"))
         in_range("--damage-at", self.damage_at, 0.0, 3600.0)
-        in_range("--seed", self.seed, *SEEDS)
-        oriented(self.orientation)
-        in_range("--scale", self.scale, *SCALES)
-        in_range("--speed", self.speed, *SPEEDS)
         for option, needed, alone in (
             ("--spp", "--renderer path", self.spp is not None and self.renderer != "path"),
             ("--fade", "--loop", self.fade is not None and not self.loop),
@@ -180,7 +153,7 @@ class Animate:
     def _inputs(self) -> list[str]:
         """Models, and the files that options name."""
         named = (self.model, self.graft, self.weights)
-        return [*(name for name in named if name is not None), *field_files(self.field, self.orientation)]
+        return [*(name for name in named if name is not None), *self.growth_files()]
 
     def _shooting(self) -> dict[str, Any]:
         """Arguments of `Shooting`."""

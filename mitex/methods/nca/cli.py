@@ -10,11 +10,11 @@ from tyro.conf import arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import in_range, mutually_exclusive, reject_unused
-from mitex.methods.nca.arguments import RESOLUTION, levels, oriented
-from mitex.methods.nca.ranges import BAKED, MOST_STEPS, SPEEDS, TILE_CELLS
-from mitex.methods.options import DeviceOptions, ReliefOptions, field_files
+from mitex.methods.nca.growth_options import BakedOptions, oriented
+from mitex.methods.nca.ranges import TILE_CELLS
+from mitex.methods.options import DeviceOptions, ReliefOptions
 from mitex.methods.words.options import ExemplarOrWordsOptions
-from mitex.ranges import SCALES, SEEDS, TEXELS
+from mitex.ranges import SEEDS, TEXELS
 from mitex.suffixes import ASSETS, PICTURES
 from mitex.training.settings import RunSettings
 
@@ -110,7 +110,7 @@ class Fit(DeviceOptions, ExemplarOrWordsOptions):
 
 
 @dataclass(kw_only=True)
-class Apply(ReliefOptions):
+class Apply(BakedOptions, ReliefOptions):
     """Grow a cellular automaton's texture on a mesh, or on a square that repeats (--tile).
 
     examples:
@@ -123,39 +123,12 @@ class Apply(ReliefOptions):
       mitex apply pebbles --tile 1024 --out pebbles-tile
     """
 
-    seed: Annotated[int, arg(metavar="N")] = 0
-    """Random seed: another seed, another variant of the texture."""
-
-    steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the model's)")] = None
-    """Steps of the automaton; more make the pattern more regular."""
-
-    subdivide: Annotated[str, arg(metavar="auto|N")] = "auto"
-    """How often to subdivide the automaton's copy of the mesh; auto: to the training's density."""
-
-    orientation: Annotated[str, arg(metavar="DEG|FIELD")] = "0"
-    """Turns the texture on the surface [degrees], or lets its up follow a vector field (as of --field)."""
-
-    scale: Annotated[float, arg(metavar="X")] = 1.0
-    """Size of the pattern."""
-
     exemplar_width: Annotated[float | None, arg(metavar="X", help_behavior_hint="")] = None
     """In place of --scale: width of the exemplar, as large as on a surface texture at 0.5 [sides of the UV
     layout's square]."""
 
-    field: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="(default: the training's)")] = None
-    """Vector field that the texture moves along: a name, a direction, or a file (.npy .ply .json)."""
-
-    speed: Annotated[float, arg(metavar="X")] = 1.0
-    """Speed along --field. At 1, the mean is an edge of the automaton's mesh in 6 steps, or as trained."""
-
-    resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {RESOLUTION})")] = None
-    """Side of the baked textures [texels]."""
-
     looks: Annotated[str | None, arg(metavar="MODEL,...", help_behavior_hint="")] = None
     """Further textures that a page (.html) offers, and grafts if they are of the same family."""
-
-    vertex_colors: Annotated[bool, arg(help_behavior_hint="")] = False
-    """Write colours at the vertices instead of textures."""
 
     keep_dense: Annotated[bool, arg(help_behavior_hint="")] = False
     """Write the subdivided, rounded mesh instead of the given one."""
@@ -176,20 +149,11 @@ class Apply(ReliefOptions):
 
     def check(self) -> None:
         super().check()
-        levels(self.subdivide)
+        self.check_growth()
         in_range("--variants", self.variants, 1, MOST_VARIANTS)
-        in_range("--seed", self.seed, *SEEDS)
         in_range("--seed", self.seed + self.variants - 1, *SEEDS)
-        in_range("--steps", self.steps, 1, MOST_STEPS)
-        oriented(self.orientation)
-        in_range("--scale", self.scale, *SCALES)
         in_range("--exemplar-width", self.exemplar_width, 1e-3, 100.0)
         mutually_exclusive("--exemplar-width", "--scale", self.exemplar_width is not None and self.scale != 1)
-        in_range("--speed", self.speed, *SPEEDS)
-        in_range("--resolution", self.resolution, *BAKED)
-        mutually_exclusive(
-            "--resolution", "--vertex-colors", self.resolution is not None and self.vertex_colors
-        )
         mutually_exclusive("--variants", "--vertex-colors", self.variants > 1 and self.vertex_colors)
         for option, used in {"--variants": self.variants > 1, "--vertex-colors": self.vertex_colors}.items():
             mutually_exclusive("--relief", option, self.relief is not None and used)
@@ -224,7 +188,7 @@ class Apply(ReliefOptions):
         reject_unused("--tile", place, place.suffix.lower() in ASSETS + PICTURES)
 
     def inputs(self) -> list[Path | str]:
-        return [*super().inputs(), *self._looks, *field_files(self.field, self.orientation)]
+        return [*super().inputs(), *self._looks, *self.growth_files()]
 
     def prepared(self) -> Path:
         if self.tile is None:
@@ -264,7 +228,7 @@ class Apply(ReliefOptions):
             from mitex.mesh import Mesh
 
             seeds = range(self.seed, self.seed + self.variants)
-            options = self._growth(out)
+            options = self._options(out)
             assets = NcaTexture.load(self.model).variants(Mesh.load(self._mesh), seeds, **options)
             write_variants(assets, out)
         elif out.suffix.lower() == PAGE:
@@ -283,11 +247,7 @@ class Apply(ReliefOptions):
             looks=[NcaTexture.load(model) for model in self._looks],
             seed=self.seed,
             steps=self.steps,
-            subdivide=levels(self.subdivide),
-            orientation=oriented(self.orientation),
-            scale=self.scale,
-            field=self.field,
-            speed=self.speed,
+            **self.growth(),
         )
 
     def applied(self, out: Path) -> Asset:
@@ -295,7 +255,7 @@ class Apply(ReliefOptions):
         from mitex.methods.nca import NcaTexture
 
         texture, mesh = NcaTexture.load(self.model), Mesh.load(self._mesh)
-        return texture.apply(mesh, seed=self.seed, **self._growth(out))
+        return texture.apply(mesh, seed=self.seed, **self._options(out))
 
     @property
     def _looks(self) -> list[str]:
@@ -306,18 +266,7 @@ class Apply(ReliefOptions):
         assert self.mesh is not None
         return self.mesh
 
-    def _growth(self, out: Path) -> dict[str, Any]:
+    def _options(self, out: Path) -> dict[str, Any]:
         """Options of `NcaTexture.apply` but the seed."""
-        textures = out.suffix.lower() != ".ply" and not self.vertex_colors
-        return {
-            "steps": self.steps,
-            "subdivide": levels(self.subdivide),
-            "orientation": oriented(self.orientation),
-            "scale": self.scale,
-            "exemplar_width": self.exemplar_width,
-            "resolution": (self.resolution or RESOLUTION) if textures else None,
-            "keep_dense": self.keep_dense,
-            "displace": self.displace,
-            "field": self.field,
-            "speed": self.speed,
-        }
+        own = ("exemplar_width", "keep_dense", "displace")
+        return self.baked(out.suffix.lower()) | {name: getattr(self, name) for name in own}

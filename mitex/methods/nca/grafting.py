@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, arg
 
 from mitex.errors import ConfigError
-from mitex.methods.checks import in_range, mutually_exclusive, reject_unused
+from mitex.methods.checks import reject_unused
 from mitex.methods.nca import METHOD
-from mitex.methods.nca.arguments import RESOLUTION, levels, oriented
-from mitex.methods.nca.ranges import BAKED, MOST_STEPS, SPEEDS
-from mitex.methods.options import MeshOptions, field_files
+from mitex.methods.nca.growth_options import BakedOptions
+from mitex.methods.options import MeshOptions
 from mitex.methods.registry import method_of
-from mitex.ranges import SCALES, SEEDS
 from mitex.suffixes import PICTURES
 
 if TYPE_CHECKING:
@@ -26,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(kw_only=True)
-class Grafted(MeshOptions):
+class Grafted(BakedOptions, MeshOptions):
     """Grow two textures of one family on a mesh, and let one become the other where the weights say so.
 
     `mitex models` tells which are of one family; models that were trained from them (--init) are, too.
@@ -48,48 +46,11 @@ class Grafted(MeshOptions):
     around a point [mesh units]; a .npy or .ply with a value from 0 to 1 at each vertex; a .png painted over
     the UVs; or one number."""
 
-    seed: Annotated[int, arg(metavar="N")] = 0
-    """Random seed."""
-
-    steps: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the slower model's)")] = None
-    """Steps of the automaton."""
-
-    subdivide: Annotated[str, arg(metavar="auto|N")] = "auto"
-    """How often to subdivide the automaton's copy of the mesh; auto: to the training's density."""
-
-    orientation: Annotated[str, arg(metavar="DEG|FIELD")] = "0"
-    """Turns the textures on the surface [degrees], or lets their up follow a vector field (as of --field)."""
-
-    scale: Annotated[float, arg(metavar="X")] = 1.0
-    """Size of the patterns."""
-
-    field: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="(default: the trainings')")] = None
-    """Vector field that the textures move along: a name (up, right, about-y, ...), a direction, or a file
-    (.npy .ply .json)."""
-
-    speed: Annotated[float, arg(metavar="X")] = 1.0
-    """Speed along --field. At 1, the mean is an edge of the automaton's mesh in 6 steps, or as trained."""
-
-    resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {RESOLUTION})")] = None
-    """Side of the baked textures [texels]."""
-
-    vertex_colors: Annotated[bool, arg(help_behavior_hint="")] = False
-    """Write colours at the vertices instead of textures."""
-
     def check(self) -> None:
-        levels(self.subdivide)
-        in_range("--seed", self.seed, *SEEDS)
-        in_range("--steps", self.steps, 1, MOST_STEPS)
-        oriented(self.orientation)
-        in_range("--scale", self.scale, *SCALES)
-        in_range("--speed", self.speed, *SPEEDS)
-        in_range("--resolution", self.resolution, *BAKED)
-        mutually_exclusive(
-            "--resolution", "--vertex-colors", self.resolution is not None and self.vertex_colors
-        )
+        self.check_growth()
 
     def inputs(self) -> list:
-        return [*super().inputs(), self.second, self.weights, *field_files(self.field, self.orientation)]
+        return [*super().inputs(), self.second, self.weights, *self.growth_files()]
 
     def check_output(self, out: Path) -> None:
         suffix = out.suffix.lower()
@@ -105,18 +66,8 @@ class Grafted(MeshOptions):
         from mitex.mesh import Mesh
 
         mesh = Mesh.load(self.mesh)
-        textures = out.suffix.lower() != ".ply" and not self.vertex_colors
-        return grafted(self.model, self.second, mesh, self.weights).apply(
-            mesh,
-            seed=self.seed,
-            steps=self.steps,
-            subdivide=levels(self.subdivide),
-            orientation=oriented(self.orientation),
-            scale=self.scale,
-            field=self.field,
-            speed=self.speed,
-            resolution=(self.resolution or RESOLUTION) if textures else None,
-        )
+        graft = grafted(self.model, self.second, mesh, self.weights)
+        return graft.apply(mesh, seed=self.seed, **self.baked(out.suffix.lower()))
 
 
 def grafted(first: str, second: str, mesh: Mesh, weights: str) -> Graft:
