@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from mitex.cli import main
 from mitex.errors import CaptureError
@@ -82,6 +83,40 @@ def test_masks_by_a_network(cameras, tmp_path, capsys):
     assert f"{stage.VIEWS} of those got a mask" in capsys.readouterr().out
     for image, (_, mask) in zip(load_capture(tmp_path / "a").images, SHOTS, strict=True):
         assert stage.overlap(image[..., 3] > 127, mask) > 0.95
+
+
+@pytest.mark.parametrize("mask", ["hull", "box:25,15,50,70", "colour:#28963c"])
+def test_masks_without_a_network(mask, cameras, tmp_path, capsys):
+    bare = [np.where(truth[..., None], picture, np.uint8(stage.WALL)) for picture, truth in SHOTS]
+    write_photos(tmp_path / "photos", bare if mask.startswith("colour") else PICTURES)
+    words = ["capture", str(tmp_path / "photos"), "--out", str(tmp_path / "a"), "--mask", mask, "--quiet"]
+    assert main(words) == 0
+    assert f"{stage.VIEWS} of those got a mask" in capsys.readouterr().out
+    images = load_capture(tmp_path / "a").images
+    overlaps = [
+        stage.overlap(image[..., 3] > 127, truth) for image, (_, truth) in zip(images, SHOTS, strict=True)
+    ]
+    assert np.median(overlaps) > 0.9 and min(overlaps) > 0.75
+
+
+def test_smaller_pictures(monkeypatch, tmp_path):
+    """COLMAP sees them as they are kept."""
+    seen = []
+
+    def smaller(folder, names):
+        seen.extend(Image.open(folder / name).size for name in names)
+        structure = stage.structure(names, np.random.default_rng(0))
+        for frame in structure.tree["frames"]:
+            frame.update({key: 0.8 * frame[key] for key in ("fl_x", "fl_y", "cx", "cy")})
+            frame.update(w=128, h=96)
+        return structure
+
+    monkeypatch.setattr(site, "reconstruct", smaller)
+    write_photos(tmp_path / "photos", PICTURES)
+    words = ["capture", str(tmp_path / "photos"), "--out", str(tmp_path / "a"), "--size", "128", "--quiet"]
+    assert main(words) == 0
+    assert set(seen) == {(128, 96)}
+    assert {image.shape for image in load_capture(tmp_path / "a").images} == {(96, 128, 4)}
 
 
 def shots(folder):
