@@ -10,6 +10,7 @@ import torch
 from safetensors import safe_open
 from scipy import ndimage
 
+from mitex.features.flow import flow_network
 from mitex.features.flow.warping import warp
 
 TOOLS = Path(__file__).parents[2] / "tools"
@@ -63,6 +64,17 @@ def test_bubbles_go_on_over_the_borders(tool):
     steps = [np.abs(np.roll(image, -1, axis) - image) for axis in (0, 1)]
     assert image.shape == (1024, 1024) and image.std() > 0.1
     assert steps[0][-1].mean() < 2 * steps[0].mean() and steps[1][:, -1].mean() < 2 * steps[1].mean()
+
+
+@pytest.mark.parametrize("changes", [False, True])
+def test_the_network_that_ships_meets_its_targets_on_other_textures(tool, changes):
+    """Errors under 0.3 px up to 2 px, and under 10 degrees and a tenth of the speed from half a pixel on."""
+    errors = tool("flow_errors")
+    by_octave = errors.by_octave(flow_network(), errors.held_out(changes))
+    fast = [one for low, one in zip(errors.OCTAVES, by_octave, strict=False) if low >= 0.5]
+    assert max(one.end_point for one in by_octave) < 0.3 and len(fast) == 3
+    assert max(one.direction for one in fast) < 10
+    assert all(0.9 < one.speed_ratio < 1.1 for one in fast)
 
 
 def test_from_textures_to_a_file_of_weights(tool, monkeypatch, tmp_path, capsys):
