@@ -188,7 +188,8 @@ class TestTask:
         plain = value()
         for options in (
             *({"masked": False}, {"memory": 0.5}, {"antialias": 2}, {"fov": 20.0}, {"exemplar_size": 48}),
-            *({"farthest": 20.0}, {"seed": 3}, {"layers": ("relu1_1",)}),
+            *({"farthest": 20.0}, {"nearest": 6.0}, {"view": 48}, {"resolution": 48}),
+            *({"seed": 3}, {"layers": ("relu1_1",)}),
         ):
             assert value(**options) != plain
         black = np.zeros((64, 64, 3), np.float32)
@@ -196,6 +197,17 @@ class TestTask:
         assert kept > plain
         assert value(black, content_weight=200.0) - plain == pytest.approx(2 * (kept - plain), rel=1e-3)
         assert value(black, content_layer="relu1_1") != kept
+
+
+def test_the_learning_rate_is_how_far_a_step_goes(ball, exemplar):
+    """Adam's first step has one length, whatever the gradient."""
+
+    def image(lr: float) -> np.ndarray:
+        return multi_view_gram.fit(exemplar, ball, set=SMALL | {"lr": lr}, steps=1).image
+
+    still = image(0.0)
+    near, far = (float(np.abs(image(lr) - still).mean()) for lr in (0.01, 0.02))
+    assert near > 0 and far == pytest.approx(2 * near, rel=0.2)
 
 
 def test_the_texture_comes_near(tmp_path):

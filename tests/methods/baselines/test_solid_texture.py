@@ -282,6 +282,16 @@ def test_a_flat_colour_is_learned(tmp_path):
     np.testing.assert_allclose(slices.mean((0, 1)), (0.8, 0.3, 0.1), atol=0.15)
 
 
+def test_the_width_goes_into_the_texture(exemplar):
+    """Half as wide, the pattern is on a mesh what one of scale 2 is."""
+    wide, narrow = (solid_texture.fit(exemplar, set=SMALL | {"width": w}, steps=1) for w in (0.5, 0.25))
+    assert (wide.width, narrow.width) == (0.5, 0.25)
+    ball, options = icosphere(4), {"resolution": 16}
+    small = narrow.apply(ball, scale=2.0, **options).maps["albedo"]
+    assert np.array_equal(small, wide.apply(ball, **options).maps["albedo"])
+    assert not np.array_equal(narrow.apply(ball, **options).maps["albedo"], small)
+
+
 def test_resuming_changes_nothing(exemplar, tmp_path):
     threads(1)
     solid_texture.fit(exemplar, tmp_path / "whole", set=SMALL, steps=4)
