@@ -150,5 +150,8 @@ def test_a_fit_that_nothing_needs_is_a_result_without_a_mesh(tmp_path):
 def test_the_preset_compares_captures(tmp_path):
     plan = prepared(preset_plan("nerf-table2", tmp_path))
     assert source_of(plan) == "capture" and KINDS["capture"].measures[: len(CAPTURES)] == CAPTURES
-    assert [part.of for part in plan.methods] == [None, "nerf", "nerf", None]
-    assert [part.output for part in plan.methods] == ["glb", "glb", "glb", "none"]
+    assert [part.of for part in plan.methods] == [
+        *(None, "nerf", "nerf", None),
+        *(None, "nerf_paper", "nerf_paper", None),
+    ]
+    assert [part.output for part in plan.methods] == 2 * ["glb", "glb", "glb", "none"]
