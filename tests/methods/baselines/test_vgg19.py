@@ -13,6 +13,8 @@ from mitex.features.weights import WeightsError
 from mitex.mesh import icosphere
 from mitex.methods.baselines.gatys.config import PRESETS as GATYS
 from mitex.methods.baselines.gatys.task import GatysTask
+from mitex.methods.baselines.multi_view_gram.config import PRESETS as MULTI_VIEW
+from mitex.methods.baselines.multi_view_gram.task import MultiViewTask
 from mitex.methods.baselines.solid_texture.config import PRESETS as SOLID
 from mitex.methods.baselines.solid_texture.task import SolidTask
 from mitex.methods.baselines.style_mesh.config import PRESETS as STYLE_MESH
@@ -25,9 +27,15 @@ STYLE = {"resolution": 32, "exemplar_size": 64, "views": 2, "view": 64, "heights
 SMALL: dict[str, dict[str, Any]] = {
     "gatys": {"layers": LAYERS, "size": 32, "exemplar_size": 32},
     "solid_texture": {"layers": LAYERS, "slice_size": 32, "exemplar_size": 32, "slices": 1},
+    "multi_view_gram": {"layers": LAYERS, "resolution": 32, "exemplar_size": 64, "view": 64},
     "style_mesh": {"layers": LAYERS, "weights": (1.0, 1.0), "small_layers": (), **STYLE},
 }
-PAPER = {"gatys": GATYS["paper"], "solid_texture": SOLID["paper"], "style_mesh": STYLE_MESH["paper"]}
+PAPER = {
+    "gatys": GATYS["paper"],
+    "solid_texture": SOLID["paper"],
+    "multi_view_gram": MULTI_VIEW["paper"],
+    "style_mesh": STYLE_MESH["paper"],
+}
 names = pytest.mark.parametrize("name", SMALL)
 
 
@@ -36,7 +44,8 @@ def task(name: str, exemplar: Exemplar) -> Any:
     kinds = {"gatys": GatysTask, "solid_texture": SolidTask}
     if name in kinds:
         return kinds[name](config, exemplar)
-    return StyleMeshTask(config, exemplar, with_layout(icosphere(2), 32))
+    of_mesh = {"multi_view_gram": MultiViewTask, "style_mesh": StyleMeshTask}
+    return of_mesh[name](config, exemplar, with_layout(icosphere(2), 32))
 
 
 @pytest.fixture
@@ -68,6 +77,26 @@ def test_gatys_divides_its_layers_by_their_means_on_the_exemplar(exemplar, tmp_p
     expected = (rows.T @ rows / len(rows) - wanted.T @ wanted / len(wanted)).square().mean() / 4
     own.targets = {"relu3_4": own.targets["relu3_4"]}
     assert float(own.loss(0, torch.Generator()).value.detach()) == pytest.approx(float(expected), rel=1e-3)
+
+
+def test_multi_view_gram_divides_its_layers_by_their_means(exemplar, tmp_path, monkeypatch):
+    """The loss of a layer does not change with its scale, and neither does that of the content."""
+    monkeypatch.setenv(VARIABLE, str(saved(tmp_path, [f"features.{n}" for n in TORCHVISION])))
+    own = task("multi_view_gram", exemplar)
+    own.content = torch.full((32, 32, 3), 0.2)
+    value = float(own.loss(0, torch.Generator().manual_seed(0)).value.detach())
+    own.means = {layer: 2 * mean for layer, mean in own.means.items()}
+    content, own.content = own.content, None
+    halved = float(own.loss(0, torch.Generator().manual_seed(0)).value.detach())
+    own.means = {layer: mean / 2 for layer, mean in own.means.items()}
+    grams = float(own.loss(0, torch.Generator().manual_seed(0)).value.detach())
+    assert halved == pytest.approx(grams / 4, rel=1e-5) and value > grams and content is not None
+    expected = own.network.features(
+        torch.from_numpy(exemplar.resized(own.exemplar_side).maps["albedo"])[None], LAYERS
+    )
+    assert {layer: own.means[layer] for layer in LAYERS} == pytest.approx(
+        {layer: float(maps.mean()) for layer, maps in expected.items()}, rel=0.05
+    )
 
 
 @names

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from mitex.errors import ConfigError
-from mitex.features.layers import check_layers
+from mitex.features.layers import NETWORKS, check_layers
 from mitex.training.settings import TrainingConfig, key
 
 
@@ -26,8 +27,13 @@ class MultiViewConfig(TrainingConfig):
     masked: bool = key(
         True, "Gram matrices are of what shows the mesh; the paper: of the black background, too"
     )
+    network: Literal["vgg16", "vgg19"] = key(
+        "vgg16",
+        "in the place of Inception V1 (the paper); vgg19, as of those who compared with it, is a file of "
+        "yours (mitex.features.vgg19)",
+    )
     layers: tuple[str, ...] = key(
-        ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "VGG-16's that are compared"
+        ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "the network's that are compared"
     )
     memory: float = key(0.95, "decay of the moving average of the Gram matrices", 0, 0.9999)
     content_layer: str = key("relu4_1", "whose features stay the content's")
@@ -37,8 +43,8 @@ class MultiViewConfig(TrainingConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_layers(self.layers)
-        check_layers([self.content_layer])
+        for layers in (self.layers, [self.content_layer]):
+            check_layers(layers, NETWORKS[self.network])
         if self.nearest > self.farthest:
             raise ConfigError(f"nearest = {self.nearest:g} is beyond farthest", "set it to less")
 

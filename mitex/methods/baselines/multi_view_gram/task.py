@@ -11,10 +11,10 @@ import torch
 
 from mitex.cache import content_key
 from mitex.exemplar import Exemplar
-from mitex.features import Vgg16
 from mitex.features.coverage import covered_places
 from mitex.features.frozen import GramTap, Tap
 from mitex.features.layers import CHANNELS
+from mitex.features.vgg19 import named_vgg
 from mitex.losses.gram import gram_targets
 from mitex.mesh import Mesh
 from mitex.methods.baselines.multi_view_gram.config import MultiViewConfig
@@ -34,7 +34,8 @@ class MultiViewTask(ParameterTask):
     """A texture whose views shall have the Gram matrices of the exemplar.
 
     The authors take Inception V1, here VGG-16 stands in its place, whose weights come with Mitex; the paper
-    that compares with this method (Kovacs et al. 2024) took a VGG as well.
+    that compares with this method (Kovacs et al. 2024) took VGG-19. Layers of the latter are divided by their
+    means on the exemplar, so that they count as those of the normalised VGG-16 do.
 
     Args:
         config: settings.
@@ -58,7 +59,8 @@ class MultiViewTask(ParameterTask):
         self.views = TextureViews(
             box, charts, self.cameras(generator, config.nearest, config.farthest), config.antialias
         )
-        self.network = Vgg16()
+        self.network = named_vgg(config.network)
+        self.means = self._means()
         self.average = GramAverage({layer: CHANNELS[layer] for layer in config.layers}, config.memory)
         self.targets = self._targets()
         self.content = None if content is None else torch.from_numpy(content.astype(np.float32))
@@ -87,7 +89,7 @@ class MultiViewTask(ParameterTask):
         blended = self.average.blended(grams)
         total = torch.zeros(())
         for layer, target in self.targets.items():
-            total = total + (blended[layer] - target).abs().mean()
+            total = total + (blended[layer] - target).abs().mean() / self.means[layer] ** 2
         if self.content is not None:
             total = total + self.config.content_weight * self._content_loss(values[CONTENT], camera)
         kept = {layer: gram.detach() for layer, gram in grams.items()}
@@ -122,6 +124,16 @@ class MultiViewTask(ParameterTask):
         picture = albedo(self.exemplar, self.exemplar_side)
         return gram_targets(self.network.features(picture[None], self.config.layers))
 
+    def _means(self) -> Mapping[str, float]:
+        """Layer -> mean activation on the exemplar; 1 where layers have been normalised."""
+        names = {*self.config.layers, self.config.content_layer}
+        if self.config.network == "vgg16":
+            return dict.fromkeys(names, 1.0)
+        picture = albedo(self.exemplar, self.exemplar_side)
+        return {
+            name: float(value.mean()) for name, value in self.network.features(picture[None], names).items()
+        }
+
     def _gram_tap(self, layer: str, coverage: torch.Tensor) -> GramTap:
         size = self.network.extent(layer, *coverage.shape)
         regions = [covered_places(coverage, size)] if self.config.masked else None
@@ -137,4 +149,4 @@ class MultiViewTask(ParameterTask):
         with torch.no_grad():
             original = self.views.picture(self.content, camera)[0]
             expected = self.network.read(original[None], {CONTENT: self._content_tap})[CONTENT]
-        return (features - expected).abs().mean()
+        return (features - expected).abs().mean() / self.means[self.config.content_layer]
