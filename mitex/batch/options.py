@@ -91,7 +91,8 @@ def implied_inputs(method: Method, fit: Mapping[str, Any], folder: Path, *, from
         if from_text and "clip" in fit_kinds(method) and "clip" not in fit:
             paths.append(model_folder())
     with suppress(WeightsError):
-        if getattr(_config(method, fit, folder), "network", None) == "vgg19":
+        config = _config(method, fit, folder)
+        if "vgg19" in (getattr(config, "network", None), getattr(config, "weights", None)):
             paths.append(vgg19_path())
     return [Input(str(path), path) for path in paths if path is not None]
 

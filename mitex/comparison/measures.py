@@ -59,7 +59,7 @@ LOOKS = (
         "Transport",
         LOWER,
         "Relaxed optimal transport (MeshNCA, equation 4) between the features of five layers of VGG-16: "
-        "whether each detail of one has its like in the other. nca and text2mesh train with it.",
+        "whether each detail of one has its like in the other. nca, text2mesh and relief train with it.",
     ),
     Measure(
         "gram",

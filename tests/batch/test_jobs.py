@@ -201,12 +201,13 @@ class TestIds:
             "named": {"method": "nca", "source": "text", "exemplars": ["moss"], "clip": "words"},
             "gatys": {"network": "vgg19", "exemplars": ["lava"]},
             "other": {"method": "gatys", "exemplars": ["lava"]},
+            "surface": {"weights": "vgg19", "exemplars": ["lava"], "meshes": ["vase"]},
         }
         ids = []
         for content in ("1", "2"):
             file.write_text(content)
             ids.append([job.id for job in jobs(tables, output="none")])
-        assert [old != new for old, new in zip(*ids, strict=True)] == [True, False, True, False]
+        assert [old != new for old, new in zip(*ids, strict=True)] == [True, False, True, False, True]
         file.unlink()  # which only the machine that fits must have
         assert len(jobs({"gatys": tables["gatys"]}, output="none")) == 1
 

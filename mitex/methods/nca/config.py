@@ -68,7 +68,7 @@ class NcaConfig(DeviceConfig, ScheduledConfig):
         True, "a view shows one picture of several maps, mixed, so that they are learned in register"
     )
     layers: tuple[str, ...] = key(
-        ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "pooling of VGG-16"
+        ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "VGG-16's that are compared"
     )
     pooling: Literal["average", "max"] = key("max", "pooling of VGG-16")
     samples: int = key(1024, "feature vectors compared in each layer and view, at most", 1, 4096)

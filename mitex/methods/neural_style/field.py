@@ -79,10 +79,22 @@ def random_waves(frequencies: int, sigma: float, generator: torch.Generator) -> 
     return sigma * torch.randn(frequencies, 3, generator=generator)
 
 
-def encoded(points: torch.Tensor, waves: torch.Tensor) -> torch.Tensor:
-    """(N, 2 M + 3): the places (N, 3), and cosines and sines of waves (M, 3)."""
+def encoded(points: torch.Tensor, waves: torch.Tensor, weights: torch.Tensor | None = None) -> torch.Tensor:
+    """(N, 2 M + 3): the places (N, 3), and cosines and sines of waves (M, 3), by weight (M,) if given."""
     phase = 2 * math.pi * points @ waves.T
-    return torch.cat([points, phase.cos(), phase.sin()], 1)
+    sides = torch.cat([phase.cos(), phase.sin()], 1)
+    return torch.cat([points, sides if weights is None else sides * weights.repeat(2)], 1)
+
+
+def opened(waves: torch.Tensor, share: float) -> torch.Tensor:
+    """(M,) weights from 0 to 1 of waves (M, 3), a share of which is open, the slowest first (Hertz et al. 2021).
+
+    Args:
+        waves: [cycles a unit of the places].
+        share: 0 for none, 1 for all of them.
+    """
+    rank = waves.norm(dim=1).argsort().argsort()
+    return (share * len(waves) - rank).clamp(0, 1)
 
 
 def colours(values: torch.Tensor) -> torch.Tensor:

@@ -60,14 +60,18 @@ class StyleTask(ParameterTask):
         """Parameters to begin with."""
 
     @abstractmethod
-    def style(self) -> tuple[torch.Tensor, torch.Tensor]:
-        """Colours (V, 3) sRGB in (0, 1) of the ball's vertices, and how far they are moved (V, 3) [radii]."""
+    def style(self, step: int | None = None) -> tuple[torch.Tensor, torch.Tensor]:
+        """Colours (V, 3) sRGB in (0, 1) of the ball's vertices, and how far they are moved (V, 3) [radii].
+
+        Args:
+            step: of the training, which a method may begin with less detail; None: after it.
+        """
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
         """Distances from the text of whole views, of close-ups, and of close-ups without colours."""
         config = self.config
         cameras = cameras_of(config, generator)
-        colours, offsets = self.style()
+        colours, offsets = self.style(step)
         coloured, plain = self.figure.pictures(cameras, self.points + offsets, colours)
         count, tilt = config.views, config.text_tilt
         whole = Augmentation.draw(generator, count, tilt=tilt)

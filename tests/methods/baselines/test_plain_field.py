@@ -182,7 +182,7 @@ def test_refusals(ball):
     with pytest.raises(ConfigError, match="cannot be put on 'icosphere"):
         ball.apply(icosphere(1))
     for density in (0.0, 1001.0, np.nan):
-        with pytest.raises(ConfigError, match="times the density"):
+        with pytest.raises(ConfigError, match="`density`"):
             ball.apply(density=density)
 
 

@@ -13,12 +13,14 @@ from mitex.exemplar import Exemplar
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.baselines import text2mesh
 from mitex.methods.baselines.text2mesh import Text2MeshConfig, Text2MeshTexture
+from mitex.methods.baselines.text2mesh.config import PRESETS, share_open
 from mitex.methods.baselines.text2mesh.task import Text2MeshTask
 from mitex.methods.layout import with_layout
 from mitex.methods.neural_style.cameras import cameras_of
 from mitex.runtime import threads
 from mitex.scenes.cameras import orbit
 from tests.cli import bad_files
+from tests.methods.neural_style.tiny import shaken, tiny
 from tests.training.contract import (
     FAULTS,
     assert_loss_is_pure,
@@ -99,6 +101,29 @@ class TestTask:
             *({"frequencies": 9}, {"width": 17}, {"exemplar_size": 64}, {"view": 56}),
         ):
             assert value(**options) != plain, options
+
+
+def test_waves_are_opened_in_as_many_steps_as_wanted(ball, exemplar):
+    """As published: 87; until then a step sees less of them, and afterwards all."""
+    assert PRESETS["text-paper"].open_waves == PRESETS["paper"].open_waves == 87
+    config = replace(CONFIG, open_waves=8)
+    assert [share_open(config, step) for step in (0, 2, 8, 9, None)] == [0, 0.25, 1, 1, 1]
+
+    def values(task) -> list[float]:
+        for name in ("colours.2.weight", "colours.2.bias"):
+            task.named[name].data.normal_(generator=torch.Generator().manual_seed(0))
+        return [float(task.loss(k, torch.Generator().manual_seed(5)).value.detach()) for k in (0, 2, 8)]
+
+    opening, plain = (
+        values(Text2MeshTask(config, exemplar, ball)),
+        values(Text2MeshTask(CONFIG, exemplar, ball)),
+    )
+    assert len({*opening}) == 3 and {*plain} == {opening[2]}
+    task = shaken(tiny("text2mesh", open_waves=8))
+    assert not torch.equal(task.style(2)[0], task.style(8)[0])
+    assert torch.equal(task.style(8)[0], task.style()[0])
+    first, last = (float(task.loss(k, torch.Generator().manual_seed(5)).value.detach()) for k in (2, 8))
+    assert first != last
 
 
 def test_a_flat_colour_is_learned(tmp_path):

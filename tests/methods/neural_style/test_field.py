@@ -5,7 +5,17 @@ import math
 import torch
 from torch import nn
 
-from mitex.methods.neural_style.field import HEAD, TRUNK, Layers, colours, encoded, head, random_waves, trunk
+from mitex.methods.neural_style.field import (
+    HEAD,
+    TRUNK,
+    Layers,
+    colours,
+    encoded,
+    head,
+    opened,
+    random_waves,
+    trunk,
+)
 
 FEW = torch.Generator().manual_seed(0)
 
@@ -30,6 +40,14 @@ def test_places_as_waves():
     row = torch.tensor([*points[0], *map(math.cos, phase), *map(math.sin, phase)])
     assert torch.allclose(encoded(points, waves)[0], row, atol=1e-5)
     assert abs(random_waves(4000, 5.0, FEW).std().item() - 5) < 0.1
+
+
+def test_waves_are_opened_from_the_slowest_on():
+    waves = torch.tensor([[3.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 2.0], [0.0, 4.0, 0.0]])
+    assert opened(waves, 0.0).tolist() == [0, 0, 0, 0] and opened(waves, 1.0).tolist() == [1, 1, 1, 1]
+    assert opened(waves, 0.375).tolist() == [0, 1, 0.5, 0]
+    row, plain = encoded(torch.ones(1, 3), waves, opened(waves, 0.375)), encoded(torch.ones(1, 3), waves)
+    assert torch.equal(row[0], plain[0] * torch.tensor([1, 1, 1, 0, 1, 0.5, 0, 0, 1, 0.5, 0]))
 
 
 def test_it_equals_torch_s_layers():

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import arg
 
 from mitex.methods.checks import in_range
+from mitex.methods.nerf.ranges import DENSITIES
 from mitex.methods.options import FieldOptions, TrainingOptions
 from mitex.paths import expanded
 
@@ -64,7 +65,7 @@ class Apply(FieldOptions):
 
     def check(self) -> None:
         super().check()
-        in_range("--density", self.density, 0.001, 1000.0)
+        in_range("--density", self.density, *DENSITIES)
 
     def applied(self, out: Path) -> AppliedField:
         from mitex.methods.baselines.plain_field import PlainFieldTexture

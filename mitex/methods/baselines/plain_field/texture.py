@@ -16,8 +16,10 @@ from mitex.mesh import Mesh, Similarity
 from mitex.methods.baselines.plain_field import METHOD
 from mitex.methods.baselines.plain_field.applied import AppliedField
 from mitex.methods.baselines.plain_field.config import PlainFieldConfig
+from mitex.methods.checks import in_range
 from mitex.methods.nerf.field.occupancy import packed_cells, unpacked_cells
 from mitex.methods.nerf.field.rendering import render_step
+from mitex.methods.nerf.ranges import DENSITIES
 from mitex.methods.nerf.training.plain import PlainField, hash_grid, parameter_shapes
 from mitex.runtime import init
 from mitex.runtime.jit import mi
@@ -102,6 +104,5 @@ class PlainFieldTexture:
                 f"a plain field cannot be put on '{mesh.name}'",
                 "leave out the mesh, or learn a texture with mitex fit nerf",
             )
-        if not 0 < density <= 1000:
-            raise ConfigError(f"{density:g} times the density", "use densities up to 1000")
+        in_range("`density`", density, *DENSITIES)
         return AppliedField(self.field, self.similarity, str(self.about["name"]), density)

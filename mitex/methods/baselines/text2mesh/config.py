@@ -22,11 +22,19 @@ class Text2MeshConfig(StyleConfig):
     )
     samples: int = key(1024, "feature vectors a layer and picture", 1)
     moment_weight: float = key(0.1, "weight of the moments", 0)
+    open_waves: int = key(
+        0, "steps in which the waves are opened, the slowest first; 0: all are open from the start", 0
+    )
     preview_every: int = 50
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_layers(self.layers)
+
+
+def share_open(config: Text2MeshConfig, step: int | None) -> float:
+    """The share of the waves that is open at a step; of all of them after the training (None)."""
+    return 1.0 if step is None or step >= config.open_waves else step / config.open_waves
 
 
 DEFAULT = Text2MeshConfig()
@@ -38,6 +46,7 @@ PAPER = replace(
     views=5,
     cameras="anchored",
     milestones=tuple(range(100, 1500, 100)),
+    open_waves=87,
 )
 WORDS = replace(DEFAULT, text="red dots on white")
 PRESETS = {

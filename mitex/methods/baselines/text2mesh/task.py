@@ -12,10 +12,10 @@ from mitex.features.coverage import fully_covered
 from mitex.features.frozen import Tap
 from mitex.losses import moment_distance, relaxed_transport
 from mitex.mesh import Mesh
-from mitex.methods.baselines.text2mesh.config import Text2MeshConfig
+from mitex.methods.baselines.text2mesh.config import Text2MeshConfig, share_open
 from mitex.methods.exemplar_pictures import albedo, framed, side_in_view
 from mitex.methods.neural_style.cameras import cameras_of, frame_height
-from mitex.methods.neural_style.field import colours, encoded, head, random_waves, trunk
+from mitex.methods.neural_style.field import colours, encoded, head, opened, random_waves, trunk
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, orbit
 from mitex.scenes.shaded import BACKGROUND
@@ -64,23 +64,31 @@ class Text2MeshTask(ParameterTask):
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
         """Relaxed transport and moments of the features of some views, and of their colours."""
-        views, masks = self.views(cameras_of(self.config, generator))
+        weights = opened(self.waves, share_open(self.config, step))
+        views, masks = self.views(cameras_of(self.config, generator), weights)
         losses = [self._view_loss(*pair, generator) for pair in zip(views, masks, strict=True)]
         return Step(torch.stack(losses).mean(), {})
 
-    def views(self, cameras: Cameras) -> tuple[torch.Tensor, torch.Tensor]:
-        """Pictures (K, S, S, 3) sRGB on white, and (K, S, S) bool, which pixels show the mesh."""
+    def views(
+        self, cameras: Cameras, weights: torch.Tensor | None = None
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Pictures (K, S, S, 3) sRGB on white, and (K, S, S) bool, which pixels show the mesh.
+
+        Args:
+            cameras: K of them.
+            weights: (M,) of the waves; None: all are open.
+        """
         hits = self.stage.hits(cameras)
         corners = torch.from_numpy(self.ball.vertices[self.ball.faces[hits.face.numpy()]])
         points = (hits.barycentric[..., None] * corners).sum(1)
         pixels = torch.full((len(hits.hit), 3), BACKGROUND)
-        pixels[hits.hit] = self.colours(points)
+        pixels[hits.hit] = self.colours(points, weights)
         shape = len(cameras), cameras.height, cameras.width
         return pixels.view(*shape, 3), hits.hit.view(*shape)
 
-    def colours(self, points: torch.Tensor) -> torch.Tensor:
-        """(N, 3) sRGB in (0, 1) at places (N, 3) [radii]."""
-        values = encoded(points, self.waves)
+    def colours(self, points: torch.Tensor, weights: torch.Tensor | None = None) -> torch.Tensor:
+        """(N, 3) sRGB in (0, 1) at places (N, 3) [radii], with weights (M,) of the waves as of `views`."""
+        values = encoded(points, self.waves, weights)
         for part in self._layers:
             values = part(self.named, values)
         return colours(values)

@@ -5,18 +5,20 @@ from __future__ import annotations
 import torch
 
 from mitex.methods.baselines.text2mesh import METHOD
-from mitex.methods.neural_style.field import colours, encoded, head, random_waves, trunk
+from mitex.methods.baselines.text2mesh.config import Text2MeshConfig, share_open
+from mitex.methods.neural_style.field import colours, encoded, head, opened, random_waves, trunk
 from mitex.methods.neural_style.task import StyleTask
 
 
 class Text2MeshTextTask(StyleTask):
     """A network whose colours, and offsets along the normals, shall make views of a mesh be what words say.
 
-    As published, but for two things: the waves are there from the first step, where the authors open them
-    one by one in the first 87 of 1500; and outlines have no derivatives, shading alone.
+    As published, but for two things: waves are opened the slowest first, where the authors' code sorts their axes
+    in place of them; and outlines have no derivatives, shading alone.
     """
 
     method = METHOD.name
+    config: Text2MeshConfig
 
     def initial(self, generator: torch.Generator) -> dict[str, torch.Tensor]:
         config = self.config
@@ -25,7 +27,8 @@ class Text2MeshTextTask(StyleTask):
         self.heads = head("colours", config.width, 3), head("offsets", config.width, 1)
         return {k: v for part in (self.trunk, *self.heads) for k, v in part.weights(generator).items()}
 
-    def style(self) -> tuple[torch.Tensor, torch.Tensor]:
-        features = self.trunk(self.named, encoded(self.points, self.waves))
+    def style(self, step: int | None = None) -> tuple[torch.Tensor, torch.Tensor]:
+        weights = opened(self.waves, share_open(self.config, step))
+        features = self.trunk(self.named, encoded(self.points, self.waves, weights))
         colour, height = (part(self.named, features) for part in self.heads)
         return colours(colour), self.config.text_relief * height.tanh() * self.normals

@@ -37,7 +37,7 @@ class XMeshTask(StyleTask):
         gates = [gate.weights(generator, config.gate_start) for gate in self.gates]
         return {name: value for part in (*layers, *gates) for name, value in part.items()}
 
-    def style(self) -> tuple[torch.Tensor, torch.Tensor]:
+    def style(self, step: int | None = None) -> tuple[torch.Tensor, torch.Tensor]:
         features = self.trunk(self.named, encoded(self.places, self.waves))
         for gate in self.gates:
             features = gate(self.named, features, self.text[0])
