@@ -1,14 +1,14 @@
 """Measures how textures of `nca` flow on meshes: where to, how fast, and what is left of the look.
 
-usage: python tools/compare_motion.py MOVING[:STILL] ... [--fields F ...] [--meshes M ...]
+usage: python tools/compare_motion.py MOVING[:STILL] ... [--fields F ...] [--meshes M ...] [--judge J]
 
 MOVING and STILL are models, run folders or bundled names; STILL is the texture that MOVING was trained from.
 Without it the look is not compared, as of textures from words, which have no exemplar.
-Close-ups of the albedo, four pixels an edge of the cells' mesh, are taken some steps apart. Lucas and
-Kanade's method estimates the motion between them, which is compared with that of the field, where that is at
-least a fifth of its mean. The look is compared with the exemplar, by the Frechet distance of VGG-16's
-features at relu2_2, some steps after the pattern is in order, as a multiple of the still texture's. Prints a
-Markdown table.
+Close-ups of the albedo, four pixels an edge of the cells' mesh, are taken some steps apart. The judge, Lucas
+and Kanade's method or the flow network (--judge flow), estimates the motion between them, which is compared
+with that of the field, where that is at least a fifth of its mean. The look is compared with the exemplar, by
+the Frechet distance of VGG-16's features at relu2_2, some steps after the pattern is in order, as a multiple
+of the still texture's. Prints a Markdown table.
 """
 
 from __future__ import annotations
@@ -17,12 +17,13 @@ import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import torch
 
 from mitex.evaluation.metrics import single_image_frechet
-from mitex.evaluation.motion import measured_motion
+from mitex.evaluation.motion import Judge, measured_motion
 from mitex.exemplar import Exemplar
 from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh, icosphere
@@ -98,7 +99,7 @@ class CloseUps:
 
 
 def motion_of(
-    texture: NcaTexture, closeups: CloseUps, field: str, later: tuple[int, ...]
+    texture: NcaTexture, closeups: CloseUps, field: str, later: tuple[int, ...], judge: Judge = "lucas-kanade"
 ) -> tuple[float, float, list[float]]:
     """Direction error [degrees], speed ratio, and distances from the exemplar after so many steps each."""
     guided = texture.look.rule.condition or carried(texture.look, texture.about)  # else as it was trained
@@ -109,7 +110,7 @@ def motion_of(
     vectors = cell_vectors(mesh, mesh, field, 1.0).astype(np.float64)
     films = np.stack(list(film(growth, state, closeups)), axis=1)
     errors = [
-        measured_motion(frames, motion, moving, steps=STEPS, period=period(texture.about))
+        measured_motion(frames, motion, moving, steps=STEPS, period=period(texture.about), judge=judge)
         for frames, motion, moving in zip(
             films, closeups.target(vectors), closeups.moving(vectors), strict=True
         )
@@ -156,6 +157,7 @@ def main() -> None:
     parser.add_argument("models", nargs="+")
     parser.add_argument("--fields", nargs="+", default=["right", "about-x", "shear-up"])
     parser.add_argument("--meshes", nargs="+", default=[SPHERE, "octopus", "vase"])
+    parser.add_argument("--judge", choices=get_args(Judge), default="lucas-kanade")
     arguments = parser.parse_args()
     later = " | ".join(f"look after {steps:,}" for steps in LATER)
     print(f"| texture | mesh | field | direction | speed | {later} |\n" + "| --- " * (5 + len(LATER)) + "|")
@@ -166,7 +168,9 @@ def main() -> None:
             moving, *still = (NcaTexture.load(name) for name in pair.split(":"))
             reference = still_distance(still[0], closeups) if still else 1.0
             for field in arguments.fields:
-                direction, ratio, looks = motion_of(moving, closeups, field, LATER if still else ())
+                direction, ratio, looks = motion_of(
+                    moving, closeups, field, LATER if still else (), arguments.judge
+                )
                 numbers = " | ".join([f"{look / reference:.2f}" for look in looks] or [""] * len(LATER))
                 names = f"{moving.about['name']} | {Path(mesh_name).stem} | {field}"
                 print(f"| {names} | {direction:.0f}° | {ratio:.2f} | {numbers} |", flush=True)

@@ -1,8 +1,10 @@
-"""How well a texture moves as it should, seen in rendered frames by a method without a trained network."""
+"""How well a texture moves as it should, seen in rendered frames."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import torch
@@ -10,7 +12,9 @@ import torch.nn.functional as F
 
 from mitex.colour import LUMINANCE
 from mitex.errors import ConfigError, ImageError
-from mitex.features.flow import lucas_kanade, smaller_eigenvalue
+from mitex.features.flow import flow_network, lucas_kanade, smaller_eigenvalue
+
+Judge = Literal["lucas-kanade", "flow"]
 
 LEAST_SPEED = 0.05  # of the mean speed: slower targets have no direction that counts
 DETAIL = 0.05  # smaller eigenvalue at which a pixel counts half
@@ -66,15 +70,20 @@ def motion_errors(motion: torch.Tensor, target: torch.Tensor, weight: torch.Tens
 
 
 def measured_motion(
-    frames: np.ndarray, target: np.ndarray, mask: np.ndarray, *, steps: float, period: float
+    frames: np.ndarray,
+    target: np.ndarray,
+    mask: np.ndarray,
+    *,
+    steps: float,
+    period: float,
+    judge: Judge = "lucas-kanade",
 ) -> MotionErrors:
     """How the texture in a film moves, beside how it should.
 
-    Lucas and Kanade's method estimates the motion from each frame to the next, which should be
-    (steps / period) * target. A pixel counts by the smaller eigenvalue e of its surroundings' structure
-    tensor, as e / (e + 0.05): not where the picture is plain or striped. Pixels outside the mask do not
-    count, nor those within 8 pixels of them, where the unmoving silhouette is seen, nor those whose target is
-    under 5 % of the mean speed.
+    The judge estimates the motion from each frame to the next, which should be (steps / period) * target. A
+    pixel counts by the smaller eigenvalue e of its surroundings' structure tensor, as e / (e + 0.05): not
+    where the picture is plain or striped. Pixels outside the mask do not count, nor those within 8 pixels of
+    them, where the unmoving silhouette is seen, nor those whose target is under 5 % of the mean speed.
 
     Args:
         frames: (N, H, W, 3) sRGB in [0, 1], N at least 2, of one unmoving view.
@@ -82,6 +91,8 @@ def measured_motion(
         mask: (H, W), above 0 where the surface is seen and its motion counts.
         steps: of the automaton from one frame to the next, so few that nothing moves by more than 4 pixels.
         period: steps of the automaton in a unit of time.
+        judge: Lucas and Kanade's method, which has no weights, or the flow network. The one that a texture
+            was not trained by is the fairer.
 
     Raises:
         ImageError: frames of another shape, or smaller than 32 x 32 pixels.
@@ -105,12 +116,21 @@ def measured_motion(
     grey = torch.from_numpy(frames @ LUMINANCE)[:, None]
     first, second = grey[:-1], grey[1:]
     expected = torch.tensor(target).movedim(2, 0)[None] * (steps / period)
+    estimate = _estimate(judge)
     with torch.no_grad():
         pairs = zip(first.split(1), second.split(1), strict=True)  # a film at once may not fit in memory
-        motion = torch.cat([lucas_kanade(*pair) for pair in pairs])
+        motion = torch.cat([estimate(*pair) for pair in pairs])
         detail = torch.cat([smaller_eigenvalue(frame) for frame in first.split(1)]).clamp_min(0)
     weight = _counting(expected, torch.tensor(mask)) * detail / (detail + DETAIL)
     return motion_errors(motion, expected.expand_as(motion), weight)
+
+
+def _estimate(judge: Judge) -> Callable[[torch.Tensor, torch.Tensor], torch.Tensor]:
+    """From two frames (1, 1, H, W) to the motion between them (1, 2, H, W) [px]."""
+    if judge == "lucas-kanade":
+        return lucas_kanade
+    network = flow_network()
+    return lambda first, second: network(torch.cat([first, second], 1))
 
 
 def _counting(target: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:

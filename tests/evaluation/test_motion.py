@@ -40,6 +40,15 @@ def test_a_turned_target(degrees):
     assert errors.speed_ratio == pytest.approx(1, abs=0.02)
 
 
+def test_the_flow_network_as_the_judge(monkeypatch):
+    """It agrees with Lucas and Kanade's method, which it does without."""
+    by_default = measured_motion(FRAMES, constant(3.0, 2.0), MASK, steps=3, period=10)
+    monkeypatch.setattr("mitex.evaluation.motion.lucas_kanade", None)
+    errors = measured_motion(FRAMES, constant(3.0, 2.0), MASK, steps=3, period=10, judge="flow")
+    assert errors.direction < 5 and 0.85 < errors.speed_ratio < 1.15
+    assert errors.direction != by_default.direction
+
+
 def test_a_texture_that_is_too_fast():
     errors = measured_motion(FRAMES, constant(0.6, 0.4), MASK, steps=1, period=1)
     assert errors.direction < 1 and errors.speed_ratio == pytest.approx(1.5, abs=0.03)

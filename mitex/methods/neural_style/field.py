@@ -87,7 +87,7 @@ def encoded(points: torch.Tensor, waves: torch.Tensor, weights: torch.Tensor | N
 
 
 def opened(waves: torch.Tensor, share: float) -> torch.Tensor:
-    """(M,) weights from 0 to 1 of waves (M, 3), a share of which is open, the slowest first (Hertz et al. 2021).
+    """(M,) weights from 0 to 1 of waves (M, 3); a share is open, the slowest first (Hertz et al. 2021).
 
     Args:
         waves: [cycles a unit of the places].

@@ -13,8 +13,8 @@ from mitex.methods.neural_style.task import StyleTask
 class Text2MeshTextTask(StyleTask):
     """A network whose colours, and offsets along the normals, shall make views of a mesh be what words say.
 
-    As published, but for two things: waves are opened the slowest first, where the authors' code sorts their axes
-    in place of them; and outlines have no derivatives, shading alone.
+    As published, but for two things: waves are opened the slowest first, where the authors' code sorts
+    their axes in place of them; and outlines have no derivatives, shading alone.
     """
 
     method = METHOD.name
