@@ -5,8 +5,8 @@ and changes the texels by gradients that went through the light. The loss is one
 
 - transport: relaxed optimal transport of features (MeshNCA, equation 4),
 - gram: Gram matrices of features (Gatys et al. 2015),
-- motion: the start is the exemplar laid over the UVs, and what is fitted is the picture of a moment later, in
-  which the texture has turned about the vase (MeshNCA, equation 13).
+- motion: starts from the exemplar laid over the UVs, and fits a picture of the texture a moment later, turned
+  about the vase (MeshNCA, equation 13).
 
 Run it as
 

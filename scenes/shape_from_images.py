@@ -2,7 +2,7 @@
 
 usage: python scenes/shape_from_images.py [OUT.png]
 
-The picture shows the pictures' shape, the ball that the search starts from, and what it found.
+OUT.png shows the true shape, the ball that the search starts from, and what it found.
 """
 
 import sys

@@ -1,8 +1,8 @@
 """A Mitsuba scene with the plugins `texel_field` and `feature`: a vase painted on the texels of its UVs.
 
 The map has eight channels: a colour, a roughness, a height, and the colour of the chart that a texel belongs
-to. `texel_field` hands the first five to a principled BSDF below a bump map; since it knows the charts, it
-filters without mixing neighbours in the map that are none on the vase. Run it as
+to. `texel_field` hands the first five to a principled BSDF below a bump map; since it knows the charts,
+its filter never mixes texels that are not neighbours on the vase. Run it as
 
     python scenes/texel_field.py [OUT.png]
 
