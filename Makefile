@@ -45,6 +45,7 @@ bench: $(STAMP)
 	OMP_WAIT_POLICY=PASSIVE $(VENV)/bin/python -m benchmarks.nca_text
 	$(VENV)/bin/python -m benchmarks.surface
 	$(VENV)/bin/python -m benchmarks.baselines
+	$(VENV)/bin/python -m benchmarks.batch
 	$(VENV)/bin/python -m benchmarks.geometric
 	$(VENV)/bin/python -m benchmarks.busy
 	$(VENV)/bin/python -m benchmarks.flow
