@@ -150,6 +150,12 @@ BAD = {
         "",
         "5 pictures to work with",
     ),
+    "a phone's photos": (
+        lambda d: bad.text(write_photos(d / "photos", PICTURES) / "IMG_1.HEIC"),
+        "photos",
+        "",
+        "IMG_1.HEIC is a HEIC photo, which Mitex cannot read; export photos as JPEG",
+    ),
     "a damaged photo": (
         lambda d: bad.cut(shots(d) / "p03.jpg"),
         "photos",

@@ -21,7 +21,7 @@ from mitex.methods.nerf.capture.transforms import ONE_FILE, Frame
 from mitex.methods.nerf.footage.coverage import advice
 from mitex.methods.nerf.footage.mask_method import mask_method
 from mitex.methods.nerf.footage.pictures import Footage, footage
-from mitex.methods.nerf.footage.sharpest import faults, reasons, sharpest
+from mitex.methods.nerf.footage.sharpest import blurred_photos, faults, reasons, sharpest
 from mitex.methods.nerf.footage.site import Site, find_site
 from mitex.optional import optional
 from mitex.paths import atomic_write, check_writable, expanded, missing_folders, writing
@@ -119,7 +119,7 @@ def _picked(taken: Footage, frames: int, folder: Path) -> tuple[list[str], str]:
         write_image(folder / name, picture.pixels.astype(np.float32) / 255.0)
         images.append(name)
         qualities.append(quality)
-    verdicts = faults(qualities) if taken.video else [""] * len(qualities)
+    verdicts = (faults if taken.video else blurred_photos)(qualities)
     names = [name for name, verdict in zip(images, verdicts, strict=True) if not verdict]
     why = reasons(verdicts)
     if len(names) < MIN_VIEWS:

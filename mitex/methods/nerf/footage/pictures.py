@@ -17,6 +17,13 @@ from mitex.errors import CaptureError
 from mitex.images import SUFFIXES, read_bytes
 from mitex.paths import expanded
 
+PHONE_SUFFIXES = (".heic", ".heif", ".hif")
+HDR_TRANSFERS = (b"arib-std-b67", b"smpte2084")
+# White is where ITU-R BT.2408 puts that of a lit page, 203 cd/m^2; what is brighter is compressed.
+TO_SRGB = (
+    "zscale=t=linear:npl=203,format=gbrpf32le,zscale=p=bt709,tonemap=mobius:desat=0,"
+    "zscale=t=iec61966-2-1:m=gbr,format=gbrp"
+)
 VIDEO = "give an MP4 or MOV video, or a folder of PNG or JPEG photos"
 
 
@@ -67,11 +74,14 @@ def footage(source: str | Path, size: int) -> Footage:
         return _photos(path, size)
     if not path.is_file():
         raise CaptureError(f"{source} does not exist", VIDEO)
-    return Footage(path, _frame_count(path), True, lambda: _frames(path, size))
+    count, is_hdr = _stream(path)
+    return Footage(path, count, True, lambda: _frames(path, size, is_hdr))
 
 
 def _photos(folder: Path, size: int) -> Footage:
     inner = folder / "images" if (folder / "images").is_dir() else folder
+    if heic := sorted(path for path in inner.iterdir() if path.suffix.lower() in PHONE_SUFFIXES):
+        raise CaptureError(f"{heic[0]} is a HEIC photo, which Mitex cannot read", "export photos as JPEG")
     paths = sorted(path for path in inner.iterdir() if path.suffix.lower() in SUFFIXES and path.is_file())
     if not paths:
         raise CaptureError(f"{folder} holds no photos", VIDEO)
@@ -88,25 +98,25 @@ def _photos(folder: Path, size: int) -> Footage:
     return Footage(folder, len(paths), False, read)
 
 
-def _frame_count(path: Path) -> int:
-    """How many frames a video has, without decoding them."""
+def _stream(path: Path) -> tuple[int, bool]:
+    """How many frames a video has, without decoding them, and whether they are HDR (HLG or PQ)."""
     done = subprocess.run(
         [*_ffmpeg(path), "-c", "copy", "-f", "null", "-"], stdin=subprocess.DEVNULL, capture_output=True
     )
     counts = re.findall(rb"frame=\s*(\d+)", done.stderr)
     if done.returncode or not counts:
         raise CaptureError(f"{path} is not a video that ffmpeg can read", VIDEO)
-    return int(counts[-1])
+    return int(counts[-1]), any(name in done.stderr for name in HDR_TRANSFERS)
 
 
-def _frames(path: Path, size: int) -> Iterator[Picture]:
-    """Decoded frames; ffmpeg turns them upright."""
+def _frames(path: Path, size: int, is_hdr: bool) -> Iterator[Picture]:
+    """Decoded frames; ffmpeg turns them upright, and HDR to sRGB."""
     scale = f"scale='min({size},iw)':'min({size},ih)':force_original_aspect_ratio=decrease:flags=area"
     pipe = [
         "-fps_mode",
         "passthrough",
         "-vf",
-        scale,
+        f"{scale},{TO_SRGB}" if is_hdr else scale,
         "-pix_fmt",
         "rgb24",
         "-c:v",

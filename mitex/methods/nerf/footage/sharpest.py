@@ -1,4 +1,4 @@
-"""Which frames of a video to keep: sharp ones, from different places, of one brightness."""
+"""Which pictures to keep: sharp ones; of a video's frames those from different places, of one brightness."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from scipy import ndimage
 
 from mitex.colour import LUMINANCE
 from mitex.images import resize
+from mitex.methods.nerf.capture.capture import MIN_VIEWS
 from mitex.methods.nerf.footage.pictures import Picture
 
 NEIGHBOURS = 5  # windows on either side that a frame is compared with
@@ -81,6 +82,15 @@ def faults(qualities: Sequence[FrameQuality]) -> list[str]:
             verdict, last = "", one
         verdicts.append(verdict)
     return verdicts
+
+
+def blurred_photos(qualities: Sequence[FrameQuality]) -> list[str]:
+    """The same of photos in order, of which none but blurred ones go; never the first one, which a box may be
+    in, and none at all if too few would be left.
+    """
+    verdicts = ["blurred" if verdict == "blurred" else "" for verdict in faults(qualities)]
+    verdicts[:1] = [""] * len(verdicts[:1])
+    return verdicts if verdicts.count("") >= MIN_VIEWS else [""] * len(verdicts)
 
 
 def reasons(verdicts: Sequence[str]) -> str:

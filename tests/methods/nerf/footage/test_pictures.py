@@ -6,7 +6,7 @@ from PIL import Image
 
 from mitex.errors import CaptureError
 from mitex.methods.nerf.footage.pictures import footage
-from tests.methods.nerf.footage.films import write_film, write_photos
+from tests.methods.nerf.footage.films import write_film, write_hdr_film, write_photos
 
 LEVEL = np.full((48, 96, 3), 60, np.uint8)
 LEVEL[:, :24] = (200, 40, 40)  # red on the left
@@ -28,6 +28,16 @@ def test_a_video_that_a_phone_held_upright_took(tmp_path):
     (first, *_) = footage(write_film(tmp_path / "a.mp4", PICTURES, rotation=90), 400).read()
     assert first.pixels.shape == (96, 48, 3)
     assert first.pixels[80, 24, 0] > 150 and first.pixels[10, 24, 0] < 100
+
+
+@pytest.mark.parametrize("transfer", ["arib-std-b67", "smpte2084"])
+def test_hdr_videos_get_the_colours_of_others(tmp_path, transfer):
+    """HLG and PQ, as phones film: colours come back, but for the brightest, which are compressed."""
+    colours = [(30, 30, 30), (90, 90, 90), (128, 128, 128), (150, 60, 50), (60, 140, 70), (245, 245, 245)]
+    picture = np.repeat(np.array(colours, np.uint8), 16, axis=0)[None].repeat(64, axis=0)
+    (first, *_) = footage(write_hdr_film(tmp_path / "a.mp4", [picture] * 3, transfer), 400).read()
+    patches = np.stack([first.pixels[20:44, 16 * k + 4 : 16 * k + 12].mean((0, 1)) for k in range(6)])
+    assert np.abs(patches[:-1] - colours[:-1]).max() < 6 and 200 < patches[-1].mean() < 245
 
 
 def test_pictures_are_scaled_down_but_not_up(tmp_path):

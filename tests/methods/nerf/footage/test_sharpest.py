@@ -5,7 +5,7 @@ import pytest
 from scipy import ndimage
 
 from mitex.methods.nerf.footage.pictures import Picture
-from mitex.methods.nerf.footage.sharpest import faults, frame_quality, reasons, sharpest
+from mitex.methods.nerf.footage.sharpest import blurred_photos, faults, frame_quality, reasons, sharpest
 
 NOISE = np.random.default_rng(0).normal(size=(120, 700))
 WAVES = ndimage.gaussian_filter(NOISE, 1.0) + 8 * ndimage.gaussian_filter(NOISE, 8.0)
@@ -45,6 +45,21 @@ def test_flawed_frames_are_named():
     assert {k: v for k, v in enumerate(verdicts) if v} == {3: "blurred", 6: "exposure", 10: "alike"}
     assert reasons(verdicts) == "1 blurred, 1 too dark or too bright, 1 like the one before"
     assert reasons(["", ""]) == ""
+
+
+def test_blurred_photos_alone_go():
+    """Photos may be alike or lit in another way; one must stay if too few are left, and the first always."""
+    frames = [frame(24 * k, seed=k) for k in range(14)]
+    frames[0], frames[3], frames[6], frames[10] = (
+        frame(blur=25),
+        frame(72, blur=25),
+        frame(144, gain=0.5),
+        frame(217, seed=99),
+    )
+    qualities = [frame_quality(one) for one in frames]
+    assert [k for k, verdict in enumerate(blurred_photos(qualities)) if verdict] == [3]
+    assert not any(blurred_photos(qualities[:8])) and faults(qualities[:8])[3] == "blurred"
+    assert blurred_photos([]) == []
 
 
 def test_drift_of_the_exposure_is_no_flaw():
