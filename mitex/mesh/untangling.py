@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import logging
+import warnings
 
 import numpy as np
 
+from mitex.errors import MeshWarning
 from mitex.mesh import Mesh
 from mitex.mesh.matrices import ring_means
 from mitex.mesh.self_intersections import piercing_pairs
@@ -23,7 +25,8 @@ def untangled(before: Mesh, after: Mesh) -> Mesh:
     """A displaced mesh that pierces itself at most twice as often as the mesh without the displacement.
 
     Each round takes a part of the displacement of piercing faces, and less of that of the vertices around.
-    How many pairs of faces pierce each other before and after is logged.
+    How many pairs of faces pierce each other before and after is logged; a `MeshWarning` says so if more are
+    left.
 
     Args:
         before: the mesh without the displacement, with the faces of `after`.
@@ -55,4 +58,10 @@ def untangled(before: Mesh, after: Mesh) -> Mesh:
         first,
         own,
     )
+    if len(pairs) > ALLOWED * own:
+        warnings.warn(
+            f"{len(pairs)} pairs of faces of {after.name} still pierce each other, {own} without the relief",
+            MeshWarning,
+            stacklevel=2,
+        )
     return mesh
