@@ -8,7 +8,7 @@ is MESH with all faces split in four N times, MESH~N a remeshed copy with N face
 and `scene`, `torus` and `nut` are made up. RUNS is where the run folders go: finished ones are used again,
 begun ones go on. The sheet is docs/gallery/SHEET.jpg, a row for each exemplar: itself, and the mesh from two
 sides, or one side of each of its meshes or variants, in the order that they are given; the ratio across seams
-is printed.
+is printed, and the contrast of the texels.
 Settings change the synthesis, of one MESH=EXEMPLAR or of all (`resolution=512`, `triples=1`, ...);
 `maps=albedo` leaves out other maps, `content=ao` transfers the style, `scale_map=LOW:HIGH` lets the pattern's
 size grow evenly from the mesh's lowest point to its highest.
@@ -25,6 +25,7 @@ import numpy as np
 from machine_part import flanged_nut
 from PIL import Image, ImageDraw, ImageFont
 
+from mitex.evaluation.contrast import Contrast, contrast
 from mitex.evaluation.seams import seam_ratio
 from mitex.exemplar import Exemplar
 from mitex.exemplar import names as exemplar_names
@@ -115,6 +116,14 @@ def texture(exemplar: Exemplar, mesh: Mesh, run: Path, settings: dict[str, str])
     )
 
 
+def contrasts(result: surface.SurfaceTexture) -> Contrast:
+    """Of the texels that lie on the mesh."""
+    albedo = result.apply().maps["albedo"]
+    mask = np.zeros(albedo.shape[:2], bool)
+    np.put(mask, result.domain.texels.index, True)
+    return contrast(albedo, mask)
+
+
 def pictures(result: surface.SurfaceTexture, count: int, side: int) -> list[np.ndarray]:
     """The mesh from `count` of its sides, each picture with `side` pixels in rows and columns."""
     asset, sides = result.apply(), SIDES.get(result.mesh.name, OTHER_SIDES)[:count]
@@ -140,6 +149,7 @@ def main() -> None:
         result = texture(exemplar, mesh, run, settings)
         seams = seam_ratio(result.apply(), result.domain.texels.size)
         print(f"{run.name}: {result.about['seconds']} s, seams {seams:.3f}", flush=True)
+        print(f"  contrast {contrasts(result)}", flush=True)
         if exemplar_name != last:
             cells.append(exemplar.resized(side).maps["albedo"])
             labels.append(f"exemplar {exemplar.name}")
