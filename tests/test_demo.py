@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from mitex import demo
@@ -74,3 +75,35 @@ def test_a_run_in_the_folder_is_continued(tmp_path, monkeypatch, left):
     with pytest.raises(Stopped):
         demo.demo(demo.Path("~/demo"), seed=0)
     assert options["out"] == run and options["resume"] == bool(left)
+
+
+def test_the_seed_reaches_the_synthesis_and_the_models(tmp_path, monkeypatch, capsys):
+    made = []
+
+    class Synthesized:
+        def apply(self):
+            return "vase"
+
+    def fit(exemplar, mesh, out, **options):
+        made.append((mesh, options["seed"], options["resume"]))
+        return Synthesized()
+
+    def put(asset, source, mesh, out):
+        picture = np.zeros((16, 16, 3), np.float32)
+        return demo.Piece(source, mesh, picture, picture, [out / f"{mesh}.glb"])
+
+    monkeypatch.setattr(surface, "fit", fit)
+    monkeypatch.setattr(NcaTexture, "apply", lambda _, mesh, **options: made.append((mesh.name, options)))
+    monkeypatch.setattr(demo, "_put", put)
+    monkeypatch.setattr(demo, "MODELS", {"lava": "knot", "ceramic": "octopus"})
+    assert main(["demo", "--out", str(tmp_path), "--seed", "7", "--quiet"]) == 0
+    grown = {"seed": 7, "resolution": demo.RESOLUTION}
+    assert made == [("vase", 7, False), ("knot", grown), ("octopus", grown)]
+    names = [line.rpartition("/")[2] for line in capsys.readouterr().out.splitlines()]
+    assert names == ["vase.glb", "knot.glb", "octopus.glb", "demo.png"]
+
+
+@pytest.mark.parametrize("seed", ["-1", "4294967296"])
+def test_a_seed_out_of_range(seed, tmp_path, capsys):
+    assert main(["demo", "--out", str(tmp_path / "out"), "--seed", seed]) == 2
+    assert f"--seed {seed} is out of range" in capsys.readouterr().err and not (tmp_path / "out").exists()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -87,7 +88,7 @@ def test_masks_by_a_network(cameras, tmp_path, capsys):
 
 @pytest.mark.parametrize("mask", ["hull", "box:25,15,50,70", "colour:#28963c"])
 def test_masks_without_a_network(mask, cameras, tmp_path, capsys):
-    bare = [np.where(truth[..., None], picture, np.uint8(stage.WALL)) for picture, truth in SHOTS]
+    bare = [np.where(truth[..., None], picture, np.array(stage.WALL, np.uint8)) for picture, truth in SHOTS]
     write_photos(tmp_path / "photos", bare if mask.startswith("colour") else PICTURES)
     words = ["capture", str(tmp_path / "photos"), "--out", str(tmp_path / "a"), "--mask", mask, "--quiet"]
     assert main(words) == 0
@@ -213,6 +214,32 @@ def test_what_cannot_be_captured(cameras, name, files, capsys):
     make(files)
     out = [] if "--out" in words else ["--out", "out/new/capture"]
     check_refused(files, ["capture", source, *out, *words.split(), "--quiet"], message, capsys)
+
+
+def test_a_box_in_a_picture_without_a_camera(monkeypatch, files, capsys):
+    def without_the_first(folder, names):
+        whole = stage.structure(names, np.random.default_rng(0))
+        later = whole.sightings[whole.sightings[:, 0] > 0] - (1, 0)
+        return replace(whole, tree={"frames": whole.tree["frames"][1:]}, sightings=later)
+
+    monkeypatch.setattr(site, "VERSION", "without the first")  # of what is in the cache
+    monkeypatch.setattr(site, "reconstruct", without_the_first)
+    write_photos(files / "photos", PICTURES)
+    words = ["capture", "photos", "--out", "out/c", "--quiet", "--mask"]
+    message = "the first picture, which the box is in, got no camera; mask in another way"
+    check_refused(files, [*words, "box:25,15,50,70"], message, capsys)
+
+
+def test_too_few_masks(cameras, monkeypatch, files, capsys):
+    """A capture needs eight."""
+
+    def cut_out(site, pictures, *_):
+        return [mask & (k < 7) for k, (_, mask) in enumerate(SHOTS)]
+
+    monkeypatch.setattr("mitex.methods.nerf.footage.cutting.cut_out", cut_out)
+    write_photos(files / "photos", PICTURES)
+    message = f"only 7 of {stage.VIEWS} pictures could be masked; mask the object in another way"
+    check_refused(files, ["capture", "photos", "--out", "out/c", "--quiet"], message, capsys)
 
 
 def test_photos_that_do_not_overlap(monkeypatch, files, capsys):

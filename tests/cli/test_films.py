@@ -92,6 +92,24 @@ BAD_FILMS = {
     "bad weights": (animate("--graft lava --weights w"), "says nothing about weights"),
     "no mesh": (animate(mesh="none.obj"), "none.obj"),
     "no model": (animate(model="none"), "no model 'none'"),
+    "a length that is no number": (animate("--seconds nan"), "--seconds nan is out of range"),
+    "a great length": (animate("--seconds 3601"), "--seconds 3601 is out of range"),
+    "a negative length": (animate("--seconds -1"), "--seconds -1 is out of range"),
+    "no frames a second": (animate("--fps 0"), "--fps 0 is out of range"),
+    "many frames a second": (animate("--fps 61"), "--fps 61 is out of range"),
+    "a start before the seed": (animate("--start -1"), "--start -1 is out of range"),
+    "a late start": (animate("--start 10001"), "--start 10001 is out of range"),
+    "a small side": (animate("--resolution 15"), "--resolution 15 is out of range"),
+    "a great side": (animate("--resolution 4097"), "--resolution 4097 is out of range"),
+    "no samples": (animate("--renderer path --spp 0"), "--spp 0 is out of range"),
+    "many samples": (animate("--renderer path --spp 65537"), "--spp 65537 is out of range"),
+    "a great azimuth": (animate("--azimuth 361"), "--azimuth 361 is out of range"),
+    "a view from the pole": (animate("--elevation 86"), "--elevation 86 is out of range"),
+    "a view from far below": (animate("--elevation -86"), "--elevation -86 is out of range"),
+    "a view below the floor": (animate("--renderer path --elevation -1"), "--elevation -1 is out of range"),
+    "damage before the film": (animate("--damage y:0: --damage-at -1"), "--damage-at -1 is out of range"),
+    "damage too late": (animate("--damage y:0: --damage-at 3601"), "--damage-at 3601 is out of range"),
+    "damage never": (animate("--damage y:0: --damage-at nan"), "--damage-at nan is out of range"),
 }
 
 
@@ -157,6 +175,7 @@ BAD_GRAFTS = {
     "a speed of nothing": (graft("--weights y --speed 2"), "stands still, so that a speed means nothing"),
     "a great speed": (graft("--weights y --field up --speed 11"), "--speed 11 is out of range"),
     "steps": (graft("--weights y --steps 0"), "--steps 0 is out of range"),
+    "resolution of a PLY": (graft("--weights y --resolution 64"), "--resolution means nothing for .ply"),
 }
 
 

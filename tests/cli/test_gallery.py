@@ -62,3 +62,18 @@ def test_a_click_shows_a_geometric_texture_and_another_one_grows_on(tab):
     assert np.array_equal(tab.array("page.automaton.read()"), states)
     tab.run("page.draw()")
     assert np.abs(tab.picture() - grown).max() < 0.05 and tab.errors == []
+
+
+@pytest.mark.parametrize(
+    ("words", "names"), [("", ["knot", "shaderball", "octopus"]), ("--mesh good.obj", ["good"])]
+)
+def test_the_meshes(files, monkeypatch, words, names):
+    shown = []
+    monkeypatch.setattr("mitex.page.Content.write", lambda content, out: shown.append((content.data, out)))
+    model = {"name": "lava", "method": "nca", "thumbnail": None}
+    monkeypatch.setattr("mitex.cli.gallery.listing", lambda: [model])
+    assert main(f"gallery --out out/a.html {words}".split()) == 0
+    data, out = shown[0]
+    assert [mesh["name"] for mesh in data["meshes"]] == names
+    assert [look["name"] for look in data["looks"]] == ["lava"] and data["thumbnails"] == [None]
+    assert out == files / "out" / "a.html"

@@ -6,6 +6,7 @@ from mitex.batch.engines.dask_cluster import Dask
 from mitex.batch.engines.local import Local
 from mitex.batch.engines.slurm import Slurm
 from mitex.cli import main
+from tests.cli.handing_on import handed_on
 
 
 class Reached(Exception):
@@ -57,3 +58,12 @@ class TestOptions:
         engine, options = handed(command, words)
         assert isinstance(engine, Slurm) and (engine.at_once, engine.threads, options["threads"]) == (5, 8, 8)
         assert engine._options == {"slurm_partition": "cpu", "slurm_time": 90, "slurm_qos": "low"}
+
+
+@pytest.mark.parametrize(("words", "seeds"), [("", (5, 7)), ("--seeds 3", (0, 1, 2)), ("--seeds 1", (0,))])
+def test_seeds_in_place_of_the_plans(tmp_path, monkeypatch, words, seeds):
+    plan = 'exemplars = ["lava"]\nseeds = [5, 7]\n[methods.image_quilting]\nmeshes = ["vase"]\n'
+    (tmp_path / "plan.toml").write_text(plan)
+    command = f"compare --plan {tmp_path / 'plan.toml'} --out {tmp_path / 'out'} {words}"
+    (plan, *_), _ = handed_on(monkeypatch, "mitex.comparison.run.run_plan", command.split())
+    assert [part.seeds for part in plan.methods] == [seeds]

@@ -20,6 +20,10 @@ def tile(words="--tile 32 --tile-cells 8 --steps 1", model="pebbles", out="out/t
     return f"apply {model} --out {out} {words}".split()
 
 
+def surface(words):
+    return f"fit surface --exemplar lava --tile 64 --out out/run {words}"
+
+
 def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
@@ -62,6 +66,14 @@ def test_a_folder_of_any_asset(files, capsys):
     assert names(files / "out" / "spikes") == ["albedo.png", "mesh.mtl", "mesh.obj"]
 
 
+def test_a_folder_of_layers(files):
+    assert main(apply(f"{GROWN} --maps-format exr", out="out/maps/")) == 0
+    maps = ("albedo", "ambient_occlusion", "height", "normal", "roughness")
+    assert names(files / "out" / "maps") == sorted(
+        [*(f"{name}.exr" for name in maps), "mesh.mtl", "mesh.obj"]
+    )
+
+
 def test_variants_differ_by_their_seeds(files):
     assert main(apply(f"{GROWN} --steps 9 --seed 5 --variants 2".replace("--steps 1 ", ""))) == 0
     file = Glb(files / "out" / "a.glb")
@@ -86,6 +98,14 @@ REFUSALS = {
     "tile on a mesh": (apply("--tile 64", out="out/t"), "--tile and --mesh contradict"),
     "turned tile": (tile("--tile 64 --orientation 45"), "--tile and --orientation contradict"),
     "tile of two sizes": (tile("--tile 64 --resolution 64"), "--tile and --resolution contradict"),
+    "subdivided tile": (tile("--tile 64 --subdivide 2"), "--tile and --subdivide contradict"),
+    "scaled tile": (tile("--tile 64 --scale 2"), "--tile and --scale contradict"),
+    "width in a tile": (tile("--tile 64 --exemplar-width 0.5"), "--tile and --exemplar-width contradict"),
+    "colours of a tile": (tile("--tile 64 --vertex-colors"), "--tile and --vertex-colors contradict"),
+    "dense tile": (tile("--tile 64 --keep-dense"), "--tile and --keep-dense contradict"),
+    "displaced tile": (tile("--tile 64 --displace"), "--tile and --displace contradict"),
+    "relief of a tile": (tile("--tile 64 --relief 0.1"), "--tile and --relief contradict"),
+    "looks of a tile": (tile("--tile 64 --looks lava"), "--tile and --looks contradict"),
     "variants of a tile": (tile("--tile 64 --variants 2"), "--tile and --variants contradict"),
     "tile as a GLB": (tile("--tile 64", out="out/a.glb"), "--tile means nothing for .glb files"),
     "tile as a picture": (tile("--tile 64", out="out/a.png"), "--tile means nothing for .png files"),
@@ -108,6 +128,12 @@ REFUSALS = {
     "surface on both": ("fit surface --exemplar lava --tile 64 --mesh good.obj", "--tile and --mesh"),
     "surface on none": ("fit surface --exemplar lava", "--mesh is missing; give --mesh MESH, or --tile N"),
     "surface of a pixel": ("fit surface --exemplar lava --tile 1", "--tile 1 is out of range"),
+    "surface of two sizes": (surface("--resolution 64"), "--tile and --resolution contradict"),
+    "surface of words": ("fit surface --text red --tile 64", "--tile and --text contradict"),
+    "surface of a content": (surface("--content ao"), "--tile and --content contradict"),
+    "turned surface": (surface("--orientation field.npy"), "--tile and --orientation contradict"),
+    "surface of sizes": (surface("--scale-map sizes.npy"), "--tile and --scale-map contradict"),
+    "surface's own UVs": (surface("--keep-uvs"), "--tile and --keep-uvs contradict"),
     "surface uneven": ("fit surface --exemplar lava --tile 200 --out out/run", "use a multiple of 32"),
 }
 

@@ -9,6 +9,7 @@ import pytest
 from mitex.asset import clay
 from mitex.cli import main
 from mitex.mesh import icosphere
+from tests.cli.handing_on import handed_on
 from tests.cli.refusals import check_refused
 from tests.features.clip.folders import write_folder
 
@@ -37,6 +38,28 @@ def test_from_words_to_a_file(files, capsys):
     apply = "apply runs/red-dots-on-red --mesh ball.ply --out ball.glb --resolution 64 --steps 2 --quiet"
     assert main([*apply.split(), "--displace", "--subdivide", "1"]) == 0
     assert (files / "ball.glb").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("words", "given"),
+    [
+        ("", {"clip": None, "mesh": None, "init": None, "motion": None}),
+        (
+            "--clip clip --mesh ball.ply --init lava --motion right",
+            {"clip": "clip", "mesh": "ball", "init": "lava", "motion": "right"},
+        ),
+    ],
+)
+def test_options_reach_an_automaton_from_words(files, monkeypatch, words, given):
+    words = f"fit nca --text moss --quiet --out out --seed 4 --steps 9 --preset text {words}".split()
+    (text, out), options = handed_on(monkeypatch, "mitex.methods.nca.fit_text", words)
+    assert (text, out) == ("moss", Path("out"))
+    assert sorted(options.pop("set")) == ["seed=4", "steps=9"]
+    mesh = options.pop("mesh")
+    assert {**options, "mesh": mesh and mesh.name} == {
+        **{"preset": "text", "config": None, "on_step": None, "resume": False},
+        **given,
+    }
 
 
 FITS = {

@@ -144,6 +144,11 @@ class TestPlanFiles:
         assert message.format(place=place) in capsys.readouterr().err
         assert not (place / "out").exists()
 
+    def test_a_plan_without_meshes(self, place):
+        plan = Plan.of({"exemplars": ["lava"], "methods": {"nca": {"output": "glb"}}}, place)
+        with pytest.raises(ConfigError, match="there are no meshes to compare on; name some"):
+            prepared(plan)
+
     @pytest.mark.parametrize("name", presets())
     def test_the_papers_comparisons_have_jobs(self, name, tmp_path):
         plan = preset_plan(name, tmp_path)

@@ -8,12 +8,15 @@ from mitex.cli import main
 from mitex.mesh import Mesh
 from tests.methods.surface.grids import flat_square
 
+EXEMPLAR, WORDS = "--exemplar lava", "--text red --clip words"
 FITTINGS = {
-    "multi_view_gram": ("--exemplar lava", "baselines.multi_view_gram.fitting.MultiViewTask"),
-    "style_mesh": ("--exemplar lava", "baselines.style_mesh.fitting.StyleMeshTask"),
-    "text2mesh": ("--exemplar lava", "baselines.text2mesh.fitting.Text2MeshTask"),
-    "x_mesh": ("--text red --clip words", "baselines.x_mesh.fitting.XMeshTask"),
-    "surface": ("--exemplar lava", "surface.fitting.SurfaceTask"),
+    "multi_view_gram": (EXEMPLAR, "baselines.multi_view_gram.fitting.MultiViewTask"),
+    "style_mesh": (EXEMPLAR, "baselines.style_mesh.fitting.StyleMeshTask"),
+    "text2mesh": (EXEMPLAR, "baselines.text2mesh.fitting.Text2MeshTask"),
+    "text2mesh from words": (WORDS, "baselines.text2mesh.fitting.Text2MeshTextTask"),
+    "x_mesh": (WORDS, "baselines.x_mesh.fitting.XMeshTask"),
+    "surface": (EXEMPLAR, "surface.fitting.SurfaceTask"),
+    "surface from words": (WORDS, "surface.fitting.SurfaceTask"),
 }
 
 
@@ -22,13 +25,13 @@ class Reached(Exception):
 
 
 @pytest.mark.parametrize("kept", [True, False])
-@pytest.mark.parametrize("method", FITTINGS)
-def test_the_layout_is_kept_if_that_is_asked_for(method, kept, tmp_path, monkeypatch):
+@pytest.mark.parametrize("name", FITTINGS)
+def test_the_layout_is_kept_if_that_is_asked_for(name, kept, tmp_path, monkeypatch):
     """A quarter of the square that the mesh has for itself; a new layout uses most of it."""
     square = flat_square(4)
     assert square.uv is not None
     clay(Mesh(square.vertices, square.faces, uv=0.5 * square.uv)).export(tmp_path / "square.obj")
-    source, place = FITTINGS[method]
+    source, place = FITTINGS[name]
     layouts = []
 
     def task(*arguments, **_):
@@ -36,10 +39,9 @@ def test_the_layout_is_kept_if_that_is_asked_for(method, kept, tmp_path, monkeyp
         layouts.append(np.ptp(np.asarray(mesh.uv).reshape(-1, 2), axis=0).max())
         raise Reached
 
-    module, _, name = place.rpartition(".")
-    monkeypatch.setattr(f"mitex.methods.{module}.{name}", task)
+    monkeypatch.setattr(f"mitex.methods.{place}", task)
     monkeypatch.chdir(tmp_path)
-    words = f"fit {method} {source} --mesh square.obj --out run --quiet --set resolution=64"
+    words = f"fit {name.split()[0]} {source} --mesh square.obj --out run --quiet --set resolution=64"
     with pytest.raises(Reached):
         main([*words.split(), *(["--keep-uvs"] if kept else [])])
     assert (layouts[0] < 0.55) == kept

@@ -6,7 +6,8 @@ import sys
 
 import pytest
 
-from mitex.batch.engines.slurm import MOST_RETURNS, Slurm
+from mitex.batch.engines import WorkerLost
+from mitex.batch.engines.slurm import MOST_RETURNS, Slurm, _Queued
 from mitex.errors import ConfigError, MissingPackage, RuntimeUnavailable
 
 STEPS = 8
@@ -51,3 +52,19 @@ def test_without_slurm(workshop):
         workshop.run(workshop.plan(), engine=Slurm())
     assert not (workshop.folder / "out").exists()
     assert workshop.told("start") == []
+
+
+@pytest.mark.parametrize("kind", ["FailedJobError", "UncompletedJobError"])
+@pytest.mark.parametrize(("said", "reason"), [("it was\nkilled\n", "killed"), ("", "it says nothing")])
+def test_a_job_that_is_lost(kind, said, reason):
+    """Its last line says why."""
+    submitit = pytest.importorskip("submitit")
+
+    class Job:
+        job_id = "77_0"
+
+        def result(self):
+            raise getattr(submitit.core.utils, kind)(said)
+
+    with pytest.raises(WorkerLost, match=rf"job 77_0 of Slurm ended without a result \({reason}\)"):
+        _Queued(Job()).result()

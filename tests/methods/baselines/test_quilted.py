@@ -198,6 +198,14 @@ def test_damaged_files_are_refused(tmp_path, image, gap, why):
         QuiltedTexture.load(damaged)
 
 
+@pytest.mark.parametrize("light", [[np.nan] * 16, [0.0] * 15 + [np.inf]])
+def test_a_damaged_light_is_refused(tmp_path, light):
+    image = np.zeros((4, 4, 3), np.float32)
+    damaged = QuiltedTexture(image, 0.1, {"name": "flat", "light": light}).save(tmp_path / "flat.safetensors")
+    with pytest.raises(CheckpointError, match="a light that is not finite"):
+        QuiltedTexture.load(damaged)
+
+
 def test_a_fit_that_fails_leaves_nothing(tmp_path, monkeypatch):
     def black_hole(shell, patches):
         return np.full((*patches.faces.shape, 3), np.nan)

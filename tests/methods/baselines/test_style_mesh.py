@@ -199,6 +199,13 @@ def test_the_texture_comes_near(tmp_path):
     assert StyleMeshTexture.load(tmp_path / "run").about["mesh"] == "icosphere4"
 
 
+def test_the_texture_is_as_fine_as_the_resolution(exemplar):
+    for side in (32, 64):
+        texture = style_mesh.fit(exemplar, icosphere(4), set=SMALL | {"resolution": side}, steps=1)
+        assert texture.image.shape == (side, side, 3)
+        assert texture.apply().maps["albedo"].shape == (side, side, 3)
+
+
 def test_resuming_changes_nothing(exemplar, tmp_path):
     threads(1)
     style_mesh.fit(exemplar, icosphere(4), tmp_path / "whole", set=SMALL, steps=4)

@@ -136,6 +136,22 @@ def test_a_flat_colour_is_learned(tmp_path):
     assert Text2MeshTexture.load(tmp_path / "run").about["mesh"] == "icosphere4"
 
 
+def test_the_texture_is_as_fine_as_the_resolution(exemplar):
+    for side in (32, 48):
+        texture = text2mesh.fit(exemplar, icosphere(4), set=SMALL | {"resolution": side}, steps=1)
+        assert texture.image.shape == (side, side, 3)
+        assert texture.apply().maps["albedo"].shape == (side, side, 3)
+
+
+def test_a_texture_of_another_mesh_is_not_applied(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    ball = with_layout(icosphere(4), 32)
+    Text2MeshTexture(ball, np.zeros((32, 32, 3), np.float32), {"name": "lava"}).save("lava.safetensors")
+    assert main(["apply", "lava.safetensors", "--mesh", "vase", "--out", "a.glb", "--quiet"]) == 2
+    assert "this texture belongs to mesh 'icosphere4', not to 'vase'" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["lava.safetensors"]
+
+
 def test_resuming_changes_nothing(exemplar, tmp_path):
     threads(1)
     text2mesh.fit(exemplar, icosphere(4), tmp_path / "whole", set=SMALL, steps=4)

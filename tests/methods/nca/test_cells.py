@@ -5,9 +5,9 @@ import pytest
 
 from mitex.errors import ConfigError
 from mitex.geometry.triangles import interpolate
-from mitex.mesh import Mesh, icosphere, scattered_sphere, subdivide_loop, subdivide_midpoint
+from mitex.mesh import Mesh, grid, icosphere, scattered_sphere, subdivide_loop, subdivide_midpoint
 from mitex.methods.nca import cells
-from mitex.methods.nca.cells import Cells, check
+from mitex.methods.nca.cells import Cells, check, scale_of_width
 from tests.methods.nca.brute_force import patchwork
 
 
@@ -109,3 +109,22 @@ def test_a_smaller_pattern_has_as_many_more_cells():
     assert check(mesh, 4, 1.0) == 4 and check(mesh, 4, 20.0) == 4
     with pytest.raises(ConfigError, match="more than"):
         check(mesh, 4, 0.5)
+
+
+@pytest.mark.parametrize(("size", "levels"), [(1, 0), (50, 0), (1, 2)])
+def test_scale_of_an_exemplar_on_a_square(monkeypatch, size, levels):
+    """V even triangles' vertices on a square of side 1 are sqrt(2 / sqrt(3) / V) apart."""
+    monkeypatch.setattr(cells, "with_layout", lambda mesh, resolution: mesh)  # the square fills its layout
+    mesh = grid(9, 9)
+    mesh = mesh.with_vertices(size * mesh.vertices)
+    apart = (2 / 3**0.5 / (100 * 4**levels)) ** 0.5
+    assert scale_of_width(mesh, 0.5, 32.0, levels) == pytest.approx(0.5 / (32 * apart))
+
+
+def test_scale_of_an_exemplar_is_in_proportion():
+    """To its width, and to the inverse of the cells along it; more cells on the mesh are as much nearer."""
+    mesh = icosphere(3)
+    scale = scale_of_width(mesh, 0.5, 32.0, 0)
+    assert scale_of_width(mesh, 1.5, 32.0, 0) == pytest.approx(3 * scale)
+    assert scale_of_width(mesh, 0.5, 8.0, 0) == pytest.approx(4 * scale)
+    assert scale_of_width(mesh, 0.5, 32.0, 2) == pytest.approx(4 * scale)

@@ -110,6 +110,8 @@ def test_names_and_default():
         ("coordinates=waves,spirals", r"coordinates holds \['spirals'\]; use some of waves, barycentrics"),
         ("waves=0", "waves = 0"),
         ("wave_frequencies=", "wave_frequencies holds nothing"),
+        ("text_distances=", "text_distances holds nothing; give one or more"),
+        ("text_distances=2,1", "text_distances = 1"),
         ("wave_frequencies=2,-1", "wave_frequencies = -1"),
         ("wave_amplitude=-0.1", "wave_amplitude = -0.1"),
         ("decoder_width=0", "decoder_width = 0"),

@@ -12,7 +12,7 @@ from mitex.atlas import laid_out
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, grid, icosphere, subdivide_loop, subdivide_midpoint
 from mitex.methods.nca import NcaTexture, cells
-from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.cells import Cells, scale_of_width
 from mitex.methods.nca.orientation import rightwards
 from mitex.methods.nca.perception import perception
 from tests.methods.nca import tiny
@@ -247,6 +247,23 @@ def test_a_larger_scale_has_fewer_cells(texture):
     assert np.allclose(np.ptp(coarse.mesh.vertices, axis=0), 2, atol=0.1)
     dense = texture.apply(sphere, steps=1, subdivide=0, scale=1.4, keep_dense=True).mesh
     assert len(dense.vertices) == pytest.approx(642 / 1.4**2, rel=0.15)
+
+
+def test_the_exemplar_width_is_a_scale(sphere):
+    pytest.importorskip("pymeshlab")
+    texture = tiny.texture(ALL)
+    texture = NcaTexture(texture.look, {**texture.about, "density": 24})
+    scale = scale_of_width(sphere, 0.9, 24, 1)
+    assert scale != pytest.approx(1, abs=0.05)
+    options = {"steps": 5, "subdivide": 1, "resolution": None}
+    one, other = (
+        texture.apply(sphere, exemplar_width=0.9, **options),
+        texture.apply(sphere, scale=scale, **options),
+    )
+    for name in ALL:
+        assert np.array_equal(one.vertex_maps[name], other.vertex_maps[name])
+    plain = texture.apply(sphere, **options)
+    assert np.abs(one.vertex_maps["albedo"] - plain.vertex_maps["albedo"]).max() > 1e-3
 
 
 def test_open_mesh_with_several_components_and_loose_vertices(texture):

@@ -11,6 +11,7 @@ import torch
 from mitex.cache_entries import results
 from mitex.errors import CheckpointError, ConfigError, MitexError
 from mitex.mesh import grid, icosphere
+from mitex.mesh.self_intersections import piercing_pairs
 from mitex.methods import relief
 from mitex.methods.layout import layout_side, with_layout
 from mitex.methods.relief import ReliefConfig, ReliefTexture
@@ -120,11 +121,21 @@ def test_a_relief_grows_on_a_flat_plane(tmp_path):
     exemplar = DEPTH * waves("height").maps["height"].std()
     assert 0.5 < spread / exemplar < 2 and texture.plain.vertices[:, 2].std() == 0
     assert texture.about["depth"] == pytest.approx(DEPTH, rel=0.05)
-    assert texture.about["piercing_before"] == 0 <= texture.about["piercing"]
+    assert texture.about["piercing_before"] == 0
+    assert texture.about["piercing"] == len(piercing_pairs(texture.moved))
     assert (tmp_path / "run" / "previews" / "000060.png").is_file()
     grey = ReliefTexture.load(tmp_path / "run").apply()
     assert len(np.unique(grey.maps["albedo"])) == 1  # no exemplar's colours
     np.testing.assert_array_equal(grey.mesh.vertices, texture.moved.vertices)
+
+
+def test_faces_that_pierce_each_other_are_counted_on_the_moved_mesh_and_before(monkeypatch):
+    def pairs(mesh):
+        return range(2 if np.ptp(mesh.vertices[:, 2]) == 0 else 3)
+
+    monkeypatch.setattr("mitex.methods.relief.fitting.piercing_pairs", pairs)
+    about = relief.fit(waves("height", "normal"), grid(4, 4), set=FLAT, steps=1).about
+    assert (about["piercing_before"], about["piercing"]) == (2, 3)
 
 
 class TestMaps:
@@ -147,6 +158,10 @@ class TestMaps:
         assert asset.texture_maps is not None
         np.testing.assert_array_equal(asset.texture_maps["albedo"], texture.textures["albedo"])
         np.testing.assert_array_equal(asset.mesh.vertices, texture.moved.vertices)
+
+    def test_they_are_as_fine_as_the_resolution(self):
+        texture = relief.fit(waves(*ALL), icosphere(4), set=WITH_MAPS | {"resolution": 48}, steps=1)
+        assert texture.textures["albedo"].shape == texture.apply().maps["albedo"].shape == (48, 48, 3)
 
     def test_a_fit_in_memory_keeps_nothing(self):
         before = len(results())

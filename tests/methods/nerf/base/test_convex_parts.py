@@ -86,3 +86,10 @@ def test_names_the_extra_that_is_missing(monkeypatch):
     monkeypatch.setitem(sys.modules, "coacd", None)
     with pytest.raises(MissingPackage, match=r"pip install 'mitex\[nerf\]'"):
         convex_parts(icosphere(2), 0.1)
+
+
+def test_a_shape_without_pieces(monkeypatch):
+    coacd = pytest.importorskip("coacd")
+    monkeypatch.setattr(coacd, "run_coacd", lambda *_, **__: [])
+    with pytest.raises(MeshError, match="icosphere2 has no convex parts; give a base mesh"):
+        convex_parts(icosphere(2), 0.1)

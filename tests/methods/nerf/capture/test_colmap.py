@@ -157,6 +157,21 @@ def test_too_few_placed(photos, monkeypatch, model):
     assert_refused(photos, f"only {5 if model else 0} of 24 photos")
 
 
+@pytest.mark.parametrize("kind", [RuntimeError, ValueError])
+def test_colmap_fails(photos, monkeypatch, kind):
+    """It is told in one line, and COLMAP says as much as before."""
+
+    def extract(*_, **__):
+        raise kind("no\n  features")
+
+    pycolmap = pytest.importorskip("pycolmap")
+    level = pycolmap.logging.minloglevel
+    monkeypatch.setattr(colmap, "VERSION", f"failed {kind}")
+    monkeypatch.setattr(pycolmap, "extract_features", extract)
+    assert_refused(photos, "COLMAP failed (no features); find the cameras with another program")
+    assert pycolmap.logging.minloglevel == level
+
+
 def test_too_few_photos(tmp_path):
     (tmp_path / "images").mkdir()
     Image.new("RGB", (8, 8)).save(tmp_path / "images" / "one.jpg")

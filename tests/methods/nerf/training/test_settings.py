@@ -161,6 +161,22 @@ class TestEmptySpace:
             task.loss(0, torch.Generator().manual_seed(0))
 
 
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"coarsest": 33, "finest": 32}, "finest = 32 is coarser than 33; raise finest"),
+        ({"rays": 15, "rays_across": 4}, "rays = 15 are fewer than 4 x 4 of one pixel; raise rays"),
+    ],
+)
+def test_settings_that_contradict(settings, message):
+    with pytest.raises(ConfigError, match=message):
+        NerfConfig(**settings)
+
+
+def test_settings_that_just_fit():
+    NerfConfig(coarsest=32, finest=32, rays=16, rays_across=4)
+
+
 TESTED_ELSEWHERE = {
     "preset": "tests/training",
     "steps": "tests/training",
