@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mitex.errors import ConfigError
+from mitex.geometry.vectors import scatter_add
 from mitex.images import resize
 from mitex.quilting.matching import mirror
 
@@ -59,12 +60,7 @@ class GuideDistance:
     """
 
     def __init__(self, guide: Guide, count: int, size: tuple[int, int], patch: int, wrapped: bool) -> None:
-        colours, self.cells = guide.colours.shape[:2]
-        if colours != count or patch % self.cells:
-            raise ConfigError(
-                f"a guide with colours of {colours} patches in {self.cells} x {self.cells} blocks",
-                f"give those of all {count}, in a number of blocks that divides {patch} texels",
-            )
+        self.cells = _cells(guide, count, patch)
         self.patch, self.weight = patch, guide.weight
         self.colours = guide.colours.reshape(count, -1)
         beyond = (0, patch), (0, patch), (0, 0)
@@ -77,3 +73,50 @@ class GuideDistance:
         means = below.reshape(self.cells, block, self.cells, block, 3).mean((1, 3))
         target = np.stack([mirror(means, flip).ravel() for flip in flips])
         return self.weight * np.sqrt(np.square(self.colours - target[:, None]).mean(2))
+
+
+class SurfaceGuide:
+    """A picture that a texture on a surface shall resemble, for `mitex.quilting.surface.quilt_on`.
+
+    Args:
+        texels: (N, 3) sRGB in [0, 1], its colours at the target's texels.
+        colours: (P, G, G, 3) and
+        weight: as of `Guide`.
+        patch: side of a patch [texels], which G divides.
+
+    Raises:
+        ConfigError: as of `Guide`, or blocks that do not divide a patch.
+    """
+
+    def __init__(self, texels: np.ndarray, colours: np.ndarray, patch: int, weight: float = WEIGHT) -> None:
+        guide = Guide(texels[None], colours, weight)
+        self.count, self.patch, self.weight = len(guide.colours), patch, weight
+        self.cells = _cells(guide, self.count, patch)
+        self.texels, self.colours = guide.image[0], guide.colours.reshape(self.count, -1, 3)
+
+    def differences(self, texels: np.ndarray, where: np.ndarray) -> np.ndarray:
+        """(P,) weight times the root mean square of the colour differences, over blocks that hold texels.
+
+        Args:
+            texels: (M,) that a patch is going to cover.
+            where: (M, 2) their columns and rows in the patch.
+        """
+        block = self.patch // self.cells
+        column, row = np.clip(np.rint(where).astype(np.int64) // block, 0, self.cells - 1).T
+        number = row * self.cells + column
+        counts = np.bincount(number, minlength=self.cells**2)
+        sums = scatter_add(number, self.texels[texels], self.cells**2)
+        held = counts > 0
+        means = sums[held] / counts[held, None]
+        return self.weight * np.sqrt(np.square(self.colours[:, held] - means).mean((1, 2)))
+
+
+def _cells(guide: Guide, count: int, patch: int) -> int:
+    """Blocks along the side of a patch, if the guide's colours are of as many patches, and fit them."""
+    colours, cells = guide.colours.shape[:2]
+    if colours != count or patch % cells:
+        raise ConfigError(
+            f"a guide with colours of {colours} patches in {cells} x {cells} blocks",
+            f"give those of all {count}, in a number of blocks that divides {patch} texels",
+        )
+    return cells

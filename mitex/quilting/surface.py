@@ -17,6 +17,7 @@ from mitex.errors import ConfigError
 from mitex.geometry.vectors import scatter_add
 from mitex.progress import announce
 from mitex.quilting.block_matching import BlockMatcher, block_means
+from mitex.quilting.guide import SurfaceGuide
 from mitex.quilting.matching import BLOCK, Source
 from mitex.quilting.plane import NEAREST, Quilt
 from mitex.quilting.repetition import EVENNESS, Repetition
@@ -34,8 +35,9 @@ def quilt_on(
     rng: np.random.Generator,
     *,
     nearest: int = NEAREST,
-    evenness: float = EVENNESS,
+    evenness: float | None = None,
     interpolated: bool = True,
+    guide: SurfaceGuide | None = None,
 ) -> Quilt:
     """Synthesizes a texture on a surface.
 
@@ -44,27 +46,38 @@ def quilt_on(
         target: the surface.
         rng: of all choices.
         nearest: candidates for a place, among which chance decides; doubled until one is allowed.
-        evenness: how much repetition is avoided, see `Repetition`.
+        evenness: how much repetition is avoided, see `Repetition`; None: nothing with a guide, which may ask
+            for a few patches all over, else `EVENNESS`.
         interpolated: values lie between those of a patch's texels, which takes fine grain from pictures;
             instead of being the nearest ones.
+        guide: a picture that the texture shall resemble.
 
     Returns:
         The texture in the target's map.
 
     Raises:
-        ConfigError: a number is out of range, or the patches cannot be used.
+        ConfigError: a number is out of range, the guide is of other patches, or these cannot be used.
     """
+    if evenness is None:
+        evenness = EVENNESS if guide is None else 0.0
     if nearest < 1:
         raise ConfigError(f"{nearest} candidates", "use 1 or more")
     matcher = BlockMatcher(source)
+    if guide is not None and guide.count != len(matcher.centres):
+        raise ConfigError(
+            f"a guide of {guide.count} patches for {len(matcher.centres)}", "give the colours of all of them"
+        )
     repetition = Repetition(matcher.centres, source.length, evenness)
     canvas = _Canvas(source, target, matcher.shape, _between if interpolated else _nearest)
     for texel in canvas.empty():
         place = canvas.beside(texel)
         costs = matcher.distances(*place.blocks())
-        costs = costs + (costs.mean() or 1.0) * repetition.penalties()
+        penalties = repetition.penalties()
+        if guide is not None:
+            penalties = penalties + guide.differences(place.texels, place.where)
+        costs = costs + (costs.mean() or 1.0) * penalties
         allowed = matcher.allowed(canvas.neighbours(place))
-        among = nearest if place.known.any() else costs.size
+        among = nearest if guide is not None or place.known.any() else costs.size
         index, _ = matcher.choose(costs[None], allowed, rng, among)
         canvas.paste(place, index)
         repetition.add(index)

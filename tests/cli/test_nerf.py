@@ -194,11 +194,11 @@ def test_where_patches_are_joined(files, run, monkeypatch, asked, quilting):
 
 APPLIED = {
     "quilting": ("--quilting sphere", "--quilting"),
-    "quilting and guide": ("--quilting surface --guide no.png", "--quilting surface and --guide"),
+    "quilting and guide": ("--quilting surface --guide no.png", "no.png"),
     "too fine for the surface": ("--size 128 --scale 0.05 --quilting surface", "use larger scales"),
     "lift": ("--lift 2", "--lift"),
     "size": ("--size 10", "--size"),
-    "size and guide": ("--size 128 --guide no.png", "--size and --guide"),
+    "size and guide": ("--size 128 --guide no.png", "--size and --guide in the plane"),
     "scale and guide": ("--scale 0.05 --guide guide.png", "use larger scales"),
     "density": ("--density 0", "--density"),
     "guide": ("--guide no.png", "no.png"),

@@ -13,6 +13,7 @@ from mitex.evaluation.seams import ratio_across
 from mitex.geometry.triangles import interpolate
 from mitex.images import bilinear
 from mitex.mesh import Mesh, grid, icosphere
+from mitex.quilting.guide import SurfaceGuide
 from mitex.quilting.matching import ArraySource
 from mitex.quilting.plane import Quilt
 from mitex.quilting.surface import quilt_on
@@ -193,3 +194,61 @@ def test_refusals():
         quilt_on(strands(), target, np.random.default_rng(0), nearest=0)
     with pytest.raises(ConfigError, match="evenness"):
         quilt_on(strands(), target, np.random.default_rng(0), evenness=-1.0)
+
+
+def levels(count: int = 40) -> ArraySource:
+    """Plain patches, from 0 to 1."""
+    value = np.linspace(0, 1, count, dtype=np.float32)[:, None, None, None]
+    return ArraySource(
+        np.broadcast_to(value, (count, PATCH, PATCH, 1)).copy(),
+        np.arange(2 * count).reshape(-1, 2) * 100.0,
+        1.0,
+    )
+
+
+def shades(source: ArraySource) -> np.ndarray:
+    """(P, 2, 2, 3) colours of plain patches."""
+    return np.broadcast_to(source.values.mean((1, 2))[:, None, None], (len(source.values), 2, 2, 3))
+
+
+@pytest.mark.parametrize("weight", [0.0, 20.0])
+def test_a_guide_decides_what_is_where(weight):
+    """Bright above and dark below, across all charts of a ball."""
+    ball, source, side = icosphere(8), levels(), 240
+    mesh = replace(ball.with_vertices(3 * ball.vertices), uv=unwrap(ball, side, 3))
+    target = SurfaceTarget(mesh, side, PATCH, GAP)
+    corners = target.mesh.vertices[target.mesh.faces[target.texels.face]]
+    height = interpolate(target.texels.barycentric, corners)[:, 1]
+    wanted = np.repeat((height > 0)[:, None], 3, axis=1).astype(np.float32)
+    guide = SurfaceGuide(wanted, shades(source), PATCH, weight)
+    quilt = quilt_on(source, target, np.random.default_rng(0), guide=guide)
+    values = quilt.features[..., 0].ravel()[target.texels.index]
+    clear = np.abs(height) > 0.5 * PATCH * GAP
+    likeness = np.corrcoef(values[clear], height[clear] > 0)[0, 1]
+    assert likeness > 0.9 if weight else abs(likeness) < 0.5
+
+
+def test_blocks_of_a_guide_by_hand():
+    """Those without texels do not count."""
+    colours = np.random.default_rng(0).random((3, 2, 2, 3)).astype(np.float32)
+    texels = np.random.default_rng(1).random((5, 3)).astype(np.float32)
+    guide = SurfaceGuide(texels, colours, 8, weight=2.0)
+    where = np.array(
+        [[0.0, 1.0], [3.4, 0.2], [5.0, 2.0], [7.4, 7.0]]
+    )  # two in the first block, one in two more
+    chosen = np.array([0, 2, 3, 4])
+    means = [texels[[0, 2]].mean(0), texels[3], texels[4]]
+    for k, one in enumerate(colours):
+        blocks = [one[0, 0], one[0, 1], one[1, 1]]
+        squares = [np.square(b - m).mean() for b, m in zip(blocks, means, strict=True)]
+        assert guide.differences(chosen, where)[k] == pytest.approx(2 * np.sqrt(np.mean(squares)), rel=1e-5)
+
+
+def test_guides_of_other_patches_are_refused():
+    source = levels()
+    target = SurfaceTarget(replace(icosphere(3), uv=unwrap(icosphere(3), SIDE, 3)), SIDE, PATCH, GAP)
+    guide = SurfaceGuide(np.zeros((target.count, 3)), shades(source)[:7], PATCH)
+    with pytest.raises(ConfigError, match="a guide of 7 patches for 40"):
+        quilt_on(source, target, np.random.default_rng(0), guide=guide)
+    with pytest.raises(ConfigError, match="divides 32"):
+        SurfaceGuide(np.zeros((4, 3)), np.zeros((2, 5, 5, 3)), PATCH)

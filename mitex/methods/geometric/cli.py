@@ -91,11 +91,19 @@ class GrowthOptions:
     back dents that would meet in thin walls; or leave that to the generators, as published."""
 
     def check_growth(self, mesh: str) -> None:
+        """Refuses levels out of range, and what means nothing for the template.
+
+        Raises:
+            ConfigError: there is such an option.
+        """
         in_range("--start-level", self.start_level, 0, MAX_LEVELS - 1)
         in_range("--end-level", self.end_level, 0, MAX_LEVELS - 1)
         in_range("--remesh", self.remesh, *EVEN_VERTICES)
         for option, given in (("--field", self.field), ("--remesh", self.remesh)):
             mutually_exclusive("--mesh template", option, mesh == TEMPLATE and given is not None)
+        mutually_exclusive(
+            "--mesh template", "--placement none", mesh == TEMPLATE and self.placement == "none"
+        )
 
     def even_mesh(self, name: str) -> tuple[Mesh, np.ndarray | None]:
         """The mesh to be displaced, remeshed if that is asked for, and the field on it."""
@@ -149,8 +157,6 @@ class Apply(GrowthOptions, MeshOptions):
     def check(self) -> None:
         self.check_growth(self.mesh)
         in_range("--seed", self.seed, *SEEDS)
-        unplaced = self.mesh == TEMPLATE and self.placement == "none"
-        mutually_exclusive("--mesh template", "--placement none", unplaced)
         if self.untangle and self.mesh == TEMPLATE:
             raise ConfigError(
                 "--untangle draws back towards the mesh, and a template lies too deep", "leave it out"

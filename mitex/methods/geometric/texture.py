@@ -219,10 +219,13 @@ class GeometricTexture:
         return Rollout(generators, hierarchy, start, noise, remeasure, thick)
 
     def _placed(self, mesh: Mesh, level: int, placement: Placement, seed: int) -> np.ndarray:
-        """Vertices (V, 3) of a mesh with bumps like those that the generators up to a level make."""
+        """Vertices (V, 3) of a mesh with bumps like those that the generators up to a level make.
+
+        On the template, lower levels place them.
+        """
         if placement not in get_args(Placement):
             raise ConfigError(f"placement {placement!r}", f"use {' or '.join(get_args(Placement))}")
-        if placement == "none" or self.about.get("field"):
+        if placement == "none" or mesh is self.template or self.about.get("field"):
             return mesh.vertices
         with listening(None):
             reference = self.generate(start_level=self.levels, end_level=level)

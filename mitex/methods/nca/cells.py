@@ -75,11 +75,16 @@ def scale_of_width(mesh: Mesh, width: float, density: float, subdivide: int | st
         subdivide: as of `NcaTexture.apply`.
 
     Raises:
-        ConfigError: an option is out of range, or the mesh has no area.
+        ConfigError: an option or the scale is out of range, or the mesh has no area.
     """
     count = len(mesh.vertices) * 4 ** check(mesh, subdivide, 1.0)
     edge = math.sqrt(2 * float(mesh.face_areas.sum()) / (math.sqrt(3) * count))  # of even triangles
-    return width * layout_side(with_layout(mesh, RESOLUTION)) / (density * edge)
+    scale = width * layout_side(with_layout(mesh, RESOLUTION)) / (density * edge)
+    low, high = SCALES
+    if not low <= scale <= high:
+        problem = f"an exemplar_width of {width:g} is a scale of {scale:.3g} on '{mesh.name}'"
+        raise ConfigError(problem, f"use {low * width / scale:.2g} to {high * width / scale:.2g}")
+    return scale
 
 
 def check(mesh: Mesh, subdivide: int | str, scale: float) -> int:

@@ -99,9 +99,8 @@ class Apply(FieldOptions, MeshOptions):
         in_range("--size", self.size, 128, 8192)
         in_range("--density", self.density, *DENSITIES)
         in_range("--lift", self.lift, *LIFTS)
-        on_surface = self.quilting == "surface"
-        mutually_exclusive("--quilting surface", "--guide", on_surface and self.guide is not None)
-        mutually_exclusive("--size", "--guide", self.size is not None and self.guide is not None)
+        in_plane = self.guide is not None and self.quilting != "surface"
+        mutually_exclusive("--size", "--guide in the plane", self.size is not None and in_plane)
 
     def check_output(self, out: Path) -> None:
         super().check_output(out)

@@ -31,6 +31,7 @@ from mitex.methods.nerf.use.on_plane import SCALE, TextureOnPlane, plane
 from mitex.methods.nerf.use.placement import (
     EXTENT,
     UNWRAP_SIZE,
+    carried_picture,
     guided_side,
     in_scene_cube,
     own_layout,
@@ -38,9 +39,8 @@ from mitex.methods.nerf.use.placement import (
 )
 from mitex.methods.nerf.use.self_maps import self_maps
 from mitex.progress import announce
-from mitex.quilting.guide import WEIGHT, Guide
+from mitex.quilting.guide import WEIGHT, Guide, SurfaceGuide
 from mitex.quilting.plane import Quilt, quilt
-from mitex.quilting.repetition import EVENNESS
 from mitex.quilting.surface import quilt_on
 from mitex.quilting.target import SurfaceTarget
 
@@ -126,7 +126,9 @@ class NerfTexture(Captured):
         scale: float = 1.0,
         patches: int = 2000,
         pattern_rate: float = PATTERN_RATE,
-        evenness: float = EVENNESS,
+        guide: np.ndarray | None = None,
+        guide_weight: float = WEIGHT,
+        evenness: float | None = None,
     ) -> tuple[Mesh, LatentMaps]:
         """More of the texture, on a mesh: patches lie on its surface, across the borders of charts.
 
@@ -135,26 +137,35 @@ class NerfTexture(Captured):
             size: side of the maps, at most [texels]: where fewer texels are as fine as those of patches, they
                 do.
             scale: as of `apply`.
-            seed, patches, pattern_rate, evenness: as of `synthesize`.
+            seed, patches, pattern_rate, guide_weight, evenness: as of `synthesize`.
+            guide: a picture that it shall resemble from afar, (H, W, 3) sRGB in [0, 1], which lies once over
+                the unit square of the mesh's UVs (if nothing overlaps in them, else it is unwrapped).
 
         Returns:
             The mesh with new UVs, and the maps on these, for `apply`.
 
         Raises:
             MeshError: the mesh has no area.
-            ConfigError: a number is out of range, no patch fits, or `size` is too small for the scale.
+            ConfigError: a number is out of range, the guide is no picture, no patch fits, or `size` is too
+                small for the scale.
         """
         check_ranges(scale, density=1.0, lift=1.0)
         gap = texel_gap(self.model.base.mesh, pattern_rate) * scale
+        pictured = mesh if guide is None else laid_out(mesh, UNWRAP_SIZE)
         mesh, side = own_layout(mesh, gap, size)
         if side is None:
             raise too_fine(mesh, size)
+        picture = None if guide is None else carried_picture(guide, pictured, mesh, side)
         announce("taking patches of the texture")
         rng = np.random.default_rng(seed)
         squares = self.patches(rng, patches, pattern_rate)
         announce("laying the mesh flat around its points")
         target = SurfaceTarget(in_scene_cube(mesh)[0], side, PATCH, gap)
-        layout = quilt_on(self.source(squares), target, rng, evenness=evenness)
+        colours = None
+        if picture is not None:
+            texels = picture.reshape(-1, 3)[target.texels.index]
+            colours = SurfaceGuide(texels, render_patches(self.shell, squares, BLOCK), PATCH, guide_weight)
+        layout = quilt_on(self.source(squares), target, rng, evenness=evenness, guide=colours)
         return mesh, replace(self.maps(squares, layout), angle=target.map(angles_of(target)) + layout.angle)
 
     def source(self, squares: Patches) -> FeatureSource:
@@ -234,12 +245,13 @@ class NerfTexture(Captured):
                 `synthesize`; `size` is then as the mesh and `scale` ask.
             quilting: without `maps`, "surface" joins patches on the mesh itself, "plane" in the plane, as
                 published: then they follow the UVs, and break where these are cut. None: on the surface, but
-                in the plane with a guide or, with a warning, if `size` is too small for the scale.
+                in the plane with a guide or, with a warning, if `size` is too small for the scale. On the
+                surface, a guide is still seen through the mesh's UVs, and patches go across its borders.
 
         Raises:
             MeshError: the mesh has no area.
-            ConfigError: a number is out of range, the light has another shape or is not finite, a guide is
-                given for the surface, or `synthesize_on` refuses.
+            ConfigError: a number is out of range, the light has another shape or is not finite, or
+                `synthesize_on` refuses.
         """
         check_ranges(scale, density, lift)
         light_coefficients = self.light if light is None else checked_light(light)
@@ -250,7 +262,7 @@ class NerfTexture(Captured):
                 problem = f"{too_fine(mesh, size).problem}; it is quilted in the plane"
                 warnings.warn(problem, MeshWarning, stacklevel=2)
             else:
-                mesh, maps = self.synthesize_on(mesh, size, seed, scale=scale)
+                mesh, maps = self.synthesize_on(mesh, size, seed, scale=scale, guide=guide)
         if maps is None or maps.angle is None:
             mesh = laid_out(mesh, UNWRAP_SIZE)
         if maps is None:

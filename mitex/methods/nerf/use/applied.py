@@ -58,12 +58,10 @@ def checked_light(light: np.ndarray) -> mi.TensorXf:
 
 
 def joined_on_surface(quilting: str | None, guide: np.ndarray | None) -> bool:
-    """Whether patches are joined on the mesh; raises a ConfigError if the two do not go together."""
+    """Whether patches are joined on the mesh; raises a ConfigError if `quilting` is no place."""
     if quilting not in (None, "surface", "plane"):
         raise ConfigError(f"unknown quilting {quilting!r}", 'use "surface" or "plane"')
-    if quilting == "surface" and guide is not None:
-        raise ConfigError("a guide for quilting on the surface", 'use quilting="plane"')
-    return guide is None and quilting != "plane"
+    return quilting == "surface" or (quilting is None and guide is None)
 
 
 class AppliedTexture(Shell):

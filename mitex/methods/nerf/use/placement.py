@@ -9,8 +9,11 @@ import numpy as np
 
 from mitex.atlas import laid_out
 from mitex.errors import ConfigError, MeshError
+from mitex.geometry.triangles import interpolate
+from mitex.images import bilinear
 from mitex.mesh import Mesh, Similarity
 from mitex.methods.layout import layout_side
+from mitex.quilting.texels import FaceTexels
 
 EXTENT = 1 / 1.2  # largest half extent of the mesh in the scene cube
 UNWRAP_SIZE = 1024  # side of the map that charts are packed for [texels]
@@ -95,6 +98,28 @@ def own_layout(mesh: Mesh, gap: float, size: int) -> tuple[Mesh, int | None]:
     assert mesh.uv is not None
     # A texel beside the square's border is left free, so that lookups never read what is on the other side.
     return replace(mesh, uv=(mesh.uv * (side - 2) + 1) / side), side
+
+
+def carried_picture(picture: np.ndarray, pictured: Mesh, mesh: Mesh, side: int) -> np.ndarray:
+    """A picture over a mesh's UVs, on another layout of the same mesh: (side, side, 3), black beside charts.
+
+    Args:
+        picture: (H, W, 3).
+        pictured: the mesh with the UVs that it lies over.
+        mesh: the same faces, with the other UVs.
+        side: of the new picture [texels].
+
+    Raises:
+        ConfigError: it is no picture.
+    """
+    image = np.asarray(picture, np.float32)
+    if image.ndim != 3 or image.shape[2] != 3 or not image.size or not np.isfinite(image).all():
+        raise ConfigError(f"a guide of shape {image.shape}", "give a finite (H, W, 3) image")
+    texels = FaceTexels.rasterize(np.asarray(mesh.uv), side)
+    places = interpolate(texels.barycentric, np.asarray(pictured.uv)[texels.face])
+    carried = np.zeros((side * side, 3), np.float32)
+    carried[texels.index] = bilinear(image, places)
+    return carried.reshape(side, side, 3)
 
 
 def too_fine(mesh: Mesh, size: int) -> ConfigError:

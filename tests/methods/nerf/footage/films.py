@@ -25,7 +25,7 @@ def write_film(path: Path, pictures: Sequence[np.ndarray], rotation: int = 0) ->
 
 
 def write_hdr_film(path: Path, pictures: Sequence[np.ndarray], transfer: str) -> Path:
-    """A video as phones take it (10 bits, BT.2020), whose white is 203 cd/m^2; ffmpeg's name of the transfer."""
+    """A video as phones take it, of 10 bits, whose white is 203 cd/m^2; ffmpeg's name of the transfer."""
     height, width = pictures[0].shape[:2]
     raw = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r 10 -i -".split()
     srgb = "setparams=color_trc=iec61966-2-1:color_primaries=bt709:colorspace=gbr:range=pc,format=gbrp"

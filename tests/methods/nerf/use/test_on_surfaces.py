@@ -7,15 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mitex.atlas import usable_uv
+from mitex.atlas import laid_out, usable_uv
 from mitex.errors import ConfigError, MeshError, MeshWarning
 from mitex.evaluation.seams import ratio_across
+from mitex.geometry.triangles import interpolate
+from mitex.images import bilinear
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nerf import texture as texture_module
 from mitex.methods.nerf.texture import NerfTexture
 from mitex.methods.nerf.use.applied import AppliedTexture
-from mitex.methods.nerf.use.placement import own_layout
+from mitex.methods.nerf.use.placement import carried_picture, own_layout
 from mitex.quilting.plane import Quilt
+from mitex.quilting.surface import quilt_on
 from mitex.quilting.target import SurfaceTarget
 from tests.methods.nerf.small import small_texture
 
@@ -116,7 +119,7 @@ def test_too_fine_for_the_surface_it_is_quilted_in_the_plane(texture: NerfTextur
     ("options", "message"),
     [
         ({"quilting": "sphere"}, "unknown quilting"),
-        ({"quilting": "surface", "guide": np.zeros((4, 4, 3))}, 'quilting="plane"'),
+        ({"quilting": "surface", "scale": 2.0, "guide": np.zeros((4, 4))}, "a guide of shape"),
         ({"scale": 0.05, "size": 128, "quilting": "surface"}, "blurs them"),
         ({"scale": 0.0}, "`scale` 0 is out of range"),
     ],
@@ -147,3 +150,34 @@ def test_the_layout_is_the_maps_own():
     assert own_layout(ball, 0.01, 16)[1] is None
     assert own_layout(ball, 0.02, 100)[1] == 100
     assert own_layout(ball, 5.0, 100)[1] == 16
+
+
+def test_a_picture_on_another_layout():
+    """Seen through either, each point of the mesh has the same colour."""
+    first = laid_out(icosphere(4), 512)
+    uv = np.asarray(first.uv)
+    second = replace(first, uv=0.5 * uv[..., ::-1] + 0.25)
+    picture = np.random.default_rng(0).random((3, 3, 3)).astype(np.float32)
+    carried = carried_picture(picture, first, second, 400)
+    rng = np.random.default_rng(1)
+    face, weights = rng.integers(0, len(uv), 500), rng.dirichlet([2.0] * 3, 500)
+    seen = bilinear(carried, interpolate(weights, np.asarray(second.uv)[face]))
+    assert np.abs(seen - bilinear(picture, interpolate(weights, uv[face]))).max() < 0.02
+
+
+def test_a_guide_on_the_surface_decides_where_it_is_bright(texture: NerfTexture, monkeypatch):
+    """Its colours lie at the texels by the given UVs, and those of the patches beside them."""
+    guides = []
+
+    def quilt(source, target: SurfaceTarget, rng, *, guide, evenness):
+        guides.append((guide, target))
+        return quilt_on(source, target, rng, guide=guide, evenness=evenness)
+
+    monkeypatch.setattr(texture_module, "quilt_on", quilt)
+    mesh = laid_out(icosphere(3), 512)
+    half = np.zeros((2, 2, 3), np.float32)
+    half[:, 1] = 1
+    texture.synthesize_on(mesh, SIZE, scale=SCALE, patches=12, guide=half, guide_weight=3.0)
+    ((guide, target),) = guides
+    assert guide.count == len(guide.colours) <= 12 and guide.weight == 3.0
+    assert len(guide.texels) == target.count and 0.2 < guide.texels.mean() < 0.8
