@@ -236,14 +236,14 @@ PRESETS = {
 PRESETS["motion"] = replace(
     DEFAULT,
     preset="motion",
-    steps=300,
+    steps=600,
     pool=24,
     view_count=4,
     lr=5e-4,
-    milestones=(150, 240),
+    milestones=(300, 480),
     motion="right",
     motion_estimator="lucas-kanade",
-    motion_weight=0.25,
+    motion_weight=0.15,
     motion_period=6.0,
 )
 PRESETS["motion-paper"] = replace(
