@@ -11,6 +11,7 @@ from mitex.cli import main
 from mitex.methods.relief import ReliefTexture
 from tests.cli import bad_files as bad
 from tests.cli.refusals import check_refused
+from tests.methods.nca.text.tiny_text import SETTINGS as TEXT_SETTINGS
 from tests.methods.relief.waves import waves
 
 pytestmark = pytest.mark.usefixtures("own_cache")
@@ -46,6 +47,20 @@ def test_fit_resume_apply_render(files, capsys):
     assert len(written.mesh.faces) > 12 and written.maps.keys() == {"albedo"}
     assert np.abs(written.mesh.vertices.max(0) - texture.moved.vertices.max(0)).max() < 1e-4
     assert main(["render", "out/a.glb", "--out", "out/a.png", "--resolution", "32", "--spp", "1"]) == 0
+
+
+def test_from_words_by_a_tile_of_nca(files):
+    """The three commands of the guide: words to maps that repeat, and these to a relief."""
+    settings = " ".join((*TEXT_SETTINGS, "steps=2"))
+    text = f"fit nca --text red --clip words --out out/red --quiet --set {settings}"
+    assert main(text.split()) == 0
+    assert main(["apply", "out/red", "--tile", "64", "--steps", "2", "--out", "out/tile", "--quiet"]) == 0
+    maps = {path.stem for path in (files / "out" / "tile").glob("*.png")}
+    assert {"albedo", "height", "normal"} <= maps
+    assert main(fit(exemplar="out/tile", out="out/relief")) == 0
+    texture = ReliefTexture.load(files / "out" / "relief")
+    assert texture.textures.keys() == {"albedo"}
+    assert np.abs(texture.moved.vertices - texture.plain.vertices).max() > 0
 
 
 def test_untangling_starts_from_the_mesh_without_its_relief(files, monkeypatch):

@@ -29,7 +29,7 @@ from mitex.methods.nca.orientation import Orientation, Turn, cell_turns
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import lattice_perception
 from mitex.methods.nca.ranges import MOST_STEPS, square_cells
-from mitex.methods.nca.tile import flat_cells, tile_maps
+from mitex.methods.nca.tile import flat_cells, relief_normals, tile_maps
 from mitex.progress import announce
 
 STEPS = 200  # of models that do not say it; enough to cover a surface
@@ -245,7 +245,7 @@ class NcaTexture(GrowingTexture):
 
         Returns:
             Maps (N, N, c) float32 in [0, 1], row 0 on top, the exemplar's up upwards; they go on at their
-            opposite sides.
+            opposite sides. The relief of a texture from words is there as normals, too.
 
         Raises:
             ConfigError: options out of range, or a field as of `apply`.
@@ -256,7 +256,9 @@ class NcaTexture(GrowingTexture):
         motion = tile_motion(self.look, self.about, lattice, field, speed)
         growth = LookGrowth(self.look, cells_of_square, 0.0, self._palette, operator, motion)
         state = _healthy(growth, seed, self.steps if steps is None else steps)
-        return tile_maps(self.look, state, lattice, resolution, self._palette)
+        maps = tile_maps(self.look, state, lattice, resolution, self._palette)
+        bound = known_relief(self.about, self.look.maps)
+        return maps | {"normal": relief_normals(maps["height"], bound, lattice)} if bound else maps
 
     def grow(
         self,

@@ -7,11 +7,11 @@ import torch
 
 from mitex.errors import ConfigError
 from mitex.exemplar import MAPS
-from mitex.geometry.normal_maps import decode, encode
+from mitex.geometry.normal_maps import decode, encode, of_slopes
 from mitex.mesh import Lattice
 from mitex.methods.nca.bake import CHUNK, Grown
 from mitex.methods.nca.cells import Cells
-from mitex.methods.nca.decoder.surface import decoder_units
+from mitex.methods.nca.decoder.surface import EDGE, decoder_units
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.ranges import TILE_CELLS
@@ -40,6 +40,21 @@ def tile_maps(
             channels = values[..., list(columns)]
             maps[name][rows] = _unit(channels) if name == "normal" else channels
     return maps
+
+
+def relief_normals(height: np.ndarray, bound: float, lattice: Lattice) -> np.ndarray:
+    """The normal map (N, N, 3) of a height map (N, N, 1) that goes on at its opposite sides.
+
+    Args:
+        height: in [0, 1], of a texture from words.
+        bound: how far the height moves the surface at most [mean edges], as of `Displacement`.
+        lattice: which the maps show.
+    """
+    offsets = bound * EDGE * decoder_units(lattice.mesh).scale * (2 * height[..., 0].astype(np.float64) - 1)
+    across = 2 * lattice.columns / len(height)  # two pixels
+    right = (np.roll(offsets, -1, 1) - np.roll(offsets, 1, 1)) / across
+    up = (np.roll(offsets, 1, 0) - np.roll(offsets, -1, 0)) / across
+    return of_slopes(np.stack([right, up], axis=-1))
 
 
 class Sampled:

@@ -9,6 +9,7 @@ import pytest
 import torch
 
 from mitex.errors import ConfigError, TextureWarning
+from mitex.geometry.normal_maps import slopes
 from mitex.mesh import Lattice
 from mitex.methods.nca import MeshNCA, NcaTexture
 from mitex.methods.nca import texture as room
@@ -19,7 +20,7 @@ from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import harmonics, lattice_perception
-from mitex.methods.nca.tile import Sampled, flat_cells, tile_maps
+from mitex.methods.nca.tile import Sampled, flat_cells, relief_normals, tile_maps
 
 MAPS = ("albedo", "normal")
 SIDE = 64  # of maps [px]
@@ -219,3 +220,26 @@ def test_variants_share_mesh_and_layout():
     assert np.abs(one.vertex_maps["albedo"] - two.vertex_maps["albedo"]).max() > 1e-3
     single = texture.apply(sphere, seed=6, **options)
     assert np.array_equal(single.vertex_maps["albedo"], two.vertex_maps["albedo"])
+
+
+def test_normals_of_waves_that_repeat(lattice):
+    """A wave across and two upwards, whose slopes are known; none breaks at the border."""
+    side, bound = 256, 1.5
+    x, y = (np.arange(side) + 0.5) / side, 1 - (np.arange(side)[:, None] + 0.5) / side
+    height = 0.5 + 0.25 * np.cos(2 * np.pi * x) + 0.25 * np.cos(4 * np.pi * y)
+    normal = relief_normals(height[..., None].astype(np.float32), bound, lattice)
+    edge = float(lattice.mesh.edge_lengths.mean())
+    rate = -2 * np.pi / lattice.columns * bound * edge * 0.5
+    rises = np.stack(np.broadcast_arrays(rate * np.sin(2 * np.pi * x), 2 * rate * np.sin(4 * np.pi * y)), -1)
+    assert np.abs(slopes(normal) - rises).max() < 0.01 * np.abs(rises).max()
+
+
+def test_a_texture_from_words_has_normals_in_a_tile():
+    maps = {}
+    for about in ({"relief": 2.0}, {}):
+        model = Look(MeshNCA(), ("albedo", "height"), None, True)
+        model.initialise(torch.Generator().manual_seed(0), gain=0.5)
+        texture = NcaTexture(model, {"name": "words", "density": 8.0, "growth_steps": 3} | about)
+        maps[len(about)] = texture.tile(SIDE, cells=16)
+    assert maps[0].keys() == {"albedo", "height"} and maps[1].keys() == {"albedo", "height", "normal"}
+    assert np.array_equal(maps[1]["normal"], relief_normals(maps[1]["height"], 2.0, Lattice.of(16)))
