@@ -52,7 +52,9 @@ def test_a_relief_without_a_direction():
     assert 40 < measured.error < 50 and measured.coherence < 0.1
 
 
-@pytest.mark.parametrize(("name", "low", "high"), [("cactus", 0, 8), ("shingles", 60, 90), ("knobs", 35, 55)])
+@pytest.mark.parametrize(
+    ("name", "low", "high"), [("cactus", 0, 8), ("shingles", 60, 90), ("bricks", 55, 90), ("knobs", 35, 55)]
+)
 def test_references(name, low, high):
     """Ribs run along `up`, rows of shingles across it, and knobs neither."""
     relief = find_reference(name)

@@ -42,7 +42,7 @@ class Fit(DeviceOptions):
 
     reference: Annotated[str, arg(metavar="MESH|NAME")]
     """Mesh file (.obj .ply .stl .glb .gltf .off), or a reference by formula: spikes, scales, knobs, ridges,
-    craters, warts, cactus, shingles, woven."""
+    craters, warts, cactus, shingles, bricks, woven."""
 
     preset: Annotated[str | None, arg(metavar="fast|paper", help_behavior_hint="(default: fast)")] = None
     """Settings to start from: `fast`, or `paper`, which follows the publication."""

@@ -98,6 +98,18 @@ def shingles() -> Mesh:
     return _sphere(0.16 * (down - row) * np.clip(gap / 0.15, 0, 1), "shingles")
 
 
+def bricks() -> Mesh:
+    """A ball with 9 courses of bricks, staggered by half: they follow the field `about-y`, both ways."""
+    points = icosphere(FREQUENCY).vertices.astype(np.float64)
+    down = 9 * np.arccos(np.clip(points[:, 1], -1, 1)) / np.pi
+    row = np.minimum(np.floor(down), 8)
+    count = np.maximum(np.round(9 * np.sin(np.pi * (row + 0.5) / 9)), 2)  # bricks of a course
+    along = np.arctan2(points[:, 0], points[:, 2]) / (2 * np.pi) * count + 0.5 * (row % 2)
+    upright = np.abs(along - np.round(along)) * 2  # 0 in the middle of a joint, 1 on that of a brick
+    level = 1 - np.abs(2 * (down - row) - 1)
+    return _sphere(0.12 * np.minimum(np.clip(upright / 0.12, 0, 1), np.clip(level / 0.25, 0, 1)), "bricks")
+
+
 def woven() -> Mesh:
     """A ball of 18 strands that go over and under each other, six by six on each side of a cube around it."""
     points = icosphere(FREQUENCY).vertices.astype(np.float64)
@@ -119,6 +131,7 @@ REFERENCES: dict[str, Callable[[], Mesh]] = {
     "warts": warts,
     "cactus": cactus,
     "shingles": shingles,
+    "bricks": bricks,
     "woven": woven,
 }
 
