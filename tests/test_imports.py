@@ -77,7 +77,7 @@ IMPORTED = {
     "displacement": {"geometric"},
     "quilted": {"nerf"},
     "plain_field": {"nerf"},
-    "nerf_tex": {"nerf", "plain_field"},
+    "nerf_tex": {"nerf"},
 }
 SHARED = {"baselines", "neural_style", "words"} | {
     file.stem for file in (ROOT / "mitex" / "methods").glob("*.py")

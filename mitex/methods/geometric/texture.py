@@ -16,6 +16,7 @@ from mitex.errors import ConfigError
 from mitex.mesh import Mesh, subdivide_midpoint
 from mitex.mesh.fields import vector_field
 from mitex.mesh.untangling import untangled
+from mitex.methods.checks import in_range
 from mitex.methods.geometric import files
 from mitex.methods.geometric.borders import REACH, with_borders
 from mitex.methods.geometric.config import Placement
@@ -26,6 +27,7 @@ from mitex.methods.geometric.network import FaceNetwork
 from mitex.methods.geometric.placement import bumps, placed
 from mitex.methods.geometric.thickness import shallow, thickness
 from mitex.progress import counted, listening
+from mitex.ranges import SEEDS
 from mitex.runtime import keep_freed_memory
 
 START = 2  # the paper starts at level 2 or 3
@@ -223,6 +225,7 @@ class GeometricTexture:
 
         On the template, lower levels place them.
         """
+        in_range("`seed`", seed, *SEEDS)
         if placement not in get_args(Placement):
             raise ConfigError(f"placement {placement!r}", f"use {' or '.join(get_args(Placement))}")
         if placement == "none" or mesh is self.template or self.about.get("field"):

@@ -13,6 +13,7 @@ import numpy as np
 from mitex.atlas import laid_out
 from mitex.errors import MeshWarning
 from mitex.mesh import Mesh
+from mitex.methods.checks import in_range
 from mitex.methods.nerf import files
 from mitex.methods.nerf.ranges import SIZE
 from mitex.methods.nerf.synthesis.maps import LatentMaps, angles_of, latent_maps
@@ -43,6 +44,7 @@ from mitex.quilting.guide import WEIGHT, Guide, SurfaceGuide
 from mitex.quilting.plane import Quilt, quilt
 from mitex.quilting.surface import quilt_on
 from mitex.quilting.target import SurfaceTarget
+from mitex.ranges import SEEDS
 
 BLOCK = PATCH // 16  # a guide is compared with patches in 16 x 16 blocks
 
@@ -105,6 +107,7 @@ class NerfTexture(Captured):
         Raises:
             ConfigError: a number is out of range, the guide is no picture, or no patch fits.
         """
+        in_range("`seed`", seed, *SEEDS)
         announce("taking patches of the texture")
         rng = np.random.default_rng(seed)
         squares = self.patches(rng, patches, pattern_rate)
@@ -149,6 +152,7 @@ class NerfTexture(Captured):
             ConfigError: a number is out of range, the guide is no picture, no patch fits, or `size` is too
                 small for the scale.
         """
+        in_range("`seed`", seed, *SEEDS)
         check_ranges(scale, density=1.0, lift=1.0)
         gap = texel_gap(self.model.base.mesh, pattern_rate) * scale
         pictured = mesh if guide is None else laid_out(mesh, UNWRAP_SIZE)

@@ -136,6 +136,18 @@ def test_reliefs_without_bumps_and_those_that_follow_a_field_start_as_published(
     assert directed._placed(mesh, 2, "even", 0) is mesh.vertices
 
 
+def test_seeds_out_of_range_are_refused(texture):
+    with pytest.raises(ConfigError, match="`seed`"):
+        texture.apply(icosphere(2), seed=-1)
+
+
+def test_the_template_gets_no_bumps(texture, monkeypatch):
+    """There, lower levels place them: a film of it grows what `generate` makes."""
+    monkeypatch.setattr("mitex.methods.geometric.texture.bumps", None)
+    *_, last = texture.growth(texture.template, frames=1, seed=1, start_level=0, placement="even")
+    assert np.allclose(last.vertices, texture.generate(1).vertices)
+
+
 def test_an_unknown_placement_is_refused(texture):
     with pytest.raises(ConfigError, match="use even or none"):
         texture.apply(icosphere(2), placement="odd")

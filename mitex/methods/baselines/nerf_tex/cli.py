@@ -15,7 +15,7 @@ from mitex.methods.options import FieldOptions, MeshOptions, TrainingOptions
 from mitex.ranges import SCALES, SEEDS
 
 if TYPE_CHECKING:
-    from mitex.methods.baselines.plain_field.applied import AppliedField
+    from mitex.methods.nerf.use.applied_field import AppliedField
 
 
 @dataclass(kw_only=True)

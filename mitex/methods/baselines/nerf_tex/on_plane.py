@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mitex.methods.baselines.nerf_tex.instances import InstancedField
-from mitex.methods.baselines.plain_field.applied import AppliedField
+from mitex.methods.nerf.use.applied_field import AppliedField
 from mitex.methods.nerf.use.on_plane import PlaneRenderer
 
 

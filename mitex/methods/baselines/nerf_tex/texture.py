@@ -22,14 +22,14 @@ from mitex.methods.baselines.nerf_tex.instances import InstancedField
 from mitex.methods.baselines.nerf_tex.networks import Evaluator, network_of
 from mitex.methods.baselines.nerf_tex.on_plane import BoxesOnPlane
 from mitex.methods.baselines.nerf_tex.ranges import SPACINGS, TILTS
-from mitex.methods.baselines.plain_field.applied import AppliedField
 from mitex.methods.checks import in_range
 from mitex.methods.nerf.field.occupancy import packed_cells, unpacked_cells
 from mitex.methods.nerf.field.rendering import render_step
 from mitex.methods.nerf.ranges import DENSITIES, LIFTS
+from mitex.methods.nerf.use.applied_field import AppliedField
 from mitex.methods.nerf.use.on_plane import SCALE, plane
 from mitex.methods.nerf.use.placement import EXTENT, in_scene_cube
-from mitex.ranges import SCALES
+from mitex.ranges import SCALES, SEEDS
 from mitex.runtime import init
 from mitex.textures.march import DIAGONAL
 from mitex.training import model_file
@@ -134,6 +134,7 @@ class NerfTexTexture:
             MeshError: the mesh has no area.
             ConfigError: a number is out of range, the boxes are more than 50,000, or they are empty.
         """
+        in_range("`seed`", seed, *SEEDS)
         in_range("`scale`", scale, *SCALES)
         in_range("`spacing`", spacing, *SPACINGS)
         in_range("`tilt`", tilt, *TILTS)

@@ -14,7 +14,7 @@ from mitex.methods.options import FieldOptions, TrainingOptions
 from mitex.paths import expanded
 
 if TYPE_CHECKING:
-    from mitex.methods.baselines.plain_field.applied import AppliedField
+    from mitex.methods.nerf.use.applied_field import AppliedField
 
 
 @dataclass(kw_only=True)

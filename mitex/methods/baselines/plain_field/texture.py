@@ -14,13 +14,13 @@ import torch
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh, Similarity
 from mitex.methods.baselines.plain_field import METHOD
-from mitex.methods.baselines.plain_field.applied import AppliedField
 from mitex.methods.baselines.plain_field.config import PlainFieldConfig
 from mitex.methods.checks import in_range
 from mitex.methods.nerf.field.occupancy import packed_cells, unpacked_cells
 from mitex.methods.nerf.field.rendering import render_step
 from mitex.methods.nerf.ranges import DENSITIES
 from mitex.methods.nerf.training.plain import PlainField, hash_grid, parameter_shapes
+from mitex.methods.nerf.use.applied_field import AppliedField
 from mitex.runtime import init
 from mitex.runtime.jit import mi
 from mitex.runtime.upload import upload

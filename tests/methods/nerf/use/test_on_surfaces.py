@@ -122,6 +122,8 @@ def test_too_fine_for_the_surface_it_is_quilted_in_the_plane(texture: NerfTextur
         ({"quilting": "surface", "scale": 2.0, "guide": np.zeros((4, 4))}, "a guide of shape"),
         ({"scale": 0.05, "size": 128, "quilting": "surface"}, "blurs them"),
         ({"scale": 0.0}, "`scale` 0 is out of range"),
+        ({"seed": -1, "scale": 2.0}, "`seed` -1 is out of range"),
+        ({"seed": -1, "quilting": "plane"}, "`seed` -1 is out of range"),
     ],
 )
 def test_refusals(options: dict, message: str):
