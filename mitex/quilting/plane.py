@@ -64,7 +64,7 @@ def quilt(
         source: the patches.
         size: height and width [texels]; any.
         rng: of all choices.
-        flips: use mirrored patches too. Their frames are mirrored along, see `patches.mirror_frames`.
+        flips: use mirrored patches too; vectors that a user keeps for a patch have to be mirrored along.
         tileable: the last column and row also continue in the first.
         guide: a picture that the texture shall resemble.
         nearest: candidates for a place, among which chance decides; doubled until one is allowed.

@@ -128,7 +128,7 @@ class SurfaceDomain:
         return config.exemplar_side(self.mean_scale, self.layout_ratio)
 
     def target(self, patch: int) -> Target:
-        """What `mitex.quilting.quilt_on` covers with patches of `patch` texels, which lie as the taps do."""
+        """What `mitex.quilting.surface.quilt_on` covers with patches of `patch` texels, as the taps lie."""
         texels, steps = self.texels, self.steps
         turned = rotate_about(self.directions, self.mesh.normals.astype(np.float64), math.radians(self.angle))
         sizes = None

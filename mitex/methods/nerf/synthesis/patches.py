@@ -66,7 +66,7 @@ class Patches:
 
 @dataclass(frozen=True, eq=False)
 class FeatureSource:
-    """Patches of features for `quilting.quilt`, evaluated when asked for.
+    """Patches of features for `mitex.quilting.plane.quilt`, evaluated when asked for.
 
     Attributes:
         patches: where.
@@ -167,7 +167,7 @@ def mirror_frames(frames: np.ndarray, flip: np.ndarray) -> np.ndarray:
 
     Args:
         frames: (N, 3, 3), rows x, y and z.
-        flip: (N,) bits as in `quilting.Quilt`.
+        flip: (N,) bits as in `mitex.quilting.plane.Quilt`.
 
     Returns:
         (N, 3, 3), left-handed where one of the two is mirrored.
