@@ -12,7 +12,7 @@ from mitex import errors
 
 PACKAGE = Path(mitex.__file__).parent
 # What only the command line calls.
-SPOKEN = {"cli.py", "arguments.py", "options.py", "checks.py", "animation.py", "demo.py"}
+SPOKEN = {"cli.py", "growth_options.py", "options.py", "checks.py", "animation.py", "demo.py"}
 
 
 @pytest.mark.parametrize(

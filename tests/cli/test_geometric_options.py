@@ -39,10 +39,12 @@ def test_a_relief_on_a_mesh(files, monkeypatch):
     [("", "growth", ((9,), {"seed": 4})), ("--to-seed 6", "interpolate", (((4, 6), 9), {}))],
 )
 def test_frames(files, monkeypatch, mesh, words, method, given):
-    words = f"animate spikes --mesh {mesh} --out out/a.gif --frames 9 {GROWTH} {words}"
+    placement = "even" if mesh == "template" else "none"  # lower levels place the template's
+    growth = GROWTH.replace("none", placement)
+    words = f"animate spikes --mesh {mesh} --out out/a.gif --frames 9 {growth} {words}"
     (texture, shown, *more), options = handed_on(monkeypatch, f"{TEXTURE}.{method}", words.split())
     assert (shown is texture.template) == (mesh == "template")
-    assert tuple(more) == given[0] and options == {**given[1], "field": None, **GIVEN}
+    assert tuple(more) == given[0] and options == {**given[1], "field": None, **GIVEN, "placement": placement}
 
 
 def test_frames_from_the_template_begin_with_its_own_level(files, monkeypatch):

@@ -56,7 +56,7 @@ class TestViews:
     def test_they_show_the_colours_of_places(self, ball, exemplar, monkeypatch):
         """A field that is the place itself: the middle of a view from +z is the pole of the ball."""
         task = Text2MeshTask(CONFIG, exemplar, ball)
-        monkeypatch.setattr(task, "colours", lambda points: 0.5 + 0.5 * points)
+        monkeypatch.setattr(task, "colours", lambda points, *_: 0.5 + 0.5 * points)
         views, masks = task.views(orbit(1, elevation=0, distance=2.0, fov=60.0, resolution=49, start=90))
         assert torch.allclose(views[0, 24, 24], torch.tensor([0.5, 0.5, 1.0]), atol=0.02)
         assert views[0, 24, 40, 0] > 0.7 and views[0, 8, 24, 1] > 0.7
