@@ -48,8 +48,8 @@ def contrast(image: np.ndarray, mask: np.ndarray | None = None) -> Contrast:
             f"fewer than two squares of {SQUARE} x {SQUARE} texels count", "give a larger picture"
         )
     grey = image.astype(np.float64) @ LUMINANCE
-    inside = ndimage.binary_erosion(mask, np.ones((3, 3)), border_value=0)
-    difference = (grey - ndimage.uniform_filter(grey, 3))[inside]
+    inside = np.asarray(ndimage.binary_erosion(mask, np.ones((3, 3)), border_value=0), bool)
+    difference = np.asarray(grey - ndimage.uniform_filter(grey, 3))[inside]
     deviations = _squares(grey[..., None])[whole].std(1)[:, 0]
     means = _squares(image.astype(np.float64))[whole].mean(1)
     low, middle, high = np.quantile(deviations, QUANTILES)

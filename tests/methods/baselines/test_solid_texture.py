@@ -286,10 +286,12 @@ def test_the_width_goes_into_the_texture(exemplar):
     """Half as wide, the pattern is on a mesh what one of scale 2 is."""
     wide, narrow = (solid_texture.fit(exemplar, set=SMALL | {"width": w}, steps=1) for w in (0.5, 0.25))
     assert (wide.width, narrow.width) == (0.5, 0.25)
-    ball, options = icosphere(4), {"resolution": 16}
-    small = narrow.apply(ball, scale=2.0, **options).maps["albedo"]
-    assert np.array_equal(small, wide.apply(ball, **options).maps["albedo"])
-    assert not np.array_equal(narrow.apply(ball, **options).maps["albedo"], small)
+
+    def albedo(texture: SolidTexture, scale: float = 1.0) -> np.ndarray:
+        return texture.apply(icosphere(4), scale=scale, resolution=16).maps["albedo"]
+
+    assert np.array_equal(albedo(narrow, 2.0), albedo(wide))
+    assert not np.array_equal(albedo(narrow), albedo(wide))
 
 
 def test_resuming_changes_nothing(exemplar, tmp_path):
