@@ -19,13 +19,13 @@ from rich.table import Table
 
 from benchmarks.nca import best, cpu
 from mitex.exemplar import Exemplar
+from mitex.features.flow import load_estimator
 from mitex.mesh import icosphere
 from mitex.methods.nca import PRESETS, NcaTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.growth import LookGrowth
 from mitex.methods.nca.motion.cell_motion import STILL, look_motion
 from mitex.methods.nca.motion.drift import Drift, draw_drift
-from mitex.methods.nca.motion.estimator import load_estimator
 from mitex.methods.nca.motion.start import with_condition
 from mitex.methods.nca.motion.task import MotionTask
 from mitex.runtime import let_idle_threads_sleep
@@ -53,7 +53,7 @@ class Motion:
         self.task.pool.copy_(0.2 * torch.randn(self.task.pool.shape, generator=self._generator()))
         self.drift = self.draw()
         self.states = [state.requires_grad_() for state in self._states()]
-        self.estimators = {name: load_estimator(name) for name in ESTIMATORS}
+        self.estimators = {n: None if n == "advection" else load_estimator(n) for n in ESTIMATORS}
 
     @staticmethod
     def _generator() -> torch.Generator:

@@ -23,8 +23,9 @@ import numpy as np
 import torch
 
 from mitex.evaluation.metrics import single_image_frechet
-from mitex.evaluation.motion import Judge, measured_motion
+from mitex.evaluation.motion import measured_motion
 from mitex.exemplar import Exemplar
+from mitex.features.flow import EstimatorName
 from mitex.geometry.triangles import interpolate
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nca import NcaTexture
@@ -99,7 +100,11 @@ class CloseUps:
 
 
 def motion_of(
-    texture: NcaTexture, closeups: CloseUps, field: str, later: tuple[int, ...], judge: Judge = "lucas-kanade"
+    texture: NcaTexture,
+    closeups: CloseUps,
+    field: str,
+    later: tuple[int, ...],
+    judge: EstimatorName = "lucas-kanade",
 ) -> tuple[float, float, list[float]]:
     """Direction error [degrees], speed ratio, and distances from the exemplar after so many steps each."""
     guided = texture.look.rule.condition or carried(texture.look, texture.about)  # else as it was trained
@@ -157,7 +162,7 @@ def main() -> None:
     parser.add_argument("models", nargs="+")
     parser.add_argument("--fields", nargs="+", default=["right", "about-x", "shear-up"])
     parser.add_argument("--meshes", nargs="+", default=[SPHERE, "octopus", "vase"])
-    parser.add_argument("--judge", choices=get_args(Judge), default="lucas-kanade")
+    parser.add_argument("--judge", choices=get_args(EstimatorName), default="lucas-kanade")
     arguments = parser.parse_args()
     later = " | ".join(f"look after {steps:,}" for steps in LATER)
     print(f"| texture | mesh | field | direction | speed | {later} |\n" + "| --- " * (5 + len(LATER)) + "|")

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import torch
@@ -12,9 +10,7 @@ import torch.nn.functional as F
 
 from mitex.colour import LUMINANCE
 from mitex.errors import ConfigError, ImageError
-from mitex.features.flow import flow_network, lucas_kanade, smaller_eigenvalue
-
-Judge = Literal["lucas-kanade", "flow"]
+from mitex.features.flow import EstimatorName, load_estimator, smaller_eigenvalue
 
 LEAST_SPEED = 0.05  # of the mean speed: slower targets have no direction that counts
 DETAIL = 0.05  # smaller eigenvalue at which a pixel counts half
@@ -76,7 +72,7 @@ def measured_motion(
     *,
     steps: float,
     period: float,
-    judge: Judge = "lucas-kanade",
+    judge: EstimatorName = "lucas-kanade",
 ) -> MotionErrors:
     """How the texture in a film moves, beside how it should.
 
@@ -116,21 +112,13 @@ def measured_motion(
     grey = torch.from_numpy(frames @ LUMINANCE)[:, None]
     first, second = grey[:-1], grey[1:]
     expected = torch.tensor(target).movedim(2, 0)[None] * (steps / period)
-    estimate = _estimate(judge)
+    estimate = load_estimator(judge)
     with torch.no_grad():
         pairs = zip(first.split(1), second.split(1), strict=True)  # a film at once may not fit in memory
         motion = torch.cat([estimate(*pair) for pair in pairs])
         detail = torch.cat([smaller_eigenvalue(frame) for frame in first.split(1)]).clamp_min(0)
     weight = _counting(expected, torch.tensor(mask)) * detail / (detail + DETAIL)
     return motion_errors(motion, expected.expand_as(motion), weight)
-
-
-def _estimate(judge: Judge) -> Callable[[torch.Tensor, torch.Tensor], torch.Tensor]:
-    """From two frames (1, 1, H, W) to the motion between them (1, 2, H, W) [px]."""
-    if judge == "lucas-kanade":
-        return lucas_kanade
-    network = flow_network()
-    return lambda first, second: network(torch.cat([first, second], 1))
 
 
 def _counting(target: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:

@@ -33,9 +33,7 @@ class Guide:
     weight: float = WEIGHT
 
     def __post_init__(self) -> None:
-        image, colours = (np.asarray(a, np.float32) for a in (self.image, self.colours))
-        if image.ndim != 3 or image.shape[2] != 3 or not image.size or not np.isfinite(image).all():
-            raise ConfigError(f"a guide of shape {image.shape}", "give a finite (H, W, 3) image")
+        image, colours = checked_picture(self.image), np.asarray(self.colours, np.float32)
         square = colours.ndim == 4 and colours.shape[1] == colours.shape[2] and colours.shape[3] == 3
         if not square or not colours.size or not np.isfinite(colours).all():
             raise ConfigError(f"patch colours of shape {colours.shape}", "give finite (P, G, G, 3) ones")
@@ -43,6 +41,14 @@ class Guide:
             raise ConfigError(f"a guide of weight {self.weight:g}", "use 0 or more")
         object.__setattr__(self, "image", image)
         object.__setattr__(self, "colours", colours)
+
+
+def checked_picture(picture: np.ndarray) -> np.ndarray:
+    """A guide's picture (H, W, 3) as float32; raises a ConfigError for other shapes and NaN."""
+    image = np.asarray(picture, np.float32)
+    if image.ndim != 3 or image.shape[2] != 3 or not image.size or not np.isfinite(image).all():
+        raise ConfigError(f"a guide of shape {image.shape}", "give a finite (H, W, 3) image")
+    return image
 
 
 class GuideDistance:

@@ -43,7 +43,7 @@ def test_a_turned_target(degrees):
 def test_the_flow_network_as_the_judge(monkeypatch):
     """It agrees with Lucas and Kanade's method, which it does without."""
     by_default = measured_motion(FRAMES, constant(3.0, 2.0), MASK, steps=3, period=10)
-    monkeypatch.setattr("mitex.evaluation.motion.lucas_kanade", None)
+    monkeypatch.setattr("mitex.features.flow.estimator.lucas_kanade", None)
     errors = measured_motion(FRAMES, constant(3.0, 2.0), MASK, steps=3, period=10, judge="flow")
     assert errors.direction < 5 and 0.85 < errors.speed_ratio < 1.15
     assert errors.direction != by_default.direction

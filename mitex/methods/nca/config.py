@@ -7,10 +7,9 @@ from typing import Any, Literal
 
 from mitex.errors import ConfigError
 from mitex.features.layers import check_layers
-from mitex.features.text_image import PROMPT
 from mitex.methods.nca.decoder.shape import COORDINATES, DecoderShape
 from mitex.methods.nca.ranges import MOST_STEPS
-from mitex.methods.words.config import check_words
+from mitex.methods.words.config import PromptConfig, check_words
 from mitex.training.settings import DeviceConfig, ScheduledConfig, key
 
 LEAST_SIDE = 32  # of pictures in which Lucas and Kanade's method can measure [px]
@@ -29,7 +28,7 @@ DECODER_KEYS = {
 
 
 @dataclass(frozen=True)
-class NcaConfig(DeviceConfig, ScheduledConfig):
+class NcaConfig(PromptConfig, DeviceConfig, ScheduledConfig):
     """Everything that shapes a training; every key can be set from a TOML file or with `--set`."""
 
     preset: str = "patch"
@@ -118,8 +117,6 @@ class NcaConfig(DeviceConfig, ScheduledConfig):
     motion_speeds: tuple[float, ...] = key((0.0, 2.0), "least and most factor of the field in a step", 0)
     text: str | None = key(None, "what the texture is made of, in words, instead of an exemplar")
     text_object: str | None = key(None, "what has the texture; by default a sphere, or the mesh's name")
-    text_prompt: str = key(PROMPT, "sentence that the vision-language model reads")
-    text_model: str | None = key(None, "CLIP folder, or words for the small embedded model")
     text_parent: str | None = key(None, "model that training starts from if no other is given")
     text_directional: bool = key(
         True, "compare the steps from the grey surface; false: pictures and text themselves"
@@ -128,12 +125,6 @@ class NcaConfig(DeviceConfig, ScheduledConfig):
     text_bank: int = key(64, "sets of views, drawn once, of which a step sees one", 1, 65_536)
     text_distances: tuple[float, ...] = key((2.5,), "distances of the cameras, one for each set", 1.01, 100)
     text_crops: int = key(2, "close-ups that are cut out of a view", 1, 64)
-    text_crop_area: float = key(0.1, "area of a close-up, as a share of the view", 1e-3, 1)
-    text_tilt: float = key(
-        0.5, "perspective tilt of what the model sees: how far corners move [half sides]", 0, 2
-    )
-    text_whole_weight: float = key(1.0, "weight of whole views' distance from the text", 0)
-    text_close_weight: float = key(1.0, "weight of the close-ups' distance from the text", 0)
     text_relief_weight: float = key(
         1.0, "weight of the distance of close-ups without colours from the text", 0
     )

@@ -1,4 +1,4 @@
-"""Settings that fits of one mesh from words share."""
+"""Settings that fits from words share."""
 
 from __future__ import annotations
 
@@ -11,14 +11,13 @@ from mitex.training.settings import key
 
 
 @dataclass(frozen=True)
-class WordsConfig:
+class PromptConfig:
     """What is said, and which parts of a view are compared with it."""
 
     text: str | None = key(None, "what the mesh is made of, in words")
     text_object: str | None = key(None, "what the mesh is; by default its name")
     text_prompt: str = key(PROMPT, "sentence that the vision-language model reads")
     text_model: str | None = key(None, "CLIP folder, or words for the small embedded model")
-    text_background: float = key(1.0, "around the mesh [sRGB]; the papers: white", 0, 1)
     text_crops: int = key(4, "close-ups that are cut out of a view", 1, 64)
     text_crop_area: float = key(0.1, "area of a close-up, as a share of the view", 1e-3, 1)
     text_tilt: float = key(
@@ -26,6 +25,13 @@ class WordsConfig:
     )
     text_whole_weight: float = key(1.0, "weight of whole views' distance from the text", 0)
     text_close_weight: float = key(1.0, "weight of the close-ups' distance from the text", 0)
+
+
+@dataclass(frozen=True)
+class WordsConfig(PromptConfig):
+    """The same for one mesh."""
+
+    text_background: float = key(1.0, "around the mesh [sRGB]; the papers: white", 0, 1)
 
     def prompt(self, name: str) -> str:
         """What the vision-language model reads of the mesh of that name."""

@@ -10,11 +10,11 @@ from typing import Any
 
 import torch
 
+from mitex.features.flow import FARTHEST, load_estimator
 from mitex.losses.advection import advection_residual
 from mitex.losses.motion import motion_loss
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.motion.drift import Drift, draw_drift
-from mitex.methods.nca.motion.estimator import FARTHEST, load_estimator
 from mitex.methods.nca.motion.views import MotionViews
 from mitex.methods.nca.pool import PoolTask, Rollout
 
@@ -38,7 +38,8 @@ class MovingPool(PoolTask):
         # A state moves in one way until the seed replaces it, so that the rule learns what becomes of its
         # pattern where the field goes on coming together, or apart. These are the random seeds of the ways.
         self.ways = torch.zeros(config.pool, dtype=torch.int64)
-        self.estimator = load_estimator(config.motion_estimator, self.look.device)
+        name = config.motion_estimator
+        self.estimator = None if name == "advection" else load_estimator(name, self.look.device)
 
     @abstractmethod
     def motion_views(self, drift: Drift, generator: torch.Generator) -> MotionViews:

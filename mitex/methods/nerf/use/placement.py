@@ -13,6 +13,7 @@ from mitex.geometry.triangles import interpolate
 from mitex.images import bilinear
 from mitex.mesh import Mesh, Similarity
 from mitex.methods.layout import layout_side
+from mitex.quilting.guide import checked_picture
 from mitex.quilting.texels import FaceTexels
 
 EXTENT = 1 / 1.2  # largest half extent of the mesh in the scene cube
@@ -112,9 +113,7 @@ def carried_picture(picture: np.ndarray, pictured: Mesh, mesh: Mesh, side: int) 
     Raises:
         ConfigError: it is no picture.
     """
-    image = np.asarray(picture, np.float32)
-    if image.ndim != 3 or image.shape[2] != 3 or not image.size or not np.isfinite(image).all():
-        raise ConfigError(f"a guide of shape {image.shape}", "give a finite (H, W, 3) image")
+    image = checked_picture(picture)
     texels = FaceTexels.rasterize(np.asarray(mesh.uv), side)
     places = interpolate(texels.barycentric, np.asarray(pictured.uv)[texels.face])
     carried = np.zeros((side * side, 3), np.float32)

@@ -174,7 +174,8 @@ def test_settings_that_contradict(settings, message):
 
 
 def test_settings_that_just_fit():
-    NerfConfig(coarsest=32, finest=32, rays=16, rays_across=4)
+    config = NerfConfig(coarsest=32, finest=32, rays=16, rays_across=4)
+    assert (config.finest, config.rays) == (config.coarsest, config.rays_across**2)
 
 
 TESTED_ELSEWHERE = {
