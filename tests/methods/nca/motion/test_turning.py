@@ -63,9 +63,11 @@ def test_a_shipped_texture_is_carried():
 
 
 @pytest.mark.slow
-def test_a_turned_field_turns_the_motion(monkeypatch):
+@pytest.mark.parametrize("estimator", ["advection", "flow"])
+def test_a_turned_field_turns_the_motion(monkeypatch, estimator):
     monkeypatch.setattr(settling, "STEPS", (1,))
-    texture = nca.fit(Exemplar.load("lava"), init="lava", motion="right", set=SETTINGS)
+    settings = (*SETTINGS, f"motion_estimator={estimator}")
+    texture = nca.fit(Exemplar.load("lava"), init="lava", motion="right", set=settings)
     velocities = [_velocity(texture, angle) for angle in (0.4, 0.4 + math.pi / 2)]
     angles = [math.atan2(y, x) for x, y in velocities]
     turn = math.degrees(angles[1] - angles[0]) % 360
