@@ -46,7 +46,7 @@ from mitex.methods.nca.weights import graft_weights
 from mitex.methods.nerf.capture import visual_hull
 from mitex.methods.nerf.capture.capture import load_capture
 from mitex.methods.nerf.capture.transforms import read_frames
-from mitex.methods.nerf.training.plain import hash_grid, parameter_shapes
+from mitex.methods.nerf.training.plain import grid_layout
 from mitex.methods.relief.texture import ReliefTexture
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.texture import SurfaceTexture
@@ -199,7 +199,7 @@ def _plain_field(path: Path) -> None:
     init()
     config = PlainFieldConfig(table=8, occupancy=16)
     about = {key: getattr(config, key) for key in SETTINGS} | {"name": "a", "centre": [0.0] * 3, "scale": 1.0}
-    parameters = {name: torch.zeros(shape) for name, shape in parameter_shapes(hash_grid(config)).items()}
+    parameters = {name: torch.zeros(shape) for name, shape in grid_layout(config).shapes.items()}
     PlainFieldTexture(parameters, np.ones((16, 16, 16), np.uint8), about).save(path)
 
 

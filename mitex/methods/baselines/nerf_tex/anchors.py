@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
 
-from mitex.errors import ConfigError, MeshError
+from mitex.errors import ConfigError
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import orthonormal, unit
 from mitex.mesh import Mesh
-from mitex.methods.nerf.synthesis.patches import DENSITY, SATURATED
+from mitex.mesh.sampling import DENSITY, apart, disk_count, random_points
 
 MOST = 50_000  # anchors
 
@@ -49,31 +48,15 @@ def place_anchors(mesh: Mesh, distance: float, tilt: float, aligned: bool, seed:
         MeshError: the mesh has no area.
         ConfigError: there would be more than 50,000 anchors.
     """
-    areas = mesh.face_areas.astype(np.float64)
-    if not areas.sum() > 0:
-        raise MeshError(f"{mesh.name} has no area to put boxes on", "give a surface")
-    count = areas.sum() / (SATURATED * distance**2)
+    count = disk_count(mesh.face_areas.sum(dtype=np.float64), distance)
     if count > MOST:
         raise ConfigError(f"{count:.0f} boxes on {mesh.name}", "use a larger scale or spacing")
     rng = np.random.default_rng(seed)
-    faces = rng.choice(len(areas), DENSITY * (int(count) + 1), p=areas / areas.sum())
-    root, v = np.sqrt(rng.random((len(faces), 1))), rng.random((len(faces), 1))
-    weights = np.concatenate([1 - root, root * (1 - v), root * v], 1)
+    faces, weights = random_points(mesh, DENSITY * (int(count) + 1), rng)
     points = interpolate(weights, mesh.vertices[mesh.faces[faces]])
     normals = unit(interpolate(weights, mesh.normals[mesh.faces[faces]]))
-    kept = _apart(points, mesh.face_normals[faces], distance)
-    return Anchors(points[kept].astype(np.float32), _frames(normals[kept], tilt, aligned, rng))
-
-
-def _apart(points: np.ndarray, normals: np.ndarray, distance: float) -> np.ndarray:
-    """Indices of points, each the first that no earlier one with an agreeing normal is near to."""
-    tree, free, kept = KDTree(points), np.ones(len(points), bool), []
-    for index in range(len(points)):
-        if free[index]:
-            kept.append(index)
-            near = np.array(tree.query_ball_point(points[index], distance))
-            free[near[normals[near] @ normals[index] > 0]] = False
-    return np.array(kept)
+    selection = apart(points, distance, mesh.face_normals[faces])
+    return Anchors(points[selection].astype(np.float32), _frames(normals[selection], tilt, aligned, rng))
 
 
 def _frames(normals: np.ndarray, tilt: float, aligned: bool, rng: np.random.Generator) -> np.ndarray:

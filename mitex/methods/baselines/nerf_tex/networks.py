@@ -9,7 +9,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Protocol
 
 import torch
@@ -17,16 +16,14 @@ import torch.nn.functional as F
 
 from mitex.bridge import call
 from mitex.methods.baselines.nerf_tex.config import NerfTexConfig
-from mitex.methods.nerf.field.decoder import HIGHEST, sigmoid
+from mitex.methods.nerf.field.decoder import HIGHEST
+from mitex.methods.nerf.field.grid_networks import GridLayout, GridNetworks, initial_parameters
 from mitex.methods.nerf.field.hash_grid import HashGrid
-from mitex.methods.nerf.field.mlp import network_rows, packed_networks, weight_bound
 from mitex.methods.nerf.field.tensors import channels, rows, tensor
-from mitex.runtime.jit import dr, mi
+from mitex.runtime.jit import mi
 from mitex.runtime.upload import upload
 
 LEVELS, COARSEST, FINEST = 8, 16, 256  # of the hash grid
-CODE, HARMONICS = 15, 16  # channels handed to the network of the colour, and those of a direction
-DENSITY, COLOUR = (2 * LEVELS, 64, CODE + 1), (CODE + 2 * HARMONICS, 64, 64, 3)  # widths of the layers
 
 WIDTH, LAYERS, SKIP, BRANCH = 256, 8, 4, 128  # of the published network
 PLACE_OCTAVES, DIRECTION_OCTAVES = 10, 4
@@ -64,17 +61,8 @@ class Network(ABC):
     shapes: Mapping[str, tuple[int, ...]]
 
     def initial(self, generator: torch.Generator) -> dict[str, torch.Tensor]:
-        """Leaf tensors to begin with: small tables, matrices as of Glorot and Bengio, biases of 0."""
-        bounds = {
-            name: weight_bound((s[0], s[-1])) if len(s) == 2 else 0.0 for name, s in self.shapes.items()
-        }
-        return {
-            name: torch.empty(shape)
-            .uniform_(-1, 1, generator=generator)
-            .mul_(1e-4 if name == "table" else bounds[name])
-            .requires_grad_()
-            for name, shape in self.shapes.items()
-        }
+        """Leaf tensors to begin with, as of `initial_parameters`."""
+        return initial_parameters(self.shapes, generator)
 
     @abstractmethod
     def attached(self, parameters: Parameters, inputs: Inputs) -> tuple[torch.Tensor, torch.Tensor]:
@@ -93,35 +81,19 @@ class HashNetwork(Network):
     """
 
     def __init__(self, table: int) -> None:
-        self.grid = HashGrid(LEVELS, COARSEST, FINEST, table)
-        layers = [(o, i) for widths in (DENSITY, COLOUR) for i, o in pairwise(widths)]
-        self.shapes = {"table": (self.grid.size,)} | {f"weights/{k}": s for k, s in enumerate(layers)}
+        self.layout = GridLayout(HashGrid(LEVELS, COARSEST, FINEST, table), directions=2)
+        self.shapes = self.layout.shapes
 
     def attached(self, parameters: Parameters, inputs: Inputs) -> tuple[torch.Tensor, torch.Tensor]:
         def run(table: mi.TensorXf, *matrices: mi.TensorXf) -> tuple[mi.TensorXf, mi.TensorXf]:
-            count = len(DENSITY) - 1
-            values = self._values(table.array, list(matrices[:count]), list(matrices[count:]), inputs)
-            return tensor(values[0]), tensor(values[1])
+            density, colours = _values(GridNetworks(self.layout, table.array, matrices), inputs)
+            return tensor(density), tensor(colours)
 
         return call(run, *parameters.values())
 
     def evaluator(self, parameters: Parameters) -> Evaluator:
-        table, *matrices = (upload(mi.TensorXf, value.detach().numpy()) for value in parameters.values())
-        count = len(DENSITY) - 1
-        density, colour = packed_networks(matrices[:count], matrices[count:])
-        return lambda inputs: self._values(table.array, density, colour, inputs)
-
-    def _values(
-        self,
-        table: mi.Float,
-        density: list[mi.TensorXf] | dr.nn.Module,
-        colour: list[mi.TensorXf] | dr.nn.Module,
-        inputs: Inputs,
-    ) -> tuple[mi.Float, mi.Color3f]:
-        exponent, *code = network_rows(density, self.grid(inputs.points, table))
-        directions = [*dr.sh_eval(inputs.view, 3), *dr.sh_eval(inputs.light, 3)]
-        display = network_rows(colour, [*code, *directions])
-        return dr.exp(dr.minimum(exponent, HIGHEST)), mi.Color3f(*(sigmoid(value) for value in display))
+        networks = GridNetworks.packed(self.layout, parameters)
+        return lambda inputs: _values(networks, inputs)
 
 
 class FrequencyNetwork(Network):
@@ -178,6 +150,11 @@ class FrequencyNetwork(Network):
         directions = [frequencies(direction, DIRECTION_OCTAVES) for direction in (view, light)]
         branch = F.relu(layer("branch", torch.cat([layer("code", values), *directions], 1)))
         return density, torch.sigmoid(layer("colour", branch))
+
+
+def _values(networks: GridNetworks, inputs: Inputs) -> tuple[mi.Float, mi.Color3f]:
+    density, code = networks.density(inputs.points)
+    return density, networks.colour(code, inputs.view, inputs.light)
 
 
 def frequencies(values: torch.Tensor, octaves: int) -> torch.Tensor:

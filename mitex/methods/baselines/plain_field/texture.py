@@ -16,10 +16,11 @@ from mitex.mesh import Mesh, Similarity
 from mitex.methods.baselines.plain_field import METHOD
 from mitex.methods.baselines.plain_field.config import PlainFieldConfig
 from mitex.methods.checks import in_range
+from mitex.methods.nerf.field.grid_networks import GridNetworks
 from mitex.methods.nerf.field.occupancy import packed_cells, unpacked_cells
 from mitex.methods.nerf.field.rendering import render_step
 from mitex.methods.nerf.ranges import DENSITIES
-from mitex.methods.nerf.training.plain import PlainField, hash_grid, parameter_shapes
+from mitex.methods.nerf.training.plain import PlainField, grid_layout
 from mitex.methods.nerf.use.applied_field import AppliedField
 from mitex.runtime import init
 from mitex.runtime.jit import mi
@@ -35,7 +36,7 @@ class PlainFieldTexture:
     """A plain radiance field, learned by `fit`.
 
     Attributes:
-        parameters: table and matrices, as of `parameter_shapes`.
+        parameters: table and matrices, in the order of `GridLayout.shapes`.
         occupied: (G, G, G) uint8, cells of the scene cube with matter.
         about: how it was made: name, preset, steps, `SETTINGS`, and how the capture was placed.
     """
@@ -56,7 +57,7 @@ class PlainFieldTexture:
             occupied = unpacked_cells(tensors.pop("occupied"), int(about["occupancy"]))
             texture = cls(tensors, occupied, about)
             texture.similarity  # noqa: B018  (raises where its numbers are none)
-            shapes = parameter_shapes(hash_grid(texture.config))
+            shapes = grid_layout(texture.config).shapes
             return cls(model_file.of_shapes(tensors, shapes), occupied, about)
 
     def save(self, path: str | Path) -> Path:
@@ -78,7 +79,8 @@ class PlainFieldTexture:
         """The field in the scene cube, ready to be marched."""
         init(needs="ad")
         mask = upload(mi.TensorXu8, self.occupied)
-        return PlainField.of(self.parameters, hash_grid(self.config), mask, render_step(self.config))
+        networks = GridNetworks.packed(grid_layout(self.config), self.parameters)
+        return PlainField(networks, mask, render_step(self.config))
 
     def in_place(self) -> PlainField:
         """What shows the object in the photos' cameras: `field`."""

@@ -14,10 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from mitex.errors import ConfigError, MeshError
+from mitex.errors import ConfigError
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import orthonormal
 from mitex.mesh import Mesh
+from mitex.mesh.sampling import DENSITY, apart, disk_distance, random_points
 from mitex.mesh.topology import mesh_edges
 from mitex.quilting.matching import HORIZONTAL, VERTICAL
 from mitex.runtime import init
@@ -31,8 +32,6 @@ MIN_FACING = 0.25  # cosine between a patch's z and the faces that it meets: the
 SPARSE = 4  # every so many texels are compared with the scan, whose points are not denser
 MAX_STEP = 1.0 / MIN_FACING  # between the depths of texels side by side; larger ones are a ledge [texel gaps]
 CHUNK = 64  # patches cast at once
-DENSITY = 30  # random points for each evenly spread one
-SATURATED = 0.6  # area per point over squared distance when no further one fits, nearly
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,23 +192,10 @@ def spread_points(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[np.
     Raises:
         MeshError: the mesh has no area.
     """
-    areas = mesh.face_areas.astype(np.float64)
-    if not areas.sum() > 0.0:
-        raise MeshError(f"{mesh.name} has no area to take patches from", "give a surface")
-    faces = rng.choice(len(areas), DENSITY * count, p=areas / areas.sum())
-    root, v = np.sqrt(rng.random((len(faces), 1))), rng.random((len(faces), 1))
-    weights = np.concatenate([1.0 - root, root * (1.0 - v), root * v], 1)
+    faces, weights = random_points(mesh, DENSITY * count, rng)
     points = interpolate(weights, mesh.vertices[mesh.faces[faces]])
-    apart = np.sqrt(SATURATED * areas.sum() / count)
-    tree = KDTree(points)
-    free = np.ones(len(points), bool)
-    selection = []
-    for index in range(len(points)):
-        if free[index]:
-            selection.append(index)
-            free[tree.query_ball_point(points[index], apart)] = False
-        if len(selection) == count:
-            break
+    distance = disk_distance(mesh.face_areas.sum(dtype=np.float64), count)
+    selection = apart(points, distance, most=count)
     return points[selection].astype(np.float32), faces[selection]
 
 
