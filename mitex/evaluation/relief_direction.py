@@ -44,7 +44,7 @@ def relief_direction(base: Mesh, relief: Mesh, field: np.ndarray) -> ReliefDirec
         field: (V, 3) vectors at the vertices of `base`; faces without a direction do not count.
 
     Raises:
-        MeshError: the meshes have other faces.
+        MeshError: the meshes have other faces, or no normal differs where the field has a direction.
     """
     if not np.array_equal(base.faces, relief.faces):
         raise MeshError(f"{base.name} and {relief.name} differ in their faces", "give the same mesh twice")
@@ -53,6 +53,8 @@ def relief_direction(base: Mesh, relief: Mesh, field: np.ndarray) -> ReliefDirec
     lean = relief.face_normals - normals
     gradient = dot(lean, along) + 1j * dot(lean, np.cross(normals, along))
     tensor = base.face_areas * gradient**2
+    if not np.abs(tensor).any():
+        raise MeshError(f"{relief.name} has no relief where the field has a direction", "give another mesh")
     whole, local = tensor.sum(), _around(base, tensor)
     error = (np.abs(_ridge(local)) * np.abs(local)).sum() / np.abs(local).sum()
     return ReliefDirection(float(_ridge(whole)), float(error), float(np.abs(whole) / np.abs(tensor).sum()))

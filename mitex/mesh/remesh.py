@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from mitex.errors import MeshError
+from mitex.errors import MeshError, MeshWarning
 from mitex.mesh.mesh import Mesh
 from mitex.mesh.subdivide import subdivide_midpoint
 from mitex.mesh.validate import validate
@@ -17,7 +18,7 @@ from mitex.progress import announce
 from mitex.ranges import EVEN_VERTICES
 
 ROUNDS = 4  # tries to meet the number of vertices
-CLOSE_ENOUGH = 0.03  # of it, as a logarithm
+CLOSE_ENOUGH, FAR_OFF = 0.03, 0.2  # of it, as logarithms
 # Equal edges that are all split or collapsed at once make the count jump; in a finer source they are not.
 FINER = 2
 # Measured: what the remesher makes of a wanted edge length is this much longer.
@@ -28,7 +29,8 @@ def remesh(mesh: Mesh, vertices: int, feature_angle: float = 60.0) -> Mesh:
     """Replaces the triangles by nearly equilateral ones of one size, as the MeshNCA paper asks for.
 
     Explicit isotropic remeshing (Botsch and Kobbelt 2004) with an edge length that is corrected until the
-    count is within about 3 % of what was asked, or as near as four tries come. UVs are lost. Takes seconds.
+    count is within about 3 % of what was asked, or as near as four tries come. Edges along curved borders
+    and creases stay: where they are too many, a `MeshWarning` tells the count. UVs are lost. Takes seconds.
 
     Args:
         mesh: any mesh.
@@ -59,6 +61,13 @@ def remesh(mesh: Mesh, vertices: int, feature_angle: float = 60.0) -> Mesh:
         if best_error < CLOSE_ENOUGH:
             break
         length *= math.sqrt(ratio)
+    if best_error > FAR_OFF:
+        warnings.warn(
+            f"{mesh.name} has {len(best.vertices):,} vertices after remeshing, not {vertices:,}: edges along "
+            "curved borders and creases stay",
+            MeshWarning,
+            stacklevel=2,
+        )
     return best
 
 

@@ -16,7 +16,7 @@ from mitex.progress import announce
 ROUNDS = 24
 RINGS = 2  # of vertices around piercing faces that are drawn back less and less
 BACK = 0.25  # part of the displacement that a round takes away at a piercing face
-ALLOWED = 2  # pairs that may stay for each one of the mesh itself
+ALLOWED = 2  # pairs that may stay for each one without the displacement
 
 log = logging.getLogger(__name__)
 
@@ -53,7 +53,7 @@ def untangled(before: Mesh, after: Mesh) -> Mesh:
         still = pairs[~np.isin(pairs, moved).any(1)]
         pairs = np.concatenate([still, piercing_pairs(mesh, moved)])
     log.info(
-        "pairs of faces that pierce each other: %d, before %d, on the mesh itself %d",
+        "pairs of faces that pierce each other: %d, before %d, without the relief %d",
         len(pairs),
         first,
         own,

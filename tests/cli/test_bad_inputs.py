@@ -147,6 +147,16 @@ MESHES = {
     "empty off": (lambda d: bad.text(d / "a.off", "OFF\n0 0 0\n"), "a.off", "a.off"),
 }
 
+# Commands that read a mesh
+READERS = {
+    "apply nca": "apply pebbles --mesh {} --out out/a.glb",
+    "apply geometric": "apply spikes --mesh {} --out out/a.glb",
+    "animate": "animate spikes --mesh {} --out out/a.gif",
+    "graft": "graft pebbles lava --mesh {} --weights y --out out/a.glb",
+    "fit surface": "fit surface --exemplar good.png --mesh {} --out out/run",
+    "fit relief": "fit relief --exemplar cobblestone --mesh {} --out out/run",
+}
+
 # Name -> (words of the command, words of the message)
 APPLIES = {
     "no options": ("apply", "RUN|MODEL is missing"),
@@ -251,11 +261,13 @@ def test_fit_options(name, files, capsys):
     check_refused(files, words, message, capsys)
 
 
+@pytest.mark.parametrize("command", READERS)
 @pytest.mark.parametrize("name", MESHES)
-def test_meshes(name, files, capsys):
+def test_meshes(name, command, files, capsys):
     make, mesh, message = MESHES[name]
+    bad.image(files / "good.png")
     make(files)
-    check_refused(files, apply(mesh=mesh), message, capsys)
+    check_refused(files, READERS[command].format(mesh).split(), message, capsys)
 
 
 @pytest.mark.parametrize("name", APPLIES)

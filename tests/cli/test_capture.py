@@ -5,15 +5,18 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
+from scipy import ndimage
 
 from mitex.cli import main
-from mitex.errors import CaptureError
+from mitex.errors import CaptureError, ConfigError
 from mitex.methods.nerf import load_capture
 from mitex.methods.nerf.footage import site
+from mitex.methods.nerf.footage.making import make_capture
 from tests.cli import bad_files as bad
 from tests.cli.refusals import check_refused, tree
 from tests.methods.nerf.footage import onnx_files, stage
@@ -214,6 +217,38 @@ def test_what_cannot_be_captured(cameras, name, files, capsys):
     make(files)
     out = [] if "--out" in words else ["--out", "out/new/capture"]
     check_refused(files, ["capture", source, *out, *words.split(), "--quiet"], message, capsys)
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ({"frames": 7}, "`frames` 7 is out of range"),
+        ({"frames": 1001}, "`frames` 1001 is out of range"),
+        ({"size": 127}, "`size` 127 is out of range"),
+        ({"size": 8193}, "`size` 8193 is out of range"),
+    ],
+)
+def test_numbers_out_of_range_in_python(option, message, tmp_path):
+    with pytest.raises(ConfigError, match=message):
+        make_capture(tmp_path, tmp_path / "capture", **option)
+
+
+@pytest.mark.parametrize(("mask", "first"), [("box:25,15,50,70", 0), ("plane", 1)])
+def test_the_photo_that_a_box_is_in_is_kept(mask, first, monkeypatch, tmp_path):
+    """Of more photos than asked for, where the first is not the sharpest of its part."""
+    blurred = ndimage.uniform_filter(PICTURES[0], (3, 3, 1))
+    write_photos(tmp_path / "photos", [blurred, *(p for p in PICTURES for _ in range(2))][:-1])
+    names = []
+
+    def stop(folder, sharp):
+        names.extend(sharp)
+        raise CaptureError("enough", "stop")
+
+    monkeypatch.setattr("mitex.methods.nerf.footage.making.find_site", stop)
+    with pytest.raises(CaptureError, match="enough"):
+        make_capture(tmp_path / "photos", tmp_path / "a", mask, frames=stage.VIEWS)
+    photos = sorted(path.stem for path in (tmp_path / "photos").iterdir())
+    assert Path(names[0]).stem == photos[first] and len(names) == stage.VIEWS
 
 
 def test_a_box_in_a_picture_without_a_camera(monkeypatch, files, capsys):

@@ -62,6 +62,11 @@ def test_references(name, low, high):
     assert low <= relief_direction(base, relief, vector_field(base, "up")).error <= high
 
 
+def test_nothing_displaced_is_refused():
+    with pytest.raises(MeshError, match="grid has no relief where the field has a direction"):
+        relief_direction(grid(3, 3), grid(3, 3), np.ones((16, 3)))
+
+
 def test_other_faces_are_refused():
     with pytest.raises(MeshError, match="differ in their faces"):
         relief_direction(grid(3, 3), grid(3, 4), np.ones((16, 3)))

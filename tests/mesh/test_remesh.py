@@ -5,8 +5,8 @@ import sys
 import numpy as np
 import pytest
 
-from mitex.errors import MeshError, MissingPackage
-from mitex.mesh import grid, icosphere, quality, remesh
+from mitex.errors import MeshError, MeshWarning, MissingPackage
+from mitex.mesh import grid, icosphere, quality, remesh, validate
 
 
 def test_names_the_extra_that_is_missing(monkeypatch):
@@ -45,3 +45,15 @@ def test_open_meshes_keep_their_border():
     assert report.boundary_edges > 0
     assert even.face_areas.sum() == pytest.approx(4.0, rel=0.01)
     assert even.uv is None
+
+
+def test_borders_that_have_too_many_edges_are_told():
+    pytest.importorskip("pymeshlab")
+    ball = icosphere(16)
+    used = ball.vertices[ball.faces, 2].max(1) < 0.5
+    with pytest.warns(MeshWarning, match="without a face"):
+        bowl = validate(ball.vertices, ball.faces[used], name="bowl")
+    with pytest.warns(
+        MeshWarning, match=r"bowl has \d+ vertices after remeshing, not 30: edges along curved"
+    ):
+        assert len(remesh(bowl, 30).vertices) > 36

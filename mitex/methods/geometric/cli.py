@@ -124,20 +124,6 @@ class GrowthOptions:
         )
 
 
-def tell_piercing(mesh: Mesh, displaced: Mesh) -> None:
-    """Says, on stderr, how often a displaced mesh pierces itself, if it does."""
-    from mitex.mesh.self_intersections import piercing_pairs
-
-    pairs = len(piercing_pairs(displaced))
-    if pairs:
-        own = len(piercing_pairs(mesh))
-        print(
-            f"{pairs} pairs of faces pierce each other, {own} in the mesh itself; "
-            "--untangle draws the relief back where they do",
-            file=sys.stderr,
-        )
-
-
 @dataclass(kw_only=True)
 class Apply(GrowthOptions, MeshOptions):
     """Grow a geometric texture on a mesh, or on its own template: --mesh template.
@@ -152,7 +138,8 @@ class Apply(GrowthOptions, MeshOptions):
     """Random seed: another seed, another variant of the texture."""
 
     untangle: Annotated[bool, arg(help_behavior_hint="")] = False
-    """Draw the relief back where the surface would pierce itself, as on thin limbs."""
+    """Draw the relief back where the surface would pierce itself, as on thin limbs, and say how many pairs of
+    faces did and do."""
 
     def check(self) -> None:
         self.check_growth(self.mesh)
@@ -183,5 +170,4 @@ class Apply(GrowthOptions, MeshOptions):
             placement=self.placement,
         )
         self.advise(texture, mesh)
-        tell_piercing(mesh, asset.mesh)
         return asset

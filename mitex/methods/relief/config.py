@@ -27,8 +27,8 @@ class ReliefConfig(ScheduledConfig):
     faces: int = key(200_000, "faces of the relief, about; at most twice as many", 1, 2_000_000)
     depth: float = key(
         0.0,
-        "depth of the relief, from the lowest to the highest point of the height map [widths of the exemplar]"
-        "; 0: what the exemplar's normals say",
+        "depth of the relief, from black to white in the height map [widths of the exemplar]; 0: what the "
+        "exemplar's normals say",
         0,
         1,
     )

@@ -35,7 +35,7 @@ class ScaleMap:
 
         Args:
             source: (V,) a factor for each vertex, or a .npy file of them; or a picture over the mesh's own
-                UVs, whose grey is the factor: white 1, middle grey 0.5.
+                UVs, whose grey is the factor: white 1, middle grey 0.5. Beyond [0, 1] it repeats.
             mesh: V vertices.
 
         Raises:
@@ -77,6 +77,7 @@ class ScaleMap:
             factors = interpolate(barycentric, self.values[mesh.faces[face]][..., None])[:, 0]
         else:
             uv = interpolate(barycentric, self.uv[face].astype(np.float64))
+            uv = np.where((uv < 0) | (uv > 1), uv % 1, uv)
             factors = bilinear(self.values, uv)[:, 0].astype(np.float32)
         if factors.min() < SMALLEST - 1e-6 or factors.max() > LARGEST + 1e-6:
             raise ConfigError(

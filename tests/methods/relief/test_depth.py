@@ -54,6 +54,15 @@ def test_a_height_map_alone_has_the_depth_that_is_given_and_its_normals():
     assert np.abs(exemplar.maps["normal"] - waves("normal").maps["normal"])[inner].max() < 0.01
 
 
+def test_depth_is_that_from_black_to_white():
+    """A map that uses a fifth of its range has a fifth of the depth."""
+    maps = waves("height").maps
+    exemplar, depth = with_depth(Exemplar({"height": 0.4 + 0.2 * maps["height"]}, "pale"), 5 * DEPTH)
+    assert depth == 5 * DEPTH
+    inner = (slice(2, -2), slice(2, -2))
+    assert np.abs(exemplar.maps["normal"] - waves("normal").maps["normal"])[inner].max() < 0.01
+
+
 def test_a_given_depth_makes_normals_steeper():
     exemplar, depth = with_depth(waves("height", "normal"), 2 * DEPTH)
     assert depth == 2 * DEPTH

@@ -81,6 +81,15 @@ class TestTask:
         ):
             assert value(**options) != plain, options
 
+    def test_the_learning_rate_and_its_falls_count(self):
+        def relief_after(**options: Any) -> np.ndarray:
+            settings = FLAT | {"lr": 0.01, "milestones": (1,), "decay": 0.3} | options
+            return relief.fit(waves(*ALL), icosphere(4), set=settings, steps=3).moved.vertices
+
+        plain = relief_after()
+        for options in ({"lr": 0.02}, {"milestones": (2,)}, {"decay": 0.5}):
+            assert not np.array_equal(relief_after(**options), plain), options
+
     def test_a_step_that_sees_nothing_moves_nothing(self, monkeypatch):
         task = task_of()
         cameras = replace(

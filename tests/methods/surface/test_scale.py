@@ -1,5 +1,6 @@
 """The size of the pattern: the exemplar's side, and taps whose step varies over the surface."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -164,6 +165,22 @@ def test_a_picture_lies_on_the_mesh_s_own_uvs(tmp_path):
     assert mapped.steps is not None
     assert np.isclose(np.log(mapped.steps).mean(), 0, atol=1e-9)
     assert np.allclose(mapped.steps * mapped.mean_scale, expected)
+
+
+def test_a_picture_repeats_beyond_its_square(tmp_path):
+    """As UVs do in glTF and OBJ; the border itself is that of the square."""
+    plain = flat_square(4)
+    write_image(tmp_path / "ramp.png", np.tile(0.25 + 0.75 * (np.arange(200) + 0.5) / 200, (50, 1)))
+    at = np.zeros(3, int), np.array([[1.0, 0, 0], [0, 1, 0], [1 / 3, 1 / 3, 1 / 3]])
+    factors = [
+        ScaleMap.of(tmp_path / "ramp.png", replace(plain, uv=plain.uv + shift)).at(plain, *at)
+        for shift in (0, 2, -3)
+    ]
+    assert np.ptp(factors[0]) > 0.1
+    for shifted in factors[1:]:
+        assert np.abs(shifted[1:] - factors[0][1:]).max() < 1e-4
+    right = replace(plain, uv=np.ones_like(plain.uv))
+    assert ScaleMap.of(tmp_path / "ramp.png", right).at(right, *at) == pytest.approx(1, abs=0.01)
 
 
 def test_the_map_changes_the_texture():

@@ -39,10 +39,10 @@ def _sides(towards: np.ndarray) -> list[str]:
         gaps = [
             _gap(directions, start + 2.0 * math.pi * k / len(SECTORS), elevation) for k in range(len(SECTORS))
         ]
-        missing = [name for name, gap in zip(SECTORS, gaps, strict=True) if gap > FAR]
+        missing = {name: gap for name, gap in zip(SECTORS, gaps, strict=True) if gap > FAR}
         if missing:
-            sides = "it all around" if len(missing) == len(SECTORS) else _listed(missing)
-            lines.append(f"film {sides} {ring}: no picture within {max(gaps):.0f} degrees")
+            sides = "it all around" if len(missing) == len(SECTORS) else _listed([*missing])
+            lines.append(f"film {sides} {ring}: no picture within {min(missing.values()):.0f} degrees")
     return lines
 
 

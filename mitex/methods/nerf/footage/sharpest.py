@@ -49,14 +49,21 @@ def frame_quality(pixels: np.ndarray) -> FrameQuality:
     return FrameQuality(sharpness, brightness, thumbnail)
 
 
-def sharpest(pictures: Iterable[Picture], count: int, frames: int) -> Iterator[tuple[Picture, FrameQuality]]:
-    """The sharpest picture of each of `frames` equal parts of `count` pictures, with its quality."""
+def sharpest(
+    pictures: Iterable[Picture], count: int, frames: int, first: bool = False
+) -> Iterator[tuple[Picture, FrameQuality]]:
+    """The sharpest picture of each of `frames` equal parts of `count` pictures, with its quality.
+
+    With `first`, the very first one stands for its part, whatever its quality.
+    """
     best: tuple[Picture, FrameQuality] | None = None
     window = 0
     for number, picture in enumerate(pictures):
         if number * frames // count > window and best is not None:
             yield best
             best, window = None, number * frames // count
+        if best is not None and first and not window:
+            continue
         quality = frame_quality(picture.pixels)
         if best is None or quality.sharpness > best[1].sharpness:
             best = picture, quality
@@ -85,11 +92,8 @@ def faults(qualities: Sequence[FrameQuality]) -> list[str]:
 
 
 def blurred_photos(qualities: Sequence[FrameQuality]) -> list[str]:
-    """The same of photos in order, of which none but blurred ones go; never the first one, which a box may be
-    in, and none at all if too few would be left.
-    """
+    """The same of photos in order, of which none but blurred ones go, and none if too few would be left."""
     verdicts = ["blurred" if verdict == "blurred" else "" for verdict in faults(qualities)]
-    verdicts[:1] = [""] * len(verdicts[:1])
     return verdicts if verdicts.count("") >= MIN_VIEWS else [""] * len(verdicts)
 
 

@@ -40,6 +40,23 @@ def test_a_missing_side():
         assert level.startswith(f"film {side} level with it: no picture within 4")
 
 
+def test_what_is_said_of_several_sides_is_true_of_each():
+    """The middle of three missing sides lacks more than its neighbours."""
+    away = [(a, e) for a, e in RINGS if abs((a - 17) % 360 - 180) > 82 or e > 60]
+    level = next(line for line in said(away) if "level with it" in line)
+    directions = [pose[:, 3] for pose in (view.pose for view in views(away))]
+    towards = np.array(directions) - [0.0, 0.0, 0.45]
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    gaps = []
+    for turn in (135, 180, 225):
+        azimuth, height = math.radians(17 + turn), math.radians(12)
+        aim = [math.cos(azimuth) * math.cos(height), math.sin(azimuth) * math.cos(height), math.sin(height)]
+        gaps.append(math.degrees(math.acos((towards @ aim).max())))
+    assert max(gaps) > min(gaps) + 5
+    sides = "the back right, the back and the back left"
+    assert level == f"film {sides} level with it: no picture within {min(gaps):.0f} degrees"
+
+
 def test_an_object_that_is_small_or_cut_off():
     assert said(RINGS, size=30) == ["go nearer: the object fills 25 % of the picture"]
     assert said(RINGS, size=120) == ["step back: the frame cuts the object off in 72 of 72 pictures"]

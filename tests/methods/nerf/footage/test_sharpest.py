@@ -36,6 +36,12 @@ def test_the_sharpest_of_every_window_is_kept():
     assert [p.name for p, _ in sharpest(pictures[:7], 12, 4)] == ["2", "5", "6"]
 
 
+def test_the_first_picture_stays_where_a_box_is_in_it():
+    pictures = [Picture(str(k), frame(20 * k, blur)) for k, blur in enumerate([9, 4, 0, 5, 0, 7])]
+    assert [p.name for p, _ in sharpest(pictures, 6, 2)] == ["2", "4"]
+    assert [p.name for p, _ in sharpest(pictures, 6, 2, first=True)] == ["0", "4"]
+
+
 def test_flawed_frames_are_named():
     frames = [frame(24 * k, seed=k) for k in range(14)]
     frames[3] = frame(72, blur=25)
@@ -48,7 +54,7 @@ def test_flawed_frames_are_named():
 
 
 def test_blurred_photos_alone_go():
-    """Photos may be alike or lit in another way; one must stay if too few are left, and the first always."""
+    """Photos may be alike or lit in another way; all stay if too few are left."""
     frames = [frame(24 * k, seed=k) for k in range(14)]
     frames[0], frames[3], frames[6], frames[10] = (
         frame(blur=25),
@@ -57,7 +63,7 @@ def test_blurred_photos_alone_go():
         frame(217, seed=99),
     )
     qualities = [frame_quality(one) for one in frames]
-    assert [k for k, verdict in enumerate(blurred_photos(qualities)) if verdict] == [3]
+    assert [k for k, verdict in enumerate(blurred_photos(qualities)) if verdict] == [0, 3]
     assert not any(blurred_photos(qualities[:8])) and faults(qualities[:8])[3] == "blurred"
     assert blurred_photos([]) == []
 
