@@ -1,4 +1,4 @@
-"""The room as a whole."""
+"""Training as a whole."""
 
 import subprocess
 import sys
