@@ -28,6 +28,10 @@ SSIM_SIGMA, SSIM_RADIUS = 1.5, 5  # of the window's Gaussian [pixels]
 def psnr(a: np.ndarray, b: np.ndarray, mask: np.ndarray | None = None) -> float:
     """Peak signal-to-noise ratio, of the mean over pixels and channels [dB]; infinite for equal images.
 
+    Args:
+        a, b: (H, W, C) in [0, 1]; so of all functions here.
+        mask: (H, W), pixels that count; None for all.
+
     Raises:
         ImageError: images of different or unusable shapes, or an unusable mask; so of all functions here.
     """

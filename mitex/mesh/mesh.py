@@ -139,6 +139,9 @@ class Mesh:
         """The same faces, UVs, polygons and edges with other positions, (V, 3).
 
         Corner normals stay if the mesh is only moved and scaled: they belong to its shape.
+
+        Raises:
+            MeshError: not one position for each vertex.
         """
         if np.shape(vertices) != self.vertices.shape:
             problem = f"{self.name} has vertices of shape {self.vertices.shape}, not {np.shape(vertices)}"

@@ -71,5 +71,5 @@ def gradient_penalty(critic: FaceNetwork, features: torch.Tensor, graph: FaceGra
 
 
 def adversarial_loss(critic: FaceNetwork, vertices: torch.Tensor, graph: FaceGraph) -> torch.Tensor:
-    """What the generator minimises: the negative score of its mesh."""
+    """What the generator minimises: the negative score () of its mesh, vertices (V, 3)."""
     return -critic(face_features(vertices, graph), graph).mean()

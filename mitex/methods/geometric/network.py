@@ -113,6 +113,6 @@ def _choice(
 
 
 def normalised(x: torch.Tensor) -> torch.Tensor:
-    """Instance norm: mean 0 and variance 1 over the faces, each channel by itself."""
+    """Instance norm of (..., F, C): mean 0 and variance 1 over the faces, each channel by itself."""
     centred = x - x.mean(-2, keepdim=True)
     return centred * (centred.square().mean(-2, keepdim=True) + EPS).rsqrt()

@@ -76,7 +76,12 @@ class Fitting:
         return vertices.detach()
 
     def distance(self, vertices: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
-        """Weighted sum of the distances of the two surfaces, in both directions, and of their normals."""
+        """Weighted sum () of the distances of the two surfaces, in both directions, and of their normals.
+
+        Args:
+            vertices: (V, 3) of the training mesh.
+            generator: of the points on both surfaces.
+        """
         ours = sample_surface(vertices, self.graph.faces, self.samples, generator)
         theirs = sample_surface(self.target, self.target_faces, self.samples, generator)
         to, back, normals_to, normals_back = chamfer(ours, theirs)
@@ -84,7 +89,7 @@ class Fitting:
         return TO_REFERENCE * to + TO_TEMPLATE * back + normals
 
     def regularity(self, vertices: torch.Tensor) -> torch.Tensor:
-        """Weighted sum that is small where edges are even and the surface is smooth."""
+        """Weighted sum () that is small where edges are even and the surface, vertices (V, 3), is smooth."""
         corners = vertices[self.graph.faces]
         lengths = (corners.roll(-1, 1) - corners).norm(dim=2)
         share = (lengths / lengths.sum(1, keepdim=True)).clamp_min(1e-9)

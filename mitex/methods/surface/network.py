@@ -69,7 +69,11 @@ class SurfaceVgg:
         return self.read(texels, {name: Tap(self.index_of(name)) for name in layers})
 
     def read(self, texels: torch.Tensor, taps: Mapping[str, Tap | GramTap]) -> dict[str, torch.Tensor]:
-        """What taps give of texel colours, under their names, in one pass."""
+        """What taps give of texel colours (N, 3), sRGB in [0, 1], under their names, in one pass.
+
+        Raises:
+            ConfigError: colours of another shape.
+        """
         if texels.shape != (self.texels, 3):
             raise ConfigError(f"texels of shape {tuple(texels.shape)}", f"give ({self.texels}, 3)")
         outputs = list(taps.values())

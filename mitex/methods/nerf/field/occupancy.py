@@ -54,7 +54,11 @@ def packed_cells(occupied: np.ndarray) -> torch.Tensor:
 
 
 def unpacked_cells(packed: torch.Tensor, side: int) -> np.ndarray:
-    """(side, side, side) uint8, the inverse of `packed_cells`; ValueError if they are of another grid."""
+    """(side, side, side) uint8, the inverse of `packed_cells`.
+
+    Raises:
+        ValueError: they are of another grid.
+    """
     if packed.shape != (-(-(side**3) // 8),):
         raise ValueError("occupied cells of another grid")
     return np.unpackbits(packed.numpy(), count=side**3).reshape((side,) * 3)
@@ -128,7 +132,11 @@ class Occupancy:
         return {"occupancy": self.values, "refreshes": torch.tensor(self.refreshes)}
 
     def load_state(self, state: dict[str, torch.Tensor]) -> None:
-        """Restores `state`; ValueError if it is of another grid."""
+        """Restores `state`.
+
+        Raises:
+            ValueError: it is of another grid.
+        """
         if state["occupancy"].shape != self.values.shape:
             raise ValueError("an occupancy grid of another size")
         self.values, self.refreshes, self._mask = state["occupancy"], int(state["refreshes"]), None

@@ -142,7 +142,7 @@ class RadianceTask(ABC, Generic[Config]):
         return self.magnitude(colour - target).mean()
 
     def magnitude(self, differences: torch.Tensor) -> torch.Tensor:
-        """How much differences of colours count."""
+        """How much differences of colours (N, 3) count, (N, 3)."""
         if self.config.colour_loss == "l1":
             return differences.abs()
         return L2_WEIGHT * differences.square()
