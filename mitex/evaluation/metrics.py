@@ -29,7 +29,7 @@ def psnr(a: np.ndarray, b: np.ndarray, mask: np.ndarray | None = None) -> float:
     """Peak signal-to-noise ratio, of the mean over pixels and channels [dB]; infinite for equal images.
 
     Args:
-        a, b: (H, W, C) in [0, 1]; so of all functions here.
+        a, b: (H, W, 3) float in [0, 1]; so of all functions here.
         mask: (H, W), pixels that count; None for all.
 
     Raises:
