@@ -1,7 +1,9 @@
 """Fixtures for all tests."""
 
 import os
+import signal
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -21,6 +23,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    # A job in the background starts without Ctrl-C, and hands that on to the processes of the tests.
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if variant := config.getoption("--variant"):
         from mitex.runtime import init
 

@@ -48,12 +48,14 @@ class Vgg16:
         self.operations: list[Operation] = []
         self._names: list[str] = []  # of what the operations give
         self._mean = torch.tensor(MEAN_RGB, device=device)
-        for name, (weight, bias) in (weights or convolutions(pool, normalised)).items():
+        if weights:
+            layers = _frozen(weights, device, self.dtype)
+        else:
+            layers = _shipped(pool, normalised, device, self.dtype)
+        for name, layer in layers.items():
             if name.endswith("_1") and name != "relu1_1":
                 self._append(f"pool{halvings(name)}", Pool(pool))
-            # The first layer reads 3 channels: float32 costs nothing there and keeps the image exact.
-            dtype = torch.float32 if name == "relu1_1" else self.dtype
-            self._append(name, FrozenConv(weight.to(device), bias.to(device), dtype, self.dtype))
+            self._append(name, layer)
         self._append(f"pool{len(WIDTHS)}", Pool(pool))
 
     def features(self, images: torch.Tensor, layers: Iterable[str]) -> dict[str, torch.Tensor]:
@@ -161,6 +163,23 @@ class Vgg16:
         places = math.prod(self.extent(name, images.shape[1], images.shape[2]))
         if where.numel() and (where.min() < 0 or where.max() >= places):
             raise ConfigError(f"positions outside the map of {name}", f"give indices below {places}")
+
+
+def _frozen(weights: Weights, device: str, dtype: torch.dtype) -> dict[str, FrozenConv]:
+    """Layers that compute in `dtype`. The first one reads 3 channels: float32 costs nothing there and keeps
+    the image exact."""
+    return {
+        name: FrozenConv(
+            weight.to(device), bias.to(device), torch.float32 if name == "relu1_1" else dtype, dtype
+        )
+        for name, (weight, bias) in weights.items()
+    }
+
+
+@cache
+def _shipped(pool: str, normalised: bool, device: str, dtype: torch.dtype) -> Mapping[str, FrozenConv]:
+    """Layers with the package's weights, which all networks of a kind share: they take up to 118 MB."""
+    return _frozen(convolutions(pool, normalised), device, dtype)
 
 
 def convolutions(pool: str, normalised: bool) -> Weights:

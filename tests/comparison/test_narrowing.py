@@ -17,7 +17,7 @@ from mitex.errors import ConfigError
 from mitex.mesh import icosphere
 from tests.cli import bad_files as bad
 from tests.comparison.conftest import write_mesh
-from tests.methods.fits import FITS, few_patches, prepare
+from tests.methods.fits import FITS, coarse_grids, few_patches, prepare, untrained_bases
 from tests.methods.nca.text.tiny_text import SETTINGS as TEXT_SETTINGS
 
 CONTENT = {
@@ -141,6 +141,8 @@ def files(place, monkeypatch):
     (place / "meshes").mkdir()
     write_mesh(place / "meshes" / "spot.obj")
     few_patches(monkeypatch)
+    coarse_grids(monkeypatch)
+    untrained_bases(monkeypatch)
     load = import_module("mitex.mesh.load")
     monkeypatch.setattr(load, "embedded", lambda name: replace(icosphere(6), name=name))
 

@@ -16,7 +16,7 @@ from mitex.images import read_image
 from mitex.methods.baselines.plain_field import PlainFieldTexture
 from mitex.methods.nerf.capture.capture import load_capture
 from mitex.methods.nerf.field.rendering import render_view, render_views
-from tests.methods.fits import few_patches, prepare
+from tests.methods.fits import few_patches, prepare, untrained_bases
 
 COMMON = ["rays=512", "table=11", "occupancy=32", "ray_steps=96", "steps=2", "preview_every=0"]
 BASE = ["base_mesh=base.obj", "base_steps=150", "coarsest=8", "finest=32"]
@@ -30,6 +30,7 @@ def compared(small, planes_alike, own_cache, tmp_path, monkeypatch):
     prepare(tmp_path)
     monkeypatch.chdir(tmp_path)
     few_patches(monkeypatch)
+    untrained_bases(monkeypatch)
     compare()
     return tmp_path / "out"
 

@@ -5,7 +5,8 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
 - fits: their settings are resolved as they were asked for, which checks them; then they get 2 steps, 3 if the
   run is resumed, and the tiny settings of their method;
 - meshes that ship with Mitex are balls of 362 vertices, as large as they and under their names;
-- automata grow for 2 steps on the mesh as it is, are not healed, and are baked at 64 texels;
+- automata grow for 2 steps on the mesh as it is, are not healed, and are baked at 64 texels, as the textures
+  of baselines are;
 - films have 4 frames of 32 pixels;
 - the photos that pages name are 8 of a ball in 24 x 24 pixels, which is its own base shape; its texture is
   joined from 30 patches to 128 texels;
@@ -44,6 +45,7 @@ TINY: dict[str, dict[str, Any]] = {
     "surface": {"resolution": 32, "exemplar_size": 32, "scales": 0, "layers": ("relu1_1",)}
     | {"text_views": 1, "text_view": 24},
     "gatys": {"size": 32, "exemplar_size": 32, "layers": ("relu1_1",)},
+    "image_quilting": {"size": 32, "resolution": 32, "exemplar_size": 32, "block": 12},
     "multi_view_gram": {"resolution": 32, "exemplar_size": 32, "view": 32, "layers": ("relu1_1",)},
     "reaction_diffusion": {"hidden": 8, "channels": 4, "grid": 32, "exemplar_size": 32, "pool": 1}
     | {"min_steps": 2, "max_steps": 2, "layers": ("relu1_1",)},
@@ -93,8 +95,11 @@ def prepare(folder: Path) -> None:
 
 def shrink(patch: pytest.MonkeyPatch) -> None:
     """Makes the work small until the patch is undone."""
+    from mitex.methods.baselines.reaction_diffusion import ReactionDiffusionTexture
+    from mitex.methods.baselines.solid_texture import SolidTexture
     from mitex.methods.nca import NcaTexture, texture
     from mitex.methods.nerf import NerfTexture, fitting
+    from mitex.methods.planar import PlanarTexture
     from mitex.render import renderer, shell
     from mitex.training import fit
 
@@ -104,6 +109,10 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(texture, "healed", lambda growth, state, generator: state)
     patch.setattr(texture, "film", _with_few_frames(texture.film))
     patch.setattr(texture.GrowingTexture, "apply", _small_growth(texture.GrowingTexture.apply))
+    for kind in (PlanarTexture, SolidTexture):
+        patch.setattr(kind, "apply", _at_few_texels(kind.apply))
+    spots = ReactionDiffusionTexture
+    patch.setattr(spots, "apply", _at_few_texels(spots.apply, steps=GROWTH))
     patch.setattr("mitex.batch.task.Process", InThisProcess)
     for name in ("PATCHES", "WINDOWS"):
         patch.setattr(f"mitex.comparison.look_pair.{name}", 1)
@@ -128,12 +137,11 @@ def _ball_in_place_of(mesh: Mesh) -> Mesh:
 def _with_few_steps(resolve: Callable[..., Any]) -> Callable[..., Any]:
     def small(presets: Mapping[str, Any], preset: str | None, file: Path | None, settings: Any) -> Any:
         config = resolve(presets, preset, file, settings)
-        if not hasattr(config, "steps"):
-            return config
         defaults = {name: next(iter(method.load_presets().values())) for name, method in methods().items()}
         name = next(name for name, default in defaults.items() if type(default) is type(config))
         steps = STEPS if file is None or file.name != CONFIG else RESUMED_STEPS
-        return replace(config, steps=steps, **EVERY_FIT, **TINY.get(name, {}))
+        training = {"steps": steps, **EVERY_FIT} if hasattr(config, "steps") else {}
+        return replace(config, **training, **TINY.get(name, {}))
 
     return small
 
@@ -158,6 +166,13 @@ def _small_growth(apply: Callable[..., Any]) -> Callable[..., Any]:
     def small(texture: Any, mesh: Mesh, **options: Any) -> Any:
         texels = None if options.get("resolution", TEXELS) is None else TEXELS
         return apply(texture, mesh, **options | {"resolution": texels, "subdivide": 0})
+
+    return small
+
+
+def _at_few_texels(apply: Callable[..., Any], **fixed: Any) -> Callable[..., Any]:
+    def small(texture: Any, mesh: Mesh, **options: Any) -> Any:
+        return apply(texture, mesh, **options | {"resolution": TEXELS} | fixed)
 
     return small
 

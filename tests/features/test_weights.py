@@ -11,9 +11,11 @@ from mitex.features.weights import VGG16_SHA256, WeightsError, verify, vgg16_pat
 @pytest.fixture
 def fresh():
     """Nothing loaded, before and after."""
-    vgg._load.cache_clear()
+    for loaded in (vgg._load, vgg._shipped):
+        loaded.cache_clear()
     yield
-    vgg._load.cache_clear()
+    for loaded in (vgg._load, vgg._shipped):
+        loaded.cache_clear()
 
 
 def test_the_package_ships_the_published_file(monkeypatch):

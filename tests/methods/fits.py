@@ -128,12 +128,29 @@ def prepare(folder: Path) -> None:
 
 
 def few_patches(patch: pytest.MonkeyPatch) -> None:
-    """Captured textures are synthesized from patches of 40 places, in place of 2000."""
+    """Captured textures are synthesized from patches of at most 40 places, in place of 2000."""
     from mitex.methods.nerf import texture
 
     extract = texture.extract_patches
 
     def few(*arguments: Any, **options: Any) -> Any:
-        return extract(*arguments, **options | {"count": 40})
+        return extract(*arguments, **options | {"count": min(options.get("count", 40), 40)})
 
     patch.setattr(texture, "extract_patches", few)
+
+
+def coarse_grids(patch: pytest.MonkeyPatch) -> None:
+    """What is solid in boxes on a mesh is looked for on a grid of an eighth of the cells."""
+    patch.setattr("mitex.methods.baselines.nerf_tex.boxes.CELLS", 32)
+
+
+def untrained_bases(patch: pytest.MonkeyPatch) -> None:
+    """Base meshes get a shell at once, without the training that measures how thick it must be."""
+    from mitex.methods.nerf.base.base_shape import given_base
+    from mitex.methods.nerf.base.coarse import BaseShape
+
+    def found(capture: Any, config: Any, base_mesh: Any, *_: Any, **__: Any) -> BaseShape:
+        base = given_base(base_mesh)
+        return BaseShape(base, base.vertices, thickness=0.15)
+
+    patch.setattr("mitex.methods.nerf.fitting.find_base", found)

@@ -26,7 +26,7 @@ from mitex.methods.registry import load, method_of, methods
 from mitex.training import checkpoint, model_file
 from mitex.training.locate import NAME
 from mitex.training.settings import FitConfig, meaning
-from tests.methods.fits import FITS, few_patches, prepare
+from tests.methods.fits import FITS, coarse_grids, few_patches, prepare
 from tests.state import in_thread, program_state
 
 SIDE = 48  # of pictures [pixels]
@@ -233,6 +233,7 @@ class TestRun:
     def test_it_is_applied_exported_and_rendered(self, name, runs, workplace, monkeypatch, capsys):
         monkeypatch.chdir(workplace)
         few_patches(monkeypatch)
+        coarse_grids(monkeypatch)
         quick = {"resolution": SIDE, "spp": 4}
         monkeypatch.setattr(methods()[name].load_apply(), "picture_options", lambda options: quick)
         for suffix in ("glb", "png"):

@@ -22,9 +22,9 @@ def network_weights(config: SurfaceConfig, generator: torch.Generator) -> Weight
 
 def random_weights(generator: torch.Generator) -> Weights:
     """Weights of the network's shape, drawn as He et al. do, without biases (figure 5 b)."""
-    weights = {}
+    weights, trained = {}, convolutions("average", False)
     for name in LAYERS:
-        weight, bias = convolutions("average", False)[name]
+        weight, bias = trained[name]
         scale = (2.0 / weight[0].numel()) ** 0.5
         weights[name] = torch.randn(weight.shape, generator=generator) * scale, torch.zeros_like(bias)
     return weights

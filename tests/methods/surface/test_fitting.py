@@ -39,6 +39,7 @@ from tests.training.contract import (
 pytestmark = pytest.mark.usefixtures("own_cache")
 SMALL = ["resolution=48", "exemplar_size=48", "steps=12", "scales=0", "checkpoint_every=6", "preview_every=0"]
 SMALL += ["start=noise"]  # which is there at once
+SHALLOW = [*SMALL, "layers=relu1_1,relu2_1"]  # where it matters little what is compared
 
 
 @pytest.fixture(scope="module")
@@ -215,7 +216,7 @@ class TestOrientation:
     def test_a_field_turns_the_frames_and_stays_with_the_texture(self, mesh, exemplar, tmp_path):
         down = np.tile(np.array([0.0, -1.0, 0.0], np.float32), (len(mesh.vertices), 1))
         np.save(tmp_path / "down.npy", down)
-        settings = [*SMALL, "steps=2"]
+        settings = [*SHALLOW, "steps=2"]
         surface.fit(exemplar, mesh, tmp_path / "run", set=settings, orientation=tmp_path / "down.npy")
         texture = SurfaceTexture.load(tmp_path / "run")
         tangents = texture.apply().tangents
@@ -225,14 +226,14 @@ class TestOrientation:
         assert (tangents[around, 1] < -0.8).all()
 
     def test_resuming_with_another_field_is_refused(self, mesh, exemplar, tmp_path):
-        fit = partial(surface.fit, exemplar, mesh, tmp_path / "run", set=[*SMALL, "steps=2"])
+        fit = partial(surface.fit, exemplar, mesh, tmp_path / "run", set=[*SHALLOW, "steps=2"])
         fit()
         with pytest.raises(CheckpointError, match="orientation"):
             fit(orientation=mesh.vertices, resume=True)
 
 
 def small_task(mesh, exemplar, *settings) -> SurfaceTask:
-    config = resolve(PRESETS, None, None, [*SMALL, *settings])
+    config = resolve(PRESETS, None, None, [*SHALLOW, *settings])
     laid = with_layout(mesh, config.resolution)
     return SurfaceTask(config, exemplar, SurfaceDomain.of(laid, config))
 
@@ -290,19 +291,19 @@ def test_a_fit_computes_its_domain_once(mesh, exemplar, tmp_path, monkeypatch):
     monkeypatch.setattr(
         room.Texels, "rasterize", staticmethod(lambda *args: (calls.append("texels"), rasterize(*args))[1])
     )
-    overrides = [*SMALL, "resolution=47", "steps=2", "preview_every=2"]
+    overrides = [*SHALLOW, "resolution=47", "steps=2", "preview_every=2"]
     surface.fit(exemplar, mesh, tmp_path / "run", set=overrides).apply()
     assert sorted(calls) == ["GeodesicTracer", "build", "texels", "vertex_directions"]
 
 
 def test_noise_start_and_range(mesh, exemplar, tmp_path):
-    texture = surface.fit(exemplar, mesh, tmp_path / "run", set=[*SMALL, "steps=1", "lr=0"])
+    texture = surface.fit(exemplar, mesh, tmp_path / "run", set=[*SHALLOW, "steps=1", "lr=0"])
     maps = [exemplar.maps[name] for name in texture.maps]
     assert np.abs(texture.values.mean(0) - np.concatenate([m.mean((0, 1)) for m in maps])).max() < 0.05
     spread = np.concatenate([m.std((0, 1)) for m in maps])
     # Uniform noise of width 1 deviates by 0.289; a channel that hardly varies gets a little of the floor.
     assert np.abs(texture.values.std(0) - 0.289 * spread).max() < 0.02
-    overrides = [*SMALL, "steps=1", "lr=0", "whitened=false", "noise=0.2"]
+    overrides = [*SHALLOW, "steps=1", "lr=0", "whitened=false", "noise=0.2"]
     texture = surface.fit(exemplar, mesh, tmp_path / "paper", set=overrides)
     assert texture.values.min() >= 0 and texture.values.max() <= 0.2
     assert abs(texture.values.mean() - 0.1) < 0.005
@@ -312,7 +313,7 @@ def test_diffusion_wears_down_what_is_finer_than_the_taps(mesh, exemplar, tmp_pa
     """Without a gradient noise fades and the mean stays."""
     textures = {}
     for amount in ("0", "0.1"):
-        overrides = [*SMALL, "lr=0", f"diffusion={amount}"]
+        overrides = [*SHALLOW, "lr=0", f"diffusion={amount}"]
         textures[amount] = surface.fit(exemplar, mesh, tmp_path / amount, set=overrides).values
     assert np.abs(textures["0.1"].mean(0) - textures["0"].mean(0)).max() < 0.01
     assert (textures["0.1"].std(0) < 0.6 * textures["0"].std(0)).all()

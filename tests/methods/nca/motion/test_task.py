@@ -139,11 +139,13 @@ def test_estimators_of_pictures_see_the_last_states(exemplar, monkeypatch):
         assert gradient is not None and gradient[:, -3:].any()
 
 
-@pytest.mark.parametrize("surface", ["even", "flat"])
-def test_patterns_wider_than_the_surface_are_measured(exemplar, surface):
+@pytest.mark.parametrize(
+    ("surface", "density", "resolution"), [("even", 512, 48), ("flat", 32, 96)], ids=["even", "flat"]
+)
+def test_patterns_wider_than_the_surface_are_measured(exemplar, surface, density, resolution):
     """Views show less of them then, in fewer pixels, but in as many as Lucas and Kanade's method needs."""
-    wide = (*MOVING, f"surfaces={surface}", "motion_estimator=lucas-kanade", "density=512", "resolution=48")
-    task = _grown(MotionTask(config(*wide), exemplar))
+    wide = (f"surfaces={surface}", f"density={density}", f"resolution={resolution}")
+    task = _grown(MotionTask(config(*MOVING, *wide, "motion_estimator=lucas-kanade"), exemplar))
     assert 0 < _metrics(task)["motion"] < math.inf
 
 

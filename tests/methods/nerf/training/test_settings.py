@@ -96,7 +96,7 @@ class TestOtherSettings:
             given.append(options)
             raise Stop
 
-        base = icosphere(8)
+        base = icosphere(44)  # even enough not to be remeshed
         settings = ["base_steps=2", "neighbours=5", "repulsion=0.2", "concavity=0.4"]
         monkeypatch.setattr("mitex.methods.nerf.base.coarse.Projection", projection)
         with pytest.raises(Stop):
