@@ -111,6 +111,7 @@ class BatchFolder:
     def start(self, job: Job, driver: str, saved: float | None) -> dict[str, Any]:
         """Writes down that a job begins, and returns it: driver, count, time, seconds and memory.
 
+        It is not done from now on, although it may have been before somebody removed its result.
         `count` is how often it has been started for the driver, this time included, but for attempts that
         were told to stop.
         `seconds` and `memory` are of the attempts before whose work it goes on with, up to their checkpoints;
@@ -120,6 +121,9 @@ class BatchFolder:
             job: the job.
             driver: the command that wants it.
             saved: when the checkpoint was written that it goes on from; None if it begins anew.
+
+        Raises:
+            OSError, OutputError: The folder cannot be written to.
         """
         before = _read(self.of(job) / STARTS) or {}
         count = before.get("count", 0) + 1 if before.get("driver") == driver else 1
@@ -127,6 +131,8 @@ class BatchFolder:
         if saved is not None:
             record["seconds"] = before.get("seconds", 0.0) + max(saved - before.get("time", saved), 0.0)
             record["memory"] = before.get("memory", 0)
+        # Before the result's folder is there again: who sees that finds no old record beside it.
+        (self.of(job) / DONE).unlink(missing_ok=True)
         self.write(job, STARTS, record)
         return record
 
