@@ -1,8 +1,9 @@
 """Two methods that take no time to import: what they learn is a hash, one more for each step.
 
 `stripes` learns from an exemplar and is put on any mesh, `inlay` learns on one mesh. An exemplar that begins
-with `poison` is refused, one that begins with `crash` ends the process. In the environment, `STRIPES_LOG` is
-a file that gets a line for each start and step, and `STRIPES_PACE` the time of a step [s].
+with `poison` is refused, one that begins with `crash` ends the process, one that begins with `helper` starts
+another process, which takes 300 MB. In the environment, `STRIPES_LOG` is a file that gets a line for each
+start and step, and `STRIPES_PACE` the time of a step [s].
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ import hashlib
 import json
 import os
 import signal
+import subprocess
+import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,6 +86,8 @@ class Fit(ExemplarOptions):
             raise ImageError(f"'{self.exemplar}' is poisoned", "take another one")
         if content.startswith(b"crash"):
             os.kill(os.getpid(), signal.SIGKILL)
+        if content.startswith(b"helper"):
+            subprocess.run([sys.executable, "-c", "bytearray(300 << 20)"], check=True)
         return content
 
     def run(self) -> None:
