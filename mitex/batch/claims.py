@@ -52,7 +52,8 @@ class Claim:
             self.release()
             return None
         for other in others:
-            other.unlink(missing_ok=True)
+            with suppress(OSError):  # those that stay are stale to everybody
+                other.unlink(missing_ok=True)
         return self
 
     def note(self, pid: int) -> None:
@@ -83,7 +84,11 @@ class Claim:
 
 
 def holder(folder: Path) -> str | None:
-    """Host of the process that works on the job of a folder; None if nobody does."""
+    """Host of the process that works on the job of a folder; None if nobody does.
+
+    Raises:
+        OSError: The folder cannot be read now.
+    """
     live = [claim for claim in _claims(folder) if _is_live(claim)]
     return _read(live[0])[0][0] if live and _read(live[0]) else None
 
@@ -112,7 +117,7 @@ def _read(path: Path) -> list[tuple[str, int, float]]:
 
 
 def _is_live(path: Path) -> bool:
-    """Whether somebody works under a claim."""
+    """Whether somebody works under a claim, or may do so, as far as one can tell."""
     entries = _read(path)
     if entries and entries[0][0] == socket.gethostname():
         return any(_is_running(pid, moment) for _, pid, moment in entries)
@@ -120,6 +125,8 @@ def _is_live(path: Path) -> bool:
         return _now(path.parent) - path.stat().st_mtime < STALE_AFTER
     except FileNotFoundError:
         return False
+    except OSError:  # a disk that is away for a moment
+        return True
 
 
 def _is_running(pid: int, noted: float) -> bool:
@@ -129,7 +136,7 @@ def _is_running(pid: int, noted: float) -> bool:
         boot = time.time() - time.clock_gettime(time.CLOCK_BOOTTIME)
         started = boot + int(fields[19]) / os.sysconf("SC_CLK_TCK")
         return fields[0] not in "ZX" and started <= noted + SLACK
-    except FileNotFoundError:
+    except (FileNotFoundError, ProcessLookupError):  # the latter if it ends meanwhile
         return not Path("/proc/self/stat").exists() and _answers(pid)
 
 

@@ -88,11 +88,19 @@ class BatchFolder:
         return self.path / job.result
 
     def done(self, job: Job) -> dict[str, Any] | None:
-        """What is known of a job that is done; None of another, or if its result is gone."""
-        return _read(self.of(job) / DONE) if self.result(job).exists() else None
+        """What is known of a job that is done; None of another, or if its result is gone.
+
+        Raises:
+            OSError: That cannot be told now.
+        """
+        return _read(self.of(job) / DONE) if _is_there(self.result(job)) else None
 
     def failed(self, job: Job) -> dict[str, Any] | None:
-        """What is known of a job that failed; None of another."""
+        """What is known of a job that failed; None of another.
+
+        Raises:
+            OSError: That cannot be told now.
+        """
         return _read(self.of(job) / FAILED)
 
     def write(self, job: Job, name: str, record: Mapping[str, Any]) -> None:
@@ -137,8 +145,11 @@ class BatchFolder:
         return record
 
     def has_driver(self, name: str) -> bool:
-        """Whether a command goes on, rather than wanting its jobs to stop."""
-        return (self.path / "drivers" / name).exists()
+        """Whether a command goes on, rather than wanting its jobs to stop; so it does if nobody can tell."""
+        try:
+            return _is_there(self.path / "drivers" / name)
+        except OSError:  # a disk that is away for a moment
+            return True
 
     def dismiss(self, name: str) -> None:
         """Lets the jobs of a command stop."""
@@ -165,13 +176,26 @@ class BatchFolder:
             self.dismiss(name)
 
     def holder(self, job: Job) -> str | None:
-        """Host that works on a job; None if none does."""
+        """Host that works on a job; None if none does.
+
+        Raises:
+            OSError: That cannot be told now.
+        """
         return claims.holder(self.of(job))
+
+
+def _is_there(path: Path) -> bool:
+    """Whether a path exists; unlike `Path.exists`, it takes no error of a disk for an answer."""
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return True
 
 
 def _read(path: Path) -> dict[str, Any] | None:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (FileNotFoundError, NotADirectoryError, ValueError):
         return None
     return content if isinstance(content, dict) else None

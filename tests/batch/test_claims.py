@@ -1,11 +1,13 @@
 """Claims: one holder at a time, whoever dies, wherever."""
 
+import errno
 import os
 import socket
 import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 
@@ -95,6 +97,18 @@ class TestStaleOnes:
         assert Claim.take(tmp_path) is None
         claimed(tmp_path, "", age=2 * STALE_AFTER)
         assert Claim.take(tmp_path)
+
+    @pytest.mark.parametrize("number", [errno.ESTALE, errno.EIO])
+    def test_not_one_of_which_the_disk_says_nothing(self, number, tmp_path, monkeypatch):
+        path, real = claimed(tmp_path, "elsewhere:1:0\n", age=1e6), Path.stat
+
+        def stat(place, **options):
+            if place == path:
+                raise OSError(number, os.strerror(number))
+            return real(place, **options)
+
+        monkeypatch.setattr(Path, "stat", stat)
+        assert Claim.take(tmp_path) is None
 
     def test_by_the_clock_of_the_file_system(self, tmp_path, monkeypatch):
         claimed(tmp_path, "elsewhere:1:0\n")
