@@ -313,7 +313,7 @@ class TestInterruptions:
         with ThreadPoolExecutor(1) as pool:
             report = pool.submit(workshop.run, plan)
             wait_for(lambda: workshop.told("step"))
-            os.kill(int(next(workshop.folder.rglob("claim.0")).read_text().split(":")[-2]), signal.SIGTERM)
+            os.kill(int(next(workshop.folder.rglob("claim.0")).read_text().split(":")[-3]), signal.SIGTERM)
             assert [row.state for row in report.result().rows] == ["interrupted", "waiting"]
 
     @pytest.mark.parametrize("engine", ["local", "dask"])
