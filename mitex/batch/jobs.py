@@ -117,9 +117,10 @@ def _fit(
 
 def _apply(part: MethodPlan, plan: Plan, fit: Job, mesh: Input | None) -> Job:
     given = dict(part.apply)
-    if fit.about["seed"] is not None and "seed" in options.apply_kinds(methods()[part.method]):
+    method = methods()[part.method]
+    if fit.about["seed"] is not None and "seed" in options.apply_kinds(method):
         given.setdefault("seed", fit.about["seed"])
-    inputs = [*_option("mesh", mesh), *options.apply_words(given, plan.folder)]
+    inputs = [*_option("mesh", mesh), *options.apply_words(method, given, plan.folder)]
     about = dict(fit.about) | ({"mesh": mesh.label} if mesh else {})
     id = _id("apply", about, [fit.id, part.output, *inputs])
     name = mesh.label if mesh else str(about["exemplar"])
