@@ -3,7 +3,7 @@
 `stripes` learns from an exemplar and is put on any mesh, `inlay` learns on one mesh. An exemplar that begins
 with `poison` is refused, one that begins with `crash` ends the process, one that begins with `helper` starts
 another process, which takes 300 MB. In the environment, `STRIPES_LOG` is a file that gets a line for each
-start and step, and `STRIPES_PACE` the time of a step [s].
+start, with some variables, and each step, and `STRIPES_PACE` the time of a step [s].
 """
 
 from __future__ import annotations
@@ -42,6 +42,9 @@ def described(name: str, fit: str) -> Method:
         texture="stripes:Stripes",
     )
 
+
+# Told at the start of a fit.
+VARIABLES = (THREADS, "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "DRJIT_CACHE_DIR")
 
 STRIPES, INLAY = described("stripes", "Fit"), described("inlay", "FitOnMesh")
 
@@ -92,7 +95,7 @@ class Fit(ExemplarOptions):
 
     def run(self) -> None:
         assert self.out is not None and not (self.resume and self.salt)
-        tell("start", self.out.name, os.environ.get(THREADS))
+        tell("start", self.out.name, *(os.environ.get(name) for name in VARIABLES))
         step, value = 0, hashlib.sha256(self.read() + self.salt.encode()).hexdigest()
         place = self.out / CHECKPOINT
         if self.resume:
