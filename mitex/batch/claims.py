@@ -1,8 +1,9 @@
 """Who works on a job: claim files that one process alone can make, also in a folder that machines share.
 
-A claim is `claim.N` in the job's folder, made with O_EXCL. Its lines are `host:pid:time`, one for each
-process at work. It is stale when these are gone, or, on another host, when nobody has touched it for a while.
-Whoever finds the newest claim stale makes the next one, so that no claim that somebody could hold is removed.
+A claim is `claim.N` in the job's folder, made with O_EXCL. Its lines are `host:pid:time:space`, one for each
+process at work; the space is where that number is the process's own. It is stale when these are gone, or, on
+another host or in another space (a container), when nobody has touched it for a while. Whoever finds the
+newest claim stale makes the next one, so that no claim that somebody could hold is removed.
 """
 
 from __future__ import annotations
@@ -11,10 +12,21 @@ import os
 import socket
 import time
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 STALE_AFTER = 60.0  # without a touch, of another host's claim [s]
 SLACK = 2.0  # by which a process may seem to have started after it made its claim [s]
+
+
+class _Entry(NamedTuple):
+    """A line of a claim."""
+
+    host: str
+    pid: int
+    moment: float  # when it was noted, by the host's clock [s]
+    space: str
 
 
 class Claim:
@@ -52,7 +64,8 @@ class Claim:
             self.release()
             return None
         for other in others:
-            other.unlink(missing_ok=True)
+            with suppress(OSError):  # those that stay are stale to everybody
+                other.unlink(missing_ok=True)
         return self
 
     def note(self, pid: int) -> None:
@@ -83,9 +96,13 @@ class Claim:
 
 
 def holder(folder: Path) -> str | None:
-    """Host of the process that works on the job of a folder; None if nobody does."""
+    """Host of the process that works on the job of a folder; None if nobody does.
+
+    Raises:
+        OSError: The folder cannot be read now.
+    """
     live = [claim for claim in _claims(folder) if _is_live(claim)]
-    return _read(live[0])[0][0] if live and _read(live[0]) else None
+    return _read(live[0])[0].host if live and _read(live[0]) else None
 
 
 def _numbers(folder: Path) -> list[int]:
@@ -97,29 +114,43 @@ def _claims(folder: Path) -> list[Path]:
 
 
 def _line(pid: int) -> str:
-    return f"{socket.gethostname()}:{pid}:{time.time():.2f}\n"
+    return f"{socket.gethostname()}:{pid}:{time.time():.2f}:{_space()}\n"
 
 
-def _read(path: Path) -> list[tuple[str, int, float]]:
-    """Host, process and time of each line; half a line is left out."""
+@cache
+def _space() -> str:
+    """Within which numbers of processes can be compared: this boot of this kernel, and the PID namespace.
+
+    Empty where there is no /proc.
+    """
+    with suppress(OSError):
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="utf-8").strip()
+        return f"{boot}/{os.stat('/proc/self/ns/pid').st_ino}"
+    return ""
+
+
+def _read(path: Path) -> list[_Entry]:
+    """The lines of a claim; half a line is left out."""
     entries = []
     with suppress(OSError, ValueError):
         for line in path.read_text(encoding="utf-8").splitlines(keepends=True):
-            host, pid, moment = line.rsplit(":", 2)
+            host, pid, moment, space = line.rsplit(":", 3)
             if line.endswith("\n"):
-                entries.append((host, int(pid), float(moment)))
+                entries.append(_Entry(host, int(pid), float(moment), space.rstrip("\n")))
     return entries
 
 
 def _is_live(path: Path) -> bool:
-    """Whether somebody works under a claim."""
+    """Whether somebody works under a claim, or may do so, as far as one can tell."""
     entries = _read(path)
-    if entries and entries[0][0] == socket.gethostname():
-        return any(_is_running(pid, moment) for _, pid, moment in entries)
+    if entries and (entries[0].host, entries[0].space) == (socket.gethostname(), _space()):
+        return any(_is_running(entry.pid, entry.moment) for entry in entries)
     try:
         return _now(path.parent) - path.stat().st_mtime < STALE_AFTER
     except FileNotFoundError:
         return False
+    except OSError:  # a disk that is away for a moment
+        return True
 
 
 def _is_running(pid: int, noted: float) -> bool:
@@ -129,7 +160,7 @@ def _is_running(pid: int, noted: float) -> bool:
         boot = time.time() - time.clock_gettime(time.CLOCK_BOOTTIME)
         started = boot + int(fields[19]) / os.sysconf("SC_CLK_TCK")
         return fields[0] not in "ZX" and started <= noted + SLACK
-    except FileNotFoundError:
+    except (FileNotFoundError, ProcessLookupError):  # the latter if it ends meanwhile
         return not Path("/proc/self/stat").exists() and _answers(pid)
 
 

@@ -6,6 +6,7 @@ import logging
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -131,11 +132,12 @@ class _Run:
         return False
 
     def _recall(self, job: Job) -> bool:
-        """Whether another call has finished the job."""
-        for state, record in (("done", self.folder.done(job)), ("failed", self.folder.failed(job))):
-            if record:
-                self.ended[job.id] = state
-                return True
+        """Whether another call has finished the job, as far as one can tell."""
+        for state, look in (("done", self.folder.done), ("failed", self.folder.failed)):
+            with suppress(OSError):  # a disk that is away for a moment; the task looks again
+                if look(job):
+                    self.ended[job.id] = state
+                    return True
         return False
 
     def _submit(self) -> None:
@@ -156,11 +158,18 @@ class _Run:
         now = time.monotonic()
         if now < self.not_before.get(job.id, 0.0) or self._recall(job):
             return
-        if self.folder.holder(job):
+        if self._is_held(job):
             self.not_before[job.id] = now + LOOK_ELSEWHERE
             return
         self.handles[job.id] = self.engine.submit(Task(job, self.folder, self.name, self.threads))
         self._tell(job, "submitted", {})
+
+    def _is_held(self, job: Job) -> bool:
+        """Whether somebody works on the job; so it is taken if nobody can tell."""
+        try:
+            return self.folder.holder(job) is not None
+        except OSError:  # a disk that is away for a moment
+            return True
 
     def _collect(self) -> None:
         """Takes note of the tasks that have ended."""
@@ -191,7 +200,7 @@ class _Run:
         """Takes back what has not begun, and waits for what has: fits save their checkpoints."""
         self.folder.dismiss(self.name)
         for job in self.jobs:
-            if job.id in self.handles and not self.folder.holder(job):
+            if job.id in self.handles and not self._is_held(job):
                 self.handles.pop(job.id).cancel()
         while self.handles:
             self._collect()

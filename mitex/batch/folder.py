@@ -88,11 +88,19 @@ class BatchFolder:
         return self.path / job.result
 
     def done(self, job: Job) -> dict[str, Any] | None:
-        """What is known of a job that is done; None of another, or if its result is gone."""
-        return _read(self.of(job) / DONE) if self.result(job).exists() else None
+        """What is known of a job that is done; None of another, or if its result is gone.
+
+        Raises:
+            OSError: That cannot be told now.
+        """
+        return _read(self.of(job) / DONE) if _is_there(self.result(job)) else None
 
     def failed(self, job: Job) -> dict[str, Any] | None:
-        """What is known of a job that failed; None of another."""
+        """What is known of a job that failed; None of another.
+
+        Raises:
+            OSError: That cannot be told now.
+        """
         return _read(self.of(job) / FAILED)
 
     def write(self, job: Job, name: str, record: Mapping[str, Any]) -> None:
@@ -111,6 +119,7 @@ class BatchFolder:
     def start(self, job: Job, driver: str, saved: float | None) -> dict[str, Any]:
         """Writes down that a job begins, and returns it: driver, count, time, seconds and memory.
 
+        It is not done from now on, although it may have been before somebody removed its result.
         `count` is how often it has been started for the driver, this time included, but for attempts that
         were told to stop.
         `seconds` and `memory` are of the attempts before whose work it goes on with, up to their checkpoints;
@@ -120,6 +129,9 @@ class BatchFolder:
             job: the job.
             driver: the command that wants it.
             saved: when the checkpoint was written that it goes on from; None if it begins anew.
+
+        Raises:
+            OSError, OutputError: The folder cannot be written to.
         """
         before = _read(self.of(job) / STARTS) or {}
         count = before.get("count", 0) + 1 if before.get("driver") == driver else 1
@@ -127,12 +139,17 @@ class BatchFolder:
         if saved is not None:
             record["seconds"] = before.get("seconds", 0.0) + max(saved - before.get("time", saved), 0.0)
             record["memory"] = before.get("memory", 0)
+        # Before the result's folder is there again: who sees that finds no old record beside it.
+        (self.of(job) / DONE).unlink(missing_ok=True)
         self.write(job, STARTS, record)
         return record
 
     def has_driver(self, name: str) -> bool:
-        """Whether a command goes on, rather than wanting its jobs to stop."""
-        return (self.path / "drivers" / name).exists()
+        """Whether a command goes on, rather than wanting its jobs to stop; so it does if nobody can tell."""
+        try:
+            return _is_there(self.path / "drivers" / name)
+        except OSError:  # a disk that is away for a moment
+            return True
 
     def dismiss(self, name: str) -> None:
         """Lets the jobs of a command stop."""
@@ -159,13 +176,26 @@ class BatchFolder:
             self.dismiss(name)
 
     def holder(self, job: Job) -> str | None:
-        """Host that works on a job; None if none does."""
+        """Host that works on a job; None if none does.
+
+        Raises:
+            OSError: That cannot be told now.
+        """
         return claims.holder(self.of(job))
+
+
+def _is_there(path: Path) -> bool:
+    """Whether a path exists; unlike `Path.exists`, it takes no error of a disk for an answer."""
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return True
 
 
 def _read(path: Path) -> dict[str, Any] | None:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (FileNotFoundError, NotADirectoryError, ValueError):
         return None
     return content if isinstance(content, dict) else None

@@ -117,9 +117,10 @@ def _fit(
 
 def _apply(part: MethodPlan, plan: Plan, fit: Job, mesh: Input | None) -> Job:
     given = dict(part.apply)
-    if fit.about["seed"] is not None and "seed" in options.apply_kinds(methods()[part.method]):
+    method = methods()[part.method]
+    if fit.about["seed"] is not None and "seed" in options.apply_kinds(method):
         given.setdefault("seed", fit.about["seed"])
-    inputs = [*_option("mesh", mesh), *options.apply_words(given, plan.folder)]
+    inputs = [*_option("mesh", mesh), *options.apply_words(method, given, plan.folder)]
     about = dict(fit.about) | ({"mesh": mesh.label} if mesh else {})
     id = _id("apply", about, [fit.id, part.output, *inputs])
     name = mesh.label if mesh else str(about["exemplar"])
@@ -132,9 +133,10 @@ def _apply(part: MethodPlan, plan: Plan, fit: Job, mesh: Input | None) -> Job:
 def _exemplars(part: MethodPlan, plan: Plan) -> list[Input]:
     if part.learns_from == "text":
         return [Input(text, None) for text in part.exemplars]
-    if part.source is not None:  # which may be names as well as files
+    method = methods()[part.method]
+    if part.learns_from != method.learns_from:  # which may be names as well as files
         return [Input.of(text, plan.folder) for text in part.exemplars]
-    return find(part.exemplars, plan.folder, "exemplar", _exemplar_names(methods()[part.method]))
+    return find(part.exemplars, plan.folder, "exemplar", _exemplar_names(method))
 
 
 def _option(name: str, value: Input | None) -> list[Input]:
@@ -161,10 +163,13 @@ def _plain(name: str) -> str:
 def _exemplar_names(method: Method) -> list[str] | None:
     """The names that may stand for what a method learns from; None if they are not checked."""
     from mitex.exemplar import names
+    from mitex.methods.geometric.references import reference_names
+    from mitex.training.locate import bundled_files
 
     if options.learns_from_paths(method):
         return []
-    return names() if method.learns_from == "exemplar" else None
+    known = {"exemplar": names, "reference": reference_names, "texture": lambda: list(bundled_files())}
+    return known[method.learns_from]() if method.learns_from in known else None
 
 
 def _mesh_names() -> list[str]:

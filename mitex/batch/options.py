@@ -13,11 +13,15 @@ from typing import Any, Union
 from mitex.batch.inputs import Input
 from mitex.errors import ConfigError, WeightsError
 from mitex.methods.method import Method
+from mitex.methods.options import field_files
 from mitex.suggestions import suggestion
 from mitex.training import values
 from mitex.training.config import resolve
 
-NAMES = {"preset", "text", "subdivide"}  # options whose texts never name files
+# What the commands never take for a file, even if one is called like it.
+NAMES = {"preset", "text", "subdivide"}  # options: whatever they are given
+WORDS = {"clip": "words", "content": "ao"}  # options: this text
+VECTOR_FIELDS = {"field", "motion", "orientation"}  # options: names, directions, angles
 PLANNED = {"out", "mesh", "model", "quiet", "resume", "set", "settings"}  # what a plan says otherwise
 
 
@@ -100,14 +104,14 @@ def implied_inputs(method: Method, fit: Mapping[str, Any], folder: Path, *, from
 def fit_words(method: Method, fit: Mapping[str, Any], folder: Path) -> list[Input]:
     """The words of the options and settings of a fit; those that name files are absolute paths."""
     options = fit_kinds(method)
-    words = list(_words({name: fit[name] for name in fit if name in options}, folder))
+    words = list(_words({name: fit[name] for name in fit if name in options}, options, folder))
     settings = [f"{name}={_text(value)}" for name, value in fit.items() if name not in options]
     return [*words, *(Input(word, None) for word in (["--set", *settings] if settings else []))]
 
 
-def apply_words(apply: Mapping[str, Any], folder: Path) -> list[Input]:
+def apply_words(method: Method, apply: Mapping[str, Any], folder: Path) -> list[Input]:
     """The words of the options of `mitex apply`; those that name files are absolute paths."""
-    return list(_words(apply, folder))
+    return list(_words(apply, apply_kinds(method), folder))
 
 
 def _config(method: Method, fit: Mapping[str, Any], folder: Path) -> Any:
@@ -117,7 +121,7 @@ def _config(method: Method, fit: Mapping[str, Any], folder: Path) -> Any:
     return resolve(method.load_presets(), fit.get("preset"), file, settings)
 
 
-def _words(options: Mapping[str, Any], folder: Path) -> Iterator[Input]:
+def _words(options: Mapping[str, Any], kinds: Mapping[str, Any], folder: Path) -> Iterator[Input]:
     for name, value in options.items():
         option = f"--{name.replace('_', '-')}"
         if value is True:
@@ -126,9 +130,18 @@ def _words(options: Mapping[str, Any], folder: Path) -> Iterator[Input]:
             # A value that begins with a dash is one word with its option.
             if isinstance(value, str) and not value.startswith("-"):
                 yield Input(option, None)
-                yield Input(value, None) if name in NAMES else Input.of(value, folder)
+                is_file = _may_name_file(name, value, kinds[name])
+                yield Input.of(value, folder) if is_file else Input(value, None)
             else:
                 yield Input(f"{option}={_text(value)}", None)
+
+
+def _may_name_file(name: str, text: str, kind: Any) -> bool:
+    """Whether the command takes the text of an option for a file if there is one."""
+    choices = [choice for one in (kind, *typing.get_args(kind)) for choice in typing.get_args(one)]
+    if name in NAMES or text == WORDS.get(name) or text in choices:
+        return False
+    return name not in VECTOR_FIELDS or bool(field_files(text))
 
 
 def _text(value: Any) -> str:

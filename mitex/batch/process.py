@@ -13,6 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
+from mitex.batch.memory import UNIT, own_peak
 from mitex.runtime.workers import THREADS
 
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", THREADS)
@@ -53,16 +54,23 @@ class Process:
         self, words: Sequence[str], folder: Path, log: IO[bytes], environment: Mapping[str, str]
     ) -> None:
         self._ended, self._sent, self._lock = False, set[int](), threading.RLock()
-        # A group of its own: Ctrl-C reaches this process alone, which passes it on once.
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "mitex.cli.job", str(os.getpid()), *words],
-            cwd=folder,
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=log,
-            env=environment,
-            process_group=0,
-        )
+        reading, writing = os.pipe()
+        os.set_blocking(reading, False)
+        self._told = open(reading, "rb", buffering=0)  # noqa: SIM115
+        try:
+            # A group of its own: Ctrl-C reaches this process alone, which passes it on once.
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "mitex.cli.job", str(os.getpid()), str(writing), *words],
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                env=environment,
+                process_group=0,
+                pass_fds=[writing],
+            )
+        finally:
+            os.close(writing)
 
     @property
     def pid(self) -> int:
@@ -70,14 +78,24 @@ class Process:
         return self._process.pid
 
     def wait(self) -> tuple[int, int]:
-        """Waits for its end; the exit code (negative: the signal) and the most memory that it had [bytes]."""
+        """Waits for its end; the exit code (negative: the signal) and the most memory that it had [bytes].
+
+        The memory of a process that was killed is 0 if this one has had as much: then it is not known.
+        """
         self.await_end()
         with self._lock:  # its number is its own until here
             _, status, usage = os.wait4(self.pid, 0)
             self._ended = True
             self._process.returncode = os.waitstatus_to_exitcode(status)
-        scale = 1 if sys.platform == "darwin" else 1024
-        return self._process.returncode, usage.ru_maxrss * scale
+        return self._process.returncode, self._memory(usage.ru_maxrss * UNIT)
+
+    def _memory(self, counted: int) -> int:
+        """What it told of its memory, or else what the system counted, unless that may be this process's."""
+        with self._told as pipe:
+            told = pipe.read(32)
+        if told or sys.platform == "darwin":
+            return int(told or counted)
+        return counted if counted > own_peak() else 0
 
     def await_end(self) -> None:
         """Waits for its end, and leaves the exit code to `wait`."""

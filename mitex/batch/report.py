@@ -11,6 +11,7 @@ from typing import Any
 
 from mitex.batch.folder import STARTS, BatchFolder
 from mitex.batch.jobs import Job
+from mitex.errors import OutputError
 from mitex.paths import atomic_write
 from mitex.training.progress import clock
 
@@ -88,16 +89,24 @@ def status(path: str | Path) -> Report:
 
     Raises:
         ConfigError: `mitex batch` has not written the folder.
+        OutputError: It cannot be read now.
     """
     folder = BatchFolder.existing(path)
     return report_of(folder, folder.jobs())
 
 
 def report_of(folder: BatchFolder, jobs: Iterable[Job]) -> Report:
-    """How far some jobs of a folder are, each after those that it needs."""
+    """How far some jobs of a folder are, each after those that it needs.
+
+    Raises:
+        OutputError: The folder cannot be read now.
+    """
     rows: dict[str, Row] = {}
-    for job in jobs:
-        rows[job.id] = _row(job, folder, rows)
+    try:
+        for job in jobs:
+            rows[job.id] = _row(job, folder, rows)
+    except OSError as e:
+        raise OutputError(f"cannot read '{folder.path}' ({e.strerror or e})", "try again later") from e
     return Report(folder.path, tuple(rows.values()))
 
 

@@ -62,12 +62,12 @@ class Task:
         """Does the job, unless it is done or another process is at it; returns when its process has ended.
 
         Raises:
-            OutputError: The batch folder cannot be written to.
+            OutputError: The batch folder cannot be read or written to.
         """
         place = self.folder.of(self.job)
-        if record := self.folder.done(self.job):
-            return Outcome("done", record)
         with writing(place):
+            if record := self.folder.done(self.job):
+                return Outcome("done", record)
             place.mkdir(parents=True, exist_ok=True)
             claim = Claim.take(place)
         if claim is None:

@@ -1,4 +1,7 @@
-"""`python -m mitex.cli.job WORDS`: a command of Mitex that does not outlive the process that started it."""
+"""`python -m mitex.cli.job PARENT PIPE WORDS`: a command of Mitex that does not outlive its parent process.
+
+Before it ends it writes into the pipe how much memory it had.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ import os
 import signal
 import sys
 
+from mitex.batch.memory import tell_peak
 from mitex.cli.entry import main
 from mitex.runtime.signals import StopSignals
 
@@ -28,5 +32,10 @@ def end_with_parent(parent: int) -> None:
 if __name__ == "__main__":
     StopSignals.second_raises = False  # who does not want to wait for a step sends a SIGKILL
     signal.signal(signal.SIGUSR2, signal.SIG_IGN)  # Slurm's warning to the parent, which sends a SIGTERM
-    end_with_parent(int(sys.argv[1]))
-    sys.exit(main(sys.argv[2:]))
+    parent, pipe = map(int, sys.argv[1:3])
+    os.set_inheritable(pipe, False)
+    end_with_parent(parent)
+    try:
+        sys.exit(main(sys.argv[3:]))
+    finally:
+        tell_peak(pipe)

@@ -1,18 +1,39 @@
 """Claims: one holder at a time, whoever dies, wherever."""
 
+import errno
 import os
 import socket
 import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 
 from mitex.batch import claims
 from mitex.batch.claims import STALE_AFTER, Claim, holder
 
-HOST = socket.gethostname()
+HOST, SPACE = socket.gethostname(), claims._space()
+ELSEWHERE = "elsewhere:1:0:there/2\n"
+
+# Takes the claim on a folder, and keeps it until its input ends.
+HOLD = """
+import sys
+from pathlib import Path
+from mitex.batch.claims import Claim
+assert Claim.take(Path(sys.argv[1]))
+print("taken", flush=True)
+sys.stdin.read()
+"""
+# A command in a PID namespace of its own, in which it has a certain number.
+CONTAINED = ["unshare", "--user", "--map-root-user", "--pid", "--fork", "--mount-proc", "sh", "-ec"]
+NUMBERED = 'echo $(($1 - 1)) > /proc/sys/kernel/ns_last_pid; shift; "$@"; true'
+
+
+def line(pid, moment=None, space=SPACE):
+    """Of a claim on this host."""
+    return f"{HOST}:{pid}:{time.time() if moment is None else moment}:{space}\n"
 
 
 def claimed(folder, line, number=0, age=0.0):
@@ -43,8 +64,9 @@ class TestOneHolder:
         assert holder(tmp_path) is None
         with taken(tmp_path) as claim:
             assert Claim.take(tmp_path) is None and holder(tmp_path) == HOST
-            host, pid, moment = claim.path.read_text().strip().split(":")
-            assert (host, int(pid)) == (HOST, os.getpid()) and abs(float(moment) - time.time()) < 60
+            host, pid, moment, space = claim.path.read_text().strip().split(":")
+            assert (host, int(pid), space) == (HOST, os.getpid(), SPACE)
+            assert abs(float(moment) - time.time()) < 60
         assert holder(tmp_path) is None and not list(tmp_path.iterdir())
         assert Claim.take(tmp_path)
 
@@ -61,7 +83,7 @@ class TestOneHolder:
                     time.sleep(0.001)
                     holders.remove(claim)
                     if stale:  # as one whose process has died
-                        claim.path.write_text(f"{HOST}:{dead}:{time.time()}\n")
+                        claim.path.write_text(line(dead))
                     else:
                         claim.release()
 
@@ -73,21 +95,30 @@ class TestOneHolder:
 
 class TestStaleOnes:
     def test_of_a_process_that_ended(self, tmp_path, dead):
-        claimed(tmp_path, f"{HOST}:{dead}:{time.time()}\n")
+        claimed(tmp_path, line(dead))
         assert holder(tmp_path) is None and Claim.take(tmp_path)
         assert [path.name for path in tmp_path.iterdir()] == ["claim.1"]
 
     def test_not_while_its_job_s_process_lives_on(self, tmp_path, dead):
-        claimed(tmp_path, f"{HOST}:{dead}:{time.time()}\n{HOST}:{os.getpid()}:{time.time()}\n", age=1e6)
+        claimed(tmp_path, line(dead) + line(os.getpid()), age=1e6)
         assert Claim.take(tmp_path) is None
 
     def test_of_a_number_that_another_process_has_now(self, tmp_path):
-        claimed(tmp_path, f"{HOST}:{os.getpid()}:{time.time() - 1e6}\n")
+        claimed(tmp_path, line(os.getpid(), time.time() - 1e6))
         assert Claim.take(tmp_path)
 
     @pytest.mark.parametrize(("age", "free"), [(0.5 * STALE_AFTER, False), (2 * STALE_AFTER, True)])
     def test_of_another_host_by_its_age(self, age, free, tmp_path):
-        claimed(tmp_path, "elsewhere:1:0\n", age=age)
+        claimed(tmp_path, ELSEWHERE, age=age)
+        assert (holder(tmp_path) is None) == free == bool(Claim.take(tmp_path))
+
+    @pytest.mark.parametrize("part", ["boot", "namespace"])
+    @pytest.mark.parametrize(("age", "free"), [(0.5 * STALE_AFTER, False), (2 * STALE_AFTER, True)])
+    def test_of_another_space_by_its_age(self, age, free, part, tmp_path, dead):
+        """In which the number of a process that has ended here, or lives, means another one."""
+        boot, _, namespace = SPACE.partition("/")
+        space = f"another/{namespace}" if part == "boot" else f"{boot}/1"
+        claimed(tmp_path, line(os.getpid() if free else dead, space=space), age=age)
         assert (holder(tmp_path) is None) == free == bool(Claim.take(tmp_path))
 
     def test_half_a_line_counts_by_its_age(self, tmp_path):
@@ -96,17 +127,42 @@ class TestStaleOnes:
         claimed(tmp_path, "", age=2 * STALE_AFTER)
         assert Claim.take(tmp_path)
 
+    @pytest.mark.parametrize("number", [errno.ESTALE, errno.EIO])
+    def test_not_one_of_which_the_disk_says_nothing(self, number, tmp_path, monkeypatch):
+        path, real = claimed(tmp_path, ELSEWHERE, age=1e6), Path.stat
+
+        def stat(place, **options):
+            if place == path:
+                raise OSError(number, os.strerror(number))
+            return real(place, **options)
+
+        monkeypatch.setattr(Path, "stat", stat)
+        assert Claim.take(tmp_path) is None
+
     def test_by_the_clock_of_the_file_system(self, tmp_path, monkeypatch):
-        claimed(tmp_path, "elsewhere:1:0\n")
+        claimed(tmp_path, ELSEWHERE)
         monkeypatch.setattr(time, "time", lambda: 1e6)
         assert Claim.take(tmp_path) is None
+
+
+def test_a_container_of_the_same_name_holds_a_claim(tmp_path, dead):
+    """By a process whose number is nobody's outside."""
+    command = [*CONTAINED, NUMBERED, "sh", str(dead)]
+    if subprocess.run([*command, "true"], capture_output=True).returncode:
+        pytest.skip("no PID namespace can be made here")
+    command += [sys.executable, "-c", HOLD, str(tmp_path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout and process.stdin and process.stdout.readline() == b"taken\n"
+        assert claims._read(tmp_path / "claim.0")[0].pid == dead
+        assert Claim.take(tmp_path) is None and holder(tmp_path) == HOST
+        process.stdin.close()
 
 
 def test_a_holder_sees_that_it_was_taken_over(tmp_path, monkeypatch):
     """As after a night of a laptop's sleep."""
     first = taken(tmp_path)
     assert first.touch()
-    first.path.write_text("elsewhere:1:0\n")
+    first.path.write_text(ELSEWHERE)
     os.utime(first.path, (0, 0))
     assert Claim.take(tmp_path) and not first.touch()
 

@@ -6,7 +6,9 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 
@@ -15,8 +17,9 @@ from mitex.batch.claims import Claim
 from mitex.batch.engines import WorkerLost
 from mitex.batch.engines.local import Local
 from mitex.batch.folder import BatchFolder
+from mitex.batch.jobs import jobs_of
 from mitex.batch.process import cores
-from mitex.batch.task import RETRIES, Outcome
+from mitex.batch.task import RETRIES, Outcome, Task
 from mitex.cli import main
 from mitex.errors import OutputError
 
@@ -202,6 +205,60 @@ class TestFailures:
         assert [row.state for row in report.rows] == states
 
 
+class TestADiskThatIsAwayForAMoment:
+    """As one of a network is: calls fail with an error that says nothing of the file."""
+
+    def test_a_job_goes_on_and_still_stops_when_it_is_told_to(self, workshop, wait_for, monkeypatch):
+        monkeypatch.setenv("STRIPES_PACE", PACE)
+        (job, _) = jobs_of(workshop.plan(("a.png",), steps=100))
+        folder, errors = BatchFolder(workshop.folder / "out"), []
+        with folder.driven([job]) as name, ThreadPoolExecutor(1) as pool:
+            outcome = pool.submit(Task(job, folder, name, 1))
+            wait_for(lambda: workshop.told("step"))
+            with monkeypatch.context() as patch:
+                patch.setattr(Path, "stat", stale("drivers", errors))
+                wait_for(lambda: len(errors) > 1)
+            folder.dismiss(name)
+            assert outcome.result().state == "interrupted"
+
+    @pytest.mark.parametrize("look", ["done", "failed", "holder"])
+    def test_a_command_looks_again(self, look, workshop, monkeypatch):
+        errors, real = [], getattr(BatchFolder, look)
+
+        def looked(folder, job):
+            if threading.current_thread() is threading.main_thread() and len(errors) < 3:
+                errors.append(job)
+                raise OSError(errno.ESTALE, os.strerror(errno.ESTALE))
+            return real(folder, job)
+
+        monkeypatch.setattr(BatchFolder, look, looked)
+        monkeypatch.setattr("mitex.batch.driver.LOOK_ELSEWHERE", 0.01)
+        assert workshop.run(workshop.plan(("a.png",))).count("done") == 2
+        assert len(errors) == 3 and len(workshop.told("start")) == 2
+
+    def test_a_finished_job_is_not_done_again(self, workshop, monkeypatch):
+        report = workshop.run(workshop.plan(("a.png",)))
+        monkeypatch.setattr(Path, "stat", stale("results", []))
+        with pytest.raises(OutputError, match="Stale file handle"):
+            workshop.run(workshop.plan(("a.png",)))
+        with pytest.raises(OutputError, match=r"cannot read .* \(Stale file handle\); try again later"):
+            status(report.folder)
+        assert len(workshop.told("start")) == 2
+
+
+def stale(folder, errors):
+    """`Path.stat` that fails, and notes that, for what is in a folder of this name."""
+    real = Path.stat
+
+    def stat(path, **options):
+        if folder in path.parts:
+            errors.append(path)
+            raise OSError(errno.ESTALE, os.strerror(errno.ESTALE))
+        return real(path, **options)
+
+    return stat
+
+
 class TestInterruptions:
     """The other jobs' files are those of a run that nothing interrupted, and no step is done twice."""
 
@@ -256,7 +313,7 @@ class TestInterruptions:
         with ThreadPoolExecutor(1) as pool:
             report = pool.submit(workshop.run, plan)
             wait_for(lambda: workshop.told("step"))
-            os.kill(int(next(workshop.folder.rglob("claim.0")).read_text().split(":")[-2]), signal.SIGTERM)
+            os.kill(int(next(workshop.folder.rglob("claim.0")).read_text().split(":")[-3]), signal.SIGTERM)
             assert [row.state for row in report.result().rows] == ["interrupted", "waiting"]
 
     @pytest.mark.parametrize("engine", ["local", "dask"])

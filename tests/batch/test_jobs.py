@@ -10,6 +10,8 @@ import tomli_w
 from mitex.batch import Job, Plan
 from mitex.batch.jobs import jobs_of
 from mitex.errors import ConfigError
+from mitex.features.text_model import EMBEDDED
+from mitex.methods.surface.content import AO
 
 
 @pytest.fixture
@@ -122,6 +124,41 @@ class TestCommands:
         *fits, last = jobs(methods, output="none")
         assert [fit.words[4] for fit in fits] == texts * 2
         assert last.words[last.words.index("--preset") + 1] == "paper"
+
+    @pytest.mark.parametrize(
+        ("method", "command", "option", "text"),
+        [
+            ("geometric", "fit", "device", "cpu"),
+            ("geometric", "apply", "placement", "none"),
+            ("geometric", "fit", "field", "about-y"),
+            ("nca", "fit", "motion", "right"),
+            ("nca", "apply", "orientation", "45"),
+            ("nca", "apply", "field", "1,0,0"),
+            ("nca", "apply", "maps_format", "exr"),
+            ("nerf", "apply", "quilting", "plane"),
+            ("nerf", "apply", "light", "own"),
+            ("surface", "fit", "content", AO),
+            ("surface", "fit", "clip", EMBEDDED),
+        ],
+    )
+    def test_values_that_are_no_files_stay(self, method, command, option, text, jobs, workshop):
+        """Where a file is called like them; one of another name is a path."""
+        other = {"content": "other.png", "clip": "other"}.get(option, "other.npy")
+        (workshop.folder / "photos").mkdir()
+        for name in (text, other):
+            (workshop.folder / name).touch()
+
+        def word(value):
+            sources = {"geometric": "spikes", "nerf": "photos"}
+            table = {"exemplars": [sources.get(method, "a.png")], "meshes": ["m.obj"]}
+            given = {option: value}
+            every = jobs({method: table | (given if command == "fit" else {"apply": given})})
+            words = next(job.words for job in every if job.words[0] == command)
+            return words[words.index(f"--{option.replace('_', '-')}") + 1]
+
+        assert word(text) == text
+        if option in ("field", "motion", "orientation", "content", "clip"):
+            assert word(other) == str(workshop.folder / other)
 
     @pytest.mark.parametrize(("value", "words"), [(True, ["--keep-uvs"]), (False, [])])
     def test_flags(self, jobs, value, words):

@@ -58,6 +58,19 @@ PLANS = {
         "there is no exemplar 'no.png'; paths are relative",
     ),
     "misspelt name": (GOOD.replace("a.png", "lafa"), "there is no exemplar 'lafa'"),
+    "misspelt reference": (
+        'exemplars = ["spkes"]\nmeshes = ["m.obj"]\n[methods.displacement]',
+        "there is no exemplar 'spkes'; paths are relative",
+    ),
+    "misspelt reference that is named as the source": (
+        'exemplars = ["spkes"]\nmeshes = ["m.obj"]\n[methods.geometric]\nsource = "reference"',
+        "there is no exemplar 'spkes'; paths are relative",
+    ),
+    "an exemplar for a reference": (
+        'exemplars = ["lava"]\nmeshes = ["m.obj"]\n[methods.geometric]',
+        "or name one of spikes, scales, ",
+    ),
+    "misspelt model": ('exemplars = ["lafa"]\nmeshes = ["m.obj"]\n[methods.quilted]', "no exemplar 'lafa'"),
     "missing mesh": (GOOD.replace("m.obj", "no.obj"), "there is no mesh 'no.obj'"),
     "pattern without a match": (GOOD.replace("a.png", "*.jpg"), "no exemplar is called '*.jpg'"),
     "device": (GOOD.replace("a.png", "/dev/zero"), "'/dev/zero' is neither a file nor a folder"),
@@ -107,6 +120,15 @@ def test_broken_plans(name, workshop, check):
     content, message = PLANS[name]
     write(workshop, content)
     check(message)
+
+
+def test_a_comparison_of_what_is_no_reference(workshop, monkeypatch, capsys):
+    monkeypatch.chdir(workshop.folder)
+    words = "compare --exemplar lava --mesh vase --methods displacement --out out --quiet"
+    assert main(words.split()) == 2
+    printed = capsys.readouterr().err
+    assert "there is no exemplar 'lava'; " in printed and printed.count("\n") == 1
+    assert not (workshop.folder / "out").exists()
 
 
 class TestPlanFiles:

@@ -1,6 +1,7 @@
 """What a job took: all attempts count that its result follows from, up to their checkpoints."""
 
 import os
+import shutil
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -78,6 +79,16 @@ def test_attempts_add_up(name, workshop, scripted):
     fit, apply = (row.record for row in report.rows)
     assert (fit["seconds"], fit["memory"]) == (seconds, memory)
     assert (apply["seconds"], apply["memory"]) == (3, 1)
+
+
+def test_a_job_that_begins_again_is_no_longer_done(workshop, scripted):
+    """Somebody has removed the results; the next attempt at the fit is interrupted after a checkpoint."""
+    plan = workshop.plan(("a.png",))
+    scripted(LAST, LAST, (100, 100, INTERRUPTED, 9), LAST, LAST)
+    assert workshop.run(plan).count("done") == 2
+    shutil.rmtree(workshop.folder / "out" / "results")
+    assert workshop.run(plan).rows[0].state == "interrupted"
+    assert [row.record["seconds"] for row in workshop.run(plan).rows] == [120, 20]
 
 
 def test_an_attempt_that_was_told_to_stop_is_no_crash(workshop, scripted):

@@ -136,13 +136,18 @@ REFERENCES: dict[str, Callable[[], Mesh]] = {
 }
 
 
+def reference_names() -> list[str]:
+    """The names that `find_reference` knows: those of shapes by formula, and of embedded meshes."""
+    return [*REFERENCES, *embedded_names()]
+
+
 def find_reference(source: str | Path) -> Mesh:
     """A reference by name, or from a file or embedded mesh as `Mesh.load` finds it.
 
     Raises:
         MeshError: as `Mesh.load`; for a name that is neither, with the names that there are.
     """
-    name, names = str(source), [*REFERENCES, *embedded_names()]
+    name, names = str(source), reference_names()
     if name in REFERENCES:
         return REFERENCES[name]()
     if name not in names and not os.path.exists(expanded(source)):

@@ -4,11 +4,14 @@ import os
 import signal
 import subprocess
 import sys
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from mitex.batch import Event, status
-from mitex.batch.engines.dask_cluster import Dask
+from mitex.batch.engines.dask_cluster import NO_LIMIT, Dask
+from mitex.batch.process import cores
 from mitex.errors import MissingPackage, RuntimeUnavailable
 
 CLUSTER = """
@@ -68,12 +71,45 @@ def test_the_scheduler_is_killed(workshop, plan, wait_for, monkeypatch):
     cluster = subprocess.Popen([sys.executable, "-c", CLUSTER], stdout=subprocess.PIPE, text=True)
     assert cluster.stdout
     with cluster, Dask(cluster.stdout.readline().strip()) as engine:
-        assert engine.threads >= 1 and engine.at_once is None
+        assert engine.threads == max(1, cores() // 2) and engine.at_once is None
         on_event = when_both_run(workshop, wait_for, cluster.kill)
         with pytest.raises(RuntimeUnavailable, match="the Dask scheduler does not answer any more; start it"):
             workshop.run(plan, engine=engine, on_event=on_event)
     assert workshop.run(plan).count("done") == 4
     check_all_is_there(workshop, plan, monkeypatch)
+
+
+def test_a_cluster_of_ours_bears_the_death_of_many_workers():
+    """Dask counts it against all that the worker was to do, and would give up at the fourth."""
+    engine: Any = Dask(jobs=1)
+    engine._jobs = 0  # a scheduler alone starts at once
+    with engine:
+        assert engine._cluster.scheduler.allowed_failures == NO_LIMIT > 1000
+
+
+@pytest.mark.parametrize(
+    ("workers", "share"),
+    [
+        ([("a", 1, 8)], 8),
+        ([("a", 1, 8), ("a", 3, 8)], 2),
+        ([("a", 1, 8), ("a", 3, 8), ("b", 2, 12)], 2),
+        ([("a", 1, 8), ("b", 4, 12), ("c", 1, 5)], 3),
+        ([("a", 4, 2)], 1),
+    ],
+)
+def test_tasks_share_the_cores_of_the_smallest_machine(workers, share):
+    """Of workers with a host, tasks at a time and the host's cores, as a scheduler tells them."""
+    told = {f"tcp://{host}:{number}": (host, tasks) for number, (host, tasks, _) in enumerate(workers)}
+    answers = {name: count for name, (_, _, count) in zip(told, workers, strict=True)}
+    left = {"tcp://gone:1": 1}  # ended between the two questions
+    engine: Any = Dask("tcp://a:1")
+    engine._client = SimpleNamespace(
+        scheduler_info=lambda n_workers: {
+            "workers": {name: {"host": host, "nthreads": tasks} for name, (host, tasks) in told.items()}
+        },
+        run=lambda function: answers | left if function is cores else {},
+    )
+    assert engine._share() == share
 
 
 def test_without_dask(monkeypatch):

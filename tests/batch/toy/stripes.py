@@ -1,8 +1,9 @@
 """Two methods that take no time to import: what they learn is a hash, one more for each step.
 
 `stripes` learns from an exemplar and is put on any mesh, `inlay` learns on one mesh. An exemplar that begins
-with `poison` is refused, one that begins with `crash` ends the process. In the environment, `STRIPES_LOG` is
-a file that gets a line for each start and step, and `STRIPES_PACE` the time of a step [s].
+with `poison` is refused, one that begins with `crash` ends the process, one that begins with `helper` starts
+another process, which takes 300 MB. In the environment, `STRIPES_LOG` is a file that gets a line for each
+start, with some variables, and each step, and `STRIPES_PACE` the time of a step [s].
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ import hashlib
 import json
 import os
 import signal
+import subprocess
+import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,6 +42,9 @@ def described(name: str, fit: str) -> Method:
         texture="stripes:Stripes",
     )
 
+
+# Told at the start of a fit.
+VARIABLES = (THREADS, "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "DRJIT_CACHE_DIR")
 
 STRIPES, INLAY = described("stripes", "Fit"), described("inlay", "FitOnMesh")
 
@@ -83,11 +89,13 @@ class Fit(ExemplarOptions):
             raise ImageError(f"'{self.exemplar}' is poisoned", "take another one")
         if content.startswith(b"crash"):
             os.kill(os.getpid(), signal.SIGKILL)
+        if content.startswith(b"helper"):
+            subprocess.run([sys.executable, "-c", "bytearray(300 << 20)"], check=True)
         return content
 
     def run(self) -> None:
         assert self.out is not None and not (self.resume and self.salt)
-        tell("start", self.out.name, os.environ.get(THREADS))
+        tell("start", self.out.name, *(os.environ.get(name) for name in VARIABLES))
         step, value = 0, hashlib.sha256(self.read() + self.salt.encode()).hexdigest()
         place = self.out / CHECKPOINT
         if self.resume:

@@ -249,7 +249,11 @@ class TestTexture:
             ReactionDiffusionTexture.load(path)
 
     @pytest.mark.parametrize(
-        "options", [{"scale": 0.01}, {"resolution": 8}, {"steps": -1}, {"steps": 20_000}]
+        "options",
+        [
+            *({"scale": 0.01}, {"resolution": 8}, {"steps": -1}, {"steps": 20_000}),
+            *({"seed": -1}, {"seed": 2**32}),
+        ],
     )
     def test_numbers_out_of_range(self, options):
         with pytest.raises(ConfigError, match=f"`{next(iter(options))}` .* is out of range"):

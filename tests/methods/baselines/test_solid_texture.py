@@ -319,6 +319,9 @@ class TestRefused:
         texture = SolidTexture(generator, 32, 0.5)
         with pytest.raises(ConfigError, match="`scale` .* is out of range"):
             texture.apply(icosphere(2), scale=100)
+        for seed in (-1, 2**32):
+            with pytest.raises(ConfigError, match=f"`seed` {seed} is out of range"):
+                texture.apply(icosphere(2), seed=seed)
         with pytest.raises(ConfigError, match="larger scale"):
             texture.at(np.random.default_rng(0).uniform(0, 1e6, (30_000, 3)))
 

@@ -23,7 +23,7 @@ from mitex.methods.checks import in_range
 from mitex.methods.layout import RESOLUTION, layout_side, with_layout
 from mitex.methods.point_colours import with_colours
 from mitex.progress import announce
-from mitex.ranges import SCALES, TEXELS
+from mitex.ranges import SCALES, SEEDS, TEXELS
 from mitex.runtime import keep_freed_memory
 from mitex.sparse import LinearMap
 from mitex.training import model_file
@@ -93,7 +93,7 @@ class ReactionDiffusionTexture:
 
         Args:
             mesh: any.
-            seed: of the blobs that it starts from: another one, another variant.
+            seed: of the blobs that it starts from, 0 to 2^32 - 1: another one, another variant.
             steps: of time.
             scale: size of the pattern.
             resolution: side of the asset's albedo [texels], 16 to 8192.
@@ -103,9 +103,10 @@ class ReactionDiffusionTexture:
             The mesh with an albedo texture, without seams.
 
         Raises:
-            ConfigError: a number is out of range, or there would be too many cells.
+            ConfigError: the seed or another number is out of range, or there would be too many cells.
             MeshError: PyMeshLab is missing or fails.
         """
+        in_range("`seed`", seed, *SEEDS)
         in_range("`scale`", scale, *SCALES)
         in_range("`resolution`", resolution, *TEXELS)
         in_range("`steps`", steps, 0, MOST_STEPS)

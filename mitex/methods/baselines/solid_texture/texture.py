@@ -28,7 +28,7 @@ from mitex.methods.checks import in_range
 from mitex.methods.layout import RESOLUTION, layout_side, with_layout
 from mitex.methods.point_colours import with_colours
 from mitex.progress import counted
-from mitex.ranges import SCALES, TEXELS
+from mitex.ranges import SCALES, SEEDS, TEXELS
 from mitex.runtime import keep_freed_memory
 from mitex.training import model_file
 
@@ -90,7 +90,7 @@ class SolidTexture:
 
         Args:
             mesh: any.
-            seed: of the noise: another one, another solid.
+            seed: of the noise, from 0 to 2^32 - 1: another one, another solid.
             scale: size of the pattern.
             resolution: side of the asset's albedo [texels], 16 to 8192.
             keep_uvs: use the mesh's own UVs.
@@ -99,8 +99,9 @@ class SolidTexture:
             The mesh with an albedo texture, without seams.
 
         Raises:
-            ConfigError: a number is out of range, or too much of the solid would be needed.
+            ConfigError: the seed or another number is out of range, or too much of the solid would be needed.
         """
+        in_range("`seed`", seed, *SEEDS)
         in_range("`scale`", scale, *SCALES)
         in_range("`resolution`", resolution, *TEXELS)
         unwrapped = with_layout(mesh, RESOLUTION, keep_uvs)
