@@ -33,7 +33,7 @@ def meaning_html(measure: Measure) -> str:
 
 
 def _head(measure: Measure) -> str:
-    better = escape(measure.better) or "&nbsp;"
+    better = escape(measure.better + (", sorted by distance" if measure.two_sided else "")) or "&nbsp;"
     return f"<th><button>{escape(measure.label)}</button><small>{better}</small></th>"
 
 
@@ -43,14 +43,27 @@ def _row(table: Summary, method: str) -> str:
 
 
 def _cell(cell: Cell | None, measure: Measure) -> str:
-    """A number, with what it is sorted by: how far it is from the best that is possible."""
+    """A number, with what it is sorted by: how far values are from the best that is possible, on average.
+
+    That is told, too, where opposite errors cancel in the number.
+    """
     if cell is None:
         return f'<td data-value="">{DASH}</td>'
-    value = measure.distance(cell.mean) if measure.distance else cell.mean
-    spread = f"± {number_text(cell.spread * measure.scale, 2)}" if cell.count > 1 and cell.spread else ""
+    value = cell.distance if measure.distance else cell.mean
     mark = ' class="best"' if cell.best else ""
-    mean = number_text(cell.mean * measure.scale)
-    return f'<td data-value="{value:.9g}"{mark}>{mean}<span class="spread">{spread}</span></td>'
+    mean, spread = number_text(cell.mean * measure.scale), _spread(cell.spread * measure.scale)
+    distance = f'<span class="spread">{_distance(cell, measure)}</span>' if measure.two_sided else ""
+    return f'<td data-value="{value:.9g}"{mark}>{mean}<span class="spread">{spread}</span>{distance}</td>'
+
+
+def _distance(cell: Cell, measure: Measure) -> str:
+    spread = _spread(cell.distance_spread * measure.scale)
+    return f"distance {number_text(cell.distance * measure.scale)} {spread}".rstrip()
+
+
+def _spread(value: float) -> str:
+    """Nothing where there is none."""
+    return f"± {number_text(value, 2)}" if value > 0 else ""
 
 
 def _floor(table: Summary, values: Mapping[str, float]) -> str:
