@@ -4,8 +4,9 @@
 
 The arguments are folders that `mitex compare` wrote, each with other exemplars. Prints two Markdown tables,
 of likeness and of costs: the means over all pairs, those of each exemplar, and those of each mesh, with the
-standard deviation over seeds where there are several. The sheet has a row for each exemplar: itself, and a
-mesh by each method; with several meshes, the rows take them in turn.
+standard deviation over seeds where there are several. Where values lie on both sides of the best one, the
+mean of their distances from it stands in brackets: in their own mean, opposite errors cancel. The sheet has a
+row for each exemplar: itself, and a mesh by each method; with several meshes, the rows take them in turn.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from mitex.comparison.html import DASH, number_text
 from mitex.comparison.look_pair import picture_of
 from mitex.comparison.measures import COSTS, LOOKS, Measure
 from mitex.comparison.results import label
+from mitex.comparison.summary import mean_and_spread
 from mitex.images import read_image, write_image
 from mitex.render import sheet
 
@@ -42,23 +44,37 @@ def _picture(folder: Path, asset: str) -> Path:
 
 
 def number(rows: Sequence[Row], measure: Measure) -> str:
-    """The mean over pairs, and the standard deviation over seeds; a dash where nothing was measured."""
+    """The mean over pairs, and the standard deviation over seeds; a dash where nothing was measured.
+
+    With the mean distance from the best value in brackets, where values lie on both sides of it.
+    """
     by_seed: dict[str, list[float]] = defaultdict(list)
     for row in rows:
         if row[measure.key]:
-            by_seed[row["seed"]].append(measure.scale * float(row[measure.key]))
-    means = [float(np.mean(values)) for values in by_seed.values()]
-    if not means:
+            by_seed[row["seed"]].append(float(row[measure.key]))
+    if not by_seed:
         return DASH
-    spread = float(np.std(means, ddof=1)) if len(means) > 1 else 0.0
-    return number_text(float(np.mean(means))) + (f" ± {number_text(spread, 2)}" if spread else "")
+    values = list(by_seed.values())
+    text = _with_spread(*mean_and_spread(values), measure.scale)
+    if not (measure.two_sided and measure.distance):
+        return text
+    distances = [[measure.distance(value) for value in one] for one in values]
+    return f"{text} ({_with_spread(*mean_and_spread(distances), measure.scale)})"
+
+
+def _with_spread(mean: float, spread: float, scale: float) -> str:
+    return number_text(scale * mean) + (f" ± {number_text(scale * spread, 2)}" if spread > 0 else "")
+
+
+def _heading(measure: Measure) -> str:
+    return f"{measure.label} (mean distance from the best)" if measure.two_sided else measure.label
 
 
 def table(
     groups: Iterable[tuple[str, Sequence[Row]]], methods: Sequence[str], measures: Sequence[Measure]
 ) -> str:
     """Markdown: a line for each group and method."""
-    names = ["exemplar or mesh", "method", *(measure.label for measure in measures)]
+    names = ["exemplar or mesh", "method", *map(_heading, measures)]
     lines = [f"| {' | '.join(names)} |", "| --- " * len(names) + "|"]
     for name, group in groups:
         for method in methods:

@@ -1,8 +1,9 @@
 """What people answered in a blind test: how often each method was preferred, and whether that is chance.
 
 As in the study of Kovacs et al. (2024): the share of answers that prefer a method, its mean and standard
-deviation over the cases, which are pairs of exemplar and mesh; a one-way analysis of variance over the
-methods, and t-tests of each two of them.
+deviation over the cases, which are pairs of exemplar and mesh, and a one-way analysis of variance over the
+methods. This takes shares as independent, which they are not: what one method wins in a case, others lose.
+So it finds differences that are chance, and what tells is a permutation test over the cases.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 import scipy.stats
 
+from mitex.comparison.permutation import permutation_p
 from mitex.comparison.study import Study
 from mitex.errors import ConfigError
 from mitex.paths import expanded
@@ -70,16 +72,19 @@ class Evaluation:
 
     Attributes:
         preferences: the most preferred method first.
-        f, p: of the analysis of variance over methods, with the cases as samples; NaN of fewer than two.
-        pairs: two methods -> p of a t-test of their shares in the cases, adjusted by Holm's procedure.
+        p: of the permutation test over cases, that methods are alike; NaN of fewer than two methods.
+        pairs: two methods -> p of the same test of the cases that both are in, adjusted by Holm's procedure.
+        f, published_p: of the analysis of variance over methods, with the cases as independent samples, as
+            published; NaN where it cannot be told.
         untested: methods that were asked about in a single case, which the tests leave out.
         people: whose answers there are.
     """
 
     preferences: tuple[Preference, ...]
-    f: float
     p: float
     pairs: Mapping[tuple[str, str], float]
+    f: float
+    published_p: float
     untested: tuple[str, ...]
     people: int
 
@@ -97,12 +102,16 @@ class Evaluation:
             share = f"{_percent(one.share)} (95 %: {low:.0f} to {high:.0f} %)"
             lines.append(f"{one.method:{width}}  {share} of {one.count}{spread}")
         if math.isnan(self.p):
-            return "\n".join([*lines, "analysis of variance: needs two methods in two cases that differ"])
+            return "\n".join([*lines, "permutation test: needs two methods in two cases"])
         if self.untested:
             lines.append(f"of a single case, and not tested: {', '.join(self.untested)}")
-        lines.append(f"analysis of variance: F = {self.f:.3f}, p = {self.p:.2g}")
-        pairs = [f"{one} and {other}: p = {p:.2g}" for (one, other), p in self.pairs.items()]
-        return "\n".join([*lines, *pairs])
+        lines.append(f"permutation test over cases: p = {self.p:.2g}")
+        if len(self.preferences) - len(self.untested) > 2:  # of two the whole is the pair
+            lines += [f"{one} and {other}: p = {p:.2g}" for (one, other), p in self.pairs.items()]
+        if not math.isnan(self.published_p):
+            published = f"F = {self.f:.3f}, p = {self.published_p:.2g}"
+            lines.append(f"analysis of variance as published, as if shares were independent: {published}")
+        return "\n".join(lines)
 
 
 def read_answers(study: Study, files: Iterable[str | Path]) -> dict[str, list[Answer]]:
@@ -134,12 +143,21 @@ def evaluate(study: Study, people: Mapping[str, Sequence[Answer]]) -> Evaluation
             counts[method, case] += 1
             wins[method, case] += 0.5 if answer.choice is None else float(answer.choice == k)
     methods = list(dict.fromkeys(method for method, _ in counts))
-    shares = {m: [wins[key] / counts[key] for key in counts if key[0] == m] for m in methods}
-    preferences = [_preference(m, shares[m], _total(wins, m), int(_total(counts, m))) for m in methods]
-    untested = tuple(m for m in methods if len(shares[m]) < 2)
-    f, p, pairs = _tests({m: shares[m] for m in methods if m not in untested})
+    cases = list(dict.fromkeys(case for _, case in counts))
+    shares = np.full((len(cases), len(methods)), math.nan)
+    for method, case in counts:
+        place = cases.index(case), methods.index(method)
+        shares[place] = wins[method, case] / counts[method, case]
+    preferences = [
+        _preference(m, column[~np.isnan(column)], _total(wins, m), int(_total(counts, m)))
+        for m, column in zip(methods, shares.T, strict=True)
+    ]
+    often = (~np.isnan(shares)).sum(0) > 1
+    untested = tuple(m for m, tested in zip(methods, often, strict=True) if not tested)
+    tested = [m for m in methods if m not in untested]
     ordered = sorted(preferences, key=lambda one: -one.share)
-    return Evaluation(tuple(ordered), f, p, pairs, untested, len(people))
+    p, pairs = _tests(tested, shares[:, often])
+    return Evaluation(tuple(ordered), p, pairs, *_published(shares[:, often]), untested, len(people))
 
 
 def _read(study: Study, file: Path) -> tuple[str, list[Answer]]:
@@ -168,7 +186,7 @@ def _total(counter: Mapping[tuple[str, str], float], method: str) -> float:
     return sum(value for (name, _), value in counter.items() if name == method)
 
 
-def _preference(method: str, shares: Sequence[float], wins: float, count: int) -> Preference:
+def _preference(method: str, shares: np.ndarray, wins: float, count: int) -> Preference:
     spread = float(np.std(shares, ddof=1)) if len(shares) > 1 else math.nan
     return Preference(
         method, wins, count, wilson_interval(wins / count, count), float(np.mean(shares)), spread
@@ -187,22 +205,24 @@ def wilson_interval(share: float, count: int) -> tuple[float, float]:
     return max(low, 0.0), min(high, 1.0)
 
 
-def _tests(shares: Mapping[str, Sequence[float]]) -> tuple[float, float, dict[tuple[str, str], float]]:
-    """F and p of the analysis of variance, and of the t-tests the adjusted p; NaN where nothing varies."""
-    varies = any(np.ptp(values) > 0 for values in shares.values())
-    if len(shares) < 2 or not varies:
-        return math.nan, math.nan, {}
-    f, p = scipy.stats.f_oneway(*shares.values())
-    raw = {pair: _t_test(*(shares[m] for m in pair)) for pair in combinations(shares, 2)}
-    return float(f), float(p), holm(raw)
+def _tests(methods: Sequence[str], shares: np.ndarray) -> tuple[float, dict[tuple[str, str], float]]:
+    """p of all methods (M,) by their shares (C, M), NaN of fewer than two, and the adjusted p of each two."""
+    if len(methods) < 2:
+        return math.nan, {}
+    raw = {}
+    for one, other in combinations(range(len(methods)), 2):
+        both = shares[:, [one, other]]
+        raw[methods[one], methods[other]] = permutation_p(both[~np.isnan(both).any(1)])
+    return permutation_p(shares), holm(raw)
 
 
-def _t_test(one: Sequence[float], other: Sequence[float]) -> float:
-    """p that shares have the same mean; of shares that do not vary it is known."""
-    if np.ptp(one) == 0 and np.ptp(other) == 0:
-        return float(one[0] == other[0])
-    test: Any = scipy.stats.ttest_ind(one, other)
-    return float(test.pvalue)
+def _published(shares: np.ndarray) -> tuple[float, float]:
+    """F and p of the one-way analysis of variance of shares (C, M); NaN where no method's vary."""
+    columns = [column[~np.isnan(column)] for column in shares.T]
+    if len(columns) < 2 or not any(np.ptp(column) > 0 for column in columns):
+        return math.nan, math.nan
+    f, p = scipy.stats.f_oneway(*columns)
+    return float(f), float(p)
 
 
 def holm(raw: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], float]:

@@ -28,6 +28,11 @@ class Measure:
     distance: Callable[[float], float] | None = abs
     scale: float = 1.0
 
+    @property
+    def two_sided(self) -> bool:
+        """Whether values lie on both sides of the best one, so that in their mean errors cancel."""
+        return self.better in (TO_ZERO, TO_ONE)
+
 
 def _off_one(value: float) -> float:
     return abs(value - 1)
@@ -73,7 +78,8 @@ LOOKS = (
         "Seam ratio",
         TO_ONE,
         "How much more the colours change across the seams of the UV layout than across other edges of the "
-        "mesh. 1: seams cannot be seen. No network is involved.",
+        "mesh. 1: seams cannot be seen. Under the mean stands the mean distance from 1, by which methods are "
+        "sorted and marked. No network is involved.",
         _off_one,
     ),
     Measure(
@@ -81,7 +87,8 @@ LOOKS = (
         "Repetition",
         TO_ZERO,
         "The highest peak of the autocorrelation beside the one at no shift, minus that of the exemplar. "
-        "Above 0: it repeats more than the exemplar; below: it is less regular. No network is involved.",
+        "Above 0: it repeats more than the exemplar; below: it is less regular. Under the mean stands the "
+        "mean distance from 0, by which methods are sorted and marked. No network is involved.",
     ),
 )
 TEXTS = (
@@ -173,7 +180,7 @@ CAPTURES = (
         "that can be seen on it.",
         _negative,
     ),
-    Measure("ssim", "SSIM", TO_ONE, "Structural similarity of the same.", _off_one),
+    Measure("ssim", "SSIM", HIGHER, "Structural similarity of the same; 1 at most.", _negative),
     Measure(
         "vgg",
         "VGG distance",

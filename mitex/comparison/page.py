@@ -18,7 +18,10 @@ from mitex.comparison.summary import Summary
 from mitex.comparison.tables import meaning_html, table_html
 from mitex.page import jpeg
 
-FIRST = "Exemplars, meshes and seeds: every method has made the same ones, but where a cell is empty."
+FIRST = (
+    "Exemplars and meshes: the same for every method, but where a cell is empty. Seeds: as many as each row "
+    "says."
+)
 LAST = (
     "Pictures: the same camera and light. What a method has learned besides what is measured shows in them.",
     "Not the same: steps and settings, which are each method's own defaults unless the table below says "
@@ -73,9 +76,16 @@ class Page:
         return list(dict.fromkeys(result.method for result in self.results))
 
     @property
-    def seeds(self) -> list[int | None]:
-        """Of all results."""
-        return list(dict.fromkeys(result.seed for result in self.results))
+    def seeds(self) -> list[int]:
+        """Of all results, but for those of presets, in order."""
+        return sorted({result.seed for result in self.results if result.seed is not None})
+
+    @property
+    def seed_counts(self) -> list[int]:
+        """How many seeds methods have, the fewest and the most; none without results."""
+        seeds = [{r.seed for r in self.results if r.method == name} for name in self.methods]
+        counts = [len(of_method) for of_method in seeds]
+        return [min(counts), max(counts)] if counts else []
 
     def _title(self) -> str:
         *names, last = self.methods or ["nothing"]
@@ -85,7 +95,9 @@ class Page:
         exemplars = ", ".join(map(label, self.exemplars))
         meshes = ", ".join(dict.fromkeys(label(r.mesh) for r in self.results if r.mesh is not None))
         inputs = " on ".join(filter(None, (exemplars, meshes)))
-        return "; ".join(filter(None, (inputs, count_text(len(self.seeds), "seed"))))
+        fewest, most = self.seed_counts or (0, 0)
+        seeds = count_text(most, "seed")
+        return "; ".join(filter(None, (inputs, seeds if fewest == most else f"{fewest} to {seeds}")))
 
     def _failures(self) -> str:
         return (
@@ -127,28 +139,40 @@ class Page:
         return "" if image is None else picture(jpeg(image, QUALITY), f"exemplar {label(exemplar)}")
 
     def _look(self, kind: str, results: Sequence[Result]) -> str:
-        """A cell with a method's picture of each seed, of which one is shown."""
-        by_seed = {result.seed: result for result in reversed(results) if kind in result.pictures}
+        """A cell with a method's picture of each seed, of which one is shown: the page's, or the first."""
+        by_seed: dict[int | None, Result] = {}
+        for result in results:
+            if kind in result.pictures:
+                by_seed.setdefault(result.seed, result)
+        if not by_seed:
+            return f'<td class="none">{DASH if results else "not done"}</td>'
+        first = self.seeds[0] if self.seeds else None
+        shown = first if first in by_seed else next(iter(by_seed))
         images = [
             picture(
                 result.pictures[kind].read_bytes(),
                 _description(result, kind),
-                f' data-seed="{seed}"' + (" hidden" if seed != self.seeds[0] else ""),
+                f' data-seed="{_seed_text(seed)}"' + (" hidden" if seed != shown else ""),
             )
             for seed, result in by_seed.items()
         ]
-        content = "".join(images) or (DASH if results else "not done")
-        return f"<td>{content}</td>" if images else f'<td class="none">{content}</td>'
+        note = "" if shown == first else f"seed {_seed_text(shown)}"
+        return f'<td data-note="{note}">{"".join(images)}</td>'
 
     def _note(self) -> str:
-        if len(self.seeds) < 2:
+        fewest, most = self.seed_counts or (0, 0)
+        if most < 2:
             return (
                 "Of one seed: how much is due to chance is not known, so nothing is marked as the best. More "
                 "seeds (--seeds 3) tell. Click on a heading to sort."
             )
+        seeds = f"{most} seeds" if fewest == most else "as many seeds as each row says"
+        one = (
+            "" if fewest > 1 else "Beside a method of one seed, whose chance is not known, nothing is green. "
+        )
         return (
-            f"Means over {len(self.seeds)} seeds ± their standard deviation. Green is what is better than "
-            "every other method by more than both spreads together. Click on a heading to sort."
+            f"Means over {seeds} ± their standard deviation. Green is what is better than every other "
+            f"method by more than both spreads together. {one}Click on a heading to sort."
         )
 
     def _tables(self) -> str:
@@ -160,4 +184,8 @@ class Page:
 
 def _description(result: Result, kind: str) -> str:
     what = f"{label(result.exemplar)}, view held out," if kind == VIEW else title_of(*result.pair)
-    return f"{what} by {result.method}, seed {result.seed}"
+    return f"{what} by {result.method}, seed {_seed_text(result.seed)}"
+
+
+def _seed_text(seed: int | None) -> str:
+    return "of the preset" if seed is None else str(seed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,12 +20,16 @@ class Cell:
         mean: over seeds.
         spread: standard deviation over seeds; NaN of a single one.
         count: of the seeds.
-        best: whether no other method comes within the spread.
+        distance, distance_spread: the same of the distances of values from the best one that is possible, in
+            which opposite errors do not cancel; NaN where no value is better.
+        best: whether no other method comes within the spread of distances.
     """
 
     mean: float
     spread: float
     count: int
+    distance: float = math.nan
+    distance_spread: float = math.nan
     best: bool = False
 
 
@@ -80,15 +84,28 @@ def _summary(
             for r in results:
                 if r.method == method and measure.key in r.numbers:
                     by_seed.setdefault(r.seed, []).append(r.numbers[measure.key])
-            values = [float(np.mean(of_seed)) for of_seed in by_seed.values() if len(of_seed) == pairs]
+            values = [of_seed for of_seed in by_seed.values() if len(of_seed) == pairs]
             if values:
-                cells[method, measure.key] = _cell(values)
+                cells[method, measure.key] = _cell(measure, values)
     return Summary(pair, methods, measures, _marked(cells, methods, measures))
 
 
-def _cell(values: Sequence[float]) -> Cell:
-    spread = float(np.std(values, ddof=1)) if len(values) > 1 else math.nan
-    return Cell(float(np.mean(values)), spread, len(values))
+def _cell(measure: Measure, values: Sequence[Sequence[float]]) -> Cell:
+    """Of the values of all pairs, for each seed."""
+    cell = Cell(*mean_and_spread(values), len(values))
+    if measure.distance is None:
+        return cell
+    distance, spread = mean_and_spread([[measure.distance(value) for value in one] for one in values])
+    return replace(cell, distance=distance, distance_spread=spread)
+
+
+def mean_and_spread(values: Sequence[Sequence[float]]) -> tuple[float, float]:
+    """Of the values of all pairs, for each seed: the mean, and the standard deviation of the seeds' means.
+
+    The deviation is NaN of a single seed.
+    """
+    means = [float(np.mean(one)) for one in values]
+    return float(np.mean(means)), float(np.std(means, ddof=1)) if len(means) > 1 else math.nan
 
 
 def _marked(
@@ -100,21 +117,21 @@ def _marked(
             method: cells[method, measure.key] for method in methods if (method, measure.key) in cells
         }
         if winner := best(measure, of_methods):
-            cell = cells[winner, measure.key]
-            marked[winner, measure.key] = Cell(cell.mean, cell.spread, cell.count, True)
+            marked[winner, measure.key] = replace(cells[winner, measure.key], best=True)
     return marked
 
 
 def best(measure: Measure, cells: dict[str, Cell]) -> str | None:
     """The method that is better than each other one by more than both spreads together, if there is one.
 
-    A single seed has no spread, so that nothing is certain.
+    Better is what is less far from the best value on average. A single seed has no spread, so that nothing is
+    certain.
     """
     if measure.distance is None or len(cells) < 2:
         return None
-    distances = {method: measure.distance(cell.mean) for method, cell in cells.items()}
-    first, *others = sorted(cells, key=lambda method: distances[method])
+    first, *others = sorted(cells, key=lambda method: cells[method].distance)
     for other in others:
-        if not distances[other] - distances[first] > cells[first].spread + cells[other].spread:
+        spreads = cells[first].distance_spread + cells[other].distance_spread
+        if not cells[other].distance - cells[first].distance > spreads:
             return None
     return first

@@ -2,6 +2,7 @@
 
 import base64
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -41,15 +42,80 @@ def test_a_report_of_nothing_says_so():
     assert "<li>gatys: it failed</li>" in html
 
 
+def report(results):
+    """The text of a report with two columns."""
+    measures = BY_KEY["seams"], BY_KEY["gram"]
+    plan = Plan.of({"exemplars": ["lava"], "meshes": ["vase"], "methods": {"gatys": {}}})
+    exemplars, tables = {"lava": np.zeros((4, 4, 3))}, summaries(results, measures)
+    return Page(results, tables, exemplars, {}, (), measures, (), Provenance(plan, {})).html()
+
+
+def with_seeds(folder, seeds):
+    """Results of methods with these seeds, which have pictures: method -> seeds."""
+    pairs = [(method, seed) for method, of_method in seeds.items() for seed in of_method]
+    for k, (method, seed) in enumerate(pairs):
+        picture = bad.image(folder / f"{method}-{seed}.jpg", (8, 8), "JPEG", seed=k)
+        yield replace(result(method, seed), numbers={"gram": 1.0 + k}, pictures={LIT: picture})
+
+
+def rows_of(html):
+    """Method -> the contents of its other cells."""
+    rows = re.findall(r'<tr><td data-value="(.)">.</td>(.*?)</tr>', html)
+    return {name: re.findall(r"<td[^>]*>(.*?)</td>", cells) for name, cells in rows}
+
+
+class TestUnequalSeeds:
+    """A method of one seed beside one of three; one with another seed, and one with that of its preset."""
+
+    SEEDS = {"a": (0,), "b": (0, 1, 2), "c": (5,), "d": (None,)}
+
+    def test_each_row_says_how_many_there_are(self, tmp_path):
+        html = report(list(with_seeds(tmp_path, self.SEEDS)))
+        assert [(name, cells[0]) for name, cells in rows_of(html).items()] == [
+            *zip("abcd", "1311", strict=True)
+        ]
+        assert "lava on ball; 1 to 3 seeds</p>" in html
+        assert "Means over as many seeds as each row says" in html and "Beside a method of one seed" in html
+        assert "Seeds: as many as each row says." in html and "made the same ones" not in html
+
+    def test_equal_ones_are_counted_once(self, tmp_path):
+        html = report(list(with_seeds(tmp_path, {"a": (0, 1), "b": (0, 1)})))
+        assert "; 2 seeds</p>" in html and "Means over 2 seeds ±" in html and "Beside a method" not in html
+
+    def test_different_single_seeds_are_single_ones(self, tmp_path):
+        html = report(list(with_seeds(tmp_path, {"a": (0,), "b": (5,)})))
+        assert "; 1 seed</p>" in html and "how much is due to chance is not known" in html
+
+    def test_a_number_of_fewer_seeds_than_its_row_says_so(self, tmp_path):
+        one, *others = with_seeds(tmp_path, {"a": (0, 1, 2)})
+        numbers = {"gram": 1.0, "seams": 1.0}
+        html = report([replace(one, numbers=numbers), *others])
+        seeds, seams, gram = rows_of(html)["a"]
+        assert seeds == "3" and "of 1 seed<" in seams and "of" not in gram
+
+    def test_every_method_shows_a_picture_from_the_start(self, tmp_path):
+        html = report(list(with_seeds(tmp_path, self.SEEDS)))
+        shown = re.findall(r'<img [^>]*alt="lava on ball by (., seed [^"]*)" data-seed="[^"]*">', html)
+        assert shown == ["a, seed 0", "b, seed 0", "c, seed 5", "d, seed of the preset"]
+        assert re.findall('<td data-note="(.*?)"', html) == ["", "", "seed 5", "seed of the preset"]
+        assert re.findall("<button value=.*?>(.*?)</button>", html) == ["0", "1", "2", "5"]
+
+    def test_a_button_leaves_the_pictures_of_methods_without_its_seed(self, browser, tmp_path):
+        (tmp_path / "report.html").write_text(report(list(with_seeds(tmp_path, self.SEEDS))))
+        tab = browser.open(tmp_path / "report.html")
+        notes = {"1": ["seed 0", "", "seed 5"], "5": ["seed 0", "seed 0", ""], "0": ["", "", "seed 5"]}
+        for seed, expected in notes.items():
+            tab.page.locator(f".seeds button[value='{seed}']").click()
+            assert tab.page.locator(VISIBLE).count() == 4
+            cells = tab.page.locator(".looks td[data-note]").all()
+            assert [cell.get_attribute("data-note") for cell in cells] == [*expected, "seed of the preset"]
+        assert not tab.errors
+
+
 class TestReport:
     @pytest.fixture
     def page(self, browser, tmp_path):
-        measures, results = (BY_KEY["seams"], BY_KEY["gram"]), list(made(tmp_path, "abcd"))
-        plan = Plan.of({"exemplars": ["lava"], "meshes": ["vase"], "methods": {"gatys": {}}})
-        tables = summaries(results, measures)
-        exemplars = {"lava": np.zeros((4, 4, 3))}
-        page = Page(results, tables, exemplars, {}, (), measures, (), Provenance(plan, {}))
-        (tmp_path / "report.html").write_text(page.html())
+        (tmp_path / "report.html").write_text(report(list(made(tmp_path, "abcd"))))
         tab = browser.open(tmp_path / "report.html")
         yield tab.page
         assert not tab.errors

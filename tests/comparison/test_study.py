@@ -4,6 +4,7 @@ import base64
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from tests.cli import bad_files as bad
 from tests.comparison.conftest import words_plan
 from tests.comparison.test_summary import result
 
+DOCS = Path(__file__).parents[2] / "docs"
 WORDS = ("red bricks", "green marble")
 EXEMPLARS = {"lava": np.zeros((4, 4, 3))}
 
@@ -114,6 +116,10 @@ class TestComparisons:
 CASES = Study("x", tuple(Question("lava", mesh, ("a", "b")) for mesh in ("ball", "vase", "knot")))
 
 
+def many_cases(count, methods=("a", "b")):
+    return Study("x", tuple(Question("lava", str(k), methods) for k in range(count)))
+
+
 def answers(*choices):
     return [Answer(k, choice) for k, choice in enumerate(choices)]
 
@@ -134,7 +140,7 @@ class TestEvaluation:
         expected = scipy.stats.binomtest(wins, count).proportion_ci(method="wilson")
         assert wilson_interval(wins / count, count) == pytest.approx((expected.low, expected.high), abs=1e-12)
 
-    def test_the_spread_is_over_cases_and_the_tests_take_them_as_samples(self):
+    def test_the_spread_is_over_cases_and_the_published_test_takes_them_as_samples(self):
         """a was preferred by all on the ball, by half on the vase and the knot."""
         done = evaluate(CASES, {"x": answers(0, 0, 1), "y": answers(0, 1, 0)})
         a, b = [1.0, 0.5, 0.5], [0.0, 0.5, 0.5]
@@ -143,8 +149,32 @@ class TestEvaluation:
         between, within = 3 * 2 * (1 / 6) ** 2 / 1, 2 * (1 / 9 + 2 / 36) / 4  # mean squares
         assert done.f == pytest.approx(between / within)
         t: Any = scipy.stats.ttest_ind(a, b)
-        assert done.p == pytest.approx(t.pvalue)  # of two groups both tests are one
-        assert done.pairs == {("a", "b"): pytest.approx(t.pvalue)}
+        assert done.published_p == pytest.approx(t.pvalue)  # of two groups both tests are one
+
+    def test_one_method_that_wins_every_case_has_p_of_all_signs_alike(self):
+        """Of n cases 2 of 2 ** n relabellings differ as much; cases without a difference say nothing."""
+        study = many_cases(6)
+        done = evaluate(study, {"x": answers(*[0] * 6)})
+        assert done.p == done.pairs["a", "b"] == 2 / 2**6
+        assert np.isnan([done.f, done.published_p]).all()  # no share varies
+        done = evaluate(study, {"x": answers(*[0] * 5, None)})
+        assert done.p == 2 / 2**5
+
+    def test_pairs_are_tested_in_the_cases_that_both_are_in(self):
+        """a and b have two cases, which can tell nothing; of the whole the sums of all three count."""
+        questions = [Question("lava", str(k), ("a", other)) for k, other in enumerate("bbccc")]
+        done = evaluate(Study("x", tuple(questions)), {"x": answers(*[0] * 5)})
+        raw = {("a", "b"): 2 / 4, ("a", "c"): 2 / 8, ("b", "c"): 1.0}
+        assert done.pairs == pytest.approx(holm(raw))
+        assert done.p == 2 / 2**5
+        assert "permutation test over cases: p = 0.062\na and c: p = 0.75\na and b: p = 1\n" in done.text()
+
+    def test_the_guides_example_is_of_such_answers(self):
+        """Twelve people in twelve cases, of whom this many preferred the first."""
+        study = many_cases(12, ("surface", "image_quilting"))
+        wins = (12, 12, 12, 11, 11, 10, 10, 10, 9, 8, 6, 5)
+        people = {str(k): answers(*(int(k >= count) for count in wins)) for k in range(12)}
+        assert f"```text\n{evaluate(study, people).text()}\n```" in (DOCS / "compare.md").read_text("utf-8")
 
     def test_p_is_adjusted_by_holms_procedure(self):
         raw = {("a", "b"): 0.01, ("a", "c"): 0.04, ("b", "c"): 0.03}
@@ -152,7 +182,7 @@ class TestEvaluation:
 
     def test_one_case_has_no_spread(self):
         done = evaluate(CASES, {"x": answers(0), "y": answers(1)})
-        assert np.isnan([done.f, done.p]).all() and done.pairs == {}
+        assert np.isnan([done.f, done.published_p, done.p]).all() and done.pairs == {}
         assert "needs two methods in two cases" in done.text() and "±" not in done.text()
 
     def test_a_method_of_one_case_is_left_out_and_named(self):
@@ -165,7 +195,8 @@ class TestEvaluation:
         assert done.untested == ("c",) and done.pairs.keys() == {("a", "b")}
         a, b = [1.0, 0.5, 0.5, 0.5], [0.0, 0.5, 0.5]
         f: Any = scipy.stats.f_oneway(a, b)
-        assert (done.f, done.p) == pytest.approx((f.statistic, f.pvalue))
+        assert (done.f, done.published_p) == pytest.approx((f.statistic, f.pvalue))
+        assert done.p == 1  # one case of three differs, either way as much
         text = "of a single case, and not tested: c\n"
         assert text in done.text() and other.untested == () and text not in other.text()
         assert {one.method: one.count for one in done.preferences}["c"] == 2

@@ -9,6 +9,7 @@ from mitex.comparison import summary
 from mitex.comparison.measures import BY_KEY, COSTS, LOOKS
 from mitex.comparison.results import Result
 from mitex.comparison.summary import Cell, best
+from mitex.comparison.tables import table_html
 
 
 def result(method, seed, mesh: str | None = "ball", **numbers):
@@ -50,9 +51,38 @@ def test_what_is_put_on_no_mesh_stands_beside_the_others_on_each():
     assert alone.pair == ("lava", None) and alone.cells["b", "gram"].mean == 5
 
 
+def test_a_distance_is_the_mean_of_distances_and_its_spread_is_theirs():
+    """Over pairs first: 0.3 and 0.5 off in the seeds, while the means are 0.1 and 0.1."""
+    numbers = {("ball", 0): 0.4, ("vase", 0): -0.2, ("ball", 1): 0.6, ("vase", 1): -0.4}
+    results = [result("a", seed, mesh, repetition=v, parameters=v) for (mesh, seed), v in numbers.items()]
+    cells = summaries(results)[-1].cells
+    cell = cells["a", "repetition"]
+    assert (cell.mean, cell.spread, cell.distance) == pytest.approx((0.1, 0, 0.4))
+    assert cell.distance_spread == pytest.approx(math.sqrt(0.02))
+    assert math.isnan(cells["a", "parameters"].distance)
+
+
+def test_a_table_tells_distances_where_values_lie_on_both_sides_of_the_best():
+    results = [result("a", 0, mesh, repetition=v, gram=2.0) for mesh, v in (("ball", 0.4), ("vase", -0.2))]
+    html = table_html(summaries(results)[-1], {})
+    assert (
+        '<td data-value="0.3">0.100<span class="spread"></span><span class="spread">distance 0.300</' in html
+    )
+    assert html.count("distance 0") == 1 and "best is 0, sorted by distance" in html
+    assert '<td data-value="2">2.00<span class="spread"></span></td>' in html
+
+
 class TestBest:
     def of(self, key, **cells):
-        return best(BY_KEY[key], {name: Cell(mean, spread, 3) for name, (mean, spread) in cells.items()})
+        """By distances and their spreads."""
+        return best(BY_KEY[key], {name: Cell(9.0, 9.0, 3, *cell) for name, cell in cells.items()})
+
+    def marked(self, key, **values):
+        """Of two meshes with the same values in two seeds: which methods are."""
+        numbers = [(m, s, k) for m in values for s in (0, 1) for k in (0, 1)]
+        results = [result(m, s, ("ball", "vase")[k], **{key: values[m][k]}) for m, s, k in numbers]
+        table = summaries(results)[-1]
+        return [m for m in values if table.cells[m, key].best]
 
     def test_the_lowest_by_more_than_both_spreads(self):
         assert self.of("gram", a=(1.0, 0.2), b=(1.5, 0.2)) == "a"
@@ -62,8 +92,12 @@ class TestBest:
         assert self.of("gram", a=(1.0, 0.1), b=(2.0, 0.1), c=(3.0, 2.5)) is None
 
     def test_nearest_to_one_and_to_zero(self):
-        assert self.of("seams", a=(0.5, 0.01), b=(1.1, 0.01)) == "b"
-        assert self.of("repetition", a=(-0.5, 0.01), b=(0.1, 0.01)) == "b"
+        assert self.marked("seams", a=(0.5, 0.5), b=(1.1, 1.1)) == ["b"]
+        assert self.marked("repetition", a=(-0.5, -0.5), b=(0.1, 0.1)) == ["b"]
+
+    def test_opposite_errors_do_not_cancel(self):
+        assert self.marked("repetition", a=(-0.3, 0.3), b=(0.1, 0.1)) == ["b"]
+        assert self.marked("seams", a=(0.5, 1.5), b=(1.2, 1.2)) == ["b"]
 
     def test_nothing_is_certain_of_one_seed_or_one_method(self):
         assert self.of("gram", a=(1.0, math.nan), b=(9.0, math.nan)) is None

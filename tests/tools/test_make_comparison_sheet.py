@@ -44,16 +44,19 @@ def lines(printed):
 
 
 def test_likeness_and_costs(script, tmp_path, monkeypatch, capsys):
-    """Over meshes first, then over seeds: gram 2 and 4; 30 and 50 s, 1.2 million parameters, 1.5 GB."""
+    """Over meshes first, then over seeds: gram 2 and 4; 30 and 50 s, 1.2 million parameters, 1.5 GB.
+
+    Repetition is 0.4 and -0.2 with one seed, a distance of 0.3, and 0.47 and -0.33 with the other, of 0.4.
+    """
 
     def costs(seconds):
         return {"fit_seconds": seconds, "parameters": 1_200_000.0, "memory": 1.5e9}
 
     lava = {
-        ("ball", 0): {"gram": 1.0, **costs(20)},
-        ("vase", 0): {"gram": 3.0, **costs(40)},
-        ("ball", 1): {"gram": 4.0, **costs(50)},
-        ("vase", 1): {"gram": 4.0, **costs(50)},
+        ("ball", 0): {"gram": 1.0, "repetition": 0.4, **costs(20)},
+        ("vase", 0): {"gram": 3.0, "repetition": -0.2, **costs(40)},
+        ("ball", 1): {"gram": 4.0, "repetition": 0.47, **costs(50)},
+        ("vase", 1): {"gram": 4.0, "repetition": -0.33, **costs(50)},
     }
     folders = [comparison(tmp_path / "lava", "lava", lava)]
     folders.append(comparison(tmp_path / "rust", "rust", {("ball", 0): {"gram": 5.0, **costs(1)}}))
@@ -65,6 +68,9 @@ def test_likeness_and_costs(script, tmp_path, monkeypatch, capsys):
     gram = 3
     assert lines(likeness)["lava"][gram] == "3.00 ± 1.4" and lines(likeness)["rust"][gram] == "5.00"
     assert lines(likeness)["lava"][0] == "–"
+    assert "Repetition (mean distance from the best)" in likeness[0] and "| Gram |" in likeness[0]
+    assert lines(likeness)["lava"][5] == "0.0850 ± 0.021 (0.350 ± 0.071)"
+    assert lines(likeness)["rust"][5] == "–"
     assert lines(spent)["lava"] == ["1,200,000", "40.0 ± 14", "–", "1.50"]
     assert lines(spent)["vase"][1] == "45.0 ± 7.1"
     assert read_image(tmp_path / "comparison.jpg").shape[2] == 3

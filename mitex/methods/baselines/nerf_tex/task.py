@@ -28,7 +28,8 @@ class BoxTask(RadianceTask[NerfTexConfig]):
     What differs from the publication in the preset `paper`, too: the rays of a step are of all pictures, not
     256 of each of four; places along a ray are 1/256 of the cube's diagonal apart and jittered together, not
     256 between where it enters and leaves, each by itself; empty cells are left out; Adam's moments decay as
-    for the other radiance fields.
+    for the other radiance fields. And where boxes are put on a mesh: published normals are jittered, here
+    boxes stand upright unless `tilt` makes them lean.
 
     Args:
         config: settings.

@@ -36,6 +36,12 @@ class StyleMeshTask(ParameterTask):
     For objects: there are no photos whose content should be kept. The authors take VGG-19, for which VGG-16
     stands in, whose weights come with Mitex.
 
+    What differs from the publication in the preset `paper`, too: the second, smaller picture of the style is
+    half as wide as the exemplar, not 256 pixels; the height of the picture in which a pixel counts is that at
+    which it is as large as a texel; views are drawn with replacement, not each once an epoch. Gram matrices
+    are compared at five layers, `relu1_1` to `relu5_1`, those of the smaller picture at the last two. How
+    large the exemplar is, and where cameras stand, is ours.
+
     Args:
         config: settings.
         exemplar: whose albedo is matched.

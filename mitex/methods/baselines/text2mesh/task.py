@@ -31,7 +31,8 @@ class Text2MeshTask(ParameterTask):
 
     As MeshNCA compares with it: the target is an image, the loss relaxed transport (MeshNCA, equation 6), and
     the geometry stays. Colours are those of the places that pixels see, where the authors interpolate them
-    from the vertices: so they are as fine on coarse meshes.
+    from the vertices: so they are as fine on coarse meshes. With anchored cameras (the preset `paper`) the
+    anchor view is the front, and elevations end at 80 degrees; waves are opened the slowest first.
 
     Args:
         config: settings.
