@@ -236,7 +236,7 @@ def test_numbers_out_of_range_in_python(option, message, tmp_path):
 @pytest.mark.parametrize(("mask", "first"), [("box:25,15,50,70", 0), ("plane", 1)])
 def test_the_photo_that_a_box_is_in_is_kept(mask, first, monkeypatch, tmp_path):
     """Of more photos than asked for, where the first is not the sharpest of its part."""
-    blurred = ndimage.uniform_filter(PICTURES[0], (3, 3, 1))
+    blurred = ndimage.gaussian_filter(PICTURES[0], (1.0, 1.0, 0.0))
     write_photos(tmp_path / "photos", [blurred, *(p for p in PICTURES for _ in range(2))][:-1])
     names = []
 

@@ -171,6 +171,7 @@ def test_a_picture_lies_on_the_mesh_s_own_uvs(tmp_path):
 def test_a_picture_repeats_beyond_its_square(tmp_path):
     """As UVs do in glTF and OBJ; the border itself is that of the square."""
     plain = flat_square(4)
+    assert plain.uv is not None
     write_image(tmp_path / "ramp.png", np.tile(0.25 + 0.75 * (np.arange(200) + 0.5) / 200, (50, 1)))
     at = np.zeros(3, int), np.array([[1.0, 0, 0], [0, 1, 0], [1 / 3, 1 / 3, 1 / 3]])
     factors = [
