@@ -42,7 +42,9 @@ class Growth(ABC):
     @property
     @abstractmethod
     def key(self) -> str:
-        """A hash of all that its states follow from, beside their number and a random seed."""
+        """A hash of all that its states, and what they show, follow from, beside their number and a random
+        seed.
+        """
 
     @abstractmethod
     def seed(self) -> torch.Tensor:
@@ -107,7 +109,9 @@ class LookGrowth(Growth):
     @property
     def key(self) -> str:
         place = self.cells.mesh.vertices, self.cells.mesh.faces, np.asarray(self.orientation)
-        return content_key(weights_key(self.look), *place, *self.motion.arrays)
+        palette = () if self.palette is None else (self.palette.colours, self.palette.radius)
+        shown = weights_key(self.look), self.relief
+        return content_key(shown, *palette, *place, *self.motion.arrays)
 
     def seed(self) -> torch.Tensor:
         return self.look.rule.seed(self.operator)[0]
