@@ -78,10 +78,10 @@ def test_places_where_the_field_is_weak_do_not_count(tool, closeups):
 @pytest.fixture
 def pictured(tool, closeups, monkeypatch):
     """A texture whose close-ups are squares of an exemplar, each repeated and as wide as it is there."""
-    waffle = Exemplar.load("waffle").resized(32).maps["albedo"]
-    pictures = np.tile(waffle, (len(closeups.cameras), 4, 4, 1))
+    bricks = Exemplar.load("bricks").resized(32).maps["albedo"]
+    pictures = np.tile(bricks, (len(closeups.cameras), 4, 4, 1))
     monkeypatch.setattr(tool.CloseUps, "pictures", lambda *_: pictures)
-    about = {"name": "tiny", "growth_steps": 1, "density": 8, "exemplar": "waffle"}
+    about = {"name": "tiny", "growth_steps": 1, "density": 8, "exemplar": "bricks"}
     return NcaTexture(tiny.texture(shape=None).look, about)
 
 
