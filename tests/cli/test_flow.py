@@ -114,7 +114,7 @@ def test_a_field_that_is_no_text_is_one_line(folder, capsys):
     about = {"name": "m", "maps": ["albedo"], "motion": 7, "motion_advection": True}
     tensors = load_file(bad_files.model(folder / "m.safetensors"))
     save_file(tensors, folder / "m.safetensors", {"about": json.dumps(about)})
-    words = "apply m.safetensors --mesh cube.obj --out a.ply".split()
+    words = ["apply", "m.safetensors", "--mesh", "cube.obj", "--out", "a.ply"]
     check_refused(folder, words, "the description in 'm.safetensors' is damaged", capsys)
 
 

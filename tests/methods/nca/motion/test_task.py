@@ -183,7 +183,7 @@ def test_the_loss_of_pictures_compares_what_it_should(exemplar, monkeypatch):
     assert 0 < mask.float().mean() < 1 and pictures[1].requires_grad
     assert options == {"steps": apart, "period": 40.0, "gamma": 0.7}
     expected = motion_loss(flow, target, mask, steps=apart, period=40.0, gamma=0.7).total
-    assert metrics["motion"] == pytest.approx(3 * float(expected), rel=1e-5)
+    assert metrics["motion"] == pytest.approx(3 * expected.item(), rel=1e-5)
 
 
 @pytest.mark.parametrize("surface", ["even", "flat"])
@@ -193,7 +193,7 @@ def test_motion_is_measured_in_the_widest_of_the_views(exemplar, monkeypatch, su
     task, sizes = MotionTask(config(*words, "density=4"), exemplar), []
     closeups = task.closeups
     monkeypatch.setattr(task, "closeups", lambda size, *least: sizes.append(size) or closeups(size, *least))
-    task.motion_views(task.drift(0, task.ways[0]), torch.Generator().manual_seed(0))
+    task.motion_views(task.drift(0, task.drift_seeds[0]), torch.Generator().manual_seed(0))
     assert sizes == [128] and list(task.zooms) == [128, 256]
 
 
@@ -252,16 +252,16 @@ def test_previews_are_of_moving_states(exemplar, monkeypatch, encoding):
 def test_a_state_keeps_its_way_until_the_seed_replaces_it(exemplar):
     """Of direction and speed; `commit` alone writes it down, and checkpoints have it."""
     task = MotionTask(config(*MOVING, "pool=1", "inject_every=4"), exemplar)
-    ways, fields = [], []
+    seeds, fields = [], []
     for step in range(1, 9):
-        before = task.ways.clone()
+        before = task.drift_seeds.clone()
         result = task.loss(step, torch.Generator().manual_seed(step))
-        assert torch.equal(task.ways, before)
+        assert torch.equal(task.drift_seeds, before)
         result.commit()
-        ways.append(int(task.ways[0]))
-        fields.append(task.drift(0, task.ways[0]).field)
-    assert len(set(ways[:3])) == len(set(ways[3:7])) == 1 and len(set(ways)) == 3
+        seeds.append(int(task.drift_seeds[0]))
+        fields.append(task.drift(0, task.drift_seeds[0]).field)
+    assert len(set(seeds[:3])) == len(set(seeds[3:7])) == 1 and len(set(seeds)) == 3
     assert np.array_equal(fields[0], fields[2]) and np.abs(fields[2] - fields[3]).max() > 0.1
     other = MotionTask(config(*MOVING, "pool=1"), exemplar)
     other.load_state(copies(task.state()))
-    assert torch.equal(other.ways, task.ways)
+    assert torch.equal(other.drift_seeds, task.drift_seeds)

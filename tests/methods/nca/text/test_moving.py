@@ -75,7 +75,9 @@ def test_it_learns_to_move_on_a_mesh_of_ones_own(tmp_path):
     one = MovingTextTask(config(*MOVING, speeds, "motion_turns=false"), MeanColour(), None, None, egg)
     (surface,) = one.surfaces
     assert isinstance(surface, TrainingSphere) and np.ptp(surface.mesh.vertices[:, 0]) < 1.3
-    assert np.allclose(one.drift(0, one.ways[0]).field, 1.5 * vector_field(surface.mesh, "right"), atol=1e-5)
+    assert np.allclose(
+        one.drift(0, one.drift_seeds[0]).field, 1.5 * vector_field(surface.mesh, "right"), atol=1e-5
+    )
     grown(one)
     assert loss(one).metrics["motion"] > 1e-6
     settings = [*SETTINGS, "motion_steps=2", "preset=text", "steps=2", "density=9"]
