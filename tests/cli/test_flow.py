@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from safetensors.numpy import load_file, save_file
 
 from mitex.asset import Asset
 from mitex.cli import main
@@ -19,6 +20,7 @@ from mitex.cli.models import listing
 from mitex.exemplar import MAPS
 from mitex.images import read_image
 from tests.cli import bad_files
+from tests.cli.refusals import check_refused
 
 pytestmark = pytest.mark.usefixtures("quick_settling")
 
@@ -105,6 +107,15 @@ def test_a_field_and_its_speed_reach_tiles_and_pages(folder, monkeypatch, out):
         with pytest.raises(Reached):
             main(f"apply m.safetensors {words} --out {out} --field up --speed {speed}".split())
         assert (given[-1]["field"], given[-1]["speed"]) == ("up", speed)
+
+
+def test_a_field_that_is_no_text_is_one_line(folder, capsys):
+    """In the description of a model whose states are carried along it."""
+    about = {"name": "m", "maps": ["albedo"], "motion": 7, "motion_advection": True}
+    tensors = load_file(bad_files.model(folder / "m.safetensors"))
+    save_file(tensors, folder / "m.safetensors", {"about": json.dumps(about)})
+    words = ["apply", "m.safetensors", "--mesh", "cube.obj", "--out", "a.ply"]
+    check_refused(folder, words, "the description in 'm.safetensors' is damaged", capsys)
 
 
 def test_options_reach_the_library(folder, monkeypatch, capsys):

@@ -42,14 +42,14 @@ def project(views: Cameras, points: np.ndarray) -> np.ndarray:
 
 
 def reference(mesh: Mesh, views: Cameras, vectors: np.ndarray, antialias: int) -> np.ndarray:
-    """(H, W, 3) motion and coverage by central differences of projected points."""
+    """(H, W, 3) motion and coverage by central differences of projected points; vectors (V, 3) or (F, 3)."""
     fine = replace(views, width=views.width * antialias, height=views.height * antialias)
     origins, directions = (rays.reshape(-1, 3) for rays in fine.rays())
     face, weights = trace(mesh, origins, directions)
     corners = mesh.faces[face]
-    points, velocity = (
-        np.einsum("nk,nkc->nc", weights, values[corners]) for values in (mesh.vertices, vectors)
-    )
+    points = np.einsum("nk,nkc->nc", weights, mesh.vertices[corners])
+    of_faces = len(vectors) == len(mesh.faces)
+    velocity = vectors[face] if of_faces else np.einsum("nk,nkc->nc", weights, vectors[corners])
     covered = (face >= 0)[:, None]
     step = 1e-5
     motion = (project(views, points + step * velocity) - project(views, points - step * velocity)) / (
@@ -90,6 +90,17 @@ def test_motion_is_that_of_projected_points(mi, vectors, kind, antialias):
     np.testing.assert_allclose(picture[..., 3], expected[..., 2], atol=1e-6)
     np.testing.assert_allclose(picture[..., :2], expected[..., :2], atol=1e-3)
     assert 0 < expected[..., 2].mean() < 1
+    assert np.abs(expected[..., :2]).max() > 1
+
+
+@pytest.mark.parametrize("antialias", [1, 2])
+def test_vectors_may_belong_to_the_faces(mi, rng, antialias):
+    views, vectors = cameras(), rng.normal(size=(len(BALL.faces), 3)).astype(np.float32)
+    options = {"attribute": "face_flow", "antialias": antialias}
+    picture = image(mi, views.sensors()[0], options, ball=moving(vectors, name="face_flow"))
+    expected = reference(BALL, views, vectors, antialias)
+    np.testing.assert_allclose(picture[..., 3], expected[..., 2], atol=1e-6)
+    np.testing.assert_allclose(picture[..., :2], expected[..., :2], atol=1e-3)
     assert np.abs(expected[..., :2]).max() > 1
 
 
@@ -265,6 +276,8 @@ def test_bad_renders_are_refused(mi, vectors):
     short = mesh_shape(BALL)
     short.add_attribute("vertex_motion", 1, vectors[:, 0].tolist())
     assert "'vertex_motion' of mesh 'ball' has 1 numbers each; give it 3" in problem({}, ball=short)
+    short.add_attribute("face_flow", 2, [0.0] * 2 * len(BALL.faces))
+    assert "'face_flow' of mesh 'ball' has 2 numbers" in problem({"attribute": "face_flow"}, ball=short)
     assert "has 2 channels; give one of 3" in problem({"field": field(mi, vectors[:, :2].copy())})
     assert "has 92 vertices" in problem({"field": field(mi, vectors[:50].copy())})
     world = scene(mi, cameras().sensors()[0], {"field": field(mi, vectors)})

@@ -20,6 +20,14 @@ FARTHEST = 4.0  # [px], up to which estimators tell a motion
 def load_estimator(name: EstimatorName, device: torch.device | str = "cpu") -> Estimator:
     """Lucas and Kanade's method, or the flow network.
 
+    Args:
+        name: which of the two.
+        device: of the network, where its pictures must be; Lucas and Kanade's method works where they are.
+
+    Returns:
+        From two pictures (K, 1, H, W), grey in [0, 1], the motion (K, 2, H, W) from the first to the second
+        [px], x to the right and y down; differentiable in both.
+
     Raises:
         WeightsError: those of the network are not there.
     """

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import torch
 
@@ -107,6 +109,18 @@ class Grown:
         right = self._right(normals, face, barycentric)
         x, y, z = (encoded * 2 - 1).T[..., None]
         return x * right + y * np.cross(normals, right) + z * normals
+
+    def detail_normals(
+        self, maps: Mapping[str, np.ndarray], normals: np.ndarray, face: np.ndarray, barycentric: np.ndarray
+    ) -> np.ndarray:
+        """Unit normals in object space (P, 3) of what it shows at points of the given mesh.
+
+        Args:
+            maps: (P, c) by name, of these points.
+            normals: (P, 3) unit, the mesh's own there.
+            face, barycentric: (P,) and (P, 3), the points.
+        """
+        return unit(self.object_normals(maps["normal"], face, barycentric)) if "normal" in maps else normals
 
     def _vertices(self) -> tuple[np.ndarray, np.ndarray]:
         """A face (V,) and barycentrics (V, 3) of each vertex of the given mesh."""

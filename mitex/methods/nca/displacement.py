@@ -25,12 +25,14 @@ class Displacement:
 
     Args:
         mesh: the mesh.
-        bound: how far the surface is moved at most [mean edges of the mesh].
+        bound: how far the surface is moved at most [mean edges of the mesh], everywhere or (V,).
         device: of the heights.
     """
 
-    def __init__(self, mesh: Mesh, bound: float, device: torch.device | str = "cpu") -> None:
-        self.bound = bound * EDGE * decoder_units(mesh).scale
+    def __init__(self, mesh: Mesh, bound: float | np.ndarray, device: torch.device | str = "cpu") -> None:
+        bounds = np.asarray(bound * EDGE * decoder_units(mesh).scale)
+        self.bound = float(bounds.max())
+        self._bounds = torch.tensor(bounds.astype(np.float32), device=device)
         self.corners = vertex_points(mesh)
         self.plain = torch.tensor(mesh.normals, device=device)
         rows = values_and_gradients(mesh)
@@ -41,7 +43,7 @@ class Displacement:
         """How far heights (V,) move the vertices outwards [mesh units]: by the bound at 1, not at 0.5, as far
         inwards at 0; heights beyond count as these.
         """
-        return self.bound * (2 * height.clamp(0, 1) - 1)
+        return self._bounds * (2 * height.clamp(0, 1) - 1)
 
     def slopes(self, height: torch.Tensor) -> torch.Tensor:
         """The gradients (V, 3) of the offsets along the surface, which the normals lean back by."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -24,14 +25,14 @@ class Embossed(Grown):
     """As `Grown`, with a normal map that follows from the height.
 
     Args:
-        bound: how far the height moves the surface at most [mean edges of the automaton's mesh].
+        relief: of the automaton's mesh.
         moved: whether the vertices are moved too; the normal map then tells what they do not.
-        grown: arguments of `Grown`, in their order.
+        grown: arguments of `Grown`, or of the class that is derived from both, in their order.
     """
 
-    def __init__(self, bound: float, moved: bool, *grown: Any) -> None:
+    def __init__(self, relief: Displacement, moved: bool, *grown: Any) -> None:
         super().__init__(*grown)
-        self.bound, self.moved = bound, moved
+        self.relief, self.moved = relief, moved
 
     def asset(self) -> Asset:
         plain, mesh = super().asset(), self._mesh
@@ -50,9 +51,10 @@ class Embossed(Grown):
             detail[rows][used] = self._normals(normals, face, barycentric)
         return super().textures(atlas) | {"normal": atlas.normal_map(self._mesh, detail)}
 
-    @cached_property
-    def _relief(self) -> Displacement:
-        return Displacement(self.cells.mesh, self.bound)
+    def detail_normals(
+        self, maps: Mapping[str, np.ndarray], normals: np.ndarray, face: np.ndarray, barycentric: np.ndarray
+    ) -> np.ndarray:
+        return self._normals(normals, face, barycentric)
 
     @cached_property
     @torch.no_grad()
@@ -67,12 +69,12 @@ class Embossed(Grown):
         mesh = self.cells.given
         if not self.moved:
             return mesh
-        offsets = self._at(self._relief.offsets(self._height)[:, None].numpy(), *self._vertices())
+        offsets = self._at(self.relief.offsets(self._height)[:, None].numpy(), *self._vertices())
         return mesh.with_vertices(mesh.vertices + offsets * mesh.normals)
 
     def _normals(self, normals: np.ndarray, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """Normals of the relief (P, 3) at points of the given mesh, given its own there."""
-        slopes = self._at(self._relief.slopes(self._height).numpy(), face, barycentric)
+        slopes = self._at(self.relief.slopes(self._height).numpy(), face, barycentric)
         return unit(normals - slopes).astype(np.float32)
 
     def _at(self, values: np.ndarray, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:

@@ -32,6 +32,7 @@ from mitex.training.config import of_record
 from mitex.training.locate import CHECKPOINT, NAME, PREVIOUS, locate
 
 REMEDY = "give a file written by mitex fit nca, or its run folder"
+STATED = ("density", "motion", "motion_advection", "motion_period")  # settings that a description holds, too
 RULE = "rule."  # before names of the rule's tensors, which files leave out
 
 
@@ -134,7 +135,7 @@ def _about(metadata: dict[str, str], path: Path) -> dict[str, Any]:
         if "palette" in about:
             Palette.from_record(about["palette"])
             maps.index("albedo")  # which the palette is of
-        of_record(NcaConfig, {key: about[key] for key in ("density",) if key in about})
+        of_record(NcaConfig, {key: about[key] for key in STATED if key in about})
     except (LookupError, ValueError, TypeError, AttributeError, RecursionError) as e:
         raise CheckpointError(f"the description in '{path}' is damaged ({e})", "save the model again") from e
     return {"name": path.stem} | about | {"maps": maps}

@@ -219,9 +219,7 @@ class PreviewCamera:
         points = self._renderer.face, self._renderer.barycentric
         maps = grown.maps(grown.values(*points))
         albedo = maps.get("albedo", np.full((len(self._normals), 3), linear_to_srgb(DEFAULT_ALBEDO)))
-        normals = self._normals
-        if "normal" in maps:
-            normals = unit(grown.object_normals(maps["normal"], *points))
+        normals = grown.detail_normals(maps, self._normals, *points)
         return self._renderer.render(albedo, normals, maps.get("ambient_occlusion", 1.0))
 
 

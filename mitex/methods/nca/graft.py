@@ -23,6 +23,7 @@ from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.decoder.surface import Points
+from mitex.methods.nca.embossed import Embossed
 from mitex.methods.nca.growth import Growth, LookGrowth
 from mitex.methods.nca.look import differing_traits, held
 from mitex.methods.nca.model import FIRE_RATE
@@ -103,7 +104,7 @@ class GraftedGrowth(Growth):
     """Two looks on one mesh.
 
     Args:
-        first, second: the looks on the mesh.
+        first, second: the looks, both on the same `cells`.
         weights: (V,) float32 in [0, 1], the second's share at each vertex of the automaton's mesh.
     """
 
@@ -113,6 +114,8 @@ class GraftedGrowth(Growth):
         self._low = torch.lerp(first.look.low, second.look.low, self._share[:, None])
         self._high = torch.lerp(first.look.high, second.look.high, self._share[:, None])
         self._of_first, self._of_second = self._share < 1, self._share > 0
+        share = weights.astype(np.float64)
+        self.relief = (1 - share) * first.relief + share * second.relief
 
     @property
     def key(self) -> str:
@@ -129,7 +132,10 @@ class GraftedGrowth(Growth):
         return state
 
     def shown(self, state: torch.Tensor) -> Grown:
-        return GraftedGrown(self.first.shown(state), self.second.shown(state), self.weights)
+        parts = self.first.shown(state), self.second.shown(state), self.weights
+        if not np.any(self.relief):
+            return GraftedGrown(*parts)
+        return EmbossedGraft(self._displacement, self.moved, *parts)
 
     def foreign(self, state: torch.Tensor) -> np.ndarray:
         foreign = np.zeros(len(state), bool)
@@ -191,3 +197,7 @@ class GraftedGrown(Grown):
         """(P,) of points of the automaton's mesh; exactly that of the corners where they are equal."""
         a, b, c = self.weights[self.cells.mesh.faces[face]].T
         return np.clip(a + barycentric[:, 1] * (b - a) + barycentric[:, 2] * (c - a), 0, 1)
+
+
+class EmbossedGraft(Embossed, GraftedGrown):
+    """The same of looks with reliefs, whose bounds are mixed too; arguments as of `Embossed`."""

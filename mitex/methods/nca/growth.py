@@ -15,6 +15,7 @@ from mitex.errors import ConfigError
 from mitex.methods.nca.bake import Grown
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.surface import Surface
+from mitex.methods.nca.displacement import Displacement
 from mitex.methods.nca.embossed import Embossed
 from mitex.methods.nca.look import Look, weights_key
 from mitex.methods.nca.motion.cell_motion import STILL, CellMotion
@@ -29,14 +30,21 @@ class Growth(ABC):
 
     Attributes:
         cells: the mesh.
+        relief: how far the height moves the surface at most [edges], everywhere or (V,); 0 if it is a map and
+            no more.
+        moved: whether the relief moves the mesh.
     """
 
     cells: Cells
+    relief: float | np.ndarray = 0.0
+    moved = False
 
     @property
     @abstractmethod
     def key(self) -> str:
-        """A hash of all that its states follow from, beside their number and a random seed."""
+        """A hash of all that its states, and what they show, follow from, beside their number and a random
+        seed.
+        """
 
     @abstractmethod
     def seed(self) -> torch.Tensor:
@@ -56,7 +64,15 @@ class Growth(ABC):
         Raises:
             ConfigError: it has no relief.
         """
-        raise ConfigError("the texture has no relief that could displace a mesh", "train one from words")
+        if not np.any(self.relief):
+            raise ConfigError("the texture has no relief that could displace a mesh", "train one from words")
+        growth = copy(self)
+        growth.moved = True
+        return growth
+
+    @cached_property
+    def _displacement(self) -> Displacement:
+        return Displacement(self.cells.mesh, self.relief)
 
     @abstractmethod
     def foreign(self, state: torch.Tensor) -> np.ndarray:
@@ -86,14 +102,16 @@ class LookGrowth(Growth):
         motion: CellMotion = STILL,
         relief: float = 0.0,
     ) -> None:
-        self.motion, self.relief, self.moved = motion, relief, False
+        self.motion, self.relief = motion, relief
         self.look, self.cells, self.orientation, self.palette = look, cells, orientation, palette
         self.operator = operator or perception(cells.mesh, look.rule.degree, orientation, mean=look.mean)
 
     @property
     def key(self) -> str:
         place = self.cells.mesh.vertices, self.cells.mesh.faces, np.asarray(self.orientation)
-        return content_key(weights_key(self.look), *place, *self.motion.arrays)
+        palette = () if self.palette is None else (self.palette.colours, self.palette.radius)
+        shown = weights_key(self.look), self.relief
+        return content_key(shown, *palette, *place, *self.motion.arrays)
 
     def seed(self) -> torch.Tensor:
         return self.look.rule.seed(self.operator)[0]
@@ -105,14 +123,7 @@ class LookGrowth(Growth):
 
     def shown(self, state: torch.Tensor) -> Grown:
         parts = (self.look, state, self.cells, self.orientation, self.palette, self._surface)
-        return Embossed(self.relief, self.moved, *parts) if self.relief else Grown(*parts)
-
-    def displaced(self) -> Self:
-        if not self.relief:
-            return super().displaced()
-        growth = copy(self)
-        growth.moved = True
-        return growth
+        return Embossed(self._displacement, self.moved, *parts) if self.relief else Grown(*parts)
 
     def foreign(self, state: torch.Tensor) -> np.ndarray:
         if self.palette is None:

@@ -14,7 +14,9 @@ from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.displacement import Displacement, known_relief
 from mitex.methods.nca.embossed import Embossed
+from mitex.methods.nca.film import PreviewCamera, Shooting
 from mitex.methods.nca.growth import LookGrowth
+from mitex.render.preview import PreviewRenderer
 from tests.methods.nca.tiny import texture
 
 EDGE = 0.1
@@ -111,6 +113,22 @@ def test_a_relief_is_a_normal_map(plate):
     normal = shown.textures(atlas)["normal"]
     tilt = 2 * normal[atlas.inside][:, 2] - 1
     assert np.allclose(tilt, 1 / np.hypot(1, steep), atol=5e-3)
+
+
+def test_a_film_shows_the_relief(plate):
+    """By the normals, in the light of the preview; not at all where the relief is of height 0."""
+    shooting = Shooting(resolution=32, azimuth=50.0)
+    camera, look = PreviewCamera(plate, shooting), texture(("albedo", "height"), shape=None).look
+    renderer = PreviewRenderer(plate, resolution=32, azimuth=50.0, elevation=shooting.elevation)
+    pictures = []
+    for relief in (0.0, 20.0, 50.0):
+        growth = LookGrowth(look, Cells(plate, 0, plate), relief=relief)
+        pictures.append(camera.picture(growth.shown(_ramp_state(plate, 0.2))))
+        steep = Displacement(plate, relief).bound * 0.4
+        normals = np.tile(unit(np.array([[-steep, 0, 1]])), (len(renderer.face), 1)).astype(np.float32)
+        expected = renderer.render(np.full((len(normals), 3), 0.5, np.float32), normals, 1.0)
+        assert np.allclose(pictures[-1], expected, atol=1e-3)
+    assert np.abs(pictures[0] - pictures[1]).max() > 0.03 < np.abs(pictures[1] - pictures[2]).max()
 
 
 def test_a_moved_mesh_has_the_relief_in_its_shape(plate):

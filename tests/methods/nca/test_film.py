@@ -9,10 +9,14 @@ import pytest
 import torch
 
 from mitex.errors import ConfigError
+from mitex.geometry.triangles import interpolate
+from mitex.geometry.vectors import unit
 from mitex.mesh import icosphere
 from mitex.methods.nca import Graft, NcaTexture, film
 from mitex.methods.nca.cells import Cells
+from mitex.methods.nca.growth import grown_state
 from mitex.methods.nca.weights import graft_weights
+from mitex.render.preview import PreviewRenderer
 from tests.methods.nca import tiny
 
 SPHERE, MAPS = icosphere(6), ("albedo", "ambient_occlusion", "normal")
@@ -55,6 +59,44 @@ def test_frames_are_states_some_steps_apart(texture, plain, tmp_path):
 )
 def test_no_option_is_ignored(texture, plain, tmp_path, options):
     assert np.abs(shoot(texture, tmp_path / "other", **options) - plain).max() > 3
+
+
+def test_the_scale_is_not_ignored(texture, plain, tmp_path):
+    pytest.importorskip("pymeshlab")
+    assert np.abs(shoot(texture, tmp_path / "other", scale=0.8) - plain).max() > 3
+
+
+@pytest.mark.parametrize("fps", [4, 10])
+def test_frames_last_as_long_as_asked_for(texture, tmp_path, fps):
+    path = texture.animate(SPHERE, tmp_path / "a.gif", **{**SHORT, "fps": fps, "resolution": 16})
+    assert iio.immeta(path)["duration"] == 1000 / fps and len(iio.imread(path)) == fps
+
+
+def test_the_path_tracer_takes_as_many_samples_as_asked_for(texture, tmp_path, monkeypatch):
+    samples = []
+
+    def render(renderer, azimuth, view, spp):
+        samples.append(spp)
+        return np.zeros((24, 24, 3), np.float32)
+
+    monkeypatch.setattr(film.OrbitRenderer, "render", render)
+    shoot(texture, tmp_path / "film", seconds=0.5, renderer="path", spp=7)
+    assert samples == [7, 7]
+
+
+def test_the_preview_shows_normals_and_ambient_occlusion(texture):
+    shooting, growth = film.Shooting(resolution=24), texture.growth(Cells(SPHERE, 0, SPHERE))
+    shown = growth.shown(grown_state(growth, 0, 12))
+    view = {"resolution": 24, "azimuth": shooting.azimuth, "elevation": shooting.elevation}
+    renderer = PreviewRenderer(SPHERE, **view)
+    points = renderer.face, renderer.barycentric
+    maps = shown.maps(shown.values(*points))
+    normals, occlusion = unit(shown.object_normals(maps["normal"], *points)), maps["ambient_occlusion"]
+    own = unit(interpolate(renderer.barycentric, SPHERE.shading_normals[renderer.face]))
+    picture = film.PreviewCamera(SPHERE, shooting).picture(shown)
+    assert np.allclose(picture, renderer.render(maps["albedo"], normals, occlusion), atol=1e-5)
+    for others in ((own, occlusion), (normals, 1.0)):
+        assert np.abs(picture - renderer.render(maps["albedo"], *others)).max() > 0.02
 
 
 def test_a_damaged_region_is_set_back_at_its_time_and_grows_again(texture):

@@ -56,6 +56,44 @@ def test_at_either_end_it_is_the_single_texture_bit_for_bit(pair, weight):
         assert maps.keys() == others.keys() and all(np.array_equal(maps[k], others[k]) for k in maps)
 
 
+def words(seed, relief):
+    """A texture from words, by what its file tells."""
+    texture = relative(seed, maps=("albedo", "height"))
+    return NcaTexture(texture.look, {**texture.about, "relief": relief})
+
+
+@pytest.mark.parametrize("weight", [0, 1])
+@pytest.mark.parametrize("more", [{}, {"resolution": None, "displace": True}], ids=str)
+@pytest.mark.filterwarnings("ignore::mitex.errors.TextureWarning")
+def test_a_relief_is_at_either_end_that_of_the_single_texture(weight, more):
+    """As normals, and as a displacement."""
+    pair = words(0, 2.5), words(1, 20.0)
+    single, grafted = (one.apply(SPHERE, **OPTIONS | more) for one in (pair[weight], graft(pair, weight)))
+    assert single.maps.keys() == grafted.maps.keys() == {"albedo", "height", "normal"}
+    assert all(np.array_equal(values, grafted.maps[name]) for name, values in single.maps.items())
+    assert np.array_equal(single.mesh.vertices, grafted.mesh.vertices)
+    assert np.array_equal(single.mesh.vertices, SPHERE.vertices) == (not more)
+
+
+def test_in_between_reliefs_are_mixed():
+    """Of one height everywhere, the bounds of the offsets are left."""
+    pair = words(0, 1.0), words(1, 3.0)
+    growth = graft(pair, "x").growth_on(CELLS, SPHERE).displaced()
+    shown = growth.shown(growth.seed())
+    shown._decoded = lambda points: np.ones((len(points.face), 4), np.float32)
+    offsets = np.linalg.norm(shown.asset().mesh.vertices - SPHERE.vertices, axis=1)
+    edges = SPHERE.edges
+    points = SPHERE.vertices.astype(np.float64)
+    edge = np.linalg.norm(points[edges.indices] - points[edges.rows], axis=1).mean()
+    share = graft_weights(SPHERE, "x")(points)
+    assert np.allclose(offsets, edge * (1 + 2 * share), rtol=1e-4) and np.ptp(share) > 0.9
+
+
+def test_a_graft_without_reliefs_displaces_nothing(pair):
+    with pytest.raises(ConfigError, match="no relief that could displace"):
+        graft(pair, 0).apply(SPHERE, displace=True, **OPTIONS)
+
+
 TRAINED = {"motion": "right", "motion_advection": True, "motion_period": 4.0, "motion_speed": 1.2}
 MOVING = {
     "one that is still": {},

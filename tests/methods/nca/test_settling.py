@@ -5,9 +5,11 @@ import pytest
 import torch
 
 from mitex.exemplar import Exemplar
-from mitex.mesh import icosphere
+from mitex.mesh import Lattice, icosphere
 from mitex.methods.nca import NcaTexture, settling
+from mitex.methods.nca.motion.cell_motion import tile_motion
 from mitex.methods.nca.perception import perception
+from mitex.methods.nca.ranges import square_cells
 from mitex.methods.nca.settling import settling_steps
 from tests.methods.nca.tiny import texture
 
@@ -57,6 +59,19 @@ def test_a_moving_pattern_is_looked_at_while_it_moves(exemplar, monkeypatch):
     )
     assert settling_steps(look, exemplar, 8) == 1
     assert (conditions[0] == torch.tensor([1.0, 0.0, 0.0])).all() and conditions[0].shape[1] == 3
+
+
+def test_a_carried_pattern_is_looked_at_while_it_is_carried(exemplar, monkeypatch):
+    """As far as in its own tile."""
+    monkeypatch.setattr(settling, "STEPS", (1,))
+    look, about = texture().look, {"motion": "up", "motion_advection": True, "motion_period": 4.0}
+    evolve, given = look.evolve, []
+    monkeypatch.setattr(look, "evolve", lambda *arguments: given.append(arguments[4:]) or evolve(*arguments))
+    assert settling_steps(look, exemplar, 8, about) == 1
+    ((condition, advection),) = given
+    expected = tile_motion(look, about, Lattice.of(square_cells(8)), None, 1.0).advection
+    assert condition is None and advection is not None and expected is not None
+    assert torch.equal(advection.upstream.barycentric, expected.upstream.barycentric)
 
 
 def test_noise_never_is_as_regular_as_stripes(exemplar, monkeypatch):

@@ -15,7 +15,7 @@ from mitex.methods.nca.decoder.surface import Points, Surface
 
 
 class Advection:
-    """One step of it on a fixed surface; linear, and stable whatever the way.
+    """One step of it on a fixed surface; linear, and stable whatever the displacement.
 
     Args:
         surface: between whose vertices states are interpolated.
@@ -36,16 +36,16 @@ class Advection:
         return self._weights(self._surface.table(spread))
 
 
-def advection(mesh: Mesh, way: np.ndarray) -> Advection:
+def advection(mesh: Mesh, displacement: np.ndarray) -> Advection:
     """Of the vertices of a mesh, each by a tangent vector (V, 3) in its units."""
-    where = surface_points(mesh, mesh.vertices.astype(np.float64) - way)
+    where = surface_points(mesh, mesh.vertices.astype(np.float64) - displacement)
     return Advection(Surface(mesh), as_points(*where))
 
 
-def flat_advection(lattice: Lattice, way: np.ndarray) -> Advection:
+def flat_advection(lattice: Lattice, displacement: np.ndarray) -> Advection:
     """Of the cells in a lattice's square, each by a vector (V, 2) [edges along the rows]."""
     places = lattice.mesh.vertices[: lattice.count, :2].astype(np.float64)
-    where = lattice.locate((places - way) / lattice.columns)
+    where = lattice.locate((places - displacement) / lattice.columns)
     return Advection(Surface(lattice.mesh), as_points(*where), lattice.source)
 
 

@@ -55,17 +55,25 @@ def look_motion(
     speed: float,
     orientation: float | np.ndarray = 0.0,
 ) -> CellMotion:
-    """How a look's cells move on a mesh; arguments as of `cell_vectors`, errors as of
-    `followed_field`.
+    """How a look's cells move on a mesh; other arguments as of `cell_vectors`.
+
+    Args:
+        look: the cell rule.
+        about: what its file tells of how it moves.
+        orientation: of the texture [rad], one or (V,) at the cells.
+
+    Raises:
+        ConfigError: as of `followed_field` and `vector_field`.
+        MeshError: as of `vector_field`.
     """
     field = followed_field(look, about, field, speed, about.get("motion"))
     if field is None:
         return STILL
     vectors = cell_vectors(given, cells, field, speed, longest=fastest(about)).astype(np.float64)
-    way = cells.edge_lengths[:, None] * vectors / period(about)
+    displacement = cells.edge_lengths[:, None] * vectors / period(about)
     return CellMotion(
         torch.from_numpy(told(vectors, cells, orientation)) if look.rule.condition else None,
-        advection(cells, way) if carried(look, about) else None,
+        advection(cells, displacement) if carried(look, about) else None,
     )
 
 
@@ -73,7 +81,10 @@ def tile_motion(
     look: Look, about: Mapping[str, Any], lattice: Lattice, field: Field | None, speed: float
 ) -> CellMotion:
     """How a look's cells move in a lattice's square, to the right if it has learned to move and no field is
-    given; errors as of `flat_vectors`.
+    given.
+
+    Raises:
+        ConfigError: as of `followed_field` and `flat_vectors`.
     """
     default = "right" if look.rule.condition or "motion" in about else None
     field = followed_field(look, about, field, speed, default)

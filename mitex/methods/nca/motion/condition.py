@@ -13,6 +13,7 @@ from mitex.errors import ConfigError, TextureWarning
 from mitex.geometry.vectors import rotate_about
 from mitex.mesh import Lattice, Mesh
 from mitex.mesh.fields import carried_field, vector_field
+from mitex.mesh.fields.files import SUFFIXES
 
 WIDTH = 3  # of a vector, which is a cell's condition
 FEW = 0.1  # of the vectors, which may be too fast
@@ -88,12 +89,17 @@ def flat_vectors(lattice: Lattice, field: Field, speed: float, longest: float = 
     """(V, 3) float32 vectors of the cells in a lattice's square, all the same.
 
     Raises:
-        ConfigError: a field that differs from place to place; or as of `vector_field`.
+        ConfigError: a field that differs from place to place, or that of one mesh; or as of `vector_field`.
     """
+    if isinstance(field, str | Path) and Path(field).suffix.lower() in SUFFIXES:
+        raise ConfigError(
+            f"the vector field '{field}' is that of a mesh",
+            "a tile takes one direction, such as right or 1,1,0",
+        )
     vectors = speed * vector_field(lattice.mesh, field)[: lattice.count]
     if np.ptp(vectors, axis=0).max() > 1e-4 * speed:
         raise ConfigError(
             f"the vector field '{field}' is not the same everywhere, so that a tile would have a seam",
-            "give a direction such as right or 1,1,0",
+            "a tile takes one direction, such as right or 1,1,0",
         )
     return slowed(vectors, longest)

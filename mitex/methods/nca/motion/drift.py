@@ -32,11 +32,13 @@ class Drift:
 
     @property
     def condition(self) -> torch.Tensor:
-        """What the cells know of it, (V, 3) (equation 10)."""
+        """What the cells know of it, (V, 3) float32 [edges a period] (equation 10)."""
         return torch.from_numpy(self.field.astype(np.float32))
 
     def advection(self, share: float) -> Advection:
-        """What a share of the period makes of states: each cell gets that of the place upstream."""
+        """What a share of the period makes of states: each cell gets that of the place upstream, as many
+        edges away as the field is long there, times the share.
+        """
         surface = self.surface
         source = surface.lattice.source if isinstance(surface, TrainingPlane) else None
         return Advection(surface.surface, self._upstream(self._cells, self.field, share), source)

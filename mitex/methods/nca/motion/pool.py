@@ -18,9 +18,9 @@ from mitex.methods.nca.motion.drift import Drift, draw_drift
 from mitex.methods.nca.motion.views import MotionViews
 from mitex.methods.nca.pool import PoolTask, Rollout
 
-MOST_WAYS = 2**31
+DRIFT_SEEDS = 2**31
 POINTS = 8192  # at which the decoder's values are compared
-FLOOR = 0.1  # of residuals: as much as a way of a third of a cell, in usual patterns
+FLOOR = 0.1  # of residuals: as much as a displacement of a third of a cell, in usual patterns
 
 
 class MovingPool(PoolTask):
@@ -35,9 +35,9 @@ class MovingPool(PoolTask):
 
     def __init__(self, config: NcaConfig, *arguments: Any) -> None:
         super().__init__(config, *arguments)
-        # A state moves in one way until the seed replaces it, so that the rule learns what becomes of its
-        # pattern where the field goes on coming together, or apart. These are the random seeds of the ways.
-        self.ways = torch.zeros(config.pool, dtype=torch.int64)
+        # A state has one drift until the seed replaces it, so that the rule learns what becomes of its
+        # pattern where the field goes on coming together, or apart. These are the drifts' random seeds.
+        self.drift_seeds = torch.zeros(config.pool, dtype=torch.int64)
         name = config.motion_estimator
         self.estimator = None if name == "advection" else load_estimator(name, self.look.device)
 
@@ -48,10 +48,10 @@ class MovingPool(PoolTask):
     def rollout(
         self, index: int, state: torch.Tensor, step: int, steps: int, generator: torch.Generator
     ) -> Rollout:
-        config, way, seed = self.config, self.ways[index], not state.any()
+        config, drift_seed, seed = self.config, self.drift_seeds[index], not state.any()
         if seed:
-            way = torch.randint(MOST_WAYS, (), generator=generator)
-        drift = self.drift(index, way)
+            drift_seed = torch.randint(DRIFT_SEEDS, (), generator=generator)
+        drift = self.drift(index, drift_seed)
         apart, views = min(config.motion_steps, steps), None
         if self.estimator:
             views = self.motion_views(drift, generator)
@@ -68,16 +68,16 @@ class MovingPool(PoolTask):
             else:
                 loss = self.state_residual(sequence, drift, apart, generator)
             terms = {"motion": config.motion_weight * loss}
-        return Rollout(states[-1], terms, partial(self._keep, index, way))
+        return Rollout(states[-1], terms, partial(self._keep, index, drift_seed))
 
     def evolved(
         self, index: int, state: torch.Tensor, steps: int, generator: torch.Generator
     ) -> torch.Tensor:
-        return self._growth(self.drift(index, self.ways[index]), generator)(state, steps)
+        return self._growth(self.drift(index, self.drift_seeds[index]), generator)(state, steps)
 
-    def drift(self, index: int, way: torch.Tensor) -> Drift:
-        """How the pool's state `index` moves, given the random seed of its way."""
-        return draw_drift(self.config, self.surface(index), torch.Generator().manual_seed(int(way)))
+    def drift(self, index: int, drift_seed: torch.Tensor) -> Drift:
+        """How the pool's state `index` moves, given its drift's random seed."""
+        return draw_drift(self.config, self.surface(index), torch.Generator().manual_seed(int(drift_seed)))
 
     def _growth(
         self, drift: Drift, generator: torch.Generator
@@ -88,15 +88,16 @@ class MovingPool(PoolTask):
         advection = drift.advection(1 / self.config.motion_period) if self.config.motion_advection else None
         return lambda state, steps: rule.evolve(state, operator, steps, generator, condition, advection)
 
-    def _keep(self, index: int, way: torch.Tensor) -> None:
-        self.ways[index] = way
+    def _keep(self, index: int, drift_seed: torch.Tensor) -> None:
+        self.drift_seeds[index] = drift_seed
 
     def state(self) -> dict[str, torch.Tensor]:
-        return super().state() | {"pool.ways": self.ways}
+        # The name is that of earlier checkpoints, which can be resumed so.
+        return super().state() | {"pool.ways": self.drift_seeds}
 
     def load_state(self, state: dict[str, torch.Tensor]) -> None:
         super().load_state(state)
-        self.ways = state["pool.ways"]
+        self.drift_seeds = state["pool.ways"]
 
     def state_residual(
         self, states: Sequence[torch.Tensor], drift: Drift, apart: int, generator: torch.Generator

@@ -5,10 +5,11 @@ import pytest
 import torch
 from scipy.spatial.transform import Rotation
 
-from mitex.mesh import icosphere, scattered_sphere
+from mitex.mesh import Lattice, icosphere, scattered_sphere
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.motion.advection import advection
+from mitex.methods.nca.motion.cell_motion import tile_motion
 from tests.methods.nca import tiny
 
 
@@ -64,3 +65,20 @@ def test_a_field_carries_a_texture_that_was_not_trained_to_move(speed, period):
     angle = 12 / period * speed * float(mesh.edge_lengths.mean()) / np.linalg.norm(field, axis=1).mean()
     error = (after[:, :3] - _pattern(mesh.vertices, angle)).square().mean()
     assert error < 0.01 * (after[:, :3] - state[:, :3]).square().mean()
+
+
+@pytest.mark.parametrize(("speed", "period"), [(1.0, 6.0), (1.5, 6.0), (1.5, 12.0), (1.5, 4.0)])
+def test_a_tile_is_carried_in_its_own_period(speed, period):
+    lattice, look = Lattice.of(16), tiny.texture(shape=None).look
+    about = {"name": "tiny"} if period == 6.0 else {"name": "tiny", "motion_period": period}
+    motion = tile_motion(look, about, lattice, "right", speed)
+    assert motion.condition is None and motion.advection is not None
+    places = torch.from_numpy(lattice.mesh.vertices[: lattice.count, :1].astype(np.float64))
+
+    def waves(way):
+        return (2 * torch.pi * (places - way) / lattice.columns).sin().float()
+
+    state = waves(0.0)
+    for _ in range(12):
+        state = motion.advection(state)
+    assert torch.allclose(state, waves(12 * speed / period), atol=0.02)

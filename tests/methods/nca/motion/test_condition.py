@@ -2,6 +2,7 @@
 
 import math
 import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -132,6 +133,11 @@ def test_a_tile_needs_one_direction(moving):
         flat_vectors(lattice, lattice.mesh.vertices, 1.0)
     with pytest.raises(ConfigError, match="normal"):
         moving.tile(32, field="0,0,1")
+    for source in ("wind.npy", Path("wind.PLY"), "strokes.json"):
+        with pytest.raises(
+            ConfigError, match="of a mesh; a tile takes one direction, such as right or 1,1,0"
+        ):
+            moving.tile(32, field=source)
 
 
 def test_a_moving_texture_without_a_field_says_what_it_needs(moving, sphere):

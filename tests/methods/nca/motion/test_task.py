@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from mitex.exemplar import Exemplar
+from mitex.losses.motion import motion_loss
 from mitex.methods.nca import task as still_training
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.motion import pool as training
@@ -139,6 +140,75 @@ def test_estimators_of_pictures_see_the_last_states(exemplar, monkeypatch):
         assert gradient is not None and gradient[:, -3:].any()
 
 
+def test_the_loss_of_pictures_compares_what_it_should(exemplar, monkeypatch):
+    """The last two states, no farther apart than estimators see, where the sphere is, in the settings' units;
+    of views that show its rim, too.
+    """
+    pictures, states, views, compared = [], [], [], []
+
+    def estimator(first, second):
+        pictures.extend((first, second))
+        return (second - first).expand(-1, 2, -1, -1)
+
+    def loss(flow, target, mask=None, **options):
+        compared.append((flow, target, mask, options))
+        return motion_loss(flow, target, mask, **options)
+
+    monkeypatch.setattr(training, "load_estimator", lambda name, device: estimator)
+    monkeypatch.setattr(training, "motion_loss", loss)
+    settings = (*MOVING, "surfaces=even", "views=full", "motion_steps=50", "min_steps=50", "max_steps=50")
+    settings += ("motion_estimator=lucas-kanade", "motion_period=40", "motion_gamma=0.7", "motion_speeds=2,2")
+    task = _grown(MotionTask(config(*settings, "motion_weight=3", "resolution=96"), exemplar))
+    evolve, motion_views = task.look.rule.evolve, task.motion_views
+
+    def evolved(state, operator, steps, *arguments):
+        states.append((steps, evolve(state, operator, steps, *arguments)))
+        return states[-1][1]
+
+    def seen(*arguments):
+        views.append(motion_views(*arguments))
+        return views[-1]
+
+    monkeypatch.setattr(task.look.rule, "evolve", evolved)
+    monkeypatch.setattr(task, "motion_views", seen)
+    metrics = _metrics(task)
+    ((flow, target, mask, options),), (view,) = compared, views
+    ways = view.target.norm(dim=1)
+    apart = int(4 * 40 / float(ways[view.mask].max()))
+    assert 2 <= apart <= 25 and [steps for steps, _ in states] == [50 % apart] + 50 // apart * [apart]
+    for picture, (_, state) in zip(pictures, states[-2:], strict=True):
+        assert torch.equal(picture, view.grey(state[0]))
+    assert torch.equal(flow, (pictures[1] - pictures[0]).expand(-1, 2, -1, -1))
+    assert torch.equal(target, view.target) and mask is not None and torch.equal(mask, view.mask)
+    assert 0 < mask.float().mean() < 1 and pictures[1].requires_grad
+    assert options == {"steps": apart, "period": 40.0, "gamma": 0.7}
+    expected = motion_loss(flow, target, mask, steps=apart, period=40.0, gamma=0.7).total
+    assert metrics["motion"] == pytest.approx(3 * expected.item(), rel=1e-5)
+
+
+@pytest.mark.parametrize("surface", ["even", "flat"])
+def test_motion_is_measured_in_the_widest_of_the_views(exemplar, monkeypatch, surface):
+    """In which it is the fewest pixels."""
+    words = (*MOVING, f"surfaces={surface}", "motion_estimator=lucas-kanade", "zooms=2", "exemplar_size=256")
+    task, sizes = MotionTask(config(*words, "density=4"), exemplar), []
+    closeups = task.closeups
+    monkeypatch.setattr(task, "closeups", lambda size, *least: sizes.append(size) or closeups(size, *least))
+    task.motion_views(task.drift(0, task.drift_seeds[0]), torch.Generator().manual_seed(0))
+    assert sizes == [128] and list(task.zooms) == [128, 256]
+
+
+def test_a_floor_keeps_the_residual_of_what_stands_still_small(exemplar, monkeypatch):
+    """A tenth of the variance of the states."""
+    task = MotionTask(config(*MOVING, "surfaces=even"), exemplar)
+    sphere, generator = task.surface(0), torch.Generator().manual_seed(1)
+    before, after = torch.randn(2, sphere.perception.vertices, 16, generator=generator)
+    monkeypatch.setattr(task, "_decoded_residual", lambda *_: torch.zeros(()))
+    drift = training.Drift(sphere, np.zeros((len(before), 3)))
+    residual = task.state_residual([before, after], drift, 2, generator)
+    expected = (after - before).square().sum() / (0.1 * (before - before.mean(0)).square().sum())
+    assert float(residual) == pytest.approx(float(expected), rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("surface", "density", "resolution"), [("even", 512, 48), ("flat", 32, 96)], ids=["even", "flat"]
 )
@@ -184,16 +254,16 @@ def test_previews_are_of_moving_states(exemplar, monkeypatch, encoding):
 def test_a_state_keeps_its_way_until_the_seed_replaces_it(exemplar):
     """Of direction and speed; `commit` alone writes it down, and checkpoints have it."""
     task = MotionTask(config(*MOVING, "pool=1", "inject_every=4"), exemplar)
-    ways, fields = [], []
+    seeds, fields = [], []
     for step in range(1, 9):
-        before = task.ways.clone()
+        before = task.drift_seeds.clone()
         result = task.loss(step, torch.Generator().manual_seed(step))
-        assert torch.equal(task.ways, before)
+        assert torch.equal(task.drift_seeds, before)
         result.commit()
-        ways.append(int(task.ways[0]))
-        fields.append(task.drift(0, task.ways[0]).field)
-    assert len(set(ways[:3])) == len(set(ways[3:7])) == 1 and len(set(ways)) == 3
+        seeds.append(int(task.drift_seeds[0]))
+        fields.append(task.drift(0, task.drift_seeds[0]).field)
+    assert len(set(seeds[:3])) == len(set(seeds[3:7])) == 1 and len(set(seeds)) == 3
     assert np.array_equal(fields[0], fields[2]) and np.abs(fields[2] - fields[3]).max() > 0.1
     other = MotionTask(config(*MOVING, "pool=1"), exemplar)
     other.load_state(copies(task.state()))
-    assert torch.equal(other.ways, task.ways)
+    assert torch.equal(other.drift_seeds, task.drift_seeds)

@@ -3,12 +3,15 @@
 import json
 import math
 
+import numpy as np
 import pytest
 import torch
 
 from mitex.mesh import icosphere
+from mitex.mesh.fields import vector_field
 from mitex.methods import nca
 from mitex.methods.nca import NcaTexture
+from mitex.methods.nca.surfaces import TrainingSphere
 from mitex.methods.nca.text.moving import MovingTextTask
 from mitex.runtime import threads
 from tests.features.clip.folders import write_folder
@@ -61,3 +64,26 @@ def test_a_texture_from_words_learns_to_move(tmp_path):
     assert (here - there).abs().max() > 1e-6
     metrics = [json.loads(line) for line in (out / "metrics.jsonl").read_text().splitlines()]
     assert any(line.get("motion", 0) > 0 for line in metrics) and "whole" in metrics[-1]
+
+
+def test_it_learns_to_move_on_a_mesh_of_ones_own(tmp_path):
+    """Its field is that of the mesh, along which states are carried."""
+    threads(1)
+    clip, egg = write_folder(tmp_path / "clip"), icosphere(29)
+    egg = egg.with_vertices(egg.vertices * np.array([0.7, 1.2, 0.9], np.float32))
+    speeds = "motion_speeds=1.5,1.5"
+    one = MovingTextTask(config(*MOVING, speeds, "motion_turns=false"), MeanColour(), None, None, egg)
+    (surface,) = one.surfaces
+    assert isinstance(surface, TrainingSphere) and np.ptp(surface.mesh.vertices[:, 0]) < 1.3
+    assert np.allclose(
+        one.drift(0, one.drift_seeds[0]).field, 1.5 * vector_field(surface.mesh, "right"), atol=1e-5
+    )
+    grown(one)
+    assert loss(one).metrics["motion"] > 1e-6
+    settings = [*SETTINGS, "motion_steps=2", "preset=text", "steps=2", "density=9"]
+    out = tmp_path / "run"
+    learned = nca.fit_text("red dots", out, clip=clip, mesh=egg, motion="up", set=settings)
+    assert (learned.about["motion"], learned.about["motion_advection"]) == ("up", True)
+    sphere = icosphere(4)
+    here, there = (learned.grow(sphere, steps=6, field=field) for field in ("about-y", "up"))
+    assert (here - there).abs().max() > 1e-6 and torch.equal(there, learned.grow(sphere, steps=6))
