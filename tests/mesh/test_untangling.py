@@ -35,7 +35,7 @@ def test_what_pierces_is_drawn_back_and_nothing_else(caplog):
         result = untangled(before, after)
     first = len(piercing_pairs(after))
     assert first > 10 and len(piercing_pairs(result)) == 0
-    assert f": 0, before {first}, on the mesh itself 0" in caplog.text
+    assert f": 0, before {first}, without the relief 0" in caplog.text
     right = before.vertices[:, 0] > 0.2
     assert np.array_equal(result.vertices[right], after.vertices[right])
     down = result.vertices[:, 2].min(initial=0, where=before.vertices[:, 2] > -1e-6)
