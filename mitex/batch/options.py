@@ -13,7 +13,7 @@ from typing import Any, Union
 from mitex.batch.inputs import Input
 from mitex.errors import ConfigError, WeightsError
 from mitex.methods.method import Method
-from mitex.methods.options import field_files
+from mitex.suffixes import names_field_file
 from mitex.suggestions import suggestion
 from mitex.training import values
 from mitex.training.config import resolve
@@ -141,7 +141,7 @@ def _may_name_file(name: str, text: str, kind: Any) -> bool:
     choices = [choice for one in (kind, *typing.get_args(kind)) for choice in typing.get_args(one)]
     if name in NAMES or text == WORDS.get(name) or text in choices:
         return False
-    return name not in VECTOR_FIELDS or bool(field_files(text))
+    return name not in VECTOR_FIELDS or names_field_file(text)
 
 
 def _text(value: Any) -> str:

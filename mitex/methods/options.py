@@ -11,7 +11,7 @@ from tyro.conf import Positional, UseAppendAction, arg
 
 from mitex.methods.checks import in_range, merged_settings, reject_unused
 from mitex.ranges import DISPLACEMENTS, SEEDS
-from mitex.suffixes import ASSETS, FIELDS, PICTURES
+from mitex.suffixes import ASSETS, PICTURES, names_field_file
 from mitex.training.settings import RunSettings
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ PICTURE_RESOLUTION = 512  # of a radiance field [pixels]
 
 def field_files(*fields: str | None) -> list[str]:
     """The files that options for vector fields name, if they do."""
-    return [field for field in fields if field and Path(field).suffix.lower() in FIELDS]
+    return [field for field in fields if field and names_field_file(field)]
 
 
 @dataclass(kw_only=True)

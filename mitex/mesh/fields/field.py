@@ -11,6 +11,7 @@ from mitex.geometry.vectors import across, unit
 from mitex.mesh.fields.files import SUFFIXES, checked_vectors, read_vectors
 from mitex.mesh.fields.named import NAMES, named_vectors
 from mitex.mesh.mesh import Mesh
+from mitex.suffixes import names_field_file
 from mitex.suggestions import suggestion
 
 FAINT = 1e-5  # parts of a vector along the surface that are shorter, relative to it, are rounding errors
@@ -59,7 +60,7 @@ def _vectors(mesh: Mesh, source: str | Path | np.ndarray) -> np.ndarray:
     name = str(source)
     if name in NAMES:
         return named_vectors(mesh, name)
-    if Path(source).suffix.lower() in SUFFIXES:
+    if names_field_file(source):
         return read_vectors(mesh, source)
     if "," in name:
         return np.tile(_direction(name), (len(mesh.vertices), 1))

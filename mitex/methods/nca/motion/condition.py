@@ -13,7 +13,7 @@ from mitex.errors import ConfigError, TextureWarning
 from mitex.geometry.vectors import rotate_about
 from mitex.mesh import Lattice, Mesh
 from mitex.mesh.fields import carried_field, vector_field
-from mitex.mesh.fields.files import SUFFIXES
+from mitex.suffixes import names_field_file
 
 WIDTH = 3  # of a vector, which is a cell's condition
 FEW = 0.1  # of the vectors, which may be too fast
@@ -91,7 +91,7 @@ def flat_vectors(lattice: Lattice, field: Field, speed: float, longest: float = 
     Raises:
         ConfigError: a field that differs from place to place, or that of one mesh; or as of `vector_field`.
     """
-    if isinstance(field, str | Path) and Path(field).suffix.lower() in SUFFIXES:
+    if names_field_file(field):
         raise ConfigError(
             f"the vector field '{field}' is that of a mesh",
             "a tile takes one direction, such as right or 1,1,0",

@@ -13,11 +13,11 @@ import torch
 from mitex.errors import ConfigError
 from mitex.mesh import icosphere
 from mitex.mesh.fields import vector_field
-from mitex.mesh.fields.files import SUFFIXES
 from mitex.methods.nca.config import PRESETS, NcaConfig
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.model import MeshNCA
 from mitex.methods.nca.motion.condition import WIDTH
+from mitex.suffixes import names_field_file
 from mitex.training.config import by_key
 from mitex.training.settings import RunOptions
 
@@ -55,7 +55,7 @@ def check_field(field: str) -> None:
     Raises:
         ConfigError: it is unknown, or of one mesh alone.
     """
-    if field.lower().endswith(SUFFIXES):
+    if names_field_file(field):
         raise ConfigError(
             f"'{field}' is the field of one mesh, and the training has spheres of its own",
             "train with a name or a direction, and give the file as `field` when it is applied",
