@@ -70,7 +70,7 @@ class Fit(DeviceOptions, ExemplarOrWordsOptions):
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()
-        print(self.fitted(options))
+        print(self.fit(options))
 
     def check_source(self) -> None:
         super().check_source()
@@ -190,9 +190,9 @@ class Apply(BakedOptions, ReliefOptions):
     def inputs(self) -> list[Path | str]:
         return [*super().inputs(), *self._looks, *self.growth_files()]
 
-    def prepared(self) -> Path:
+    def output_path(self) -> Path:
         if self.tile is None:
-            return super().prepared()
+            return super().output_path()
         from mitex.export import check_folder
         from mitex.paths import expanded
 

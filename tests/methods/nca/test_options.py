@@ -14,9 +14,9 @@ from mitex.methods import nca
 from mitex.methods.nca import NcaConfig
 from mitex.methods.nca.motion import pool as motion_pool
 from mitex.methods.nca.motion import task as motion_task
-from mitex.methods.nca.motion.drift import Drift, draw_drift
+from mitex.methods.nca.motion.tangent_field import TangentField, random_field
 from mitex.methods.nca.motion.task import MotionTask
-from mitex.methods.nca.motion.views import sphere_views
+from mitex.methods.nca.motion.views import mesh_views
 from mitex.methods.nca.task import NcaTask
 from mitex.runtime import threads
 from tests.methods.nca.tiny import SETTINGS, config
@@ -386,18 +386,18 @@ def speed_of_motion(build):
         task = build(*settings, f"motion_steps={steps}", f"motion_period={period}")
         shares = []
         with patch.object(
-            Drift, "advection", lambda self, share, to=shares: to.append(share) or (lambda s: s + 1)
+            TangentField, "advection", lambda self, share, to=shares: to.append(share) or (lambda s: s + 1)
         ):
             _motion(task)
         assert shares == [expected]
 
 
 @check("motion_turns", "motion_speeds")
-def drifts(build):
+def directions_and_speeds(build):
     sphere = build().surfaces[0]
     for turns, speeds in (("false", "1,1"), ("true", "2,3")):
         settings = build("motion=up", f"motion_turns={turns}", f"motion_speeds={speeds}").config
-        field = draw_drift(settings, sphere, torch.Generator().manual_seed(0)).field
+        field = random_field(settings, sphere, torch.Generator().manual_seed(0)).vectors
         unturned = np.abs(field[:, [0, 2]].mean(axis=0)).max() < 0.01
         assert unturned == (turns == "false")
         low, high = map(float, speeds.split(","))
@@ -413,13 +413,13 @@ def motion_in_pictures(build):
         names.append(name)
         return lambda first, second: 0.1 * targets[-1] + (second - first)
 
-    def views(look, drift, cameras):
-        result = sphere_views(look, drift, cameras)
+    def views(look, field, cameras):
+        result = mesh_views(look, field, cameras)
         targets.append(result.target)
         return result
 
     loading = patch.object(motion_pool, "load_estimator", load)
-    with loading, patch.object(motion_task, "sphere_views", views):
+    with loading, patch.object(motion_task, "mesh_views", views):
         settings = (*MOVING, "motion_estimator=lucas-kanade")
         tasks = [build(*settings, f"motion_gamma={gamma}") for gamma in (0.5, 4, 7.5)]
         losses = [_motion(MotionTask(task.config, task.exemplar)) for task in tasks]

@@ -46,7 +46,7 @@ class Fit(ExemplarOrWordsOptions):
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()
-        print(self.fitted(options))
+        print(self.fit(options))
 
     def check_source(self) -> None:
         super().check_source()
