@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
 import torch
 
 from mitex.colour import LUMINANCE
-from mitex.geometry.triangles import interpolate
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.motion.tangent_field import TangentField
 from mitex.methods.nca.surfaces import TrainingMesh, TrainingPlane, Windows
 from mitex.scenes.cameras import Cameras
-from mitex.scenes.screen import screen_motion
+from mitex.scenes.screen import surface_motion
 
 STILL = 1e-6  # [px] in a period
 RIM = 4  # pixels along a silhouette, where an estimator's windows see the background, which stands still
@@ -45,21 +43,11 @@ def mesh_views(look: Look, field: TangentField, cameras: Cameras) -> MotionViews
     surface = field.surface
     assert isinstance(surface, TrainingMesh)
     hits = surface.stage.hits(cameras)
-    corners = surface.mesh.faces[hits.face.numpy()]
-    weights = hits.barycentric.numpy().astype(np.float64)
-    points, vectors = (
-        interpolate(weights, values[corners]) for values in (surface.mesh.vertices, field.vectors)
-    )
-    hit = hits.hit.numpy()
-    camera = np.flatnonzero(hit) // (cameras.width * cameras.height)
-    motion = np.zeros((len(hit), 2))
-    motion[hit] = screen_motion(cameras, camera, points, surface.edge * vectors)
-    size = cameras.shape
-    target = torch.from_numpy(motion.astype(np.float32)).view(*size, 2).permute(0, 3, 1, 2)
+    target = surface_motion(cameras, surface.mesh, hits, surface.edge * field.vectors)
     return MotionViews(
         lambda state: _grey(look, surface.views(look, state, cameras)),
-        target.to(look.device),
-        without_rim(hits.hit.view(size)).to(look.device),
+        torch.from_numpy(target).permute(0, 3, 1, 2).to(look.device),
+        without_rim(hits.hit.view(cameras.shape)).to(look.device),
     )
 
 
