@@ -130,6 +130,19 @@ class ExemplarOptions(TrainingOptions):
 
 
 @dataclass(kw_only=True)
+class MeshFitOptions(FitOptions):
+    """Options of the methods whose textures belong to the mesh that they are learned on."""
+
+    fits_to_mesh: ClassVar[bool] = True
+
+    mesh: Annotated[str, arg(metavar="MESH|NAME")]
+    """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
+
+    keep_uvs: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Use the mesh's own UVs, which must not overlap."""
+
+
+@dataclass(kw_only=True)
 class ApplyOptions:
     """Options of every `mitex apply RUN|MODEL`."""
 
