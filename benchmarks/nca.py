@@ -29,7 +29,7 @@ from mitex.methods.nca import PRESETS, NcaConfig, NcaTexture
 from mitex.methods.nca.decoder.decoder import OFFSET
 from mitex.methods.nca.decoder.surface import Points
 from mitex.methods.nca.model import FIRE_RATE
-from mitex.methods.nca.surfaces import TrainingSphere
+from mitex.methods.nca.surfaces import TrainingMesh
 from mitex.methods.nca.task import NcaTask
 from mitex.runtime.precision import bfloat16_flags
 from mitex.scenes.cameras import Cameras
@@ -69,7 +69,7 @@ class Bench:
         self.task = NcaTask(config, exemplar)
         ((self.size, self.appearance),) = self.task.zooms.items()
         self.config, self.rule, self.network = config, self.task.look.rule, self.appearance.network
-        self.sphere = TrainingSphere.of(icosphere(config.frequency), self.task.look)
+        self.sphere = TrainingMesh.of(icosphere(config.frequency), self.task.look)
         self.adam = Adam(self.task.parameters)
         generator = torch.Generator().manual_seed(0)
         self.task.pool.uniform_(-0.2, 0.2, generator=generator)  # as full of states as in a training

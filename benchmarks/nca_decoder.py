@@ -23,7 +23,7 @@ from mitex.atlas import Atlas, laid_out
 from mitex.exemplar import Exemplar
 from mitex.mesh import Mesh, embedded
 from mitex.methods.nca import PRESETS, NcaTexture
-from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.bake import GrownTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.decoder import OFFSET, Decoder
 from mitex.methods.nca.decoder.surface import Points, Surface
@@ -80,7 +80,7 @@ class Baking:
         self.texture, self.mesh = NcaTexture.load(MODEL), laid_out(embedded(MESH), 1024)
         self.cells = Cells.of(self.mesh)
         self.state = self.texture.grow(self.cells.mesh)
-        self.grown = Grown(self.texture.look, self.state, self.cells)
+        self.grown = GrownTexture(self.texture.look, self.state, self.cells)
 
     def atlas(self, resolution: int) -> Atlas:
         return Atlas.build(self.mesh, resolution, 8, self.mesh.uv)

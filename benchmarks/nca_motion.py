@@ -25,8 +25,8 @@ from mitex.methods.nca import PRESETS, NcaTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.growth import LookGrowth
 from mitex.methods.nca.motion.cell_motion import STILL, look_motion
-from mitex.methods.nca.motion.drift import Drift, draw_drift
 from mitex.methods.nca.motion.start import with_condition
+from mitex.methods.nca.motion.tangent_field import TangentField, random_field
 from mitex.methods.nca.motion.task import MotionTask
 from mitex.runtime import let_idle_threads_sleep
 
@@ -38,7 +38,7 @@ WAYS = ("still", "told", "carried")  # of a field
 
 
 class Motion:
-    """The parts of a step, each with the same drift and states.
+    """The parts of a step, each with the same field and states.
 
     Args:
         quick: at a small size.
@@ -51,7 +51,7 @@ class Motion:
         self.task = MotionTask(config, Exemplar.load(MODEL), with_condition(NcaTexture.load(MODEL).look))
         (self.surface,) = self.task.surfaces
         self.task.pool.copy_(0.2 * torch.randn(self.task.pool.shape, generator=self._generator()))
-        self.drift = self.draw()
+        self.field = self.draw()
         self.states = [state.requires_grad_() for state in self._states()]
         self.estimators = {n: None if n == "advection" else load_estimator(n) for n in ESTIMATORS}
 
@@ -63,8 +63,8 @@ class Motion:
         count = self.task.config.min_steps // self.task.config.motion_steps + 1
         return [self.task.grown(0)[0] + 0.01 * k for k in range(count)]
 
-    def draw(self) -> Drift:
-        return draw_drift(self.task.config, self.surface, self._generator())
+    def draw(self) -> TangentField:
+        return random_field(self.task.config, self.surface, self._generator())
 
     def rollout(self) -> None:
         result = self.task.evolved(0, self.task.grown(0), self.task.config.min_steps, self._generator())
@@ -74,9 +74,9 @@ class Motion:
         task, apart = self.task, self.task.config.motion_steps
         task.estimator = self.estimators[name]
         if task.estimator:
-            value = task.picture_loss(self.states, task.motion_views(self.drift, self._generator()), apart)
+            value = task.picture_loss(self.states, task.motion_views(self.field, self._generator()), apart)
         else:
-            value = task.state_residual(self.states, self.drift, apart, self._generator())
+            value = task.state_residual(self.states, self.field, apart, self._generator())
         torch.autograd.grad(value, self.states[-1])
 
     def step(self) -> None:

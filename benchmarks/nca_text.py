@@ -61,7 +61,7 @@ class Words:
     def __init__(self, config: NcaConfig, model: TextImageModel) -> None:
         self.config = replace(config, text="red dots on white", surfaces=("even",), text_bank=1)
         self.model, self.task = model, TextTask(self.config, model)
-        (self.sphere,) = self.task.spheres
+        (self.sphere,) = self.task.meshes
         self.state = 0.2 * torch.randn(self.task.pool.shape[1:], generator=torch.Generator().manual_seed(0))
         self.task.pool[:] = self.state
         self.task.banks[self.sphere].negative(0)

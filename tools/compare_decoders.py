@@ -25,9 +25,9 @@ from mitex.exemplar import Exemplar
 from mitex.images import write_image
 from mitex.mesh import Mesh, icosphere, scattered_sphere
 from mitex.methods.nca import NcaTexture, fit
-from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.bake import GrownTexture
 from mitex.methods.nca.cells import Cells
-from mitex.methods.nca.surfaces import TrainingSphere
+from mitex.methods.nca.surfaces import TrainingMesh
 from mitex.render import sheet
 from mitex.scenes.cameras import patch_views
 from mitex.training.locate import has_checkpoint
@@ -63,7 +63,7 @@ def main() -> None:
 def views(texture: NcaTexture) -> tuple[np.ndarray, np.ndarray]:
     """The albedo on a sphere: as wide as the exemplar, and an eighth of that."""
     mesh = icosphere(FREQUENCY)
-    sphere, state = TrainingSphere.of(mesh, texture.look), texture.grow(mesh)
+    sphere, state = TrainingMesh.of(mesh, texture.look), texture.grow(mesh)
     edge = float(np.sqrt(8 * np.pi / np.sqrt(3) / len(mesh.vertices)))
     half = 0.5 * float(texture.about["density"]) * edge
     pictures = []
@@ -87,7 +87,7 @@ def row(texture: NcaTexture, run: Path, exemplar: Path, wide: np.ndarray) -> lis
 def decoding(texture: NcaTexture) -> float:
     """Twelve patches of 128 x 128 pixels, forward and backward, the best of three [ms]."""
     mesh = icosphere(FREQUENCY)
-    sphere, state = TrainingSphere.of(mesh, texture.look), texture.grow(mesh).requires_grad_()
+    sphere, state = TrainingMesh.of(mesh, texture.look), texture.grow(mesh).requires_grad_()
     cameras = patch_views(torch.Generator().manual_seed(0), mesh, 12, 0.3, 128)
     times = []
     for _ in range(4):
@@ -99,7 +99,7 @@ def decoding(texture: NcaTexture) -> float:
 
 def triangles(texture: NcaTexture, mesh: Mesh) -> tuple[float, float]:
     """Share of the place within a triangle in the values, and in their squared steps along a side."""
-    grown = Grown(texture.look, texture.grow(mesh), Cells(mesh, 0, mesh))
+    grown = GrownTexture(texture.look, texture.grow(mesh), Cells(mesh, 0, mesh))
     grid, step = places(), np.float32(0.02)
     face = np.repeat(np.arange(len(mesh.faces), dtype=np.int32), len(grid))
     here = np.tile(grid * (1 - step) + step / 3, (len(mesh.faces), 1)).astype(np.float32)

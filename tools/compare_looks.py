@@ -26,7 +26,7 @@ from mitex.exemplar import names as exemplar_names
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.cells import Cells
-from mitex.methods.nca.surfaces import TrainingSphere
+from mitex.methods.nca.surfaces import TrainingMesh
 from mitex.scenes.cameras import Cameras, patch_views
 
 SPHERE = "sphere"
@@ -63,7 +63,7 @@ def patches(texture: NcaTexture, size: int, surface: str) -> tuple[dict[str, np.
     """Patches (K, h, w, 3) of each map, in which the exemplar is `size` [px] wide, and what shows surface."""
     decoded = hasattr(texture.look.decoder, "network")
     mesh = icosphere(FREQUENCIES[decoded]) if surface == SPHERE else cells(surface, decoded)
-    ground, state = TrainingSphere.of(mesh, texture.look), texture.grow(mesh)
+    ground, state = TrainingMesh.of(mesh, texture.look), texture.grow(mesh)
     edge = math.sqrt(4 / math.sqrt(3) * float(mesh.face_areas.sum()) / len(mesh.faces))
     width = float(texture.about["density"]) * edge
     half = min(0.5 * width, WIDEST) if surface == SPHERE else 0.25 * width
@@ -76,7 +76,7 @@ def patches(texture: NcaTexture, size: int, surface: str) -> tuple[dict[str, np.
     return {name: rgb(views[..., list(columns)]) for name, columns in texture.look.layout.items()}, masks
 
 
-def most_covered(ground: TrainingSphere, cameras: Cameras) -> Cameras:
+def most_covered(ground: TrainingMesh, cameras: Cameras) -> Cameras:
     """The `PATCHES` cameras that see the most surface, the first ones where several see as much."""
     hit = np.asarray(ground.stage.hits(cameras, 1).hit).reshape(len(cameras), -1)
     best = np.argsort(-hit.mean(1), kind="stable")[:PATCHES]

@@ -31,11 +31,11 @@ from mitex.mesh import Mesh, icosphere
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.growth import Growth
-from mitex.methods.nca.motion.cell_motion import STILL, carried, period
+from mitex.methods.nca.motion.cell_motion import STILL, is_advected, period
 from mitex.methods.nca.motion.condition import cell_vectors
 from mitex.scenes.cameras import Cameras, patch_views
-from mitex.scenes.screen import screen_motion
-from mitex.scenes.stage import Stage
+from mitex.scenes.screen import surface_motion
+from mitex.scenes.stage import Hits, Stage
 
 SPHERE = "sphere"
 FREQUENCY = 32  # of the sphere that textures are trained on
@@ -55,23 +55,29 @@ class CloseUps:
 
     cells: Cells
     cameras: Cameras
-    hit: np.ndarray
-    face: np.ndarray
-    barycentric: np.ndarray
+    hits: Hits
 
     @staticmethod
     def of(mesh: Mesh) -> CloseUps:
         fine = Cells.dense(mesh).mesh
         half = 0.5 * SIDE / PIXELS * float(np.median(fine.edge_lengths))
         cameras = patch_views(torch.Generator().manual_seed(0), fine, VIEWS, half, SIDE)
-        hits = Stage(fine).hits(cameras, 1)
-        arrays = hits.hit.numpy(), hits.face.numpy(), hits.barycentric.numpy()
-        return CloseUps(Cells(fine, 0, fine), cameras, *arrays)
+        return CloseUps(Cells(fine, 0, fine), cameras, Stage(fine).hits(cameras))
+
+    @property
+    def face(self) -> np.ndarray:
+        """(P,) under each pixel that sees the surface."""
+        return self.hits.face.numpy()
+
+    @property
+    def barycentric(self) -> np.ndarray:
+        """(P, 3)."""
+        return self.hits.barycentric.numpy()
 
     @property
     def covered(self) -> np.ndarray:
         """(K, H, W) bool."""
-        return self.hit.reshape(self.cameras.shape)
+        return self.hits.hit.numpy().reshape(self.cameras.shape)
 
     def moving(self, field: np.ndarray) -> np.ndarray:
         """(K, H, W) bool, where cells' vectors (V, 3) are so long that the pattern should be seen to move."""
@@ -80,23 +86,19 @@ class CloseUps:
 
     def pictures(self, growth: Growth, state: torch.Tensor) -> np.ndarray:
         """The albedo (K, H, W, 3) of a state, black where there is no surface."""
-        grown = growth.shown(state)
+        grown = growth.texture(state)
         albedo = grown.maps(grown.values(self.face, self.barycentric))["albedo"]
         return self._image(albedo)
 
     def target(self, field: np.ndarray) -> np.ndarray:
         """Motion (K, H, W, 2) of the cells' vectors (V, 3), of which 1 is an edge [px]."""
         mesh = self.cells.mesh
-        corners = mesh.faces[self.face]
-        velocities = interpolate(self.barycentric, (field * mesh.edge_lengths[:, None])[corners])
-        points = interpolate(self.barycentric, mesh.vertices[corners].astype(np.float64))
-        camera = np.repeat(np.arange(len(self.cameras)), SIDE * SIDE)[self.hit]
-        return self._image(screen_motion(self.cameras, camera, points, velocities))
+        return surface_motion(self.cameras, mesh, self.hits, field * mesh.edge_lengths[:, None])
 
     def _image(self, values: np.ndarray) -> np.ndarray:
-        image = np.zeros((len(self.hit), values.shape[1]), np.float32)
-        image[self.hit] = values
-        return image.reshape(*self.cameras.shape, -1)
+        image = np.zeros((*self.cameras.shape, values.shape[1]), np.float32)
+        image[self.covered] = values
+        return image
 
 
 def motion_of(
@@ -107,7 +109,7 @@ def motion_of(
     judge: EstimatorName = "lucas-kanade",
 ) -> tuple[float, float, list[float]]:
     """Direction error [degrees], speed ratio, and distances from the exemplar after so many steps each."""
-    guided = texture.look.rule.condition or carried(texture.look, texture.about)  # else as it was trained
+    guided = texture.look.rule.condition or is_advected(texture.look, texture.about)  # else as it was trained
     growth = texture.growth(closeups.cells, 0.0, texture.motion(closeups.cells, field) if guided else STILL)
     generator = torch.Generator().manual_seed(0)
     state = growth.evolve(growth.seed(), texture.steps, generator)

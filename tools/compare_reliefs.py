@@ -53,7 +53,7 @@ class VertexFigure(Figure):
 
     def textured(self, look: Look, state: torch.Tensor, cameras: Cameras) -> Views:
         hit, points = self._visible(cameras)
-        values = look.decoder(self.sphere.surface, self.sphere.surface.table(state), self.relief.corners)
+        values = look.decoder(self.surface.surface, self.surface.surface.table(state), self.relief.corners)
         height, colours = values[:, look.layout["height"][0]], values[:, list(look.layout["albedo"])]
         shade = self._shade(self.relief.normals(height), points, hit, cameras)
         between = Weights(self._faces[points.face.long()], points.barycentric, len(colours))
@@ -67,7 +67,7 @@ WAYS = {"normals": Figure, "geometry": MovedFigure, "vertices": VertexFigure}
 def task_of(config: NcaConfig, way: str, start: NcaTexture | None = None) -> TextTask:
     """A training on the even sphere whose reliefs are seen one way or the other."""
     task = TextTask(config, words_model(), start.look if start else None)
-    task.figures.update({sphere: WAYS[way](sphere, config.text_relief) for sphere in task.spheres})
+    task.figures.update({surface: WAYS[way](surface, config.text_relief) for surface in task.meshes})
     return task
 
 
@@ -75,7 +75,7 @@ class Scene:
     """A grown texture in the views of one step."""
 
     def __init__(self, task: TextTask, texture: NcaTexture) -> None:
-        self.task, (self.sphere,) = task, task.spheres
+        self.task, (self.sphere,) = task, task.meshes
         state, generator = torch.zeros_like(task.grown(0)), torch.Generator().manual_seed(0)
         with torch.no_grad():
             self.state = task.evolved(0, state, texture.steps, generator)[0]

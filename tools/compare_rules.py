@@ -76,7 +76,7 @@ def albedo(texture: NcaTexture | Graft, mesh: Mesh, cameras: Cameras) -> np.ndar
     """What one camera sees of a grown texture's albedo (CELL, CELL, 3)."""
     growth = texture.growth_on(Cells(mesh, 0, mesh), mesh)
     state = growth.evolve(growth.seed(), texture.steps, torch.Generator().manual_seed(0))
-    grown, hits = growth.shown(state), Stage(mesh).hits(cameras, 2)
+    grown, hits = growth.texture(state), Stage(mesh).hits(cameras, 2)
     colours = np.zeros((len(hits.hit), 3), np.float32)
     values = grown.values(hits.face.numpy(), hits.barycentric.numpy())
     colours[hits.hit.numpy()] = grown.maps(values)["albedo"]

@@ -20,7 +20,7 @@ from mitex.images import write_image
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.cells import Cells
-from mitex.methods.nca.film import PreviewCamera, Shooting
+from mitex.methods.nca.film import FilmSettings, PreviewCamera
 from mitex.render import sheet
 from mitex.render.video import check_video, write_video
 
@@ -42,10 +42,10 @@ def moments(texture: NcaTexture, field: str, mesh: Mesh, steps: int, side: int) 
     generator = torch.Generator().manual_seed(0)
     cells = Cells.of(mesh, 0)
     growth = texture.growth(cells, 0.0, texture.motion(cells, field))
-    camera = PreviewCamera(mesh, Shooting(resolution=side, azimuth=0.0))
+    camera = PreviewCamera(mesh, FilmSettings(resolution=side, azimuth=0.0))
     state = growth.evolve(growth.seed(), texture.steps, generator)
     while True:
-        yield camera.picture(growth.shown(state))
+        yield camera.picture(growth.texture(state))
         state = growth.evolve(state, steps, generator)
 
 

@@ -54,7 +54,7 @@ def grown(runs: Path, reference: str, mesh: Mesh, mapped: bool) -> Mesh:
     """A mesh with the relief, by the network or by a displacement map."""
     if mapped:
         bake = DisplacementMap.bake(find_reference(reference))
-        return bake.apply(mesh, scale=(COARSE / len(mesh.faces)) ** 0.5, levels=2).mesh
+        return bake.apply(mesh, scale=(COARSE / len(mesh.faces)) ** 0.5, subdivide=2).mesh
     run = runs / reference
     return GeometricTexture.load(run if run.exists() else reference).apply(mesh).mesh
 

@@ -24,11 +24,11 @@ from mitex.images import read_image, write_image
 from mitex.mesh import Mesh, embedded, icosphere
 from mitex.methods.nca import Graft, NcaTexture
 from mitex.methods.nca.cells import Cells
-from mitex.methods.nca.film import PreviewCamera, Shooting, States
+from mitex.methods.nca.film import FilmSettings, PreviewCamera, States
 from mitex.methods.nca.growth import grown_state
 from mitex.methods.nca.orientation import Orientation
 from mitex.methods.nca.region import region
-from mitex.methods.nca.surfaces import TrainingSphere
+from mitex.methods.nca.surfaces import TrainingMesh
 from mitex.methods.nca.texture import GrowingTexture
 from mitex.methods.nca.weights import graft_weights
 from mitex.render import sheet, still, tone
@@ -47,7 +47,7 @@ SPHERE = icosphere(26)  # of the controls: large patterns are seen better
 def unlit(texture: NcaTexture) -> list[np.ndarray]:
     """Views of every map on the training sphere, in the order of the exemplar's names."""
     mesh = icosphere(FREQUENCY)
-    sphere = TrainingSphere.of(mesh, texture.look)
+    sphere = TrainingMesh.of(mesh, texture.look)
     with torch.no_grad():
         cameras = orbit(1, distance=2.05, resolution=CELL)
         view = sphere.views(texture.look, texture.grow(mesh), cameras, antialias=4)[0].clamp(0, 1).numpy()
@@ -109,14 +109,14 @@ def _grafts() -> Labelled:
 
 def _healing() -> Labelled:
     """A ball of cells is set back to the seed in the second picture."""
-    mesh, shooting = embedded("vase"), Shooting(resolution=CELL, damage_at=1 / 24)
+    mesh, settings = embedded("vase"), FilmSettings(resolution=CELL, damage_at=1 / 24)
     cells = Cells.of(mesh, 0)
-    growth, camera = NcaTexture.load("lava").growth(cells), PreviewCamera(mesh, shooting)
+    growth, camera = NcaTexture.load("lava").growth(cells), PreviewCamera(mesh, settings)
     inside = torch.from_numpy(region("0.25,0.1,0.55,0.3")(cells.mesh.vertices))
-    states = States(growth, replace(shooting, steps_per_frame=10, start=200), 0, inside)
+    states = States(growth, replace(settings, steps_per_frame=10, start=200), 0, inside)
     frames = dict(zip(range(17), states.frames(0, 17), strict=True))
     steps = {0: "before", 1: "damaged", 2: "10 steps later", 5: "40 steps later", 16: "150 steps later"}
-    return [(label, camera.picture(growth.shown(frames[k]))) for k, label in steps.items()]
+    return [(label, camera.picture(growth.texture(frames[k]))) for k, label in steps.items()]
 
 
 def _densities() -> Labelled:
@@ -149,8 +149,8 @@ def _grown(
     """A preview (H, W, 3) of a texture on a mesh."""
     cells = Cells.of(mesh, 0, scale)
     growth = texture.growth_on(cells, mesh, orientation)
-    camera = PreviewCamera(mesh, Shooting(resolution=CELL, azimuth=azimuth))
-    return camera.picture(growth.shown(grown_state(growth, 0, steps)))
+    camera = PreviewCamera(mesh, FilmSettings(resolution=CELL, azimuth=azimuth))
+    return camera.picture(growth.texture(grown_state(growth, 0, steps)))
 
 
 def thumbnails(exemplars: Path) -> np.ndarray:

@@ -61,7 +61,7 @@ def displaced(texture: GeometricTexture, reference: Mesh, mesh: Mesh, level: int
     if kind != "map":
         return texture.apply(mesh, start_level=level, placement="none" if kind == "none" else "even").mesh
     size, _ = texture.relative_size(mesh)
-    return DisplacementMap.bake(reference).apply(mesh, scale=size, levels=texture.levels - 1 - START).mesh
+    return DisplacementMap.bake(reference).apply(mesh, scale=size, subdivide=texture.levels - 1 - START).mesh
 
 
 def level_sheet(texture: GeometricTexture, reference: str, meshes: Path, words: list[str]) -> np.ndarray:

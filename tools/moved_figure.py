@@ -12,7 +12,7 @@ from torch.autograd.function import once_differentiable
 from mitex.bridge import call
 from mitex.mesh import Mesh
 from mitex.methods.nca.look import Look
-from mitex.methods.nca.surfaces import TrainingSphere
+from mitex.methods.nca.surfaces import TrainingMesh
 from mitex.methods.nca.text.views import Figure, Views
 from mitex.plugins import init
 from mitex.runtime.jit import dr, mi
@@ -32,19 +32,19 @@ class MovedFigure(Figure):
     views have and close-ups do not, are Mitsuba's projective sampling, view by view.
 
     Args:
-        sphere, bound: as of a `Figure`, on the processor.
+        surface, bound: as of a `Figure`, on the processor.
     """
 
-    def __init__(self, sphere: TrainingSphere, bound: float) -> None:
-        super().__init__(sphere, bound)
+    def __init__(self, surface: TrainingMesh, bound: float) -> None:
+        super().__init__(surface, bound)
         init(needs="ad")
-        self._still = torch.tensor(sphere.mesh.vertices)
+        self._still = torch.tensor(surface.mesh.vertices)
         # The graph between positions and normals is a scene's own, until other positions come.
-        self._inside, self.border = MovedScene(sphere.mesh), MovedScene(sphere.mesh)
+        self._inside, self.border = MovedScene(surface.mesh), MovedScene(surface.mesh)
 
     def textured(self, look: Look, state: torch.Tensor, cameras: Cameras) -> Views:
         """With what a state (V, C) shows; differentiable in the state and the look's decoder."""
-        values = look.decoder(self.sphere.surface, self.sphere.surface.table(state), self.relief.corners)
+        values = look.decoder(self.surface.surface, self.surface.surface.table(state), self.relief.corners)
         height = values[:, look.layout["height"][0]]
         colours = values[:, list(look.layout["albedo"])].clamp(0, 1)
         coloured, plain = self.pictures(self.moved(height), colours, cameras)

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from torch.nn.functional import normalize
-from word_patterns import KINDS, Drawn, Place, smooth_noise
+from word_patterns import KINDS
+from word_places import Drawn, Place, smooth_noise
 
 from mitex.colour import linear_to_srgb, srgb_to_linear
 

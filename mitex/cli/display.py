@@ -25,7 +25,7 @@ class _Screen(Protocol):
 
 
 @contextmanager
-def shown(quiet: bool = False, stream: TextIO | None = None) -> Iterator[None]:
+def progress_display(quiet: bool = False, stream: TextIO | None = None) -> Iterator[None]:
     """Within the context, work that is announced is shown.
 
     Args:

@@ -80,7 +80,7 @@ def _command(words: list[str]) -> Any:
 
 def _run(command: Any) -> int:
     """Runs a command, with what it is at and what Mitex logs as lines on stderr, but for --quiet."""
-    from mitex.cli.display import shown
+    from mitex.cli.display import progress_display
     from mitex.runtime.signals import terminable
 
     log, lines, quiet = logging.getLogger("mitex"), _LogLines(), getattr(command, "quiet", False)
@@ -88,7 +88,7 @@ def _run(command: Any) -> int:
     log.addHandler(lines)
     log.setLevel(logging.WARNING if quiet else logging.INFO)
     try:
-        with terminable(), shown(quiet):
+        with terminable(), progress_display(quiet):
             return command.run() or 0
     finally:
         log.setLevel(level)

@@ -30,7 +30,7 @@ class Evaluate:
     examples:
       mitex evaluate vase.glb --exemplar lava
       mitex evaluate spiky.glb --reference spikes
-      mitex evaluate dots.glb --text "red dots on white" --object vase --clip models/clip-b16
+      mitex evaluate dots.glb --text "red dots on white" --object vase --judge models/clip-b16
     """
 
     asset: Annotated[Positional[Path], arg(metavar="ASSET")]
@@ -48,8 +48,8 @@ class Evaluate:
     object: Annotated[str | None, arg(metavar="WORD", help_behavior_hint="(default: object)")] = None
     """What the words call the object."""
 
-    clip: Annotated[str | None, arg(metavar="DIR|NAME", help_behavior_hint="(default: as of `fit`)")] = None
-    """CLIP folder, or `words` for the small model that ships with Mitex."""
+    judge: Annotated[str | None, arg(metavar="DIR|NAME", help_behavior_hint="(default: as of `fit`)")] = None
+    """CLIP folder that scores it, or `words` for the small model that ships with Mitex."""
 
     json: Annotated[bool, arg(help_behavior_hint="")] = False
     """For programs: a JSON object."""
@@ -60,7 +60,7 @@ class Evaluate:
     def run(self) -> None:
         if self.exemplar is None and self.reference is None and self.text is None:
             raise ConfigError("nothing to compare it with", "give --exemplar, --reference or --text")
-        for option, value in (("--object", self.object), ("--clip", self.clip)):
+        for option, value in (("--object", self.object), ("--judge", self.judge)):
             if value is not None and self.text is None:
                 raise ConfigError(f"{option} belongs to --text", "give both, or none")
         from mitex.runtime import let_idle_threads_sleep
@@ -107,7 +107,7 @@ class Evaluate:
         from mitex.features.text_model import text_image_model
         from mitex.render.sides import sides
 
-        model, thing = text_image_model(self.clip), self.object or "object"
+        model, thing = text_image_model(self.judge), self.object or "object"
         prompt = object_prompt(self.text, thing)
         model.encode_texts([prompt, thing])  # before it takes the time of pictures: unknown words are refused
         shown = (self._loaded, clay(self._loaded.mesh))

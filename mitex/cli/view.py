@@ -48,7 +48,7 @@ class View:
     """Show no progress."""
 
     def run(self) -> None:
-        page, news = self.shown()
+        page, news = self.content()
         from mitex.page.server import PageServer
 
         with PageServer(lambda: page().html(), news) as server:
@@ -58,7 +58,7 @@ class View:
             with suppress(KeyboardInterrupt):  # the usual end
                 server.serve_forever()
 
-    def shown(self) -> tuple[Callable[[], Content], Callable[[], Any]]:
+    def content(self) -> tuple[Callable[[], Content], Callable[[], Any]]:
         """What gives the page and what is new in it.
 
         Raises:

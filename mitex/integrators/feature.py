@@ -13,7 +13,7 @@ from mitex.integrators.grid import (
 )
 from mitex.runtime.jit import dr, mi
 from mitex.textures.field import Field
-from mitex.textures.shown import nested
+from mitex.textures.scene_objects import nested
 from mitex.textures.variant import for_variant, option
 
 

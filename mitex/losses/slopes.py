@@ -21,8 +21,8 @@ def slope_correlation(height: torch.Tensor, normal: torch.Tensor) -> torch.Tenso
     x, y, z = (2 * normal - 1).unbind(3)
     z = z.clamp(min=STEEPEST)
     # A normal is along (-dh/dx, -dh/dy, 1), and rows go down.
-    told = torch.stack([-x / z, y / z], 1)
-    smooth = F.avg_pool2d(torch.cat([height[:, None], told], 1), 3, stride=1)
+    slopes = torch.stack([-x / z, y / z], 1)
+    smooth = F.avg_pool2d(torch.cat([height[:, None], slopes], 1), 3, stride=1)
     rises = smooth[:, 0]
     across = 0.5 * (rises[:, 1:-1, 2:] - rises[:, 1:-1, :-2])
     down = 0.5 * (rises[:, 2:, 1:-1] - rises[:, :-2, 1:-1])

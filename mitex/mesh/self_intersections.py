@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import KDTree
 
+from mitex.geometry.vectors import dot
+from mitex.mesh.box_tree import BoxTree
 from mitex.mesh.mesh import Mesh
 
-BLOCK = 4096  # faces whose neighbourhoods are looked at together
 ROUNDING = 1e-12  # volumes that are smaller, relative to their edges, are 0: what touches does not pierce
 
 
@@ -30,66 +30,53 @@ def piercing_pairs(mesh: Mesh, faces: np.ndarray | None = None) -> np.ndarray:
     wanted = np.full(len(corners), faces is None)
     if faces is not None:
         wanted[faces] = True
-    blocks = [_piercing(corners, pairs) for pairs in _near(corners, wanted)]
-    return np.unique(np.concatenate([np.empty((0, 2), np.int64), *blocks]), axis=0)
+    planes = _plane(*corners.swapaxes(0, 1))
+    tree = BoxTree(corners.min(1), corners.max(1), wanted)
+    blocks = [
+        pairs[_pierce(corners, planes, *pairs.T) | _pierce(corners, planes, *pairs.T[::-1])]
+        for pairs in tree.pairs()
+    ]
+    return np.unique(np.sort(np.concatenate([np.empty((0, 2), np.int64), *blocks]), axis=1), axis=0)
 
 
-def _near(corners: np.ndarray, wanted: np.ndarray) -> Iterator[np.ndarray]:
-    """Pairs (N, 2) of faces, one of them wanted, whose boxes overlap, in blocks, the lower one first.
-
-    Faces are looked for in classes of size, so that a few large ones do not widen every search.
-    """
-    low, high = (np.ascontiguousarray(ends.T) for ends in (corners.min(1), corners.max(1)))
-    centres = corners.mean(1)
-    radii = np.linalg.norm(corners - centres[:, None], axis=2).max(1)
-    octave = np.floor(np.log2(np.maximum(radii, 1e-30))).astype(int)
-    for size in np.unique(octave):
-        members, others = octave == size, octave <= size
-        for around, inside in ((others & wanted, members), (others & ~wanted, members & wanted)):
-            for one, other in _balls(np.flatnonzero(around), np.flatnonzero(inside), centres, radii):
-                pairs = one != other
-                for k in range(3):
-                    one, other = one[pairs], other[pairs]
-                    pairs = (low[k, one] <= high[k, other]) & (low[k, other] <= high[k, one])
-                yield np.sort(np.stack([one[pairs], other[pairs]], axis=1), axis=1)
-
-
-def _balls(
-    around: np.ndarray, inside: np.ndarray, centres: np.ndarray, radii: np.ndarray
-) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Faces `around` and faces `inside` whose balls may overlap, (N,) each, in blocks."""
-    if not len(inside):
-        return
-    tree, reach = KDTree(centres[inside]), radii[inside].max()
-    for start in range(0, len(around), BLOCK):
-        block = around[start : start + BLOCK]
-        nearby = tree.query_ball_point(centres[block], radii[block] + reach)
-        one = np.repeat(block, [len(faces) for faces in nearby])
-        yield one, inside[np.concatenate(nearby).astype(np.int64)]
-
-
-def _piercing(corners: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Those of pairs (N, 2) of faces that pierce each other.
+def _pierce(corners: np.ndarray, planes: Plane, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Whether an edge of the faces `one` (N,) goes through the inside of the faces `other` (N,): (N,) bool.
 
     The ends of the edge lie on two sides of the plane, and the line passes all three edges on the same side.
+
+    Args:
+        corners: (F, 3, 3) of all faces.
+        planes: of all faces.
     """
-    hit = np.zeros(len(pairs), bool)
-    for one, other in ((0, 1), (1, 0)):
-        ends, face = corners[pairs[:, one]], corners[pairs[:, other]]
-        a, b, c = face.swapaxes(0, 1)
-        sides = [_side(a, b, c, ends[:, k]) for k in range(3)]
-        for k in range(3):
-            crossing = np.flatnonzero(sides[k] * sides[(k + 1) % 3] < 0)
-            a, b, c = face[crossing].swapaxes(0, 1)
-            start, end = ends[crossing, k], ends[crossing, (k + 1) % 3]
-            turns = _side(start, end, a, b) + _side(start, end, b, c) + _side(start, end, c, a)
-            hit[crossing] |= np.abs(turns) == 3
-    return pairs[hit]
+    hit = np.zeros(len(one), bool)
+    plane = Plane(*(values[other] for values in planes))
+    sides = [plane.side(corners[one, k]) for k in range(3)]
+    for k in range(3):
+        crossing = np.flatnonzero(sides[k] * sides[(k + 1) % 3] < 0)
+        start, end = corners[one[crossing], k], corners[one[crossing], (k + 1) % 3]
+        face = corners[other[crossing]].swapaxes(0, 1)
+        turns = sum(_plane(start, end, face[j]).side(face[(j + 1) % 3]) for j in range(3))
+        hit[crossing] |= np.abs(turns) == 3
+    return hit
 
 
-def _side(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """(N,) sign of the volume of tetrahedra; 0 where rounding errors could have made it."""
-    edges = b - a, c - a, d - a
-    volume = (np.cross(edges[0], edges[1]) * edges[2]).sum(1)
-    scale = np.prod([np.linalg.norm(edge, axis=1) for edge in edges], axis=0)
-    return np.where(np.abs(volume) > ROUNDING * scale, np.sign(volume), 0.0)
+class Plane(NamedTuple):
+    """Planes through triangles (N,)."""
+
+    origin: np.ndarray  # (N, 3), their first corners
+    normal: np.ndarray  # (N, 3), twice their areas long
+    size: np.ndarray  # (N,), product of the edges at their first corners
+
+    def side(self, points: np.ndarray) -> np.ndarray:
+        """(N,) signs of the volumes that triangles and points (N, 3) span; 0 if rounding may have made it."""
+        edge = points - self.origin
+        volume = dot(self.normal, edge)
+        return np.where(
+            np.abs(volume) > ROUNDING * self.size * np.sqrt(dot(edge, edge)), np.sign(volume), 0.0
+        )
+
+
+def _plane(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> Plane:
+    """Through points (N, 3)."""
+    edges = b - a, c - a
+    return Plane(a, np.cross(*edges), np.sqrt(dot(edges[0], edges[0]) * dot(edges[1], edges[1])))

@@ -4,33 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
-
-from tyro.conf import arg
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from mitex.lazy import load
-from mitex.methods.options import ExemplarOptions, OptionalMeshOptions
+from mitex.methods.options import ExemplarOptions, MeshFitOptions, OptionalMeshOptions
 
 if TYPE_CHECKING:
     from mitex.methods.interface import Applied
 
 
 @dataclass(kw_only=True)
-class MeshTextureFitOptions(ExemplarOptions):
+class MeshTextureFitOptions(MeshFitOptions, ExemplarOptions):
     """A fit of an exemplar on one mesh; a method's own class has the help and the examples.
 
     Attributes:
         method: the baseline that fits.
     """
 
-    fits_to_mesh: ClassVar[bool] = True
     method: ClassVar[str]
-
-    mesh: Annotated[str, arg(metavar="MESH|NAME")]
-    """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
-
-    keep_uvs: Annotated[bool, arg(help_behavior_hint="")] = False
-    """Use the mesh's own UVs, which must not overlap."""
 
     def further(self) -> dict[str, object]:
         """What a method's `fit` takes beside that."""

@@ -130,6 +130,19 @@ class ExemplarOptions(TrainingOptions):
 
 
 @dataclass(kw_only=True)
+class MeshFitOptions(FitOptions):
+    """Options of the methods whose textures belong to the mesh that they are learned on."""
+
+    fits_to_mesh: ClassVar[bool] = True
+
+    mesh: Annotated[str, arg(metavar="MESH|NAME")]
+    """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
+
+    keep_uvs: Annotated[bool, arg(help_behavior_hint="")] = False
+    """Use the mesh's own UVs, which must not overlap."""
+
+
+@dataclass(kw_only=True)
 class ApplyOptions:
     """Options of every `mitex apply RUN|MODEL`."""
 
@@ -150,12 +163,12 @@ class ApplyOptions:
     def run(self) -> None:
         """Applies the texture, writes the file, and prints its path."""
         self.check()
-        out = self.prepared()
+        out = self.output_path()
         self.check_output(out)
         self.write(out)
         print(self.out)
 
-    def prepared(self) -> Path:
+    def output_path(self) -> Path:
         """--out as an absolute path, once it is sure that it can be written."""
         from mitex.export import is_folder, prepare_export
 
@@ -165,13 +178,13 @@ class ApplyOptions:
 
     def write(self, out: Path) -> None:
         """Applies the texture and writes it to `out`, which has been checked."""
-        applied = self.finished(self.applied(out))
+        applied = self.finish(self.applied(out))
         if out.suffix.lower() in PICTURES:
             applied.render(out, **self.picture_options())
         else:
             applied.export(self.out, self.maps_format)
 
-    def finished(self, applied: Applied) -> Applied:
+    def finish(self, applied: Applied) -> Applied:
         """What is done to the textured mesh before it is written."""
         return applied
 
@@ -232,7 +245,7 @@ class ReliefOptions(OptionalMeshOptions):
     def check(self) -> None:
         in_range("--relief", self.relief, *DISPLACEMENTS)
 
-    def finished(self, applied: Applied) -> Applied:
+    def finish(self, applied: Applied) -> Applied:
         if self.relief is None:
             return applied
         from mitex.asset import Asset

@@ -6,8 +6,31 @@ import math
 
 import numpy as np
 
+from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import dot
+from mitex.mesh import Mesh
 from mitex.scenes.cameras import Cameras
+from mitex.scenes.stage import Hits
+
+
+def surface_motion(cameras: Cameras, mesh: Mesh, hits: Hits, velocities: np.ndarray) -> np.ndarray:
+    """How a surface that moves along a field moves in images, (K, H, W, 2) float32 [px].
+
+    x to the right, y down; 0 where there is no surface.
+
+    Args:
+        cameras: K cameras.
+        mesh: V vertices.
+        hits: what one sample in each of the cameras' pixels sees of it.
+        velocities: (V, 3) [mesh units].
+    """
+    hit, corners = hits.hit.numpy(), mesh.faces[hits.face.numpy()]
+    weights = hits.barycentric.numpy().astype(np.float64)
+    points, velocities = (interpolate(weights, values[corners]) for values in (mesh.vertices, velocities))
+    camera = np.flatnonzero(hit) // (cameras.width * cameras.height)
+    motion = np.zeros((len(hit), 2), np.float32)
+    motion[hit] = screen_motion(cameras, camera, points, velocities)
+    return motion.reshape(*cameras.shape, 2)
 
 
 def screen_motion(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from mitex.errors import ConfigError
 from mitex.runtime.jit import dr, mi
 from mitex.textures.field import FieldMethods, Located
-from mitex.textures.shown import holds, is_rendered, loaded_meshes
+from mitex.textures.scene_objects import holds, is_rendered, loaded_meshes
 
 
 class VertexRows(FieldMethods):

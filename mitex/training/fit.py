@@ -24,7 +24,7 @@ from mitex.training.task import Task
 Config = TypeVar("Config", bound=FitConfig)
 
 
-class Saved(Protocol):
+class Savable(Protocol):
     """What a fit needs of a texture."""
 
     def save(self, path: str | Path) -> Path:
@@ -32,7 +32,7 @@ class Saved(Protocol):
         ...
 
 
-Learned = TypeVar("Learned", bound=Saved)
+Learned = TypeVar("Learned", bound=Savable)
 
 
 @dataclass(frozen=True)

@@ -117,7 +117,15 @@ def test_smaller_pictures(monkeypatch, tmp_path):
 
     monkeypatch.setattr(site, "reconstruct", smaller)
     write_photos(tmp_path / "photos", PICTURES)
-    words = ["capture", str(tmp_path / "photos"), "--out", str(tmp_path / "a"), "--size", "128", "--quiet"]
+    words = [
+        "capture",
+        str(tmp_path / "photos"),
+        "--out",
+        str(tmp_path / "a"),
+        "--resolution",
+        "128",
+        "--quiet",
+    ]
     assert main(words) == 0
     assert set(seen) == {(128, 96)}
     assert {image.shape for image in load_capture(tmp_path / "a").images} == {(96, 128, 4)}
@@ -200,7 +208,7 @@ BAD = {
         "the network takes 0.0 % of the pictures for the object",
     ),
     "few frames asked for": (shots, "photos", "--frames 3", "--frames 3 is out of range"),
-    "huge pictures asked for": (shots, "photos", "--size 99999", "--size 99999 is out of range"),
+    "huge pictures asked for": (shots, "photos", "--resolution 99999", "--resolution 99999 is out of range"),
     "into a folder that exists": (
         lambda d: [shots(d), bad.text(d / "out" / "run" / "mine.txt")],
         "photos",
@@ -224,8 +232,8 @@ def test_what_cannot_be_captured(cameras, name, files, capsys):
     [
         ({"frames": 7}, "`frames` 7 is out of range"),
         ({"frames": 1001}, "`frames` 1001 is out of range"),
-        ({"size": 127}, "`size` 127 is out of range"),
-        ({"size": 8193}, "`size` 8193 is out of range"),
+        ({"resolution": 127}, "`resolution` 127 is out of range"),
+        ({"resolution": 8193}, "`resolution` 8193 is out of range"),
     ],
 )
 def test_numbers_out_of_range_in_python(option, message, tmp_path):

@@ -42,7 +42,7 @@ def test_a_line_comes_within_two_seconds():
 
 def test_work_gets_lines_where_there_is_no_terminal(quick):
     stream = io.StringIO()
-    with display.shown(stream=stream):
+    with display.progress_display(stream=stream):
         wait_for(stream, "starting\n")
         announce("growing the texture", 3, 8)
         wait_for(stream, "growing the texture, 3 of 8\ngrowing the texture, 3 of 8\n")
@@ -58,7 +58,7 @@ def test_many_short_works_in_a_row_get_a_line(monkeypatch):
     monkeypatch.setattr(display, "FIRST_LINE", 0.3)
     monkeypatch.setattr(display, "LOOK_EVERY", 0.01)
     stream = io.StringIO()
-    with display.shown(stream=stream):
+    with display.progress_display(stream=stream):
         for number in range(20):  # none of them takes as long as FIRST_LINE
             announce(f"work {number}")
             time.sleep(0.1)
@@ -69,7 +69,7 @@ def test_short_work_gets_no_line(monkeypatch):
     monkeypatch.setattr(display, "FIRST_LINE", 100.0)
     monkeypatch.setattr(display, "LOOK_EVERY", 0.01)
     stream = io.StringIO()
-    with display.shown(stream=stream):
+    with display.progress_display(stream=stream):
         for work in ("reading", "baking", "writing"):
             announce(work)
             time.sleep(0.02)
@@ -79,7 +79,7 @@ def test_short_work_gets_no_line(monkeypatch):
 @pytest.mark.parametrize("kind", [io.StringIO, Terminal])
 def test_quiet_shows_nothing(quick, kind):
     stream = kind()
-    with display.shown(quiet=True, stream=stream):
+    with display.progress_display(quiet=True, stream=stream):
         announce("growing the texture")
         time.sleep(0.1)
     assert stream.getvalue() == ""
@@ -89,7 +89,7 @@ def test_a_terminal_shows_the_work_at_once_and_it_vanishes(monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("COLUMNS", "100")
     stream = Terminal()
-    with display.shown(stream=stream):
+    with display.progress_display(stream=stream):
         announce("reading bunny.obj")
         announce("growing [the] texture", 3, 8)
     text = plain(stream)
@@ -116,7 +116,7 @@ def test_the_time_left_follows_the_parts_that_are_done(monkeypatch):
 
 def test_an_error_ends_the_display(quick):
     stream = io.StringIO()
-    with pytest.raises(ValueError), display.shown(stream=stream):
+    with pytest.raises(ValueError), display.progress_display(stream=stream):
         raise ValueError
     before = stream.getvalue()
     time.sleep(0.1)

@@ -35,7 +35,7 @@ def numbers(capsys, *words: str) -> dict[str, float]:
 
 def test_words_that_fit_score_higher(one_side, red, capsys):
     right, wrong = (
-        numbers(capsys, str(red), "--text", text, "--clip", "words") for text in ("plain red", "plain blue")
+        numbers(capsys, str(red), "--text", text, "--judge", "words") for text in ("plain red", "plain blue")
     )
     assert set(right) == {"MES", "MES-dir"}
     assert right["MES"] > wrong["MES"] and right["MES-dir"] > wrong["MES-dir"] + 20
@@ -43,7 +43,7 @@ def test_words_that_fit_score_higher(one_side, red, capsys):
 
 def test_the_object_is_named_in_the_text(one_side, red, capsys):
     plain, ball = (
-        numbers(capsys, str(red), "--text", "plain red", "--clip", "words", *words)
+        numbers(capsys, str(red), "--text", "plain red", "--judge", "words", *words)
         for words in ((), ("--object", "red metal"))
     )
     assert plain != ball
@@ -73,7 +73,7 @@ def test_beside_an_exemplar(red, tmp_path, capsys):
 
 
 def test_the_table_says_which_way_better_lies(one_side, red, capsys):
-    assert main(["evaluate", str(red), "--text", "plain red", "--clip", "words", "--quiet"]) == 0
+    assert main(["evaluate", str(red), "--text", "plain red", "--judge", "words", "--quiet"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 2 and all(line.endswith("high is better") for line in lines)
 
@@ -82,10 +82,10 @@ def test_the_table_says_which_way_better_lies(one_side, red, capsys):
     ("words", "message"),
     [
         ((), "give --exemplar, --reference or --text"),
-        (("--clip", "words", "--exemplar", "lava"), "--clip belongs to --text"),
+        (("--judge", "words", "--exemplar", "lava"), "--judge belongs to --text"),
         (("--object", "vase", "--exemplar", "lava"), "--object belongs to --text"),
-        (("--text", "plain graay", "--clip", "words"), "did you mean gray?"),
-        (("--text", "plain red", "--clip", "no-folder"), "no-folder"),
+        (("--text", "plain graay", "--judge", "words"), "did you mean gray?"),
+        (("--text", "plain red", "--judge", "no-folder"), "no-folder"),
         (("--exemplar", "no-picture.png"), "no-picture.png"),
     ],
 )
@@ -96,7 +96,7 @@ def test_refusals_are_one_line(words, message, red, capsys):
 
 
 def test_a_missing_asset_is_one_line(capsys):
-    assert main(["evaluate", "nowhere.glb", "--text", "plain red", "--clip", "words"]) == 2
+    assert main(["evaluate", "nowhere.glb", "--text", "plain red", "--judge", "words"]) == 2
     error = capsys.readouterr().err.strip()
     assert "\n" not in error and "nowhere.glb" in error
 

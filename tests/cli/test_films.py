@@ -146,7 +146,7 @@ def test_options_reach_the_graft(files, monkeypatch):
     monkeypatch.setattr(Graft, "apply", small)
     words = "--weights y --seed 4 --steps 7 --subdivide 1 --orientation 6 --scale 2 --field up --speed 3"
     assert main(graft(f"{words} --resolution 128", "out/a.glb")) == main(graft(out="out/b.glb")) == 0
-    assert main(graft("--weights y --vertex-colors", "out/c.glb")) == main(graft()) == 0
+    assert main(graft("--weights y --vertex-colours", "out/c.glb")) == main(graft()) == 0
     given, plain, coloured, ply = calls
     assert given == {
         **{"seed": 4, "steps": 7, "subdivide": 1, "orientation": 6, "scale": 2, "field": "up", "speed": 3},
@@ -167,7 +167,7 @@ BAD_GRAFTS = {
     "short weights": (graft("--weights short.npy"), "one number for each of 8 vertices"),
     "no UVs": (graft("--weights paint.png"), "has no UVs"),
     "a film": (graft(out="out/a.mp4"), "use one of .glb"),
-    "colours in a folder": (graft("--weights y --vertex-colors", out="out/maps/"), "--vertex-colors means"),
+    "colours in a folder": (graft("--weights y --vertex-colours", out="out/maps/"), "--vertex-colours means"),
     "its own weights": (graft("--weights short.ply", out="short.ply"), "is an input"),
     "a field of no name": (graft("--weights y --field rihgt"), "did you mean right?"),
     "a short field": (graft("--weights y --field short.npy"), "the vector field 'short.npy' is"),

@@ -66,7 +66,7 @@ def test_fit_apply_render(folder, capsys):
     assert run(*apply, "--out", "a.glb", "--resolution", "64") == "a.glb"
     baked = Asset.load("a.glb")
     assert set(baked.vertex_maps) == set(MAPS) and baked.atlas is not None
-    assert run(*apply, "--out", "new/b.glb", "--vertex-colors", "--orientation", "-90") == "new/b.glb"
+    assert run(*apply, "--out", "new/b.glb", "--vertex-colours", "--orientation", "-90") == "new/b.glb"
     assert Asset.load("new/b.glb").atlas is None
     assert run(*apply, "--out", "c.ply") == "c.ply"
     assert len(Asset.load("c.ply").mesh.faces) == 12

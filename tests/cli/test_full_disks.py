@@ -47,7 +47,7 @@ class TestFullDisks:
         bad.model(files / "m.safetensors")
         bad.text(files / "out" / "a.glb", "old")
         fill("fsync")
-        words = apply("--subdivide 0 --steps 1 --vertex-colors", model="m.safetensors")
+        words = apply("--subdivide 0 --steps 1 --vertex-colours", model="m.safetensors")
         check_refused(files, words, "space", capsys)
         assert (files / "out" / "a.glb").read_text() == "old"
 
@@ -62,7 +62,7 @@ class TestFullDisks:
     )
     def test_render(self, files, fill, moment, name, capsys):
         bad.model(files / "m.safetensors")
-        assert main(apply("--subdivide 0 --steps 1 --vertex-colors", model="m.safetensors")) == 0
+        assert main(apply("--subdivide 0 --steps 1 --vertex-colours", model="m.safetensors")) == 0
         capsys.readouterr()
         words = f"render out/a.glb --out out/{name} --resolution 16 --spp 1".split()
         fill(moment)

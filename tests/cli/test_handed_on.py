@@ -17,7 +17,7 @@ BAKED = {"seed": 0, "steps": None, "resolution": 1024, **GROWTH}
         ("--exemplar-width 0.3", {"exemplar_width": 0.3}),
         ("--scale 2.5", {"scale": 2.5}),
         ("--keep-dense --displace", {"keep_dense": True, "displace": True}),
-        ("--vertex-colors", {"resolution": None}),
+        ("--vertex-colours", {"resolution": None}),
         ("--resolution 64 --steps 9 --subdivide 1", {"resolution": 64, "steps": 9, "subdivide": 1}),
     ],
 )

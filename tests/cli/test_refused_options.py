@@ -20,7 +20,7 @@ APPLIES = {
     "great speed": (apply("--field up --speed 11"), "--speed 11 is out of range"),
     "looks of a mesh": (apply("--looks lava"), "--looks means nothing for .glb"),
     "resolution of a page": (apply("--resolution 64", out=PAGE), "--resolution means nothing for .html"),
-    "colours of a page": (apply("--vertex-colors", out=PAGE), "--vertex-colors means nothing for .html"),
+    "colours of a page": (apply("--vertex-colours", out=PAGE), "--vertex-colours means nothing for .html"),
     "dense page": (apply("--keep-dense", out=PAGE), "--keep-dense means nothing for .html"),
     "displaced page": (apply("--displace", out=PAGE), "--displace means nothing for .html"),
     "variants of a page": (apply("--variants 2", out=PAGE), "--variants means nothing for .html"),

@@ -141,7 +141,7 @@ BAD_APPLIES = {
     "another mesh": ("--mesh other.obj --out out/a.glb", "belongs to mesh 'good', not to 'other'"),
     "seed": ("--mesh good.obj --out out/a.glb --seed 3", "--seed is no option"),
     "resolution": ("--mesh good.obj --out out/a.glb --resolution 64", "--resolution is no option"),
-    "vertex colours": ("--mesh good.obj --out out/a.glb --vertex-colors", "--vertex-colors is no option"),
+    "vertex colours": ("--mesh good.obj --out out/a.glb --vertex-colours", "--vertex-colours is no option"),
     "subdivide": ("--mesh good.obj --out out/a.glb --subdivide 1", "--subdivide is no option"),
 }
 

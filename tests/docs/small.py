@@ -154,9 +154,9 @@ def _with_few_growth_steps(grown_state: Callable[..., Any]) -> Callable[..., Any
 
 
 def _with_few_frames(film: Callable[..., Any]) -> Callable[..., Any]:
-    def small(growth: Any, path: Any, shooting: Any, *others: Any) -> Any:
-        loop = None if shooting.loop is None else 1
-        short = replace(shooting, seconds=4 / shooting.fps, resolution=32, start=2, loop=loop, damage_at=0.0)
+    def small(growth: Any, path: Any, settings: Any, *others: Any) -> Any:
+        loop = None if settings.loop is None else 1
+        short = replace(settings, seconds=4 / settings.fps, resolution=32, start=2, loop=loop, damage_at=0.0)
         return film(growth, path, short, *others)
 
     return small

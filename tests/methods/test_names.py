@@ -24,7 +24,7 @@ APPLY_ONLY = {
     "quiet",
     "maps_format",
     "remesh",
-    "vertex_colors",
+    "vertex_colours",
     "variants",
     "tile",
     "tile_cells",

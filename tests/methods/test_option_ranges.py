@@ -25,7 +25,7 @@ TABLE = {
     Gatys: SCALE + TEXELS,
     SolidTexture: SCALE + TEXELS + SEED,
     ReactionDiffusion: [*SCALE, *TEXELS, *SEED, ("steps", -1), ("steps", 10_001)],
-    Displacement: [*SCALE, ("levels", -1), ("levels", 7)],
+    Displacement: [*SCALE, ("subdivide", -1), ("subdivide", 7)],
     Quilted: SCALE + TEXELS,
     NerfTex: [
         *(SCALE + SEED + PIXELS + DENSITY + LIFT),

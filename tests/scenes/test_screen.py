@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from mitex.mesh import icosphere
 from mitex.scenes.cameras import Cameras
-from mitex.scenes.screen import screen_motion
+from mitex.scenes.screen import screen_motion, surface_motion
+from mitex.scenes.stage import Stage
 
 ORIGIN, TARGET, UP = ([3.0, 1, 2], [-1, 2, 3]), ([0.1, 0, 0], [0, 0.2, 0]), ([0, 1.0, 0], [0.3, 1, 0])
 
@@ -42,3 +44,20 @@ def test_right_and_up_in_an_upright_image():
     camera = Cameras("perspective", place, np.zeros((1, 3)), up, 90, height=80)
     motions = screen_motion(camera, np.zeros(3, int), np.zeros((3, 3)), np.eye(3))
     assert np.allclose(motions, [[20, 0], [0, -20], [0, 0]], atol=1e-5)
+
+
+def test_a_surface_that_turns_in_two_images():
+    """Seen along the axis and from its side; both images are 4 units high. Its background stands still."""
+    places, up = np.array([[0, 3.0, 0], [0, 0, 3.0]]), np.array([[0, 0, -1.0], [0, 1.0, 0]])
+    cameras = Cameras("orthographic", places, np.zeros((2, 3)), up, half_width=2.0, width=40, height=40)
+    ball = icosphere(8)
+    hits = Stage(ball).hits(cameras)
+    motion = surface_motion(cameras, ball, hits, np.cross([0, 1.0, 0], ball.vertices))
+    hit = hits.hit.numpy().reshape(2, 40, 40)
+    assert motion.shape == (2, 40, 40, 2) and 0.1 < hit.mean() < 0.3
+    assert (motion[~hit] == 0).all()
+    row, column = np.nonzero(hit[0])
+    assert np.allclose(motion[0, row, column], np.stack([row - 19.5, 19.5 - column], 1), atol=1e-3)
+    row, column = np.nonzero(hit[1])
+    depth = np.sqrt(np.maximum(100 - (row - 19.5) ** 2 - (column - 19.5) ** 2, 0))
+    assert np.allclose(motion[1, row, column], np.stack([depth, 0 * depth], 1), atol=0.8)

@@ -1,4 +1,4 @@
-"""texel_field: lookups against a slow reference, charts that do not bleed, BSDFs, gradients, `feature`."""
+"""texel_field: lookups against a slow reference, charts that do not bleed, gradients, `feature`."""
 
 from typing import Any
 
@@ -7,61 +7,9 @@ import pytest
 import torch
 
 from mitex.bridge import render
-from mitex.colour import srgb_to_linear
-from mitex.errors import ConfigError
 from mitex.runtime.upload import upload
-from tests.textures.helpers import QUAD, quad, radiance, sphere_picture
-
-UNIT = (QUAD[:, :2] + 1) / 2  # uv of the quad whose map covers it once
-
-
-def field(mi, data: np.ndarray, charts: np.ndarray | None = None, **options) -> dict:
-    plugin = {"type": "texel_field", "data": upload(mi.TensorXf, np.asarray(data, np.float32))} | options
-    return (
-        plugin if charts is None else plugin | {"charts": upload(mi.TensorXf, np.asarray(charts, np.float32))}
-    )
-
-
-def at(mi, uv: np.ndarray):
-    """Surface interactions with the given (N, 2) uv."""
-    si = mi.SurfaceInteraction3f()
-    si.uv = mi.Point2f(
-        upload(mi.Float, uv[:, 0].astype(np.float32)), upload(mi.Float, uv[:, 1].astype(np.float32))
-    )
-    return si
-
-
-def lookups(mi, plugin: dict, uv: np.ndarray) -> np.ndarray:
-    """(N, C) values of all channels."""
-    texture = mi.load_dict(plugin)
-    return np.stack([value.numpy() for value in texture.gather(texture.locate(at(mi, uv)))], axis=1)
-
-
-def slow_weights(shape: tuple[int, int], uv: np.ndarray, charts=None, nearest: bool = False) -> np.ndarray:
-    """(N, H * W) weights of every texel in every lookup, point by point and texel by texel."""
-    height, width = shape
-    matrix = np.zeros((len(uv), height * width))
-    for n, (u, v) in enumerate(np.clip(uv.astype(np.float64), 0, 1)):
-        x, y = u * width - 0.5, (1 - v) * height - 0.5
-        around = []
-        for row in (np.floor(y), np.floor(y) + 1):
-            for column in (np.floor(x), np.floor(x) + 1):
-                weight = (1 - abs(x - column)) * (1 - abs(y - row))
-                r, c = int(np.clip(row, 0, height - 1)), int(np.clip(column, 0, width - 1))
-                chart = 0 if charts is None else charts[r, c]
-                if chart >= 0:
-                    around.append((np.hypot(x - column, y - row), chart, weight, r * width + c))
-        if not around:
-            continue
-        _, own, _, texel = min(around)
-        if nearest:
-            matrix[n, texel] = 1
-            continue
-        for _, chart, weight, texel in around:
-            if chart == own:
-                matrix[n, texel] += weight
-        matrix[n] /= matrix[n].sum()
-    return matrix
+from tests.textures.helpers import quad
+from tests.textures.texels import UNIT, at, field, lookups, slow_weights
 
 
 @pytest.fixture
@@ -221,81 +169,6 @@ def test_slope_of_the_nearest_texel_is_zero(mi, rng, uv):
     assert not np.array(texture.eval_1_grad(at(mi, uv))).any()
 
 
-def ramp(slope: tuple[float, float], side: int = 64) -> np.ndarray:
-    """(N, N, 1) slope . (x, y) on the quad of the tests, where u = (x + 1) / 2."""
-    centre = (np.arange(side) + 0.5) / side * 2 - 1
-    return (slope[0] * centre[None, :] - slope[1] * centre[:, None])[..., None]
-
-
-def test_reflectance_decodes_srgb(mi, points):
-    x, y = (0.95 * p for p in points)
-    data = 0.5 + 0.7 * ramp((0.4, 0.8)) * np.array([1, -1, 0.5])  # leaves [0, 1] at the rim
-    encoded = 0.5 + 0.7 * (0.4 * x + 0.8 * y)[:, None] * np.array([[1, -1, 0.5]])
-    shape = quad(mi, {"type": "diffuse", "reflectance": field(mi, data)}, UNIT)
-    np.testing.assert_allclose(radiance(mi, shape, x, y), srgb_to_linear(encoded.clip(0, 1)), atol=1e-3)
-    shape = quad(mi, {"type": "diffuse", "reflectance": field(mi, encoded.clip(0, 1)[None], raw=True)}, UNIT)
-    middle = (2 * (np.arange(50) + 0.5) / 50 - 1).astype(np.float32)  # every texel's centre
-    np.testing.assert_allclose(radiance(mi, shape, middle, 0 * middle), encoded.clip(0, 1), atol=1e-5)
-
-
-@pytest.mark.parametrize(("channel", "channels"), [(0, (0, 1, 2)), (2, (2, 3, 4)), (3, (3, 3, 3))])
-def test_channel_selects(mi, rng, points, channel: int, channels: tuple[int, ...]):
-    values = rng.uniform(0.1, 0.9, 5)
-    data = np.broadcast_to(values, (3, 4, 5))
-    bsdf = {"type": "diffuse", "reflectance": field(mi, data, raw=True, channel=channel)}
-    result = radiance(mi, quad(mi, bsdf, UNIT), *points)
-    np.testing.assert_allclose(result, np.broadcast_to(values[list(channels)], (50, 3)), atol=1e-6)
-
-
-LIGHT = np.array([0.3, 0.2, -1.0]) / np.linalg.norm([0.3, 0.2, -1.0])
-NESTED = {"type": "diffuse", "reflectance": 0.6}
-
-
-def test_bump_of_a_linear_height_tilts_the_normal(mi, points):
-    slope = (0.3, -0.5)
-    bsdf = {
-        "type": "bumpmap",
-        "height": field(mi, ramp(slope)),
-        "bsdf": NESTED,
-        "use_shadowing_function": False,
-    }
-    normal = np.array([-slope[0], -slope[1], 1]) / np.linalg.norm([*slope, 1])
-    expected = 0.6 * np.dot(normal, -LIGHT)
-    result = radiance(mi, quad(mi, bsdf, UNIT), *points, light=tuple(LIGHT))
-    np.testing.assert_allclose(result, expected, atol=1e-4)
-    assert abs(expected - 0.6 * -LIGHT[2]) > 0.05
-
-
-def test_normal_map_tilts_the_normal(mi, points):
-    normal = np.array([0.3, -0.2, 0.93])
-    normal /= np.linalg.norm(normal)
-    encoded = np.broadcast_to(0.5 * (normal + 1), (2, 2, 3))
-    bsdf = {
-        "type": "normalmap",
-        "normalmap": field(mi, encoded),
-        "bsdf": NESTED,
-        "use_shadowing_function": False,
-    }
-    result = radiance(mi, quad(mi, bsdf, UNIT), *points, light=tuple(LIGHT))
-    np.testing.assert_allclose(result, 0.6 * np.dot(normal, -LIGHT), atol=1e-5)
-
-
-def test_constant_field_equals_a_constant(mi):
-    """Albedo and roughness of a principled BSDF in a path-traced picture."""
-    color = {"type": "rgb", "value": [0.2, 0.5, 0.8]}
-    constant = {"type": "principled", "base_color": color, "roughness": 0.3}
-    data = np.broadcast_to([0.2, 0.5, 0.8, 0.3], (4, 8, 4))
-    varying = {
-        "type": "principled",
-        "base_color": field(mi, data, np.zeros((4, 8)), raw=True),
-        "roughness": field(mi, data, channel=3),
-    }
-    expected = sphere_picture(mi, constant)
-    np.testing.assert_allclose(sphere_picture(mi, varying), expected, rtol=1e-4, atol=1e-5)
-    smoother = varying | {"roughness": field(mi, data, channel=3, scale=0.5)}
-    assert np.abs(sphere_picture(mi, smoother) - expected).max() > 0.05 * expected.max()
-
-
 def feature_scene(mi, texture: dict, antialias: int, size: int = 12):
     """`feature` looking straight down on the whole quad."""
     camera = {
@@ -327,95 +200,3 @@ def test_feature_images_all_channels_with_their_adjoint(mi, rng, charts, antiali
     assert values.grad is not None
     expected = np.einsum("hwt,hwc->tc", weights, upstream)
     np.testing.assert_allclose(values.grad.numpy().reshape(54, 5), expected, atol=1e-3)
-
-
-def test_update_through_traverse(mi, points):
-    plugin = field(mi, np.full((4, 4, 3), 0.2), np.zeros((4, 4)), raw=True)
-    shape = quad(mi, {"type": "diffuse", "reflectance": plugin}, UNIT)
-    np.testing.assert_allclose(radiance(mi, shape, *points), 0.2, atol=1e-6)
-    params, key = mi.traverse(shape), "bsdf.reflectance."
-    params[key + "data"] = upload(mi.TensorXf, np.full((4, 4, 3), 0.7, np.float32))
-    params[key + "scale"] = 0.5
-    params.update()
-    np.testing.assert_allclose(radiance(mi, shape, *points), 0.35, atol=1e-6)
-    chart = np.zeros((4, 4), np.float32)
-    chart[:, 2:] = -1
-    params[key + "charts"] = mi.TensorXf(chart)
-    params.update()
-    x, y = points
-    far = x > 2 * (2.5 / 4) - 1  # none of the four texels is used
-    np.testing.assert_allclose(radiance(mi, shape, x, y)[:, 0], np.where(far, 0, 0.35), atol=1e-6)
-    for name, bad in (("data", (4, 12)), ("data", (4, 5, 3)), ("charts", (4, 4, 1))):
-        good = mi.TensorXf(params[key + name])
-        params[key + name] = upload(mi.TensorXf, np.zeros(bad, np.float32))
-        with pytest.raises(ConfigError, match="shape"):
-            params.update()
-        params[key + name] = good
-        params.update()
-
-
-def test_mean_max_and_resolution(mi, rng):
-    data, charts = rng.uniform(0, 0.9, (5, 7, 4)), rng.integers(-1, 3, (5, 7))
-    data[charts < 0] = 1
-    texture = mi.load_dict(field(mi, data, charts))
-    used = srgb_to_linear(data[charts >= 0][:, :3])
-    assert texture.mean()[0] == pytest.approx(used.mean(), rel=1e-4)
-    assert texture.max() == pytest.approx(used.max(), rel=1e-4)
-    plain = mi.load_dict(field(mi, data, raw=True, channel=3))
-    assert plain.mean()[0] == pytest.approx(data[..., 3].mean(), rel=1e-5)
-    assert list(texture.resolution()) == [7, 5]
-    assert texture.is_spatially_varying()
-
-
-def test_to_string(mi):
-    text = str(mi.load_dict(field(mi, np.zeros((7, 5, 2)), channel=1, scale=2.0)))
-    start = "TexelField[\n  resolution = [5, 7],\n  channels = 2,\n  filter = bilinear,\n  masked = false,\n"
-    assert text.startswith(start + "  channel = 1,\n  scale = [2]") and text.endswith("\n]")
-
-
-@pytest.mark.parametrize(
-    ("options", "problem"),
-    [
-        ({"chanel": 1}, "chanel"),
-        ({"channel": 3}, "use 0 to 2"),
-        ({"filter": "cubic"}, "bilinear or nearest"),
-        ({"data": None}, "data"),
-        ({"data": np.zeros((4, 3))}, "shape"),
-        ({"data": np.zeros((4, 0, 3))}, "shape"),
-        ({"data": np.full((4, 4, 3), np.nan)}, "not finite"),
-        ({"charts": np.zeros((4, 5))}, "'charts' has shape"),
-        ({"charts": np.full((4, 4), 0.5)}, "no integers from 0 on"),
-        ({"charts": np.full((4, 4), -2)}, "no integers from 0 on"),
-        ({"charts": np.full((4, 4), np.nan)}, "no integers from 0 on"),
-        ({"charts": np.full((4, 4), -1)}, "no texel"),
-    ],
-)
-def test_bad_properties_are_refused(mi, options: dict, problem: str):
-    plugin = field(mi, np.zeros((4, 4, 3)))
-    for key, value in options.items():
-        plugin[key] = (
-            upload(mi.TensorXf, value.astype(np.float32)) if isinstance(value, np.ndarray) else value
-        )
-    with pytest.raises(RuntimeError, match=problem):
-        mi.load_dict({k: v for k, v in plugin.items() if v is not None})
-
-
-def test_other_variants(mi, points):
-    """Registration follows the variant; mono shows luminance, spectral has no colours, scalar is refused."""
-    before = mi.variant()
-    try:
-        mi.set_variant("llvm_ad_mono")
-        texture = field(mi, np.full((4, 4, 3), (0.2, 0.5, 0.7)), raw=True)
-        value = radiance(mi, quad(mi, {"type": "diffuse", "reflectance": texture}, UNIT), *points)
-        np.testing.assert_allclose(value, 0.2 * 0.212671 + 0.5 * 0.715160 + 0.7 * 0.072169, atol=1e-5)
-        mi.set_variant("llvm_ad_spectral")
-        colour = mi.load_dict(field(mi, np.zeros((4, 4, 3))))
-        assert colour.eval_1(at(mi, np.array([(0.2, 0.3)])))[0] == 0
-        with pytest.raises(ConfigError, match="texel_field: colours need an rgb or mono"):
-            colour.eval(at(mi, np.array([(0.2, 0.3)])))
-        mi.set_variant("scalar_rgb")
-        with pytest.raises(RuntimeError, match="llvm or cuda"):
-            mi.load_dict(field(mi, np.zeros((4, 4, 3))))
-    finally:
-        mi.set_variant(before)
-    assert mi.load_dict(field(mi, np.zeros((4, 4, 3)))).channel_count == 3

@@ -15,7 +15,7 @@ TOOLS = Path(__file__).parents[2] / "tools"
 @pytest.fixture
 def tool(monkeypatch):
     monkeypatch.syspath_prepend(str(TOOLS))
-    for name in ("measure_words", "word_pictures", "word_patterns"):
+    for name in ("measure_words", "word_pictures", "word_patterns", "word_places"):
         monkeypatch.delitem(sys.modules, name, raising=False)
     return import_module("measure_words")
 

@@ -24,7 +24,7 @@ def seen(request, monkeypatch):
     monkeypatch.syspath_prepend(str(TOOLS))
     monkeypatch.delitem(sys.modules, "moved_figure", raising=False)
     one = grown(task("frequency=8", *VIEWS[request.param]))
-    (sphere,) = one.spheres
+    (sphere,) = one.meshes
     figure = import_module("moved_figure").MovedFigure(sphere, one.config.text_relief)
     cameras = one.banks[sphere].sight(0).cameras
     points = torch.tensor(sphere.mesh.vertices)

@@ -17,9 +17,13 @@ TOOLS = Path(__file__).parents[2] / "tools"
 MODULES = (
     "word_augmentation",
     "word_captions",
+    "word_materials",
     "word_patterns",
     "word_pictures",
+    "word_places",
     "word_retrieval",
+    "word_shapes",
+    "word_tilings",
     "train_words",
 )
 

@@ -14,11 +14,11 @@ from mitex.mesh.nearest import surface_points
 OF_VERTICES = (".npy", ".ply")  # files of vectors that belong to the vertices of one mesh
 
 
-def carried_field(given: Mesh, mesh: Mesh, source: str | Path | np.ndarray) -> np.ndarray:
+def carried_field(base: Mesh, mesh: Mesh, source: str | Path | np.ndarray) -> np.ndarray:
     """The `vector_field` of a mesh, from a source that may be of the vertices of another mesh.
 
     Args:
-        given: the mesh to whose vertices the vectors of a file or an array belong.
+        base: the mesh to whose vertices the vectors of a file or an array belong.
         mesh: V vertices; the same mesh, or one of nearly the same surface.
         source: see `mitex.mesh.fields`.
 
@@ -29,8 +29,8 @@ def carried_field(given: Mesh, mesh: Mesh, source: str | Path | np.ndarray) -> n
         ConfigError, MeshError: as of `vector_field`.
     """
     own = isinstance(source, np.ndarray) or Path(source).suffix.lower() in OF_VERTICES
-    if own and mesh is not given:
-        vectors = vector_field(given, source).astype(np.float64)
-        face, weights = surface_points(given, mesh.vertices.astype(np.float64))
-        source = interpolate(weights, vectors[given.faces[face]])
+    if own and mesh is not base:
+        vectors = vector_field(base, source).astype(np.float64)
+        face, weights = surface_points(base, mesh.vertices.astype(np.float64))
+        source = interpolate(weights, vectors[base.faces[face]])
     return vector_field(mesh, source)

@@ -51,7 +51,7 @@ class Animate(GrowthOptions):
     frames: Annotated[int, arg(metavar="N")] = 36
     """Frames: of each level's growth, or of the way from seed to seed."""
 
-    meshes: Annotated[Path | None, arg(metavar="FOLDER", help_behavior_hint="")] = None
+    meshes: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None
     """Write the mesh of each frame there too, as 0000.ply and so on."""
 
     resolution: Annotated[int, arg(metavar="N")] = 384

@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 
 from mitex.losses.chamfer import Samples, chamfer, sample_surface
 from mitex.mesh import Mesh
-from mitex.scenes.crossings import crossing_edges
+from mitex.mesh.self_intersections import piercing_pairs
 
 SAMPLES = 30_000
 
@@ -25,7 +25,7 @@ class FitReport:
         hausdorff: largest of these distances.
         normals: mean angle between the normals there [degrees].
         flipped: faces whose normal is more than a right angle away from that of the nearest point.
-        crossings: edges that pierce a face.
+        piercing: pairs of faces that pierce each other.
     """
 
     faces: int
@@ -33,12 +33,12 @@ class FitReport:
     hausdorff: float
     normals: float
     flipped: int
-    crossings: int
+    piercing: int
 
     def __str__(self) -> str:
         return (
             f"{self.faces:,} faces, distance {self.chamfer:.4f} (largest {self.hausdorff:.3f}), normals off "
-            f"by {self.normals:.0f} degrees, {self.flipped} flipped faces, {self.crossings} crossing edges"
+            f"by {self.normals:.0f} degrees, {self.flipped} flipped faces, {self.piercing} piercing pairs"
         )
 
 
@@ -59,7 +59,7 @@ def report(mesh: Mesh, reference: Mesh, seed: int = 0) -> FitReport:
         hausdorff=far / extent,
         normals=float(np.degrees(np.arccos(np.clip(1 - (cos_to + cos_back) / 2, -1, 1)))),
         flipped=int(((mesh.face_normals * nearest).sum(1) < 0).sum()),
-        crossings=len(crossing_edges(mesh)),
+        piercing=len(piercing_pairs(mesh)),
     )
 
 

@@ -26,7 +26,7 @@ __all__ = [
     "MeshNCA",
     "NcaConfig",
     "NcaTexture",
-    "Shooting",
+    "FilmSettings",
     "fit",
     "fit_text",
     "graft_weights",
@@ -42,7 +42,7 @@ __getattr__ = attributes(
         "MeshNCA": "mitex.methods.nca.model",
         "GrowingTexture": "mitex.methods.nca.texture",
         "NcaTexture": "mitex.methods.nca.texture",
-        "Shooting": "mitex.methods.nca.film",
+        "FilmSettings": "mitex.methods.nca.film",
         "graft_weights": "mitex.methods.nca.weights",
         "living_page": "mitex.methods.nca.page",
         "fit": "mitex.methods.nca.fitting",
@@ -52,7 +52,7 @@ __getattr__ = attributes(
 
 if TYPE_CHECKING:
     from mitex.methods.nca.config import PRESETS, NcaConfig
-    from mitex.methods.nca.film import Shooting
+    from mitex.methods.nca.film import FilmSettings
     from mitex.methods.nca.fitting import fit
     from mitex.methods.nca.graft import Graft
     from mitex.methods.nca.model import MeshNCA

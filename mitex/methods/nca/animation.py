@@ -105,9 +105,9 @@ class Animate(GrowthOptions):
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()
-        from mitex.methods.nca.film import Shooting
+        from mitex.methods.nca.film import FilmSettings
 
-        target = Shooting(**self._shooting()).recording(self.out, {}).target
+        target = FilmSettings(**self._settings()).recording(self.out, {}).target
         if target.suffix.lower() in VIDEOS:
             prepare_output(target, inputs=[*mesh_files(self.mesh), *self._inputs()])
         from mitex.mesh import Mesh
@@ -125,7 +125,7 @@ class Animate(GrowthOptions):
             resume=self.resume,
             seed=self.seed,
             **self.growth(),
-            **self._shooting(),
+            **self._settings(),
         )
         print(self.out)
 
@@ -155,8 +155,8 @@ class Animate(GrowthOptions):
         named = (self.model, self.graft, self.weights)
         return [*(name for name in named if name is not None), *self.growth_files()]
 
-    def _shooting(self) -> dict[str, Any]:
-        """Arguments of `Shooting`."""
+    def _settings(self) -> dict[str, Any]:
+        """Arguments of `FilmSettings`."""
         same = (
             "seconds",
             "fps",

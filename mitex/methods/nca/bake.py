@@ -22,7 +22,7 @@ from mitex.progress import announce
 CHUNK = 1 << 18  # points that are decoded at a time
 
 
-class Grown:
+class GrownTexture:
     """A state on an automaton's mesh, and what it shows at points of the mesh that the texture is for.
 
     Args:
@@ -49,7 +49,7 @@ class Grown:
 
     @torch.no_grad()
     def values(self, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
-        """Values (P, K) float32, clipped to [0, 1], at points of the given mesh; columns as `look.layout`."""
+        """Values (P, K) float32, clipped to [0, 1], at points of the base mesh; columns as `look.layout`."""
         parts = [np.empty((0, sum(MAPS[name] for name in self.look.maps)), np.float32)]
         for start in range(0, len(face), CHUNK):
             chunk = slice(start, start + CHUNK)
@@ -58,30 +58,30 @@ class Grown:
             parts.append(self._decoded(points))
         return np.concatenate(parts)
 
-    def held(self, values: np.ndarray) -> np.ndarray:
+    def project(self, values: np.ndarray) -> np.ndarray:
         """Values (P, K) whose albedos are within the exemplar's colours, if these are known."""
         if self.palette is None:
             return values
         values, columns = values.copy(), list(self.look.layout["albedo"])
-        values[:, columns] = self.palette.held(values[:, columns])
+        values[:, columns] = self.palette.project(values[:, columns])
         return values
 
     def _decoded(self, points: Points) -> np.ndarray:
         """Values (P, K) at points of the automaton's mesh."""
-        return self.held(self.look.decoder(self.surface, self.table, points).clamp_(0, 1).numpy())
+        return self.project(self.look.decoder(self.surface, self.table, points).clamp_(0, 1).numpy())
 
     def at_vertices(self) -> dict[str, np.ndarray]:
-        """Maps (V, c) at the vertices of the given mesh."""
+        """Maps (V, c) at the vertices of the base mesh."""
         return self.maps(self.values(*self._vertices()))
 
     def asset(self) -> Asset:
-        """The given mesh with the maps at its vertices."""
-        mesh = self.cells.given
+        """The base mesh with the maps at its vertices."""
+        mesh = self.cells.base
         right = self._right(mesh.normals, *self._vertices())
         return Asset(mesh, self.at_vertices(), right, name=mesh.name)
 
     def textures(self, atlas: Atlas) -> dict[str, np.ndarray]:
-        """Maps (N, N, c) on the texels of a layout of the given mesh; the mean where there is no chart."""
+        """Maps (N, N, c) on the texels of a layout of the base mesh; the mean where there is no chart."""
         side, maps = atlas.resolution, self.look.maps
         images = {name: np.zeros((side, side, MAPS[name]), np.float32) for name in maps}
         for rows in atlas.strips():
@@ -93,7 +93,7 @@ class Grown:
         empty = atlas.face < 0
         for name, image in images.items():
             if name == "normal":
-                images[name] = atlas.normal_map(self.cells.given, image)
+                images[name] = atlas.normal_map(self.cells.base, image)
             elif not empty.all():
                 image[empty] = image[~empty].mean(axis=0)
         return images
@@ -103,8 +103,8 @@ class Grown:
         return {name: values[:, list(columns)] for name, columns in self.look.layout.items()}
 
     def object_normals(self, encoded: np.ndarray, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
-        """Normals in object space (P, 3) of a normal map's values at points of the given mesh."""
-        mesh = self.cells.given
+        """Normals in object space (P, 3) of a normal map's values at points of the base mesh."""
+        mesh = self.cells.base
         normals = unit(interpolate(barycentric, mesh.shading_normals[face]))
         right = self._right(normals, face, barycentric)
         x, y, z = (encoded * 2 - 1).T[..., None]
@@ -113,7 +113,7 @@ class Grown:
     def detail_normals(
         self, maps: Mapping[str, np.ndarray], normals: np.ndarray, face: np.ndarray, barycentric: np.ndarray
     ) -> np.ndarray:
-        """Unit normals in object space (P, 3) of what it shows at points of the given mesh.
+        """Unit normals in object space (P, 3) of what it shows at points of the base mesh.
 
         Args:
             maps: (P, c) by name, of these points.
@@ -123,12 +123,12 @@ class Grown:
         return unit(self.object_normals(maps["normal"], face, barycentric)) if "normal" in maps else normals
 
     def _vertices(self) -> tuple[np.ndarray, np.ndarray]:
-        """A face (V,) and barycentrics (V, 3) of each vertex of the given mesh."""
-        points = vertex_points(self.cells.given)
+        """A face (V,) and barycentrics (V, 3) of each vertex of the base mesh."""
+        points = vertex_points(self.cells.base)
         return points.face.numpy(), points.barycentric.numpy()
 
     def _right(self, normals: np.ndarray, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
-        """Where the exemplar's right points, (P, 3) unit, at points of the given mesh with these normals.
+        """Where the exemplar's right points, (P, 3) unit, at points of the base mesh with these normals.
 
         Training views have +y up, so without a turn right is y x normal.
         """

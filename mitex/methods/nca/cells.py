@@ -1,7 +1,7 @@
 """The mesh that an automaton runs on, beside the mesh that its texture is for.
 
 A cell sits at each vertex, and the size of a pattern follows their density. So a mesh is subdivided, or
-meshed anew, for the automaton alone; points of the given mesh are looked up on it.
+meshed anew, for the automaton alone; points of the base mesh are looked up on it.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ class Cells:
 
     Attributes:
         mesh: with a cell at each vertex.
-        levels: rounds of midpoint subdivision that made it of the given mesh; None if it was meshed anew.
-        given: the mesh that the texture is for.
+        levels: rounds of midpoint subdivision that made it of the base mesh; None if it was meshed anew.
+        base: the mesh that the texture is for.
     """
 
     mesh: Mesh
     levels: int | None
-    given: Mesh
+    base: Mesh
 
     @staticmethod
     def of(mesh: Mesh, subdivide: int | str = "auto", scale: float = 1.0) -> Cells:
@@ -58,10 +58,10 @@ class Cells:
         return Cells(fine, 0, fine)
 
     def locate(self, face: np.ndarray, barycentric: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Faces (P,) and barycentrics (P, 3) on the automaton's mesh of points of the given one."""
+        """Faces (P,) and barycentrics (P, 3) on the automaton's mesh of points of the base mesh."""
         if self.levels is not None:
             return child_points(face, barycentric, self.levels)
-        corners = self.given.vertices[self.given.faces[face]]
+        corners = self.base.vertices[self.base.faces[face]]
         return nearest_points(self.mesh, interpolate(barycentric, corners))
 
 

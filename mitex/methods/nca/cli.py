@@ -56,7 +56,7 @@ class Fit(DeviceOptions, ExemplarOrWordsOptions):
     --motion) and `motion-paper` likewise, for textures that move; `text`, `text-words` (the default with the
     small embedded model) and `text-paper`, for those from words."""
 
-    init: Annotated[str | None, arg(metavar="MODEL|RUN", help_behavior_hint="")] = None
+    init: Annotated[str | None, arg(metavar="RUN|MODEL", help_behavior_hint="")] = None
     """Start from the weights of a model or a run; of the still texture, for one that shall move. The preset
     `text` starts from a model in any case."""
 
@@ -70,7 +70,7 @@ class Fit(DeviceOptions, ExemplarOrWordsOptions):
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()
-        print(self.fitted(options))
+        print(self.fit(options))
 
     def check_source(self) -> None:
         super().check_source()
@@ -116,7 +116,7 @@ class Apply(BakedOptions, ReliefOptions):
     examples:
       mitex apply runs/pebbles --mesh bunny.obj --out bunny.glb
       mitex apply pebbles --mesh bunny.obj --out bunny.glb --subdivide 2 --resolution 2048
-      mitex apply pebbles --mesh scan.ply --out scan.glb --vertex-colors --seed 7 --orientation 45
+      mitex apply pebbles --mesh scan.ply --out scan.glb --vertex-colours --seed 7 --orientation 45
       mitex apply pebbles --mesh bunny.obj --out bunny.glb --variants 5
       mitex apply pebbles --mesh bunny.obj --out bunny.html --looks lava,knit
       mitex apply pebbles --mesh bunny.obj --out maps/ --maps-format exr
@@ -154,8 +154,11 @@ class Apply(BakedOptions, ReliefOptions):
         in_range("--seed", self.seed + self.variants - 1, *SEEDS)
         in_range("--exemplar-width", self.exemplar_width, 1e-3, 100.0)
         mutually_exclusive("--exemplar-width", "--scale", self.exemplar_width is not None and self.scale != 1)
-        mutually_exclusive("--variants", "--vertex-colors", self.variants > 1 and self.vertex_colors)
-        for option, used in {"--variants": self.variants > 1, "--vertex-colors": self.vertex_colors}.items():
+        mutually_exclusive("--variants", "--vertex-colours", self.variants > 1 and self.vertex_colours)
+        for option, used in {
+            "--variants": self.variants > 1,
+            "--vertex-colours": self.vertex_colours,
+        }.items():
             mutually_exclusive("--relief", option, self.relief is not None and used)
         self._check_tile()
 
@@ -175,7 +178,7 @@ class Apply(BakedOptions, ReliefOptions):
             "--scale": self.scale != 1,
             "--exemplar-width": self.exemplar_width is not None,
             "--resolution": self.resolution is not None,
-            "--vertex-colors": self.vertex_colors,
+            "--vertex-colours": self.vertex_colours,
             "--keep-dense": self.keep_dense,
             "--displace": self.displace,
             "--relief": self.relief is not None,
@@ -190,9 +193,9 @@ class Apply(BakedOptions, ReliefOptions):
     def inputs(self) -> list[Path | str]:
         return [*super().inputs(), *self._looks, *self.growth_files()]
 
-    def prepared(self) -> Path:
+    def output_path(self) -> Path:
         if self.tile is None:
-            return super().prepared()
+            return super().output_path()
         from mitex.export import check_folder
         from mitex.paths import expanded
 
@@ -202,7 +205,7 @@ class Apply(BakedOptions, ReliefOptions):
         suffix = out.suffix.lower()
         if self.tile is None:
             coloured = suffix in (".glb", ".ply", *PICTURES)
-            reject_unused("--vertex-colors", out, self.vertex_colors and not coloured)
+            reject_unused("--vertex-colours", out, self.vertex_colours and not coloured)
             reject_unused("--resolution", out, self.resolution is not None and suffix == ".ply")
             reject_unused("--variants", out, self.variants > 1 and suffix != ".glb")
             page = suffix == PAGE

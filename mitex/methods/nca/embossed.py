@@ -16,18 +16,18 @@ from mitex.geometry.normal_maps import encode
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import orthonormal, unit
 from mitex.mesh import Mesh
-from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.bake import GrownTexture
 from mitex.methods.nca.decoder.surface import vertex_points
 from mitex.methods.nca.displacement import Displacement
 
 
-class Embossed(Grown):
-    """As `Grown`, with a normal map that follows from the height.
+class EmbossedTexture(GrownTexture):
+    """As `GrownTexture`, with a normal map that follows from the height.
 
     Args:
         relief: of the automaton's mesh.
         moved: whether the vertices are moved too; the normal map then tells what they do not.
-        grown: arguments of `Grown`, or of the class that is derived from both, in their order.
+        grown: arguments of `GrownTexture`, or of the class that is derived from both, in their order.
     """
 
     def __init__(self, relief: Displacement, moved: bool, *grown: Any) -> None:
@@ -47,7 +47,7 @@ class Embossed(Grown):
         detail = np.zeros((*atlas.face.shape, 3), np.float32)
         for rows in atlas.strips():
             used, face, barycentric = atlas.points(rows)
-            normals = unit(interpolate(barycentric, self.cells.given.shading_normals[face]))
+            normals = unit(interpolate(barycentric, self.cells.base.shading_normals[face]))
             detail[rows][used] = self._normals(normals, face, barycentric)
         return super().textures(atlas) | {"normal": atlas.normal_map(self._mesh, detail)}
 
@@ -65,19 +65,19 @@ class Embossed(Grown):
 
     @cached_property
     def _mesh(self) -> Mesh:
-        """The given mesh, moved if it shall be."""
-        mesh = self.cells.given
+        """The base mesh, moved if it shall be."""
+        mesh = self.cells.base
         if not self.moved:
             return mesh
         offsets = self._at(self.relief.offsets(self._height)[:, None].numpy(), *self._vertices())
         return mesh.with_vertices(mesh.vertices + offsets * mesh.normals)
 
     def _normals(self, normals: np.ndarray, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
-        """Normals of the relief (P, 3) at points of the given mesh, given its own there."""
+        """Normals of the relief (P, 3) at points of the base mesh, given its own there."""
         slopes = self._at(self.relief.slopes(self._height).numpy(), face, barycentric)
         return unit(normals - slopes).astype(np.float32)
 
     def _at(self, values: np.ndarray, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
-        """Values (V, C) of the automaton's vertices at points of the given mesh, (P, C)."""
+        """Values (V, C) of the automaton's vertices at points of the base mesh, (P, C)."""
         located, weights = self.cells.locate(face, barycentric)
         return interpolate(weights, values[self.cells.mesh.faces[located]])

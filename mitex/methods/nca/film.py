@@ -20,7 +20,7 @@ from mitex.errors import ConfigError
 from mitex.geometry.triangles import interpolate
 from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh
-from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.bake import GrownTexture
 from mitex.methods.nca.growth import Growth
 from mitex.methods.nca.ranges import MOST_STEPS
 from mitex.methods.nca.region import region
@@ -35,7 +35,7 @@ OF_THE_FILM = ("seconds", "loop")  # what no single picture follows from
 
 
 @dataclass(frozen=True)
-class Shooting:
+class FilmSettings:
     """How a texture is filmed.
 
     Attributes:
@@ -127,26 +127,26 @@ class Shooting:
 
 
 def film(
-    growth: Growth, path: str | os.PathLike[str], shooting: Shooting, seed: int, resume: bool = False
+    growth: Growth, path: str | os.PathLike[str], settings: FilmSettings, seed: int, resume: bool = False
 ) -> Path:
     """Films what grows, on the mesh that it is for.
 
     Args:
         growth: the automaton.
         path, resume: as of `GrowingTexture.animate`; errors too.
-        shooting: how, `start` among it.
+        settings: how, `start` among it.
         seed: of the random updates.
     """
-    mesh = growth.cells.given
-    states = States(growth, shooting, seed, shooting.damaged(growth.cells.mesh))
+    mesh = growth.cells.base
+    states = States(growth, settings, seed, settings.damaged(growth.cells.mesh))
     scene = {"mesh": content_key(mesh.vertices, mesh.faces), "texture": growth.key, "seed": seed}
-    scene |= {name: value for name, value in asdict(shooting).items() if name not in OF_THE_FILM}
-    recording = shooting.recording(path, scene)
+    scene |= {name: value for name, value in asdict(settings).items() if name not in OF_THE_FILM}
+    recording = settings.recording(path, scene)
     keep_freed_memory()
-    camera: Camera = (PreviewCamera if shooting.renderer == "preview" else TracedCamera)(mesh, shooting)
+    camera: Camera = (PreviewCamera if settings.renderer == "preview" else TracedCamera)(mesh, settings)
 
     def pictures(done: int) -> Iterator[np.ndarray]:
-        return map(camera.picture, map(growth.shown, states.frames(done, recording.pictures)))
+        return map(camera.picture, map(growth.texture, states.frames(done, recording.pictures)))
 
     return recording.record(pictures, resume)
 
@@ -156,12 +156,12 @@ class States:
     """The states of a film's frames.
 
     Attributes:
-        growth, shooting, seed: as of `film`.
+        growth, settings, seed: as of `film`.
         damage: (V,) bool, the cells that are set back; None for none.
     """
 
     growth: Growth
-    shooting: Shooting
+    settings: FilmSettings
     seed: int
     damage: torch.Tensor | None
 
@@ -170,7 +170,7 @@ class States:
         exactly as if it had not been interrupted.
         """
         generator = torch.Generator().manual_seed(self.seed)
-        state = self.growth.evolve(self.growth.seed(), self.shooting.start or 0, generator)
+        state = self.growth.evolve(self.growth.seed(), self.settings.start or 0, generator)
         for frame in range(done):
             announce("growing what has been filmed", frame, done)
             state = self._next(self._damaged(state, frame), generator)
@@ -185,18 +185,18 @@ class States:
             state = self._next(state, generator)
 
     def _damaged(self, state: torch.Tensor, frame: int) -> torch.Tensor:
-        if self.damage is None or frame != self.shooting.damaged_frame:
+        if self.damage is None or frame != self.settings.damaged_frame:
             return state
         return torch.where(self.damage[:, None], 0.0, state)
 
     def _next(self, state: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
-        return self.growth.evolve(state, self.shooting.steps_per_frame, generator)
+        return self.growth.evolve(state, self.settings.steps_per_frame, generator)
 
 
 class Camera(Protocol):
     """Takes pictures of states on one mesh."""
 
-    def picture(self, grown: Grown) -> np.ndarray:
+    def picture(self, grown: GrownTexture) -> np.ndarray:
         """(H, W, 3) sRGB in [0, 1] of what a state shows."""
         ...
 
@@ -204,18 +204,18 @@ class Camera(Protocol):
 class PreviewCamera:
     """Direct light, in a fraction of a second a picture."""
 
-    def __init__(self, mesh: Mesh, shooting: Shooting) -> None:
+    def __init__(self, mesh: Mesh, settings: FilmSettings) -> None:
         self._renderer = PreviewRenderer(
             mesh,
-            resolution=shooting.resolution,
-            azimuth=shooting.azimuth,
-            elevation=shooting.elevation,
+            resolution=settings.resolution,
+            azimuth=settings.azimuth,
+            elevation=settings.elevation,
         )
         self._normals = unit(
             interpolate(self._renderer.barycentric, mesh.shading_normals[self._renderer.face])
         )
 
-    def picture(self, grown: Grown) -> np.ndarray:
+    def picture(self, grown: GrownTexture) -> np.ndarray:
         points = self._renderer.face, self._renderer.barycentric
         maps = grown.maps(grown.values(*points))
         albedo = maps.get("albedo", np.full((len(self._normals), 3), linear_to_srgb(DEFAULT_ALBEDO)))
@@ -226,17 +226,17 @@ class PreviewCamera:
 class TracedCamera:
     """The path tracer, with textures baked for each picture."""
 
-    def __init__(self, mesh: Mesh, shooting: Shooting) -> None:
-        self._shooting = shooting
-        self._atlas = Atlas.build(mesh, shooting.texels, layout=mesh.uv)
+    def __init__(self, mesh: Mesh, settings: FilmSettings) -> None:
+        self._settings = settings
+        self._atlas = Atlas.build(mesh, settings.texels, layout=mesh.uv)
         self._renderer: OrbitRenderer | None = None
 
-    def picture(self, grown: Grown) -> np.ndarray:
+    def picture(self, grown: GrownTexture) -> np.ndarray:
         asset = replace(grown.asset(), atlas=self._atlas, texture_maps=grown.textures(self._atlas))
-        shooting = self._shooting
+        settings = self._settings
         if self._renderer is None:
-            self._renderer = OrbitRenderer(asset, resolution=shooting.resolution)
-            self._view = self._renderer.fit_view(shooting.azimuth, shooting.elevation)
+            self._renderer = OrbitRenderer(asset, resolution=settings.resolution)
+            self._view = self._renderer.fit_view(settings.azimuth, settings.elevation)
         else:
             self._renderer.show(asset)
-        return tone(self._renderer.render(shooting.azimuth, self._view, shooting.spp))
+        return tone(self._renderer.render(settings.azimuth, self._view, settings.spp))

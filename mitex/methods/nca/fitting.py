@@ -10,12 +10,12 @@ from mitex.exemplar import Exemplar
 from mitex.methods.nca import files
 from mitex.methods.nca.look import Look, weights_key
 from mitex.methods.nca.motion.start import (
+    check_albedo,
     check_field,
-    check_seen,
-    learner,
+    motion_options,
     motion_record,
-    moving,
     presets_from,
+    training_look,
 )
 from mitex.methods.nca.motion.task import MotionTask
 from mitex.methods.nca.palette import Palette
@@ -55,7 +55,7 @@ def fit(
         Interrupted: by Ctrl-C, likewise.
     """
     parent, about = (None, {}) if init is None else files.load(init)
-    settings = options if motion is None else moving(options, motion)
+    settings = options if motion is None else motion_options(options, motion)
     run = Run.of(presets_from(about, motion), out, **settings)
     config = run.config
     if config.text is not None:
@@ -65,13 +65,13 @@ def fit(
     if config.motion:
         check_field(config.motion)
     maps = Exemplar.of(exemplar)
-    check_seen(config, maps.maps)
+    check_albedo(config, maps.maps)
     origin: dict[str, Any] = {"exemplar": maps.name, "density": config.density}
     if "albedo" in maps.maps:
         origin["palette"] = Palette.of(maps.maps["albedo"]).record()
     lineage = resumed_lineage(run)
     if parent is not None:
-        parent = learner(config, parent)
+        parent = training_look(config, parent)
         lineage = fitting_lineage(parent, about, Look.of(config, sorted(maps.maps)))
     origin |= motion_record(config)
     task = (MotionTask if config.motion else NcaTask)(config, maps, parent, lineage)

@@ -19,13 +19,13 @@ import torch
 from mitex.cache import content_key
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh
-from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.bake import GrownTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.decoder.surface import Points
-from mitex.methods.nca.embossed import Embossed
+from mitex.methods.nca.embossed import EmbossedTexture
 from mitex.methods.nca.growth import Growth, LookGrowth
-from mitex.methods.nca.look import differing_traits, held
+from mitex.methods.nca.look import clamp_state, differing_traits
 from mitex.methods.nca.model import FIRE_RATE
 from mitex.methods.nca.motion.condition import Field
 from mitex.methods.nca.motion.start import with_condition
@@ -76,12 +76,12 @@ class Graft(GrowingTexture):
     def growth_on(
         self,
         cells: Cells,
-        given: Mesh,
+        base: Mesh,
         orientation: Orientation = 0.0,
         field: Field | None = None,
         speed: float = 1.0,
     ) -> GraftedGrowth:
-        place = cells, given, orientation, field, speed
+        place = cells, base, orientation, field, speed
         first, second = (texture.growth_on(*place) for texture in (self.first, self.second))
         return GraftedGrowth(first, second, self.weights(cells.mesh.vertices.astype(np.float64)))
 
@@ -131,10 +131,10 @@ class GraftedGrowth(Growth):
             state = self._step(state[None], generator)[0]
         return state
 
-    def shown(self, state: torch.Tensor) -> Grown:
-        parts = self.first.shown(state), self.second.shown(state), self.weights
+    def texture(self, state: torch.Tensor) -> GrownTexture:
+        parts = self.first.texture(state), self.second.texture(state), self.weights
         if not np.any(self.relief):
-            return GraftedGrown(*parts)
+            return GrownGraft(*parts)
         return EmbossedGraft(self._displacement, self.moved, *parts)
 
     def foreign(self, state: torch.Tensor) -> np.ndarray:
@@ -159,7 +159,7 @@ class GraftedGrowth(Growth):
             else state
             for growth, own in parts
         )
-        mixed = held(torch.lerp(first, second, self._share[:, None]), self._low, self._high)
+        mixed = clamp_state(torch.lerp(first, second, self._share[:, None]), self._low, self._high)
         first, second = (
             mixed if growth.motion.advection is None else growth.motion.advection(mixed)
             for growth in (self.first, self.second)
@@ -167,7 +167,7 @@ class GraftedGrowth(Growth):
         return torch.lerp(first, second, self._share[:, None])
 
 
-class GraftedGrown(Grown):
+class GrownGraft(GrownTexture):
     """A state on an automaton's mesh, as two looks show it, mixed.
 
     Args:
@@ -175,7 +175,7 @@ class GraftedGrown(Grown):
         weights: (V,) float32, the second's share at each vertex of the automaton's mesh.
     """
 
-    def __init__(self, first: Grown, second: Grown, weights: np.ndarray) -> None:
+    def __init__(self, first: GrownTexture, second: GrownTexture, weights: np.ndarray) -> None:
         self.look, self.cells, self.orientation = first.look, first.cells, first.orientation
         self.surface, self.table = first.surface, first.table
         self.first, self.second, self.weights = first, second, weights
@@ -190,7 +190,7 @@ class GraftedGrown(Grown):
         else:  # the maps are channels of the state, for both
             values = own(*place)
         values = values.clamp_(0, 1).numpy()
-        first, second = (torch.from_numpy(grown.held(values)) for grown in (self.first, self.second))
+        first, second = (torch.from_numpy(grown.project(values)) for grown in (self.first, self.second))
         return torch.lerp(first, second, share).numpy()
 
     def _share(self, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
@@ -199,5 +199,5 @@ class GraftedGrown(Grown):
         return np.clip(a + barycentric[:, 1] * (b - a) + barycentric[:, 2] * (c - a), 0, 1)
 
 
-class EmbossedGraft(Embossed, GraftedGrown):
-    """The same of looks with reliefs, whose bounds are mixed too; arguments as of `Embossed`."""
+class EmbossedGraft(EmbossedTexture, GrownGraft):
+    """The same of looks with reliefs, whose bounds are mixed too; arguments as of `EmbossedTexture`."""

@@ -55,7 +55,7 @@ class Grafted(BakedOptions, MeshOptions):
     def check_output(self, out: Path) -> None:
         suffix = out.suffix.lower()
         reject_unused(
-            "--vertex-colors", out, self.vertex_colors and suffix not in (".glb", ".ply", *PICTURES)
+            "--vertex-colours", out, self.vertex_colours and suffix not in (".glb", ".ply", *PICTURES)
         )
         reject_unused("--resolution", out, self.resolution is not None and suffix == ".ply")
 

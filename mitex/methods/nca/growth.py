@@ -12,11 +12,11 @@ import torch
 
 from mitex.cache import content_key
 from mitex.errors import ConfigError
-from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.bake import GrownTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.surface import Surface
 from mitex.methods.nca.displacement import Displacement
-from mitex.methods.nca.embossed import Embossed
+from mitex.methods.nca.embossed import EmbossedTexture
 from mitex.methods.nca.look import Look, weights_key
 from mitex.methods.nca.motion.cell_motion import STILL, CellMotion
 from mitex.methods.nca.orientation import Turn
@@ -55,7 +55,7 @@ class Growth(ABC):
         """The state (V, C) after some steps, held within the bounds of the training."""
 
     @abstractmethod
-    def shown(self, state: torch.Tensor) -> Grown:
+    def texture(self, state: torch.Tensor) -> GrownTexture:
         """What a state (V, C) looks like on the mesh that the texture is for."""
 
     def displaced(self) -> Self:
@@ -121,15 +121,17 @@ class LookGrowth(Growth):
         motion = self.motion.condition, self.motion.advection
         return self.look.evolve(state[None], self.operator, steps, generator, *motion)[0]
 
-    def shown(self, state: torch.Tensor) -> Grown:
+    def texture(self, state: torch.Tensor) -> GrownTexture:
         parts = (self.look, state, self.cells, self.orientation, self.palette, self._surface)
-        return Embossed(self._displacement, self.moved, *parts) if self.relief else Grown(*parts)
+        return (
+            EmbossedTexture(self._displacement, self.moved, *parts) if self.relief else GrownTexture(*parts)
+        )
 
     def foreign(self, state: torch.Tensor) -> np.ndarray:
         if self.palette is None:
             return np.zeros(len(state), bool)
         own = Cells(self.cells.mesh, 0, self.cells.mesh)
-        grown = Grown(self.look, state, own, surface=self._surface)
+        grown = GrownTexture(self.look, state, own, surface=self._surface)
         return self.palette.unlike(grown.at_vertices()["albedo"])
 
     @cached_property

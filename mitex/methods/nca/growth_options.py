@@ -76,7 +76,7 @@ class BakedOptions(GrowthOptions):
     resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {RESOLUTION})")] = None
     """Side of the baked textures [texels]."""
 
-    vertex_colors: Annotated[bool, arg(help_behavior_hint="")] = False
+    vertex_colours: Annotated[bool, arg(help_behavior_hint="")] = False
     """Write colours at the vertices instead of textures."""
 
     def check_growth(self) -> None:
@@ -84,12 +84,12 @@ class BakedOptions(GrowthOptions):
         in_range("--steps", self.steps, 1, MOST_STEPS)
         in_range("--resolution", self.resolution, *BAKED)
         mutually_exclusive(
-            "--resolution", "--vertex-colors", self.resolution is not None and self.vertex_colors
+            "--resolution", "--vertex-colours", self.resolution is not None and self.vertex_colours
         )
 
     def baked(self, suffix: str) -> dict[str, Any]:
         """What Python takes for a file of this kind, but the seed."""
-        textures = suffix != ".ply" and not self.vertex_colors
+        textures = suffix != ".ply" and not self.vertex_colours
         resolution = (self.resolution or RESOLUTION) if textures else None
         return {"steps": self.steps, "resolution": resolution, **self.growth()}
 

@@ -34,7 +34,7 @@ def healed(growth: Growth, state: torch.Tensor, generator: torch.Generator) -> t
     places = growth.foreign(state)
     if inner(cells.mesh, places).any():
         warnings.warn(
-            f"{places.mean():.1%} of '{cells.given.name}' has colours that the exemplar does not have; "
+            f"{places.mean():.1%} of '{cells.base.name}' has colours that the exemplar does not have; "
             "try another seed, or remesh it evenly",
             TextureWarning,
             stacklevel=5,

@@ -114,18 +114,18 @@ class Look(nn.Module):
         """
         for step in range(steps):
             announce("growing the texture", step, steps)
-            state = self.bounded(self.rule.evolve(state, operator, 1, generator, condition))
+            state = self.clamp(self.rule.evolve(state, operator, 1, generator, condition))
             state = state if advection is None else advection(state)
         return state
 
-    def bounded(self, state: torch.Tensor) -> torch.Tensor:
+    def clamp(self, state: torch.Tensor) -> torch.Tensor:
         """The state (..., C) held where the training's states were: on meshes unlike the sphere it may grow
         without an end, as nothing has taught the rule to come back.
         """
-        return held(state, self.low, self.high)
+        return clamp_state(state, self.low, self.high)
 
 
-def held(state: torch.Tensor, low: torch.Tensor, high: torch.Tensor) -> torch.Tensor:
+def clamp_state(state: torch.Tensor, low: torch.Tensor, high: torch.Tensor) -> torch.Tensor:
     """States (..., C) within bounds (..., C) and a margin beyond them."""
     margin = MARGIN * (high - low)
     return torch.minimum(torch.maximum(state, low - margin), high + margin)

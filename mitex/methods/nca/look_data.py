@@ -12,7 +12,7 @@ from mitex.methods.nca.decoder.decoder import Decoder, Readout
 from mitex.methods.nca.decoder.surface import EDGE
 from mitex.methods.nca.displacement import known_relief
 from mitex.methods.nca.look import MARGIN, traits
-from mitex.methods.nca.motion.cell_motion import carried, fastest, period
+from mitex.methods.nca.motion.cell_motion import fastest, is_advected, period
 from mitex.methods.nca.palette import NEARLY, TOLERANCE, Palette
 from mitex.methods.nca.texture import NcaTexture
 from mitex.page import packed
@@ -29,7 +29,7 @@ def look_data(texture: NcaTexture) -> dict[str, Any]:
         "family": content_key(texture.family, repr(sorted(traits(look).items()))),
         "relief": 0.0 if "normal" in look.maps else 2 * EDGE * known_relief(texture.about, look.maps),
         "fastest": longest if np.isfinite(longest) else None,
-        "carried": carried(look, texture.about),
+        "carried": is_advected(look, texture.about),
         "period": period(texture.about),
         "channels": rule.channels,
         "hidden": rule.hidden,

@@ -18,20 +18,20 @@ Turn = float | np.ndarray
 """An angle about the normals [rad]: one, or (V,) of the vertices of an automaton's mesh."""
 
 
-def cell_turns(orientation: Orientation, cells: Mesh, given: Mesh) -> Turn:
+def cell_turns(orientation: Orientation, cells: Mesh, base: Mesh) -> Turn:
     """The angle by which the texture is turned, counter-clockwise, from where its up is +y.
 
     Args:
         orientation: an angle, or a field that the exemplar's up follows.
         cells: V vertices.
-        given: the mesh whose vertices the vectors of a file or an array belong to.
+        base: the mesh whose vertices the vectors of a file or an array belong to.
 
     Raises:
         ConfigError: a field that cannot be used on the mesh.
     """
     if isinstance(orientation, int | float):
         return math.radians(orientation)
-    vectors = cell_vectors(given, cells, orientation, 1.0).astype(np.float64)
+    vectors = cell_vectors(base, cells, orientation, 1.0).astype(np.float64)
     normals = unit(cells.normals.astype(np.float64))
     right = rightwards(normals)
     return np.arctan2(-dot(vectors, right), dot(vectors, np.cross(normals, right)))

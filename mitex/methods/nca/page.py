@@ -12,9 +12,9 @@ from mitex.mesh import Mesh
 from mitex.mesh.fields import NAMES
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.surface import EDGE
-from mitex.methods.nca.film import PreviewCamera, Shooting
+from mitex.methods.nca.film import FilmSettings, PreviewCamera
 from mitex.methods.nca.look_data import look_data
-from mitex.methods.nca.motion.cell_motion import followed_field
+from mitex.methods.nca.motion.cell_motion import motion_field
 from mitex.methods.nca.motion.condition import Field, cell_vectors
 from mitex.methods.nca.orientation import Orientation
 from mitex.methods.nca.texture import NcaTexture, grown_state
@@ -61,7 +61,7 @@ def living_page(
     moved = _followed(texture, field, speed)
     announce("preparing the mesh")
     cells = Cells.of(mesh, subdivide, scale)
-    base, levels = (cells.given, cells.levels) if cells.levels is not None else (cells.mesh, 0)
+    base, levels = (cells.base, cells.levels) if cells.levels is not None else (cells.mesh, 0)
     turn, upwards = (orientation, None) if isinstance(orientation, int | float) else (0.0, orientation)
     own = {
         name: cell_vectors(mesh, base, source, 1.0)
@@ -74,7 +74,7 @@ def living_page(
     followed = own.get("upwards", orientation), own.get("motion", field)
     growth = texture.growth_on(Cells.of(shown, levels), shown, *followed, speed)
     state = grown_state(growth, seed, texture.steps if steps is None else steps)
-    picture = PreviewCamera(shown, Shooting(resolution=PICTURE)).picture(growth.shown(state))
+    picture = PreviewCamera(shown, FilmSettings(resolution=PICTURE)).picture(growth.texture(state))
     options = {"seed": seed, "turn": radians(turn), "upwards": _anywhere(upwards), "speed": speed}
     return Content(content.title, {**content.data, **options}, jpeg(picture)).write(target)
 
@@ -102,7 +102,7 @@ def _content(
 
 def _followed(texture: NcaTexture, field: Field | None, speed: float) -> Field | None:
     """The vector field that a texture follows in a page."""
-    return followed_field(texture.look, texture.about, field, speed, texture.about.get("motion"))
+    return motion_field(texture.look, texture.about, field, speed, texture.about.get("motion"))
 
 
 def _anywhere(field: Field | None) -> str | list[float] | None:

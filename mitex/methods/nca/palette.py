@@ -39,7 +39,7 @@ class Palette:
         """Which of the colours (P, 3) are none of these: (P,) bool."""
         return KDTree(self.colours).query(colours)[0] > self.radius + TOLERANCE
 
-    def held(self, colours: np.ndarray) -> np.ndarray:
+    def project(self, colours: np.ndarray) -> np.ndarray:
         """Colours (P, 3) float32, of which those that are none of these are moved to the nearest one, as far
         as it takes.
         """

@@ -42,10 +42,10 @@ def settling_steps(
     plane = TrainingPlane.of(square_cells(density), look)
     generator = torch.Generator().manual_seed(0)
     motion = tile_motion(look, about or {}, plane.lattice, None, 1.0)
-    told = motion.condition, motion.advection
+    inputs = motion.condition, motion.advection
     state, age = look.rule.seed(plane.perception), 0
     for steps in STEPS:
-        state = look.evolve(state, plane.perception, steps - age, generator, *told)
+        state = look.evolve(state, plane.perception, steps - age, generator, *inputs)
         age = steps
         if _regularity(plane.whole(look, state[0], REPEATS * SIDE), look) >= goal:
             break

@@ -51,8 +51,8 @@ class CloseUps:
 
 
 @dataclass(frozen=True, eq=False)
-class TrainingSphere:
-    """A sphere on which states grow and are seen.
+class TrainingMesh:
+    """A mesh on which states grow and are seen.
 
     Attributes:
         mesh: the mesh.
@@ -67,10 +67,10 @@ class TrainingSphere:
     stage: Stage
 
     @staticmethod
-    def of(mesh: Mesh, look: Look) -> TrainingSphere:
+    def of(mesh: Mesh, look: Look) -> TrainingMesh:
         """For a look's rule and decoder."""
         operator = perception(mesh, look.rule.degree, device=look.device, mean=look.mean)
-        return TrainingSphere(mesh, operator, Surface(mesh, look.interpolation, look.device), Stage(mesh))
+        return TrainingMesh(mesh, operator, Surface(mesh, look.interpolation, look.device), Stage(mesh))
 
     @property
     def edge(self) -> float:
@@ -95,7 +95,7 @@ class TrainingSphere:
         return patch_views(generator, self.mesh, closeups.count, share * half, closeups.pixels(share))
 
     def whole(self, look: Look, state: torch.Tensor, resolution: int) -> torch.Tensor:
-        """The sphere as a camera sees it, (H, W, C)."""
+        """The mesh as a camera sees it, (H, W, C)."""
         return self.views(look, state, orbit(1, distance=2.05, resolution=resolution), antialias=2)[0]
 
 
@@ -149,7 +149,7 @@ class TrainingPlane:
     def patches(
         self, look: Look, state: torch.Tensor, closeups: CloseUps, generator: torch.Generator
     ) -> torch.Tensor:
-        """As of `TrainingSphere`; within the square, as the decoder's waves do not repeat."""
+        """As of `TrainingMesh`; within the square, as the decoder's waves do not repeat."""
         return self.windows(look, state, self.places(closeups, generator))
 
     def places(self, closeups: CloseUps, generator: torch.Generator) -> Windows:
@@ -178,7 +178,7 @@ class TrainingPlane:
         return values.view(sides).mean((2, 4))
 
 
-TrainingSurface = TrainingSphere | TrainingPlane
+TrainingSurface = TrainingMesh | TrainingPlane
 
 
 def training_surfaces(config: NcaConfig, look: Look) -> list[TrainingSurface]:
@@ -191,8 +191,8 @@ def training_surfaces(config: NcaConfig, look: Look) -> list[TrainingSurface]:
             surfaces.append(TrainingPlane.of(columns, look, 0.5 * math.pi * planes))
             planes += 1
         elif kind == "even":
-            surfaces.append(TrainingSphere.of(icosphere(config.frequency), look))
+            surfaces.append(TrainingMesh.of(icosphere(config.frequency), look))
         else:
             mesh = scattered_sphere(10 * config.frequency**2 + 2, config.seed)
-            surfaces.append(TrainingSphere.of(mesh, look))
+            surfaces.append(TrainingMesh.of(mesh, look))
     return surfaces

@@ -18,8 +18,8 @@ from mitex.methods.nca.relief import Relief
 from mitex.methods.nca.surfaces import (
     LEAST,
     CloseUps,
+    TrainingMesh,
     TrainingPlane,
-    TrainingSphere,
     TrainingSurface,
     training_surfaces,
 )
@@ -51,7 +51,7 @@ class NcaTask(PoolTask):
         lineage: Mapping[str, str] | None = None,
     ) -> None:
         keep_freed_memory()
-        announce("preparing spheres and the exemplar")
+        announce("preparing surfaces and the exemplar")
         self.exemplar = exemplar.resized(min(config.exemplar_size, *exemplar.size))
         self.maps = sorted(exemplar.maps)
         look = initial_look(config, self.maps, init, config.device)
@@ -92,18 +92,18 @@ class NcaTask(PoolTask):
         self, surface: TrainingSurface, state: torch.Tensor, size: int, generator: torch.Generator
     ) -> torch.Tensor:
         """The views (K, H, W, C) of one step in which the exemplar is `size` [px] wide."""
-        if isinstance(surface, TrainingSphere):
+        if isinstance(surface, TrainingMesh):
             return surface.views(self.look, state, self.cameras(surface, size, generator))
         return surface.patches(self.look, state, self.closeups(size), generator)
 
     def cameras(
-        self, sphere: TrainingSphere, size: int, generator: torch.Generator, least: int = LEAST
+        self, surface: TrainingMesh, size: int, generator: torch.Generator, least: int = LEAST
     ) -> Cameras:
         """The cameras of `views`."""
         config = self.config
         if config.views == "full":
             return random_views(generator, config.view_count, config.distance, config.fov, config.resolution)
-        return sphere.cameras(self.closeups(size, least), generator)
+        return surface.cameras(self.closeups(size, least), generator)
 
     def closeups(self, size: int, least: int = LEAST) -> CloseUps:
         """Those of one step in which the exemplar is `size` [px] wide."""

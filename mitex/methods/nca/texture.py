@@ -19,7 +19,7 @@ from mitex.methods.nca import files
 from mitex.methods.nca.cells import Cells, scale_of_width
 from mitex.methods.nca.displacement import known_relief
 from mitex.methods.nca.field import fields
-from mitex.methods.nca.film import Shooting, film
+from mitex.methods.nca.film import FilmSettings, film
 from mitex.methods.nca.growth import Growth, LookGrowth, grown_state
 from mitex.methods.nca.healing import healed
 from mitex.methods.nca.look import Look, weights_key
@@ -60,12 +60,12 @@ class GrowingTexture(ABC):
     def growth_on(
         self,
         cells: Cells,
-        given: Mesh,
+        base: Mesh,
         orientation: Orientation = 0.0,
         field: Field | None = None,
         speed: float = 1.0,
     ) -> Growth:
-        """The automaton on a mesh; options and errors as of `apply`, whose vectors are those of `given`."""
+        """The automaton on a mesh; options and errors as of `apply`, whose vectors are those of `base`."""
 
     def apply(
         self,
@@ -123,11 +123,11 @@ class GrowingTexture(ABC):
         cells = (Cells.dense if keep_dense else Cells.of)(laid, subdivide, scale)
         growth = self.growth_on(cells, mesh, orientation, field, speed)
         growth = growth.displaced() if displace else growth
-        grown = growth.shown(_healthy(growth, seed, self.steps if steps is None else steps))
+        grown = growth.texture(_healthy(growth, seed, self.steps if steps is None else steps))
         asset = grown.asset()
         if resolution is None:
             return asset
-        atlas = Atlas.build(cells.given, resolution, max(min(8, resolution // 8), 1), cells.given.uv)
+        atlas = Atlas.build(cells.base, resolution, max(min(8, resolution // 8), 1), cells.base.uv)
         return replace(asset, atlas=atlas, texture_maps=grown.textures(atlas))
 
     def animate(
@@ -142,7 +142,7 @@ class GrowingTexture(ABC):
         field: Field | None = None,
         speed: float = 1.0,
         resume: bool = False,
-        **shooting: Any,
+        **settings: Any,
     ) -> Path:
         """Films the texture as it grows, changes, or heals, before a camera that stays.
 
@@ -151,7 +151,7 @@ class GrowingTexture(ABC):
             path: of the film: .mp4, .gif, or a new folder for its frames as PNG.
             seed, subdivide, orientation, scale, field, speed: as of `apply`.
             resume: goes on with a film that was interrupted, whose frames are in a hidden folder beside it.
-            shooting: as of `mitex.methods.nca.film.Shooting`: seconds, fps, loop, damage, and others.
+            settings: as of `mitex.methods.nca.film.FilmSettings`: seconds, fps, loop, damage, and others.
 
         Returns:
             The path written.
@@ -161,7 +161,7 @@ class GrowingTexture(ABC):
             OutputError: another kind of file, an unwritable place, or nothing there to resume.
             KeyboardInterrupt: stopped after a whole frame.
         """
-        shot = Shooting(**shooting)
+        shot = FilmSettings(**settings)
         shot.recording(path, {})  # refuses what it can before the work starts
         laid = mesh if shot.renderer == "preview" else laid_out(mesh, shot.texels)
         announce("preparing the mesh")
@@ -293,7 +293,7 @@ class NcaTexture(GrowingTexture):
         field: Field | None = None,
         speed: float = 1.0,
         orientation: Turn = 0.0,
-        given: Mesh | None = None,
+        base: Mesh | None = None,
     ) -> CellMotion:
         """How the cells move along a vector field.
 
@@ -302,13 +302,13 @@ class NcaTexture(GrowingTexture):
             field: see `mitex.mesh.fields`; None for the one that the texture was trained with, if any.
             speed: factor of the field, whose mean length is 1.
             orientation: of the texture.
-            given: whose vertices the vectors of a file or an array belong to; None for `cells.given`.
+            base: whose vertices the vectors of a file or an array belong to; None for `cells.base`.
 
         Raises:
             ConfigError: a field that the texture cannot follow, or that cannot be used on the mesh; a speed
                 of a texture that stands still.
         """
-        return look_motion(self.look, self.about, given or cells.given, cells.mesh, field, speed, orientation)
+        return look_motion(self.look, self.about, base or cells.base, cells.mesh, field, speed, orientation)
 
     def growth(self, cells: Cells, orientation: Turn = 0.0, motion: CellMotion = STILL) -> LookGrowth:
         """The automaton on a mesh, its texture turned, its cells moving."""
@@ -318,13 +318,13 @@ class NcaTexture(GrowingTexture):
     def growth_on(
         self,
         cells: Cells,
-        given: Mesh,
+        base: Mesh,
         orientation: Orientation = 0.0,
         field: Field | None = None,
         speed: float = 1.0,
     ) -> LookGrowth:
-        turn = cell_turns(orientation, cells.mesh, given)
-        return self.growth(cells, turn, self.motion(cells, field, speed, turn, given))
+        turn = cell_turns(orientation, cells.mesh, base)
+        return self.growth(cells, turn, self.motion(cells, field, speed, turn, base))
 
     @property
     def steps(self) -> int:

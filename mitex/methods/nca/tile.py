@@ -9,7 +9,7 @@ from mitex.errors import ConfigError
 from mitex.exemplar import MAPS
 from mitex.geometry.normal_maps import decode, encode, of_slopes
 from mitex.mesh import Lattice
-from mitex.methods.nca.bake import CHUNK, Grown
+from mitex.methods.nca.bake import CHUNK, GrownTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.surface import EDGE, decoder_units
 from mitex.methods.nca.look import Look
@@ -30,7 +30,7 @@ def tile_maps(
     look: Look, state: torch.Tensor, lattice: Lattice, resolution: int, palette: Palette | None = None
 ) -> dict[str, np.ndarray]:
     """Maps (N, N, c) of a state (V, C) of the cells in a lattice's square, as of `NcaTexture.tile`."""
-    sampled = Sampled(look, state, lattice, palette)
+    sampled = SampledTile(look, state, lattice, palette)
     maps = {name: np.empty((resolution, resolution, MAPS[name]), np.float32) for name in look.maps}
     height = max(CHUNK // resolution, 1)
     for top in range(0, resolution, height):
@@ -57,14 +57,14 @@ def relief_normals(height: np.ndarray, bound: float, lattice: Lattice) -> np.nda
     return of_slopes(np.stack([right, up], axis=-1))
 
 
-class Sampled:
+class SampledTile:
     """A state on a lattice, read at pixels of the plane.
 
     Args:
         look: the decoder and the maps.
         state: (V, C) of the cells in the square.
         lattice: their places.
-        palette: as of `Grown`.
+        palette: as of `GrownTexture`.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class Sampled:
         spread = state[torch.from_numpy(lattice.source)]
         scale = decoder_units(lattice.mesh).scale
         repeating = look.repeating(lattice.columns / scale, lattice.edge / scale)
-        self.grown = Grown(repeating, spread, cells, palette=palette)
+        self.grown = GrownTexture(repeating, spread, cells, palette=palette)
 
     def values(self, rows: np.ndarray, columns: np.ndarray, resolution: int) -> np.ndarray:
         """Values (R, C, K) in [0, 1] at the centres of pixels, of which `resolution` are a period.

@@ -30,7 +30,6 @@ from mitex.methods.nerf.use.applied import AppliedTexture, check_ranges, checked
 from mitex.methods.nerf.use.captured import Captured
 from mitex.methods.nerf.use.on_plane import SCALE, TextureOnPlane, plane
 from mitex.methods.nerf.use.placement import (
-    EXTENT,
     UNWRAP_SIZE,
     carried_picture,
     guided_side,
@@ -38,7 +37,6 @@ from mitex.methods.nerf.use.placement import (
     own_layout,
     too_fine,
 )
-from mitex.methods.nerf.use.self_maps import self_maps
 from mitex.progress import announce
 from mitex.quilting.guide import WEIGHT, Guide, SurfaceGuide
 from mitex.quilting.plane import Quilt, quilt
@@ -212,12 +210,6 @@ class NerfTexture(Captured):
         """
         field = self.apply(plane(), self.synthesize(size, seed, tileable=True), scale=SCALE, lift=0.0)
         return TextureOnPlane(field, np.array(self.light), along)
-
-    def on_base_shape(self, size: int = SIZE) -> AppliedTexture:
-        """The captured texture as maps of `size` texels on its own base shape, in the scene cube."""
-        mesh, maps = self_maps(self.model.base.mesh, self.model.frames, self.features, size)
-        low, high = mesh.vertices.min(0), mesh.vertices.max(0)
-        return self.apply(mesh, maps, scale=2 * EXTENT / float((high - low).max()), lift=0.0)
 
     def apply(
         self,

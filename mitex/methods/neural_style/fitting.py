@@ -13,7 +13,7 @@ from mitex.methods.layout import with_layout
 from mitex.methods.neural_style.config import StyleConfig
 from mitex.methods.neural_style.styled_mesh import StyledMesh
 from mitex.methods.neural_style.task import StyleTask
-from mitex.methods.words.wording import check_text, worded
+from mitex.methods.words.wording import check_text, words_options
 from mitex.training.fit import Run
 from mitex.training.settings import RunOptions
 
@@ -46,7 +46,7 @@ def fit_style(
         MitexError: as the method's own `fit`, which says more.
     """
     inputs = {"text": text, "text_model": clip and os.fspath(clip)}
-    run = Run.of(presets, out, **worded(options, inputs))
+    run = Run.of(presets, out, **words_options(options, inputs))
     config = run.config
     check_text(config.text, config.preset)
     model = text_image_model(config.text_model)

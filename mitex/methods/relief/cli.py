@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
 from mitex.methods.checks import in_range
-from mitex.methods.options import ExemplarOptions, OptionalMeshOptions
+from mitex.methods.options import ExemplarOptions, MeshFitOptions, OptionalMeshOptions
 from mitex.ranges import SCALES
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(kw_only=True)
-class Fit(ExemplarOptions):
+class Fit(MeshFitOptions, ExemplarOptions):
     """Shape the surface of a mesh after an exemplar's height or normal map: surface synthesizes all maps of
     the exemplar, then the mesh itself is moved until it looks like the exemplar's relief. Colours stay on it.
 
@@ -31,11 +31,6 @@ class Fit(ExemplarOptions):
       mitex fit relief --exemplar cobblestone --mesh vase --out runs/cobbles --resume
     """
 
-    fits_to_mesh: ClassVar[bool] = True
-
-    mesh: Annotated[str, arg(metavar="MESH|NAME")]
-    """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
-
     scale: Annotated[float | None, arg(metavar="X", help_behavior_hint="(default: 1)")] = None
     """Size of the pattern."""
 
@@ -43,9 +38,6 @@ class Fit(ExemplarOptions):
         float | None, arg(metavar="X", help_behavior_hint="(default: what the exemplar's normals say)")
     ] = None
     """Depth of the relief [widths of the exemplar]; needed for a height map without normals."""
-
-    keep_uvs: Annotated[bool, arg(help_behavior_hint="")] = False
-    """Use the mesh's own UVs, which must not overlap."""
 
     def run(self) -> None:
         in_range("--scale", self.scale, *SCALES)

@@ -80,7 +80,7 @@ class Fit(ExemplarOrWordsOptions):
         self.check_source()
         self._check_tile()
         options = self.run_options(resolution=self.tile or self.resolution, scale=self.scale)
-        print(self.fitted(options))
+        print(self.fit(options))
 
     def fit_exemplar(self, options: RunSettings) -> Path:
         from mitex.exemplar import Exemplar

@@ -27,7 +27,7 @@ from mitex.methods.surface.task import SurfaceTask
 from mitex.methods.surface.texture import SurfaceTexture
 from mitex.methods.surface.tile import TileDomain
 from mitex.methods.surface.words import Words
-from mitex.methods.words.wording import check_text, worded
+from mitex.methods.words.wording import check_text, words_options
 from mitex.runtime import available_memory
 from mitex.training.fit import Run
 from mitex.training.lbfgs import Lbfgs
@@ -111,7 +111,7 @@ def fit_text(
         MitexError, Cancelled, Interrupted: as `fit`.
     """
     inputs = {"text": text, "text_model": clip and os.fspath(clip)}
-    run = Run.of(PRESETS, out, **worded(options, inputs))
+    run = Run.of(PRESETS, out, **words_options(options, inputs))
     config = run.config
     check_text(config.text, config.preset, WORDS)
     if exemplar is None and (orientation is not None or scale_map is not None):

@@ -46,7 +46,7 @@ class ExemplarOrWordsOptions(WordsOptions):
         """Refuses sources that are missing, or do not go together."""
         check_source(self.exemplar, self.text, self.clip)
 
-    def fitted(self, options: RunSettings) -> Path:
+    def fit(self, options: RunSettings) -> Path:
         """Fits from what was given; the run folder."""
         return self.fit_exemplar(options) if self.text is None else self.fit_text(self.text, options)
 

@@ -15,7 +15,7 @@ PAPER = "text-paper"
 PRESETS = (CLIP, EMBEDDED, PAPER)
 
 
-def worded(options: RunOptions, inputs: Mapping[str, str | None]) -> RunOptions:
+def words_options(options: RunOptions, inputs: Mapping[str, str | None]) -> RunOptions:
     """Options of a fit from words; where nothing else tells, the preset is the one for the model.
 
     Args:

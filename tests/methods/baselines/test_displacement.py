@@ -42,9 +42,9 @@ def test_a_ball_is_nearly_flat():
 
 def test_vertices_move_along_their_normals_only():
     ball = icosphere(8)
-    moved = DisplacementMap.bake(knobs()).apply(ball, scale=1.5, levels=1).mesh
+    moved = DisplacementMap.bake(knobs()).apply(ball, scale=1.5, subdivide=1).mesh
     assert len(moved.faces) == 4 * len(ball.faces)
-    still = DisplacementMap(np.zeros((8, 8)), 0.2).apply(ball, levels=1).mesh
+    still = DisplacementMap(np.zeros((8, 8)), 0.2).apply(ball, subdivide=1).mesh
     way = moved.vertices - still.vertices
     along = (way * still.normals).sum(1, keepdims=True) * still.normals
     assert np.abs(way - along).max() < 1e-6
@@ -81,7 +81,7 @@ def test_refuses_holes():
         DisplacementMap.bake(hole)
 
 
-@pytest.mark.parametrize("options", [{"scale": 0.0}, {"scale": np.nan}, {"levels": -1}, {"levels": 7}])
+@pytest.mark.parametrize("options", [{"scale": 0.0}, {"scale": np.nan}, {"subdivide": -1}, {"subdivide": 7}])
 def test_refuses_numbers_out_of_range(options):
     with pytest.raises(ConfigError, match=f"`{next(iter(options))}` .* is out of range"):
         DisplacementMap(np.zeros((8, 8)), 0.2).apply(icosphere(2), **options)

@@ -8,7 +8,7 @@ import torch
 from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh
 from mitex.methods.nca import NcaTexture
-from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.bake import GrownTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.motion.cell_motion import STILL, CellMotion
 from mitex.methods.nca.orientation import Turn
@@ -26,7 +26,7 @@ def states(
     while True:
         fires = torch.from_numpy(mask(len(mesh.vertices), step, seed))
         with torch.no_grad():
-            values = look.bounded(look.rule.step(values, operator, fires, motion.condition))
+            values = look.clamp(look.rule.step(values, operator, fires, motion.condition))
             values = values if motion.advection is None else motion.advection(values)
         step += 1
         yield values[0]
@@ -47,7 +47,7 @@ def shown(
     texture: NcaTexture, state: torch.Tensor, mesh: Mesh, turn: Turn, ids: np.ndarray
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """The maps, and the normals (P, 3), at pixels that see the surface."""
-    grown = Grown(texture.look, state, Cells(mesh, 0, mesh), turn, texture._palette)
+    grown = GrownTexture(texture.look, state, Cells(mesh, 0, mesh), turn, texture._palette)
     face, barycentric = points(ids)
     maps = grown.maps(grown.values(face, barycentric))
     return maps, unit(grown.object_normals(maps["normal"], face, barycentric))

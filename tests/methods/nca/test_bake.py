@@ -9,7 +9,7 @@ import torch
 from mitex.atlas import Atlas, laid_out
 from mitex.mesh import Mesh, grid, icosphere
 from mitex.methods.nca import bake
-from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.bake import GrownTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.decoder import Decoder
 from mitex.methods.nca.decoder.surface import Points, Surface
@@ -31,10 +31,10 @@ def sphere():
     return laid_out(icosphere(3), 64)
 
 
-def _grown(look: Look, mesh: Mesh, levels: int = 1, orientation: float = 0.0) -> Grown:
+def _grown(look: Look, mesh: Mesh, levels: int = 1, orientation: float = 0.0) -> GrownTexture:
     cells = Cells.of(mesh, levels)
     state = torch.rand(len(cells.mesh.vertices), 16, generator=torch.Generator().manual_seed(5)) - 0.5
-    return Grown(look, state, cells, orientation)
+    return GrownTexture(look, state, cells, orientation)
 
 
 @pytest.fixture(scope="module")

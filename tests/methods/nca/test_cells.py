@@ -1,4 +1,4 @@
-"""The automaton's mesh: how fine it is, and where points of the given mesh are on it."""
+"""The automaton's mesh: how fine it is, and where points of the base mesh are on it."""
 
 import numpy as np
 import pytest
@@ -23,9 +23,9 @@ def _places(mesh: Mesh, face, barycentric):
 @pytest.mark.parametrize("levels", range(4))
 @pytest.mark.parametrize("mesh", [icosphere(2), patchwork()], ids=["sphere", "patchwork"])
 def test_points_of_the_given_mesh_on_its_subdivision(mesh, levels, rng):
-    """At the same places; vertices of the given mesh come first among the cells."""
+    """At the same places; vertices of the base mesh come first among the cells."""
     own = Cells.of(mesh, levels)
-    assert own.given is mesh and own.levels == levels
+    assert own.base is mesh and own.levels == levels
     assert np.array_equal(own.mesh.vertices, subdivide_midpoint(mesh, levels).vertices)
     face, barycentric = _points(mesh, rng)
     located = own.locate(face, barycentric)
@@ -47,7 +47,7 @@ def test_texels_a_little_outside_stay_there(rng):
 def test_dense_cells_are_the_mesh_that_is_textured(rng):
     mesh = icosphere(2)
     own = Cells.dense(mesh, 2)
-    assert own.mesh is own.given and own.levels == 0
+    assert own.mesh is own.base and own.levels == 0
     assert np.array_equal(own.mesh.vertices, subdivide_loop(mesh, 2).vertices)
     face, barycentric = _points(own.mesh, rng)
     located = own.locate(face, barycentric)
@@ -58,7 +58,7 @@ def test_a_remeshed_copy_has_the_nearest_points(rng):
     pytest.importorskip("pymeshlab")
     mesh = icosphere(6)
     own = Cells.of(mesh, 0, 0.6)
-    assert own.levels is None and own.given is mesh
+    assert own.levels is None and own.base is mesh
     assert len(own.mesh.vertices) == pytest.approx(362 / 0.36, rel=0.15)
     face, barycentric = _points(mesh, rng)
     located = own.locate(face, barycentric)

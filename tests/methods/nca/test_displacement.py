@@ -13,8 +13,8 @@ from mitex.mesh import Mesh, grid, icosphere
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.displacement import Displacement, known_relief
-from mitex.methods.nca.embossed import Embossed
-from mitex.methods.nca.film import PreviewCamera, Shooting
+from mitex.methods.nca.embossed import EmbossedTexture
+from mitex.methods.nca.film import FilmSettings, PreviewCamera
 from mitex.methods.nca.growth import LookGrowth
 from mitex.render.preview import PreviewRenderer
 from tests.methods.nca.tiny import texture
@@ -96,11 +96,11 @@ def _ramp_state(mesh, slope):
     return state
 
 
-def _embossed(mesh: Mesh, moved: bool) -> Embossed:
+def _embossed(mesh: Mesh, moved: bool) -> EmbossedTexture:
     look = texture(("albedo", "height"), shape=None).look
     growth = LookGrowth(look, Cells(mesh, 0, mesh), relief=2.0)
-    shown = (growth.displaced() if moved else growth).shown(_ramp_state(mesh, 0.05))
-    assert isinstance(shown, Embossed)
+    shown = (growth.displaced() if moved else growth).texture(_ramp_state(mesh, 0.05))
+    assert isinstance(shown, EmbossedTexture)
     return shown
 
 
@@ -117,13 +117,13 @@ def test_a_relief_is_a_normal_map(plate):
 
 def test_a_film_shows_the_relief(plate):
     """By the normals, in the light of the preview; not at all where the relief is of height 0."""
-    shooting = Shooting(resolution=32, azimuth=50.0)
-    camera, look = PreviewCamera(plate, shooting), texture(("albedo", "height"), shape=None).look
-    renderer = PreviewRenderer(plate, resolution=32, azimuth=50.0, elevation=shooting.elevation)
+    settings = FilmSettings(resolution=32, azimuth=50.0)
+    camera, look = PreviewCamera(plate, settings), texture(("albedo", "height"), shape=None).look
+    renderer = PreviewRenderer(plate, resolution=32, azimuth=50.0, elevation=settings.elevation)
     pictures = []
     for relief in (0.0, 20.0, 50.0):
         growth = LookGrowth(look, Cells(plate, 0, plate), relief=relief)
-        pictures.append(camera.picture(growth.shown(_ramp_state(plate, 0.2))))
+        pictures.append(camera.picture(growth.texture(_ramp_state(plate, 0.2))))
         steep = Displacement(plate, relief).bound * 0.4
         normals = np.tile(unit(np.array([[-steep, 0, 1]])), (len(renderer.face), 1)).astype(np.float32)
         expected = renderer.render(np.full((len(normals), 3), 0.5, np.float32), normals, 1.0)

@@ -85,15 +85,15 @@ def test_the_path_tracer_takes_as_many_samples_as_asked_for(texture, tmp_path, m
 
 
 def test_the_preview_shows_normals_and_ambient_occlusion(texture):
-    shooting, growth = film.Shooting(resolution=24), texture.growth(Cells(SPHERE, 0, SPHERE))
-    shown = growth.shown(grown_state(growth, 0, 12))
-    view = {"resolution": 24, "azimuth": shooting.azimuth, "elevation": shooting.elevation}
+    settings, growth = film.FilmSettings(resolution=24), texture.growth(Cells(SPHERE, 0, SPHERE))
+    shown = growth.texture(grown_state(growth, 0, 12))
+    view = {"resolution": 24, "azimuth": settings.azimuth, "elevation": settings.elevation}
     renderer = PreviewRenderer(SPHERE, **view)
     points = renderer.face, renderer.barycentric
     maps = shown.maps(shown.values(*points))
     normals, occlusion = unit(shown.object_normals(maps["normal"], *points)), maps["ambient_occlusion"]
     own = unit(interpolate(renderer.barycentric, SPHERE.shading_normals[renderer.face]))
-    picture = film.PreviewCamera(SPHERE, shooting).picture(shown)
+    picture = film.PreviewCamera(SPHERE, settings).picture(shown)
     assert np.allclose(picture, renderer.render(maps["albedo"], normals, occlusion), atol=1e-5)
     for others in ((own, occlusion), (normals, 1.0)):
         assert np.abs(picture - renderer.render(maps["albedo"], *others)).max() > 0.02
@@ -103,8 +103,8 @@ def test_a_damaged_region_is_set_back_at_its_time_and_grows_again(texture):
     states, cells = {}, Cells(SPHERE, 0, SPHERE)
     inside = torch.from_numpy(SPHERE.vertices[:, 1] > 0)
     for damage in (None, inside):
-        shooting = film.Shooting(seconds=1, fps=4, steps_per_frame=3, start=6, damage_at=0.5)
-        shot = film.States(texture.growth(cells), shooting, 0, damage)
+        settings = film.FilmSettings(seconds=1, fps=4, steps_per_frame=3, start=6, damage_at=0.5)
+        shot = film.States(texture.growth(cells), settings, 0, damage)
         states[damage is not None] = list(shot.frames(0, 4))
     whole, damaged = states[False], states[True]
     assert all(torch.equal(a, b) for a, b in zip(whole[:2], damaged[:2], strict=True))

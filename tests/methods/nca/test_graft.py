@@ -11,7 +11,7 @@ import torch
 from mitex.errors import ConfigError
 from mitex.mesh import icosphere
 from mitex.methods.nca import Graft, NcaTexture
-from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.bake import GrownTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.growth import grown_state
 from mitex.methods.nca.motion.cell_motion import STILL
@@ -79,7 +79,7 @@ def test_in_between_reliefs_are_mixed():
     """Of one height everywhere, the bounds of the offsets are left."""
     pair = words(0, 1.0), words(1, 3.0)
     growth = graft(pair, "x").growth_on(CELLS, SPHERE).displaced()
-    shown = growth.shown(growth.seed())
+    shown = growth.texture(growth.seed())
     shown._decoded = lambda points: np.ones((len(points.face), 4), np.float32)
     offsets = np.linalg.norm(shown.asset().mesh.vertices - SPHERE.vertices, axis=1)
     edges = SPHERE.edges
@@ -174,22 +174,22 @@ def test_maps_are_those_of_a_decoder_mixed_by_the_weight_at_the_point():
     state = grown_state(growth, 0, 5)
     face = np.arange(0, len(SPHERE.faces), 16, dtype=np.int32)
     barycentric = np.full((len(face), 3), 1 / 3, np.float32)
-    mixed = growth.shown(state).values(face, barycentric)
+    mixed = growth.texture(state).values(face, barycentric)
     places = SPHERE.vertices[SPHERE.faces[face]].mean(axis=1, dtype=np.float64)
     own, others = (texture.look.state_dict() for texture in pair)
     for k, share in enumerate(graft_weights(SPHERE, "x")(places)):
         look = deepcopy(pair[0].look)
         look.load_state_dict({name: torch.lerp(own[name], others[name], float(share)) for name in own})
-        expected = Grown(look, state, CELLS).values(face[k : k + 1], barycentric[k : k + 1])
+        expected = GrownTexture(look, state, CELLS).values(face[k : k + 1], barycentric[k : k + 1])
         assert np.allclose(mixed[k], expected[0], atol=1e-4)
-    assert np.abs(mixed - pair[0].growth(CELLS).shown(state).values(face, barycentric)).max() > 0.05
+    assert np.abs(mixed - pair[0].growth(CELLS).texture(state).values(face, barycentric)).max() > 0.05
 
 
 def test_maps_that_are_channels_are_the_state(pair):
     plain = [NcaTexture(relative(seed, shape=None).look, {"family": "one"}) for seed in (0, 1)]
     growth = graft(plain, "x").growth_on(CELLS, SPHERE)
     state = grown_state(growth, 0, 5)
-    albedo = growth.shown(state).at_vertices()["albedo"]
+    albedo = growth.texture(state).at_vertices()["albedo"]
     assert np.allclose(albedo, np.clip(state[:, :3].numpy() + 0.5, 0, 1), atol=1e-6)
 
 

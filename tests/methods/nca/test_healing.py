@@ -87,7 +87,7 @@ def test_it_grows_again_with_the_rule(cells):
     generator, operator = torch.Generator().manual_seed(0), perception(cells.mesh, mean=True)
     with torch.no_grad():
         for _ in range(60):
-            expected = look.bounded(look.rule.evolve(expected[None], operator, 1, generator))[0]
+            expected = look.clamp(look.rule.evolve(expected[None], operator, 1, generator))[0]
     assert torch.equal(result, expected) and not result.requires_grad
     assert result.abs().max() > 0.01
 
@@ -108,7 +108,7 @@ def test_textures_with_a_palette_are_healed(monkeypatch):
     calls = []
 
     def spy(growth, state, generator):
-        calls.append((len(state), len(growth.cells.given.vertices)))
+        calls.append((len(state), len(growth.cells.base.vertices)))
         return torch.zeros_like(state)
 
     sphere, plain = icosphere(3), tiny.texture(shape=None)

@@ -13,7 +13,7 @@ from mitex.errors import ConfigError, OutputError
 from mitex.images import bilinear
 from mitex.mesh import Mesh, icosphere, subdivide_midpoint, torus
 from mitex.methods.nca import NcaTexture, living_page
-from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.bake import GrownTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.graft import GraftedGrowth
 from mitex.page import quantised
@@ -190,7 +190,7 @@ def test_grafted_looks_share_their_steps_and_their_pictures(tab, compute, textur
     assert (state(compute, cells) - expected).abs().max() < 1e-4
     colour, *_, ids = tab.maps()
     hit = ids[..., 0] > 0
-    values = graft.shown(now).values(*points(ids[hit]))
+    values = graft.texture(now).values(*points(ids[hit]))
     assert np.abs(colour[hit][:, :3] - values[:, :3]).max() < 4e-3
     tab.run("page.setGraft(null); page.setShare(0)")
 
@@ -210,7 +210,9 @@ def test_a_downloaded_asset_shows_what_the_page_shows(tab, texture, cells, tmp_p
     assert normals[..., 2].min() > 0.5  # none points inwards
     faces = np.arange(len(cells.faces), dtype=np.int32)
     middles = np.full((len(faces), 3), 1 / 3, np.float32)
-    grown = Grown(texture.look, state(tab, cells), Cells(cells, 0, cells), np.radians(TURN), texture._palette)
+    grown = GrownTexture(
+        texture.look, state(tab, cells), Cells(cells, 0, cells), np.radians(TURN), texture._palette
+    )
     expected = grown.maps(grown.values(faces, middles))["albedo"]
     uv = geometry.visual.uv.reshape(-1, 3, 2).mean(axis=1)  # trimesh has v upwards
     baked = bilinear(image, uv)

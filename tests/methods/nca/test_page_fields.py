@@ -11,7 +11,7 @@ import trimesh
 from mitex.mesh import Mesh, icosphere, subdivide_midpoint, torus
 from mitex.methods.nca import NcaTexture, living_page
 from mitex.methods.nca.motion.cell_motion import CellMotion
-from mitex.methods.nca.motion.condition import cell_vectors, told
+from mitex.methods.nca.motion.condition import cell_vectors, conditions
 from mitex.methods.nca.orientation import cell_turns
 from mitex.page import quantised
 from tests.methods.nca import tiny
@@ -56,7 +56,7 @@ def grown(texture, given, motion, upwards, angle=0.0, levels=1, speed=1.0):
     base = quantised(given)
     mesh = subdivide_midpoint(base, levels)
     turns = cell_turns(upwards, mesh, base) + angle
-    vectors = told(cell_vectors(base, mesh, motion, speed), mesh, turns)
+    vectors = conditions(cell_vectors(base, mesh, motion, speed), mesh, turns)
     motion = CellMotion(torch.from_numpy(vectors))
     return mesh, turns, after(16, states(texture, mesh, turn=turns, motion=motion)).numpy()
 

@@ -15,7 +15,7 @@ from mitex.exemplar import Exemplar
 from mitex.mesh import icosphere
 from mitex.methods.nca import NcaTexture, living_page
 from mitex.methods.nca.motion.cell_motion import CellMotion
-from mitex.methods.nca.motion.condition import cell_vectors, told
+from mitex.methods.nca.motion.condition import cell_vectors, conditions
 from mitex.page import quantised
 from tests.methods.nca import tiny
 from tests.methods.nca.pages import after, states
@@ -86,7 +86,7 @@ def test_a_moving_texture_is_led(browser, tmp_path):
     tab.page.get_by_role("button", name="about y").click()
     tab.page.get_by_role("slider", name="Pace").fill("1.7")
     turn = np.radians(30.0)
-    vectors = told(cell_vectors(mesh, mesh, "about-y", 1.7), mesh, turn)
+    vectors = conditions(cell_vectors(mesh, mesh, "about-y", 1.7), mesh, turn)
     motion = CellMotion(torch.from_numpy(vectors))
     state = after(4, states(texture, mesh, turn=turn, motion=motion)).numpy()
     # As processors take the steps, as graphics cards do, where a thread has one cell, and in WebGL2.

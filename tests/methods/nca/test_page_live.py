@@ -22,7 +22,7 @@ def test_a_page_follows_a_training(browser, tmp_path):
     trimesh.creation.icosphere(2).export(mesh)
     nca.fit(exemplar, run, set=[*SETTINGS, "steps=2", "checkpoint_every=1"])
     (run / "texture.safetensors").unlink()  # as of a run that is not at its end
-    content, news = View(source=str(run), mesh=str(mesh)).shown()
+    content, news = View(source=str(run), mesh=str(mesh)).content()
     with PageServer(lambda: content().html(), news) as server:
         thread = Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
         thread.start()

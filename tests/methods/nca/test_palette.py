@@ -117,7 +117,7 @@ def test_foreign_colours_are_moved_to_the_nearest_and_others_stay():
     palette = Palette(np.array([[0.2, 0.2, 0.2], [0.8, 0.1, 0.1]]), radius=0.02)
     rng = np.random.default_rng(0)
     colours = rng.random((2000, 3), np.float32)
-    held = palette.held(colours)
+    held = palette.project(colours)
     foreign = palette.unlike(colours)
     assert 100 < foreign.sum() < 2000 and not palette.unlike(held).any()
     assert np.abs(held - colours)[~foreign].max() < 2e-4

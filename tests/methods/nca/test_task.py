@@ -13,7 +13,7 @@ from mitex.exemplar import Exemplar
 from mitex.mesh import icosphere
 from mitex.methods.nca import task as training
 from mitex.methods.nca.config import DEFAULT
-from mitex.methods.nca.surfaces import TrainingSphere
+from mitex.methods.nca.surfaces import TrainingMesh
 from mitex.methods.nca.task import NcaTask
 from mitex.runtime import threads
 from mitex.training import train
@@ -39,8 +39,8 @@ def task(exemplar):
     return NcaTask(config(), exemplar)
 
 
-def _spheres(task) -> list[TrainingSphere]:
-    return [surface for surface in task.surfaces if isinstance(surface, TrainingSphere)]
+def _spheres(task) -> list[TrainingMesh]:
+    return [surface for surface in task.surfaces if isinstance(surface, TrainingMesh)]
 
 
 def _fresh(task):

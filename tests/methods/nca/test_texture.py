@@ -242,7 +242,7 @@ def test_a_larger_scale_has_fewer_cells(texture):
     pytest.importorskip("pymeshlab")
     sphere = icosphere(8)
     coarse = Cells.of(sphere, 0, 1.4)
-    assert coarse.given is sphere and coarse.levels is None
+    assert coarse.base is sphere and coarse.levels is None
     assert len(coarse.mesh.vertices) == pytest.approx(642 / 1.4**2, rel=0.15)
     assert np.allclose(np.ptp(coarse.mesh.vertices, axis=0), 2, atol=0.1)
     dense = texture.apply(sphere, steps=1, subdivide=0, scale=1.4, keep_dense=True).mesh

@@ -13,14 +13,14 @@ from mitex.geometry.normal_maps import slopes
 from mitex.mesh import Lattice
 from mitex.methods.nca import MeshNCA, NcaTexture
 from mitex.methods.nca import texture as room
-from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.bake import GrownTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.coordinates import Waves
 from mitex.methods.nca.decoder.shape import DecoderShape
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.palette import Palette
 from mitex.methods.nca.perception import harmonics, lattice_perception
-from mitex.methods.nca.tile import Sampled, flat_cells, relief_normals, tile_maps
+from mitex.methods.nca.tile import SampledTile, flat_cells, relief_normals, tile_maps
 
 MAPS = ("albedo", "normal")
 SIDE = 64  # of maps [px]
@@ -87,7 +87,7 @@ def test_no_place_is_special_to_the_maps(lattice, state, shape):
 
 @pytest.mark.parametrize("shape", [None, DecoderShape(width=12, depth=2)])
 def test_pixels_whole_periods_apart_are_equal_to_the_bit(lattice, state, shape):
-    sampled, pixels = Sampled(look(shape), state, lattice), np.arange(SIDE)
+    sampled, pixels = SampledTile(look(shape), state, lattice), np.arange(SIDE)
     values = sampled.values(pixels, pixels, SIDE)
     for rows, columns in ((SIDE, 0), (-SIDE, 3 * SIDE)):
         again = sampled.values(pixels + rows, pixels + columns, SIDE)
@@ -113,9 +113,9 @@ def test_what_is_read_goes_on_across_the_sides(lattice, state, interpolation, rn
     one, other = copies(lattice)
     assert len(one) > 4 * lattice.columns
     weights = rng.dirichlet([1, 1, 1], len(one)).astype(np.float32)
-    grown = Sampled(model, state, lattice).grown
+    grown = SampledTile(model, state, lattice).grown
     assert np.abs(grown.values(one, weights) - grown.values(other, weights)).max() < 2e-3
-    untiled = Grown(model, spread, cells)
+    untiled = GrownTexture(model, spread, cells)
     assert np.abs(untiled.values(one, weights) - untiled.values(other, weights)).max() > 0.02
 
 

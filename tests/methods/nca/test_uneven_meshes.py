@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull
 
 from mitex.mesh import Mesh, icosphere, scattered_sphere, subdivide_midpoint, torus
 from mitex.methods.nca import METHOD, NcaTexture, bake
-from mitex.methods.nca.bake import Grown
+from mitex.methods.nca.bake import GrownTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.decoder.surface import Surface
 from mitex.methods.nca.healing import inner
@@ -67,9 +67,9 @@ def test_no_region_has_foreign_colours(name, monkeypatch):
     palette = Palette.from_record(texture.about["palette"])
     for number, mesh in enumerate(meshes()):
         state = texture.grow(mesh, steps=STEPS, seed=number)
-        colours = Grown(texture.look, state, Cells(mesh, 0, mesh)).at_vertices()["albedo"]
+        colours = GrownTexture(texture.look, state, Cells(mesh, 0, mesh)).at_vertices()["albedo"]
         assert not inner(mesh, palette.unlike(colours)).any(), f"mesh {number}, {mesh}"
-        assert not palette.unlike(palette.held(colours)).any(), f"mesh {number}, {mesh}"
+        assert not palette.unlike(palette.project(colours)).any(), f"mesh {number}, {mesh}"
 
 
 def test_there_are_thirty_meshes_of_all_valences():

@@ -29,3 +29,8 @@ def texture(
     look = Look(MeshNCA(**options), maps, shape)
     look.initialise(torch.Generator().manual_seed(seed), gain=0.5)
     return NcaTexture(look, {"name": "tiny"})
+
+
+def same_weights(one: torch.nn.Module, other: torch.nn.Module) -> bool:
+    a, b = one.state_dict(), other.state_dict()
+    return a.keys() == b.keys() and all(torch.equal(a[k], b[k]) for k in a)

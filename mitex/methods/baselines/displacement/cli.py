@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from mitex.methods.baselines.displacement.config import LEVELS
+from mitex.methods.baselines.displacement.config import SUBDIVISIONS
 from mitex.methods.checks import in_range
 from mitex.methods.options import FitOptions, MeshOptions
 from mitex.ranges import SCALES
@@ -48,22 +48,22 @@ class Apply(MeshOptions):
     """Displace a mesh along its normals by a baked height map, repeated over its UVs.
 
     examples:
-      mitex apply runs/cactus-map --mesh bunny.obj --out bunny.glb --levels 2 --scale 0.5
+      mitex apply runs/cactus-map --mesh bunny.obj --out bunny.glb --subdivide 2 --scale 0.5
     """
 
     scale: Annotated[float, arg(metavar="X")] = 1.0
     """Size of the features beside the whole mesh, against that on the reference."""
 
-    levels: Annotated[int, arg(metavar="N")] = 0
+    subdivide: Annotated[int, arg(metavar="N")] = 0
     """How often every face is split in four first."""
 
     def check(self) -> None:
         in_range("--scale", self.scale, *SCALES)
-        in_range("--levels", self.levels, *LEVELS)
+        in_range("--subdivide", self.subdivide, *SUBDIVISIONS)
 
     def applied(self, out: Path) -> Asset:
         from mitex.mesh import Mesh
         from mitex.methods.baselines.displacement import DisplacementMap
 
         texture = DisplacementMap.load(self.model)
-        return texture.apply(Mesh.load(self.mesh), scale=self.scale, levels=self.levels)
+        return texture.apply(Mesh.load(self.mesh), scale=self.scale, subdivide=self.subdivide)

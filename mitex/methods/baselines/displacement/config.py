@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from mitex.training.settings import FitConfig, key
 
-LEVELS = (0, 6)  # in which every face of a mesh is split in four
+SUBDIVISIONS = (0, 6)  # in which every face of a mesh is split in four
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from mitex.errors import ConfigError
 from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh, subdivide_midpoint
 from mitex.methods.baselines.displacement import METHOD
-from mitex.methods.baselines.displacement.config import LEVELS
+from mitex.methods.baselines.displacement.config import SUBDIVISIONS
 from mitex.methods.checks import in_range
 from mitex.ranges import SCALES
 from mitex.runtime import init
@@ -103,13 +103,13 @@ class DisplacementMap:
         }
         return model_file.save(path, tensors, METHOD.name, self.about)
 
-    def apply(self, mesh: Mesh, *, scale: float = 1.0, levels: int = 0) -> Asset:
+    def apply(self, mesh: Mesh, *, scale: float = 1.0, subdivide: int = 0) -> Asset:
         """A mesh displaced along its normals by the map, repeated in mirrored squares over its UVs.
 
         Args:
             mesh: its own UVs are used if they do not overlap, else new ones.
             scale: size of the features beside the whole mesh, against that on the reference.
-            levels: how often every face is split in four first.
+            subdivide: how often every face is split in four first.
 
         Returns:
             The displaced mesh in light grey; where charts meet, heights are averaged and the pattern breaks.
@@ -119,8 +119,8 @@ class DisplacementMap:
             ConfigError: a number is out of range.
         """
         in_range("`scale`", scale, *SCALES)
-        in_range("`levels`", levels, *LEVELS)
-        fine = subdivide_midpoint(laid_out(mesh, ATLAS), levels)
+        in_range("`subdivide`", subdivide, *SUBDIVISIONS)
+        fine = subdivide_midpoint(laid_out(mesh, ATLAS), subdivide)
         assert fine.uv is not None
         area = float(fine.face_areas.sum(dtype=np.float64))
         stretch = np.sqrt(area / max(0.5 * np.abs(twice_area(fine.uv)).sum(), 1e-12))  # [mesh units per UV]

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from tyro.conf import arg
 
 from mitex.methods.checks import mutually_exclusive
 from mitex.methods.mesh_texture_options import MeshTextureOptions
+from mitex.methods.options import MeshFitOptions
 from mitex.methods.words.options import ExemplarOrWordsOptions
 from mitex.training.settings import RunSettings
 
 
 @dataclass(kw_only=True)
-class Fit(ExemplarOrWordsOptions):
+class Fit(MeshFitOptions, ExemplarOrWordsOptions):
     """Learn a network that colours one mesh by the place, as Text2Mesh (Michel et al. 2022) does: until views
     of it look like an exemplar's albedo, or are what words say. Words also move its vertices.
 
@@ -29,16 +30,8 @@ class Fit(ExemplarOrWordsOptions):
       mitex fit text2mesh --exemplar lava --mesh vase --out runs/field --resume
     """
 
-    fits_to_mesh: ClassVar[bool] = True
-
     text: Annotated[str | None, arg(metavar="WORDS", help_behavior_hint="")] = None
     """In place of an exemplar: what the mesh is made of. It gets colours, and a shape."""
-
-    mesh: Annotated[str, arg(metavar="MESH|NAME")]
-    """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
-
-    keep_uvs: Annotated[bool, arg(help_behavior_hint="")] = False
-    """Use the mesh's own UVs, which must not overlap."""
 
     def run(self) -> None:
         self.check_source()
@@ -46,7 +39,7 @@ class Fit(ExemplarOrWordsOptions):
         from mitex.runtime import let_idle_threads_sleep
 
         let_idle_threads_sleep()
-        print(self.fitted(options))
+        print(self.fit(options))
 
     def check_source(self) -> None:
         super().check_source()

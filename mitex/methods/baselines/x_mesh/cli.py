@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from tyro.conf import arg
 
 from mitex.methods.mesh_texture_options import MeshTextureOptions
+from mitex.methods.options import MeshFitOptions
 from mitex.methods.words.options import WordsOptions
 
 
 @dataclass(kw_only=True)
-class Fit(WordsOptions):
+class Fit(MeshFitOptions, WordsOptions):
     """Learn a network that colours one mesh by the place and moves its vertices until views of it are what
     words say, through gates that the words set, as X-Mesh (Ma et al. 2023) does.
 
@@ -25,16 +26,8 @@ class Fit(WordsOptions):
       mitex fit x_mesh --text "red dots on white" --mesh vase --out runs/dots --resume
     """
 
-    fits_to_mesh: ClassVar[bool] = True
-
     text: Annotated[str, arg(metavar="WORDS")]
     """What the mesh is made of. It gets colours, and a shape."""
-
-    mesh: Annotated[str, arg(metavar="MESH|NAME")]
-    """Mesh file (.obj .ply .stl .glb .gltf .off), or name of an embedded mesh."""
-
-    keep_uvs: Annotated[bool, arg(help_behavior_hint="")] = False
-    """Use the mesh's own UVs, which must not overlap."""
 
     def run(self) -> None:
         options = self.run_options()

@@ -1,4 +1,4 @@
-"""How the cells of a texture move along a vector field: what they are told of it, and what carries them."""
+"""How the cells of a texture move along a vector field: their conditions, and what carries them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mitex.errors import ConfigError
 from mitex.mesh import Lattice, Mesh
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.motion.advection import Advection, advection, flat_advection
-from mitex.methods.nca.motion.condition import WIDTH, Field, cell_vectors, flat_vectors, told
+from mitex.methods.nca.motion.condition import WIDTH, Field, cell_vectors, conditions, flat_vectors
 from mitex.methods.nca.ranges import SPEEDS
 
 # Steps in which a texture that was not trained to move goes an edge, where the field has length 1.
@@ -27,7 +27,7 @@ class CellMotion:
     """How the cells of one mesh move.
 
     Attributes:
-        condition: what they are told, (V, 3) (MeshNCA, equation 10); None for nothing.
+        condition: of the cells, (V, 3) (MeshNCA, equation 10); None for none.
         advection: what carries their states in each step; None for nothing.
     """
 
@@ -49,7 +49,7 @@ STILL = CellMotion()
 def look_motion(
     look: Look,
     about: Mapping[str, Any],
-    given: Mesh,
+    base: Mesh,
     cells: Mesh,
     field: Field | None,
     speed: float,
@@ -63,17 +63,17 @@ def look_motion(
         orientation: of the texture [rad], one or (V,) at the cells.
 
     Raises:
-        ConfigError: as of `followed_field` and `vector_field`.
+        ConfigError: as of `motion_field` and `vector_field`.
         MeshError: as of `vector_field`.
     """
-    field = followed_field(look, about, field, speed, about.get("motion"))
+    field = motion_field(look, about, field, speed, about.get("motion"))
     if field is None:
         return STILL
-    vectors = cell_vectors(given, cells, field, speed, longest=fastest(about)).astype(np.float64)
+    vectors = cell_vectors(base, cells, field, speed, longest=fastest(about)).astype(np.float64)
     displacement = cells.edge_lengths[:, None] * vectors / period(about)
     return CellMotion(
-        torch.from_numpy(told(vectors, cells, orientation)) if look.rule.condition else None,
-        advection(cells, displacement) if carried(look, about) else None,
+        torch.from_numpy(conditions(vectors, cells, orientation)) if look.rule.condition else None,
+        advection(cells, displacement) if is_advected(look, about) else None,
     )
 
 
@@ -84,20 +84,20 @@ def tile_motion(
     given.
 
     Raises:
-        ConfigError: as of `followed_field` and `flat_vectors`.
+        ConfigError: as of `motion_field` and `flat_vectors`.
     """
     default = "right" if look.rule.condition or "motion" in about else None
-    field = followed_field(look, about, field, speed, default)
+    field = motion_field(look, about, field, speed, default)
     if field is None:
         return STILL
     vectors = flat_vectors(lattice, field, speed, fastest(about))
     return CellMotion(
         torch.from_numpy(vectors) if look.rule.condition else None,
-        flat_advection(lattice, vectors[:, :2] / period(about)) if carried(look, about) else None,
+        flat_advection(lattice, vectors[:, :2] / period(about)) if is_advected(look, about) else None,
     )
 
 
-def carried(look: Look, about: Mapping[str, Any]) -> bool:
+def is_advected(look: Look, about: Mapping[str, Any]) -> bool:
     """Whether the states of a texture are carried along a field: those that were trained so, and those that
     were not trained to move.
     """
@@ -118,7 +118,7 @@ def fastest(about: Mapping[str, Any]) -> float:
     return math.inf if "motion" in about else LONGEST
 
 
-def followed_field(
+def motion_field(
     look: Look, about: Mapping[str, Any], field: Field | None, speed: float, default: Field | None
 ) -> Field | None:
     """The vector field that a look follows: the given one or the default; None if it shall not move.
@@ -129,7 +129,7 @@ def followed_field(
     name, width = about.get("name", "the model"), look.rule.condition
     if not SPEEDS[0] <= speed <= SPEEDS[1]:
         raise ConfigError(f"a speed of {speed:g}", f"use {SPEEDS[0]:g} to {SPEEDS[1]:g}")
-    if not width and not carried(look, about):
+    if not width and not is_advected(look, about):
         if field is None and speed == 1.0:
             return None
         raise ConfigError(

@@ -1,4 +1,4 @@
-"""What the cells of a moving texture are told of a vector field on a mesh (MeshNCA, equation 10)."""
+"""The conditions of a moving texture's cells: vectors of a field on a mesh (MeshNCA, equation 10)."""
 
 from __future__ import annotations
 
@@ -35,38 +35,41 @@ class Motion(TypedDict, total=False):
 
 
 def cell_vectors(
-    given: Mesh,
+    base: Mesh,
     cells: Mesh,
     field: Field,
     speed: float,
     longest: float = math.inf,
 ) -> np.ndarray:
-    """(V, 3) float32 vectors at the cells of a texture that is not turned; else see `told`.
+    """(V, 3) float32 vectors at the cells of a texture that is not turned; else see `conditions`.
 
     Args:
-        given: the mesh whose vertices the vectors of a file or an array belong to.
+        base: the mesh whose vertices the vectors of a file or an array belong to.
         cells: V vertices; the same mesh, or one of nearly the same surface.
         field: see `Field`.
         speed: factor of the field, whose mean length is 1.
-        longest: length of the longest vectors, see `slowed`.
+        longest: length of the longest vectors, see `clamp_lengths`.
 
     Raises:
         ConfigError: as of `vector_field`.
     """
-    return slowed(speed * carried_field(given, cells, field).astype(np.float64), longest).astype(np.float32)
+    vectors = speed * carried_field(base, cells, field).astype(np.float64)
+    return clamp_lengths(vectors, longest).astype(np.float32)
 
 
-def told(vectors: np.ndarray, cells: Mesh, orientation: float | np.ndarray) -> np.ndarray:
-    """(V, 3) float32, vectors (V, 3) as the cells of a turned texture are told them.
+def conditions(vectors: np.ndarray, cells: Mesh, orientation: float | np.ndarray) -> np.ndarray:
+    """(V, 3) float32, the conditions of a turned texture's cells.
 
     Args:
+        vectors: (V, 3) of the field at the cells.
+        cells: the mesh of the V cells.
         orientation: of the texture [rad], one or (V,). Cells take what is turned by it for upright, so their
             vectors are turned back.
     """
     return rotate_about(vectors, cells.normals.astype(np.float64), -orientation).astype(np.float32)
 
 
-def slowed(vectors: np.ndarray, longest: float) -> np.ndarray:
+def clamp_lengths(vectors: np.ndarray, longest: float) -> np.ndarray:
     """The vectors (V, 3), none longer than `longest`: a pattern that is told to move faster than it has
     learned stands still, and one that is carried faster than it heals dissolves.
 
@@ -102,4 +105,4 @@ def flat_vectors(lattice: Lattice, field: Field, speed: float, longest: float = 
             f"the vector field '{field}' is not the same everywhere, so that a tile would have a seam",
             "a tile takes one direction, such as right or 1,1,0",
         )
-    return slowed(vectors, longest)
+    return clamp_lengths(vectors, longest)

@@ -14,11 +14,11 @@ from mitex.features.flow import FARTHEST, load_estimator
 from mitex.losses.advection import advection_residual
 from mitex.losses.motion import motion_loss
 from mitex.methods.nca.config import NcaConfig
-from mitex.methods.nca.motion.drift import Drift, draw_drift
+from mitex.methods.nca.motion.tangent_field import TangentField, random_field
 from mitex.methods.nca.motion.views import MotionViews
 from mitex.methods.nca.pool import PoolTask, Rollout
 
-DRIFT_SEEDS = 2**31
+FIELD_SEEDS = 2**31
 POINTS = 8192  # at which the decoder's values are compared
 FLOOR = 0.1  # of residuals: as much as a displacement of a third of a cell, in usual patterns
 
@@ -35,28 +35,28 @@ class MovingPool(PoolTask):
 
     def __init__(self, config: NcaConfig, *arguments: Any) -> None:
         super().__init__(config, *arguments)
-        # A state has one drift until the seed replaces it, so that the rule learns what becomes of its
-        # pattern where the field goes on coming together, or apart. These are the drifts' random seeds.
-        self.drift_seeds = torch.zeros(config.pool, dtype=torch.int64)
+        # A state has one field until the seed replaces it, so that the rule learns what becomes of its
+        # pattern where the field goes on coming together, or apart. These are the fields' random seeds.
+        self.field_seeds = torch.zeros(config.pool, dtype=torch.int64)
         name = config.motion_estimator
         self.estimator = None if name == "advection" else load_estimator(name, self.look.device)
 
     @abstractmethod
-    def motion_views(self, drift: Drift, generator: torch.Generator) -> MotionViews:
+    def motion_views(self, field: TangentField, generator: torch.Generator) -> MotionViews:
         """What an estimator of motions in pictures looks at."""
 
     def rollout(
         self, index: int, state: torch.Tensor, step: int, steps: int, generator: torch.Generator
     ) -> Rollout:
-        config, drift_seed, seed = self.config, self.drift_seeds[index], not state.any()
+        config, field_seed, seed = self.config, self.field_seeds[index], not state.any()
         if seed:
-            drift_seed = torch.randint(DRIFT_SEEDS, (), generator=generator)
-        drift = self.drift(index, drift_seed)
+            field_seed = torch.randint(FIELD_SEEDS, (), generator=generator)
+        field = self.field(index, field_seed)
         apart, views = min(config.motion_steps, steps), None
         if self.estimator:
-            views = self.motion_views(drift, generator)
+            views = self.motion_views(field, generator)
             apart = min(apart, views.steps_within(FARTHEST, config.motion_period))
-        grow = self._growth(drift, generator)
+        grow = self._growth(field, generator)
         states = [grow(state, steps % apart)]
         for _ in range(steps // apart):
             states.append(grow(states[-1], apart))
@@ -66,48 +66,48 @@ class MovingPool(PoolTask):
             if views:
                 loss = self.picture_loss(sequence, views, apart)
             else:
-                loss = self.state_residual(sequence, drift, apart, generator)
+                loss = self.state_residual(sequence, field, apart, generator)
             terms = {"motion": config.motion_weight * loss}
-        return Rollout(states[-1], terms, partial(self._keep, index, drift_seed))
+        return Rollout(states[-1], terms, partial(self._keep, index, field_seed))
 
     def evolved(
         self, index: int, state: torch.Tensor, steps: int, generator: torch.Generator
     ) -> torch.Tensor:
-        return self._growth(self.drift(index, self.drift_seeds[index]), generator)(state, steps)
+        return self._growth(self.field(index, self.field_seeds[index]), generator)(state, steps)
 
-    def drift(self, index: int, drift_seed: torch.Tensor) -> Drift:
-        """How the pool's state `index` moves, given its drift's random seed."""
-        return draw_drift(self.config, self.surface(index), torch.Generator().manual_seed(int(drift_seed)))
+    def field(self, index: int, field_seed: torch.Tensor) -> TangentField:
+        """How the pool's state `index` moves, given its field's random seed."""
+        return random_field(self.config, self.surface(index), torch.Generator().manual_seed(int(field_seed)))
 
     def _growth(
-        self, drift: Drift, generator: torch.Generator
+        self, field: TangentField, generator: torch.Generator
     ) -> Callable[[torch.Tensor, int], torch.Tensor]:
-        """Of states (1, V, C), by so many steps, along a drift."""
-        rule, operator = self.look.rule, drift.surface.perception
-        condition = drift.condition.to(self.look.device) if rule.condition else None
-        advection = drift.advection(1 / self.config.motion_period) if self.config.motion_advection else None
+        """Of states (1, V, C), by so many steps, along a field."""
+        rule, operator = self.look.rule, field.surface.perception
+        condition = field.condition.to(self.look.device) if rule.condition else None
+        advection = field.advection(1 / self.config.motion_period) if self.config.motion_advection else None
         return lambda state, steps: rule.evolve(state, operator, steps, generator, condition, advection)
 
-    def _keep(self, index: int, drift_seed: torch.Tensor) -> None:
-        self.drift_seeds[index] = drift_seed
+    def _keep(self, index: int, field_seed: torch.Tensor) -> None:
+        self.field_seeds[index] = field_seed
 
     def state(self) -> dict[str, torch.Tensor]:
         # The name is that of earlier checkpoints, which can be resumed so.
-        return super().state() | {"pool.ways": self.drift_seeds}
+        return super().state() | {"pool.ways": self.field_seeds}
 
     def load_state(self, state: dict[str, torch.Tensor]) -> None:
         super().load_state(state)
-        self.drift_seeds = state["pool.ways"]
+        self.field_seeds = state["pool.ways"]
 
     def state_residual(
-        self, states: Sequence[torch.Tensor], drift: Drift, apart: int, generator: torch.Generator
+        self, states: Sequence[torch.Tensor], field: TangentField, apart: int, generator: torch.Generator
     ) -> torch.Tensor:
-        """How far states (V, C), each `apart` automaton steps from the next, are from moving with a drift."""
+        """How far states (V, C), each `apart` automaton steps from the next, are from moving with a field."""
         share = apart / self.config.motion_period
-        advection = drift.advection(share)
+        advection = field.advection(share)
         residuals = [advection_residual(a, b, advection(a), FLOOR) for a, b in pairwise(states)]
         return torch.stack(residuals).mean() + self._decoded_residual(
-            states[-2], states[-1], drift, share, generator
+            states[-2], states[-1], field, share, generator
         )
 
     def picture_loss(self, states: Sequence[torch.Tensor], views: MotionViews, apart: int) -> torch.Tensor:
@@ -121,14 +121,14 @@ class MovingPool(PoolTask):
         self,
         before: torch.Tensor,
         after: torch.Tensor,
-        drift: Drift,
+        field: TangentField,
         share: float,
         generator: torch.Generator,
     ) -> torch.Tensor:
         """The residual of what two states (V, C) show at random points: grain that stays in place costs."""
-        points, upstream = drift.random_places(POINTS, share, generator)
-        surface, decoder = drift.surface.surface, self.look.decoder
-        table = drift.table(before)
+        points, upstream = field.random_places(POINTS, share, generator)
+        surface, decoder = field.surface.surface, self.look.decoder
+        table = field.table(before)
         with torch.no_grad():
             there, here = (decoder(surface, table, where) for where in (upstream, points))
-        return advection_residual(here, decoder(surface, drift.table(after), points), there, FLOOR)
+        return advection_residual(here, decoder(surface, field.table(after), points), there, FLOOR)

@@ -24,7 +24,7 @@ from mitex.training.settings import RunOptions
 PRESET = "motion"
 
 
-def moving(options: RunOptions, field: str) -> RunOptions:
+def motion_options(options: RunOptions, field: str) -> RunOptions:
     """Options of a fit whose texture moves along a field; the preset is `PRESET` where nothing else tells.
 
     Raises:
@@ -63,7 +63,7 @@ def check_field(field: str) -> None:
     vector_field(icosphere(2), field)
 
 
-def check_seen(config: NcaConfig, maps: Iterable[str]) -> None:
+def check_albedo(config: NcaConfig, maps: Iterable[str]) -> None:
     """Refuses a training that looks at the motion of pictures without an albedo, which they show.
 
     Raises:
@@ -90,13 +90,13 @@ def _longest(field: str) -> float:
     return float(np.linalg.norm(vector_field(icosphere(8), field), axis=1).max())
 
 
-def learner(config: NcaConfig, look: Look) -> Look:
-    """The look that a training starts from, whose cells are told a vector if the settings want it."""
+def training_look(config: NcaConfig, look: Look) -> Look:
+    """The look that a training starts from, whose cells take a vector if the settings want it."""
     return with_condition(look) if config.motion and config.motion_encoding else look
 
 
 def with_condition(look: Look) -> Look:
-    """A look whose cells are told a vector: a copy for which it does not matter yet, if they are not so far.
+    """A look whose cells take a vector: a copy for which it does not matter yet, if they are not so far.
 
     The weights of the new inputs are zero, so that it grows bit for bit what the look grows.
     """

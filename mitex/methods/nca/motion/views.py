@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
 import torch
 
 from mitex.colour import LUMINANCE
-from mitex.geometry.triangles import interpolate
 from mitex.methods.nca.look import Look
-from mitex.methods.nca.motion.drift import Drift
-from mitex.methods.nca.surfaces import TrainingPlane, TrainingSphere, Windows
+from mitex.methods.nca.motion.tangent_field import TangentField
+from mitex.methods.nca.surfaces import TrainingMesh, TrainingPlane, Windows
 from mitex.scenes.cameras import Cameras
-from mitex.scenes.screen import screen_motion
+from mitex.scenes.screen import surface_motion
 
 STILL = 1e-6  # [px] in a period
 RIM = 4  # pixels along a silhouette, where an estimator's windows see the background, which stands still
@@ -26,7 +24,7 @@ class MotionViews:
 
     Attributes:
         grey: of a state (V, C), its luminance (K, 1, H, W), differentiable in the state.
-        target: (K, 2, H, W) the drift in the motion's period [px]; x to the right, y down.
+        target: (K, 2, H, W) the field in the motion's period [px]; x to the right, y down.
         mask: (K, H, W) bool, where the surface is, but for a margin along silhouettes.
     """
 
@@ -40,24 +38,16 @@ class MotionViews:
         return max(int(pixels * period / max(farthest, STILL)), 1)
 
 
-def sphere_views(look: Look, drift: Drift, cameras: Cameras) -> MotionViews:
-    """Of a sphere, as cameras see it."""
-    sphere = drift.surface
-    assert isinstance(sphere, TrainingSphere)
-    hits = sphere.stage.hits(cameras)
-    corners = sphere.mesh.faces[hits.face.numpy()]
-    weights = hits.barycentric.numpy().astype(np.float64)
-    points, field = (interpolate(weights, values[corners]) for values in (sphere.mesh.vertices, drift.field))
-    hit = hits.hit.numpy()
-    camera = np.flatnonzero(hit) // (cameras.width * cameras.height)
-    motion = np.zeros((len(hit), 2))
-    motion[hit] = screen_motion(cameras, camera, points, sphere.edge * field)
-    size = cameras.shape
-    target = torch.from_numpy(motion.astype(np.float32)).view(*size, 2).permute(0, 3, 1, 2)
+def mesh_views(look: Look, field: TangentField, cameras: Cameras) -> MotionViews:
+    """Of a mesh, as cameras see it."""
+    surface = field.surface
+    assert isinstance(surface, TrainingMesh)
+    hits = surface.stage.hits(cameras)
+    target = surface_motion(cameras, surface.mesh, hits, surface.edge * field.vectors)
     return MotionViews(
-        lambda state: _grey(look, sphere.views(look, state, cameras)),
-        target.to(look.device),
-        without_rim(hits.hit.view(size)).to(look.device),
+        lambda state: _grey(look, surface.views(look, state, cameras)),
+        torch.from_numpy(target).permute(0, 3, 1, 2).to(look.device),
+        without_rim(hits.hit.view(cameras.shape)).to(look.device),
     )
 
 
@@ -67,11 +57,11 @@ def without_rim(mask: torch.Tensor) -> torch.Tensor:
     return outside[:, 0] == 0
 
 
-def plane_views(look: Look, drift: Drift, windows: Windows) -> MotionViews:
+def plane_views(look: Look, field: TangentField, windows: Windows) -> MotionViews:
     """Of a flat square, in windows."""
-    plane = drift.surface
+    plane = field.surface
     assert isinstance(plane, TrainingPlane)
-    right, up = plane.axes @ drift.field[0] * (windows.pixels / (windows.width * plane.lattice.columns))
+    right, up = plane.axes @ field.vectors[0] * (windows.pixels / (windows.width * plane.lattice.columns))
     size = len(windows.corners), windows.pixels, windows.pixels
     target = torch.tensor([right, -up], dtype=torch.float32, device=look.device)
     return MotionViews(

@@ -11,13 +11,13 @@ from mitex.mesh import Mesh
 from mitex.methods.nca import files
 from mitex.methods.nca.config import PRESETS, NcaConfig
 from mitex.methods.nca.look import Look, weights_key
-from mitex.methods.nca.motion.start import learner, motion_record
+from mitex.methods.nca.motion.start import motion_record, training_look
 from mitex.methods.nca.parents import fitting_lineage, resumed_lineage
 from mitex.methods.nca.text.moving import MovingTextTask
 from mitex.methods.nca.text.task import TextTask
 from mitex.methods.nca.text.wording import MAPS, check, with_maps
 from mitex.methods.nca.texture import NcaTexture
-from mitex.methods.words.wording import worded
+from mitex.methods.words.wording import words_options
 from mitex.training.fit import Run
 from mitex.training.settings import RunOptions
 
@@ -57,7 +57,7 @@ def fit_text(
         Interrupted: by Ctrl-C, likewise.
     """
     inputs = {"text": text, "text_model": clip and os.fspath(clip), "motion": motion}
-    run = Run.of(PRESETS, out, **worded(options, inputs))
+    run = Run.of(PRESETS, out, **words_options(options, inputs))
     config = run.config
     check(config)
     look, lineage = _start(init, run)
@@ -81,5 +81,5 @@ def _start(init: str | Path | None, run: Run[NcaConfig]) -> tuple[Look | None, d
     if source is None or run.resume:
         return None, resumed_lineage(run)
     parent, about = files.load(source)
-    parent = learner(run.config, with_maps(parent, MAPS))
+    parent = training_look(run.config, with_maps(parent, MAPS))
     return parent, fitting_lineage(parent, about, Look.of(run.config, MAPS))

@@ -16,7 +16,7 @@ from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.look import Look
 from mitex.methods.nca.pool import PoolTask, initial_look
-from mitex.methods.nca.surfaces import TrainingSphere, TrainingSurface, training_surfaces
+from mitex.methods.nca.surfaces import TrainingMesh, TrainingSurface, training_surfaces
 from mitex.methods.nca.text.views import Figure, training_cameras
 from mitex.methods.nca.text.wording import MAPS, prompts
 from mitex.methods.words.distance import Negative, Part, Sight, SightBank, WordsDistance
@@ -59,19 +59,19 @@ class TextTask(PoolTask):
         look = initial_look(config, MAPS, init, device)
         surfaces = training_surfaces(config, look) if mesh is None else [training_mesh(mesh, look)]
         super().__init__(config, look, surfaces, lineage)
-        self.spheres = [surface for surface in surfaces if isinstance(surface, TrainingSphere)]
-        self.figures = {sphere: Figure(sphere, config.text_relief, device) for sphere in self.spheres}
-        self._edges = {sphere: _edges(sphere.mesh, device) for sphere in self.spheres}
-        self.banks = {sphere: self._bank(sphere) for sphere in self.spheres}
+        self.meshes = [surface for surface in surfaces if isinstance(surface, TrainingMesh)]
+        self.figures = {surface: Figure(surface, config.text_relief, device) for surface in self.meshes}
+        self._edges = {surface: _edges(surface.mesh, device) for surface in self.meshes}
+        self.banks = {surface: self._bank(surface) for surface in self.meshes}
 
-    def _bank(self, sphere: TrainingSphere) -> SightBank:
-        config, figure = self.config, self.figures[sphere]
-        return SightBank(config, partial(training_cameras, config, sphere), self.words, figure.bare)
+    def _bank(self, surface: TrainingMesh) -> SightBank:
+        config, figure = self.config, self.figures[surface]
+        return SightBank(config, partial(training_cameras, config, surface), self.words, figure.bare)
 
     def terms(
         self, surface: TrainingSurface, state: torch.Tensor, generator: torch.Generator
     ) -> dict[str, torch.Tensor]:
-        assert isinstance(surface, TrainingSphere)
+        assert isinstance(surface, TrainingMesh)
         config, bank = self.config, self.banks[surface]
         index = bank.draw(generator)
         sight = bank.sight(index)
@@ -99,7 +99,7 @@ class TextTask(PoolTask):
     def preview(self, step: int) -> np.ndarray:
         """Two views of an evolved state, coloured, and grey below."""
         surface, state, _ = self.example(step)
-        assert isinstance(surface, TrainingSphere)
+        assert isinstance(surface, TrainingMesh)
         cameras = orbit(2, distance=2.05, resolution=PREVIEW, start=90)
         views = self.figures[surface].textured(self.look, state, cameras)
         rows = (torch.cat(list(pictures), 1) for pictures in (views.coloured, views.plain))
@@ -115,11 +115,11 @@ class TextTask(PoolTask):
         return {"method": "nca", "maps": ",".join(MAPS)} | known | self.lineage
 
 
-def training_mesh(mesh: Mesh, look: Look) -> TrainingSphere:
+def training_mesh(mesh: Mesh, look: Look) -> TrainingMesh:
     """A mesh of any shape to train on, at the size of the spheres, as finely divided as when the texture is
     applied to it.
     """
-    return TrainingSphere.of(Cells.of(mesh.normalised()[0]).mesh, look)
+    return TrainingMesh.of(Cells.of(mesh.normalised()[0]).mesh, look)
 
 
 def _edges(mesh: Mesh, device: torch.device | str) -> tuple[torch.Tensor, torch.Tensor]:

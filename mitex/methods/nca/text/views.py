@@ -11,20 +11,20 @@ from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.decoder.surface import Points
 from mitex.methods.nca.displacement import Displacement
 from mitex.methods.nca.look import Look
-from mitex.methods.nca.surfaces import LEAST, CloseUps, TrainingSphere
+from mitex.methods.nca.surfaces import LEAST, CloseUps, TrainingMesh
 from mitex.scenes.cameras import Cameras, random_views
 from mitex.scenes.shaded import GREY, lamps_of_pixels, pictured, shading
 from mitex.sparse import Weights
 
 
 def training_cameras(
-    config: NcaConfig, sphere: TrainingSphere, generator: torch.Generator, least: int = LEAST
+    config: NcaConfig, surface: TrainingMesh, generator: torch.Generator, least: int = LEAST
 ) -> Cameras:
     """Random views of a step: of the whole surface, or of patches as wide as the density, of `least` pixels
     a side or more."""
     count, resolution = config.view_count, config.resolution
     if config.views == "patch":
-        return sphere.cameras(CloseUps(config.density, count, resolution, least=least), generator)
+        return surface.cameras(CloseUps(config.density, count, resolution, least=least), generator)
     distances = config.text_distances
     distance = distances[int(torch.randint(len(distances), (), generator=generator))]
     return random_views(generator, count, distance, config.fov, resolution)
@@ -51,14 +51,14 @@ class Figure:
     """A surface as cameras see it, shaded.
 
     Args:
-        sphere: the surface.
+        surface: the surface.
         bound: of the relief [edges].
         device: of states.
     """
 
-    def __init__(self, sphere: TrainingSphere, bound: float, device: torch.device | str = "cpu") -> None:
-        self.sphere, self.relief = sphere, Displacement(sphere.mesh, bound, device)
-        self._faces = torch.tensor(sphere.mesh.faces, device=device)
+    def __init__(self, surface: TrainingMesh, bound: float, device: torch.device | str = "cpu") -> None:
+        self.surface, self.relief = surface, Displacement(surface.mesh, bound, device)
+        self._faces = torch.tensor(surface.mesh.faces, device=device)
 
     def bare(self, cameras: Cameras) -> torch.Tensor:
         """Pictures (K, H, W, 3) without any texture, grey and even."""
@@ -68,7 +68,7 @@ class Figure:
     def textured(self, look: Look, state: torch.Tensor, cameras: Cameras) -> Views:
         """With what a state (V, C) shows; differentiable in the state and the look's decoder."""
         hit, points = self._visible(cameras)
-        surface, layout = self.sphere.surface, look.layout
+        surface, layout = self.surface.surface, look.layout
         table = surface.table(state)
         values, corners = (look.decoder(surface, table, where) for where in (points, self.relief.corners))
         height = corners[:, layout["height"][0]]
@@ -79,7 +79,7 @@ class Figure:
 
     def _visible(self, cameras: Cameras) -> tuple[torch.Tensor, Points]:
         """Which pixels meet the surface, (K H W,) bool, and where."""
-        hits = self.sphere.stage.hits(cameras)
+        hits = self.surface.stage.hits(cameras)
         return hits.hit.to(self._faces.device), Points(hits.face, hits.barycentric)
 
     def _shade(

@@ -41,7 +41,7 @@ class MakeCapture:
     frames: Annotated[int, arg(metavar="N")] = 80
     """Pictures to pick, at most."""
 
-    size: Annotated[int, arg(metavar="PX")] = 1600
+    resolution: Annotated[int, arg(metavar="N")] = 1600
     """Longer side of the capture's pictures, at most [pixels]."""
 
     quiet: Annotated[bool, arg(help_behavior_hint="")] = False
@@ -49,8 +49,8 @@ class MakeCapture:
 
     def run(self) -> None:
         in_range("--frames", self.frames, 8, 1000)
-        in_range("--size", self.size, 128, 8192)
+        in_range("--resolution", self.resolution, 128, 8192)
         from mitex.methods.nerf.footage.making import make_capture
 
-        report = make_capture(self.source, self.out, self.mask, self.frames, self.size)
+        report = make_capture(self.source, self.out, self.mask, self.frames, self.resolution)
         print(*report.lines(), self.out, sep="\n")

@@ -27,7 +27,7 @@ from mitex.optional import optional
 from mitex.paths import atomic_write, check_writable, expanded, missing_folders, writing
 from mitex.progress import counted
 
-FRAMES, SIZE = 80, 1600
+FRAMES, RESOLUTION = 80, 1600
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,11 @@ class Report:
 
 
 def make_capture(
-    source: str | Path, out: str | Path, mask: str = "plane", frames: int = FRAMES, size: int = SIZE
+    source: str | Path,
+    out: str | Path,
+    mask: str = "plane",
+    frames: int = FRAMES,
+    resolution: int = RESOLUTION,
 ) -> Report:
     """Makes a capture of a video or of a folder of photos, in the layout that `load_capture` reads.
 
@@ -74,7 +78,7 @@ def make_capture(
         out: folder to be made; it appears when it is complete.
         mask: how the object is told from its surroundings, as `mask_method` reads it.
         frames: pictures to pick, at most, 8 to 1000.
-        size: longer side of the pictures in the capture, at most [pixels].
+        resolution: longer side of the pictures in the capture, at most [pixels].
 
     Raises:
         CaptureError: no video or photos, too few that are sharp, have a camera or a mask.
@@ -85,14 +89,14 @@ def make_capture(
         WeightsError: the network that is to mask cannot be used.
     """
     in_range("`frames`", frames, MIN_VIEWS, 1000)
-    in_range("`size`", size, 128, 8192)
+    in_range("`resolution`", resolution, 128, 8192)
     method = mask_method(mask)
     cut_out = optional("mitex.methods.nerf.footage.cutting", "nerf").cut_out
     network = None
     if method.network is not None:
         network = optional("mitex.methods.nerf.footage.network", "nerf").read_network(method.network)
     with _new_folder(expanded(out), expanded(source)) as folder:
-        taken = footage(source, size)
+        taken = footage(source, resolution)
         names, why = _picked(taken, frames, folder, first=method.kind == "box")
         site = find_site(folder, names)
         if method.kind == "box" and site.frames[0].name != names[0]:

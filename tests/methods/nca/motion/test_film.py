@@ -62,7 +62,7 @@ FILMS = {
 def test_films_are_resumed_with_the_same_texture_alone(tmp_path, monkeypatch, name):
     """Another motion, orientation, mixture, relief or palette would show in the rest of the frames."""
     made, options, abouts = FILMS[name]
-    shooting = OPTIONS | {"seconds": 0.2, "start": 0, "resolution": 16}
+    settings = OPTIONS | {"seconds": 0.2, "start": 0, "resolution": 16}
     sphere, picture = icosphere(3), film.PreviewCamera.picture
     with monkeypatch.context() as patch:
 
@@ -72,12 +72,12 @@ def test_films_are_resumed_with_the_same_texture_alone(tmp_path, monkeypatch, na
 
         patch.setattr(film.PreviewCamera, "picture", stopped)
         with pytest.raises(KeyboardInterrupt):
-            made().animate(sphere, tmp_path / "film", **shooting)
+            made().animate(sphere, tmp_path / "film", **settings)
     others = [(made(), option) for option in options] + [(made(**about), {}) for about in abouts]
     for texture, option in others:
         with pytest.raises(ConfigError, match="had another texture"):
-            texture.animate(sphere, tmp_path / "film", **shooting, **option, resume=True)
-    made().animate(sphere, tmp_path / "film", **shooting, resume=True)
+            texture.animate(sphere, tmp_path / "film", **settings, **option, resume=True)
+    made().animate(sphere, tmp_path / "film", **settings, resume=True)
 
 
 @pytest.mark.parametrize("option", [{"field": "up"}, {"speed": 3.0}])

@@ -13,7 +13,7 @@ from mitex.methods.nca.look import Look
 from mitex.methods.nca.motion import pool as training
 from mitex.methods.nca.motion.start import with_condition
 from mitex.methods.nca.motion.task import MotionTask
-from mitex.methods.nca.surfaces import TrainingPlane, TrainingSphere
+from mitex.methods.nca.surfaces import TrainingMesh, TrainingPlane
 from mitex.methods.nca.task import NcaTask
 from mitex.runtime import threads
 from tests.methods.nca.tiny import config
@@ -49,7 +49,7 @@ def _smooth(task):
     """The same, with states that differ little from cell to cell."""
     for index, state in enumerate(task.pool):
         surface, scale = task.surface(index), 3.0
-        mesh = surface.mesh if isinstance(surface, TrainingSphere) else surface.lattice.mesh
+        mesh = surface.mesh if isinstance(surface, TrainingMesh) else surface.lattice.mesh
         if isinstance(surface, TrainingPlane):
             scale = 2 * math.pi / surface.lattice.columns
         waves = np.sin(scale * mesh.vertices[: surface.perception.vertices].astype(np.float64)).round(9)
@@ -91,7 +91,7 @@ def test_motion_is_one_more_term(exemplar):
 
 
 def test_a_perfect_transport_would_cost_nothing(exemplar, monkeypatch):
-    """Where each of the states is the one before, carried along; also the drift that the cells were told. A
+    """Where each of the states is the one before, carried along; also the field that the cells were told. A
     decoder with grain, which stays in place, never is perfect.
     """
     settings = (*MOVING, "min_steps=7", "max_steps=7", "motion_period=4", "motion_weight=1")
@@ -100,20 +100,20 @@ def test_a_perfect_transport_would_cost_nothing(exemplar, monkeypatch):
         _smooth(MotionTask(config(*settings, f"coordinates={words}"), exemplar)) for words in ("", "waves")
     )
     monkeypatch.setattr(training, "FLOOR", 0.0)
-    drifts = []
+    fields = []
 
     def draw(*arguments):
-        drifts.append(training.Drift(*drawn(*arguments)))
-        return drifts[-1]
+        fields.append(training.TangentField(*drawn(*arguments)))
+        return fields[-1]
 
     drawn = lambda *arguments: vars(original(*arguments)).values()  # noqa: E731
-    original = training.draw_drift
-    monkeypatch.setattr(training, "draw_drift", draw)
+    original = training.random_field
+    monkeypatch.setattr(training, "random_field", draw)
 
     def evolve(state, operator, steps, generator, condition, advection):
         assert advection is None
-        assert torch.equal(condition, drifts[-1].condition)
-        return drifts[-1].advection(steps / 4)(state[0])[None]
+        assert torch.equal(condition, fields[-1].condition)
+        return fields[-1].advection(steps / 4)(state[0])[None]
 
     for one in (task, grainy):
         monkeypatch.setattr(one.look.rule, "evolve", evolve)
@@ -123,7 +123,7 @@ def test_a_perfect_transport_would_cost_nothing(exemplar, monkeypatch):
 
 
 def test_estimators_of_pictures_see_the_last_states(exemplar, monkeypatch):
-    """And are compared with what the drift would show; their loss is that of motions in pictures."""
+    """And are compared with what the field would show; their loss is that of motions in pictures."""
 
     def estimator(first, second):
         assert first.shape == second.shape == (4, 1, 32, 32) and second.requires_grad
@@ -193,7 +193,7 @@ def test_motion_is_measured_in_the_widest_of_the_views(exemplar, monkeypatch, su
     task, sizes = MotionTask(config(*words, "density=4"), exemplar), []
     closeups = task.closeups
     monkeypatch.setattr(task, "closeups", lambda size, *least: sizes.append(size) or closeups(size, *least))
-    task.motion_views(task.drift(0, task.drift_seeds[0]), torch.Generator().manual_seed(0))
+    task.motion_views(task.field(0, task.field_seeds[0]), torch.Generator().manual_seed(0))
     assert sizes == [128] and list(task.zooms) == [128, 256]
 
 
@@ -203,8 +203,8 @@ def test_a_floor_keeps_the_residual_of_what_stands_still_small(exemplar, monkeyp
     sphere, generator = task.surface(0), torch.Generator().manual_seed(1)
     before, after = torch.randn(2, sphere.perception.vertices, 16, generator=generator)
     monkeypatch.setattr(task, "_decoded_residual", lambda *_: torch.zeros(()))
-    drift = training.Drift(sphere, np.zeros((len(before), 3)))
-    residual = task.state_residual([before, after], drift, 2, generator)
+    field = training.TangentField(sphere, np.zeros((len(before), 3)))
+    residual = task.state_residual([before, after], field, 2, generator)
     expected = (after - before).square().sum() / (0.1 * (before - before.mean(0)).square().sum())
     assert float(residual) == pytest.approx(float(expected), rel=1e-3)
 
@@ -256,14 +256,14 @@ def test_a_state_keeps_its_way_until_the_seed_replaces_it(exemplar):
     task = MotionTask(config(*MOVING, "pool=1", "inject_every=4"), exemplar)
     seeds, fields = [], []
     for step in range(1, 9):
-        before = task.drift_seeds.clone()
+        before = task.field_seeds.clone()
         result = task.loss(step, torch.Generator().manual_seed(step))
-        assert torch.equal(task.drift_seeds, before)
+        assert torch.equal(task.field_seeds, before)
         result.commit()
-        seeds.append(int(task.drift_seeds[0]))
-        fields.append(task.drift(0, task.drift_seeds[0]).field)
+        seeds.append(int(task.field_seeds[0]))
+        fields.append(task.field(0, task.field_seeds[0]).vectors)
     assert len(set(seeds[:3])) == len(set(seeds[3:7])) == 1 and len(set(seeds)) == 3
     assert np.array_equal(fields[0], fields[2]) and np.abs(fields[2] - fields[3]).max() > 0.1
     other = MotionTask(config(*MOVING, "pool=1"), exemplar)
     other.load_state(copies(task.state()))
-    assert torch.equal(other.drift_seeds, task.drift_seeds)
+    assert torch.equal(other.field_seeds, task.field_seeds)

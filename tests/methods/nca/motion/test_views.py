@@ -8,9 +8,9 @@ import scipy.ndimage
 import torch
 
 from mitex.mesh import icosphere
-from mitex.methods.nca.motion.drift import Drift, turned_field
-from mitex.methods.nca.motion.views import RIM, MotionViews, plane_views, sphere_views
-from mitex.methods.nca.surfaces import CloseUps, TrainingPlane, TrainingSphere
+from mitex.methods.nca.motion.tangent_field import TangentField, turned_field
+from mitex.methods.nca.motion.views import RIM, MotionViews, mesh_views, plane_views
+from mitex.methods.nca.surfaces import CloseUps, TrainingMesh, TrainingPlane
 from mitex.scenes.cameras import random_views
 from tests.methods.nca.tiny import SHAPE, texture
 
@@ -23,9 +23,11 @@ def look():
     return texture(shape=replace(SHAPE, coordinates=())).look
 
 
-def _assert_moving(views: MotionViews, drift: Drift, state: torch.Tensor, size: tuple[int, int, int]) -> None:
+def _assert_moving(
+    views: MotionViews, field: TangentField, state: torch.Tensor, size: tuple[int, int, int]
+) -> None:
     """Grey values change by the target's share times their slope, with the opposite sign."""
-    pictures = views.grey(state), views.grey(drift.advection(SHARE)(state))
+    pictures = views.grey(state), views.grey(field.advection(SHARE)(state))
     assert pictures[0].shape == pictures[1].shape == (size[0], 1, *size[1:])
     assert views.target.shape == (size[0], 2, *size[1:]) and views.mask.shape == size
     first, second = (grey[:, 0].detach().numpy() for grey in pictures)
@@ -51,25 +53,25 @@ def _state(places: np.ndarray) -> torch.Tensor:
 def test_windows_of_a_square(look):
     plane = TrainingPlane.of(32, look, 0.5 * np.pi)
     places = (2 * np.pi / 32) * plane.lattice.mesh.vertices[: plane.lattice.count].astype(np.float64)
-    drift = Drift(plane, np.tile(np.array([1.5, 1.0]) @ plane.axes, (len(places), 1)))
+    field = TangentField(plane, np.tile(np.array([1.5, 1.0]) @ plane.axes, (len(places), 1)))
     state = _state(places.round(9))
     windows = plane.places(CloseUps(16, 3, 40), torch.Generator().manual_seed(0))
-    views = plane_views(look, drift, windows)
-    _assert_moving(views, drift, state, (3, 40, 40))
+    views = plane_views(look, field, windows)
+    _assert_moving(views, field, state, (3, 40, 40))
     assert torch.allclose(views.target[:, 0], torch.tensor(1.5 * 40 / 16))
     assert torch.allclose(views.target[:, 1], torch.tensor(-1.0 * 40 / 16))
 
 
 @pytest.mark.parametrize("views", ["patch", "full"])
 def test_views_of_a_sphere(look, views):
-    sphere, generator = TrainingSphere.of(icosphere(16), look), torch.Generator().manual_seed(1)
-    drift = Drift(sphere, turned_field(sphere.mesh, "about-x", np.eye(3)))
+    sphere, generator = TrainingMesh.of(icosphere(16), look), torch.Generator().manual_seed(1)
+    field = TangentField(sphere, turned_field(sphere.mesh, "about-x", np.eye(3)))
     state = _state(2 * sphere.mesh.vertices.astype(np.float64))
     cameras = sphere.cameras(CloseUps(8, 2, 40), generator)
     if views == "full":
         cameras = random_views(generator, 2, 2.0, 60.0, 40)
-    seen = sphere_views(look, drift, cameras)
-    _assert_moving(seen, drift, state, (2, 40, 40))
+    seen = mesh_views(look, field, cameras)
+    _assert_moving(seen, field, state, (2, 40, 40))
     assert seen.mask.all() == (views == "patch")
     if views == "full":
         _assert_without_rim(seen.mask.numpy(), sphere.stage.hits(cameras).hit.view(2, 40, 40).numpy())

@@ -11,7 +11,7 @@ from mitex.mesh import icosphere
 from mitex.mesh.fields import vector_field
 from mitex.methods import nca
 from mitex.methods.nca import NcaTexture
-from mitex.methods.nca.surfaces import TrainingSphere
+from mitex.methods.nca.surfaces import TrainingMesh
 from mitex.methods.nca.text.moving import MovingTextTask
 from mitex.runtime import threads
 from tests.features.clip.folders import write_folder
@@ -74,9 +74,9 @@ def test_it_learns_to_move_on_a_mesh_of_ones_own(tmp_path):
     speeds = "motion_speeds=1.5,1.5"
     one = MovingTextTask(config(*MOVING, speeds, "motion_turns=false"), MeanColour(), None, None, egg)
     (surface,) = one.surfaces
-    assert isinstance(surface, TrainingSphere) and np.ptp(surface.mesh.vertices[:, 0]) < 1.3
+    assert isinstance(surface, TrainingMesh) and np.ptp(surface.mesh.vertices[:, 0]) < 1.3
     assert np.allclose(
-        one.drift(0, one.drift_seeds[0]).field, 1.5 * vector_field(surface.mesh, "right"), atol=1e-5
+        one.field(0, one.field_seeds[0]).vectors, 1.5 * vector_field(surface.mesh, "right"), atol=1e-5
     )
     grown(one)
     assert loss(one).metrics["motion"] > 1e-6

@@ -37,7 +37,7 @@ def _spread(augmentation):
 
 
 def _sight(one):
-    return one.banks[one.spheres[0]].sight(0)
+    return one.banks[one.meshes[0]].sight(0)
 
 
 CHECKS = {}
@@ -58,7 +58,7 @@ def text(build):
 def text_directional(build):
     """Without it the distance is that of the pictures themselves, whatever the grey sphere looks like."""
     one = build("text_directional=false")
-    surface, generator = one.spheres[0], torch.Generator().manual_seed(0)
+    surface, generator = one.meshes[0], torch.Generator().manual_seed(0)
     sight = one.banks[surface].sight(int(torch.randint(one.config.text_bank, (), generator=generator)))
     views = one.figures[surface].textured(one.look, one.pool[0], sight.cameras)
     (pictures,) = one.words.directions([sight.whole(views.coloured, one.words.model.resolution)])
@@ -83,14 +83,14 @@ def text_bank(build):
     for seed in range(12):
         one = build("text_bank=2")
         _terms(one, seed)
-        negatives = set(one.banks[one.spheres[0]]._negatives)
+        negatives = set(one.banks[one.meshes[0]]._negatives)
     assert negatives == {0, 1}
 
 
 @check
 def text_distances(build):
     one = build("text_distances=2,4", "text_bank=8")
-    bank = one.banks[one.spheres[0]]
+    bank = one.banks[one.meshes[0]]
     distances = {round(float(np.linalg.norm(bank.sight(k).cameras.origin[0])), 3) for k in range(8)}
     assert distances == {2.0, 4.0}
 

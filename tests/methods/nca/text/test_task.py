@@ -35,7 +35,7 @@ def test_a_skipped_step_leaves_every_byte(fault):
 def test_the_grey_seed_is_at_no_distance_from_its_negative():
     """Its pictures are the negative's, pixel by pixel: the same cuts and tilts are done to both."""
     one = task("decoder=false", "channels=12")
-    surface = one.spheres[0]
+    surface = one.meshes[0]
     state = torch.zeros(one.pool.shape[1:], requires_grad=True)
     terms = one.terms(surface, state, torch.Generator().manual_seed(0))
     assert [terms[name].item() for name in ("whole", "close", "relief")] == [1.0, 1.0, 1.0]
@@ -47,7 +47,7 @@ def test_the_terms_are_those_of_the_paper():
     """Equations 7 to 9, picture by picture."""
     weights = "text_relief_weight=2", "text_range_weight=3", "text_smooth_weight=5"
     one = grown(task(*weights, "text_roughness=0.01"))
-    surface, state, generator = one.spheres[0], one.pool[0], torch.Generator()
+    surface, state, generator = one.meshes[0], one.pool[0], torch.Generator()
     terms = one.terms(surface, state, generator.manual_seed(5))
     index = int(torch.randint(3, (), generator=generator.manual_seed(5)))
     sight, figure, model = one.banks[surface].sight(index), one.figures[surface], MeanColour()
@@ -71,27 +71,27 @@ def test_the_terms_are_those_of_the_paper():
 
 def test_negatives_are_computed_once_and_equal_fresh_ones():
     one, again = task(), task()
-    surface = one.spheres[0]
+    surface = one.meshes[0]
     first = one.banks[surface].negative(1)
     assert one.banks[surface].negative(1) is first and one.banks[surface].negative(2) is not first
     loss(grown(one))
-    fresh = again.banks[again.spheres[0]].negative(1)
+    fresh = again.banks[again.meshes[0]].negative(1)
     assert torch.equal(fresh.whole, first.whole) and torch.equal(fresh.close, first.close)
     assert not torch.equal(one.banks[surface].negative(2).close, first.close)
 
 
 def test_a_bank_holds_other_views_for_another_seed():
     one, same, other = task(), task(), task("seed=1")
-    cameras = [t.banks[t.spheres[0]].sight(2).cameras.origin for t in (one, same, other)]
+    cameras = [t.banks[t.meshes[0]].sight(2).cameras.origin for t in (one, same, other)]
     assert np.array_equal(cameras[0], cameras[1]) and not np.array_equal(cameras[0], cameras[2])
-    assert not np.array_equal(cameras[0], one.banks[one.spheres[0]].sight(0).cameras.origin)
+    assert not np.array_equal(cameras[0], one.banks[one.meshes[0]].sight(0).cameras.origin)
 
 
 def test_it_learns_a_colour():
     def colour(one):
         state = one.evolved(0, torch.zeros_like(one.grown(0)), 3, torch.Generator().manual_seed(0))[0]
-        cameras = one.banks[one.spheres[0]].sight(0).cameras
-        views = one.figures[one.spheres[0]].textured(one.look, state, cameras)
+        cameras = one.banks[one.meshes[0]].sight(0).cameras
+        views = one.figures[one.meshes[0]].textured(one.look, state, cameras)
         return views.values[:, :3].mean(0)
 
     settings = ("steps=40", "inject_every=1", "pool=1", "lr=0.01")
@@ -125,7 +125,7 @@ def test_a_mesh_of_ones_own():
     """It is trained on in place of the spheres, in their size, and is what the prompt speaks of."""
     mesh = torus(12, 8)
     one = TextTask(config("text_object=none"), MeanColour(), mesh=mesh.with_vertices(7 * mesh.vertices))
-    (surface,) = one.spheres
+    (surface,) = one.meshes
     assert np.linalg.norm(surface.mesh.vertices, axis=1).max() == pytest.approx(1.0, abs=1e-3)
     assert len(surface.mesh.vertices) >= 8000
     assert one.metadata()["mesh"] == mesh.name and "mesh_key" in one.metadata()

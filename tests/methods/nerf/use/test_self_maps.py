@@ -19,12 +19,13 @@ from mitex.methods.nerf.use.placement import EXTENT
 from mitex.quilting.plane import Quilt
 from tests.methods.nerf.field.test_shell import at, mi, rows, shell
 from tests.methods.nerf.tiny import tiny_capture
+from tests.methods.nerf.use.self_maps import on_base_shape
 
 
 def test_on_its_own_base_shape_it_gives_the_training_views_back(texture):
     """The promise is 1 dB less than the fit."""
     training, _ = tiny_capture().split()
-    again = texture.on_base_shape(512)
+    again = on_base_shape(texture, 512)
     thickness = again.thickness * again.similarity.scale
     np.testing.assert_allclose(thickness, texture.model.base.thickness, rtol=1e-5)
     losses = []

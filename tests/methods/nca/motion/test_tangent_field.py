@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from mitex.mesh import icosphere, scattered_sphere
 from mitex.mesh.fields import vector_field
-from mitex.methods.nca.motion.drift import Drift, draw_drift, random_rotation, turned_field
-from mitex.methods.nca.surfaces import TrainingPlane, TrainingSphere
+from mitex.methods.nca.motion.tangent_field import TangentField, random_field, random_rotation, turned_field
+from mitex.methods.nca.surfaces import TrainingMesh, TrainingPlane
 from tests.methods.nca.tiny import config, texture
 
 
@@ -31,7 +31,7 @@ def test_a_square_carries_waves_along(look, azimuth):
         return torch.from_numpy(np.stack([np.sin(3 * x), np.cos(2 * x - 3 * y)], 1)).float()
 
     field = np.tile(2 * way @ plane.axes, (len(places), 1))
-    carried = Drift(plane, field).advection(0.5)(waves(0 * way))
+    carried = TangentField(plane, field).advection(0.5)(waves(0 * way))
     assert (carried - waves(way)).abs().max() < 0.01
     assert (waves(0 * way) - waves(way)).abs().max() > 0.5
 
@@ -39,7 +39,7 @@ def test_a_square_carries_waves_along(look, azimuth):
 @pytest.mark.parametrize("mesh", [icosphere(16), scattered_sphere(2562)], ids=["even", "uneven"])
 def test_a_sphere_carries_a_pattern_about_an_axis(look, mesh):
     """A turn by the angle that the field says, in edges."""
-    sphere = TrainingSphere.of(mesh, look)
+    sphere = TrainingMesh.of(mesh, look)
     angle = 1.5 * sphere.edge
     points = mesh.vertices.astype(np.float64)
 
@@ -48,7 +48,7 @@ def test_a_sphere_carries_a_pattern_about_an_axis(look, mesh):
         return torch.from_numpy(np.stack([np.sin(5 * x), z * y, x * x], 1)).float()
 
     field = np.cross([0.0, 1.5, 0.0], points)  # [edges] at the equator
-    carried = Drift(sphere, field).advection(1.0)(pattern(0.0))
+    carried = TangentField(sphere, field).advection(1.0)(pattern(0.0))
     error = (carried - pattern(angle)).abs().max()
     assert error < 0.1 * (pattern(0.0) - pattern(angle)).abs().max()
 
@@ -65,38 +65,38 @@ def test_turned_fields_are_those_of_the_turned_mesh():
 
 @pytest.mark.parametrize("kind", ["plane", "sphere"])
 def test_each_step_draws_a_direction_and_a_speed(look, kind):
-    surface = TrainingPlane.of(8, look) if kind == "plane" else TrainingSphere.of(icosphere(3), look)
+    surface = TrainingPlane.of(8, look) if kind == "plane" else TrainingMesh.of(icosphere(3), look)
     settings, generator = config("motion=up", "motion_speeds=0.5,2"), torch.Generator().manual_seed(0)
-    fields = [draw_drift(settings, surface, generator).field for _ in range(40)]
+    fields = [random_field(settings, surface, generator).vectors for _ in range(40)]
     speeds = [np.linalg.norm(field, axis=1).mean() for field in fields]
     assert 0.5 <= min(speeds) < 0.7 and 1.7 < max(speeds) <= 2 + 1e-6
     pull = np.array([field.mean(axis=0) for field in fields])
     assert (pull.min(axis=0) < -0.3).sum() >= 2 and (pull.max(axis=0) > 0.3).sum() >= 2
-    drift = draw_drift(settings, surface, generator)
-    assert drift.condition.shape == (surface.perception.vertices, 3)
-    assert np.allclose(drift.condition.numpy(), drift.field)
+    field = random_field(settings, surface, generator)
+    assert field.condition.shape == (surface.perception.vertices, 3)
+    assert np.allclose(field.condition.numpy(), field.vectors)
 
 
 def test_without_turns_a_sphere_has_the_very_field(look):
-    sphere = TrainingSphere.of(icosphere(3), look)
+    sphere = TrainingMesh.of(icosphere(3), look)
     settings = config("motion=about-y", "motion_turns=false", "motion_speeds=2,2")
-    drift = draw_drift(settings, sphere, torch.Generator())
-    assert np.allclose(drift.field, 2 * vector_field(sphere.mesh, "about-y"))
+    field = random_field(settings, sphere, torch.Generator())
+    assert np.allclose(field.vectors, 2 * vector_field(sphere.mesh, "about-y"))
 
 
 @pytest.mark.parametrize("kind", ["plane", "sphere"])
 def test_places_upstream_show_what_is_carried_here(look, kind):
     """A smooth state there is the transported state here; points are where there is area."""
-    surface = TrainingPlane.of(32, look) if kind == "plane" else TrainingSphere.of(icosphere(16), look)
-    drift = draw_drift(config("motion=up"), surface, torch.Generator().manual_seed(1))
+    surface = TrainingPlane.of(32, look) if kind == "plane" else TrainingMesh.of(icosphere(16), look)
+    field = random_field(config("motion=up"), surface, torch.Generator().manual_seed(1))
     mesh = surface.lattice.mesh if isinstance(surface, TrainingPlane) else surface.mesh
-    places = mesh.vertices[: len(drift.field)].astype(np.float64)
+    places = mesh.vertices[: len(field.vectors)].astype(np.float64)
     scale = 2 * math.pi / 32 if kind == "plane" else 3.0
     state = torch.from_numpy(np.sin(scale * places).round(9)).float()
-    points, before = drift.random_places(4000, 0.5, torch.Generator().manual_seed(0))
-    carried = drift.table(drift.advection(0.5)(state))
-    here, there = surface.surface.read(carried, points), surface.surface.read(drift.table(state), before)
-    still = surface.surface.read(drift.table(state), points)
+    points, before = field.random_places(4000, 0.5, torch.Generator().manual_seed(0))
+    carried = field.table(field.advection(0.5)(state))
+    here, there = surface.surface.read(carried, points), surface.surface.read(field.table(state), before)
+    still = surface.surface.read(field.table(state), points)
     assert (here - there).abs().mean() < 0.05 * (here - still).abs().mean()
     middle = np.einsum(
         "pk,pkd->pd", points.barycentric.numpy(), mesh.vertices[mesh.faces[points.face.numpy()]]

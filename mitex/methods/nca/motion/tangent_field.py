@@ -15,33 +15,33 @@ from mitex.mesh.nearest import nearest_points
 from mitex.methods.nca.config import NcaConfig
 from mitex.methods.nca.decoder.surface import Points
 from mitex.methods.nca.motion.advection import Advection, as_points
-from mitex.methods.nca.surfaces import TrainingPlane, TrainingSphere, TrainingSurface
+from mitex.methods.nca.surfaces import TrainingMesh, TrainingPlane, TrainingSurface
 
 
 @dataclass(frozen=True, eq=False)
-class Drift:
+class TangentField:
     """A tangent field on a training surface.
 
     Attributes:
         surface: the surface.
-        field: (V, 3) float64 at its cells, in the mesh's space: 1 is an edge in the motion's period.
+        vectors: (V, 3) float64 at its cells, in the mesh's space: 1 is an edge in the motion's period.
     """
 
     surface: TrainingSurface
-    field: np.ndarray
+    vectors: np.ndarray
 
     @property
     def condition(self) -> torch.Tensor:
         """What the cells know of it, (V, 3) float32 [edges a period] (equation 10)."""
-        return torch.from_numpy(self.field.astype(np.float32))
+        return torch.from_numpy(self.vectors.astype(np.float32))
 
     def advection(self, share: float) -> Advection:
         """What a share of the period makes of states: each cell gets that of the place upstream, as many
-        edges away as the field is long there, times the share.
+        edges away as the vector is long there, times the share.
         """
         surface = self.surface
         source = surface.lattice.source if isinstance(surface, TrainingPlane) else None
-        return Advection(surface.surface, self._upstream(self._cells, self.field, share), source)
+        return Advection(surface.surface, self._upstream(self._cells, self.vectors, share), source)
 
     def table(self, state: torch.Tensor) -> torch.Tensor:
         """What the decoder reads of a state (V, C)."""
@@ -56,33 +56,33 @@ class Drift:
         numbers = torch.rand(count, 3, generator=generator, dtype=torch.float64).numpy()
         face, weights = scattered(mesh.face_areas, numbers.T)
         corners = mesh.faces[face]
-        field = self.field
+        vectors = self.vectors
         if isinstance(self.surface, TrainingPlane):
-            field = field[self.surface.lattice.source]
+            vectors = vectors[self.surface.lattice.source]
         places = interpolate(weights, mesh.vertices[corners].astype(np.float64))
-        before = self._upstream(places, interpolate(weights, field[corners]), share)
+        before = self._upstream(places, interpolate(weights, vectors[corners]), share)
         return as_points(face, weights), before
 
     @property
     def _mesh(self) -> Mesh:
         surface = self.surface
-        return surface.mesh if isinstance(surface, TrainingSphere) else surface.lattice.mesh
+        return surface.mesh if isinstance(surface, TrainingMesh) else surface.lattice.mesh
 
     @property
     def _cells(self) -> np.ndarray:
-        return self._mesh.vertices[: len(self.field)].astype(np.float64)
+        return self._mesh.vertices[: len(self.vectors)].astype(np.float64)
 
-    def _upstream(self, places: np.ndarray, field: np.ndarray, share: float) -> Points:
-        """Where what is at places (P, 3) was before, given the field there (P, 3)."""
+    def _upstream(self, places: np.ndarray, vectors: np.ndarray, share: float) -> Points:
+        """Where what is at places (P, 3) was before, given the vectors there (P, 3)."""
         surface = self.surface
-        if isinstance(surface, TrainingSphere):
-            return as_points(*nearest_points(surface.mesh, places - share * surface.edge * field))
+        if isinstance(surface, TrainingMesh):
+            return as_points(*nearest_points(surface.mesh, places - share * surface.edge * vectors))
         columns = surface.lattice.columns
-        return as_points(*surface.lattice.locate((places - share * field) @ surface.axes.T / columns))
+        return as_points(*surface.lattice.locate((places - share * vectors) @ surface.axes.T / columns))
 
 
-def draw_drift(config: NcaConfig, surface: TrainingSurface, generator: torch.Generator) -> Drift:
-    """A drift of random speed, and of a random direction: a rule that has seen them all follows any field.
+def random_field(config: NcaConfig, surface: TrainingSurface, generator: torch.Generator) -> TangentField:
+    """A field of random speed, and of a random direction: a rule that has seen them all follows any field.
 
     On spheres it is the config's field, turned about a random axis if the config wants it; on flat squares,
     which a constant field alone repeats on, always a random direction.
@@ -92,10 +92,10 @@ def draw_drift(config: NcaConfig, surface: TrainingSurface, generator: torch.Gen
     if isinstance(surface, TrainingPlane):
         angle = 2 * math.pi * float(torch.rand((), generator=generator))
         direction = np.array([math.cos(angle), math.sin(angle)]) @ surface.axes
-        return Drift(surface, np.tile(speed * direction, (surface.perception.vertices, 1)))
+        return TangentField(surface, np.tile(speed * direction, (surface.perception.vertices, 1)))
     rotation = random_rotation(generator) if config.motion_turns else np.eye(3)
     assert config.motion is not None
-    return Drift(surface, speed * turned_field(surface.mesh, config.motion, rotation))
+    return TangentField(surface, speed * turned_field(surface.mesh, config.motion, rotation))
 
 
 def turned_field(mesh: Mesh, source: str, rotation: np.ndarray) -> np.ndarray:
