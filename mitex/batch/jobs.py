@@ -103,7 +103,7 @@ def _fit(
     given = options.fit_words(method, part.fit, plan.folder)
     about = {"method": part.label, "exemplar": exemplar.label, "seed": seed}
     about |= {"mesh": mesh.label} if mesh else {}
-    from_text = part.learns_from == "text"
+    from_text = options.is_text(method, part.learns_from)
     implied = options.implied_inputs(method, part.fit, plan.folder, from_text=from_text)
     id = _id("fit", about, [*words, *inputs, *given, *implied])
     out = ("--out", f"{RESULTS}/{id}")
@@ -131,12 +131,12 @@ def _apply(part: MethodPlan, plan: Plan, fit: Job, mesh: Input | None) -> Job:
 
 
 def _exemplars(part: MethodPlan, plan: Plan) -> list[Input]:
-    if part.learns_from == "text":
-        return [Input(text, None) for text in part.exemplars]
     method = methods()[part.method]
+    if options.is_text(method, part.learns_from):
+        return [Input(text, None) for text in part.exemplars]
     if part.learns_from != method.learns_from:  # which may be names as well as files
         return [Input.of(text, plan.folder) for text in part.exemplars]
-    return find(part.exemplars, plan.folder, "exemplar", _exemplar_names(method))
+    return find(part.exemplars, plan.folder, "exemplar", options.source_names(method))
 
 
 def _option(name: str, value: Input | None) -> list[Input]:
@@ -158,18 +158,6 @@ def _id(command: str, about: Mapping[str, Any], parts: Sequence[str | Input]) ->
 def _plain(name: str) -> str:
     """A name as it can stand in a file's."""
     return re.sub(r"[^\w.]+", "_", name, flags=re.ASCII).strip("._")[:LONGEST_NAME] or "x"
-
-
-def _exemplar_names(method: Method) -> list[str] | None:
-    """The names that may stand for what a method learns from; None if they are not checked."""
-    from mitex.exemplar import names
-    from mitex.methods.geometric.references import reference_names
-    from mitex.training.locate import bundled_files
-
-    if options.learns_from_paths(method):
-        return []
-    known = {"exemplar": names, "reference": reference_names, "texture": lambda: list(bundled_files())}
-    return known[method.learns_from]() if method.learns_from in known else None
 
 
 def _mesh_names() -> list[str]:

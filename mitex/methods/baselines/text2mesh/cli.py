@@ -10,6 +10,7 @@ from tyro.conf import arg
 
 from mitex.methods.checks import mutually_exclusive
 from mitex.methods.mesh_texture_options import MeshTextureOptions
+from mitex.methods.option_types import PlainText
 from mitex.methods.words.options import ExemplarOrWordsOptions
 from mitex.training.settings import RunSettings
 
@@ -31,7 +32,7 @@ class Fit(ExemplarOrWordsOptions):
 
     fits_to_mesh: ClassVar[bool] = True
 
-    text: Annotated[str | None, arg(metavar="WORDS", help_behavior_hint="")] = None
+    text: Annotated[PlainText | None, arg(metavar="WORDS", help_behavior_hint="")] = None
     """In place of an exemplar: what the mesh is made of. It gets colours, and a shape."""
 
     mesh: Annotated[str, arg(metavar="MESH|NAME")]

@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar
 from tyro.conf import arg
 
 from mitex.methods.mesh_texture_options import MeshTextureOptions
+from mitex.methods.option_types import PlainText
 from mitex.methods.words.options import WordsOptions
 
 
@@ -27,7 +28,7 @@ class Fit(WordsOptions):
 
     fits_to_mesh: ClassVar[bool] = True
 
-    text: Annotated[str, arg(metavar="WORDS")]
+    text: Annotated[PlainText, arg(metavar="WORDS")]
     """What the mesh is made of. It gets colours, and a shape."""
 
     mesh: Annotated[str, arg(metavar="MESH|NAME")]
