@@ -23,8 +23,9 @@ from typing import Any
 
 from mitex.batch import claims
 from mitex.batch.jobs import Job
-from mitex.errors import ConfigError, OutputError
-from mitex.paths import atomic_write, check_writable, expanded, is_temporary, writing
+from mitex.errors import ConfigError
+from mitex.paths import atomic_write, check_own_folder, expanded, writing
+from mitex.records import write_json
 
 PLAN = "plan.jsonl"
 DONE, FAILED, STARTS, LOG = "done.json", "failed.json", "starts.json", "log.txt"
@@ -47,13 +48,7 @@ class BatchFolder:
         Raises:
             OutputError: It holds other files, or cannot be written to.
         """
-        folder = BatchFolder(Path(os.path.abspath(expanded(out))))
-        check_writable(folder.path)
-        files = folder.path.iterdir() if folder.path.is_dir() else ()
-        # Another call may be about to write the plan.
-        if not all(map(is_temporary, files)) and not folder.is_ours():
-            raise OutputError(f"'{out}' holds other files", "name a new or empty folder with `out`")
-        return folder
+        return BatchFolder(check_own_folder(out, lambda folder: BatchFolder(folder).is_ours()))
 
     @staticmethod
     def existing(path: str | Path) -> BatchFolder:
@@ -109,8 +104,7 @@ class BatchFolder:
         Raises:
             OutputError: The disk is full, or the folder is not writable.
         """
-        with atomic_write(self.of(job) / name) as temporary:
-            temporary.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+        write_json(self.of(job) / name, record)
 
     def forget_failure(self, job: Job) -> None:
         """Lets a job that failed be run again."""

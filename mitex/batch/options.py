@@ -34,12 +34,12 @@ def check_options(
         if name not in (*options, *keys):
             raise ConfigError(f"methods.{label} has no key '{name}'", suggestion(name, [*options, *keys]))
         if name in options:
-            _check(name, value, options[name], label)
+            values.read(values.check, value, options[name], f"{name} of methods.{label}")
     for name, value in apply.items():
         kinds = apply_kinds(method)
         if name not in kinds:
             raise ConfigError(f"methods.{label}.apply has no key '{name}'", suggestion(name, kinds))
-        _check(name, value, kinds[name], f"{label}.apply")
+        values.read(values.check, value, kinds[name], f"{name} of methods.{label}.apply")
     _config(method, fit, folder)
 
 
@@ -142,15 +142,6 @@ def _text(value: Any) -> str:
     if isinstance(value, list | tuple):
         return ",".join(map(_text, value))
     return str(value).lower() if isinstance(value, bool) else str(value)
-
-
-def _check(name: str, value: Any, kind: Any, place: str) -> None:
-    try:
-        values.check(value, kind)
-    except ValueError as e:
-        raise ConfigError(
-            f"{name} of methods.{place} cannot be {value!r}", f"give {values.describe(kind)}"
-        ) from e
 
 
 def _hints(command: type) -> dict[str, Any]:

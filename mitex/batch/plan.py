@@ -118,7 +118,7 @@ class Plan:
         Raises:
             ConfigError: An unknown key or method, a value of a wrong type or out of range, or nothing to do.
         """
-        common, tables = _split(content, "methods", {key: KEYS[key] for key in KEYS}, "the plan")
+        common, tables = _split(content, "methods", KEYS, "the plan")
         if unknown := [key for key in content if key not in (*KEYS, "methods")]:
             raise ConfigError(f"a plan has no key '{unknown[0]}'", suggestion(unknown[0], [*KEYS, "methods"]))
         if not tables:
@@ -164,18 +164,12 @@ def _split(
     table: Mapping[str, Any], inner: str, kinds: Mapping[str, Any], place: str
 ) -> tuple[dict[str, Any], Mapping[str, Any]]:
     """The values of the known keys, checked, and the table `inner`."""
-    known = {}
-    for key in kinds.keys() & table.keys():
-        try:
-            known[key] = values.check(table[key], kinds[key])
-        except ValueError as e:
-            raise ConfigError(
-                f"{key} of {place} cannot be {table[key]!r}", f"give {values.describe(kinds[key])}"
-            ) from e
+    keys = [key for key in kinds if key in table]
+    own = {key: values.read(values.check, table[key], kinds[key], f"{key} of {place}") for key in keys}
     tables = table.get(inner, {})
     if not isinstance(tables, Mapping):
         raise ConfigError(f"{inner} of {place} cannot be {tables!r}", f"give {TABLES[inner]}")
-    return known, tables
+    return own, tables
 
 
 def _check_lists(plan: MethodPlan) -> None:

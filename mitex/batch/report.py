@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -12,7 +11,7 @@ from typing import Any
 from mitex.batch.folder import STARTS, BatchFolder
 from mitex.batch.jobs import Job
 from mitex.errors import OutputError
-from mitex.paths import atomic_write
+from mitex.records import write_csv
 from mitex.training.progress import clock
 
 STATES = ("done", "running", "interrupted", "waiting", "failed", "blocked")
@@ -73,15 +72,8 @@ class Report:
         """
         records = [_flat(row) for row in self.rows]
         metrics = sorted({key for record in records for key in record} - set(COLUMNS))
-        path = self.folder / TABLE
-        with (
-            atomic_write(path) as temporary,
-            temporary.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file,
-        ):
-            writer = csv.DictWriter(file, [*COLUMNS, *metrics], restval="")
-            writer.writeheader()
-            writer.writerows(records)
-        return path
+        write_csv(self.folder / TABLE, [*COLUMNS, *metrics], records)
+        return self.folder / TABLE
 
 
 def status(path: str | Path) -> Report:

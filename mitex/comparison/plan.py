@@ -148,11 +148,4 @@ def add_setting(tables: Mapping[str, dict[str, Any]], setting: str) -> None:
 
 def _value(key: str, text: str, kinds: Mapping[str, Any], label: str) -> Any:
     """The value of an option; that of a setting stays a text, which its config reads."""
-    if key not in kinds:
-        return text
-    try:
-        return values.parse(text, kinds[key])
-    except ValueError as e:
-        raise ConfigError(
-            f"{key} of {label} cannot be '{text}'", f"give {values.describe(kinds[key])}"
-        ) from e
+    return text if key not in kinds else values.read(values.parse, text, kinds[key], f"{key} of {label}")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -22,8 +20,9 @@ from mitex.comparison.provenance import Provenance
 from mitex.comparison.results import Result, results_of
 from mitex.comparison.study import check_study, write_study
 from mitex.comparison.summary import Summary, summaries
-from mitex.errors import ConfigError, OutputError
-from mitex.paths import atomic_write, check_writable, expanded, is_temporary
+from mitex.errors import ConfigError
+from mitex.paths import atomic_write, check_own_folder
+from mitex.records import write_csv, write_json
 
 BATCH, MEASURED = "batch", "measured"  # folders: of the jobs, and of what was measured of their results
 NAMES, PLACES = ("exemplar", "mesh", "method", "seed"), ("asset", "run")  # of a result, besides its numbers
@@ -92,7 +91,7 @@ def compare(
     _check_judge(kind, judge)
     if study:
         check_study(plan)
-    place = checked_folder(folder)
+    place = check_own_folder(folder, lambda path: BatchFolder(path / BATCH).is_ours())
     report = run_plan(plan, place / BATCH, engine, threads=threads, retry=retry, on_event=on_event)
     results = results_of(report, source_of(plan))
     measurements = measure(results, partial(kind.pair_of, judge=judge), Kept(place / MEASURED))
@@ -101,20 +100,6 @@ def compare(
     if study:
         write_study(place, comparison.results, measurements.exemplars)
     return comparison
-
-
-def checked_folder(folder: str | Path) -> Path:
-    """A folder that is new, empty, or an earlier comparison's; absolute. Nothing is written.
-
-    Raises:
-        OutputError: It holds other files, or cannot be written to.
-    """
-    place = Path(os.path.abspath(expanded(folder)))
-    check_writable(place)
-    files = place.iterdir() if place.is_dir() else ()
-    if not all(map(is_temporary, files)) and not BatchFolder(place / BATCH).is_ours():
-        raise OutputError(f"'{folder}' holds other files", "name a new or empty folder with `out`")
-    return place
 
 
 def _check_judge(kind: Kind, judge: str | None) -> None:
@@ -156,28 +141,18 @@ def _write(comparison: Comparison, measurements: Measurements, kind: Kind, prove
     )
     with atomic_write(comparison.report) as temporary:
         temporary.write_text(page.html(), encoding="utf-8", errors="replace")
-    _write_csv(comparison.folder / TABLE, results, kind)
+    columns = (*NAMES, *(measure.key for measure in kind.measures), *PLACES)
+    rows = [_flat(result, comparison.folder) for result in results]
+    write_csv(comparison.folder / TABLE, columns, rows)
     record: dict[str, Any] = {
         **provenance.record(),
         "judge": measurements.judge,
-        "results": [_flat(result, comparison.folder) for result in comparison.results],
+        "results": rows,
         "means": [_record(table, floors) for table in comparison.tables],
         "failures": list(comparison.failures),
         "measures": {m.key: {"better": m.better, "meaning": m.meaning} for m in kind.measures},
     }
-    with atomic_write(comparison.folder / RECORD) as temporary:
-        temporary.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-
-
-def _write_csv(path: Path, results: Sequence[Result], kind: Kind) -> None:
-    columns = (*NAMES, *(measure.key for measure in kind.measures), *PLACES)
-    with (
-        atomic_write(path) as temporary,
-        temporary.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file,
-    ):
-        writer = csv.DictWriter(file, columns, restval="")
-        writer.writeheader()
-        writer.writerows(_flat(result, path.parent) for result in results)
+    write_json(comparison.folder / RECORD, record)
 
 
 def _flat(result: Result, folder: Path) -> dict[str, Any]:

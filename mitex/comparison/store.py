@@ -14,7 +14,7 @@ from mitex.asset import Asset
 from mitex.comparison.kinds import Pair
 from mitex.comparison.results import LIT, VIEW, Result
 from mitex.images import write_image
-from mitex.paths import atomic_write
+from mitex.records import write_json
 from mitex.training.locate import CHECKPOINT
 
 VERSION = 3  # of what is measured: numbers of another one are measured again
@@ -88,9 +88,7 @@ def _read(path: Path, judge: str | None, time: str | None = None) -> dict[str, f
 
 def _write(path: Path, numbers: Mapping[str, float], judge: str | None, time: str | None = None) -> None:
     about = {key: value for key, value in (("judge", judge), ("time", time)) if value}
-    record = {"version": VERSION, "numbers": dict(numbers), **about}
-    with atomic_write(path) as temporary:
-        temporary.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    write_json(path, {"version": VERSION, "numbers": dict(numbers), **about})
 
 
 def _with(result: Result, numbers: Mapping[str, float], pictures: Mapping[str, Path]) -> Result:

@@ -23,6 +23,7 @@ from mitex.comparison.results import LIT, Result
 from mitex.errors import ConfigError
 from mitex.page import jpeg
 from mitex.paths import atomic_write, expanded
+from mitex.records import write_json
 
 PAGE, KEY = "study.html", "study.json"
 MOST = 40  # questions to one person, as MeshNCA asked
@@ -132,8 +133,7 @@ def _write(folder: Path, asked: Sequence[tuple[Question, list[str]]], pictures: 
     text = json.dumps(data).replace("<", "\\u003c")  # words could end the script
     page = template(PAGE).substitute(style=text_of("style.css"), data=text)
     key = {"id": id, "questions": [asdict(question) for question, _ in asked]}
-    with atomic_write(folder / KEY) as temporary:
-        temporary.write_text(json.dumps(key, indent=1) + "\n", encoding="utf-8")
+    write_json(folder / KEY, key)
     with atomic_write(folder / PAGE) as temporary:
         temporary.write_text(page, encoding="utf-8")
     return folder / PAGE
