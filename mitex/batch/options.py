@@ -76,7 +76,7 @@ def apply_kinds(method: Method) -> dict[str, Any]:
     return _kinds(method.load_apply(), set())
 
 
-def implied_inputs(method: Method, fit: Mapping[str, Any], folder: Path, *, from_text: bool) -> list[Input]:
+def implicit_inputs(method: Method, fit: Mapping[str, Any], folder: Path, *, from_text: bool) -> list[Input]:
     """Files that a fit reads although no option names them: the CLIP model of words, and VGG-19.
 
     Args:
@@ -123,6 +123,7 @@ def _config(method: Method, fit: Mapping[str, Any], folder: Path) -> Any:
 
 
 def _words(options: Mapping[str, Any], command: type, folder: Path) -> Iterator[Input]:
+    """The words of a command's options, by name; files are told from other texts by the options' types."""
     hints = _hints(command)
     for name, value in options.items():
         option = f"--{name.replace('_', '-')}"

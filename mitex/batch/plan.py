@@ -131,6 +131,7 @@ class Plan:
 
 
 def _content(file: Path) -> dict[str, Any]:
+    """The tables of a TOML file."""
     try:
         if not file.is_file():
             reason = "it is no file" if file.exists() else "there is no such file"
@@ -146,6 +147,7 @@ def _content(file: Path) -> dict[str, Any]:
 
 
 def _method(label: str, table: Any, common: Mapping[str, Any], folder: Path) -> MethodPlan:
+    """A method by its table, which goes before the plan's common values."""
     if not isinstance(table, Mapping):
         raise ConfigError(f"methods.{label} cannot be {table!r}", f"give {TABLES['methods']}")
     own, apply = _split(table, "apply", OWN_KEYS, f"methods.{label}")
@@ -173,6 +175,7 @@ def _split(
 
 
 def _check_lists(plan: MethodPlan) -> None:
+    """Refuses a method without exemplars, or meshes that it needs, and seeds out of range."""
     method = methods()[plan.method]
     if not plan.exemplars:
         raise ConfigError(f"methods.{plan.label} has no exemplars", "name some in the list `exemplars`")

@@ -105,6 +105,7 @@ def _first_seeds(count: int) -> tuple[int, ...]:
 
 
 def _prepared(part: MethodPlan, kind: Kind) -> MethodPlan:
+    """As `prepared`, of one method: only fit if it is put on no mesh, with patterns of one size otherwise."""
     method = methods()[part.method]
     output = "glb" if method.applies_to_meshes else "none"
     if part.output not in ("glb", output):
@@ -116,12 +117,12 @@ def _prepared(part: MethodPlan, kind: Kind) -> MethodPlan:
         return replace(part, output=output)
     if not part.meshes:
         raise ConfigError("there are no meshes to compare on", "name some")
-    sized = (
+    needs_width = (
         part.learns_from == "exemplar"
         and WIDTH in apply_kinds(method)
         and not any(name in part.apply for name in SCALES)
     )
-    return replace(part, apply={**part.apply, WIDTH: EXEMPLAR_WIDTH}) if sized else part
+    return replace(part, apply={**part.apply, WIDTH: EXEMPLAR_WIDTH}) if needs_width else part
 
 
 def add_setting(tables: Mapping[str, dict[str, Any]], setting: str) -> None:
