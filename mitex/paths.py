@@ -5,7 +5,7 @@ import os
 import re
 import secrets
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -86,6 +86,29 @@ def prepare_folder(path: str | os.PathLike[str]) -> Path:
     except OSError as e:
         raise _translated(e, target) from e
     return target
+
+
+def check_own_folder(path: str | os.PathLike[str], is_own: Callable[[Path], bool]) -> Path:
+    """Checks that the folder `path` is new, empty, or one's own, and can be written to. Creates nothing.
+
+    Temporary files do not count: another call may be about to write what makes the folder one's own.
+
+    Args:
+        path: the folder.
+        is_own: tells by what is in a folder that one may go on in it.
+
+    Returns:
+        The path, absolute.
+
+    Raises:
+        OutputError: It holds other files, is a file, or cannot be made or written to.
+    """
+    check_writable(path)
+    folder = Path(os.path.abspath(expanded(path)))
+    files = folder.iterdir() if folder.is_dir() else ()
+    if not all(map(is_temporary, files)) and not is_own(folder):
+        raise OutputError(f"'{path}' holds other files", "name a new or empty folder with `out`")
+    return folder
 
 
 def missing_folders(path: str | os.PathLike[str]) -> list[Path]:

@@ -51,6 +51,7 @@ ORDER = [
     "cache_entries",
     "manifest",
     "progress",
+    "records",
     "paths",
     "reading",
     "ranges",

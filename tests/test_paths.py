@@ -8,7 +8,15 @@ import pytest
 
 from mitex import paths
 from mitex.errors import ConfigError, OutputError
-from mitex.paths import atomic_write, cache_dir, expanded, is_temporary, prepare_folder, prepare_output
+from mitex.paths import (
+    atomic_write,
+    cache_dir,
+    check_own_folder,
+    expanded,
+    is_temporary,
+    prepare_folder,
+    prepare_output,
+)
 
 needs_permissions = pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 
@@ -46,7 +54,9 @@ def test_prepare_output_refuses(tmp_path: Path, name: str, words: str):
     assert words.format(tmp_path) in str(error.value)
 
 
-@pytest.mark.parametrize("prepare", [prepare_output, prepare_folder])
+@pytest.mark.parametrize(
+    "prepare", [prepare_output, prepare_folder, lambda path: check_own_folder(path, lambda folder: True)]
+)
 def test_places_without_permission_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, prepare):
     monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != tmp_path)
     with pytest.raises(OutputError, match="not writable"):
@@ -111,6 +121,24 @@ def test_prepare_folder(tmp_path: Path):
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match="is a file"):
         prepare_folder(tmp_path / "file")
+
+
+@pytest.mark.parametrize(
+    ("names", "accepted"),
+    [([], True), ([".a.0123abcd.tmp.json"], True), (["thesis.txt"], False), (["thesis.txt", "mine"], True)],
+)
+def test_a_folder_of_ones_own(tmp_path: Path, names: list[str], accepted: bool):
+    folder = tmp_path / "out"
+    assert check_own_folder(f"{folder}/", lambda path: False) == folder and not folder.exists()
+    folder.mkdir()
+    for name in names:
+        (folder / name).touch()
+    if accepted:
+        assert check_own_folder(folder, lambda path: (path / "mine").exists()) == folder
+    else:
+        with pytest.raises(OutputError, match="'.*out' holds other files; name a new or empty folder"):
+            check_own_folder(folder, lambda path: (path / "mine").exists())
+    assert listing(folder) == sorted(names)
 
 
 def test_the_old_file_stays_until_the_block_ends(tmp_path: Path):

@@ -141,7 +141,7 @@ def _read(path: Path) -> list[_Entry]:
 
 
 def _is_live(path: Path) -> bool:
-    """Whether somebody works under a claim, or may do so, as far as one can tell."""
+    """Whether a process works under a claim, or may do so, as far as one can tell."""
     entries = _read(path)
     if entries and (entries[0].host, entries[0].space) == (socket.gethostname(), _space()):
         return any(_is_running(entry.pid, entry.moment) for entry in entries)
@@ -153,19 +153,19 @@ def _is_live(path: Path) -> bool:
         return True
 
 
-def _is_running(pid: int, noted: float) -> bool:
-    """Whether the process lives that had this number at a time, and not a later one of the same number."""
+def _is_running(pid: int, moment: float) -> bool:
+    """Whether the process that had a number at a moment still runs, and not a later one of that number."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
         boot = time.time() - time.clock_gettime(time.CLOCK_BOOTTIME)
         started = boot + int(fields[19]) / os.sysconf("SC_CLK_TCK")
-        return fields[0] not in "ZX" and started <= noted + SLACK
+        return fields[0] not in "ZX" and started <= moment + SLACK
     except (FileNotFoundError, ProcessLookupError):  # the latter if it ends meanwhile
-        return not Path("/proc/self/stat").exists() and _answers(pid)
+        return not Path("/proc/self/stat").exists() and _exists(pid)
 
 
-def _answers(pid: int) -> bool:
-    """Where there is no /proc."""
+def _exists(pid: int) -> bool:
+    """Whether a process has this number, where there is no /proc."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:

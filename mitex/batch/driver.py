@@ -24,7 +24,7 @@ from mitex.training.progress import clock
 
 log = logging.getLogger(__name__)
 
-LOOK_ELSEWHERE = 1.0  # between two looks at a job that another call works on [s]
+RECHECK = 1.0  # between two looks at a job that another call works on [s]
 
 EventState = Literal["submitted", "done", "failed", "interrupted", "elsewhere"]
 
@@ -79,20 +79,20 @@ def run_plan(
         KeyboardInterrupt: Ctrl-C or SIGTERM; the fits that were running have saved their checkpoints.
     """
     jobs = jobs_of(plan)
-    place = BatchFolder.checked(folder)
-    with StopSignals() as signals, engine or Local() as workers, place.driven(jobs) as name:
+    batch_folder = BatchFolder.checked(folder)
+    with StopSignals() as signals, engine or Local() as workers, batch_folder.driver(jobs) as driver:
         if retry:
             for job in jobs:
-                place.forget_failure(job)
-        run = _Run(jobs, place, workers, name, threads or workers.threads, on_event)
-        stopped = run.loop(signals)
-    summary = report_of(place, jobs)
-    summary.write_csv()
-    if stopped:
+                batch_folder.forget_failure(job)
+        run = _Run(jobs, batch_folder, workers, driver, threads or workers.threads, on_event)
+        is_complete = run.loop(signals)
+    report = report_of(batch_folder, jobs)
+    report.write_csv()
+    if not is_complete:
         raise KeyboardInterrupt(
-            f"interrupted with {summary.count('done')} of {len(jobs)} jobs done; the same command goes on"
+            f"interrupted with {report.count('done')} of {len(jobs)} jobs done; the same command goes on"
         )
-    return summary
+    return report
 
 
 @dataclass
@@ -100,7 +100,8 @@ class _Run:
     """One call of `run_plan`.
 
     Attributes:
-        ended: jobs that this call has nothing more to do with, and how they ended.
+        driver: name of this call in the folder.
+        end_states: how the jobs ended that this call has nothing more to do with, by their ids.
         handles: tasks that were submitted, by the jobs' ids.
         losses: how many workers were lost with a job.
         not_before: when to look again at jobs that other calls work on.
@@ -109,34 +110,34 @@ class _Run:
     jobs: Sequence[Job]
     folder: BatchFolder
     engine: Engine
-    name: str
+    driver: str
     threads: int
     on_event: Callable[[Event], None] | None
-    ended: dict[str, str] = field(default_factory=dict)
+    end_states: dict[str, str] = field(default_factory=dict)
     handles: dict[str, Handle] = field(default_factory=dict)
     losses: Counter[str] = field(default_factory=Counter)
     not_before: dict[str, float] = field(default_factory=dict)
 
     def loop(self, signals: StopSignals) -> bool:
-        """Goes on until all jobs have ended; returns whether a signal came before."""
+        """Goes on until all jobs have ended; returns whether they have, or False if a signal came before."""
         for job in self.jobs:
-            self._recall(job)
+            self._note_finished(job)
         self._announce()
-        while len(self.ended) < len(self.jobs):
+        while len(self.end_states) < len(self.jobs):
             if signals.requested:
                 self._stop()
-                return True
+                return False
             self._submit()
             self._collect()
             time.sleep(self.engine.pause)
-        return False
+        return True
 
-    def _recall(self, job: Job) -> bool:
-        """Whether another call has finished the job, as far as one can tell."""
+    def _note_finished(self, job: Job) -> bool:
+        """Takes note of a job that another call has finished; whether it has, as far as one can tell."""
         for state, look in (("done", self.folder.done), ("failed", self.folder.failed)):
             with suppress(OSError):  # a disk that is away for a moment; the task looks again
                 if look(job):
-                    self.ended[job.id] = state
+                    self.end_states[job.id] = state
                     return True
         return False
 
@@ -145,24 +146,24 @@ class _Run:
         for job in self.jobs:
             if self.engine.at_once is not None and len(self.handles) >= self.engine.at_once:
                 break
-            if job.id in self.ended or job.id in self.handles:
+            if job.id in self.end_states or job.id in self.handles:
                 continue
-            need = "done" if job.needs is None else self.ended.get(job.needs)
-            if need == "done":
+            needed_state = "done" if job.needs is None else self.end_states.get(job.needs)
+            if needed_state == "done":
                 self._begin(job)
-            elif need is not None:
-                self.ended[job.id] = "blocked"
+            elif needed_state is not None:
+                self.end_states[job.id] = "blocked"
 
     def _begin(self, job: Job) -> None:
         """Submits a job, unless another call works on it or has finished it."""
         now = time.monotonic()
-        if now < self.not_before.get(job.id, 0.0) or self._recall(job):
+        if now < self.not_before.get(job.id, 0.0) or self._note_finished(job):
             return
         if self._is_held(job):
-            self.not_before[job.id] = now + LOOK_ELSEWHERE
+            self.not_before[job.id] = now + RECHECK
             return
-        self.handles[job.id] = self.engine.submit(Task(job, self.folder, self.name, self.threads))
-        self._tell(job, "submitted", {})
+        self.handles[job.id] = self.engine.submit(Task(job, self.folder, self.driver, self.threads))
+        self._report(job, "submitted", {})
 
     def _is_held(self, job: Job) -> bool:
         """Whether somebody works on the job; so it is taken if nobody can tell."""
@@ -181,11 +182,12 @@ class _Run:
                     self._note_loss(job, loss)
 
     def _note(self, job: Job, outcome: Outcome) -> None:
+        """Takes note of how a task ended; a job that another call works on is looked at again later."""
         if outcome.state == "elsewhere":
-            self.not_before[job.id] = time.monotonic() + LOOK_ELSEWHERE
+            self.not_before[job.id] = time.monotonic() + RECHECK
             return
-        self.ended[job.id] = outcome.state
-        self._tell(job, outcome.state, outcome.record)
+        self.end_states[job.id] = outcome.state
+        self._report(job, outcome.state, outcome.record)
 
     def _note_loss(self, job: Job, loss: WorkerLost) -> None:
         """A job whose worker is gone is submitted again, but not for ever."""
@@ -198,7 +200,7 @@ class _Run:
 
     def _stop(self) -> None:
         """Takes back what has not begun, and waits for what has: fits save their checkpoints."""
-        self.folder.dismiss(self.name)
+        self.folder.dismiss(self.driver)
         for job in self.jobs:
             if job.id in self.handles and not self._is_held(job):
                 self.handles.pop(job.id).cancel()
@@ -206,8 +208,9 @@ class _Run:
             self._collect()
             time.sleep(self.engine.pause)
 
-    def _tell(self, job: Job, state: EventState, record: dict[str, Any]) -> None:
-        count = len(self.ended)
+    def _report(self, job: Job, state: EventState, record: dict[str, Any]) -> None:
+        """Lets the log, `on_event` and the progress display know of an event."""
+        count = len(self.end_states)
         if state == "done":
             log.info("%s: done in %s", job.name, clock(record.get("seconds", 0)))
         elif state != "submitted":
@@ -217,4 +220,4 @@ class _Run:
         self._announce()
 
     def _announce(self) -> None:
-        announce("running jobs", len(self.ended), len(self.jobs))
+        announce("running jobs", len(self.end_states), len(self.jobs))

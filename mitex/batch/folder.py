@@ -23,8 +23,9 @@ from typing import Any
 
 from mitex.batch import claims
 from mitex.batch.jobs import Job
-from mitex.errors import ConfigError, OutputError
-from mitex.paths import atomic_write, check_writable, expanded, is_temporary, writing
+from mitex.errors import ConfigError
+from mitex.paths import atomic_write, check_own_folder, expanded, writing
+from mitex.records import write_json
 
 PLAN = "plan.jsonl"
 DONE, FAILED, STARTS, LOG = "done.json", "failed.json", "starts.json", "log.txt"
@@ -47,13 +48,7 @@ class BatchFolder:
         Raises:
             OutputError: It holds other files, or cannot be written to.
         """
-        folder = BatchFolder(Path(os.path.abspath(expanded(out))))
-        check_writable(folder.path)
-        files = folder.path.iterdir() if folder.path.is_dir() else ()
-        # Another call may be about to write the plan.
-        if not all(map(is_temporary, files)) and not folder.is_ours():
-            raise OutputError(f"'{out}' holds other files", "name a new or empty folder with `out`")
-        return folder
+        return BatchFolder(check_own_folder(out, lambda folder: BatchFolder(folder).is_ours()))
 
     @staticmethod
     def existing(path: str | Path) -> BatchFolder:
@@ -109,14 +104,13 @@ class BatchFolder:
         Raises:
             OutputError: The disk is full, or the folder is not writable.
         """
-        with atomic_write(self.of(job) / name) as temporary:
-            temporary.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+        write_json(self.of(job) / name, record)
 
     def forget_failure(self, job: Job) -> None:
         """Lets a job that failed be run again."""
         (self.of(job) / FAILED).unlink(missing_ok=True)
 
-    def start(self, job: Job, driver: str, saved: float | None) -> dict[str, Any]:
+    def start(self, job: Job, driver: str, checkpoint_time: float | None) -> dict[str, Any]:
         """Writes down that a job begins, and returns it: driver, count, time, seconds and memory.
 
         It is not done from now on, although it may have been before somebody removed its result.
@@ -128,17 +122,18 @@ class BatchFolder:
         Args:
             job: the job.
             driver: the command that wants it.
-            saved: when the checkpoint was written that it goes on from; None if it begins anew.
+            checkpoint_time: when the checkpoint was written that it goes on from; None if it begins anew.
 
         Raises:
             OSError, OutputError: The folder cannot be written to.
         """
-        before = _read(self.of(job) / STARTS) or {}
-        count = before.get("count", 0) + 1 if before.get("driver") == driver else 1
+        previous = _read(self.of(job) / STARTS) or {}
+        count = previous.get("count", 0) + 1 if previous.get("driver") == driver else 1
         record = {"driver": driver, "count": count, "time": time.time(), "seconds": 0.0, "memory": 0}
-        if saved is not None:
-            record["seconds"] = before.get("seconds", 0.0) + max(saved - before.get("time", saved), 0.0)
-            record["memory"] = before.get("memory", 0)
+        if checkpoint_time is not None:
+            last_seconds = max(checkpoint_time - previous.get("time", checkpoint_time), 0.0)
+            record["seconds"] = previous.get("seconds", 0.0) + last_seconds
+            record["memory"] = previous.get("memory", 0)
         # Before the result's folder is there again: who sees that finds no old record beside it.
         (self.of(job) / DONE).unlink(missing_ok=True)
         self.write(job, STARTS, record)
@@ -157,8 +152,8 @@ class BatchFolder:
             (self.path / "drivers" / name).unlink(missing_ok=True)
 
     @contextmanager
-    def driven(self, jobs: Sequence[Job]) -> Iterator[str]:
-        """The name of a command that runs these jobs within the context; the folder's plan is of them now.
+    def driver(self, jobs: Sequence[Job]) -> Iterator[str]:
+        """The name of a new driver, a command that runs these jobs within the context; they are the plan now.
 
         Raises:
             OutputError: The folder cannot be written to.

@@ -91,7 +91,7 @@ def digest(path: Path) -> str:
         ConfigError: It cannot be read, is no regular file, or is too large.
     """
     files = sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else _parts(path)
-    total = hashlib.sha256()
+    folder_hash = hashlib.sha256()
     for file in files:
         try:
             _check_regular(file)
@@ -99,8 +99,8 @@ def digest(path: Path) -> str:
                 content = hashlib.file_digest(stream, "sha256").hexdigest()
         except OSError as e:
             raise ConfigError(f"cannot read '{file}' ({e.strerror or e})", "check the file") from e
-        total.update(f"{os.path.relpath(file, path)}\0{content}\n".encode("utf-8", "surrogateescape"))
-    return total.hexdigest()
+        folder_hash.update(f"{os.path.relpath(file, path)}\0{content}\n".encode("utf-8", "surrogateescape"))
+    return folder_hash.hexdigest()
 
 
 def _parts(path: Path) -> list[Path]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -77,6 +77,7 @@ def jobs_of(plan: Plan) -> list[Job]:
 
 
 def _jobs(part: MethodPlan, plan: Plan) -> Iterator[Job]:
+    """The jobs of a method, each fit before those that apply its texture."""
     method = methods()[part.method]
     exemplars = _exemplars(plan.first(part), plan)
     meshes = find(part.meshes, plan.folder, "mesh", _mesh_names())
@@ -87,64 +88,75 @@ def _jobs(part: MethodPlan, plan: Plan) -> Iterator[Job]:
                 yield fit
                 if part.output == "none":
                     continue
-                goals = [mesh] if mesh else meshes if method.applies_to_meshes else [None]
-                yield from (_apply(part, plan, fit, goal) for goal in goals)
+                targets = [mesh] if mesh else meshes if method.applies_to_meshes else [None]
+                yield from (_apply(part, plan, fit, target) for target in targets)
 
 
 def _fit(
     part: MethodPlan, method: Method, plan: Plan, exemplar: Input, seed: int | None, mesh: Input | None
 ) -> Job:
-    source = Input(f"--{part.learns_from.replace('_', '-')}", None)
-    words = ["fit", method.name, "--quiet"]
+    """The job of a fit.
+
+    Args:
+        part, method, plan: what is fit.
+        exemplar: of the plan, which the fit learns from, or the first one whose run it learns from.
+        seed: None for that of the preset.
+        mesh: which it is fit to; None for any.
+    """
     first = plan.first(part)
-    before = None if first is part else _fit(first, methods()[first.method], plan, exemplar, seed, None)
-    learned = exemplar if before is None else Input(before.result, None)
-    inputs = [source, learned, *_option("mesh", mesh), *([] if seed is None else _pair("seed", seed))]
-    given = options.fit_words(method, part.fit, plan.folder)
+    first_fit = None if first is part else _fit(first, methods()[first.method], plan, exemplar, seed, None)
+    subject = exemplar if first_fit is None else Input(first_fit.result, None)
+    seed_input = None if seed is None else Input(str(seed), None)
+    inputs = [*_option(part.learns_from, subject), *_option("mesh", mesh), *_option("seed", seed_input)]
+    settings = options.fit_words(method, part.fit, plan.folder)
+    lasting = {key: value for key, value in part.fit.items() if key not in method.load_fit().only_at_start}
+    lasting_settings = options.fit_words(method, lasting, plan.folder)
+    from_text = options.is_text(method, part.learns_from)
+    implicit = options.implicit_inputs(method, part.fit, plan.folder, from_text=from_text)
     about = {"method": part.label, "exemplar": exemplar.label, "seed": seed}
     about |= {"mesh": mesh.label} if mesh else {}
-    from_text = part.learns_from == "text"
-    implied = options.implied_inputs(method, part.fit, plan.folder, from_text=from_text)
-    id = _id("fit", about, [*words, *inputs, *given, *implied])
-    out = ("--out", f"{RESULTS}/{id}")
-    command = (*words, *(one.text for one in [*inputs, *given]), *out)
-    later = {key: value for key, value in part.fit.items() if key not in method.load_fit().only_at_start}
-    again = options.fit_words(method, later, plan.folder)
-    resumed = (*words, *(one.text for one in [*inputs, *again]), *out, "--resume")
-    needs = None if before is None else before.id
-    return Job(id, command, resumed if method.resumes else (), out[1], needs, about)
+    words = ("fit", method.name, "--quiet")
+    id = _id("fit", about, [*words, *inputs, *settings, *implicit])
+    result = f"{RESULTS}/{id}"
+    command = (*words, *_texts([*inputs, *settings]), "--out", result)
+    resumed = (*words, *_texts([*inputs, *lasting_settings]), "--out", result, "--resume")
+    needs = None if first_fit is None else first_fit.id
+    return Job(id, command, resumed if method.resumes else (), result, needs, about)
 
 
 def _apply(part: MethodPlan, plan: Plan, fit: Job, mesh: Input | None) -> Job:
-    given = dict(part.apply)
+    """The job that puts the texture of a fit on a mesh, or on the one that it was fit to."""
+    values = dict(part.apply)
     method = methods()[part.method]
     if fit.about["seed"] is not None and "seed" in options.apply_kinds(method):
-        given.setdefault("seed", fit.about["seed"])
-    inputs = [*_option("mesh", mesh), *options.apply_words(method, given, plan.folder)]
+        values.setdefault("seed", fit.about["seed"])
+    inputs = [*_option("mesh", mesh), *options.apply_words(method, values, plan.folder)]
     about = dict(fit.about) | ({"mesh": mesh.label} if mesh else {})
     id = _id("apply", about, [fit.id, part.output, *inputs])
     name = mesh.label if mesh else str(about["exemplar"])
-    file = f"{_plain(name)}/" if part.output == "maps" else f"{_plain(name)}.{part.output}"
+    file = f"{_file_name(name)}/" if part.output == "maps" else f"{_file_name(name)}.{part.output}"
     result = f"{RESULTS}/{id}"
-    words = ("apply", fit.result, "--quiet", *(one.text for one in inputs), "--out", f"{result}/{file}")
+    words = ("apply", fit.result, "--quiet", *_texts(inputs), "--out", f"{result}/{file}")
     return Job(id, words, (), result, fit.id, about)
 
 
 def _exemplars(part: MethodPlan, plan: Plan) -> list[Input]:
-    if part.learns_from == "text":
-        return [Input(text, None) for text in part.exemplars]
+    """What a method learns from."""
     method = methods()[part.method]
+    if options.is_text(method, part.learns_from):
+        return [Input(text, None) for text in part.exemplars]
     if part.learns_from != method.learns_from:  # which may be names as well as files
         return [Input.of(text, plan.folder) for text in part.exemplars]
-    return find(part.exemplars, plan.folder, "exemplar", _exemplar_names(method))
+    return find(part.exemplars, plan.folder, "exemplar", options.source_names(method))
 
 
 def _option(name: str, value: Input | None) -> list[Input]:
-    return [] if value is None else [Input(f"--{name}", None), value]
+    """The words of an option; none without a value."""
+    return [] if value is None else [Input(f"--{name.replace('_', '-')}", None), value]
 
 
-def _pair(name: str, value: object) -> list[Input]:
-    return [Input(f"--{name}", None), Input(str(value), None)]
+def _texts(inputs: Iterable[Input]) -> list[str]:
+    return [each.text for each in inputs]
 
 
 def _id(command: str, about: Mapping[str, Any], parts: Sequence[str | Input]) -> str:
@@ -152,24 +164,12 @@ def _id(command: str, about: Mapping[str, Any], parts: Sequence[str | Input]) ->
     digest = hashlib.sha256(json.dumps([__version__, command, *keys]).encode("utf-8", "surrogateescape"))
     seed = [] if about["seed"] is None else [f"s{about['seed']}"]
     names = [about["method"], about["exemplar"], *seed, *([about["mesh"]] if "mesh" in about else [])]
-    return "-".join([command, *map(_plain, names), digest.hexdigest()[:16]])
+    return "-".join([command, *map(_file_name, names), digest.hexdigest()[:16]])
 
 
-def _plain(name: str) -> str:
+def _file_name(name: str) -> str:
     """A name as it can stand in a file's."""
     return re.sub(r"[^\w.]+", "_", name, flags=re.ASCII).strip("._")[:LONGEST_NAME] or "x"
-
-
-def _exemplar_names(method: Method) -> list[str] | None:
-    """The names that may stand for what a method learns from; None if they are not checked."""
-    from mitex.exemplar import names
-    from mitex.methods.geometric.references import reference_names
-    from mitex.training.locate import bundled_files
-
-    if options.learns_from_paths(method):
-        return []
-    known = {"exemplar": names, "reference": reference_names, "texture": lambda: list(bundled_files())}
-    return known[method.learns_from]() if method.learns_from in known else None
 
 
 def _mesh_names() -> list[str]:

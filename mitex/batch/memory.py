@@ -1,7 +1,7 @@
 """The most memory that a process had.
 
 Linux's account of a process that has ended begins with the memory of the one that started it. So a job counts
-its own, and tells it through a pipe before it ends.
+its own, and writes it into a pipe before it ends.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def peak() -> int:
     return max(own_peak(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * UNIT)
 
 
-def tell_peak(pipe: int) -> None:
-    """Writes it into a pipe, if somebody still reads there."""
+def write_peak(pipe: int) -> None:
+    """Writes `peak` into a pipe, if somebody still reads there."""
     with suppress(OSError):
         os.write(pipe, str(peak()).encode())

@@ -13,15 +13,11 @@ from typing import Any, Union
 from mitex.batch.inputs import Input
 from mitex.errors import ConfigError, WeightsError
 from mitex.methods.method import Method
-from mitex.suffixes import names_field_file
+from mitex.methods.option_types import is_plain_text, known_names, may_be_file
 from mitex.suggestions import suggestion
 from mitex.training import values
 from mitex.training.config import resolve
 
-# What the commands never take for a file, even if one is called like it.
-NAMES = {"preset", "text", "subdivide"}  # options: whatever they are given
-WORDS = {"clip": "words", "content": "ao"}  # options: this text
-VECTOR_FIELDS = {"field", "motion", "orientation"}  # options: names, directions, angles
 PLANNED = {"out", "mesh", "model", "quiet", "resume", "set", "settings"}  # what a plan says otherwise
 
 
@@ -38,12 +34,12 @@ def check_options(
         if name not in (*options, *keys):
             raise ConfigError(f"methods.{label} has no key '{name}'", suggestion(name, [*options, *keys]))
         if name in options:
-            _check(name, value, options[name], label)
+            values.read(values.check, value, options[name], f"{name} of methods.{label}")
     for name, value in apply.items():
         kinds = apply_kinds(method)
         if name not in kinds:
             raise ConfigError(f"methods.{label}.apply has no key '{name}'", suggestion(name, kinds))
-        _check(name, value, kinds[name], f"{label}.apply")
+        values.read(values.check, value, kinds[name], f"{name} of methods.{label}.apply")
     _config(method, fit, folder)
 
 
@@ -53,16 +49,21 @@ def check_source(method: Method, source: str | None, fit: Mapping[str, Any], lab
     Raises:
         ConfigError: The method's fit has no such option, it takes no text, or `fit` gives it another one.
     """
-    texts = [name for name, kind in fit_kinds(method).items() if kind in (str, Union[str])]  # noqa: UP007
+    texts = [name for name, kind in fit_kinds(method).items() if str in _members(kind)]
     if source is not None and source not in (*texts, method.learns_from):
         raise ConfigError(f"source of methods.{label} cannot be '{source}'", suggestion(source, texts))
     if source in fit:
         raise ConfigError(f"methods.{label} has '{source}' besides its exemplars", f"leave out `{source}`")
 
 
-def learns_from_paths(method: Method) -> bool:
-    """Whether what the method learns from is a file or folder, and never a name or words."""
-    return typing.get_type_hints(method.load_fit())[method.learns_from] is Path
+def is_text(method: Method, source: str) -> bool:
+    """Whether an option of the method's fit takes words or a name, and never a file."""
+    return is_plain_text(_hints(method.load_fit())[source])
+
+
+def source_names(method: Method) -> list[str] | None:
+    """What the method may learn from besides files, by name; None if that is not known."""
+    return known_names(_hints(method.load_fit())[method.learns_from])
 
 
 def fit_kinds(method: Method) -> dict[str, Any]:
@@ -75,7 +76,7 @@ def apply_kinds(method: Method) -> dict[str, Any]:
     return _kinds(method.load_apply(), set())
 
 
-def implied_inputs(method: Method, fit: Mapping[str, Any], folder: Path, *, from_text: bool) -> list[Input]:
+def implicit_inputs(method: Method, fit: Mapping[str, Any], folder: Path, *, from_text: bool) -> list[Input]:
     """Files that a fit reads although no option names them: the CLIP model of words, and VGG-19.
 
     Args:
@@ -104,14 +105,14 @@ def implied_inputs(method: Method, fit: Mapping[str, Any], folder: Path, *, from
 def fit_words(method: Method, fit: Mapping[str, Any], folder: Path) -> list[Input]:
     """The words of the options and settings of a fit; those that name files are absolute paths."""
     options = fit_kinds(method)
-    words = list(_words({name: fit[name] for name in fit if name in options}, options, folder))
+    words = _words({name: fit[name] for name in fit if name in options}, method.load_fit(), folder)
     settings = [f"{name}={_text(value)}" for name, value in fit.items() if name not in options]
     return [*words, *(Input(word, None) for word in (["--set", *settings] if settings else []))]
 
 
 def apply_words(method: Method, apply: Mapping[str, Any], folder: Path) -> list[Input]:
     """The words of the options of `mitex apply`; those that name files are absolute paths."""
-    return list(_words(apply, apply_kinds(method), folder))
+    return list(_words(apply, method.load_apply(), folder))
 
 
 def _config(method: Method, fit: Mapping[str, Any], folder: Path) -> Any:
@@ -121,7 +122,9 @@ def _config(method: Method, fit: Mapping[str, Any], folder: Path) -> Any:
     return resolve(method.load_presets(), fit.get("preset"), file, settings)
 
 
-def _words(options: Mapping[str, Any], kinds: Mapping[str, Any], folder: Path) -> Iterator[Input]:
+def _words(options: Mapping[str, Any], command: type, folder: Path) -> Iterator[Input]:
+    """The words of a command's options, by name; files are told from other texts by the options' types."""
+    hints = _hints(command)
     for name, value in options.items():
         option = f"--{name.replace('_', '-')}"
         if value is True:
@@ -130,18 +133,9 @@ def _words(options: Mapping[str, Any], kinds: Mapping[str, Any], folder: Path) -
             # A value that begins with a dash is one word with its option.
             if isinstance(value, str) and not value.startswith("-"):
                 yield Input(option, None)
-                is_file = _may_name_file(name, value, kinds[name])
-                yield Input.of(value, folder) if is_file else Input(value, None)
+                yield Input.of(value, folder) if may_be_file(value, hints[name]) else Input(value, None)
             else:
                 yield Input(f"{option}={_text(value)}", None)
-
-
-def _may_name_file(name: str, text: str, kind: Any) -> bool:
-    """Whether the command takes the text of an option for a file if there is one."""
-    choices = [choice for one in (kind, *typing.get_args(kind)) for choice in typing.get_args(one)]
-    if name in NAMES or text == WORDS.get(name) or text in choices:
-        return False
-    return name not in VECTOR_FIELDS or names_field_file(text)
 
 
 def _text(value: Any) -> str:
@@ -151,13 +145,9 @@ def _text(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def _check(name: str, value: Any, kind: Any, place: str) -> None:
-    try:
-        values.check(value, kind)
-    except ValueError as e:
-        raise ConfigError(
-            f"{name} of methods.{place} cannot be {value!r}", f"give {values.describe(kind)}"
-        ) from e
+def _hints(command: type) -> dict[str, Any]:
+    """The types of a command's options, with their marks."""
+    return typing.get_type_hints(command, include_extras=True)
 
 
 def _kinds(command: type, planned: set[str]) -> dict[str, Any]:
@@ -168,12 +158,13 @@ def _kinds(command: type, planned: set[str]) -> dict[str, Any]:
 
 def _plain(kind: Any) -> Any:
     """The type in TOML: paths are texts, and what may be None is left out rather than none."""
-    if kind is Path:
-        return str
-    if typing.get_origin(kind) in (Union, types.UnionType):
-        members = [_plain(member) for member in typing.get_args(kind) if member is not types.NoneType]
-        return Union[tuple(members)]  # noqa: UP007
-    return kind
+    members = [member for member in _members(kind) if member is not types.NoneType]
+    return Union[tuple(str if member is Path else member for member in members)]  # noqa: UP007
+
+
+def _members(kind: Any) -> tuple[Any, ...]:
+    """Those of a union; another type itself."""
+    return typing.get_args(kind) if typing.get_origin(kind) in (Union, types.UnionType) else (kind,)
 
 
 def _keys(method: Method) -> set[str]:

@@ -118,7 +118,7 @@ class Plan:
         Raises:
             ConfigError: An unknown key or method, a value of a wrong type or out of range, or nothing to do.
         """
-        common, tables = _split(content, "methods", {key: KEYS[key] for key in KEYS}, "the plan")
+        common, tables = _split(content, "methods", KEYS, "the plan")
         if unknown := [key for key in content if key not in (*KEYS, "methods")]:
             raise ConfigError(f"a plan has no key '{unknown[0]}'", suggestion(unknown[0], [*KEYS, "methods"]))
         if not tables:
@@ -131,6 +131,7 @@ class Plan:
 
 
 def _content(file: Path) -> dict[str, Any]:
+    """The tables of a TOML file."""
     try:
         if not file.is_file():
             reason = "it is no file" if file.exists() else "there is no such file"
@@ -146,6 +147,7 @@ def _content(file: Path) -> dict[str, Any]:
 
 
 def _method(label: str, table: Any, common: Mapping[str, Any], folder: Path) -> MethodPlan:
+    """A method by its table, which goes before the plan's common values."""
     if not isinstance(table, Mapping):
         raise ConfigError(f"methods.{label} cannot be {table!r}", f"give {TABLES['methods']}")
     own, apply = _split(table, "apply", OWN_KEYS, f"methods.{label}")
@@ -164,21 +166,16 @@ def _split(
     table: Mapping[str, Any], inner: str, kinds: Mapping[str, Any], place: str
 ) -> tuple[dict[str, Any], Mapping[str, Any]]:
     """The values of the known keys, checked, and the table `inner`."""
-    known = {}
-    for key in kinds.keys() & table.keys():
-        try:
-            known[key] = values.check(table[key], kinds[key])
-        except ValueError as e:
-            raise ConfigError(
-                f"{key} of {place} cannot be {table[key]!r}", f"give {values.describe(kinds[key])}"
-            ) from e
+    keys = [key for key in kinds if key in table]
+    own = {key: values.read(values.check, table[key], kinds[key], f"{key} of {place}") for key in keys}
     tables = table.get(inner, {})
     if not isinstance(tables, Mapping):
         raise ConfigError(f"{inner} of {place} cannot be {tables!r}", f"give {TABLES[inner]}")
-    return known, tables
+    return own, tables
 
 
 def _check_lists(plan: MethodPlan) -> None:
+    """Refuses a method without exemplars, or meshes that it needs, and seeds out of range."""
     method = methods()[plan.method]
     if not plan.exemplars:
         raise ConfigError(f"methods.{plan.label} has no exemplars", "name some in the list `exemplars`")

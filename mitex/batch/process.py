@@ -54,23 +54,23 @@ class Process:
         self, words: Sequence[str], folder: Path, log: IO[bytes], environment: Mapping[str, str]
     ) -> None:
         self._ended, self._sent, self._lock = False, set[int](), threading.RLock()
-        reading, writing = os.pipe()
-        os.set_blocking(reading, False)
-        self._told = open(reading, "rb", buffering=0)  # noqa: SIM115
+        read_end, write_end = os.pipe()
+        os.set_blocking(read_end, False)
+        self._memory_pipe = open(read_end, "rb", buffering=0)  # noqa: SIM115
         try:
             # A group of its own: Ctrl-C reaches this process alone, which passes it on once.
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "mitex.cli.job", str(os.getpid()), str(writing), *words],
+                [sys.executable, "-m", "mitex.cli.job", str(os.getpid()), str(write_end), *words],
                 cwd=folder,
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
                 env=environment,
                 process_group=0,
-                pass_fds=[writing],
+                pass_fds=[write_end],
             )
         finally:
-            os.close(writing)
+            os.close(write_end)
 
     @property
     def pid(self) -> int:
@@ -89,13 +89,13 @@ class Process:
             self._process.returncode = os.waitstatus_to_exitcode(status)
         return self._process.returncode, self._memory(usage.ru_maxrss * UNIT)
 
-    def _memory(self, counted: int) -> int:
-        """What it told of its memory, or else what the system counted, unless that may be this process's."""
-        with self._told as pipe:
-            told = pipe.read(32)
-        if told or sys.platform == "darwin":
-            return int(told or counted)
-        return counted if counted > own_peak() else 0
+    def _memory(self, system_peak: int) -> int:
+        """The peak in its pipe [bytes], or else the system's; 0 where that may be this process's."""
+        with self._memory_pipe as pipe:
+            own_text = pipe.read(32)
+        if own_text or sys.platform == "darwin":
+            return int(own_text or system_peak)
+        return system_peak if system_peak > own_peak() else 0
 
     def await_end(self) -> None:
         """Waits for its end, and leaves the exit code to `wait`."""

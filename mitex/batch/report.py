@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -12,7 +11,7 @@ from typing import Any
 from mitex.batch.folder import STARTS, BatchFolder
 from mitex.batch.jobs import Job
 from mitex.errors import OutputError
-from mitex.paths import atomic_write
+from mitex.records import write_csv
 from mitex.training.progress import clock
 
 STATES = ("done", "running", "interrupted", "waiting", "failed", "blocked")
@@ -71,17 +70,10 @@ class Report:
         Raises:
             OutputError: The disk is full, or the folder is not writable.
         """
-        records = [_flat(row) for row in self.rows]
+        records = [_record(row) for row in self.rows]
         metrics = sorted({key for record in records for key in record} - set(COLUMNS))
-        path = self.folder / TABLE
-        with (
-            atomic_write(path) as temporary,
-            temporary.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file,
-        ):
-            writer = csv.DictWriter(file, [*COLUMNS, *metrics], restval="")
-            writer.writeheader()
-            writer.writerows(records)
-        return path
+        write_csv(self.folder / TABLE, [*COLUMNS, *metrics], records)
+        return self.folder / TABLE
 
 
 def status(path: str | Path) -> Report:
@@ -111,6 +103,7 @@ def report_of(folder: BatchFolder, jobs: Iterable[Job]) -> Report:
 
 
 def _row(job: Job, folder: BatchFolder, before: Mapping[str, Row]) -> Row:
+    """A job by the files of its state; `before` has the rows of those that it may need."""
     if record := folder.done(job):
         return Row(job, "done", record)
     if host := folder.holder(job):
@@ -122,8 +115,9 @@ def _row(job: Job, folder: BatchFolder, before: Mapping[str, Row]) -> Row:
     return Row(job, "interrupted" if (folder.of(job) / STARTS).exists() else "waiting")
 
 
-def _flat(row: Row) -> dict[str, Any]:
+def _record(row: Row) -> dict[str, Any]:
+    """Its line in the table."""
     own = {"id": row.job.id, "state": row.state, "result": row.job.result, **row.job.about}
-    measured = {key: row.record[key] for key in ("seconds", "memory", "host") if key in row.record}
+    process = {key: row.record[key] for key in ("seconds", "memory", "host") if key in row.record}
     metrics = row.record.get("metrics", {})
-    return {**{f"last_{key}": value for key, value in metrics.items()}, **own, **measured}
+    return {**{f"last_{key}": value for key, value in metrics.items()}, **own, **process}

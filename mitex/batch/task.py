@@ -22,7 +22,7 @@ from mitex.batch.process import Process, environment
 from mitex.paths import writing
 from mitex.training.locate import METRICS, checkpoints
 
-BEAT = 0.5  # between two looks at claim and driver [s]
+HEARTBEAT = 0.5  # between two looks at claim and driver [s]
 RETRIES = 3  # of a job that a signal ended
 INTERRUPTED = 130  # exit code
 
@@ -80,35 +80,36 @@ class Task:
             return self._attempts(claim)
 
     def _attempts(self, claim: Claim) -> Outcome:
-        why = "its machine or its worker ended while it ran"
+        """Runs the command, again after a signal from outside, until it ends or the driver wants no more."""
+        reason = "its machine or its worker ended while it ran"
         while self.folder.has_driver(self.driver):
-            saved = self._saved()
-            start = self.folder.start(self.job, self.driver, saved)
+            checkpoint_time = self._checkpoint_time()
+            start = self.folder.start(self.job, self.driver, checkpoint_time)
             if start["count"] > 1 + RETRIES:
-                return self._failure(f"started {1 + RETRIES} times; {why}")
+                return self._failure(f"started {1 + RETRIES} times; {reason}")
             try:
-                code, memory = self._run(claim, saved is not None)
+                code, memory = self._run(claim, checkpoint_time is not None)
             except SystemExit:  # of the engine: Slurm wants the machine back
-                self._excuse(start)
+                self._write_stop(start)
                 raise
             start["memory"] = max(start["memory"], memory)
             if code == 0:
                 return self._success(start)
             if code == INTERRUPTED:
-                self._excuse(start)
+                self._write_stop(start)
                 break
             self.folder.write(self.job, STARTS, start)
             if code > 0:
-                return self._failure(_complaint(self.folder.of(self.job) / LOG), code)
-            why = f"ended by {_signal_name(code)}"
+                return self._failure(_last_error(self.folder.of(self.job) / LOG), code)
+            reason = f"ended by {_signal_name(code)}"
         return Outcome("interrupted")
 
-    def _excuse(self, start: dict[str, Any]) -> None:
+    def _write_stop(self, start: dict[str, Any]) -> None:
         """Writes down an attempt that was told to stop, and so does not count as a crash."""
         self.folder.write(self.job, STARTS, start | {"count": start["count"] - 1})
 
-    def _saved(self) -> float | None:
-        """When the checkpoint was written from which the job goes on; None if it begins anew."""
+    def _checkpoint_time(self) -> float | None:
+        """When the checkpoint was written that the job goes on from; None if it begins anew."""
         files = checkpoints(self.folder.result(self.job)) if self.job.resumed else []
         return max((file.stat().st_mtime for file in files), default=None)
 
@@ -126,13 +127,13 @@ class Task:
     @contextmanager
     def _watched(self, process: Process, claim: Claim) -> Iterator[None]:
         """Keeps the claim, and stops the process when the claim is lost or the driver wants it."""
-        over = threading.Event()
+        ended = threading.Event()
 
         def watch() -> None:
-            while not over.wait(BEAT):
+            while not ended.wait(HEARTBEAT):
                 if not claim.touch() or not self.folder.has_driver(self.driver):
                     process.stop()
-                    while not over.wait(BEAT):
+                    while not ended.wait(HEARTBEAT):
                         claim.touch()
 
         watcher = threading.Thread(target=watch, daemon=True)
@@ -140,7 +141,7 @@ class Task:
         try:
             yield
         finally:
-            over.set()
+            ended.set()
             watcher.join()
 
     def _success(self, start: Mapping[str, Any]) -> Outcome:
@@ -192,7 +193,7 @@ def _running(process: Process) -> Iterator[None]:
         _processes.discard(process)
 
 
-def _complaint(log: Path) -> str:
+def _last_error(log: Path) -> str:
     """The line with which a command ended: that of the error, or else the last one."""
     text = re.sub(r"\x1b\[[0-9;]*m", "", log.read_text(encoding="utf-8", errors="replace"))
     lines = [line.strip() for line in text.splitlines() if line.strip()]

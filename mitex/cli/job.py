@@ -10,7 +10,7 @@ import os
 import signal
 import sys
 
-from mitex.batch.memory import tell_peak
+from mitex.batch.memory import write_peak
 from mitex.cli.entry import main
 from mitex.runtime.signals import StopSignals
 
@@ -38,4 +38,4 @@ if __name__ == "__main__":
     try:
         sys.exit(main(sys.argv[3:]))
     finally:
-        tell_peak(pipe)
+        write_peak(pipe)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -24,13 +23,14 @@ from mitex.comparison.permutation import permutation_p
 from mitex.comparison.study import Study
 from mitex.errors import ConfigError
 from mitex.paths import expanded
+from mitex.reading import content
 
 MOST_BYTES = 1 << 20  # of a file of answers
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What somebody preferred.
+    """A person's answer to a question.
 
     Attributes:
         question: its number in the study.
@@ -68,7 +68,7 @@ class Preference:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What a study has come to.
+    """The outcome of a study.
 
     Attributes:
         preferences: the most preferred method first.
@@ -115,7 +115,7 @@ class Evaluation:
 
 
 def read_answers(study: Study, files: Iterable[str | Path]) -> dict[str, list[Answer]]:
-    """The answers in files that the page saved: participant -> answers.
+    """The answers in files that the page saved: a person's random id, as the page has made it -> answers.
 
     Raises:
         ConfigError: A file cannot be read, is of another study, answers a question twice, or is the same
@@ -123,10 +123,10 @@ def read_answers(study: Study, files: Iterable[str | Path]) -> dict[str, list[An
     """
     people: dict[str, list[Answer]] = {}
     for file in files:
-        name, answers = _read(study, expanded(file))
-        if name in people:
+        id, answers = _read(study, expanded(file))
+        if id in people:
             raise ConfigError(f"the answers in '{file}' are there twice", "name every file once")
-        people[name] = answers
+        people[id] = answers
     if not any(people.values()):
         raise ConfigError("there are no answers", "name files that the study's page has saved")
     return people
@@ -134,45 +134,43 @@ def read_answers(study: Study, files: Iterable[str | Path]) -> dict[str, list[An
 
 def evaluate(study: Study, people: Mapping[str, Sequence[Answer]]) -> Evaluation:
     """Shares, their spread over the cases, and the tests."""
-    wins: defaultdict[tuple[str, str], float] = defaultdict(float)
-    counts: defaultdict[tuple[str, str], int] = defaultdict(int)
-    for answer in (answer for answers in people.values() for answer in answers):
-        question = study.questions[answer.question]
-        case = f"{question.exemplar}\0{question.mesh}"
+    methods, wins, counts = _tally(study, [answer for answers in people.values() for answer in answers])
+    shares = np.divide(wins, counts, out=np.full_like(wins, math.nan), where=counts > 0)
+    preferences = list(map(_preference, methods, shares.T, wins.sum(0), counts.sum(0)))
+    is_tested = (counts > 0).sum(0) > 1  # in several cases
+    untested = tuple(m for m, tested in zip(methods, is_tested, strict=True) if not tested)
+    by_share = sorted(preferences, key=lambda one: -one.share)
+    p, pairs = _tests([m for m in methods if m not in untested], shares[:, is_tested])
+    return Evaluation(tuple(by_share), p, pairs, *_published(shares[:, is_tested]), untested, len(people))
+
+
+def _tally(study: Study, answers: Sequence[Answer]) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """The methods, and (C, M) how often each won in each case, and how often it was asked about there."""
+    questions = [study.questions[answer.question] for answer in answers]
+    methods = list(dict.fromkeys(method for question in questions for method in question.methods))
+    cases = list(dict.fromkeys((question.exemplar, question.mesh) for question in questions))
+    wins, counts = np.zeros((2, len(cases), len(methods)))
+    for answer, question in zip(answers, questions, strict=True):
+        case = cases.index((question.exemplar, question.mesh))
         for k, method in enumerate(question.methods):
-            counts[method, case] += 1
-            wins[method, case] += 0.5 if answer.choice is None else float(answer.choice == k)
-    methods = list(dict.fromkeys(method for method, _ in counts))
-    cases = list(dict.fromkeys(case for _, case in counts))
-    shares = np.full((len(cases), len(methods)), math.nan)
-    for method, case in counts:
-        place = cases.index(case), methods.index(method)
-        shares[place] = wins[method, case] / counts[method, case]
-    preferences = [
-        _preference(m, column[~np.isnan(column)], _total(wins, m), int(_total(counts, m)))
-        for m, column in zip(methods, shares.T, strict=True)
-    ]
-    often = (~np.isnan(shares)).sum(0) > 1
-    untested = tuple(m for m, tested in zip(methods, often, strict=True) if not tested)
-    tested = [m for m in methods if m not in untested]
-    ordered = sorted(preferences, key=lambda one: -one.share)
-    p, pairs = _tests(tested, shares[:, often])
-    return Evaluation(tuple(ordered), p, pairs, *_published(shares[:, often]), untested, len(people))
+            cell = case, methods.index(method)
+            counts[cell] += 1
+            wins[cell] += 0.5 if answer.choice is None else answer.choice == k
+    return methods, wins, counts
 
 
 def _read(study: Study, file: Path) -> tuple[str, list[Answer]]:
+    """A person's id and answers."""
     try:
-        if not file.is_file() or file.stat().st_size > MOST_BYTES:
-            raise ConfigError(f"'{file}' is no file of answers", "name one that the study's page has saved")
-        record = json.loads(file.read_text(encoding="utf-8"))
+        record = json.loads(content(file, MOST_BYTES))
         if record["study"] != study.id:
             raise ConfigError(f"'{file}' answers another study", "name answers to this one")
-        name, answers = str(record["participant"]), [_answer(study, entry) for entry in record["answers"]]
+        id, answers = str(record["participant"]), [_answer(study, entry) for entry in record["answers"]]
     except (OSError, ValueError, TypeError, KeyError, IndexError, RecursionError) as e:
         raise ConfigError(f"'{file}' holds no answers", "name a file that the study's page has saved") from e
     if len({answer.question for answer in answers}) < len(answers):
         raise ConfigError(f"'{file}' answers a question twice", "name one that the study's page has saved")
-    return name, answers
+    return id, answers
 
 
 def _answer(study: Study, entry: Mapping[str, Any]) -> Answer:
@@ -182,15 +180,12 @@ def _answer(study: Study, entry: Mapping[str, Any]) -> Answer:
     return Answer(question, choice)
 
 
-def _total(counter: Mapping[tuple[str, str], float], method: str) -> float:
-    return sum(value for (name, _), value in counter.items() if name == method)
-
-
-def _preference(method: str, shares: np.ndarray, wins: float, count: int) -> Preference:
-    spread = float(np.std(shares, ddof=1)) if len(shares) > 1 else math.nan
-    return Preference(
-        method, wins, count, wilson_interval(wins / count, count), float(np.mean(shares)), spread
-    )
+def _preference(method: str, shares: np.ndarray, wins: float, count: float) -> Preference:
+    """Of shares (C,) in the cases, NaN where a method was not asked about, and sums over them."""
+    known = shares[~np.isnan(shares)]
+    spread = float(np.std(known, ddof=1)) if len(known) > 1 else math.nan
+    interval = wilson_interval(float(wins / count), int(count))
+    return Preference(method, float(wins), int(count), interval, float(np.mean(known)), spread)
 
 
 def wilson_interval(share: float, count: int) -> tuple[float, float]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from mitex.asset import Asset
 from mitex.cache import content_key
-from mitex.comparison.inputs import CELL, lit, mesh_of, read_once
+from mitex.comparison.inputs import CELL, lit_picture, mesh_of, read_once
 from mitex.comparison.results import LIT, VIEW
 from mitex.evaluation.elevations import Renderer, photo_distances, plane_distances
 from mitex.evaluation.views import view_quality
@@ -115,10 +115,10 @@ class CapturePair:
         return {} if self.mesh is None else _named(photo_distances(windows_of(self.folder)))
 
     def pictures(self, asset: Asset | None, run: Path) -> dict[str, np.ndarray]:
-        """The asset as of `mitex.comparison.inputs.lit`, and what is seen in place of the photo `image`."""
+        """As of `mitex.comparison.inputs.lit_picture`, and the captured object in the view of `image`."""
         texture, pictures = load(run), {}
         if asset is not None:
-            pictures[LIT] = lit(asset, self.mesh)
+            pictures[LIT] = lit_picture(asset, self.mesh)
         if isinstance(texture, Captured):
             pictures[VIEW] = _squared(render_view(texture.in_place(), self._held_out, 0, CELL)[0])
         return pictures

@@ -44,7 +44,7 @@ def mesh_of(name: str) -> Mesh:
     return Mesh.load(name)
 
 
-def lit(asset: Asset, like: Mesh | None = None) -> np.ndarray:
+def lit_picture(asset: Asset, like: Mesh | None = None) -> np.ndarray:
     """(CELL, CELL, 3) sRGB in [0, 1]: an asset in light, path-traced, framed as the mesh `like`."""
     renderer = OrbitRenderer(asset, resolution=CELL, like=like)
     return tone(renderer.render(AZIMUTH, renderer.fit_view(AZIMUTH, ELEVATION), SPP))

@@ -15,8 +15,8 @@ from mitex.lazy import load
 
 
 class Pair(Protocol):
-    """What is learned from, and a mesh, or none where `Kind.meshless`: all that results on them are measured
-    with, whatever the method."""
+    """An exemplar in the widest sense (what is learned from), and a mesh, or none where `Kind.meshless`: all
+    that is needed to measure results on them, whatever the method."""
 
     @property
     def key(self) -> str:
@@ -39,7 +39,7 @@ class Pair(Protocol):
         ...
 
     def floor(self) -> dict[str, float]:
-        """The same of what is learned from beside itself, as far as that is known."""
+        """The noise floor: the same of what is learned from, beside itself, as far as that is known."""
         ...
 
     def pictures(self, asset: Asset | None, run: Path) -> dict[str, np.ndarray]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mitex.asset import Asset, clay
 from mitex.cache import content_key
-from mitex.comparison.inputs import lit, mesh_of, read_once
+from mitex.comparison.inputs import lit_picture, mesh_of, read_once
 from mitex.comparison.results import LIT
 from mitex.errors import ImageError
 from mitex.evaluation.likeness import Vectors, exemplar_patches, likeness, patch_features
@@ -87,8 +87,8 @@ class LookPair:
             return {}
 
     def pictures(self, asset: Asset, run: Path) -> dict[str, np.ndarray]:
-        """As of `mitex.comparison.inputs.lit`."""
-        return {LIT: lit(asset, self.mesh)}
+        """As of `mitex.comparison.inputs.lit_picture`."""
+        return {LIT: lit_picture(asset, self.mesh)}
 
     def _likeness(self, asset: Asset) -> dict[str, float]:
         """Distances of patches; none on a mesh so thin that they show too little of it."""

@@ -1,4 +1,4 @@
-"""Measuring what a comparison's jobs have made, pair by pair: what one is measured with is large."""
+"""Measuring the results of a comparison's jobs pair by pair, since what a pair is measured with is large."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mitex.comparison.inputs import forget
-from mitex.comparison.kept import Kept
 from mitex.comparison.kinds import Pair
 from mitex.comparison.results import Result
+from mitex.comparison.store import Store
 from mitex.errors import MitexError, OutputError
 from mitex.progress import announce
 
 
 @dataclass
 class Measurements:
-    """What is known of results.
+    """What is measured of results.
 
     Attributes:
-        known: id of a result -> itself, with its numbers and pictures.
+        results: id of a result -> itself, with its numbers and pictures.
         exemplars: path, name or words -> picture (S, S, 3), sRGB in [0, 1]; None without one.
         floors: exemplar and mesh -> measure -> value of the exemplar beside itself.
         failures: a line for each result that cannot be measured.
         judge: name of the model that judged; None where there is no choice.
     """
 
-    known: dict[str, Result] = field(default_factory=dict)
+    results: dict[str, Result] = field(default_factory=dict)
     exemplars: dict[str, np.ndarray | None] = field(default_factory=dict)
     floors: dict[tuple[str, str | None], dict[str, float]] = field(default_factory=dict)
     failures: list[str] = field(default_factory=list)
@@ -35,14 +35,14 @@ class Measurements:
 
 
 def measure(
-    results: Sequence[Result], pair_of: Callable[[str, str | None], Pair], kept: Kept
+    results: Sequence[Result], pair_of: Callable[[str, str | None], Pair], store: Store
 ) -> Measurements:
-    """Measures what was not measured before; a result that cannot be is a failure of its own.
+    """Measures what the store does not have; a result that cannot be measured is a failure of its own.
 
     Args:
-        results: without numbers, as the jobs have made them.
+        results: of the jobs, without numbers.
         pair_of: exemplar and mesh -> what results are measured with.
-        kept: what was measured before.
+        store: has what was measured before, and gets the rest.
 
     Raises:
         OutputError: The disk is full.
@@ -50,7 +50,7 @@ def measure(
     forget()
     measurements = Measurements()
     for names in dict.fromkeys(result.pair for result in results):
-        _measure_pair(names, results, pair_of, kept, measurements)
+        _measure_pair(names, results, pair_of, store, measurements)
     return measurements
 
 
@@ -58,24 +58,24 @@ def _measure_pair(
     names: tuple[str, str | None],
     results: Sequence[Result],
     pair_of: Callable[[str, str | None], Pair],
-    kept: Kept,
+    store: Store,
     measurements: Measurements,
 ) -> None:
-    pair, complete = None, {}
+    """Adds the measurements of a pair's results to the others; nothing of the pair is kept in memory."""
+    pair, of_pair = None, {}
     for result in (result for result in results if result.pair == names):
-        announce(
-            "measuring", len(measurements.known) + len(complete) + len(measurements.failures), len(results)
-        )
+        count = len(measurements.results) + len(of_pair) + len(measurements.failures)
+        announce("measuring", count, len(results))
         try:
             pair = pair or pair_of(*names)
-            complete[result.id] = kept.completed(result, pair) or kept.measured(result, pair)
+            of_pair[result.id] = store.load(result, pair) or store.measure(result, pair)
         except OutputError:
             raise
         except MitexError as e:
             measurements.failures.append(f"{result.id.rpartition('-')[0]} cannot be measured: {e}")
-    if pair is not None and complete:
-        measurements.known.update(complete)
+    if pair is not None and of_pair:
+        measurements.results.update(of_pair)
         measurements.judge = pair.judge
-        measurements.floors[names] = kept.floor(pair)
+        measurements.floors[names] = store.floor(pair)
         if names[0] not in measurements.exemplars:
             measurements.exemplars[names[0]] = pair.image

@@ -35,24 +35,24 @@ def narrowed(
     tables: dict[str, dict[str, Any]] = plan.content()["methods"]
     if labels:
         names = [label.strip().replace("-", "_") for label in labels]
-        tables = {label: tables[label] for label in _picked(list(tables), names, "method")}
+        tables = {label: tables[label] for label in _selection(list(tables), names, "method")}
     for setting in settings:
         add_setting(tables, setting)
     for key, names in (("exemplars", exemplars), ("meshes", meshes)):
         if names:
             kind = "exemplar" if key == "exemplars" else "mesh"
             own = list(dict.fromkeys(text for table in tables.values() for text in table.get(key, ())))
-            picked = _picked(own, names, kind)
+            selection = _selection(own, names, kind)
             for table in tables.values():
-                table[key] = [text for text in table.get(key, ()) if text in picked]
+                table[key] = [text for text in table.get(key, ()) if text in selection]
     return Plan.of({"methods": tables}, plan.folder)
 
 
-def _picked(own: Sequence[str], names: Sequence[str], kind: str) -> list[str]:
+def _selection(own: Sequence[str], names: Sequence[str], kind: str) -> list[str]:
     """The texts that are named, in their own order."""
     known = {text: text for text in own} | {Path(text).stem: text for text in own}
     for name in names:
         if name not in known:
             raise ConfigError(f"the comparison has no {kind} '{name}'", suggestion(name, sorted(known)))
-    wanted = {known[name] for name in names}
-    return [text for text in own if text in wanted]
+    selection = {known[name] for name in names}
+    return [text for text in own if text in selection]

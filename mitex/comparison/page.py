@@ -18,11 +18,11 @@ from mitex.comparison.summary import Summary
 from mitex.comparison.tables import meaning_html, table_html
 from mitex.page import jpeg
 
-FIRST = (
+FIRST_CONDITION = (
     "Exemplars and meshes: the same for every method, but where a cell is empty. Seeds: as many as each row "
     "says."
 )
-LAST = (
+LAST_CONDITIONS = (
     "Pictures: the same camera and light. What a method has learned besides what is measured shows in them.",
     "Not the same: steps and settings, which are each method's own defaults unless the table below says "
     "something else, and the load of the machine while seconds were measured.",
@@ -61,11 +61,11 @@ class Page:
             subtitle=escape(self._subtitle()),
             failures=self._failures(),
             seeds=self._seed_buttons(),
-            looks="".join(map(self._looks, self.exemplars)),
+            looks="".join(map(self._pictures, self.exemplars)),
             numbers_note=escape(self._note()),
             tables=self._tables(),
             meanings="".join(map(meaning_html, self.measures)),
-            conditions=items((FIRST, *self.conditions, *LAST)),
+            conditions=items((FIRST_CONDITION, *self.conditions, *LAST_CONDITIONS)),
             provenance=self.provenance.html(),
             footer=f"Mitex {escape(__version__)}, {time.strftime('%-d %B %Y')}",
         )
@@ -115,8 +115,8 @@ class Page:
         )
         return f'<p class="seeds"><span class="soft">Seed</span> {buttons}</p>'
 
-    def _looks(self, exemplar: str) -> str:
-        """The pictures of an exemplar: a row for a view and for each mesh, a column for each method."""
+    def _pictures(self, exemplar: str) -> str:
+        """The pictures for an exemplar: a row for a view and for each mesh, a column for each method."""
         results = [result for result in self.results if result.exemplar == exemplar]
         meshes = dict.fromkeys(result.mesh for result in results if result.mesh is not None)
         rows = [self._row(label(m), LIT, [r for r in results if r.mesh in (m, None)]) for m in meshes]
@@ -131,14 +131,14 @@ class Page:
         return f'<div class="wide"><table class="looks" style="{columns}">{content}</table></div>'
 
     def _row(self, title: str, kind: str, results: Sequence[Result]) -> str:
-        cells = (self._look(kind, [r for r in results if r.method == name]) for name in self.methods)
+        cells = (self._cell(kind, [r for r in results if r.method == name]) for name in self.methods)
         return f"<th>{escape(title)}</th>{''.join(cells)}"
 
     def _exemplar(self, exemplar: str) -> str:
         image = self.exemplars[exemplar]
         return "" if image is None else picture(jpeg(image, QUALITY), f"exemplar {label(exemplar)}")
 
-    def _look(self, kind: str, results: Sequence[Result]) -> str:
+    def _cell(self, kind: str, results: Sequence[Result]) -> str:
         """A cell with a method's picture of each seed, of which one is shown: the page's, or the first."""
         by_seed: dict[int | None, Result] = {}
         for result in results:
@@ -146,17 +146,17 @@ class Page:
                 by_seed.setdefault(result.seed, result)
         if not by_seed:
             return f'<td class="none">{DASH if results else "not done"}</td>'
-        first = self.seeds[0] if self.seeds else None
-        shown = first if first in by_seed else next(iter(by_seed))
+        page_seed = self.seeds[0] if self.seeds else None
+        visible_seed = page_seed if page_seed in by_seed else next(iter(by_seed))
         images = [
             picture(
                 result.pictures[kind].read_bytes(),
                 _description(result, kind),
-                f' data-seed="{_seed_text(seed)}"' + (" hidden" if seed != shown else ""),
+                f' data-seed="{_seed_text(seed)}"' + (" hidden" if seed != visible_seed else ""),
             )
             for seed, result in by_seed.items()
         ]
-        note = "" if shown == first else f"seed {_seed_text(shown)}"
+        note = "" if visible_seed == page_seed else f"seed {_seed_text(visible_seed)}"
         return f'<td data-note="{note}">{"".join(images)}</td>'
 
     def _note(self) -> str:
@@ -167,12 +167,12 @@ class Page:
                 "seeds (--seeds 3) tell. Click on a heading to sort."
             )
         seeds = f"{most} seeds" if fewest == most else "as many seeds as each row says"
-        one = (
+        single = (
             "" if fewest > 1 else "Beside a method of one seed, whose chance is not known, nothing is green. "
         )
         return (
             f"Means over {seeds} ± their standard deviation. Green is what is better than every other "
-            f"method by more than both spreads together. {one}Click on a heading to sort."
+            f"method by more than both spreads together. {single}Click on a heading to sort."
         )
 
     def _tables(self) -> str:

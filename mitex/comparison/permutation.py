@@ -22,7 +22,7 @@ def permutation_p(shares: np.ndarray, draws: int = DRAWS, seed: int = 0) -> floa
 
     Args:
         shares: (C, M) of C cases and M methods in [0, 1]; NaN where a method has no answers in a case.
-        draws: if there are more relabellings, this many are drawn, and what was seen counts as one more
+        draws: if there are more relabellings, this many are drawn, and the observed one counts as one more
             (Phipson and Smyth 2010).
         seed: of the draws.
 
@@ -32,9 +32,9 @@ def permutation_p(shares: np.ndarray, draws: int = DRAWS, seed: int = 0) -> floa
     rows = [_centred(row) for row in shares]
     cases = np.maximum((~np.isnan(shares)).sum(0), 1)
     if math.prod(math.factorial(len(places)) for places, _ in rows) <= draws:
-        return float(_reached(_all_totals(rows, len(cases)), rows, cases).mean())
+        return float(_is_extreme(_all_totals(rows, len(cases)), rows, cases).mean())
     totals = _random_totals(rows, len(cases), draws, np.random.default_rng(seed))
-    return float((_reached(totals, rows, cases).sum() + 1) / (draws + 1))
+    return float((_is_extreme(totals, rows, cases).sum() + 1) / (draws + 1))
 
 
 Row = tuple[np.ndarray, np.ndarray]  # methods (k,) of a case, and their shares (k,) less their mean
@@ -45,12 +45,12 @@ def _centred(row: np.ndarray) -> Row:
     return places, row[places] - (row[places].mean() if len(places) else 0.0)
 
 
-def _reached(totals: np.ndarray, rows: Sequence[Row], cases: np.ndarray) -> np.ndarray:
-    """(N,) bool: which sums (N, M) differ at least as much as those that were seen."""
-    seen = np.zeros(len(cases))
+def _is_extreme(totals: np.ndarray, rows: Sequence[Row], cases: np.ndarray) -> np.ndarray:
+    """(N,) bool: which sums (N, M) differ at least as much as the observed ones."""
+    observed = np.zeros(len(cases))
     for places, values in rows:
-        seen[places] += values
-    return (totals**2 / cases).sum(1) >= (seen**2 / cases).sum() * (1 - TOLERANCE)
+        observed[places] += values
+    return (totals**2 / cases).sum(1) >= (observed**2 / cases).sum() * (1 - TOLERANCE)
 
 
 def _all_totals(rows: Sequence[Row], methods: int) -> np.ndarray:

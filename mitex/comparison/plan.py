@@ -105,6 +105,7 @@ def _first_seeds(count: int) -> tuple[int, ...]:
 
 
 def _prepared(part: MethodPlan, kind: Kind) -> MethodPlan:
+    """As `prepared`, of one method: only fit if it is put on no mesh, with patterns of one size otherwise."""
     method = methods()[part.method]
     output = "glb" if method.applies_to_meshes else "none"
     if part.output not in ("glb", output):
@@ -116,12 +117,12 @@ def _prepared(part: MethodPlan, kind: Kind) -> MethodPlan:
         return replace(part, output=output)
     if not part.meshes:
         raise ConfigError("there are no meshes to compare on", "name some")
-    sized = (
+    needs_width = (
         part.learns_from == "exemplar"
         and WIDTH in apply_kinds(method)
         and not any(name in part.apply for name in SCALES)
     )
-    return replace(part, apply={**part.apply, WIDTH: EXEMPLAR_WIDTH}) if sized else part
+    return replace(part, apply={**part.apply, WIDTH: EXEMPLAR_WIDTH}) if needs_width else part
 
 
 def add_setting(tables: Mapping[str, dict[str, Any]], setting: str) -> None:
@@ -148,11 +149,4 @@ def add_setting(tables: Mapping[str, dict[str, Any]], setting: str) -> None:
 
 def _value(key: str, text: str, kinds: Mapping[str, Any], label: str) -> Any:
     """The value of an option; that of a setting stays a text, which its config reads."""
-    if key not in kinds:
-        return text
-    try:
-        return values.parse(text, kinds[key])
-    except ValueError as e:
-        raise ConfigError(
-            f"{key} of {label} cannot be '{text}'", f"give {values.describe(kinds[key])}"
-        ) from e
+    return text if key not in kinds else values.read(values.parse, text, kinds[key], f"{key} of {label}")

@@ -1,4 +1,4 @@
-"""How results were made, so that they can be made again: the plan, and the settings of each method."""
+"""How results came about, so that they can be repeated: the plan, and the settings of each method."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ class Provenance:
 
 
 def _row(part: MethodPlan) -> str:
-    applied = DASH if part.output == "none" else _options(part.apply)
-    return f"<tr><td>{escape(part.label)}</td><td>{_options(part.fit)}</td><td>{applied}</td></tr>"
+    apply = DASH if part.output == "none" else _options(part.apply)
+    return f"<tr><td>{escape(part.label)}</td><td>{_options(part.fit)}</td><td>{apply}</td></tr>"
 
 
 def _options(table: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mitex.asset import CLAY, Asset, clay
 from mitex.cache import content_key
-from mitex.comparison.inputs import lit, mesh_of, read_once
+from mitex.comparison.inputs import lit_picture, mesh_of, read_once
 from mitex.comparison.results import LIT
 from mitex.errors import ImageError
 from mitex.evaluation.form import ReliefForm
@@ -60,7 +60,7 @@ class ReliefPair:
     @property
     def image(self) -> np.ndarray:
         """The reference in light."""
-        return lit(clay(self.reference))
+        return lit_picture(clay(self.reference))
 
     def numbers(self, asset: Asset, run: Path | None = None) -> dict[str, float]:
         """Distances of form, of the statistics of edges and vertices, and of shaded pictures."""
@@ -84,8 +84,8 @@ class ReliefPair:
             return {}
 
     def pictures(self, asset: Asset, run: Path) -> dict[str, np.ndarray]:
-        """As of `mitex.comparison.inputs.lit`."""
-        return {LIT: lit(asset, self.mesh)}
+        """As of `mitex.comparison.inputs.lit_picture`."""
+        return {LIT: lit_picture(asset, self.mesh)}
 
     def _form_of(self, mesh: Mesh) -> dict[str, float]:
         """Distance and size; nothing for meshes so thin that patches show too little of them."""

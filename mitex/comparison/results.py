@@ -1,4 +1,4 @@
-"""The results of a comparison's jobs: which fit and which asset belong together, and what was measured."""
+"""The results of a comparison's jobs: which fit and which asset belong together, and their measurements."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Result:
 
 
 def results_of(report: Report, source: str) -> list[Result]:
-    """What the jobs of a batch that are done have written, with the time and memory that they took.
+    """The results of a batch's jobs that are done, with the time and memory that they took.
 
     Args:
         report: of the batch.
@@ -70,22 +70,23 @@ def _chain(row: Row, rows: Mapping[str, Row]) -> list[Row]:
 
 
 def _result(folder: Path, chain: Sequence[Row], source: str) -> Result:
-    job, applied = chain[0].job, chain[0].job.words[0] == "apply"
-    fits = chain[1:] if applied else chain
+    """Of a job and those that it follows from."""
+    job, is_apply = chain[0].job, chain[0].job.words[0] == "apply"
+    fits = chain[1:] if is_apply else chain
     return Result(
         id=job.id,
         exemplar=_argument(fits[-1].job, source),
-        mesh=_argument(job, "mesh") if applied else None,
+        mesh=_argument(job, "mesh") if is_apply else None,
         method=str(job.about["method"]),
         seed=job.about["seed"],
-        asset=folder / _argument(job, "out") if applied else None,
+        asset=folder / _argument(job, "out") if is_apply else None,
         run=folder / fits[0].job.result,
         time=chain[0].record.get("time"),
         numbers={
             "fit_seconds": float(sum(fit.record["seconds"] for fit in fits)),
             "memory": float(max(row.record["memory"] for row in chain)),
         }
-        | ({"apply_seconds": float(chain[0].record["seconds"])} if applied else {}),
+        | ({"apply_seconds": float(chain[0].record["seconds"])} if is_apply else {}),
     )
 
 

@@ -1,9 +1,7 @@
-"""Running a comparison: the jobs of its plan, what they made measured, and the report."""
+"""Running a comparison: the jobs of its plan, the measurement of their results, and the report."""
 
 from __future__ import annotations
 
-import csv
-import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -13,31 +11,32 @@ from typing import Any
 
 from mitex.batch import Engine, Event, Plan, Report, run_plan
 from mitex.batch.folder import BatchFolder
-from mitex.comparison.kept import Kept
 from mitex.comparison.kinds import KINDS, Kind
 from mitex.comparison.measuring import Measurements, measure
 from mitex.comparison.page import Page
 from mitex.comparison.plan import source_of
 from mitex.comparison.provenance import Provenance
 from mitex.comparison.results import Result, results_of
+from mitex.comparison.store import Store
 from mitex.comparison.study import check_study, write_study
 from mitex.comparison.summary import Summary, summaries
-from mitex.errors import ConfigError, OutputError
-from mitex.paths import atomic_write, check_writable, expanded, is_temporary
+from mitex.errors import ConfigError
+from mitex.paths import atomic_write, check_own_folder
+from mitex.records import write_csv, write_json
 
-BATCH, MEASURED = "batch", "measured"  # folders: of the jobs, and of what was measured of their results
+BATCH, MEASURED = "batch", "measured"  # folders: of the jobs, and of the measurements of their results
 NAMES, PLACES = ("exemplar", "mesh", "method", "seed"), ("asset", "run")  # of a result, besides its numbers
 REPORT, TABLE, RECORD = "report.html", "report.csv", "report.json"
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """What a comparison has come to.
+    """The outcome of a comparison.
 
     Attributes:
         folder: of everything.
-        results: what was made and measured.
-        tables: means of it.
+        results: with what was measured of them.
+        tables: their means.
         failures: a line for each job or measurement that failed.
         missing: jobs that are not done, and results that cannot be measured.
         total: jobs in all.
@@ -92,29 +91,15 @@ def compare(
     _check_judge(kind, judge)
     if study:
         check_study(plan)
-    place = checked_folder(folder)
+    place = check_own_folder(folder, lambda path: BatchFolder(path / BATCH).is_ours())
     report = run_plan(plan, place / BATCH, engine, threads=threads, retry=retry, on_event=on_event)
     results = results_of(report, source_of(plan))
-    measurements = measure(results, partial(kind.pair_of, judge=judge), Kept(place / MEASURED))
+    measurements = measure(results, partial(kind.pair_of, judge=judge), Store(place / MEASURED))
     comparison = _comparison(place, results, measurements, report, kind)
     _write(comparison, measurements, kind, Provenance.of(plan, comparison.results))
     if study:
         write_study(place, comparison.results, measurements.exemplars)
     return comparison
-
-
-def checked_folder(folder: str | Path) -> Path:
-    """A folder that is new, empty, or an earlier comparison's; absolute. Nothing is written.
-
-    Raises:
-        OutputError: It holds other files, or cannot be written to.
-    """
-    place = Path(os.path.abspath(expanded(folder)))
-    check_writable(place)
-    files = place.iterdir() if place.is_dir() else ()
-    if not all(map(is_temporary, files)) and not BatchFolder(place / BATCH).is_ours():
-        raise OutputError(f"'{folder}' holds other files", "name a new or empty folder with `out`")
-    return place
 
 
 def _check_judge(kind: Kind, judge: str | None) -> None:
@@ -130,7 +115,16 @@ def _check_judge(kind: Kind, judge: str | None) -> None:
 def _comparison(
     folder: Path, everything: Sequence[Result], measurements: Measurements, report: Report, kind: Kind
 ) -> Comparison:
-    results = tuple(measurements.known[result.id] for result in everything if result.id in measurements.known)
+    """What jobs and measurements have come to.
+
+    Args:
+        folder: of the comparison.
+        everything: the results of the jobs, also those that cannot be measured.
+        measurements, report: of these results, and of the jobs.
+        kind: of the comparison.
+    """
+    measured = measurements.results
+    results = tuple(measured[result.id] for result in everything if result.id in measured)
     failures = (
         *(f"{row.job.name}: {row.record.get('error')}" for row in report.failures),
         *measurements.failures,
@@ -141,46 +135,36 @@ def _comparison(
 
 
 def _write(comparison: Comparison, measurements: Measurements, kind: Kind, provenance: Provenance) -> None:
-    results, exemplars, floors = comparison.results, measurements.exemplars, measurements.floors
-    judge = measurements.judge
-    conditions = kind.conditions if judge is None else (*kind.conditions, f"The judge: {judge}.")
+    """Writes the report as a page, a table and a JSON object."""
+    judge, floors = measurements.judge, measurements.floors
     page = Page(
-        results,
-        comparison.tables,
-        exemplars,
-        floors,
-        comparison.failures,
-        kind.measures,
-        conditions,
-        provenance,
+        results=comparison.results,
+        tables=comparison.tables,
+        exemplars=measurements.exemplars,
+        floors=floors,
+        failures=comparison.failures,
+        measures=kind.measures,
+        conditions=kind.conditions if judge is None else (*kind.conditions, f"The judge: {judge}."),
+        provenance=provenance,
     )
     with atomic_write(comparison.report) as temporary:
         temporary.write_text(page.html(), encoding="utf-8", errors="replace")
-    _write_csv(comparison.folder / TABLE, results, kind)
+    columns = (*NAMES, *(measure.key for measure in kind.measures), *PLACES)
+    rows = [_row(result, comparison.folder) for result in comparison.results]
+    write_csv(comparison.folder / TABLE, columns, rows)
     record: dict[str, Any] = {
         **provenance.record(),
-        "judge": measurements.judge,
-        "results": [_flat(result, comparison.folder) for result in comparison.results],
+        "judge": judge,
+        "results": rows,
         "means": [_record(table, floors) for table in comparison.tables],
         "failures": list(comparison.failures),
         "measures": {m.key: {"better": m.better, "meaning": m.meaning} for m in kind.measures},
     }
-    with atomic_write(comparison.folder / RECORD) as temporary:
-        temporary.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    write_json(comparison.folder / RECORD, record)
 
 
-def _write_csv(path: Path, results: Sequence[Result], kind: Kind) -> None:
-    columns = (*NAMES, *(measure.key for measure in kind.measures), *PLACES)
-    with (
-        atomic_write(path) as temporary,
-        temporary.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file,
-    ):
-        writer = csv.DictWriter(file, columns, restval="")
-        writer.writeheader()
-        writer.writerows(_flat(result, path.parent) for result in results)
-
-
-def _flat(result: Result, folder: Path) -> dict[str, Any]:
+def _row(result: Result, folder: Path) -> dict[str, Any]:
+    """A result in the table and the JSON object; its places are relative to the folder."""
     names = {key: getattr(result, key) for key in NAMES}
     places = {key: getattr(result, key) for key in PLACES}
     relative = {key: place and os.path.relpath(place, folder) for key, place in places.items()}
@@ -188,6 +172,7 @@ def _flat(result: Result, folder: Path) -> dict[str, Any]:
 
 
 def _record(table: Summary, floors: Mapping[tuple[str, str | None], Mapping[str, float]]) -> dict[str, Any]:
+    """A table of means in the JSON object, where null stands for what is not known."""
     cells = [
         {"method": method, "measure": key} | {k: v if v == v else None for k, v in asdict(cell).items()}
         for (method, key), cell in table.cells.items()

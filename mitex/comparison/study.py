@@ -23,6 +23,7 @@ from mitex.comparison.results import LIT, Result
 from mitex.errors import ConfigError
 from mitex.page import jpeg
 from mitex.paths import atomic_write, expanded
+from mitex.records import write_json
 
 PAGE, KEY = "study.html", "study.json"
 MOST = 40  # questions to one person, as MeshNCA asked
@@ -30,7 +31,7 @@ MOST = 40  # questions to one person, as MeshNCA asked
 
 @dataclass(frozen=True)
 class Question:
-    """Two methods on one exemplar and mesh.
+    """Which of two methods is nearer to an exemplar, on a mesh.
 
     Attributes:
         exemplar, mesh: paths or names.
@@ -44,10 +45,10 @@ class Question:
 
 @dataclass(frozen=True)
 class Study:
-    """What is asked.
+    """The questions of a study.
 
     Attributes:
-        id: which answers tell that they are of this study.
+        id: a hash of questions and pictures, which answers name.
         questions: in an order that says nothing.
     """
 
@@ -96,44 +97,56 @@ def write_study(folder: Path, results: Sequence[Result], exemplars: Mapping[str,
         ConfigError: There are no two methods to compare.
         OutputError: The folder cannot be written to.
     """
-    shown = {(*result.pair, result.method): result for result in reversed(results) if LIT in result.pictures}
+    files = {
+        (*result.pair, result.method): result.pictures[LIT]
+        for result in reversed(results)
+        if LIT in result.pictures
+    }
     pictures: dict[str, bytes] = {}
-    asked: list[tuple[Question, list[str]]] = []
+    choices: dict[Question, list[str]] = {}
     for exemplar, mesh in dict.fromkeys((r.exemplar, r.mesh) for r in results if r.mesh is not None):
-        methods = sorted({method for one, other, method in shown if (one, other) == (exemplar, mesh)})
+        methods = sorted({method for one, other, method in files if (one, other) == (exemplar, mesh)})
         if (image := exemplars[exemplar]) is not None:
             pictures.setdefault(exemplar, jpeg(image, QUALITY))
         for pair in combinations(methods, 2):
-            files = [shown[exemplar, mesh, method].pictures[LIT] for method in pair]
-            pictures |= {str(file): file.read_bytes() for file in files}
-            asked.append((Question(exemplar, mesh, pair), list(map(str, files))))
-    if not asked:
+            of_pair = [files[exemplar, mesh, method] for method in pair]
+            pictures |= {str(file): file.read_bytes() for file in of_pair}
+            choices[Question(exemplar, mesh, pair)] = list(map(str, of_pair))
+    if not choices:
         raise ConfigError("there are no two methods to ask about", "name more methods, or see what failed")
-    return _write(folder, asked, pictures)
+    return _write(folder, choices, pictures)
 
 
-def _write(folder: Path, asked: Sequence[tuple[Question, list[str]]], pictures: dict[str, bytes]) -> Path:
+def _write(folder: Path, choices: Mapping[Question, Sequence[str]], pictures: Mapping[str, bytes]) -> Path:
+    """Writes page and key.
+
+    Args:
+        folder: of the comparison.
+        choices: names of each question's two pictures.
+        pictures: name -> JPEG; those of exemplars are named as these.
+    """
     hashes = [hashlib.sha256(content).hexdigest() for content in pictures.values()]
-    subject = json.dumps([hashes, [asdict(question) for question, _ in asked]])
+    subject = json.dumps([hashes, list(map(asdict, choices))])
     id = hashlib.sha256(subject.encode("utf-8", "surrogateescape")).hexdigest()[:16]
     shuffle = random.Random(id)
-    asked = shuffle.sample(asked, len(asked))
+    questions = shuffle.sample(list(choices), len(choices))
     names = shuffle.sample(list(pictures), len(pictures))  # so that their places tell nothing either
     number = {name: k for k, name in enumerate(names)}
-    questions = [
-        {
-            "exemplar": number.get(question.exemplar, question.exemplar),
-            "choices": [number[name] for name in choices],
-        }
-        for question, choices in asked
-    ]
-    encoded = [base64.b64encode(pictures[name]).decode() for name in names]
-    data = {"id": id, "most": MOST, "questions": questions, "pictures": encoded}
+    data = {
+        "id": id,
+        "most": MOST,
+        "questions": [
+            {
+                "exemplar": number.get(question.exemplar, question.exemplar),
+                "choices": [number[name] for name in choices[question]],
+            }
+            for question in questions
+        ],
+        "pictures": [base64.b64encode(pictures[name]).decode() for name in names],
+    }
     text = json.dumps(data).replace("<", "\\u003c")  # words could end the script
     page = template(PAGE).substitute(style=text_of("style.css"), data=text)
-    key = {"id": id, "questions": [asdict(question) for question, _ in asked]}
-    with atomic_write(folder / KEY) as temporary:
-        temporary.write_text(json.dumps(key, indent=1) + "\n", encoding="utf-8")
+    write_json(folder / KEY, {"id": id, "questions": list(map(asdict, questions))})
     with atomic_write(folder / PAGE) as temporary:
         temporary.write_text(page, encoding="utf-8")
     return folder / PAGE

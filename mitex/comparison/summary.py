@@ -62,13 +62,14 @@ def summaries(results: Sequence[Result], measures: tuple[Measure, ...]) -> list[
 
 
 def _pairs(results: Sequence[Result]) -> list[tuple[str, str | None]]:
-    """Without exemplars alone that there are results on meshes of."""
+    """The pairs of results; an exemplar without a mesh only if no result of it is on one."""
     pairs = dict.fromkeys(result.pair for result in results)
     on_meshes = {exemplar for exemplar, mesh in pairs if mesh is not None}
     return [pair for pair in pairs if pair[1] is not None or pair[0] not in on_meshes]
 
 
 def _is_of(result: Result, pair: tuple[str, str | None]) -> bool:
+    """Whether a result is of a pair, or of its exemplar on no mesh."""
     return result.exemplar == pair[0] and result.mesh in (pair[1], None)
 
 
@@ -111,6 +112,7 @@ def mean_and_spread(values: Sequence[Sequence[float]]) -> tuple[float, float]:
 def _marked(
     cells: dict[tuple[str, str], Cell], methods: Sequence[str], measures: Sequence[Measure]
 ) -> dict[tuple[str, str], Cell]:
+    """The cells, of which the best one of each measure says so, where that is certain."""
     marked = dict(cells)
     for measure in measures:
         of_methods = {

@@ -43,11 +43,13 @@ def _head(measure: Measure) -> str:
 
 
 def _row(table: Summary, method: str) -> str:
-    own = [table.cells.get((method, measure.key)) for measure in table.measures]
-    seeds = max((cell.count for cell in own if cell), default=0)
-    cells = "".join(_cell(cell, measure, seeds) for cell, measure in zip(own, table.measures, strict=True))
+    cells = [table.cells.get((method, measure.key)) for measure in table.measures]
+    seeds = max((cell.count for cell in cells if cell), default=0)
+    columns = "".join(
+        _cell(cell, measure, seeds) for cell, measure in zip(cells, table.measures, strict=True)
+    )
     name = f'<td data-value="{escape(method)}">{escape(method)}</td>'
-    return f'<tr>{name}<td data-value="{seeds}">{seeds or DASH}</td>{cells}</tr>'
+    return f'<tr>{name}<td data-value="{seeds}">{seeds or DASH}</td>{columns}</tr>'
 
 
 def _cell(cell: Cell | None, measure: Measure, seeds: int) -> str:

@@ -10,7 +10,7 @@ import torch
 
 from mitex.asset import Asset, clay
 from mitex.cache import content_key
-from mitex.comparison.inputs import lit, mesh_of, read_once
+from mitex.comparison.inputs import lit_picture, mesh_of, read_once
 from mitex.comparison.results import LIT
 from mitex.evaluation.text import text_scores
 from mitex.features.text_image import TextImageModel, object_prompt
@@ -63,8 +63,8 @@ class TextPair:
         return {}
 
     def pictures(self, asset: Asset, run: Path) -> dict[str, np.ndarray]:
-        """As of `mitex.comparison.inputs.lit`."""
-        return {LIT: lit(asset, self.mesh)}
+        """As of `mitex.comparison.inputs.lit_picture`."""
+        return {LIT: lit_picture(asset, self.mesh)}
 
     @cached_property
     def _bare(self) -> torch.Tensor:

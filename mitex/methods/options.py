@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from tyro.conf import Positional, UseAppendAction, arg
 
 from mitex.methods.checks import in_range, merged_settings, reject_unused
+from mitex.methods.option_types import ExemplarName, PlainText
 from mitex.ranges import DISPLACEMENTS, SEEDS
 from mitex.suffixes import ASSETS, PICTURES, names_field_file
 from mitex.training.settings import RunSettings
@@ -43,7 +44,7 @@ class FitOptions:
     out: Annotated[Path | None, arg(metavar="RUN", help_behavior_hint="(default: a folder in runs/)")] = None
     """Run folder."""
 
-    preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
+    preset: Annotated[PlainText | None, arg(metavar="NAME", help_behavior_hint="")] = None
     """Settings to start from."""
 
     config: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None
@@ -125,7 +126,7 @@ class DeviceOptions(TrainingOptions):
 class ExemplarOptions(TrainingOptions):
     """Options of the methods that learn from images."""
 
-    exemplar: Annotated[str, arg(metavar="IMAGE|DIR|NAME")]
+    exemplar: Annotated[ExemplarName, arg(metavar="IMAGE|DIR|NAME")]
     """PNG or JPEG, a folder with any of albedo, height, normal, roughness, ambient_occlusion, or a name."""
 
 

@@ -112,7 +112,4 @@ def _from_file(file: Path, kinds: Mapping[str, Any]) -> dict[str, Any]:
 def _read(key: str, value: Any, kinds: Mapping[str, Any], reader: Callable[[Any, Any], Any]) -> Any:
     if key not in kinds:
         raise ConfigError(f"there is no key '{key}'", suggestion(key, kinds))
-    try:
-        return reader(value, kinds[key])
-    except ValueError as e:
-        raise ConfigError(f"{key} cannot be {value!r}", f"give {values.describe(kinds[key])}") from e
+    return values.read(reader, value, kinds[key], key)

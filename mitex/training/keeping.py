@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from mitex.images import write_image
-from mitex.paths import atomic_write
+from mitex.records import write_json
 from mitex.training import checkpoint, optim, run
 from mitex.training.metrics import Metrics, plain
 from mitex.training.state import TrainState
@@ -97,9 +96,7 @@ class RunFolder(Recorder):
         broken = record["skipped"] == "gradient"
         norms = optim.gradient_norms(state.optimizer.parameters).tolist() if broken else []
         place = self._folder / run.DIVERGED
-        with atomic_write(place) as temporary:
-            dump = plain(record) | {"gradient_norms": [str(norm) for norm in norms]}
-            temporary.write_text(json.dumps(dump, indent=1) + "\n", encoding="utf-8")
+        write_json(place, plain(record) | {"gradient_norms": [str(norm) for norm in norms]})
         newest = self.checkpoint
         last_good = f"the last good checkpoint is '{newest}'" if newest else "no checkpoint had been reached"
         return f"{last_good}, and '{place}' has the step's numbers"

@@ -8,6 +8,8 @@ import types
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, Union, get_args, get_origin
 
+from mitex.errors import ConfigError
+
 Reader = Callable[[Any, Any], Any]  # from a value and its type to the value that it stands for
 
 TRUTH = {
@@ -72,6 +74,23 @@ def check(value: Any, kind: Any) -> Any:
     if get_origin(kind) is tuple and isinstance(value, list | tuple):
         return _each(check, value, kind)
     return _first(check, value, kind)
+
+
+def read(reader: Reader, value: Any, kind: Any, name: str) -> Any:
+    """Reads a value that somebody has given.
+
+    Args:
+        reader: `parse` or `check`.
+        value, kind: its arguments.
+        name: whose value it is, for the message.
+
+    Raises:
+        ConfigError: It is no value of this type.
+    """
+    try:
+        return reader(value, kind)
+    except ValueError as e:
+        raise ConfigError(f"{name} cannot be {value!r}", f"give {describe(kind)}") from e
 
 
 def describe(kind: Any) -> str:

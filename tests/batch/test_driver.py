@@ -212,7 +212,7 @@ class TestADiskThatIsAwayForAMoment:
         monkeypatch.setenv("STRIPES_PACE", PACE)
         (job, _) = jobs_of(workshop.plan(("a.png",), steps=100))
         folder, errors = BatchFolder(workshop.folder / "out"), []
-        with folder.driven([job]) as name, ThreadPoolExecutor(1) as pool:
+        with folder.driver([job]) as name, ThreadPoolExecutor(1) as pool:
             outcome = pool.submit(Task(job, folder, name, 1))
             wait_for(lambda: workshop.told("step"))
             with monkeypatch.context() as patch:
@@ -232,7 +232,7 @@ class TestADiskThatIsAwayForAMoment:
             return real(folder, job)
 
         monkeypatch.setattr(BatchFolder, look, looked)
-        monkeypatch.setattr("mitex.batch.driver.LOOK_ELSEWHERE", 0.01)
+        monkeypatch.setattr("mitex.batch.driver.RECHECK", 0.01)
         assert workshop.run(workshop.plan(("a.png",))).count("done") == 2
         assert len(errors) == 3 and len(workshop.told("start")) == 2
 

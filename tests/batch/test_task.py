@@ -96,7 +96,7 @@ def test_an_attempt_that_was_told_to_stop_is_no_crash(workshop, scripted):
     (job, _) = jobs_of(workshop.plan(("a.png",)))
     folder = BatchFolder(workshop.folder / "out")
     returns = [(10, 20, SystemExit(-1), 5)] * (3 * RETRIES)
-    with folder.driven([job]) as name:
+    with folder.driver([job]) as name:
         task = Task(job, folder, name, 1)
         scripted(*returns, (10, 20, -9, 5), LAST)
         for _ in returns:

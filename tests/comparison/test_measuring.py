@@ -34,10 +34,10 @@ def pairs():
     return SimpleNamespace(of=Pair, told=told)
 
 
-def kept(known=()) -> Any:
+def store(known=()) -> Any:
     return SimpleNamespace(
-        completed=lambda result, pair: result if result.id in known else None,
-        measured=lambda result, pair: result,
+        load=lambda result, pair: result if result.id in known else None,
+        measure=lambda result, pair: result,
         floor=lambda pair: {"gram": len(pair.mesh)},
     )
 
@@ -45,18 +45,18 @@ def kept(known=()) -> Any:
 def test_a_pair_is_there_once_and_alone(pairs):
     """The exemplar's picture is taken once."""
     made = [result(method, 0, mesh) for method in "ab" for mesh in ("ball", "vase")]
-    found = measure(made, pairs.of, kept(known={made[0].id}))
+    found = measure(made, pairs.of, store(known={made[0].id}))
     assert pairs.told == ["ball", "picture", "vase"]
-    assert found.known == {one.id: one for one in made} and not found.failures
+    assert found.results == {one.id: one for one in made} and not found.failures
     assert found.exemplars == {"lava": None}
     assert found.floors == {("lava", "ball"): {"gram": 4}, ("lava", "vase"): {"gram": 4}}
 
 
 def test_what_cannot_be_measured_is_a_failure_of_its_own(pairs):
     made = [result("a", 0, "broken"), result("b", 0, "broken"), result("a", 0, "ball")]
-    found = measure(made, pairs.of, kept())
+    found = measure(made, pairs.of, store())
     assert found.failures == [
         "a-0 cannot be measured: no mesh; take another one",
         "b-0 cannot be measured: no mesh; take another one",
     ]
-    assert list(found.known) == ["a-0-ball"] and list(found.floors) == [("lava", "ball")]
+    assert list(found.results) == ["a-0-ball"] and list(found.floors) == [("lava", "ball")]

@@ -16,8 +16,8 @@ from mitex import __version__
 from mitex.batch import Plan
 from mitex.cli import main
 from mitex.comparison import compare, comparison_plan
-from mitex.comparison.kept import VERSION, Kept, optimized_numbers
 from mitex.comparison.kinds import Pair
+from mitex.comparison.store import VERSION, Store, optimized_numbers
 from tests.cli import bad_files as bad
 
 QUILT = ["image_quilting:size=64", "image_quilting:exemplar_size=32", "image_quilting:block=12"]
@@ -30,13 +30,13 @@ def quilting(exemplars=("a.png",), seeds=1):
 @pytest.fixture
 def measurings(monkeypatch):
     """Which results are measured."""
-    measured, names = Kept.measured, []
+    measure, names = Store.measure, []
 
     def counted(self, result, *others):
         names.append(result.id.rpartition("-")[0])
-        return measured(self, result, *others)
+        return measure(self, result, *others)
 
-    monkeypatch.setattr(Kept, "measured", counted)
+    monkeypatch.setattr(Store, "measure", counted)
     return names
 
 
@@ -91,29 +91,29 @@ def check_provenance(folder, record, rows):
 def test_numbers_of_another_version_judge_or_result_are_measured_again(tmp_path):
     from tests.comparison.test_summary import result
 
-    kept, one = Kept(tmp_path), result("a", 0)
+    store, one = Store(tmp_path), result("a", 0)
     clip, none = (cast(Pair, SimpleNamespace(judge=judge)) for judge in ("clip", None))
-    assert kept.completed(one, none) is None
+    assert store.load(one, none) is None
     bad.image(tmp_path / f"{one.id}-view.jpg", kind="JPEG")  # which is not all
     (tmp_path / f"{one.id}.json").write_text(json.dumps({"version": VERSION, "numbers": {}}))
-    assert kept.completed(one, none) is None
-    assert kept.completed(replace(one, asset=None), none) is not None
+    assert store.load(one, none) is None
+    assert store.load(replace(one, asset=None), none) is not None
     bad.image(tmp_path / f"{one.id}.jpg", kind="JPEG")
     file = tmp_path / f"{one.id}.json"
     record = {"version": VERSION, "numbers": {"gram": 2.5}}
     for judge, pair, other in ((None, none, clip), ("clip", clip, none)):
         file.write_text(json.dumps(record | ({"judge": judge} if judge else {})))
-        known = kept.completed(one, pair)
-        assert known is not None and known.numbers["gram"] == 2.5
-        assert kept.completed(one, other) is None
+        loaded = store.load(one, pair)
+        assert loaded is not None and loaded.numbers["gram"] == 2.5
+        assert store.load(one, other) is None
     for content in ({"version": VERSION - 1, "numbers": {}}, [], {"version": VERSION}):
         file.write_text(json.dumps(content))
-        assert kept.completed(one, none) is None
+        assert store.load(one, none) is None
     file.write_text(json.dumps(record | {"time": "2026-11-01"}))
-    assert kept.completed(replace(one, time="2026-11-01"), none) is not None
-    assert kept.completed(replace(one, time="2026-11-02"), none) is None
+    assert store.load(replace(one, time="2026-11-01"), none) is not None
+    assert store.load(replace(one, time="2026-11-02"), none) is None
     file.write_text("{")
-    assert kept.completed(one, none) is None
+    assert store.load(one, none) is None
 
 
 def test_what_a_fit_optimizes_is_counted_by_its_checkpoint(tmp_path):

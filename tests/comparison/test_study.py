@@ -239,9 +239,14 @@ def test_files_that_are_none(tmp_path):
     for name in ("bad.json", "missing.json", "."):
         with pytest.raises(ConfigError, match="answers"):
             read_answers(CASES, [tmp_path / name])
-    twice = saved(tmp_path / "1.json")
-    with pytest.raises(ConfigError, match="there twice"):
-        read_answers(CASES, [twice, twice])
+
+
+def test_a_persons_answers_count_once_whatever_their_file_is_called(tmp_path):
+    """Also those that a person saved twice, the second time with more."""
+    first = saved(tmp_path / "1.json", entries=((0, 0),))
+    for again in (first, saved(tmp_path / "renamed.json")):
+        with pytest.raises(ConfigError, match=f"the answers in '{again}' are there twice"):
+            read_answers(CASES, [first, again])
 
 
 def test_the_command(study, tmp_path, capsys):

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from mitex.cli import main
-from mitex.comparison.kept import Kept
 from mitex.comparison.measures import CAPTURES, COSTS
+from mitex.comparison.store import Store
 from mitex.evaluation.views import view_quality
 from mitex.images import read_image
 from mitex.methods.baselines.plain_field import PlainFieldTexture
@@ -45,7 +45,7 @@ def test_a_plain_field_is_compared_by_its_views(compared, monkeypatch):
     check_table(compared)
     check_means(compared)
     check_page(compared)
-    monkeypatch.setattr(Kept, "measured", None)  # what is known is not measured again
+    monkeypatch.setattr(Store, "measure", None)  # what is known is not measured again
     compare()
 
 

@@ -10,6 +10,7 @@ from functools import partial
 from importlib import import_module
 from inspect import signature
 from pathlib import Path
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from mitex.cli.usage import parse
 from mitex.errors import CheckpointError
 from mitex.images import read_image
 from mitex.lazy import load as resolve_reference
+from mitex.methods.option_types import may_be_file
 from mitex.methods.options import ApplyOptions, FitOptions
 from mitex.methods.registry import load, method_of, methods
 from mitex.training import checkpoint, model_file
@@ -202,6 +204,8 @@ class TestDescription:
         assert method.applies_to_meshes == ("--mesh " in FITS[name].apply)
         assert method.resumes == bool(FITS[name].resume)
         assert method.load_fit().only_at_start <= options
+        preset = get_type_hints(method.load_fit(), include_extras=True)["preset"]
+        assert not may_be_file("paper", preset)
 
     def test_its_settings_are_listed(self, name, capsys):
         assert main(["fit", name, "--settings"]) == 0

@@ -11,7 +11,8 @@ from tyro.conf import arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import in_range, mutually_exclusive
-from mitex.methods.geometric.config import MAX_LEVELS, Placement
+from mitex.methods.geometric.config import MAX_LEVELS, Placement, ReferenceName
+from mitex.methods.option_types import PlainText, VectorField
 from mitex.methods.options import DeviceOptions, MeshOptions, field_files
 from mitex.ranges import EVEN_VERTICES, SEEDS
 
@@ -40,17 +41,19 @@ class Fit(DeviceOptions):
       mitex fit geometric --reference cactus.obj --out runs/cactus --resume --steps 12000   (one more level)
     """
 
-    reference: Annotated[str, arg(metavar="MESH|NAME")]
+    reference: Annotated[ReferenceName, arg(metavar="MESH|NAME")]
     """Mesh file (.obj .ply .stl .glb .gltf .off), or a reference by formula: spikes, scales, knobs, ridges,
     craters, warts, cactus, shingles, bricks, woven."""
 
-    preset: Annotated[str | None, arg(metavar="fast|paper", help_behavior_hint="(default: fast)")] = None
+    preset: Annotated[PlainText | None, arg(metavar="fast|paper", help_behavior_hint="(default: fast)")] = (
+        None
+    )
     """Settings to start from: `fast`, or `paper`, which follows the publication."""
 
     template: Annotated[str | None, arg(metavar="MESH", help_behavior_hint="(default: by genus)")] = None
     """Coarse mesh of the reference's topology from which its training meshes are made."""
 
-    field: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="")] = None
+    field: Annotated[VectorField | None, arg(metavar="FIELD", help_behavior_hint="")] = None
     """Vector field on the reference that its relief follows: a name (up, about-y ...), a direction, or a file
     (.npy .ply .json)."""
 
@@ -82,7 +85,7 @@ class GrowthOptions:
     remesh: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None
     """Give the mesh N even vertices first; fewer make the texture larger."""
 
-    field: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="")] = None
+    field: Annotated[VectorField | None, arg(metavar="FIELD", help_behavior_hint="")] = None
     """Vector field on the mesh that a relief with a direction follows: a name (up, about-y ...), a direction,
     or a file (.npy .ply .json)."""
 

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 from mitex.errors import ConfigError
+from mitex.methods.option_types import TextOf
 from mitex.training.settings import DeviceConfig, key
 
 MAX_LEVELS = 7  # 0 to 6
 Placement = Literal["even", "none"]  # of bumps, before the first generator; see `placement`
+
+# A file, a shape by formula, or an embedded mesh.
+ReferenceName = Annotated[str, TextOf(names="mitex.methods.geometric.references:reference_names")]
 
 
 @dataclass(frozen=True)

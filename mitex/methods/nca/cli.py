@@ -12,6 +12,7 @@ from mitex.errors import ConfigError
 from mitex.methods.checks import in_range, mutually_exclusive, reject_unused
 from mitex.methods.nca.growth_options import BakedOptions, oriented
 from mitex.methods.nca.ranges import TILE_CELLS
+from mitex.methods.option_types import PlainText, VectorField
 from mitex.methods.options import DeviceOptions, ReliefOptions
 from mitex.methods.words.options import ExemplarOrWordsOptions
 from mitex.ranges import SEEDS, TEXELS
@@ -45,13 +46,13 @@ class Fit(DeviceOptions, ExemplarOrWordsOptions):
 
     only_at_start: ClassVar[frozenset[str]] = frozenset({"init"})
 
-    text: Annotated[str | None, arg(metavar="WORDS", help_behavior_hint="")] = None
+    text: Annotated[PlainText | None, arg(metavar="WORDS", help_behavior_hint="")] = None
     """In place of an exemplar: what the texture is made of. It gets colours and a relief."""
 
     mesh: Annotated[str | None, arg(metavar="MESH|NAME", help_behavior_hint="(default: spheres)")] = None
     """With --text: train on this mesh."""
 
-    preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: patch)")] = None
+    preset: Annotated[PlainText | None, arg(metavar="NAME", help_behavior_hint="(default: patch)")] = None
     """Settings to start from: `patch` is fast, `paper` follows the publication; `motion` (the default with
     --motion) and `motion-paper` likewise, for textures that move; `text`, `text-words` (the default with the
     small embedded model) and `text-paper`, for those from words."""
@@ -60,7 +61,7 @@ class Fit(DeviceOptions, ExemplarOrWordsOptions):
     """Start from the weights of a model or a run; of the still texture, for one that shall move. The preset
     `text` starts from a model in any case."""
 
-    motion: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="")] = None
+    motion: Annotated[VectorField | None, arg(metavar="FIELD", help_behavior_hint="")] = None
     """Vector field that the texture learns to move along, by name (right, up, about-y ...) or direction."""
 
     def run(self) -> None:

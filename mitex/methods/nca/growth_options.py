@@ -10,6 +10,7 @@ from tyro.conf import arg
 from mitex.errors import ConfigError
 from mitex.methods.checks import in_range, mutually_exclusive
 from mitex.methods.nca.ranges import BAKED, MOST_STEPS, SPEEDS
+from mitex.methods.option_types import PlainText, VectorField
 from mitex.methods.options import field_files
 from mitex.ranges import SCALES, SEEDS, TURNS
 
@@ -23,16 +24,18 @@ class GrowthOptions:
     seed: Annotated[int, arg(metavar="N")] = 0
     """Random seed: another seed, another variant of the texture."""
 
-    subdivide: Annotated[str, arg(metavar="auto|N")] = "auto"
+    subdivide: Annotated[PlainText, arg(metavar="auto|N")] = "auto"
     """How often to subdivide the automaton's copy of the mesh; auto: to the training's density."""
 
-    orientation: Annotated[str, arg(metavar="DEG|FIELD")] = "0"
+    orientation: Annotated[VectorField, arg(metavar="DEG|FIELD")] = "0"
     """Turns the texture on the surface [degrees], or lets its up follow a vector field (as of --field)."""
 
     scale: Annotated[float, arg(metavar="X")] = 1.0
     """Size of the pattern."""
 
-    field: Annotated[str | None, arg(metavar="FIELD", help_behavior_hint="(default: the training's)")] = None
+    field: Annotated[
+        VectorField | None, arg(metavar="FIELD", help_behavior_hint="(default: the training's)")
+    ] = None
     """Vector field that the texture moves along: a name (up, right, about-y, ...), a direction, or a file
     (.npy .ply .json)."""
 

@@ -10,6 +10,7 @@ from tyro.conf import arg
 
 from mitex.methods.checks import in_range, mutually_exclusive, reject_unused
 from mitex.methods.nerf.ranges import DENSITIES, LIFTS, SIZE
+from mitex.methods.option_types import PlainText
 from mitex.methods.options import FieldOptions, MeshOptions, TrainingOptions
 from mitex.paths import expanded
 from mitex.ranges import SCALES, SEEDS
@@ -35,7 +36,9 @@ class Fit(TrainingOptions):
     capture: Annotated[Path, arg(metavar="DIR")]
     """Folder with transforms.json and photos with masks (alpha), or with plain photos."""
 
-    preset: Annotated[str | None, arg(metavar="fast|paper", help_behavior_hint="(default: fast)")] = None
+    preset: Annotated[PlainText | None, arg(metavar="fast|paper", help_behavior_hint="(default: fast)")] = (
+        None
+    )
     """Settings to start from: `fast`, or `paper`, which follows the publication."""
 
     base_mesh: Annotated[str | None, arg(metavar="MESH", help_behavior_hint="(default: found)")] = None

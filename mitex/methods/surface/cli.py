@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from tyro.conf import arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import in_range, mutually_exclusive
+from mitex.methods.option_types import PlainText
 from mitex.methods.options import ReliefOptions
 from mitex.methods.words.options import ExemplarOrWordsOptions
 from mitex.ranges import SCALES
@@ -42,7 +43,7 @@ class Fit(ExemplarOrWordsOptions):
 
     fits_to_mesh: ClassVar[bool] = True
 
-    text: Annotated[str | None, arg(metavar="WORDS", help_behavior_hint="")] = None
+    text: Annotated[PlainText | None, arg(metavar="WORDS", help_behavior_hint="")] = None
     """What the mesh is made of: in place of an exemplar, or beside one."""
 
     mesh: Annotated[str | None, arg(metavar="MESH|NAME", help_behavior_hint="")] = None
@@ -51,7 +52,7 @@ class Fit(ExemplarOrWordsOptions):
     tile: Annotated[int | None, arg(metavar="N", help_behavior_hint="")] = None
     """In place of a mesh: a texture of N x N pixels that repeats without a seam."""
 
-    preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: fast)")] = None
+    preset: Annotated[PlainText | None, arg(metavar="NAME", help_behavior_hint="(default: fast)")] = None
     """Settings to start from: `fast` begins with patches of the exemplar, `noise` with noise, `paper` follows
     the publication, `style` goes with --content; `text` and `text-words` (the default with the small
     embedded model) are for words."""
@@ -59,7 +60,7 @@ class Fit(ExemplarOrWordsOptions):
     resolution: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: the preset's)")] = None
     """Side of the texture [texels]."""
 
-    content: Annotated[str | None, arg(metavar="IMAGE|ao", help_behavior_hint="")] = None
+    content: Annotated[Literal["ao"] | str | None, arg(metavar="IMAGE|ao", help_behavior_hint="")] = None
     """Style transfer: keep the structure of this texture (on the mesh's own UVs), or of ambient occlusion."""
 
     orientation: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None

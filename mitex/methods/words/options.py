@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 from tyro.conf import arg
 
 from mitex.methods.checks import check_source
+from mitex.methods.option_types import ExemplarName, PlainText
 from mitex.methods.options import TrainingOptions
 from mitex.training.settings import RunSettings
 
@@ -20,7 +21,7 @@ LONGEST = 60  # name of a run folder from words [characters]
 class WordsOptions(TrainingOptions):
     """Options of the methods that learn from words; the text is each method's own."""
 
-    clip: Annotated[str | None, arg(metavar="DIR|NAME", help_behavior_hint="")] = None
+    clip: Annotated[Literal["words"] | str | None, arg(metavar="DIR|NAME", help_behavior_hint="")] = None
     """With --text: folder of a CLIP model, name of one in Hugging Face's cache, or `words` for the small
     embedded model. By default $MITEX_CLIP, else the cache, else the embedded one."""
 
@@ -36,10 +37,10 @@ class ExemplarOrWordsOptions(WordsOptions):
 
     source: ClassVar[str | None] = "exemplar"
 
-    exemplar: Annotated[str | None, arg(metavar="IMAGE|DIR|NAME", help_behavior_hint="")] = None
+    exemplar: Annotated[ExemplarName | None, arg(metavar="IMAGE|DIR|NAME", help_behavior_hint="")] = None
     """PNG or JPEG, a folder with any of albedo, height, normal, roughness, ambient_occlusion, or a name."""
 
-    text: Annotated[str | None, arg(metavar="WORDS", help_behavior_hint="")] = None
+    text: Annotated[PlainText | None, arg(metavar="WORDS", help_behavior_hint="")] = None
     """What the mesh is made of."""
 
     def check_source(self) -> None:

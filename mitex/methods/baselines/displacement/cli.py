@@ -10,6 +10,7 @@ from tyro.conf import arg
 
 from mitex.methods.baselines.displacement.config import SUBDIVISIONS
 from mitex.methods.checks import in_range
+from mitex.methods.geometric.config import ReferenceName
 from mitex.methods.options import FitOptions, MeshOptions
 from mitex.ranges import SCALES
 
@@ -29,7 +30,7 @@ class Fit(FitOptions):
       mitex fit displacement --reference cactus.obj --set window=0.2 resolution=512
     """
 
-    reference: Annotated[str, arg(metavar="MESH|NAME")]
+    reference: Annotated[ReferenceName, arg(metavar="MESH|NAME")]
     """Mesh file (.obj .ply .stl .glb .gltf .off), or a reference by formula, as of mitex fit geometric."""
 
     def run(self) -> None:

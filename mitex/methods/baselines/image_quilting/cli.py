@@ -7,6 +7,7 @@ from typing import Annotated
 
 from tyro.conf import arg
 
+from mitex.methods.option_types import ExemplarName
 from mitex.methods.options import FitOptions
 from mitex.methods.planar_options import PlanarOptions
 
@@ -22,7 +23,7 @@ class Fit(FitOptions):
       mitex fit image_quilting --exemplar pebbles.png --set block=96 size=1024
     """
 
-    exemplar: Annotated[str, arg(metavar="IMAGE|DIR|NAME")]
+    exemplar: Annotated[ExemplarName, arg(metavar="IMAGE|DIR|NAME")]
     """PNG or JPEG, a folder with an albedo, or a name."""
 
     def run(self) -> None:

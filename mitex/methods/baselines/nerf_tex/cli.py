@@ -11,6 +11,7 @@ from tyro.conf import arg
 from mitex.methods.baselines.nerf_tex.ranges import SPACINGS, TILTS
 from mitex.methods.checks import in_range
 from mitex.methods.nerf.ranges import DENSITIES, LIFTS
+from mitex.methods.option_types import ModelName, PlainText
 from mitex.methods.options import FieldOptions, MeshOptions, TrainingOptions
 from mitex.ranges import SCALES, SEEDS
 
@@ -31,12 +32,12 @@ class Fit(TrainingOptions):
       mitex fit nerf_tex --texture runs/durian --out runs/boxed-durian --resume
     """
 
-    texture: Annotated[str, arg(metavar="RUN|MODEL")]
+    texture: Annotated[ModelName, arg(metavar="RUN|MODEL")]
     """Run folder or model file of `mitex fit nerf`."""
 
-    preset: Annotated[str | None, arg(metavar="default|paper", help_behavior_hint="(default: default)")] = (
-        None
-    )
+    preset: Annotated[
+        PlainText | None, arg(metavar="default|paper", help_behavior_hint="(default: default)")
+    ] = None
     """Settings to start from: `default`, or `paper`, which follows the publication."""
 
     def run(self) -> None:

@@ -10,6 +10,7 @@ from tyro.conf import arg
 
 from mitex.methods.checks import in_range
 from mitex.methods.nerf.ranges import DENSITIES
+from mitex.methods.option_types import PlainText
 from mitex.methods.options import FieldOptions, TrainingOptions
 from mitex.paths import expanded
 
@@ -33,7 +34,9 @@ class Fit(TrainingOptions):
     capture: Annotated[Path, arg(metavar="DIR")]
     """Folder with transforms.json and photos with masks (alpha), or with plain photos."""
 
-    preset: Annotated[str | None, arg(metavar="fast|paper", help_behavior_hint="(default: fast)")] = None
+    preset: Annotated[PlainText | None, arg(metavar="fast|paper", help_behavior_hint="(default: fast)")] = (
+        None
+    )
     """Settings to start from: those of the texture that it is compared with."""
 
     def run(self) -> None:

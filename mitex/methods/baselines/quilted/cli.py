@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import arg
 
 from mitex.methods.checks import in_range
+from mitex.methods.option_types import ModelName
 from mitex.methods.options import FitOptions, MeshOptions
 from mitex.ranges import SCALES, TEXELS
 
@@ -27,7 +28,7 @@ class Fit(FitOptions):
       mitex fit quilted --texture runs/durian --set size=2048 even=false relit=false
     """
 
-    texture: Annotated[str, arg(metavar="RUN|MODEL")]
+    texture: Annotated[ModelName, arg(metavar="RUN|MODEL")]
     """Run folder or model file of `mitex fit nerf`."""
 
     def run(self) -> None:

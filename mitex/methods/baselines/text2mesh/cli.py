@@ -10,6 +10,7 @@ from tyro.conf import arg
 
 from mitex.methods.checks import mutually_exclusive
 from mitex.methods.mesh_texture_options import MeshTextureOptions
+from mitex.methods.option_types import PlainText
 from mitex.methods.options import MeshFitOptions
 from mitex.methods.words.options import ExemplarOrWordsOptions
 from mitex.training.settings import RunSettings
@@ -30,7 +31,7 @@ class Fit(MeshFitOptions, ExemplarOrWordsOptions):
       mitex fit text2mesh --exemplar lava --mesh vase --out runs/field --resume
     """
 
-    text: Annotated[str | None, arg(metavar="WORDS", help_behavior_hint="")] = None
+    text: Annotated[PlainText | None, arg(metavar="WORDS", help_behavior_hint="")] = None
     """In place of an exemplar: what the mesh is made of. It gets colours, and a shape."""
 
     def run(self) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from mitex.methods.mesh_texture_options import MeshTextureOptions
+from mitex.methods.option_types import PlainText
 from mitex.methods.options import MeshFitOptions
 from mitex.methods.words.options import WordsOptions
 
@@ -26,7 +27,7 @@ class Fit(MeshFitOptions, WordsOptions):
       mitex fit x_mesh --text "red dots on white" --mesh vase --out runs/dots --resume
     """
 
-    text: Annotated[str, arg(metavar="WORDS")]
+    text: Annotated[PlainText, arg(metavar="WORDS")]
     """What the mesh is made of. It gets colours, and a shape."""
 
     def run(self) -> None:

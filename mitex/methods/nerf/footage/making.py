@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import tempfile
@@ -24,8 +23,9 @@ from mitex.methods.nerf.footage.pictures import Footage, footage
 from mitex.methods.nerf.footage.sharpest import blurred_photos, faults, reasons, sharpest
 from mitex.methods.nerf.footage.site import Site, find_site
 from mitex.optional import optional
-from mitex.paths import atomic_write, check_writable, expanded, missing_folders, writing
+from mitex.paths import check_writable, expanded, missing_folders, writing
 from mitex.progress import counted
+from mitex.records import write_json
 
 FRAMES, RESOLUTION = 80, 1600
 
@@ -146,8 +146,7 @@ def _write(folder: Path, site: Site, masks: Sequence[np.ndarray], kept: Sequence
     for k in kept:
         write_image(folder / "masks" / f"{site.frames[k].image.stem}.png", masks[k].astype(np.float32))
     tree = {"camera_model": "OPENCV", "frames": [_entry(frame) for frame in frames]}
-    with atomic_write(folder / ONE_FILE) as temporary:
-        temporary.write_text(json.dumps(tree, indent=1) + "\n")
+    write_json(folder / ONE_FILE, tree)
     images = {frame.image.name for frame in frames}
     for path in (folder / "images").iterdir():
         if path.name not in images:

@@ -1,4 +1,4 @@
-"""What was measured, kept in a folder: a later call measures only what is new."""
+"""Measurements on disk: a later call measures only what is new."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mitex.asset import Asset
 from mitex.comparison.kinds import Pair
 from mitex.comparison.results import LIT, VIEW, Result
 from mitex.images import write_image
-from mitex.paths import atomic_write
+from mitex.records import write_json
 from mitex.training.locate import CHECKPOINT
 
 VERSION = 3  # of what is measured: numbers of another one are measured again
@@ -22,43 +22,44 @@ OPTIMIZED = ("optimizer/first/", "optimizer/point")  # tensors of a checkpoint, 
 SUFFIXES = {LIT: ".jpg", VIEW: "-view.jpg"}  # of the files of pictures
 
 
-class Kept:
+class Store:
     """A folder with numbers and pictures of each result, and the numbers of exemplars beside themselves."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def completed(self, result: Result, pair: Pair) -> Result | None:
-        """The result with what is known of it; None if that is not all, or of another judge or making."""
+    def load(self, result: Result, pair: Pair) -> Result | None:
+        """The result with its numbers and pictures; None if some are missing, or of another judge or another
+        run of its job."""
         files = {kind: self._file(result, suffix) for kind, suffix in SUFFIXES.items()}
         pictures = {kind: file for kind, file in files.items() if file.is_file()}
         numbers = _read(self._file(result, ".json"), pair.judge, result.time)
-        is_shown = (VIEW if result.asset is None else LIT) in pictures
-        return _with(result, numbers, pictures) if numbers is not None and is_shown else None
+        has_picture = (VIEW if result.asset is None else LIT) in pictures
+        return _with(result, numbers, pictures) if numbers is not None and has_picture else None
 
-    def measured(self, result: Result, pair: Pair) -> Result:
-        """The result, measured now and kept.
+    def measure(self, result: Result, pair: Pair) -> Result:
+        """The result, measured now and stored.
 
         Raises:
             MitexError: The asset cannot be read or measured, or the disk is full.
         """
         asset = None if result.asset is None else Asset.load(result.asset)
         numbers = pair.numbers(asset, result.run) | {"parameters": optimized_numbers(result.run)}
-        known = {key: value for key, value in numbers.items() if math.isfinite(value)}
+        finite = {key: value for key, value in numbers.items() if math.isfinite(value)}
         pictures = {
             kind: write_image(self._file(result, SUFFIXES[kind]), picture)
             for kind, picture in pair.pictures(asset, result.run).items()
         }
-        _write(self._file(result, ".json"), known, pair.judge, result.time)
-        return _with(result, known, pictures)
+        _write(self._file(result, ".json"), finite, pair.judge, result.time)
+        return _with(result, finite, pictures)
 
     def floor(self, pair: Pair) -> dict[str, float]:
-        """That of a pair."""
+        """The numbers of a pair's exemplar beside itself, stored or measured now."""
         path = self.folder / f"exemplar-{pair.key}.json"
-        if (known := _read(path, pair.judge)) is None:
-            known = pair.floor()
-            _write(path, known, pair.judge)
-        return known
+        if (numbers := _read(path, pair.judge)) is None:
+            numbers = pair.floor()
+            _write(path, numbers, pair.judge)
+        return numbers
 
     def _file(self, result: Result, suffix: str) -> Path:
         return self.folder / f"{result.id}{suffix}"
@@ -75,8 +76,8 @@ def optimized_numbers(run: Path) -> int:
 
 
 def _read(path: Path, judge: str | None, time: str | None = None) -> dict[str, float] | None:
-    """Numbers that were kept; None if there are none, or if another version or judge has measured them, or
-    they are of a result that was made at another time."""
+    """Numbers in a file; None if there are none, or they are by another version or judge, or of a result of
+    another time."""
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
         if (record["version"], record.get("judge"), record.get("time")) != (VERSION, judge, time):
@@ -88,9 +89,7 @@ def _read(path: Path, judge: str | None, time: str | None = None) -> dict[str, f
 
 def _write(path: Path, numbers: Mapping[str, float], judge: str | None, time: str | None = None) -> None:
     about = {key: value for key, value in (("judge", judge), ("time", time)) if value}
-    record = {"version": VERSION, "numbers": dict(numbers), **about}
-    with atomic_write(path) as temporary:
-        temporary.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    write_json(path, {"version": VERSION, "numbers": dict(numbers), **about})
 
 
 def _with(result: Result, numbers: Mapping[str, float], pictures: Mapping[str, Path]) -> Result:
