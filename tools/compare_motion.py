@@ -31,7 +31,7 @@ from mitex.mesh import Mesh, icosphere
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.growth import Growth
-from mitex.methods.nca.motion.cell_motion import STILL, is_advected, period
+from mitex.methods.nca.motion.cell_motion import STILL, follows_fields, period
 from mitex.methods.nca.motion.condition import cell_vectors
 from mitex.scenes.cameras import Cameras, patch_views
 from mitex.scenes.screen import surface_motion
@@ -109,7 +109,7 @@ def motion_of(
     judge: EstimatorName = "lucas-kanade",
 ) -> tuple[float, float, list[float]]:
     """Direction error [degrees], speed ratio, and distances from the exemplar after so many steps each."""
-    guided = texture.look.rule.condition or is_advected(texture.look, texture.about)  # else as it was trained
+    guided = follows_fields(texture.look, texture.about)  # else as it was trained
     growth = texture.growth(closeups.cells, 0.0, texture.motion(closeups.cells, field) if guided else STILL)
     generator = torch.Generator().manual_seed(0)
     state = growth.evolve(growth.seed(), texture.steps, generator)

@@ -21,6 +21,7 @@ from mitex.mesh import Mesh, icosphere
 from mitex.methods.nca import NcaTexture
 from mitex.methods.nca.cells import Cells
 from mitex.methods.nca.film import FilmSettings, PreviewCamera
+from mitex.methods.nca.motion.cell_motion import STILL, follows_fields
 from mitex.render import sheet
 from mitex.render.video import check_video, write_video
 
@@ -41,7 +42,8 @@ def moments(texture: NcaTexture, field: str, mesh: Mesh, steps: int, side: int) 
     """Pictures (side, side, 3) of a texture that follows a field, without an end, so many steps apart."""
     generator = torch.Generator().manual_seed(0)
     cells = Cells.of(mesh, 0)
-    growth = texture.growth(cells, 0.0, texture.motion(cells, field))
+    guided = follows_fields(texture.look, texture.about)  # else as it was trained
+    growth = texture.growth(cells, 0.0, texture.motion(cells, field) if guided else STILL)
     camera = PreviewCamera(mesh, FilmSettings(resolution=side, azimuth=0.0))
     state = growth.evolve(growth.seed(), texture.steps, generator)
     while True:

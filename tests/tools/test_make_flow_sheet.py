@@ -63,3 +63,10 @@ def test_the_command_draws_a_row_for_each_model_and_scene(small, tmp_path, monke
     monkeypatch.setattr(sys, "argv", [*sys.argv, "--film", str(film)])
     tool.main()
     assert iio.imread(film).shape[:3] == (3, 48, 48)
+
+
+def test_a_texture_that_follows_no_field_moves_as_it_was_trained(small):
+    """One that was trained without the encoding, and is not carried: it has no field to be given."""
+    own = NcaTexture(texture("a").look, {**texture("a").about, "motion": "right", "motion_advection": False})
+    one, other = (list(islice(tool.moments(own, field, BALL, 2, 24), 2)) for field in ("right", "about-y"))
+    assert np.array_equal(one, other) and np.abs(one[0] - one[1]).max() > 0.01

@@ -104,6 +104,11 @@ def is_advected(look: Look, about: Mapping[str, Any]) -> bool:
     return bool(about.get("motion_advection", "motion" not in about and not look.rule.condition))
 
 
+def follows_fields(look: Look, about: Mapping[str, Any]) -> bool:
+    """Whether a texture moves along any vector field, rather than in the way that it was trained alone."""
+    return bool(look.rule.condition) or is_advected(look, about)
+
+
 def period(about: Mapping[str, Any]) -> float:
     """Steps in which the pattern of a texture goes an edge, where the field has length 1."""
     steps = about.get("motion_period")
@@ -129,7 +134,7 @@ def motion_field(
     name, width = about.get("name", "the model"), look.rule.condition
     if not SPEEDS[0] <= speed <= SPEEDS[1]:
         raise ConfigError(f"a speed of {speed:g}", f"use {SPEEDS[0]:g} to {SPEEDS[1]:g}")
-    if not width and not is_advected(look, about):
+    if not follows_fields(look, about):
         if field is None and speed == 1.0:
             return None
         raise ConfigError(
