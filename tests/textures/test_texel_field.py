@@ -419,3 +419,17 @@ def test_other_variants(mi, points):
     finally:
         mi.set_variant(before)
     assert mi.load_dict(field(mi, np.zeros((4, 4, 3)))).channel_count == 3
+
+
+def test_maps_of_any_size_share_their_kernel(mi, uv):
+    from mitex.runtime.jit import dr
+
+    kernels = []
+    si = at(mi, uv)
+    for height, width in ((7, 5), (64, 32)):
+        texture = mi.load_dict(field(mi, np.ones((height, width, 3))))
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+            dr.kernel_history_clear()
+            dr.eval(texture.eval_1_grad(si))
+            kernels.append([entry["hash"] for entry in dr.kernel_history()])
+    assert kernels[0] == kernels[1] and len(kernels[0]) == 1
