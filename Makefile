@@ -21,11 +21,14 @@ $(STAMP): pyproject.toml constraints.txt
 demo: $(STAMP)
 	$(VENV)/bin/mitex demo --out out/demo
 
-# Two at a time, a thread each: most tests have no use for two. A process that dies is not replaced: with
-# `loadfile` its tests are dealt out once more, and the run may wait for ever (pytest-xdist 1323).
+# Two at a time, a thread each, of torch and of Dr.Jit: most tests have no use for two, and idle workers spin
+# on the cores of the other process. Files are dealt out in their order: by the number of their tests, those
+# with one long test would come last, when the other process has nothing left to do. A process that dies is
+# not replaced: with `loadfile` its tests are dealt out once more, and the run may wait for ever
+# (pytest-xdist 1323).
 test: $(STAMP)
-	OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -m "not slow" --numprocesses 2 --dist loadfile \
-		--max-worker-restart 0
+	OMP_NUM_THREADS=1 MITEX_THREADS=1 $(VENV)/bin/python -m pytest -m "not slow" --numprocesses 2 --dist loadfile \
+		--no-loadscope-reorder --max-worker-restart 0
 
 lint: $(STAMP)
 	$(VENV)/bin/ruff check .

@@ -10,6 +10,7 @@ import numpy as np
 
 FINER = 4  # reads along the shorter extent of a footprint
 READS = 64  # along each side of a footprint, at most
+PIXELS = 256  # read at once
 TOLERANCE = 1e-3  # of a read: rounding adds none to a footprint of one texel
 
 
@@ -44,14 +45,21 @@ class MipMap:
         reads = np.ceil(sides / np.maximum(narrow / FINER, 1.0) - TOLERANCE)
         counts = np.clip(reads, 1, READS).astype(np.int64)
         level = np.log2(np.maximum((sides / counts).max(1), 1.0))
-        total = np.zeros((len(places), self.levels[0].shape[2]))
-        for index in np.ndindex(*counts.max(0, initial=0)):
-            part = np.flatnonzero((counts > index).all(1))
-            offset = (np.array(index) + 0.5) / counts[part] - 0.5  # in pixels
-            total[part] += self._trilinear(
-                places[part] + (footprints[part] @ offset[:, :, None])[..., 0], level[part]
-            )
-        return total / counts.prod(1)[:, None]
+        parts = np.split(np.arange(len(places)), range(PIXELS, len(places), PIXELS))
+        return np.concatenate([self._means(places[p], footprints[p], counts[p], level[p]) for p in parts])
+
+    def _means(
+        self, places: np.ndarray, footprints: np.ndarray, counts: np.ndarray, level: np.ndarray
+    ) -> np.ndarray:
+        """(N, C) means of `counts` (N, 2) reads of the levels around `level` (N,)."""
+        reads = counts.prod(1)
+        starts = np.cumsum(reads) - reads
+        pixel = np.repeat(np.arange(len(places)), reads)
+        index = np.arange(len(pixel)) - starts[pixel]
+        across = counts[pixel, 1]
+        offset = (np.column_stack([index // across, index % across]) + 0.5) / counts[pixel] - 0.5  # in pixels
+        inner = places[pixel] + (footprints[pixel] @ offset[:, :, None])[..., 0]
+        return np.add.reduceat(self._trilinear(inner, level[pixel]), starts) / reads[:, None]
 
     def _trilinear(self, places: np.ndarray, level: np.ndarray) -> np.ndarray:
         """(N, C) values at places (N, 2), interpolated within and between the levels around `level` (N,)."""

@@ -1,5 +1,6 @@
 """Fixtures for all tests."""
 
+import gc
 import os
 import signal
 import sys
@@ -35,8 +36,10 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.fixture(autouse=True)
 def _leave_no_trace() -> Iterator[None]:
     """Gives back the variant, thread counts and Dr.Jit memory, so that no test leaks into another."""
-    before = _process_state()
+    before, shapes = _process_state(), _shape_count()
     yield
+    if _shape_count() > shapes:
+        gc.collect()
     after = _process_state()
     for key, value in before.items():
         if after[key] != value:
@@ -54,6 +57,23 @@ def _process_state() -> dict[str, Any]:
     if (mi := sys.modules.get("mitsuba")) and mi.variant():
         state["variant"] = mi.variant()
     return state
+
+
+def _shape_count() -> int:
+    """How many shapes of Mitsuba there are. Kernels are made for the materials of all of them, so scenes that
+    wait for the collector, as many do after an error, make those of later tests ever larger."""
+    mi = sys.modules.get("mitsuba")
+    if mi is None or not (mi.variant() or "").startswith(("llvm", "cuda")):
+        return 0
+    shapes: list[Any] = []
+
+    def visit(shape: Any, nothing: Any) -> Any:
+        shapes.extend([shape] if shape is not None else [])
+        return nothing
+
+    dr = sys.modules["drjit"]
+    dr.dispatch(dr.zeros(mi.ShapePtr), visit, mi.Float(0))
+    return len(shapes)
 
 
 def _set_torch(count: int) -> None:

@@ -46,8 +46,10 @@ def _candidates(
     in some of the largest faces.
     """
     corners = mesh.vertices[mesh.faces].astype(np.float64)
+    centres = corners.mean(axis=1)
+    reach = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1)
     if mesh not in _trees:
-        _trees[mesh] = KDTree(corners.mean(axis=1))
+        _trees[mesh] = KDTree(centres)
     count = min(count, len(corners))
     _, faces = _trees[mesh].query(points, k=count, workers=-1)
     faces = np.asarray(faces).reshape(len(points), count)
@@ -55,7 +57,10 @@ def _candidates(
     faces = np.column_stack([faces, np.broadcast_to(large, (len(points), len(large)))])
     best, face, barycentric = np.full(len(points), np.inf), faces[:, 0].copy(), np.zeros((len(points), 3))
     for candidate in faces.T:
-        weights, distance = nearest_on_triangles(corners[candidate], points)
-        closer = distance < best
-        best[closer], face[closer], barycentric[closer] = distance[closer], candidate[closer], weights[closer]
+        least = np.linalg.norm(points - centres[candidate], axis=1) - reach[candidate]
+        maybe = np.flatnonzero(least < best)
+        weights, distance = nearest_on_triangles(corners[candidate[maybe]], points[maybe])
+        closer = distance < best[maybe]
+        row = maybe[closer]
+        best[row], face[row], barycentric[row] = distance[closer], candidate[row], weights[closer]
     return face, barycentric, best

@@ -146,6 +146,7 @@ class DecodedField(VertexRows):
         except MeshError as e:
             raise _named(e) from e
         self._count = len(mesh.vertices)
+        self._vertices = dr.opaque(mi.UInt32, self._count)
         self._positions = upload(mi.Float, mesh.vertices.ravel())
         self._normals = upload(mi.Float, mesh.normals.ravel())
         self._edges = upload(mi.Float, mesh.edge_lengths.astype(np.float32))
@@ -205,7 +206,7 @@ class DecodedField(VertexRows):
 
     def locate(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> Located:
         """Rows, weights and local coordinates of the points `si`, and which have any."""
-        return self._at(*triangle_points(si, self._count, active))
+        return self._at(*triangle_points(si, self._vertices, active))
 
     def _at(self, index: Sequence[mi.UInt32], barycentric: Sequence[mi.Float], active: mi.Bool) -> Located:
         position = [dr.gather(mi.Point3f, self._positions, i, active) for i in index]
@@ -244,7 +245,7 @@ class DecodedField(VertexRows):
     def eval_1_grad(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Vector2f:
         """Derivatives along `si.dp_du` and `si.dp_dv`."""
         self._lookup(si, active)
-        points = triangle_points(si, self._count, active)
+        points = triangle_points(si, self._vertices, active)
         _, e1, e2 = edges(mi.MeshPtr(si.shape), points.index, points.active)
         located = self._at(*points)
         rows = self._states(located)

@@ -97,6 +97,8 @@ class TexelField(FieldMethods):
         shape = self.data.shape
         if len(shape) != 3 or 0 in shape:
             raise ConfigError(f"texel_field: 'data' has shape {shape}", "give one of shape (H, W, C)")
+        # Opaque: as literals, each size would ask for a kernel of its own.
+        self._height, self._width = (dr.opaque(mi.UInt32, size) for size in shape[:2])
         if self.charts is not None and self.charts.shape != shape[:2]:
             raise ConfigError(
                 f"texel_field: 'charts' has shape {self.charts.shape}",
@@ -146,8 +148,7 @@ class TexelField(FieldMethods):
             sum(w * (v - mean) for w, v in zip(footprint.normalised(slope), values, strict=True))
             for slope in footprint.slopes
         ]
-        height, width = self.data.shape[:2]
-        slope = mi.Vector2f(width * slopes[0], -height * slopes[1])
+        slope = mi.Vector2f(mi.Float(self._width) * slopes[0], -mi.Float(self._height) * slopes[1])
         return self.scale * dr.select(footprint.active, slope, 0)
 
     def to_string(self) -> str:
@@ -162,8 +163,7 @@ class TexelField(FieldMethods):
         return Located(footprint.texels, footprint.normalised(footprint.weights), footprint.active)
 
     def _footprint(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool) -> _Footprint:
-        height, width = self.data.shape[:2]
-        return _Footprint.around(si.uv, width, height, self._chart, mi.Bool(active))
+        return _Footprint.around(si.uv, self._width, self._height, self._chart, mi.Bool(active))
 
 
 class _Footprint(NamedTuple):
@@ -188,7 +188,7 @@ class _Footprint(NamedTuple):
 
     @staticmethod
     def around(
-        uv: mi.Point2f, width: int, height: int, chart: mi.Int32 | None, active: mi.Bool
+        uv: mi.Point2f, width: mi.UInt32, height: mi.UInt32, chart: mi.Int32 | None, active: mi.Bool
     ) -> _Footprint:
         """The footprints of the points `uv`; `chart` has one number per texel or is None."""
         (c0, c1, a), (r0, r1, b) = _between(uv.x, width), _between(1 - uv.y, height)
@@ -223,13 +223,13 @@ class _Footprint(NamedTuple):
         return tuple(dr.select(c, v / total, 0) for c, v in zip(self.counts, values, strict=True))
 
 
-def _between(t: mi.Float, size: int) -> tuple[mi.UInt32, mi.UInt32, mi.Float]:
+def _between(t: mi.Float, size: mi.UInt32) -> tuple[mi.UInt32, mi.UInt32, mi.Float]:
     """The two of `size` texels on both sides of t in [0, 1], and how far t is from the first [texel]."""
-    position = dr.clip(t, 0, 1) * size - 0.5
+    position = dr.clip(t, 0, 1) * mi.Float(size) - 0.5
     below = dr.floor(position)
     first = mi.Int32(below)
     # Clipped as integers, since a NaN passes through the other clip; at a border both are the same texel.
-    low, high = (mi.UInt32(dr.clip(i, 0, size - 1)) for i in (first, first + 1))
+    low, high = (mi.UInt32(dr.clip(i, 0, mi.Int32(size) - 1)) for i in (first, first + 1))
     return low, high, position - below
 
 

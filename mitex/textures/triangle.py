@@ -23,10 +23,11 @@ class TrianglePoints(NamedTuple):
 
 
 def triangle_points(
-    si: mi.SurfaceInteraction3f, vertices: int, active: mi.Bool | bool = True
+    si: mi.SurfaceInteraction3f, vertices: mi.UInt32, active: mi.Bool | bool = True
 ) -> TrianglePoints:
     """Corners and barycentric weights of the points `si`, active on meshes with corners below `vertices`.
 
+    That number is opaque, `dr.opaque`: as a literal, each would ask for a kernel of its own.
     A mesh without UVs gives the weights exactly in `si.uv`. With UVs they are solved from `si.p` in the
     triangle, the way Mitsuba evaluates its own mesh attributes: `si.uv` cannot be inverted where the UV map
     folds or is degenerate. `si.p` is in world space, so a mesh with UVs must not be placed through an

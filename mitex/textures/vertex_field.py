@@ -63,13 +63,14 @@ class VertexField(VertexRows):
     def _check_data(self) -> None:
         if self.data.ndim != 2 or 0 in self.data.shape:
             raise ConfigError(f"vertex_field: 'data' has shape {self.data.shape}", "give one of shape (V, C)")
+        self._vertices = dr.opaque(mi.UInt32, self.data.shape[0])
 
     def _rows(self) -> mi.UInt32:
         return dr.arange(mi.UInt32, self.data.shape[0])
 
     def locate(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> Located:
         """Vertices (3 indices) and barycentric weights (3) of the points `si`, and which have any."""
-        return Located(*triangle_points(si, self.data.shape[0], active))
+        return Located(*triangle_points(si, self._vertices, active))
 
     def eval_1_grad(self, si: mi.SurfaceInteraction3f, active: mi.Bool | bool = True) -> mi.Vector2f:
         """Derivatives along `si.dp_du` and `si.dp_dv`: the interpolant's surface gradient, projected on each.

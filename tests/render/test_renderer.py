@@ -218,3 +218,19 @@ def test_a_texture_shows_what_no_vertex_holds():
     image = picture(replace(baked, texture_maps={"albedo": red_map}))
     red, green, _ = middle(image)
     assert red > 5 * green
+
+
+def test_meshes_of_any_size_share_their_kernels():
+    """To make them takes far longer than a picture."""
+    from mitex.runtime.jit import dr
+
+    kernels = []
+    for frequency in (4, 5):
+        ball = icosphere(frequency)
+        asset = Asset(ball, {"albedo": np.full((len(ball.vertices), 3), 0.5, np.float32)})
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+            dr.kernel_history_clear()
+            picture(asset, spp=1)
+            large = {entry["hash"] for entry in dr.kernel_history() if entry.get("operation_count", 0) > 1000}
+        kernels.append(large)
+    assert kernels[0] == kernels[1] != set()

@@ -72,7 +72,7 @@ def test_values_and_shapes(shape):
     assert (np.array(upload(mi.UInt32, whole)) == whole).all()
 
 
-def test_arrays_are_copied_only_where_a_packet_may_leave_the_page():
+def test_arrays_are_copied_only_where_they_do_not_begin_a_packet_or_a_packet_may_leave_the_page():
     page = np.zeros(8192, np.uint8)
     first = -page.__array_interface__["data"][0] % 4096
     inside = page[first : first + 40].view(np.float32)
@@ -80,7 +80,9 @@ def test_arrays_are_copied_only_where_a_packet_may_leave_the_page():
     last = page[first + 4096 - 40 : first + 4096].view(np.float32)
     roomy = with_room(last)
     assert not np.shares_memory(roomy, last) and (roomy == last).all()
-    assert roomy.base is not None and roomy.base.size == len(last) + PACKET
+    assert roomy.base is not None
+    end = roomy.ctypes.data + roomy.nbytes + PACKET * roomy.itemsize
+    assert end <= roomy.base.ctypes.data + roomy.base.nbytes
     whole = page[first + 4096 - 64 : first + 4096].view(np.float32)  # Embree reads one past it
     assert not np.shares_memory(with_room(whole), whole)
     whole = page[first + 4096 - 128 : first + 4096 - 64].view(np.float32)
@@ -123,3 +125,17 @@ def _is_flat(function: ast.expr) -> bool:
 def _of_numpy(argument: ast.expr) -> bool:
     text = ast.unparse(argument)
     return not text.startswith("tensor_with_room") and any(sign in text for sign in NUMPY)
+
+
+@pytest.mark.parametrize("kind", ["Float", "Float64", "UInt32", "UInt8"])
+def test_arrays_share_their_kernels_wherever_they_begin(kind):
+    from mitex.runtime.jit import dr
+
+    dtype = {"Float": np.float32, "Float64": np.float64, "UInt32": np.uint32, "UInt8": np.uint8}[kind]
+    memory, kernels = np.ones(200, dtype), set()
+    for first in range(0, 2 * PACKET, 3):
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+            dr.kernel_history_clear()
+            dr.eval(upload(getattr(mi, kind), memory[first : first + 40]) + 1)
+            kernels |= {entry["hash"] for entry in dr.kernel_history() if "hash" in entry}
+    assert len(kernels) == 1

@@ -56,9 +56,13 @@ def properties(
 
 def values(mi, texture, mesh: Mesh, face, barycentric) -> np.ndarray:
     """(P, K) values of all channels."""
+    from mitex.runtime.jit import dr
+
     shape = mesh_shape(mesh)
     si = interaction(mi, shape, np.asarray(face), np.asarray(barycentric))
-    return np.array(texture.gather(texture.locate(si))).T
+    channels = texture.gather(texture.locate(si))
+    dr.eval(channels)  # in one kernel, which takes most of the time
+    return np.array(channels).T
 
 
 def constant(mi, value: list[float], data: np.ndarray | None = None, **options) -> dict:

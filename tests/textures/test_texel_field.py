@@ -200,3 +200,17 @@ def test_feature_images_all_channels_with_their_adjoint(mi, rng, charts, antiali
     assert values.grad is not None
     expected = np.einsum("hwt,hwc->tc", weights, upstream)
     np.testing.assert_allclose(values.grad.numpy().reshape(54, 5), expected, atol=1e-3)
+
+
+def test_maps_of_any_size_share_their_kernel(mi, uv):
+    from mitex.runtime.jit import dr
+
+    kernels = []
+    si = at(mi, uv)
+    for height, width in ((7, 5), (64, 32)):
+        texture = mi.load_dict(field(mi, np.ones((height, width, 3))))
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+            dr.kernel_history_clear()
+            dr.eval(texture.eval_1_grad(si))
+            kernels.append([entry["hash"] for entry in dr.kernel_history()])
+    assert kernels[0] == kernels[1] and len(kernels[0]) == 1
