@@ -99,7 +99,8 @@ def seen(si: mi.SurfaceInteraction3f, colours: mi.Float, lamp: mi.Vector3f) -> t
     """The colour at points of a mesh by those of its vertices (3 V numbers), shaded as by
     `mitex.scenes.shaded`, and its shade.
     """
-    corners, weights, active = triangle_points(si, dr.width(colours) // 3, si.is_valid())
+    count = dr.opaque(mi.UInt32, dr.width(colours) // 3)
+    corners, weights, active = triangle_points(si, count, si.is_valid())
     colour = mi.Color3f(0)
     for corner, weight in zip(corners, weights, strict=True):
         colour += weight * dr.gather(mi.Color3f, colours, corner, active)
