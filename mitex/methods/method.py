@@ -64,9 +64,14 @@ class Method:
 
     @property
     def learns_from(self) -> str:
-        """The option of `mitex fit` that names what it learns from: the one that must be given, if any."""
+        """The option of `mitex fit` that names what it learns from: the one that must be given, if any,
+        besides the mesh that a fit is of.
+        """
         fit = self.load_fit()
-        return fit.source or next(one.name for one in fields(fit) if _is_required(one))
+        target = {"mesh"} if fit.fits_to_mesh else set()
+        return fit.source or next(
+            one.name for one in fields(fit) if _is_required(one) and one.name not in target
+        )
 
     @property
     def fits_to_mesh(self) -> bool:
