@@ -43,7 +43,7 @@ BOXES |= {"lift": 0.4, "density": 3.0, "seed": 7}
     ("method", "texture", "own"),
     [
         (NerfTex, "nerf_tex.NerfTexTexture", BOXES),
-        (Displacement, "displacement.DisplacementMap", {"scale": 2.0, "levels": 3}),
+        (Displacement, "displacement.DisplacementMap", {"scale": 2.0, "subdivide": 3}),
         (Quilted, "quilted.QuiltedTexture", {"scale": 2.0, "resolution": 64}),
     ],
     ids=["nerf_tex", "displacement", "quilted"],
