@@ -47,6 +47,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             _say(as_options(f"error: {e}", command))
             return 2
         except KeyboardInterrupt as e:
+            # After an interrupt within an `exec` of a text, such as a dataclass's, `python -m` would end by
+            # SIGINT whatever is returned here; another `exec` resets that.
+            exec("")
             _say(as_options(str(e) or "interrupted", command))
             return 130
         except BrokenPipeError:  # `mitex models | head`: nobody reads on, which is no error

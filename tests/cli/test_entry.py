@@ -84,6 +84,20 @@ class TestExitCodes:
         assert main(["try"]) == 130
         assert capsys.readouterr().err == "interrupted\n"
 
+    def test_interrupted_where_python_executes_a_text(self, tmp_path):
+        """As for a dataclass: `python -m` then ends by the signal, unless another text is executed."""
+        (tmp_path / "interrupted.py").write_text(
+            "import sys\nfrom mitex.cli import entry\n"
+            "entry._command = lambda words: exec('raise KeyboardInterrupt')\n"
+            "sys.exit(entry.main(['models']))\n"
+        )
+        environment = os.environ | {
+            "PYTHONPATH": os.pathsep.join([str(tmp_path), str(Path(mitex.__file__).parents[1])])
+        }
+        words = [sys.executable, "-m", "interrupted"]
+        done = subprocess.run(words, env=environment, capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (130, "interrupted\n")
+
     def test_a_bug_shows_itself(self, command):
         command.action = fail(ZeroDivisionError("a bug"))
         with pytest.raises(ZeroDivisionError):
