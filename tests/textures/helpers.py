@@ -9,6 +9,12 @@ from mitex.scenes.shapes import mesh_shape
 
 QUAD = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], np.float32)
 FACES = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
+LIGHT = np.array([0.3, 0.2, -1.0]) / np.linalg.norm([0.3, 0.2, -1.0])  # where a slanting one goes
+GREY = {"type": "diffuse", "reflectance": 0.6}
+BUMPS = {"type": "bumpmap", "bsdf": GREY, "use_shadowing_function": False}  # with a texture as `height`
+NORMALS = {"type": "normalmap", "bsdf": GREY, "use_shadowing_function": False}  # and as `normalmap`
+SLOPE = np.array([0.3, -0.5])  # of a height
+NORMAL = np.array([0.3, -0.2, 0.93]) / np.linalg.norm([0.3, -0.2, 0.93])
 
 
 def quad(mi, bsdf: dict, uv: np.ndarray | None = None):
@@ -29,6 +35,11 @@ def radiance(mi, shape, x: np.ndarray, y: np.ndarray, light=(0.0, 0.0, -1.0)) ->
     ray = mi.RayDifferential3f(mi.Ray3f(origin, mi.Vector3f(0, 0, -1)))
     value, _, _ = mi.load_dict({"type": "direct"}).sample(scene, sampler, ray)
     return np.array(value).T
+
+
+def grey_radiance(normal: np.ndarray) -> float:
+    """What leaves `GREY` under a directional light along `LIGHT`, as `radiance` has it, by its normal."""
+    return 0.6 * float(np.dot(normal, -LIGHT) / np.linalg.norm(normal))
 
 
 def interaction(mi, shape, face: np.ndarray, barycentric: np.ndarray):

@@ -6,11 +6,21 @@ import pytest
 from mitex.colour import srgb_to_linear
 from mitex.errors import ConfigError
 from mitex.runtime.upload import upload
-from tests.textures.helpers import quad, radiance, sphere_picture
+from tests.textures.helpers import (
+    BUMPS,
+    LIGHT,
+    NORMAL,
+    NORMALS,
+    SLOPE,
+    grey_radiance,
+    quad,
+    radiance,
+    sphere_picture,
+)
 from tests.textures.texels import UNIT, field
 
 
-def ramp(slope: tuple[float, float], side: int = 64) -> np.ndarray:
+def ramp(slope: np.ndarray, side: int = 64) -> np.ndarray:
     """(N, N, 1) slope . (x, y) on the quad of the tests, where u = (x + 1) / 2."""
     centre = (np.arange(side) + 0.5) / side * 2 - 1
     return (slope[0] * centre[None, :] - slope[1] * centre[:, None])[..., None]
@@ -18,7 +28,7 @@ def ramp(slope: tuple[float, float], side: int = 64) -> np.ndarray:
 
 def test_reflectance_decodes_srgb(mi, points):
     x, y = (0.95 * p for p in points)
-    data = 0.5 + 0.7 * ramp((0.4, 0.8)) * np.array([1, -1, 0.5])  # leaves [0, 1] at the rim
+    data = 0.5 + 0.7 * ramp(np.array((0.4, 0.8))) * np.array([1, -1, 0.5])  # leaves [0, 1] at the rim
     encoded = 0.5 + 0.7 * (0.4 * x + 0.8 * y)[:, None] * np.array([[1, -1, 0.5]])
     shape = quad(mi, {"type": "diffuse", "reflectance": field(mi, data)}, UNIT)
     np.testing.assert_allclose(radiance(mi, shape, x, y), srgb_to_linear(encoded.clip(0, 1)), atol=1e-3)
@@ -36,37 +46,18 @@ def test_channel_selects(mi, rng, points, channel: int, channels: tuple[int, ...
     np.testing.assert_allclose(result, np.broadcast_to(values[list(channels)], (50, 3)), atol=1e-6)
 
 
-LIGHT = np.array([0.3, 0.2, -1.0]) / np.linalg.norm([0.3, 0.2, -1.0])
-NESTED = {"type": "diffuse", "reflectance": 0.6}
-
-
 def test_bump_of_a_linear_height_tilts_the_normal(mi, points):
-    slope = (0.3, -0.5)
-    bsdf = {
-        "type": "bumpmap",
-        "height": field(mi, ramp(slope)),
-        "bsdf": NESTED,
-        "use_shadowing_function": False,
-    }
-    normal = np.array([-slope[0], -slope[1], 1]) / np.linalg.norm([*slope, 1])
-    expected = 0.6 * np.dot(normal, -LIGHT)
+    bsdf = BUMPS | {"height": field(mi, ramp(SLOPE))}
+    expected = grey_radiance(np.array([*-SLOPE, 1]))
     result = radiance(mi, quad(mi, bsdf, UNIT), *points, light=tuple(LIGHT))
     np.testing.assert_allclose(result, expected, atol=1e-4)
     assert abs(expected - 0.6 * -LIGHT[2]) > 0.05
 
 
 def test_normal_map_tilts_the_normal(mi, points):
-    normal = np.array([0.3, -0.2, 0.93])
-    normal /= np.linalg.norm(normal)
-    encoded = np.broadcast_to(0.5 * (normal + 1), (2, 2, 3))
-    bsdf = {
-        "type": "normalmap",
-        "normalmap": field(mi, encoded),
-        "bsdf": NESTED,
-        "use_shadowing_function": False,
-    }
+    bsdf = NORMALS | {"normalmap": field(mi, np.broadcast_to(0.5 * (NORMAL + 1), (2, 2, 3)))}
     result = radiance(mi, quad(mi, bsdf, UNIT), *points, light=tuple(LIGHT))
-    np.testing.assert_allclose(result, 0.6 * np.dot(normal, -LIGHT), atol=1e-5)
+    np.testing.assert_allclose(result, grey_radiance(NORMAL), atol=1e-5)
 
 
 def test_constant_field_equals_a_constant(mi):

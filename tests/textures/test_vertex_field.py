@@ -6,7 +6,19 @@ import pytest
 from mitex.colour import srgb_to_linear
 from mitex.errors import ConfigError
 from mitex.runtime.upload import upload
-from tests.textures.helpers import QUAD, quad, radiance, sphere_picture
+from tests.textures.helpers import (
+    BUMPS,
+    GREY,
+    LIGHT,
+    NORMAL,
+    NORMALS,
+    QUAD,
+    SLOPE,
+    grey_radiance,
+    quad,
+    radiance,
+    sphere_picture,
+)
 
 QUAD_UV = np.array([(0.1, 0), (0.7, 0.2), (0.5, 0.9), (0.2, 0.8)], np.float32)  # skewed on purpose
 
@@ -60,33 +72,22 @@ def test_scale_and_offset_come_before_decoding(mi, points):
 
 @pytest.mark.parametrize("uv", [None, QUAD_UV], ids=["none", "skewed"])
 def test_bump_of_a_linear_height_tilts_the_normal(mi, points, uv):
-    slope = np.array([0.3, -0.5])
-    height = field(mi, 2 + QUAD[:, :2] @ slope)
-    nested = {"type": "diffuse", "reflectance": 0.6}
-    bsdf = {"type": "bumpmap", "height": height, "bsdf": nested, "use_shadowing_function": False}
-    light = np.array([0.3, 0.2, -1.0]) / np.linalg.norm([0.3, 0.2, -1.0])
-    normal = np.array([-slope[0], -slope[1], 1]) / np.linalg.norm([*slope, 1])
-    expected = 0.6 * np.dot(normal, -light)
-    result = radiance(mi, quad(mi, bsdf, uv), *points, light=tuple(light))
+    bsdf = BUMPS | {"height": field(mi, 2 + QUAD[:, :2] @ SLOPE)}
+    expected = grey_radiance(np.array([*-SLOPE, 1]))
+    result = radiance(mi, quad(mi, bsdf, uv), *points, light=tuple(LIGHT))
     np.testing.assert_allclose(result, expected, atol=1e-5)
-    assert abs(expected - 0.6 * -light[2]) > 0.05
+    assert abs(expected - 0.6 * -LIGHT[2]) > 0.05
 
 
 def test_normal_map_tilts_the_normal(mi, points):
-    normal = np.array([0.3, -0.2, 0.93])
-    normal /= np.linalg.norm(normal)
-    nested = {"type": "diffuse", "reflectance": 0.6}
-    encoded = np.broadcast_to(0.5 * (normal + 1), (4, 3))
-    plain_cosine = {"type": "normalmap", "bsdf": nested, "use_shadowing_function": False}
-    bsdf = plain_cosine | {"normalmap": field(mi, encoded)}
+    bsdf = NORMALS | {"normalmap": field(mi, np.broadcast_to(0.5 * (NORMAL + 1), (4, 3)))}
     shape = quad(mi, bsdf, QUAD[:, :2])  # uv = xy, so that the tangent frame is the axes
-    light = np.array([0.3, 0.2, -1.0]) / np.linalg.norm([0.3, 0.2, -1.0])
-    expected = 0.6 * np.dot(normal, -light)
-    np.testing.assert_allclose(radiance(mi, shape, *points, light=tuple(light)), expected, atol=1e-5)
+    result = radiance(mi, shape, *points, light=tuple(LIGHT))
+    np.testing.assert_allclose(result, grey_radiance(NORMAL), atol=1e-5)
 
-    flat = plain_cosine | {"normalmap": field(mi, np.full((4, 3), (0.5, 0.5, 1.0)))}
-    plain = radiance(mi, quad(mi, nested), *points, light=tuple(light))
-    np.testing.assert_allclose(radiance(mi, quad(mi, flat), *points, light=tuple(light)), plain, atol=1e-5)
+    flat = NORMALS | {"normalmap": field(mi, np.full((4, 3), (0.5, 0.5, 1.0)))}
+    plain = radiance(mi, quad(mi, GREY), *points, light=tuple(LIGHT))
+    np.testing.assert_allclose(radiance(mi, quad(mi, flat), *points, light=tuple(LIGHT)), plain, atol=1e-5)
 
 
 def test_constant_field_equals_a_constant(mi):
