@@ -16,7 +16,7 @@ from mitex.methods.nerf.texture import SIZE
 from tests.cli import bad_files as bad
 from tests.cli.refusals import check_refused
 from tests.methods.fits import few_patches
-from tests.methods.nerf.capture.test_capture import CENTRE, RADII, rgba, set_alpha, write
+from tests.methods.nerf.capture.ellipsoid import CENTRE, RADII, rgba, set_alpha, write
 
 pytestmark = pytest.mark.usefixtures("own_cache")
 SMALL = "base_steps=150 rays=512 ray_steps=96 table=11 coarsest=8 finest=32 occupancy=32"

@@ -65,7 +65,7 @@ from tests.mesh.examples import (
     obj_text,
     ply_bytes,
 )
-from tests.methods.nerf.capture.test_capture import write as write_capture
+from tests.methods.nerf.capture.ellipsoid import write as write_capture
 
 BALL = icosphere(2)
 RESULT = "cache/method/" + "0" * 32  # a cache of its own, which is trimmed to its limit

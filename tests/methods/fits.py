@@ -118,7 +118,7 @@ FITS = {
 def prepare(folder: Path) -> None:
     """Writes the files that the words name."""
     from tests.cli.test_nerf import holed, icosphere, save
-    from tests.methods.nerf.capture.test_capture import write
+    from tests.methods.nerf.capture.ellipsoid import write
 
     bad.text(folder / "cube.obj", bad.CUBE)
     bad.image(folder / "photo.png")
