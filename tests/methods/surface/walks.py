@@ -1,6 +1,7 @@
 """Rays on meshes, and where they end."""
 
 import numpy as np
+from scipy.spatial import Delaunay
 
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.surface.exponential import Arrival
@@ -42,3 +43,13 @@ def locate(mesh: Mesh, point) -> tuple[np.ndarray, np.ndarray]:
 def bumpy(rng, frequency: int = 6) -> Mesh:
     mesh = icosphere(frequency)
     return mesh.with_vertices(mesh.vertices * rng.uniform(0.8, 1.2, (len(mesh.vertices), 1)))
+
+
+def plane(rng, count: int = 400) -> Mesh:
+    """The unit square, triangulated irregularly; lifted to a slanted plane that float32 holds exactly."""
+    inner = rng.integers(1, 1024, (count, 2))
+    border = np.linspace(0, 1024, 9)
+    sides = [np.column_stack(p) for b in (0 * border, 1024 + 0 * border) for p in ((border, b), (b, border))]
+    xy = np.unique(np.concatenate([inner, *sides]) / 1024.0, axis=0)
+    faces = rng.permuted(Delaunay(xy).simplices, axis=1)
+    return Mesh(np.column_stack([xy, 0.5 * xy[:, 0] + 0.25 * xy[:, 1]]), faces)
