@@ -5,49 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.ndimage import gaussian_filter
 
 from mitex.errors import ConfigError
-from mitex.quilting.guide import Guide, GuideDistance
+from mitex.quilting.guide import Guide
 from mitex.quilting.matching import SIDES, ArraySource, Matcher, mirror, overlap, strip
 from mitex.quilting.plane import Quilt, quilt
+from tests.quilting.sources import SIDE, continued, crop_source, crops, every, noise_source, periodic_image
 
-SIDE, STRIDE = 32, 20
-
-
-def periodic_image(period: int = 64, channels: int = 2, seed: int = 1) -> np.ndarray:
-    noise = np.random.default_rng(seed).normal(size=(period, period, channels))
-    smooth = gaussian_filter(noise, (2.0, 2.0, 0.0), mode="wrap")
-    return (smooth / smooth.std()).astype(np.float32)
-
-
-def crops(image: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """(P, SIDE, SIDE, C) parts of an image that goes on periodically."""
-    index = np.arange(SIDE)
-    rows = (corners[:, 0, None] + index) % image.shape[0]
-    columns = (corners[:, 1, None] + index) % image.shape[1]
-    return image[rows[:, :, None], columns[:, None]]
-
-
-def every(step: int, period: int = 64) -> np.ndarray:
-    """(P, 2) the upper left corners of all crops on a lattice."""
-    return np.stack(np.meshgrid(*[np.arange(0, period, step)] * 2, indexing="ij"), -1).reshape(-1, 2)
-
-
-def crop_source(image: np.ndarray, corners: np.ndarray, channels: int | None = None) -> ArraySource:
-    return ArraySource(crops(image, corners), corners.astype(float), float(SIDE), channels)
-
-
-def noise_source(count: int = 60, channels: int = 3, seed: int = 4) -> ArraySource:
-    """Patches that fit nowhere, from all over a plane."""
-    draw = np.random.default_rng(seed)
-    values = draw.normal(size=(count, SIDE, SIDE, channels)).astype(np.float32)
-    return ArraySource(values, draw.random((count, 2)) * 5.0 * SIDE, float(SIDE))
-
-
-def continued(image: np.ndarray, corner: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    rows, columns = ((first + np.arange(length)) % 64 for first, length in zip(corner, size, strict=True))
-    return image[rows[:, None], columns]
+STRIDE = 20
 
 
 def test_one_source_is_put_together_again(rng: np.random.Generator):
@@ -194,63 +159,6 @@ def test_seeds(rng: np.random.Generator):
     assert len(firsts) > 20  # the first is any of 60, not one of the 16 nearest to nothing
 
 
-def border_steps(values: np.ndarray, axis: int) -> tuple[float, float]:
-    """Mean difference across the border, and the largest of those between rows inside."""
-    moved = np.moveaxis(values, axis, 0)
-    inside = np.square(np.diff(moved, axis=0)).mean(tuple(range(1, moved.ndim)))
-    return float(np.square(moved[0] - moved[-1]).mean()), float(inside.max())
-
-
-@pytest.mark.parametrize("size", [(100, 100), (90, 131), (32, 32)])
-def test_tileable_has_no_border(size: tuple[int, int], rng: np.random.Generator):
-    image = periodic_image(256, 1)
-    corners = rng.integers(0, 256 - SIDE, (600, 2))
-    source = crop_source(image, corners)
-    texture = quilt(source, size, rng, tileable=True)
-    assert texture.features.shape == (*size, 1) and texture.texel.shape == (*size, 2)
-    for axis in (0, 1):
-        across, inside = border_steps(texture.features, axis)
-        assert across <= inside
-    plain = quilt(source, size, rng)
-    steps = [border_steps(plain.features, axis) for axis in (0, 1)]
-    assert all(across > 2.0 * inside for across, inside in steps)
-
-
-def test_tileable_puts_a_periodic_image_together(rng: np.random.Generator):
-    """Two periods by one wrap without a flaw, as every crop is there."""
-    image, corners = periodic_image(), every(1)
-    texture = quilt(crop_source(image, corners), (128, 64), rng, tileable=True, nearest=1)
-    corner = corners[texture.patch[20, 20]] + texture.texel[20, 20] - 20
-    expected = continued(image, corner % 64, (128, 64))
-    assert np.abs(texture.features - expected).max() < 1e-5
-
-
-@pytest.mark.parametrize("axis", [0, 1])
-def test_last_patches_lead_back_to_the_first(axis: int, rng: np.random.Generator):
-    """Ramps between any two values: only a ramp that ends where the first one begins leaves no step."""
-    ends = rng.random((2000, 2, 1, 1, 1))
-    place = (np.arange(SIDE) / (SIDE - 1)).reshape((-1, 1, 1) if axis == 0 else (1, -1, 1))
-    ramps = (ends[:, 0] + (ends[:, 1] - ends[:, 0]) * place) + np.zeros((1, SIDE, SIDE, 1))
-    source = ArraySource(ramps.astype(np.float32), rng.random((2000, 2)) * 1e4, float(SIDE))
-    size = (75, 32) if axis == 0 else (32, 75)
-    steps = []
-    for _ in range(4):
-        image = quilt(source, size, rng, tileable=True, nearest=4).features
-        steps.append(np.abs(image - np.roll(image, 1, axis)).max())
-    assert np.mean(steps) < 0.08
-
-
-def test_wrapped_seam_is_closed(rng: np.random.Generator):
-    """Down to where a column shows the last row's patches changes by one at most, around the border too."""
-    source = noise_source(60, 1)
-    for _ in range(8):
-        texture = quilt(source, (64, 90), rng, tileable=True)
-        first = texture.texel[:12, :, 0] == np.arange(12)[:, None]  # patches of the first row begin there
-        depth = (~first).sum(0)
-        assert np.ptp(depth) > 3
-        assert np.abs(depth - np.roll(depth, 1)).max() <= 1
-
-
 @pytest.mark.parametrize("size", [(1, 1), (12, 33), (32, 32), (33, 32), (71, 52)])
 def test_any_size(size: tuple[int, int], rng: np.random.Generator):
     texture = quilt(noise_source(), size, rng)
@@ -272,53 +180,6 @@ def test_one_mask_serves_all_maps(tileable: bool, rng: np.random.Generator):
     assert 0.1 < quiet.mean() < 0.8
     assert np.abs(texture.features - named)[quiet].max() < 1e-5
     assert np.abs(texture.features - named)[~quiet].max() > 0.1
-
-
-def bright_source(rng: np.random.Generator) -> tuple[ArraySource, np.ndarray]:
-    """Patches of noise, with a brightness each that is not compared, and their colours."""
-    base = noise_source(200, 2)
-    base.values[..., 1] = rng.random(200)[:, None, None]
-    source = ArraySource(base.values, base.centres, base.length, channels=1)
-    return source, np.broadcast_to(base.values[:, :1, :1, 1:], (200, 2, 2, 3))
-
-
-def test_guide_decides_what_is_where(rng: np.random.Generator):
-    source, colours = bright_source(rng)
-    picture = np.zeros((20, 30, 3))
-    picture[:, 15:] = 1.0
-    image = quilt(source, (112, 172), rng, guide=Guide(picture, colours, weight=20.0)).features[..., 1]
-    assert image[:, :70].mean() < 0.2 and image[:, 102:].mean() > 0.8
-    ignored = quilt(source, (112, 172), rng, guide=Guide(picture, colours, weight=0.0)).features[..., 1]
-    assert ignored[:, :70].mean() > 0.35
-
-
-@pytest.mark.parametrize("level", [0.0, 1.0])
-def test_guide_chooses_the_first_patch_too(level: float, rng: np.random.Generator):
-    source, colours = bright_source(rng)
-    guide = Guide(np.full((4, 4, 3), level), colours)
-    values = [quilt(source, (32, 32), rng, guide=guide).features[0, 0, 1] for _ in range(10)]
-    assert np.abs(np.array(values) - level).max() < 0.15
-
-
-def test_guide_turns_patches(rng: np.random.Generator):
-    """All are dark on their left and bright below; the guide wants it the other way round."""
-    source = noise_source(20)
-    colours = np.zeros((20, 2, 2, 3))
-    colours[:, 0, 1], colours[:, 1, 0], colours[:, 1, 1] = 0.3, 0.5, 0.8
-    picture = mirror(colours[0], 3).repeat(16, 0).repeat(16, 1)
-    texture = quilt(source, (32, 32), rng, flips=True, guide=Guide(picture, colours), nearest=1)
-    assert (texture.flip == 3).all()
-
-
-def test_likeness_is_the_root_mean_square(rng: np.random.Generator):
-    colours, picture = rng.random((3, 4, 4, 3)), rng.random((50, 50, 3))
-    likeness = GuideDistance(Guide(picture, colours, 2.0), 3, (50, 50), SIDE, wrapped=True)
-    differences = likeness.differences(40, 10, (0, 1, 2, 3))
-    below = np.tile(picture, (2, 2, 1))[40:72, 10:42].reshape(4, 8, 4, 8, 3).mean((1, 3))
-    for flip in range(4):
-        patches = np.stack([mirror(c, flip) for c in colours])
-        expected = 2.0 * np.sqrt(np.square(patches - below).mean((1, 2, 3)))
-        assert differences[flip] == pytest.approx(expected, rel=1e-5)
 
 
 def broken(values: Iterable[tuple[Any, Any]]) -> ArraySource:
@@ -347,19 +208,3 @@ def test_refusals(rng: np.random.Generator):
     for source, size, wrong, message in options:
         with pytest.raises(ConfigError, match=message):
             quilt(source, size, rng, **wrong)
-
-
-def test_guide_refusals():
-    picture, colours = np.zeros((4, 4, 3)), np.zeros((3, 2, 2, 3))
-    guides: list[tuple[np.ndarray, np.ndarray, float]] = [
-        (picture[..., :2], colours, 1.0),
-        (picture[:0], colours, 1.0),
-        (picture + np.nan, colours, 1.0),
-        (picture, colours[:, :1], 1.0),
-        (picture, colours + np.inf, 1.0),
-        (picture, colours, -1.0),
-        (picture, colours, np.nan),
-    ]
-    for wrong in guides:
-        with pytest.raises(ConfigError):
-            Guide(*wrong)
