@@ -1,14 +1,15 @@
-"""A small stochastic task whose every part must survive a checkpoint, and tools to compare two runs."""
+"""A small stochastic task whose every part must survive a checkpoint; training it, and comparing two runs."""
 
 import json
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
 
-from mitex.training import Change, Step, checkpoint
+from mitex.training import Change, Step, checkpoint, train
 
 from .contract import assert_same_checkpoint
 
@@ -79,6 +80,14 @@ class SmallTask:
 
     def metadata(self):
         return {"method": "small"}
+
+
+def train_small(out, task=None, config=None, **options):
+    """Trains a task into a folder; returns the task and the result."""
+    task = task or SmallTask()
+    config = config or SmallConfig()
+    arguments: dict[str, Any] = {"lr": config.lr} | options
+    return task, train(task, config, out, **arguments)
 
 
 def lines(folder: Path) -> list[dict]:

@@ -15,17 +15,14 @@ from mitex.training.control import Control
 
 from .task import SmallConfig, SmallTask, assert_same_run
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 CONFIG = SmallConfig()
 
 
 def fit(out, task=None, steps=20, resume=False, **options):
     config = replace(CONFIG, steps=steps)
     return train(task or SmallTask(), config, out, lr=0.01, resume=resume, control=Control(**options))
-
-
-@pytest.fixture(autouse=True)
-def _one_thread():
-    torch.set_num_threads(1)
 
 
 @pytest.fixture
