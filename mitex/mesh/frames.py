@@ -48,8 +48,8 @@ def tangent_frames(
         kind: "fixed", as in the paper: right is y x normal. "smooth": alike where the surface is upright,
             smooth elsewhere.
         angle: turns both counter-clockwise seen from outside [rad].
-        field: (V, 3) where right should point, of any length and direction, in place of `kind`. Where it is
-            zero or along the normal, the fixed frame is taken.
+        field: (V, 3) where up should point, of any length and direction, in place of `kind`. Where it is zero
+            or along the normal, the fixed frame is taken.
 
     Returns:
         Right and up, (M, 3) float64 each, orthonormal, across the face's normal; right x up is the outward
@@ -92,7 +92,8 @@ def vertex_directions(mesh: Mesh, kind: str = "smooth", field: np.ndarray | None
     if field is not None:
         target = scatter_add(place, _checked(field, len(place)), count)
         target = _without_faint(across(target, normals))
-        directions = np.where(target.any(axis=1, keepdims=True), orthonormal(target, normals), directions)
+        right = np.cross(orthonormal(target, normals), normals)
+        directions = np.where(target.any(axis=1, keepdims=True), right, directions)
     elif kind == "smooth":
         areas = np.linalg.norm(mesh.face_crosses, axis=1) / 6.0
         share = np.bincount(corners.ravel(), np.repeat(areas, 3), count)

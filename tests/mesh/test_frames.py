@@ -235,7 +235,7 @@ def test_directions_that_cancel_leave_a_frame():
 
 
 @pytest.mark.parametrize("length", [1e-30, 1.0, 1e30])
-def test_a_field_says_where_right_points(length, rng):
+def test_a_field_says_where_up_points(length, rng):
     mesh = icosphere(6)
     field = length * (np.cross(X, mesh.vertices) + 0.4 * mesh.vertices)
     face, barycentric = everywhere(mesh, rng)
@@ -244,7 +244,7 @@ def test_a_field_says_where_right_points(length, rng):
     points = np.einsum("mk,mkc->mc", barycentric, mesh.vertices[mesh.faces[face]])
     around = np.cross(X, points)
     fine = np.linalg.norm(around, axis=1) > 0.3  # away from the poles, where it turns
-    cosine = (right * around).sum(axis=1) / np.linalg.norm(around, axis=1)
+    cosine = (up * around).sum(axis=1) / np.linalg.norm(around, axis=1)
     assert cosine[fine].min() > 0.98
 
 

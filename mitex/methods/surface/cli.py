@@ -10,7 +10,7 @@ from tyro.conf import arg
 
 from mitex.errors import ConfigError
 from mitex.methods.checks import in_range, mutually_exclusive
-from mitex.methods.option_types import PlainText
+from mitex.methods.option_types import PlainText, VectorField
 from mitex.methods.options import ReliefOptions
 from mitex.methods.words.options import ExemplarOrWordsOptions
 from mitex.ranges import SCALES
@@ -63,9 +63,9 @@ class Fit(ExemplarOrWordsOptions):
     content: Annotated[Literal["ao"] | str | None, arg(metavar="IMAGE|ao", help_behavior_hint="")] = None
     """Style transfer: keep the structure of this texture (on the mesh's own UVs), or of ambient occlusion."""
 
-    orientation: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None
-    """Where the exemplar's right shall point: a vector for each vertex of the mesh (.npy, .ply), or strokes
-    drawn on it (.json)."""
+    orientation: Annotated[VectorField | None, arg(metavar="FIELD", help_behavior_hint="")] = None
+    """Vector field that the exemplar's up follows: a name (up, right, about-y, ...), a direction, or a file
+    (.npy .ply .json). For one angle everywhere: --set angle=DEG."""
 
     scale: Annotated[float | None, arg(metavar="X", help_behavior_hint="(default: the preset's)")] = None
     """Size of the pattern."""

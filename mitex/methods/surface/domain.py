@@ -35,7 +35,7 @@ class SurfaceDomain:
         resolution: side of the texture [texels].
         frames: "smooth" or "fixed", see `tangent_frames`.
         angle: turns the frames counter-clockwise, seen from outside [degrees].
-        orientation: (V, 3) where the exemplar's right shall point, in place of `frames`.
+        orientation: (V, 3) where the exemplar's up shall point, in place of `frames`.
         correct, continued: how levels are computed, see `SurfaceConfig`.
         scale_map: where the pattern's size varies, its factors.
         depth: number of levels.

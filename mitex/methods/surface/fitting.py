@@ -17,7 +17,7 @@ from mitex.features.text_image import TextImageModel
 from mitex.features.text_model import text_image_model
 from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh
-from mitex.mesh.fields import read_vectors
+from mitex.mesh.fields import vector_field
 from mitex.methods.layout import layout_ratio, with_layout
 from mitex.methods.surface.config import PRESETS, WORDS, SurfaceConfig
 from mitex.methods.surface.content import AO, content_colours
@@ -59,8 +59,8 @@ def fit(
         keep_uvs: use the mesh's own UVs.
         content: style transfer: a texture on the mesh's own UVs (an image file), which are kept then, or "ao"
             for the mesh's ambient occlusion.
-        orientation: (V, 3) where the exemplar's right shall point, or a file of it, see
-            `mitex.mesh.fields.read_vectors`; else the frames follow the config.
+        orientation: a vector field that the exemplar's up shall follow, see `mitex.mesh.fields`; else the
+            frames follow the config.
         scale_map: where the pattern's size varies: factors of it, see `ScaleMap.of`.
         options: preset ("fast", "noise", "paper", or "style", the default with `content`), and those of
             `RunOptions`.
@@ -145,10 +145,9 @@ def _synthesized(
         keeps = keep_uvs or image
         surface = with_layout(given, config.resolution, keeps)
         ratio = layout_ratio(given, surface, config.resolution, keeps)
-        if isinstance(orientation, str | Path):
-            orientation = read_vectors(surface, orientation).astype(np.float32)
+        upwards = None if orientation is None else vector_field(surface, orientation)
         sizes = None if scale_map is None else ScaleMap.of(scale_map, given)
-        domain = SurfaceDomain.of(surface, config, orientation, sizes, run.folder is not None, ratio)
+        domain = SurfaceDomain.of(surface, config, upwards, sizes, run.folder is not None, ratio)
     run.control.check()
     domain.exemplar_side(config)  # refuses a size that the exemplar cannot have
     check_memory(domain.mesh, config, 1 if exemplar is None else len(exemplar.maps), domain.steps)

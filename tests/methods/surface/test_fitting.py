@@ -13,8 +13,10 @@ from mitex.atlas import usable_uv
 from mitex.errors import CheckpointError, ConfigError
 from mitex.exemplar import Exemplar
 from mitex.features.layers import LAYERS, with_poolings
+from mitex.geometry.vectors import unit
 from mitex.images import write_image
 from mitex.mesh import Mesh, embedded, icosphere
+from mitex.mesh.fields import vector_field
 from mitex.methods import surface
 from mitex.methods.layout import with_layout
 from mitex.methods.registry import method_of
@@ -221,9 +223,15 @@ class TestOrientation:
         texture = SurfaceTexture.load(tmp_path / "run")
         tangents = texture.apply().tangents
         assert texture.domain.orientation is not None and tangents is not None
-        assert np.array_equal(texture.domain.orientation, down)
+        assert np.array_equal(texture.domain.orientation, vector_field(mesh, down))
         around = np.abs(mesh.normals[:, 1]) < 0.5
-        assert (tangents[around, 1] < -0.8).all()
+        right = np.cross([0.0, -1.0, 0.0], mesh.normals[around])  # of up, with the outward normal
+        assert ((unit(right) * tangents[around, :3]).sum(axis=1) > 0.99).all()
+
+    def test_a_name_is_the_field_of_that_name(self, mesh, exemplar):
+        fit = partial(surface.fit, exemplar, mesh, set=[*SHALLOW, "steps=1"])
+        orientation = fit(orientation="about-x").domain.orientation
+        assert np.array_equal(orientation, vector_field(mesh, "about-x"))
 
     def test_resuming_with_another_field_is_refused(self, mesh, exemplar, tmp_path):
         fit = partial(surface.fit, exemplar, mesh, tmp_path / "run", set=[*SHALLOW, "steps=2"])
