@@ -89,7 +89,12 @@ class LitShellIntegrator(FieldPaths):
         radiance, throughput = dr.zeros(mi.Spectrum, count), dr.ones(mi.Spectrum, count)
         valid = dr.zeros(mi.Bool, count)
         # The density with which the last direction was drawn; light sources hit after a mirror count fully.
-        pdf, delta, start = mi.Float(1), mi.Bool(True), dr.zeros(mi.Interaction3f, count)
+        pdf, delta = dr.ones(mi.Float, count), dr.full(mi.Bool, True, count)
+        start = dr.zeros(mi.Interaction3f, count)
+        # As after each segment, so that the same kernels do for the first one, whatever the camera.
+        dr.make_opaque(radiance, throughput, valid, alive, pdf, delta, start)
+        sampler.schedule_state()
+        dr.eval(ray)
         for depth in range(self.max_depth):
             si = scene.ray_intersect(ray, alive)
             segment = mi.Ray3f(ray)
@@ -110,6 +115,8 @@ class LitShellIntegrator(FieldPaths):
             start, pdf, delta = vertex.interaction, vertex.pdf, vertex.delta
             ray = start.spawn_ray(vertex.direction)
             alive = mi.Bool(dr.max(throughput) > 0)
+            # The sampler, too: else what it did before would be in the kernels of every later segment.
+            sampler.schedule_state()
             dr.eval(ray, radiance, throughput, alive, start, pdf, delta, valid)
         return radiance, valid
 
@@ -138,7 +145,8 @@ class LitShellIntegrator(FieldPaths):
     ) -> Vertex:
         """Scattering by the field's reflection at the distances t along rays."""
         solid, phong = self.field.reflection(ray(t), ray.d, active)
-        lifted = ray(t) + mi.Point3f(phong.normal * (LIFT * self.field.world_step))
+        lift = dr.opaque(mi.Float, LIFT * self.field.world_step)  # a literal would ask for another kernel
+        lifted = ray(t) + mi.Point3f(phong.normal * lift)
         interaction = mi.Interaction3f(t, ray.time, ray.wavelengths, lifted, mi.Normal3f(phong.normal))
 
         def reflected(direction: mi.Vector3f) -> tuple[mi.Spectrum, mi.Float]:

@@ -50,7 +50,12 @@ class ShellIntegrator(FieldPaths):
         valid = dr.zeros(mi.Bool, count)
         context = mi.BSDFContext()
         # The density with which the last direction was drawn; light sources hit after a mirror count fully.
-        pdf, delta, start = mi.Float(1), mi.Bool(True), dr.zeros(mi.Interaction3f, count)
+        pdf, delta = dr.ones(mi.Float, count), dr.full(mi.Bool, True, count)
+        start = dr.zeros(mi.Interaction3f, count)
+        # As after each segment, so that the same kernels do for the first one, whatever the camera.
+        dr.make_opaque(radiance, throughput, valid, alive, pdf, delta, start)
+        sampler.schedule_state()
+        dr.eval(ray)
         for depth in range(self.max_depth):
             si = scene.ray_intersect(ray, alive)
             segment = mi.Ray3f(ray)
@@ -74,6 +79,8 @@ class ShellIntegrator(FieldPaths):
             delta = mi.has_flag(scattered.sampled_type, mi.BSDFFlags.Delta)
             ray = si.spawn_ray(si.to_world(scattered.wo))
             alive &= dr.max(dr.detach(throughput)) > 0
+            # The sampler, too: else what it did before would be in the kernels of every later segment.
+            sampler.schedule_state()
             dr.eval(ray, radiance, throughput, alive, start, pdf, delta, valid)
         return radiance, valid
 

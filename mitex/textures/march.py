@@ -1,4 +1,8 @@
-"""Marching rays through occupied cells of the scene cube, and what they gather (all in Dr.Jit)."""
+"""Marching rays through occupied cells of the scene cube, and what they gather (all in Dr.Jit).
+
+Lengths of steps and sides of grids are opaque, `dr.opaque`: as literals, each would ask for kernels of its
+own.
+"""
 
 from __future__ import annotations
 
@@ -35,6 +39,11 @@ class Samples:
 
     def __len__(self) -> int:
         return dr.width(self.ray) if self.rays else 0
+
+    @property
+    def length(self) -> mi.Float:
+        """The same as `step`, opaque."""
+        return dr.opaque(mi.Float, self.step)
 
     def subset(self, index: mi.UInt32) -> Samples:
         """The samples at ascending indices."""
@@ -111,10 +120,11 @@ def composite(
     near, leave = scene_box(origin, direction)
     leave = dr.minimum(leave, far)
     alive = mi.UInt32(dr.compress(near < leave))
+    window = dr.opaque(mi.Float, WINDOW * field.step)
     while dr.width(alive):
         o, d = dr.gather(mi.Point3f, origin, alive), dr.gather(mi.Vector3f, direction, alive)
         j, first, last = (dr.gather(mi.Float, v, alive) for v in (jitter, near, leave))
-        end = first + WINDOW * field.step
+        end = first + window
         samples = march(o, d, field.mask, field.step, j, first, dr.minimum(last, end))
         if len(samples):
             _gather(field, samples, o, d, alive, result)
@@ -175,13 +185,10 @@ def march(
     if not longest > 0:
         return Samples(mi.UInt32(), mi.Float(), step, count)
     steps = math.ceil(longest / step) + 1
-    index = dr.arange(mi.UInt32, count * steps)
-    # Opaque: a number that changes with every call would make a new kernel each time.
-    ray = index // dr.opaque(mi.UInt32, steps)
-    t = (
-        dr.gather(mi.Float, enter, ray)
-        + (mi.Float(index - ray * dr.opaque(mi.UInt32, steps)) + dr.gather(mi.Float, jitter, ray)) * step
-    )
+    index, width = dr.arange(mi.UInt32, count * steps), dr.opaque(mi.UInt32, steps)
+    ray = index // width
+    within = mi.Float(index - ray * width) + dr.gather(mi.Float, jitter, ray)
+    t = dr.gather(mi.Float, enter, ray) + within * dr.opaque(mi.Float, step)
     before_exit = t < dr.gather(mi.Float, leave, ray)
     candidates = Samples(ray, t, step, count)
     cell = cells_of(candidates.points(origin, direction), side)
@@ -211,15 +218,17 @@ def visible(
         index = mi.UInt32(dr.compress(part & (dr.gather(mi.Float, transmittance, samples.ray) > OPAQUE)))
         if dr.width(index):
             points = samples.subset(index).points(origin, direction)
-            dr.scatter(depth, density(points) * samples.step, index)
+            dr.scatter(depth, density(points) * samples.length, index)
     before = sum_before(mi.Float64(depth), samples)
     return samples.subset(mi.UInt32(dr.compress(dr.exp(-before) > OPAQUE)))
 
 
 def cells_of(points: mi.Point3f, side: int) -> mi.UInt32:
     """Index of the cell of the scene cube, x slowest, for `mi.Point3f` inside."""
-    x, y, z = (mi.UInt32(dr.clip((p + 1) * (0.5 * side), 0, side - 1)) for p in points)
-    return (x * side + y) * side + z
+    half, last = dr.opaque(mi.Float, 0.5 * side), dr.opaque(mi.Float, side - 1)
+    x, y, z = (mi.UInt32(dr.clip((p + 1) * half, 0, last)) for p in points)
+    count = dr.opaque(mi.UInt32, side)
+    return (x * count + y) * count + z
 
 
 def weights_of(density: mi.Float, samples: Samples) -> tuple[mi.Float, mi.Float]:
@@ -229,7 +238,7 @@ def weights_of(density: mi.Float, samples: Samples) -> tuple[mi.Float, mi.Float]
         density: (M,) [1 / scene units], attached or not.
         samples: their places.
     """
-    depth = mi.Float64(density * samples.step)
+    depth = mi.Float64(density * samples.length)
     weights = dr.exp(-dr.custom(_Before, depth, samples)) * (1 - dr.exp(-depth))
     return mi.Float(weights), mi.Float(dr.exp(-sum_rays(depth, samples)))
 

@@ -63,10 +63,11 @@ def first_event(
     near, leave = scene_box(origin, direction)
     leave = dr.minimum(leave, far)
     alive = mi.UInt32(dr.compress(near < leave))
+    window = dr.opaque(mi.Float, WINDOW * field.step)
     while dr.width(alive):
         o, d = dr.gather(mi.Point3f, origin, alive), dr.gather(mi.Vector3f, direction, alive)
         j, first, last, rest = (dr.gather(mi.Float, v, alive) for v in (jitter, near, leave, least))
-        end = first + WINDOW * field.step
+        end = first + window
         samples = march(o, d, field.mask, field.step, j, first, dr.minimum(last, end))
         event, transmittance = _first_of(field, samples, o, d, rest)
         dr.scatter(distance, event, alive)
@@ -87,7 +88,7 @@ def _first_of(
     if not dr.width(index):
         return distance, transmittance
     samples = samples.subset(index)
-    depth = mi.Float64(density * samples.step)
+    depth = mi.Float64(density * samples.length)
     behind = mi.Float(dr.exp(-sum_before(depth, samples) - depth))
     # The samples are in the order of their rays, and ascend along each.
     ends = mi.UInt32(dr.compress(behind < dr.gather(mi.Float, least, samples.ray)))

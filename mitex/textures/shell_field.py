@@ -61,6 +61,12 @@ class ShellField:
         return float("inf")
 
     @property
+    def _scale(self) -> mi.Float:
+        """World units of a unit of the cube; opaque as all that says where the field is, so that fields in
+        many places share kernels."""
+        return dr.opaque(mi.Float, float(self.similarity.scale))
+
+    @property
     def world_step(self) -> float:
         """Of rays through the field [world units]."""
         return self.field.step * float(self.similarity.scale)
@@ -74,9 +80,10 @@ class ShellField:
             jitter: (R,) in [0, 1), see `march`.
             active: which rays are marched, one value for each or for all; what is not marched passes freely.
         """
-        scale = float(self.similarity.scale)
+        scale = self._scale
         count = max(dr.width(ray.o), dr.width(active), dr.width(jitter))
         total = Composite(dr.zeros(mi.Color3f, count), dr.ones(mi.Float, count), dr.zeros(mi.Float, count))
+        dr.schedule(jitter)
         for index, origin, direction, far in self._parts(ray, active, count):
             pixels = composite(self.field, origin, direction, dr.gather(mi.Float, jitter, index), far)
             dr.scatter(total.colour, pixels.colour, index)
@@ -96,10 +103,11 @@ class ShellField:
         """
         count = max(dr.width(ray.o), dr.width(active), dr.width(jitter))
         distance = dr.full(mi.Float, dr.inf, count)
+        dr.schedule(jitter, threshold)
         for index, origin, direction, far in self._parts(ray, active, count):
             j, least = dr.gather(mi.Float, jitter, index), dr.gather(mi.Float, threshold, index)
             event = first_event(self.field, origin, direction, j, least, far)
-            dr.scatter(distance, event * float(self.similarity.scale), index)
+            dr.scatter(distance, event * self._scale, index)
         return distance
 
     def reflection(self, points: mi.Point3f, view: mi.Vector3f, active: mi.Bool) -> tuple[mi.Bool, Phong]:
@@ -121,7 +129,7 @@ class ShellField:
         for index, place, direction, _ in self._parts(rays, active, count):
             part, phong = self.field.reflection(place, direction)
             index = dr.gather(mi.UInt32, index, part)
-            phong.normal = mi.Vector3f(mi.Matrix3f(self.turn.tolist()) @ phong.normal)
+            phong.normal = mi.Vector3f(_opaque(self.turn) @ phong.normal)
             dr.scatter(solid, True, index)
             for name, values in vars(total).items():
                 dr.scatter(values, getattr(phong, name), index)
@@ -132,14 +140,14 @@ class ShellField:
     ) -> Iterator[tuple[mi.UInt32, mi.Point3f, mi.Vector3f, mi.Float]]:
         """Indices of active rays, at most `CHUNK` at a time, and the rays in the field's cube: their origins,
         directions and ends."""
-        scale = float(self.similarity.scale)
-        centre = mi.Vector3f(np.asarray(self.similarity.centre, np.float32).tolist())
+        scale, centre = self._scale, dr.opaque(mi.Vector3f, self.similarity.centre.tolist())
+        dr.eval(ray, active)  # at once, or each array that is gathered from would be computed alone
         rays = mi.UInt32(dr.compress(active & dr.full(mi.Bool, True, count)))
         for start in range(0, dr.width(rays), CHUNK):
-            part = dr.arange(mi.UInt32, start, min(start + CHUNK, dr.width(rays)))
+            size = min(CHUNK, dr.width(rays) - start)
+            part = dr.arange(mi.UInt32, size) + dr.opaque(mi.UInt32, start)
             index = dr.gather(mi.UInt32, rays, part)
-            # Anew for each part: a zero in it can become as wide as what it was multiplied with.
-            back = mi.Matrix3f(self.turn.T.tolist())
+            back = _opaque(self.turn.T)
             origin = mi.Point3f((back @ dr.gather(mi.Point3f, ray.o, index) - centre) / scale)
             direction = mi.Vector3f(back @ dr.gather(mi.Vector3f, ray.d, index))
             yield index, origin, direction, dr.gather(mi.Float, ray.maxt, index) / scale
@@ -155,6 +163,10 @@ class ShellField:
 
     def to_string(self) -> str:
         return f"ShellField[\n  bbox = {self.bbox()},\n  step = {self.field.step}\n]"
+
+
+def _opaque(matrix: np.ndarray) -> mi.Matrix3f:
+    return dr.opaque(mi.Matrix3f, matrix.tolist())
 
 
 def shell_field(field: RadianceField, similarity: Similarity, turn: np.ndarray | None = None) -> mi.Volume:

@@ -184,6 +184,11 @@ class Shell:
                 )
         self.decoder.pack()
 
+    @property
+    def _factor(self) -> mi.Float:
+        """Of the density; opaque, or each would ask for a kernel of its own."""
+        return dr.opaque(mi.Float, self.strength / self.scale)
+
     def locate(self, points: mi.Point3f) -> tuple[mi.UInt32, ShellCoords]:
         """Which of the points, `mi.Point3f`, are in the shell, as ascending `mi.UInt32`, and where."""
         index, projections = within(self.projection(rows(points)), self.thickness, self.lift)
@@ -202,7 +207,7 @@ class Shell:
         if not dr.width(index):
             return mi.UInt32(), mi.Float()
         exponent = self.decoder.exponent(self.latents.features(coords), coords.distance)
-        return index, dr.exp(dr.minimum(exponent, HIGHEST)) * (self.strength / self.scale)
+        return index, dr.exp(dr.minimum(exponent, HIGHEST)) * self._factor
 
     def reflection(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, Phong]:
         """Ascending indices of those of N points that are in the shell, and their reflection.
@@ -232,7 +237,7 @@ class Shell:
             return mi.UInt32(), mi.Float(), mi.Color3f()
         along = dr.gather(mi.Vector3f, view, index)
         density, colour, _ = appearance(self.latents, self.decoder, self.light, coords, along)
-        return index, density * (self.strength / self.scale), colour
+        return index, density * self._factor, colour
 
 
 def within(projections: Projections, thickness: float, lift: float = 0.0) -> tuple[np.ndarray, Projections]:

@@ -63,7 +63,8 @@ class MappedLatents:
     """
 
     def __init__(self, maps: LatentMaps, uv: np.ndarray, frames: np.ndarray) -> None:
-        self.size = maps.size
+        # Opaque: maps of each size would ask for kernels of their own.
+        self._height, self._width = (dr.opaque(mi.Int32, side) for side in maps.size)
         self.texels = upload(mi.TensorXf, maps.features)
         self._which = upload(mi.UInt32, maps.frame.astype(np.uint32).ravel())
         self._turns = upload(mi.Float, np.ascontiguousarray(maps.frames, np.float32).ravel())
@@ -92,8 +93,7 @@ class MappedLatents:
     def frame(self, coords: ShellCoords) -> tuple[mi.Vector3f, mi.Vector3f, mi.Vector3f]:
         """The captured frame's axes, laid on the mesh: equation 4 of each."""
         x, y = self._place(coords)
-        height, width = self.size
-        texel = self._index(mi.Int32(dr.floor(x + 0.5)), mi.Int32(dr.floor(y + 0.5)), height, width)
+        texel = self._index(mi.Int32(dr.floor(x + 0.5)), mi.Int32(dr.floor(y + 0.5)))
         turn = dr.gather(mi.UInt32, self._which, texel) * 9
         axes = [dr.gather(mi.Vector3f, self._frames, coords.face * 3 + k) for k in range(3)]
         if self._angle is not None:
@@ -111,23 +111,21 @@ class MappedLatents:
 
     def _place(self, coords: ShellCoords) -> tuple[mi.Float, mi.Float]:
         """Column and row of the foot [texels], of which whole numbers are centres."""
-        height, width = self.size
         corner = [dr.gather(mi.Point2f, self._uv, coords.face * 3 + k) for k in range(3)]
         b, c = coords.barycentric
         uv = corner[0] * (1 - b - c) + corner[1] * b + corner[2] * c
-        return uv.x * width - 0.5, (1 - uv.y) * height - 0.5
+        return uv.x * mi.Float(self._width) - 0.5, (1 - uv.y) * mi.Float(self._height) - 0.5
 
     def _blended(self, coords: ShellCoords, count: int) -> list[mi.Float]:
         """The first `count` channels, bilinear."""
         x, y = self._place(coords)
-        height, width = self.size
         left, top = dr.floor(x), dr.floor(y)
         across, down = x - left, y - top
         total = [mi.Float(0)] * count
         for right in (0, 1):
             for below in (0, 1):
                 share = (across if right else 1 - across) * (down if below else 1 - down)
-                texel = self._index(mi.Int32(left) + right, mi.Int32(top) + below, height, width)
+                texel = self._index(mi.Int32(left) + right, mi.Int32(top) + below)
                 for k in range(0, count, PACKET):
                     packet = texel * (CHANNELS // PACKET) + k // PACKET
                     shape = (PACKET, dr.width(texel))
@@ -136,10 +134,9 @@ class MappedLatents:
                         total[k + j] = dr.fma(values[j], share, total[k + j])
         return total
 
-    @staticmethod
-    def _index(column: mi.Int32, row: mi.Int32, height: int, width: int) -> mi.UInt32:
+    def _index(self, column: mi.Int32, row: mi.Int32) -> mi.UInt32:
         """Of texels, repeated beyond the borders."""
-        return mi.UInt32(_wrapped(row, height) * width + _wrapped(column, width))
+        return mi.UInt32(_wrapped(row, self._height) * self._width + _wrapped(column, self._width))
 
 
 def latent_maps(patches: Patches, layout: Quilt, captured: np.ndarray) -> LatentMaps:
@@ -182,6 +179,6 @@ def angles_of(target: SurfaceTarget) -> np.ndarray:
     return np.arctan2(dot(right, b), dot(right, t)).astype(np.float32)
 
 
-def _wrapped(index: mi.Int32, size: int) -> mi.Int32:
+def _wrapped(index: mi.Int32, size: mi.Int32) -> mi.Int32:
     rest = index % size
     return dr.select(rest < 0, rest + size, rest)

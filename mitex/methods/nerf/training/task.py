@@ -231,9 +231,10 @@ class TextureTask(RadianceTask[NerfConfig]):
         part = coords.subset(index)
         features = latents(part)
         depth = dr.gather(mi.Float, depths, dr.gather(mi.UInt32, samples.ray, index))
+        thickness = dr.opaque(mi.Float, self.thickness)  # as a literal it would ask for a kernel of its own
         with dr.suspend_grad():
             above = decoder(*features, part.distance)
-            part.distance -= depth * (part.distance + self.thickness)
+            part.distance -= depth * (part.distance + thickness)
             buried = self._buried(latents, decoder, part)
         below = decoder(*features, part.distance)
         return buried * sum(
@@ -243,13 +244,13 @@ class TextureTask(RadianceTask[NerfConfig]):
     def _buried(self, latents: CapturedLatents, decoder: Decoder, coords: ShellCoords) -> mi.Float:
         """The least opacity of a step at places, a bit above them, and a bit to four sides of them."""
         across, along = mi.coordinate_system(coords.normal)
-        reach = BURIED * self.thickness
+        reach, step = (dr.opaque(mi.Float, v) for v in (BURIED * self.thickness, self.step_length))
         lowest = mi.Float(math.inf)
         for x, y, z in AROUND:
             foot = coords.foot + mi.Point3f(reach * (x * across + y * along))
             moved = replace(coords, foot=foot, distance=coords.distance + reach * z)
             lowest = dr.minimum(lowest, decoder.exponent(latents.features(moved), moved.distance))
-        return 1 - dr.exp(-dr.exp(lowest) * self.step_length)
+        return 1 - dr.exp(-dr.exp(lowest) * step)
 
     def _uses_interior(self, step: int) -> bool:
         """Only late: colours learn slower beside a loss that wants them the same at all depths.

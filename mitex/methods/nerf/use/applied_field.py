@@ -47,7 +47,8 @@ class AppliedField(Generic[Field]):
     def evaluate(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, mi.Float, mi.Color3f]:
         """As of `RadianceField`."""
         index, density, colour = self.field.evaluate(points, view)
-        return index, density * self.strength if dr.width(index) else density, colour
+        factor = dr.opaque(mi.Float, self.strength)  # a literal would ask for another kernel
+        return index, density * factor if dr.width(index) else density, colour
 
     def density(self, points: np.ndarray) -> np.ndarray:
         """Density [1 / scene units] of points (N, 3) of the scene cube, (N,)."""

@@ -31,8 +31,12 @@ FEW = replace(PRESETS["fast"], base_steps=STEPS)
 
 @pytest.fixture
 def ball(tmp_path, monkeypatch) -> Mesh:
-    """A base mesh, in place of one that so short a training could not give; and an empty cache."""
+    """A base mesh, in place of one that so short a training could not give; and an empty cache. What a step
+    of the training learns does not matter, so it is a small one."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(
+        coarse, "COARSE", replace(coarse.COARSE, rays=32, ray_steps=64, table=8, occupancy=16)
+    )
     mesh = icosphere(44)
     mesh = mesh.with_vertices(0.55 * mesh.vertices)
     monkeypatch.setattr(coarse, "scan_surface", lambda task: 1.1 * mesh.vertices)
