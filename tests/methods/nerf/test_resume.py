@@ -16,37 +16,41 @@ from safetensors.torch import load_file
 from mitex.mesh import Mesh
 from mitex.methods.nerf import PRESETS, fit
 from mitex.methods.nerf.field import occupancy
+from mitex.methods.nerf.training import radiance, task
 from mitex.methods.nerf.training.plain import train_plain_field
-from mitex.methods.nerf.training.radiance import REFRESH
 from mitex.methods.nerf.training.task import TextureTask
 from mitex.runtime import threads
 from mitex.training import Interrupted, checkpoint
 from mitex.training.config import resolve
 from mitex.training.locate import NAME
+from tests.methods.fits import untrained_bases
 from tests.methods.nerf.tiny import SETTINGS, tiny_capture
 
 SMALL = (
-    *(s for s in SETTINGS if not s.startswith(("steps", "lr_steps", "preview", "checkpoint"))),
-    "lr_steps=40",
-    "preview_every=10",
-    "checkpoint_every=7",
+    *(s for s in SETTINGS if not s.startswith(("steps", "lr_steps", "occupancy", "preview", "checkpoint"))),
+    "lr_steps=10",
+    "occupancy=24",
+    "preview_every=4",
+    "checkpoint_every=2",
     "rays=128",
     "interior_weight=0.01",
     "learn_light=true",
     "refine_cameras=true",
     "exposures=true",
 )
-# The occupancy is refreshed and the mean updated before and after an interruption, and the inside counts
-# from step 20 on, before a fit of 30 steps ends.
-BEFORE, LATE, STEPS = 18, 30, 40
+# Every `REFRESH` steps the occupancy is refreshed and the mean updated: before and after an interruption. The
+# inside counts from step 5 on, before a fit of 8 steps ends.
+REFRESH, BEFORE, LATE, STEPS = 4, 5, 8, 10
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _one_thread(run) -> Iterator[None]:
+def _one_thread() -> Iterator[None]:
     before = torch.get_num_threads()
     threads(1)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(run.parent / "cache"))  # with the base shape
+        untrained_bases(patch)
+        patch.setattr(radiance, "REFRESH", REFRESH)
+        patch.setattr(task, "SURFACE", 0.005)  # of the fog after so few steps
         patch.setattr(occupancy, "WARMUP", 1)  # after which cells are drawn by chance
         yield
     threads(before)
@@ -104,9 +108,9 @@ def test_the_comparison_covers_what_a_fit_holds(whole):
 def test_an_interrupted_fit_is_that_of_one_go(whole, base, tmp_path, monkeypatch):
     average = TextureTask._average
 
-    def stop(task: TextureTask) -> None:
-        average(task)
-        if task._commits == BEFORE:
+    def stop(trained: TextureTask) -> None:
+        average(trained)
+        if trained._commits == BEFORE:
             os.kill(os.getpid(), signal.SIGINT)
 
     monkeypatch.setattr(TextureTask, "_average", stop)

@@ -30,7 +30,7 @@ from mitex.methods.nerf.use.extract import extract_mesh
 from mitex.methods.nerf.use.placement import in_scene_cube
 from mitex.progress import announce
 from mitex.ranges import SCALES
-from mitex.runtime.jit import mi
+from mitex.runtime.jit import dr, mi
 from mitex.runtime.upload import upload
 from mitex.textures.march import DIAGONAL
 
@@ -142,7 +142,9 @@ class AppliedTexture(Shell):
         foot = channels(mi.Point3f, interpolate(barycentric, corners).astype(np.float32))
         faces = upload(mi.UInt32, np.ascontiguousarray(face, np.uint32))
         coords = ShellCoords(foot, mi.Float(0), faces, at, mi.Vector3f(0))
-        return np.stack([np.array(value) for value in self.latents.features(coords)], axis=1)
+        values = self.latents.features(coords)
+        dr.eval(values)  # at once, not in a kernel for each
+        return np.stack([np.array(value) for value in values], axis=1)
 
     def export(self, path: str | os.PathLike[str], maps_format: Format = "png") -> Path:
         """Writes what is solid as a coloured mesh, as of `Asset.export`.

@@ -15,7 +15,7 @@ from mitex.methods.nerf.field.rendering import render_step
 from mitex.methods.nerf.field.shell import CapturedLatents, Shell
 from mitex.methods.nerf.field.tensors import channels
 from mitex.runtime import init
-from mitex.runtime.jit import mi
+from mitex.runtime.jit import dr, mi
 from mitex.runtime.upload import upload
 
 DEEPEST = 2.0  # percentile of the scan's distances that counts as the ground
@@ -82,6 +82,7 @@ class Captured:
         place = channels(mi.Point3f, points)
         encoding, tables = self.latents.encoding, self.latents.tables
         values = [row for k in range(2) for row in encoding(k, place, tables[k])]
+        dr.eval(values)  # at once, not in a kernel for each
         return np.stack([np.array(value) for value in values], axis=1)
 
     def in_place(self) -> Shell:
