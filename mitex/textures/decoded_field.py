@@ -152,7 +152,9 @@ class DecodedField(VertexRows):
         self._edges = upload(mi.Float, mesh.edge_lengths.astype(np.float32))
         if self.interpolation == "smooth":
             matrix = values_and_gradients(mesh).tocoo()
-            self._entry_row, self._entry_column = mi.UInt32(matrix.row), mi.UInt32(matrix.col)
+            self._entry_row, self._entry_column = (
+                upload(mi.UInt32, place.astype(np.uint32)) for place in (matrix.row, matrix.col)
+            )
             self._entry = upload(mi.Float, matrix.data)
 
     @property

@@ -31,7 +31,7 @@ def radiance(mi, shape, x: np.ndarray, y: np.ndarray, light=(0.0, 0.0, -1.0)) ->
     scene = mi.load_dict({"type": "scene", "shape": shape, "light": emitter})
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(0, len(x))
-    origin = mi.Point3f(mi.Float(x), mi.Float(y), 3.0)
+    origin = mi.Point3f(upload(mi.Float, x), upload(mi.Float, y), 3.0)
     ray = mi.RayDifferential3f(mi.Ray3f(origin, mi.Vector3f(0, 0, -1)))
     value, _, _ = mi.load_dict({"type": "direct"}).sample(scene, sampler, ray)
     return np.array(value).T
@@ -50,7 +50,7 @@ def interaction(mi, shape, face: np.ndarray, barycentric: np.ndarray):
 
     si = dr.zeros(mi.SurfaceInteraction3f, len(face))
     si.t, si.shape, si.prim_index = mi.Float(1), mi.ShapePtr(shape), upload(mi.UInt32, face.astype(np.uint32))
-    si.uv = mi.Point2f(*np.asarray(barycentric, np.float32).T[1:])
+    si.uv = mi.Point2f(*(upload(mi.Float, weight) for weight in np.asarray(barycentric, np.float32).T[1:]))
     return si
 
 
