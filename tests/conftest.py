@@ -33,13 +33,24 @@ def pytest_configure(config: pytest.Config) -> None:
         init(variant)
 
 
+@pytest.fixture(autouse=True, scope="module")
+def _leave_no_scene() -> Iterator[None]:
+    """Frees the scenes that the tests of a module shared."""
+    shapes = _shape_count()
+    yield
+    if _shape_count() > shapes:
+        gc.collect()
+
+
 @pytest.fixture(autouse=True)
 def _leave_no_trace() -> Iterator[None]:
     """Gives back the variant, thread counts and Dr.Jit memory, so that no test leaks into another."""
     before, shapes = _process_state(), _shape_count()
+    gc.freeze()  # the collector need not look at all that there was before the test
     yield
     if _shape_count() > shapes:
         gc.collect()
+    gc.unfreeze()
     after = _process_state()
     for key, value in before.items():
         if after[key] != value:
@@ -100,9 +111,10 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def quick_settling() -> Iterator[None]:
-    """How long a pattern takes to be in order is looked for in 10 steps at most, not in 1000."""
+    """How long a pattern takes to be in order is looked for in 10 steps at most, not in 1000, and few pixels."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("mitex.methods.nca.settling.STEPS", (2, 5, 10))
+        patch.setattr("mitex.methods.nca.settling.SIDE", 32)
         yield
 
 
