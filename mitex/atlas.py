@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -28,6 +29,8 @@ ROUGHNESS = 0.03  # by which vertices are moved before unwrapping [edge lengths]
 STRIP = 1 << 18  # texels
 OVERLAP_SIDE = 512  # of the raster on which overlaps are counted [texels]
 FULL = 1.001  # the area of the unit square, and some rounding
+
+_layouts: weakref.WeakKeyDictionary[Mesh, dict[tuple[int, int], np.ndarray]] = weakref.WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +195,7 @@ def spread(image: np.ndarray, used: np.ndarray, padding: int) -> np.ndarray:
 
 
 def unwrap(mesh: Mesh, resolution: int, padding: int) -> np.ndarray:
-    """Cuts the mesh into charts and packs them into the unit square (xatlas).
+    """Cuts the mesh into charts and packs them into the unit square (xatlas); kept as long as the mesh lives.
 
     Charts are flattened, or, on meshes of more than `HUGE` faces, projected along an axis.
 
@@ -202,8 +205,16 @@ def unwrap(mesh: Mesh, resolution: int, padding: int) -> np.ndarray:
         padding: gap between charts [texels].
 
     Returns:
-        (F, 3, 2) float32 in [0, 1], v upwards. Charts may be mirrored.
+        (F, 3, 2) float32 in [0, 1], v upwards, read-only. Charts may be mirrored.
     """
+    layouts = _layouts.setdefault(mesh, {})
+    if (resolution, padding) not in layouts:
+        layouts[resolution, padding] = sealed(_unwrapped(mesh, resolution, padding))
+    return layouts[resolution, padding]
+
+
+def _unwrapped(mesh: Mesh, resolution: int, padding: int) -> np.ndarray:
+    """What `unwrap` keeps."""
     announce("unwrapping the mesh")
     # xatlas has absolute tolerances; a power of two changes no digits.
     extent = float(np.ptp(mesh.vertices, axis=0).max())
