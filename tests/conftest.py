@@ -111,7 +111,7 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def quick_settling() -> Iterator[None]:
-    """How long a pattern takes to be in order is looked for in 10 steps at most, not in 1000, and few pixels."""
+    """How long a pattern takes to be in order is looked for in 10 steps at most, not 1000, and few pixels."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("mitex.methods.nca.settling.STEPS", (2, 5, 10))
         patch.setattr("mitex.methods.nca.settling.SIDE", 32)

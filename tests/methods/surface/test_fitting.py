@@ -38,7 +38,7 @@ from tests.training.contract import (
     assert_third_step_leaves_no_trace,
 )
 
-pytestmark = pytest.mark.usefixtures("own_cache")
+pytestmark = pytest.mark.usefixtures("own_cache", "known_exemplars")
 SMALL = ["resolution=48", "exemplar_size=48", "steps=12", "scales=0", "checkpoint_every=6", "preview_every=0"]
 SMALL += ["start=noise"]  # which is there at once
 SHALLOW = [*SMALL, "layers=relu1_1,relu2_1"]  # where it matters little what is compared
@@ -299,6 +299,7 @@ def test_a_fit_computes_its_domain_once(mesh, exemplar, tmp_path, monkeypatch):
     monkeypatch.setattr(
         room.Texels, "rasterize", staticmethod(lambda *args: (calls.append("texels"), rasterize(*args))[1])
     )
+    monkeypatch.setattr("mitex.methods.surface.task.VIEW", 16)
     overrides = [*SHALLOW, "resolution=47", "steps=2", "preview_every=2"]
     surface.fit(exemplar, mesh, tmp_path / "run", set=overrides).apply()
     assert sorted(calls) == ["GeodesicTracer", "build", "texels", "vertex_directions"]

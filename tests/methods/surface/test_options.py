@@ -1,6 +1,7 @@
 """Every setting of `SurfaceConfig` changes the texture: an ignored one fails here."""
 
 from dataclasses import fields
+from functools import cache
 
 import numpy as np
 import pytest
@@ -10,17 +11,19 @@ from mitex.mesh import icosphere
 from mitex.methods import surface
 from mitex.runtime import threads
 
-pytestmark = pytest.mark.usefixtures("own_cache")
+pytestmark = pytest.mark.usefixtures("own_cache", "known_exemplars")
 BASE = {
     **{"resolution": "48", "exemplar_size": "48", "steps": "3", "scales": "0", "layers": "relu1_1,relu2_1"},
-    **{"checkpoint_every": "9", "preview_every": "0"},
+    **{"checkpoint_every": "9", "preview_every": "0", "start": "noise"},
 }
+MESH = icosphere(6)
 UNCHANGED = {"preset", "checkpoint_every", "preview_every"}  # what they do is tested with the loop
+PATCHES = {"start": "patches"}  # the default, which takes a while
 TRANSPORT, CONTENT = {"loss": "transport", "samples": "64"}, {"content": "ao", "whitened": "false"}
 # key -> another value, and what else both fits are given
 CASES: dict[str, tuple[str, dict[str, str]]] = {
     "steps": ("4", {}),
-    "seed": ("1", {}),
+    "seed": ("1", PATCHES),
     "resolution": ("40", {}),
     "scale": ("0.5", {}),
     "exemplar_size": ("32", {}),
@@ -44,9 +47,9 @@ CASES: dict[str, tuple[str, dict[str, str]]] = {
     "triples": ("3", {"maps": "all"}),
     "whitened": ("false", {}),
     "diffusion": ("0.5", {}),
-    "start": ("noise", {}),
-    "patch": ("0.25", {}),
-    "noise": ("0.5", {"start": "noise"}),
+    "start": ("patches", {}),
+    "patch": ("0.25", PATCHES),
+    "noise": ("0.5", {}),
     "optimizer": ("lbfgs", {}),
     "lr": ("0.1", {}),
     "milestones": ("1", {}),
@@ -61,13 +64,17 @@ def test_every_setting_has_a_case():
     assert {name for name in names if name.partition("_")[0] != "text"} == {*CASES, *UNCHANGED}
 
 
+@cache
+def cobblestone() -> Exemplar:
+    return Exemplar.load("cobblestone").resized(48)
+
+
 def synthesize(folder, settings: dict[str, str]) -> np.ndarray:
     settings = BASE | settings
-    maps = Exemplar.load("cobblestone").resized(48).maps
-    maps = maps if settings.pop("maps", "") else {"albedo": maps["albedo"]}
+    maps = cobblestone().maps if settings.pop("maps", "") else {"albedo": cobblestone().maps["albedo"]}
     content = settings.pop("content", None)
     overrides = [f"{key}={value}" for key, value in settings.items()]
-    return surface.fit(Exemplar(maps), icosphere(6), folder, set=overrides, content=content).values
+    return surface.fit(Exemplar(maps), MESH, folder, set=overrides, content=content).values
 
 
 @pytest.fixture(scope="module")

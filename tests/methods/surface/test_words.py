@@ -31,7 +31,7 @@ from tests.training.contract import (
     assert_third_step_leaves_no_trace,
 )
 
-pytestmark = pytest.mark.usefixtures("own_cache")
+pytestmark = pytest.mark.usefixtures("own_cache", "known_exemplars")
 SMALL = (
     *("resolution=32", "exemplar_size=32", "steps=4", "scales=1", "layers=relu1_1,relu2_1", "diffusion=0.01"),
     *("checkpoint_every=2", "preview_every=0", "content_layer=relu2_1", "text_object=sphere"),
