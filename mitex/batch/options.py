@@ -88,16 +88,17 @@ def implicit_inputs(method: Method, fit: Mapping[str, Any], folder: Path, *, fro
     Returns:
         Those that are here; what another machine must have is missed by the job itself.
     """
-    from mitex.features.text_model import model_folder
-    from mitex.features.vgg19 import vgg19_path
-
     paths: list[Path | None] = []
-    with suppress(WeightsError):
+    with suppress(WeightsError):  # both networks import torch, which takes a second
         if from_text and "clip" in fit_kinds(method) and "clip" not in fit:
+            from mitex.features.text_model import model_folder
+
             paths.append(model_folder())
     with suppress(WeightsError):
         config = _config(method, fit, folder)
         if "vgg19" in (getattr(config, "network", None), getattr(config, "weights", None)):
+            from mitex.features.vgg19 import vgg19_path
+
             paths.append(vgg19_path())
     return [Input(str(path), path) for path in paths if path is not None]
 
