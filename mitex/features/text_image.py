@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-import torch
+if TYPE_CHECKING:  # settings read the prompt, without torch
+    import torch
 
 PROMPT = "an image of {object} made of {text}"  # MeshNCA, section 4.2
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 
 from mitex.errors import ConfigError
-from mitex.features.text_model import model_folder
 from mitex.training.config import by_key
 from mitex.training.settings import RunOptions
 
@@ -34,6 +33,8 @@ def words_options(options: RunOptions, inputs: Mapping[str, str | None]) -> RunO
     elsewhere = options.get("config") or options.get("resume") or "preset" in settings
     preset = options.get("preset")
     if not (preset or elsewhere):
+        from mitex.features.text_model import model_folder  # imports torch, which settings alone do not need
+
         preset = CLIP if model_folder(settings.get("text_model")) else EMBEDDED
     return {**options, "set": settings, "preset": preset}
 
