@@ -28,11 +28,13 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Jobs run in this process, with few and small patches and pictures."""
+    """Jobs run in this process, with few and small patches and pictures; words are judged by one view."""
     monkeypatch.setattr("mitex.batch.task.Process", InThisProcess)
     values = {"look_pair.PATCHES": 2, "look_pair.WINDOWS": 1, "inputs.CELL": 16, "inputs.SPP": 1}
     for name, value in values.items():
         monkeypatch.setattr(f"mitex.comparison.{name}", value)
+    monkeypatch.setattr("mitex.render.sides.AZIMUTHS", (0,))
+    monkeypatch.setattr("mitex.render.sides.ELEVATIONS", (0.0,))
 
 
 @pytest.fixture
@@ -61,10 +63,8 @@ def planes_alike(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def grey(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Jobs learn nothing and write grey meshes; words are judged by one view."""
+    """Jobs learn nothing and write grey meshes."""
     monkeypatch.setattr("mitex.batch.task.Process", Grey)
-    monkeypatch.setattr("mitex.render.sides.AZIMUTHS", (0,))
-    monkeypatch.setattr("mitex.render.sides.ELEVATIONS", (0.0,))
 
 
 def words_plan(words: Sequence[str], names: Sequence[str] = ("nca", "x_mesh")) -> Plan:
