@@ -29,7 +29,7 @@ from tests.training.contract import (
     assert_third_step_leaves_no_trace,
 )
 
-pytestmark = pytest.mark.usefixtures("own_cache")
+pytestmark = pytest.mark.usefixtures("own_cache", "known_exemplars", "small_previews")
 SMALL: dict[str, Any] = {
     "resolution": 32,
     "faces": 400,

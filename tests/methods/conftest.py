@@ -33,3 +33,11 @@ def _fingerprint(network: Vgg16) -> tuple:
     """Differs between networks that see differently: by their weights, or by how they pool."""
     layers = [one for one in network.operations if isinstance(one, FrozenConv)]
     return network.pool, network.dtype, *(float(one.weight.float().abs().sum()) for one in layers)
+
+
+@pytest.fixture(scope="module")
+def small_previews() -> Iterator[None]:
+    """Previews of surface textures have images of 16 pixels, in place of 384."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mitex.methods.surface.task.VIEW", 16)
+        yield
