@@ -7,7 +7,7 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
 - meshes that ship with Mitex are balls of 362 vertices, as large as they and under their names;
 - automata grow for 2 steps on the mesh as it is, are not healed, and are baked at 64 texels, as the textures
   of baselines are;
-- films have 4 frames of 32 pixels;
+- films have 4 frames of 32 pixels, of automata on the mesh as it is;
 - the photos that pages name are 8 of a ball in 24 x 24 pixels, which is its own base shape; its texture is
   joined from 30 patches to 128 texels;
 - pictures are traced in 16 x 16 pixels with one path each, and enlarged;
@@ -109,6 +109,7 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(texture, "healed", lambda growth, state, generator: state)
     patch.setattr(texture, "film", _with_few_frames(texture.film))
     patch.setattr(texture.GrowingTexture, "apply", _small_growth(texture.GrowingTexture.apply))
+    patch.setattr(texture.GrowingTexture, "animate", _without_subdivision(texture.GrowingTexture.animate))
     for kind in (PlanarTexture, SolidTexture):
         patch.setattr(kind, "apply", _at_few_texels(kind.apply))
     spots = ReactionDiffusionTexture
@@ -166,6 +167,13 @@ def _small_growth(apply: Callable[..., Any]) -> Callable[..., Any]:
     def small(texture: Any, mesh: Mesh, **options: Any) -> Any:
         texels = None if options.get("resolution", TEXELS) is None else TEXELS
         return apply(texture, mesh, **options | {"resolution": texels, "subdivide": 0})
+
+    return small
+
+
+def _without_subdivision(animate: Callable[..., Any]) -> Callable[..., Any]:
+    def small(texture: Any, mesh: Mesh, path: Any, **options: Any) -> Any:
+        return animate(texture, mesh, path, **options | {"subdivide": 0})
 
     return small
 
