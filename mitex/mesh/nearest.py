@@ -59,6 +59,8 @@ def _candidates(
     for candidate in faces.T:
         least = np.linalg.norm(points - centres[candidate], axis=1) - reach[candidate]
         maybe = np.flatnonzero(least < best)
+        if not len(maybe):
+            continue
         weights, distance = nearest_on_triangles(corners[candidate[maybe]], points[maybe])
         closer = distance < best[maybe]
         row = maybe[closer]
