@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import subprocess
+import sys
 import tomllib
 
 import pytest
@@ -23,6 +25,19 @@ def jobs(workshop):
         return jobs_of(Plan.of(content, workshop.folder))
 
     return jobs
+
+
+def test_plans_do_not_load_torch():
+    """Jobs do, in processes of their own."""
+    code = """
+import sys
+from mitex.batch import Plan
+from mitex.batch.jobs import jobs_of
+methods = dict.fromkeys(("nca", "surface", "gatys", "text2mesh"), {})
+jobs_of(Plan.of({"exemplars": ["lava"], "meshes": ["vase"], "methods": methods}))
+sys.exit("torch" in sys.modules)
+"""
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
 
 def test_a_plan_that_is_written_down_is_the_same(workshop):
