@@ -14,7 +14,6 @@ from mitex.errors import CheckpointError, ConfigError
 from mitex.exemplar import Exemplar
 from mitex.features.layers import LAYERS, with_poolings
 from mitex.geometry.vectors import unit
-from mitex.images import write_image
 from mitex.mesh import Mesh, embedded, icosphere
 from mitex.mesh.fields import vector_field
 from mitex.methods import surface
@@ -22,36 +21,15 @@ from mitex.methods.layout import with_layout
 from mitex.methods.registry import method_of
 from mitex.methods.surface import METHOD
 from mitex.methods.surface.config import PRESETS
-from mitex.methods.surface.content import content_colours
-from mitex.methods.surface.domain import SurfaceDomain
-from mitex.methods.surface.task import VIEW, SurfaceTask
 from mitex.methods.surface.texture import SurfaceTexture
 from mitex.runtime import threads
 from mitex.texels import charts
 from mitex.training import resolve
 from mitex.training.locate import NAME
-from tests.methods.surface.grids import flat_square
-from tests.training.contract import (
-    FAULTS,
-    assert_loss_is_pure,
-    assert_same_checkpoint,
-    assert_third_step_leaves_no_trace,
-)
+from tests.methods.surface.small import SHALLOW, SMALL
+from tests.training.contract import assert_same_checkpoint
 
 pytestmark = pytest.mark.usefixtures("own_cache", "known_exemplars")
-SMALL = ["resolution=48", "exemplar_size=48", "steps=12", "scales=0", "checkpoint_every=6", "preview_every=0"]
-SMALL += ["start=noise"]  # which is there at once
-SHALLOW = [*SMALL, "layers=relu1_1,relu2_1"]  # where it matters little what is compared
-
-
-@pytest.fixture(scope="module")
-def mesh():
-    return icosphere(6)
-
-
-@pytest.fixture(scope="module")
-def exemplar():
-    return Exemplar.load("cobblestone").resized(48)
 
 
 @pytest.fixture(scope="module")
@@ -240,54 +218,6 @@ class TestOrientation:
             fit(orientation=mesh.vertices, resume=True)
 
 
-def small_task(mesh, exemplar, *settings) -> SurfaceTask:
-    config = resolve(PRESETS, None, None, [*SHALLOW, *settings])
-    laid = with_layout(mesh, config.resolution)
-    return SurfaceTask(config, exemplar, SurfaceDomain.of(laid, config))
-
-
-DIFFUSION = "diffusion=0.01"  # so that `commit` changes the texels in every step
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_a_skipped_step_leaves_every_byte(mesh, exemplar, fault):
-    threads(1)
-    config = small_task(mesh, exemplar, DIFFUSION).config
-    assert_third_step_leaves_no_trace(lambda: small_task(mesh, exemplar, DIFFUSION), config, fault)
-
-
-@pytest.mark.parametrize("setting", ["loss=gram", "loss=transport"])
-def test_the_loss_changes_nothing(mesh, exemplar, setting):
-    threads(1)
-    assert_loss_is_pure(small_task(mesh, exemplar, setting), 1)
-
-
-def test_diffusion_falls_with_the_learning_rate(mesh, exemplar):
-    task = small_task(mesh, exemplar, DIFFUSION, "milestones=2,4", "layers=relu1_1")
-    start, moved = task.coordinates.detach().mul(0.1), {}
-    for step in (0, 1, 2, 5):
-        with torch.no_grad():
-            task.coordinates.copy_(start)
-        task.loss(step, torch.Generator()).commit()
-        moved[step] = task.coordinates.detach() - start
-    assert moved[0].abs().max() > 1e-4 and torch.equal(moved[0], moved[1])
-    for step, share in ((2, 0.5), (5, 0.25)):
-        assert torch.allclose(moved[step], share * moved[0], atol=1e-6)
-
-
-def test_previews_show_the_mesh_beside_the_exemplar(mesh, exemplar):
-    task = small_task(mesh, exemplar)
-    values = torch.zeros(len(task.coordinates), task.channels)
-    values[:, task.layout["albedo"][0]] = 1.0
-    with torch.no_grad():
-        task.coordinates.copy_(task.space.coordinates(values))
-    picture = task.preview(3)
-    assert picture.shape == (3 * VIEW, 3 * VIEW, 3)  # colours, normals and the grey maps in turn
-    sphere = picture[VIEW // 2, VIEW + VIEW // 2]
-    assert sphere[0] > 0.9 and (sphere[1:] < 1e-4).all()
-    assert (picture[0, VIEW] == 1).all()
-
-
 def test_a_fit_computes_its_domain_once(mesh, exemplar, tmp_path, monkeypatch):
     """Synthesis, previews and texture work on one domain, for which each piece is computed once."""
     room, calls = import_module("mitex.methods.surface.domain"), []
@@ -326,14 +256,6 @@ def test_diffusion_wears_down_what_is_finer_than_the_taps(mesh, exemplar, tmp_pa
         textures[amount] = surface.fit(exemplar, mesh, tmp_path / amount, set=overrides).values
     assert np.abs(textures["0.1"].mean(0) - textures["0"].mean(0)).max() < 0.01
     assert (textures["0.1"].std(0) < 0.6 * textures["0"].std(0)).all()
-
-
-def test_the_scale_becomes_finer():
-    task = object.__new__(SurfaceTask)
-    task.config = resolve(PRESETS, None, None, ["steps=100", "scales=2", "coarse_share=0.4"])
-    assert [task.scale(k) for k in (0, 19, 20, 39, 40, 99)] == [2, 2, 1, 1, 0, 0]
-    costs = [task.cost(k) for k in (0, 20, 40)]
-    assert costs == pytest.approx([0.1 + 1 / 16, 0.1 + 1 / 4, 1.1])
 
 
 class TestLayouts:
@@ -378,43 +300,3 @@ def test_size_does_not_matter(mesh, exemplar, tmp_path, power):
     )
     assert np.array_equal(a.domain.uv, b.domain.uv)
     assert np.abs(a.values - b.values).max() < 1e-2
-
-
-class TestStyleTransfer:
-    STYLE = [*SMALL, "steps=20"]
-
-    def test_ambient_occlusion_keeps_its_structure(self, exemplar, tmp_path):
-        """The result still follows the content, in the exemplar's colours."""
-        mesh = embedded("mushrooms")
-        image = Exemplar({"albedo": exemplar.maps["albedo"]})
-        texture = surface.fit(image, mesh, tmp_path / "run", content="ao", set=self.STYLE)
-        content = content_colours("ao", texture.domain)
-        assert content.std() > 0.05 and content.min() >= 0 and content.max() <= 1
-        assert np.corrcoef(content.mean(1), texture.values.mean(1))[0, 1] > 0.3
-        assert np.abs(texture.values - content).mean() > 0.02
-
-    def test_without_style_nothing_changes(self, mesh, exemplar, tmp_path):
-        """All weight on the content: its texture is the optimum from the start."""
-        image = Exemplar({"albedo": exemplar.maps["albedo"]})
-        overrides = [*self.STYLE, "content_weight=1e12", "lr=0.001", "steps=2"]
-        texture = surface.fit(image, mesh, tmp_path / "run", content="ao", set=overrides)
-        assert np.abs(texture.values - content_colours("ao", texture.domain)).max() < 0.02
-
-    def test_images_are_read_on_the_meshs_own_uvs(self, tmp_path):
-        """A ramp in u and v; every texel gets its own uv as colour."""
-        square = flat_square(4)
-        u, v = np.meshgrid((np.arange(256) + 0.5) / 256, 1 - (np.arange(256) + 0.5) / 256)
-        write_image(tmp_path / "ramp.png", np.stack([u, v, 0 * u], -1))
-        domain = SurfaceDomain(square, 32)
-        colours = content_colours(tmp_path / "ramp.png", domain)
-        assert np.abs(colours[:, :2] - domain.texels.position[:, :2]).max() < 0.01 and not colours[:, 2].any()
-
-    def test_an_image_needs_uvs(self, mesh, exemplar, tmp_path):
-        image = Exemplar({"albedo": exemplar.maps["albedo"]})
-        with pytest.raises(ConfigError, match="no UVs"):
-            surface.fit(image, mesh, tmp_path / "run", content="a.png", set=self.STYLE)
-
-    def test_one_image_is_transferred(self, mesh, exemplar, tmp_path):
-        with pytest.raises(ConfigError, match="one image"):
-            surface.fit(exemplar, mesh, tmp_path / "run", content="ao", set=self.STYLE)
-        assert not (tmp_path / "run").exists()

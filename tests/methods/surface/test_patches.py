@@ -60,8 +60,8 @@ def test_stripes_lie_as_the_settings_say(settings, waves):
 
 def test_stripes_follow_a_field_and_a_map_of_sizes():
     mesh, chosen = flat_square(SIDE), config()
-    upwards = np.tile(np.array([0.0, 1.0, 0.0], np.float32), (len(mesh.vertices), 1))
-    along, down = frequencies(image_of(SurfaceDomain.of(mesh, chosen, upwards, keep=False), chosen))
+    left = np.tile(np.array([-1.0, 0.0, 0.0], np.float32), (len(mesh.vertices), 1))  # where up shall point
+    along, down = frequencies(image_of(SurfaceDomain.of(mesh, chosen, left, keep=False), chosen))
     assert along <= 1 and abs(down - PERIODS) <= 1
     factors = np.where(mesh.vertices[:, 1] > mesh.vertices[:, 1].mean(), 2.0, 0.5)
     domain = SurfaceDomain.of(mesh, chosen, None, ScaleMap(factors), keep=False)
