@@ -97,7 +97,7 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     """Makes the work small until the patch is undone."""
     from mitex.methods.baselines.reaction_diffusion import ReactionDiffusionTexture
     from mitex.methods.baselines.solid_texture import SolidTexture
-    from mitex.methods.nca import NcaTexture, texture
+    from mitex.methods.nca import NcaTexture, page, texture
     from mitex.methods.nerf import NerfTexture, fitting
     from mitex.methods.planar import PlanarTexture
     from mitex.render import renderer, shell
@@ -105,7 +105,9 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
 
     patch.setattr(fit, "resolve", _with_few_steps(fit.resolve))
     patch.setattr("mitex.mesh.load.embedded", lambda name: _ball_in_place_of(embedded(name)))
-    patch.setattr(texture, "grown_state", _with_few_growth_steps(texture.grown_state))
+    few_steps = _with_few_growth_steps(texture.grown_state)
+    for module in (texture, page):
+        patch.setattr(module, "grown_state", few_steps)
     patch.setattr(texture, "healed", lambda growth, state, generator: state)
     patch.setattr(texture, "film", _with_few_frames(texture.film))
     patch.setattr(texture.GrowingTexture, "apply", _small_growth(texture.GrowingTexture.apply))
