@@ -209,7 +209,7 @@ class TestOrientation:
     def test_a_name_is_the_field_of_that_name(self, mesh, exemplar):
         fit = partial(surface.fit, exemplar, mesh, set=[*SHALLOW, "steps=1"])
         orientation = fit(orientation="about-x").domain.orientation
-        assert np.array_equal(orientation, vector_field(mesh, "about-x"))
+        assert orientation is not None and np.array_equal(orientation, vector_field(mesh, "about-x"))
 
     def test_resuming_with_another_field_is_refused(self, mesh, exemplar, tmp_path):
         fit = partial(surface.fit, exemplar, mesh, tmp_path / "run", set=[*SHALLOW, "steps=2"])
