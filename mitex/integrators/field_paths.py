@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mitex.errors import ConfigError
-from mitex.runtime.jit import mi
+from mitex.runtime.jit import dr, mi
 from mitex.textures.shell_field import ShellField, works_in_variant
 from mitex.textures.variant import init_base, option, require_variant
 
@@ -58,3 +58,26 @@ class FieldPaths:
     ) -> tuple[mi.Spectrum, mi.Bool]:
         """Radiance along R rays, and which of them meet something."""
         raise NotImplementedError
+
+
+def first_segment(
+    count: int,
+) -> tuple[mi.Spectrum, mi.Spectrum, mi.Bool, mi.Interaction3f, mi.Float, mi.Bool]:
+    """What is known of `count` paths that begin at a camera: radiance, throughput, whether they have met
+    anything, where their last direction was drawn, with which density, and whether no light source can be
+    drawn in it: those hit after a mirror, or at once, count fully.
+
+    Opaque, as all is after a segment, so that the same kernels do for the first one.
+    """
+    radiance, throughput = dr.zeros(mi.Spectrum, count), dr.ones(mi.Spectrum, count)
+    valid = dr.zeros(mi.Bool, count)
+    start, pdf, delta = dr.zeros(mi.Interaction3f, count), dr.ones(mi.Float, count), dr.ones(mi.Bool, count)
+    dr.make_opaque(radiance, throughput, valid, start, pdf, delta)
+    return radiance, throughput, valid, start, pdf, delta
+
+
+def evaluate(sampler: mi.Sampler, *state: Any) -> None:
+    """Evaluates what is known of paths between two segments, and the sampler: else what it did before would
+    be in the kernels of every later segment."""
+    sampler.schedule_state()
+    dr.eval(state)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from mitex.errors import ConfigError
-from mitex.integrators.field_paths import FieldPaths
+from mitex.integrators.field_paths import FieldPaths, evaluate, first_segment
 from mitex.integrators.sources import sampled_light, source_met
 from mitex.runtime.jit import dr, mi
 from mitex.textures.scattering import ReflectingField
@@ -86,15 +86,9 @@ class LitShellIntegrator(FieldPaths):
     ) -> tuple[mi.Spectrum, mi.Bool]:
         count = dr.width(ray.o)
         alive = mi.Bool(active & dr.full(mi.Bool, True, count))
-        radiance, throughput = dr.zeros(mi.Spectrum, count), dr.ones(mi.Spectrum, count)
-        valid = dr.zeros(mi.Bool, count)
-        # The density with which the last direction was drawn; light sources hit after a mirror count fully.
-        pdf, delta = dr.ones(mi.Float, count), dr.full(mi.Bool, True, count)
-        start = dr.zeros(mi.Interaction3f, count)
-        # As after each segment, so that the same kernels do for the first one, whatever the camera.
-        dr.make_opaque(radiance, throughput, valid, alive, pdf, delta, start)
-        sampler.schedule_state()
-        dr.eval(ray)
+        radiance, throughput, valid, start, pdf, delta = first_segment(count)
+        dr.make_opaque(alive)
+        evaluate(sampler, ray)
         for depth in range(self.max_depth):
             si = scene.ray_intersect(ray, alive)
             segment = mi.Ray3f(ray)
@@ -115,9 +109,7 @@ class LitShellIntegrator(FieldPaths):
             start, pdf, delta = vertex.interaction, vertex.pdf, vertex.delta
             ray = start.spawn_ray(vertex.direction)
             alive = mi.Bool(dr.max(throughput) > 0)
-            # The sampler, too: else what it did before would be in the kernels of every later segment.
-            sampler.schedule_state()
-            dr.eval(ray, radiance, throughput, alive, start, pdf, delta, valid)
+            evaluate(sampler, ray, radiance, throughput, alive, start, pdf, delta, valid)
         return radiance, valid
 
     def _on_surface(
