@@ -62,7 +62,7 @@ def toy(levels: int) -> GeometricTask:
         torch.tensor(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=generator)
         for k, mesh in enumerate(hierarchy.meshes)
     ]
-    return GeometricTask(config, hierarchy, torch.tensor(ball.vertices), meshes, ball)
+    return GeometricTask(config, hierarchy, torch.tensor(ball.vertices), meshes, ball, {})
 
 
 def main() -> None:

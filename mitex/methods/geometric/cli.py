@@ -45,10 +45,11 @@ class Fit(DeviceOptions):
     """Mesh file (.obj .ply .stl .glb .gltf .off), or a reference by formula: spikes, scales, knobs, ridges,
     craters, warts, cactus, shingles, bricks, woven."""
 
-    preset: Annotated[PlainText | None, arg(metavar="fast|paper", help_behavior_hint="(default: fast)")] = (
-        None
-    )
-    """Settings to start from: `fast`, or `paper`, which follows the publication."""
+    preset: Annotated[
+        PlainText | None, arg(metavar="fast|paper|fine", help_behavior_hint="(default: fast)")
+    ] = None
+    """Settings to start from: `fast`; `paper`, which follows the publication; or `fine`, for features of a few
+    edges that are next to each other, such as craters and ridges."""
 
     template: Annotated[str | None, arg(metavar="MESH", help_behavior_hint="(default: by genus)")] = None
     """Coarse mesh of the reference's topology from which its training meshes are made."""
@@ -75,7 +76,9 @@ class Fit(DeviceOptions):
 class GrowthOptions:
     """How a geometric texture grows on a mesh."""
 
-    start_level: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 2)")] = None
+    start_level: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 2, of `fine` 0)")] = (
+        None
+    )
     """The generator to begin with; low ones change the shape. With --mesh template (default: 0), `apply`
     rebuilds the levels below it without noise, and `animate` leaves them out."""
 

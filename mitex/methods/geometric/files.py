@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import fields as attributes
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ import torch
 from mitex.mesh import Mesh
 from mitex.mesh.topology import face_edges
 from mitex.methods.geometric import METHOD
+from mitex.methods.geometric.coarse_relief import CoarseRelief
+from mitex.methods.geometric.config import MAX_LEVELS
 from mitex.methods.geometric.model import network
 from mitex.methods.geometric.network import FaceNetwork
 from mitex.training import model_file
@@ -62,14 +65,18 @@ def load(
             raise ValueError("noise of another template")
         if not 0 <= float(about["noise"]) < math.inf or not isinstance(about["remeasure"], bool):
             raise ValueError("noise that is no number, or features of another kind")
-        levels, kind = int(about["levels"]), about.get("field")  # models of before have no such key
+        # Models of before have none of the keys that are taken by `get`.
+        levels, kind, first = int(about["levels"]), about.get("field"), int(about.get("first_level", 0))
+        coarse = about.get("coarse")
+        if not 0 <= first < MAX_LEVELS or (coarse is not None and not _sound(coarse)):
+            raise ValueError("levels, or a coarse relief, of another kind")
         if kind not in (None, VECTOR, LINE):
             raise ValueError("a field of another kind")
         fields = [tensors[f"field/{level}"] for level in range(levels)] if kind else []
         counts = _vertex_counts(template, len(fields))
         if any(field.shape != (count, 3) for field, count in zip(fields, counts, strict=True)):
             raise ValueError("a field of another template")
-        generators = _generators(tensors, levels, bool(kind))
+        generators = _generators(tensors, range(first, first + levels), bool(kind))
         return generators, template, tensors["fixed"], about, fields
 
 
@@ -83,10 +90,16 @@ def _vertex_counts(mesh: Mesh, levels: int) -> list[int]:
     return counts
 
 
-def _generators(tensors: Mapping[str, torch.Tensor], levels: int, directed: bool) -> list[FaceNetwork]:
+def _sound(coarse: Any) -> bool:
+    """Whether these are the finite attributes of a `CoarseRelief`."""
+    names = {attribute.name for attribute in attributes(CoarseRelief)}
+    return set(coarse) == names and all(math.isfinite(float(value)) for value in coarse.values())
+
+
+def _generators(tensors: Mapping[str, torch.Tensor], levels: range, directed: bool) -> list[FaceNetwork]:
     generators = []
-    for level in range(levels):
+    for place, level in enumerate(levels):
         generator = network(level, 3, torch.Generator(), directed)
-        generator.load([tensors[f"{level}/{k}"] for k in range(len(generator.parameters))])
+        generator.load([tensors[f"{place}/{k}"] for k in range(len(generator.parameters))])
         generators.append(generator)
     return generators

@@ -14,10 +14,12 @@ from mitex.cache import cached, content_key
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh
 from mitex.mesh.fields import vector_field
+from mitex.methods.geometric.coarse_relief import CoarseRelief, split
 from mitex.methods.geometric.config import PRESETS, GeometricConfig
 from mitex.methods.geometric.directions import level_fields
 from mitex.methods.geometric.files import LINE, VECTOR
 from mitex.methods.geometric.hierarchy import Hierarchy
+from mitex.methods.geometric.low_pass import blurred
 from mitex.methods.geometric.references import find_reference
 from mitex.methods.geometric.report import FitReport, report
 from mitex.methods.geometric.task import GeometricTask, betas, inputs, learning_rate
@@ -32,6 +34,7 @@ from mitex.training.optim import Adam
 from mitex.training.settings import RunOptions
 
 VERSION = 1  # of the training meshes in the cache
+DRAWN = 48  # coarse reliefs that samples of a training start from
 log = logging.getLogger(__name__)
 
 
@@ -55,7 +58,7 @@ def fit(
         field: the vector field on the reference that its relief follows, see `mitex.mesh.fields`; the texture
             then needs one wherever it is grown. With `symmetric` among the settings, a vector and its
             opposite are the same. None for a relief without a direction.
-        options: preset ("fast" or "paper"), and those of `RunOptions`.
+        options: preset ("fast", "paper" or "fine"), and those of `RunOptions`.
 
     Returns:
         The texture, also saved as `texture.safetensors` in `out` if that is given.
@@ -72,10 +75,16 @@ def fit(
     if field is None and config.symmetric:
         raise ConfigError("a relief without a `field` has no ends that look alike", "leave `symmetric` out")
     vectors = None if field is None else vector_field(shape, field)
+    if field is not None and config.first_level:
+        raise ConfigError("a relief with a `field` begins on the coarsest level", "leave `first_level` at 0")
     shape, start = normalised(shape, find_template(shape, template))
-    run.check_inputs(inputs(shape, start, vectors))
+    source = inputs(shape, start, vectors)
+    run.check_inputs(source)
     keep_freed_memory()
     meshes, reports = training_meshes(shape, start, config, run.control, keep=run.folder is not None)
+    coarse, own = None, None
+    if config.first_level:
+        start, meshes, own, coarse = _from_level(config.first_level, start, meshes)
     hierarchy, fields = Hierarchy.of(start, config.levels), []
     if vectors is not None:
         placed = [
@@ -84,9 +93,11 @@ def fit(
         ]
         fields = level_fields(shape, vectors, placed)
         hierarchy = hierarchy.directed(fields, config.symmetric)
-    task = GeometricTask(config, hierarchy, torch.tensor(start.vertices), meshes, shape, vectors)
-    origin = {key: getattr(config, key) for key in ("levels", "noise", "remeasure")}
+    drawn = [] if coarse is None else [coarse.on(start)(config.seed + k) for k in range(DRAWN)]
+    task = GeometricTask(config, hierarchy, torch.tensor(start.vertices), meshes, shape, source, own, drawn)
+    origin = {key: getattr(config, key) for key in ("levels", "noise", "remeasure", "first_level")}
     origin |= {"field": field_kind(vectors, config.symmetric), "fit": [vars(r) for r in reports]}
+    origin |= {"coarse": None if coarse is None else vars(coarse)}
     return run.train(
         task,
         shape.name,
@@ -100,6 +111,22 @@ def fit(
         lr=partial(learning_rate, config),
         optimizer=partial(Adam, betas=betas(config)),
     )
+
+
+def _from_level(
+    level: int, template: Mesh, meshes: list[torch.Tensor]
+) -> tuple[Mesh, list[torch.Tensor], np.ndarray, CoarseRelief]:
+    """What a training that begins on a higher level has for its template and training meshes.
+
+    Returns:
+        The training mesh of that level without its relief, mean edge 1, those from that level on, the
+        coarse part of the relief as displacements (V, 3), and its distribution.
+    """
+    finest = Hierarchy.of(template, level + 1).meshes[-1]
+    base, relief, coarse = split(finest.with_vertices(meshes[level].numpy()))
+    unit = float(base.edge_lengths.mean())
+    scaled = [vertices / unit for vertices in meshes[level:]]
+    return base.with_vertices(base.vertices / unit), scaled, relief / unit, coarse
 
 
 def field_kind(field: np.ndarray | None, symmetric: bool) -> str | None:
@@ -118,6 +145,8 @@ def training_meshes(
 ) -> tuple[list[torch.Tensor], list[FitReport]]:
     """Vertices (V, 3) of the training mesh of each level, from the cache where it has them, and how they fit.
 
+    With `fit_blur`, each is of the reference without what is too small for its edges.
+
     Args:
         reference, template: from `normalised`.
         config: settings.
@@ -127,7 +156,7 @@ def training_meshes(
     Raises:
         Cancelled: by `control`.
     """
-    hierarchy = Hierarchy.of(template, config.levels)
+    hierarchy = Hierarchy.of(template, config.first_level + config.levels)
     options = {key: value for key, value in vars(config).items() if key.startswith("fit_")}
     arrays = (reference.vertices, reference.faces, template.vertices, template.faces)
     meshes, reports = [], []
@@ -136,11 +165,13 @@ def training_meshes(
         place = cache_dir() / "geometric" / content_key(VERSION, *arrays, (config.seed, options, level))
         start = hierarchy.finer(meshes[-1], level - 1) if meshes else torch.tensor(template.vertices)
 
-        def compute(start: torch.Tensor = start, level: int = level) -> torch.Tensor:
-            return fit_level(reference, start, hierarchy.graphs[level], level, config)
+        target = blurred(reference, config.fit_blur / 2**level)
+
+        def compute(start: torch.Tensor = start, level: int = level, target: Mesh = target) -> torch.Tensor:
+            return fit_level(target, start, hierarchy.graphs[level], level, config)
 
         meshes.append(cached(place, compute, _read, _write, keep))
-        reports.append(report(mesh.with_vertices(meshes[-1].numpy() / 2**level), reference))
+        reports.append(report(mesh.with_vertices(meshes[-1].numpy() / 2**level), target))
         log.info("training mesh %d: %s", level, reports[-1])
     return meshes, reports
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -35,11 +36,15 @@ class GeometricTask:
         template: (V, 3) its vertices, in units of their mean edge length.
         meshes: vertices of the training mesh of each level.
         reference: what they were fitted to; previews show it.
-        field: (V, 3) of its vertices, from which the hierarchy's faces have their directions, if any.
+        source: what the training is of, see `inputs`.
+        relief: (V, 3) the coarse part of the reference's relief on the template, if the training begins with
+            one, see `coarse_relief`.
+        drawn: vertices (V, 3) of the template with others like it, from which random samples start then.
 
     Attributes:
         generators, critics: a network for each possible level, so that a resumed run may go on to more.
-        fixed: (V, 3) the noise from which the reference shall come; 0 on higher levels.
+        fixed: (V, 3) from which the reference shall come: the noise of the first level, 0 on higher ones, or
+            the relief.
         started: how many levels have been trained, the one under way included.
     """
 
@@ -50,18 +55,27 @@ class GeometricTask:
         template: torch.Tensor,
         meshes: list[torch.Tensor],
         reference: Mesh,
-        field: np.ndarray | None = None,
+        source: dict[str, str],
+        relief: np.ndarray | None = None,
+        drawn: Sequence[np.ndarray] = (),
     ) -> None:
         self.device = config.device
         self.config, self.hierarchy = config, hierarchy.to(self.device)
         self.template = template.to(self.device)
         self.meshes = [vertices.to(self.device) for vertices in meshes]
-        self.reference, self.field = reference, field
+        self.reference, self.source = reference, source
         rng = torch.Generator().manual_seed(config.seed)
         directed = hierarchy.graphs[0].directions is not None
-        self.generators = [network(level, 3, rng, directed).to(self.device) for level in range(MAX_LEVELS)]
-        self.critics = [network(level, 1, rng, directed).to(self.device) for level in range(MAX_LEVELS)]
-        self.fixed = self._noise(template, rng)
+        levels = range(config.first_level, config.first_level + MAX_LEVELS)
+        self.generators = [network(level, 3, rng, directed).to(self.device) for level in levels]
+        self.critics = [network(level, 1, rng, directed).to(self.device) for level in levels]
+        if relief is None:
+            self.fixed = self.first_noise = self._noise(template, rng)
+            self.own, self.starts = self.template, [self.template]
+        else:
+            self.fixed, self.first_noise = torch.tensor(relief).float().to(self.device), 0.0
+            self.own = self.template + self.fixed
+            self.starts = [torch.tensor(vertices).float().to(self.device) for vertices in drawn]
         self.optimizers = [Adam(critic.parameters, betas(config)) for critic in self.critics]
         with torch.no_grad():
             graphs = self.hierarchy.graphs
@@ -103,7 +117,7 @@ class GeometricTask:
         graph = self.hierarchy.graphs[level]
         fake = self._sample(level, generator)
         adversarial = adversarial_loss(self.critics[level], fake, graph)
-        noise = self.fixed if level == 0 else 0.0
+        noise = self.first_noise if level == 0 else 0.0
         start = self._reconstruction_start(level)
         reconstruction = generate(self.generators[level], start, graph, noise, self.config.remeasure)
         error = (reconstruction - self.meshes[level]).square().mean()
@@ -161,7 +175,7 @@ class GeometricTask:
         return np.hstack([portrait(self.reference.vertices, self.reference.faces), *portraits])
 
     def metadata(self) -> dict[str, str]:
-        return {"method": "geometric"} | inputs(self.reference, self.hierarchy.meshes[0], self.field)
+        return {"method": "geometric"} | self.source
 
     def _critic_turns(self, step: int) -> int:
         """How many steps of the critic come before a step of the generator: they are spread evenly."""
@@ -188,7 +202,9 @@ class GeometricTask:
 
     def _sample(self, level: int, generator: torch.Generator) -> torch.Tensor:
         """A random mesh of a level; only its own generator has a gradient."""
-        vertices = self.template
+        vertices = self.starts[0]
+        if len(self.starts) > 1:
+            vertices = self.starts[int(torch.randint(len(self.starts), (), generator=generator))]
         for k in range(level + 1):
             if k:
                 vertices = self.hierarchy.finer(vertices, k - 1)
@@ -205,7 +221,7 @@ class GeometricTask:
     def _reconstruction_start(self, level: int) -> torch.Tensor:
         """Where the reconstruction of a level starts from; the lower levels are finished and stay."""
         if self._start is None or self._start[0] != level:
-            start = self.template
+            start = self.own
             if level:
                 with torch.no_grad():
                     below = self._reconstruction(level - 1)
@@ -214,10 +230,10 @@ class GeometricTask:
         return self._start[1]
 
     def _reconstruction(self, level: int) -> torch.Tensor:
-        """The mesh of a level from the fixed noise: the reference, once the generators have learned it."""
-        noises = [self.fixed, *[0.0] * level]
+        """The mesh of a level from `fixed`: the reference, once the generators have learned it."""
+        noises = [self.first_noise, *[0.0] * level]
         generators = self.generators[: level + 1]
-        *_, vertices = grow(generators, self.hierarchy, self.template, noises, self.config.remeasure)
+        *_, vertices = grow(generators, self.hierarchy, self.own, noises, self.config.remeasure)
         return vertices
 
 

@@ -19,6 +19,7 @@ from mitex.mesh.untangling import untangled
 from mitex.methods.checks import in_range
 from mitex.methods.geometric import files
 from mitex.methods.geometric.borders import REACH, with_borders
+from mitex.methods.geometric.coarse_relief import CoarseRelief
 from mitex.methods.geometric.config import Placement
 from mitex.methods.geometric.directions import spread
 from mitex.methods.geometric.hierarchy import Hierarchy, mean_edge
@@ -41,9 +42,10 @@ class GeometricTexture:
     Attributes:
         generators: of levels 0 to `levels` - 1.
         template: the mesh that training started from, mean edge 1.
-        fixed: (V, 3) the noise on it from which the reference comes.
+        fixed: (V, 3) the noise on it from which the reference comes, or the coarse part of its relief.
         about: how it was made; `levels`, `noise` and `remeasure` at least. `field` is "vector" if the relief
-            follows a field, "line" if a vector of it and its opposite are the same.
+            follows a field, "line" if a vector of it and its opposite are the same. `coarse` has the
+            attributes of its `CoarseRelief` if growth begins with one.
         fields: of such a relief, (V, 3) unit vectors or zero on the template of each level.
     """
 
@@ -57,6 +59,17 @@ class GeometricTexture:
     def levels(self) -> int:
         """Number of generators."""
         return len(self.generators)
+
+    @property
+    def coarse(self) -> CoarseRelief | None:
+        """What the first generator completes, if it has learned to."""
+        values = self.about.get("coarse")
+        return None if values is None else CoarseRelief(**values)
+
+    @property
+    def first(self) -> int:
+        """The level that growth on a mesh begins with, if nothing else is asked for."""
+        return START if self.coarse is None else 0
 
     @classmethod
     def load(cls, source: str | Path) -> GeometricTexture:
@@ -93,16 +106,17 @@ class GeometricTexture:
         Args:
             mesh: any mesh; near-uniform edges give an even texture (`mitex.mesh.remesh`).
             seed: of the noise.
-            start_level: generator to begin with; 2, or `end_level` if that is lower, if None. Low levels
-                change the shape.
+            start_level: generator to begin with; if None, `first`, or `end_level` if that is lower. Low
+                levels change the shape.
             end_level: the last generator; the last one trained if None.
             untangle: draw the relief back where the surface pierces itself; see `untangled`.
             field: the vector field on the mesh that the relief follows, if it has learned to follow one; see
                 `mitex.mesh.fields`.
             placement: where bumps and dents go that are larger than a face of the first level: "even" spreads
                 them as densely as on the reference (`geometric.placement`) if a relief has such and follows
-                no field, and draws back dents that would meet in thin walls (`geometric.thickness`); "none"
-                leaves all to the generators, as published.
+                no field, or draws its coarse part (`geometric.coarse_relief`) if it begins with one; and dents
+                that would meet in thin walls are drawn back (`geometric.thickness`). "none" leaves all to the
+                generators, as published.
 
         Returns:
             The displaced mesh in light grey, in the mesh's own units and place; UVs are interpolated.
@@ -152,8 +166,13 @@ class GeometricTexture:
             end_level: as in `apply`.
         """
         rollout = self.rollout(self.template, 0, end_level)
-        reconstruction = [self.fixed, *[torch.zeros(())] * (len(rollout.generators) - 1)]
-        *_, result = rollout.run([*reconstruction[:start_level], *rollout.noise(seed)[start_level:]])
+        fixed, vertices = self.fixed, None
+        if self.coarse is not None:
+            own = self.template.vertices + self.fixed.numpy()
+            fixed, vertices = torch.zeros(()), own if start_level else self.coarse.on(self.template)(seed)
+        reconstruction = [fixed, *[torch.zeros(())] * (len(rollout.generators) - 1)]
+        noise = [*reconstruction[:start_level], *rollout.noise(seed)[start_level:]]
+        *_, result = rollout.run(noise, vertices)
         return result
 
     def growth(
@@ -230,6 +249,8 @@ class GeometricTexture:
             raise ConfigError(f"placement {placement!r}", f"use {' or '.join(get_args(Placement))}")
         if placement == "none" or mesh is self.template or self.about.get("field"):
             return mesh.vertices
+        if self.coarse is not None:
+            return mesh.vertices if level else self.coarse.on(mesh)(seed)
         with listening(None):
             reference = self.generate(start_level=self.levels, end_level=level)
         texture = bumps(reference, 0.5**level)
@@ -255,7 +276,7 @@ class GeometricTexture:
         """The first and the last level of a growth; see `apply` for what None stands for."""
         last = self.levels - 1
         end = last if end_level is None else end_level
-        start = min(START, end) if start_level is None else start_level
+        start = min(self.first, end) if start_level is None else start_level
         if not 0 <= start <= end <= last:
             raise ConfigError(
                 f"levels {start} to {end} are out of range", f"this texture has the levels 0 to {last}"

@@ -27,7 +27,7 @@ def small_task(**changes) -> GeometricTask:
         torch.tensor(mesh.vertices) * 2**k + 0.1 * torch.randn(len(mesh.vertices), 3, generator=generator)
         for k, mesh in enumerate(hierarchy.meshes)
     ]
-    return GeometricTask(config, hierarchy, torch.tensor(ball.vertices), meshes, bumpy())
+    return GeometricTask(config, hierarchy, torch.tensor(ball.vertices), meshes, bumpy(), {})
 
 
 def same_weights(one: FaceNetwork, other: FaceNetwork) -> bool:
