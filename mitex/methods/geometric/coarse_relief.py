@@ -1,10 +1,11 @@
 """The coarse part of a relief: measured on a training mesh, and drawn at random for any other mesh.
 
-Where features are only a few edges wide, the levels below cannot show them, and what these pass on is
-arbitrary. Then generators begin on the first level that resolves them (`first_level`), and something else has
-to say where each feature goes: the band of lengths between `FINE` and `WIDE`. The reference's own is what the
-generator learns to complete. Elsewhere it is drawn with the same spread: evenly placed bumps or dents where the
-reference has such, noise of that band where its heights are as often up as down.
+Coarse levels cannot show features that are narrower than about four of their edges, and what they pass on
+instead is arbitrary. So generators may begin on the first level that resolves the features (`first_level`).
+Something else has to say then where each of them goes: the part of the relief whose lengths lie between `FINE`
+and `WIDE`. The first generator learns to complete that of the reference. For other meshes it is drawn with the
+same spread: evenly placed bumps or dents where the reference has such, noise where heights go up as often as
+down.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from mitex.mesh import Mesh
 from mitex.methods.geometric.low_pass import blurred, low_pass
 from mitex.methods.geometric.placement import even_places, separate_tops
 
-FINE, WIDE = 2.0, 4.0  # widths of the filters between which the coarse part lies [mean edges]
+FINE, WIDE = 1.0, 4.0  # widths of the filters between which the coarse part lies [mean edges]
 SKEWED = 0.5  # skewness of heights from which on they are bumps, or dents, on a ground
 
 
