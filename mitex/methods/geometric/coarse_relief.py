@@ -2,10 +2,10 @@
 
 Coarse levels cannot show features that are narrower than about four of their edges, and what they pass on
 instead is arbitrary. So generators may begin on the first level that resolves the features (`first_level`).
-Something else has to say then where each of them goes: the part of the relief whose lengths lie between `FINE`
-and `WIDE`. The first generator learns to complete that of the reference. For other meshes it is drawn with the
-same spread: evenly placed bumps or dents where the reference has such, noise where heights go up as often as
-down.
+Something else has to say then where each of them goes: the coarse part of the relief, which lies between two
+low-pass filters. The first generator learns to complete that of the reference. For other meshes it is drawn
+with the same spread: evenly placed bumps or dents where the reference has such, else noise. Noise has not the
+form of ridges, so that less of these is given, and more is left to the generator.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from mitex.mesh import Mesh
 from mitex.methods.geometric.low_pass import blurred, low_pass
 from mitex.methods.geometric.placement import even_places, separate_tops
 
-FINE, WIDE = 1.0, 4.0  # widths of the filters between which the coarse part lies [mean edges]
+WIDE = 4.0  # width of the filter that leaves the shape without its relief [mean edges]
+OF_BUMPS, OF_NOISE = 1.0, 2.0  # of that which leaves the coarse part as well, if it is drawn as these
 SKEWED = 0.5  # skewness of heights from which on they are bumps, or dents, on a ground
 
 
@@ -40,7 +41,9 @@ class CoarseRelief:
 
     def on(self, mesh: Mesh) -> Callable[[int], np.ndarray]:
         """What draws it for a mesh: from a seed to vertices (V, 3) float64, moved along the normals."""
-        edge, band = _mean_edge(mesh), _band(mesh)
+        edge = _mean_edge(mesh)
+        width = OF_BUMPS if self.faces else OF_NOISE
+        fine, wide = (low_pass(mesh, value * edge) for value in (width, WIDE))
 
         def drawn(seed: int) -> np.ndarray:
             if self.faces:
@@ -48,7 +51,8 @@ class CoarseRelief:
                 impulses[even_places(mesh, self.faces, seed)] = self.side
             else:
                 impulses = np.random.default_rng(seed).normal(size=len(mesh.vertices))
-            heights = band(impulses)
+            heights = fine(impulses) - wide(impulses)
+            heights -= heights.mean()
             heights *= self.spread * edge / max(float(heights.std()), 1e-12)
             return mesh.vertices + heights[:, None] * mesh.normals
 
@@ -63,26 +67,23 @@ def split(mesh: Mesh) -> tuple[Mesh, np.ndarray, CoarseRelief]:
     """
     edge = _mean_edge(mesh)
     base = blurred(mesh, WIDE * edge)
-    heights = dot(low_pass(mesh, FINE * edge)(mesh.vertices.astype(np.float64)) - base.vertices, base.normals)
-    heights -= heights.mean()
-    spread = float(heights.std())
-    skewness = float(np.mean(heights**3)) / max(spread, 1e-12) ** 3
+    heights = _heights(mesh, base, OF_BUMPS * edge)
+    skewness = float(np.mean(heights**3)) / max(float(heights.std()), 1e-12) ** 3
     side = 1.0 if skewness > 0 else -1.0
     tops = separate_tops(base, side * heights) if abs(skewness) > SKEWED else None
-    faces = 0.0 if tops is None else len(mesh.faces) / len(tops)
-    return base, heights[:, None] * base.normals, CoarseRelief(spread / edge, faces, side)
+    if tops is None:
+        heights = _heights(mesh, base, OF_NOISE * edge)
+        coarse = CoarseRelief(float(heights.std()) / edge)
+    else:
+        coarse = CoarseRelief(float(heights.std()) / edge, len(mesh.faces) / len(tops), side)
+    return base, heights[:, None] * base.normals, coarse
 
 
-def _band(mesh: Mesh) -> Callable[[np.ndarray], np.ndarray]:
-    """The part of heights (V,) that lies between the two filters, with a mean of 0."""
-    edge = _mean_edge(mesh)
-    fine, wide = (low_pass(mesh, width * edge) for width in (FINE, WIDE))
-
-    def band(heights: np.ndarray) -> np.ndarray:
-        part = fine(heights) - wide(heights)
-        return part - part.mean()
-
-    return band
+def _heights(mesh: Mesh, base: Mesh, width: float) -> np.ndarray:
+    """(V,) of a mesh after a low-pass filter, above its base and along the normals of that; the mean is 0."""
+    filtered = low_pass(mesh, width)(mesh.vertices.astype(np.float64))
+    heights = dot(filtered - base.vertices, base.normals)
+    return heights - heights.mean()
 
 
 def _mean_edge(mesh: Mesh) -> float:

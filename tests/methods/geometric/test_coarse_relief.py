@@ -6,7 +6,7 @@ from scipy.spatial import KDTree
 
 from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh, icosphere
-from mitex.methods.geometric.coarse_relief import FINE, WIDE, CoarseRelief, split
+from mitex.methods.geometric.coarse_relief import OF_NOISE, WIDE, CoarseRelief, split
 
 BALL = icosphere(16)
 EDGE = float(BALL.edge_lengths.mean())
@@ -53,8 +53,8 @@ def test_waves_are_no_bumps():
 
 
 def test_only_the_band_between_both_filters_counts():
-    """Waves of 7 edges, half as long as the finer filter keeps, and twice as long as the wider one lets by."""
-    lengths = 7, 2.2 * FINE, 9 * WIDE
+    """Waves in it, half as long as the finer filter keeps, and more than twice as long as the wider one."""
+    lengths = 12, 2.2 * OF_NOISE, 12 * WIDE
     middle, short, long = (split(waves(2 * np.pi / (length * EDGE)))[2].spread for length in lengths)
     assert middle > 1.9 * short and middle > 9 * long
 
