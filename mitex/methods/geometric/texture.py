@@ -114,9 +114,9 @@ class GeometricTexture:
                 `mitex.mesh.fields`.
             placement: where bumps and dents go that are larger than a face of the first level: "even" spreads
                 them as densely as on the reference (`geometric.placement`) if a relief has such and follows
-                no field, or draws its coarse part (`geometric.coarse_relief`) if it begins with one; dents that
-                would meet in thin walls are drawn back (`geometric.thickness`). "none" leaves all to the
-                generators, as published.
+                no field, or draws its coarse part (`geometric.coarse_relief`) if it begins with one; dents
+                that would meet in thin walls are drawn back (`geometric.thickness`). "none" leaves all to
+                the generators, as published.
 
         Returns:
             The displaced mesh in light grey, in the mesh's own units and place; UVs are interpolated.

@@ -53,10 +53,10 @@ def test_waves_are_no_bumps():
 
 
 def test_only_the_band_between_both_filters_counts():
-    """Waves in it, half as long as the finer filter keeps, and more than twice as long as the wider one."""
-    lengths = 12, 2.2 * OF_NOISE, 12 * WIDE
+    """Waves in it, a third as long as the finer filter keeps, and more than twice as long as the wider one."""
+    lengths = 12, 1.5 * OF_NOISE, 12 * WIDE
     middle, short, long = (split(waves(2 * np.pi / (length * EDGE)))[2].spread for length in lengths)
-    assert middle > 1.9 * short and middle > 9 * long
+    assert middle > 2.5 * short and middle > 9 * long
 
 
 @pytest.mark.parametrize("coarse", [CoarseRelief(0.2), CoarseRelief(0.3, 80, 1), CoarseRelief(0.3, 80, -1)])
