@@ -48,8 +48,8 @@ class Fit(DeviceOptions):
     preset: Annotated[
         PlainText | None, arg(metavar="fast|paper|fine", help_behavior_hint="(default: fast)")
     ] = None
-    """Settings to start from: `fast`; `paper`, which follows the publication; or `fine`, for features too small
-    for the coarse levels, such as craters and ridges."""
+    """Settings to start from: `fast`; `paper`, which follows the publication; or `fine`, for features too
+    small for the coarse levels, such as craters and ridges."""
 
     template: Annotated[str | None, arg(metavar="MESH", help_behavior_hint="(default: by genus)")] = None
     """Coarse mesh of the reference's topology from which its training meshes are made."""

@@ -53,7 +53,7 @@ def test_waves_are_no_bumps():
 
 
 def test_only_the_band_between_both_filters_counts():
-    """Waves in it, a third as long as the finer filter keeps, and more than twice as long as the wider one."""
+    """Waves in it, a third as long as the finer filter keeps, and twice as long as the wider one or more."""
     lengths = 12, 1.5 * OF_NOISE, 12 * WIDE
     middle, short, long = (split(waves(2 * np.pi / (length * EDGE)))[2].spread for length in lengths)
     assert middle > 2.5 * short and middle > 9 * long
