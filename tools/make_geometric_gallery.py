@@ -5,7 +5,7 @@ usage: python tools/make_geometric_gallery.py RUNS MESHES SHEET ROW[,...] MESH~F
 
 RUNS holds a finished run of `mitex fit geometric` for each reference, MESHES is a folder; meshes are named
 as for make_surface_gallery.py, so that they are remeshed first. A ROW is REFERENCE[@LEVEL][:map|:none].
-Each mesh is displaced from LEVEL on (2), and rendered: docs/gallery/SHEET.jpg has a row for each reference,
+Each mesh is displaced from LEVEL on (2; the first of a `fine` one), and rendered: docs/gallery/SHEET.jpg has a row for each reference,
 which stands first, and above them the meshes alone. For every pair the Wasserstein-1 distances between the
 local statistics of result and reference are printed, and those of the mesh itself, remeshed to as many
 vertices as the result has, which takes minutes for finer results than those of five levels: there they are
@@ -96,14 +96,15 @@ def main() -> None:
     for word in references.split(","):
         row, _, kind = word.partition(":")
         reference, _, start_level = row.partition("@")
-        level = int(start_level or START)
         texture = GeometricTexture.load(Path(runs) / reference)
+        level = int(start_level or texture.first)
+        finer = level + int(texture.about.get("first_level", 0))
         # The reference with edges as long as the results'.
         reconstruction = texture.generate(start_level=texture.levels)
         cells.append(picture(find_reference(reference)))
         labels.append(LABELS[kind].format(reference))
         for mesh, mesh_word in zip(originals, words, strict=True):
-            even = coarse_mesh(mesh_word, level, Path(meshes))
+            even = coarse_mesh(mesh_word, finer, Path(meshes))
             start = time.perf_counter()
             grown = displaced(texture, find_reference(reference), even, level, kind)
             seconds = time.perf_counter() - start

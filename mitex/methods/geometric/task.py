@@ -157,9 +157,9 @@ class GeometricTask:
         self.started = started
 
     def _start_level(self, level: int) -> None:
-        """From level `carried` on the first weights are those of the level before."""
+        """From level `carried` of the training meshes on, the first weights are those of the level before."""
         self.started = level + 1
-        if level >= self.config.carried:
+        if level and level + self.config.first_level >= self.config.carried:
             self.generators[level].load(self.generators[level - 1].parameters)
             self.critics[level].load(self.critics[level - 1].parameters)
 
