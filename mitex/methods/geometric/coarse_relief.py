@@ -9,7 +9,7 @@ alike: evenly placed bumps or dents where the reference has such, else noise wit
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -38,7 +38,7 @@ class CoarseRelief:
     """
 
     spread: float
-    bands: tuple[float, ...]
+    bands: Sequence[float]
     faces: float = 0.0
     side: float = 1.0
 
@@ -77,7 +77,7 @@ def split(mesh: Mesh) -> tuple[Mesh, np.ndarray, CoarseRelief]:
     side = 1.0 if skewness > 0 else -1.0
     tops = separate_tops(base, side * heights) if abs(skewness) > SKEWED else None
     faces = 0.0 if tops is None else len(mesh.faces) / len(tops)
-    bands = tuple(float(part.std()) / edge for part in parts)
+    bands = [float(part.std()) / edge for part in parts]
     return base, heights[:, None] * base.normals, CoarseRelief(spread / edge, bands, faces, side)
 
 

@@ -8,12 +8,13 @@ from dataclasses import fields as attributes
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 
 from mitex.mesh import Mesh
 from mitex.mesh.topology import face_edges
 from mitex.methods.geometric import METHOD
-from mitex.methods.geometric.coarse_relief import CoarseRelief
+from mitex.methods.geometric.coarse_relief import WIDTHS, CoarseRelief
 from mitex.methods.geometric.config import MAX_LEVELS
 from mitex.methods.geometric.model import network
 from mitex.methods.geometric.network import FaceNetwork
@@ -93,7 +94,9 @@ def _vertex_counts(mesh: Mesh, levels: int) -> list[int]:
 def _sound(coarse: Any) -> bool:
     """Whether these are the finite attributes of a `CoarseRelief`."""
     names = {attribute.name for attribute in attributes(CoarseRelief)}
-    return set(coarse) == names and all(math.isfinite(float(value)) for value in coarse.values())
+    if set(coarse) != names or len(coarse["bands"]) != len(WIDTHS) - 1:
+        return False
+    return all(math.isfinite(float(value)) for key in names for value in np.atleast_1d(coarse[key]))
 
 
 def _generators(tensors: Mapping[str, torch.Tensor], levels: range, directed: bool) -> list[FaceNetwork]:

@@ -1,12 +1,15 @@
 """The coarse part of a relief: what is measured, and what is drawn like it."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from numpy.polynomial import Legendre
 from scipy.spatial import KDTree
 
 from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh, icosphere
-from mitex.methods.geometric.coarse_relief import OF_NOISE, WIDE, CoarseRelief, split
+from mitex.methods.geometric.coarse_relief import WIDTHS, CoarseRelief, split
 
 BALL = icosphere(16)
 EDGE = float(BALL.edge_lengths.mean())
@@ -53,27 +56,41 @@ def test_waves_are_no_bumps():
 
 
 def test_only_the_band_between_both_filters_counts():
-    """Waves in it, a third as long as the finer filter keeps, and twice as long as the wider one or more."""
-    lengths = 12, 1.5 * OF_NOISE, 12 * WIDE
+    """Waves in it, half as long as the finest filter keeps, and much longer than the widest one lets by."""
+    lengths = 7, 2.2 * WIDTHS[0], 12 * WIDTHS[-1]
     middle, short, long = (split(waves(2 * np.pi / (length * EDGE)))[2].spread for length in lengths)
-    assert middle > 2.5 * short and middle > 9 * long
+    assert middle > 1.9 * short and middle > 9 * long
 
 
-@pytest.mark.parametrize("coarse", [CoarseRelief(0.2), CoarseRelief(0.3, 80, 1), CoarseRelief(0.3, 80, -1)])
+def test_waves_are_in_the_band_of_their_length():
+    """Spherical harmonics of degree n; between two filters, the length pi sqrt(2 fine wide) passes best."""
+    for band, (fine, wide) in enumerate(pairwise(WIDTHS)):
+        degree = round(2 * np.pi / (np.pi * np.sqrt(2 * fine * wide) * EDGE) - 0.5)
+        bands = split(with_heights(Legendre.basis(degree)(BALL.vertices[:, 1])))[2].bands
+        assert np.argmax(bands) == band
+
+
+SHARES = (0.5, 0.4, 0.2, 0.1)
+
+
+@pytest.mark.parametrize(
+    "coarse", [CoarseRelief(0.2, SHARES), CoarseRelief(0.3, SHARES, 80, 1), CoarseRelief(0.3, SHARES, 80, -1)]
+)
 def test_what_is_drawn_is_like_what_was_measured(coarse):
     draw = coarse.on(BALL)
     heights = ((draw(0) - BALL.vertices) * BALL.normals).sum(1) / EDGE
     assert heights.std() == pytest.approx(coarse.spread, rel=1e-3) and abs(heights.mean()) < 1e-3
     skewness = np.mean(heights**3) / heights.std() ** 3
-    assert skewness * coarse.side > 1 if coarse.faces else abs(skewness) < 0.3
+    assert skewness * coarse.side > 0.5 if coarse.faces else abs(skewness) < 0.3
     assert np.array_equal(draw(0), draw(0)) and not np.allclose(draw(0), draw(1))
     again = split(BALL.with_vertices(draw(0)))[2]
     assert bool(again.faces) == bool(coarse.faces)
+    assert np.argsort(again.bands)[:2].tolist() == [3, 2]
     if coarse.faces:
         assert again.faces == pytest.approx(coarse.faces, rel=0.02) and again.side == coarse.side
 
 
 def test_what_is_drawn_has_the_size_of_edges():
-    coarse = CoarseRelief(0.3)
+    coarse = CoarseRelief(0.3, SHARES)
     large = BALL.with_vertices(5 * BALL.vertices)
     assert np.allclose(coarse.on(large)(2), 5 * coarse.on(BALL)(2), atol=1e-4)

@@ -104,10 +104,11 @@ def test_too_many_levels(tmp_path):
     [
         {"first_level": 9},
         {"first_level": 0},
-        {"coarse": {"spread": float("inf"), "faces": 0.0, "side": 1.0}},
+        {"coarse": {"spread": float("inf"), "bands": [0.1] * 4, "faces": 0.0, "side": 1.0}},
+        {"coarse": {"spread": 0.1, "bands": [0.1], "faces": 0.0, "side": 1.0}},
         {"coarse": {"spread": 0.1}},
     ],
-    ids=["a level that cannot be", "other networks", "not finite", "incomplete"],
+    ids=["a level that cannot be", "other networks", "not finite", "a band", "incomplete"],
 )
 def test_damaged_models_are_refused(run, tmp_path, about):
     texture = GeometricTexture.load(run[0])
