@@ -35,6 +35,7 @@ class Fit(DeviceOptions):
 
     examples:
       mitex fit geometric --reference spikes
+      mitex fit geometric --reference craters --preset fine
       mitex fit geometric --reference cactus.obj --out runs/cactus
       mitex fit geometric --reference cactus --field up --set symmetric=true
       mitex fit geometric --reference ring.obj --template coarse-ring.obj --preset paper
