@@ -5,11 +5,11 @@ usage: python tools/make_geometric_gallery.py RUNS MESHES SHEET ROW[,...] MESH~F
 
 RUNS holds a finished run of `mitex fit geometric` for each reference, MESHES is a folder; meshes are named
 as for make_surface_gallery.py, so that they are remeshed first. A ROW is REFERENCE[@LEVEL][:map|:none].
-Each mesh is displaced from LEVEL on (2; of a `fine` one 0), and rendered: docs/gallery/SHEET.jpg has a row for
-each reference, which stands first, and above them the meshes alone. For every pair the Wasserstein-1 distances between the
-local statistics of result and reference are printed, and those of the mesh itself, remeshed to as many
-vertices as the result has, which takes minutes for finer results than those of five levels: there they are
-left out. REFERENCE:map makes a row of displacement maps, REFERENCE:none one without bumps that are placed
+Each mesh is displaced from LEVEL on (2; of a `fine` one 0), and rendered: docs/gallery/SHEET.jpg has a row
+for each reference, which stands first, and above them the meshes alone. For every pair the Wasserstein-1
+distances between the local statistics of result and reference are printed, and those of the mesh itself,
+remeshed to as many vertices as the result has, which takes minutes for finer results than those of five
+levels: there they are left out. REFERENCE:map makes a row of displacement maps, REFERENCE:none one without bumps that are placed
 (`mitex.methods.geometric.placement`).
 
 REFERENCE:levels makes a sheet of start levels: a row for the reference and each mesh, which stand first, then
