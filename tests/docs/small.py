@@ -120,6 +120,7 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
     for name in ("PATCHES", "WINDOWS"):
         patch.setattr(f"mitex.comparison.look_pair.{name}", 1)
     patch.setattr(NcaTexture, "tile", _small_tile(NcaTexture.tile))
+    patch.setattr("mitex.methods.geometric.references.FREQUENCY", 12)
     patch.setattr(fitting, "find_base", lambda *_, **__: _ball_as_base())
     patch.setattr(NerfTexture, "synthesize", _small_quilt(NerfTexture.synthesize))
     patch.setattr(NerfTexture, "synthesize_on", _small_quilt_on(NerfTexture.synthesize_on))

@@ -93,7 +93,10 @@ def fit(
         ]
         fields = level_fields(shape, vectors, placed)
         hierarchy = hierarchy.directed(fields, config.symmetric)
-    drawn = [] if coarse is None else [coarse.on(start)(config.seed + k) for k in range(DRAWN)]
+    drawn: list[np.ndarray] = []
+    if coarse is not None:
+        draw = coarse.on(start)
+        drawn = [draw(config.seed + k) for k in range(DRAWN)]
     task = GeometricTask(config, hierarchy, torch.tensor(start.vertices), meshes, shape, source, own, drawn)
     origin = {key: getattr(config, key) for key in ("levels", "noise", "remeasure", "first_level")}
     origin |= {"field": field_kind(vectors, config.symmetric), "fit": [vars(r) for r in reports]}
