@@ -61,7 +61,7 @@ def main() -> None:
     for label, picture in grafts(mesh, stranger, NcaTexture.load(name)).items():
         cells.append(picture)
         labels.append(label)
-    write_image(GALLERY / "nca-ablations.jpg", sheet(cells, columns=5, labels=labels, cell=CELL))
+    write_image(GALLERY / "nca-ablations.jpg", sheet(cells, columns=6, labels=labels, cell=CELL))
 
 
 def closeup(texture: NcaTexture, mesh: Mesh) -> Cameras:
