@@ -14,23 +14,16 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from make_geometric_gallery import CELL, GALLERY, picture
 
-from mitex.asset import clay
 from mitex.images import write_image
-from mitex.mesh import Mesh
+from mitex.mesh.low_pass import blurred
 from mitex.methods.geometric import GeometricTexture
-from mitex.methods.geometric.low_pass import blurred
 from mitex.methods.geometric.references import find_reference
 from mitex.methods.geometric.template import find_template, normalised
-from mitex.render import sheet, still, tone
+from mitex.render import sheet
 
-GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
 LEVELS = range(2, 6)
-CELL, AZIMUTH = 224, 20  # side of a picture [px], and where the camera stands [degrees]
-
-
-def picture(mesh: Mesh) -> np.ndarray:
-    return tone(still(clay(mesh), resolution=CELL, spp=96, azimuth=AZIMUTH))
 
 
 def blurs(names: list[str]) -> np.ndarray:

@@ -7,7 +7,7 @@ import scipy.stats
 
 from mitex.geometry.vectors import scatter_add, unit
 from mitex.mesh import Mesh
-from mitex.mesh.cotangents import cotangent_weights
+from mitex.mesh.cotangents import cotangent_weights, vertex_areas
 from mitex.mesh.topology import mesh_edges, paired_sides
 
 LEAST = 1e-12
@@ -53,6 +53,5 @@ def _mean_curvature(mesh: Mesh) -> np.ndarray:
     pairs, weights = cotangent_weights(mesh)
     edge = weights[:, None] * (points[pairs[:, 0]] - points[pairs[:, 1]])
     total = scatter_add(pairs[:, 0], edge, count) - scatter_add(pairs[:, 1], edge, count)
-    area = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas / 3, 3), count)
-    normal = total / np.maximum(area, LEAST)[:, None]  # 2 H n
+    normal = total / np.maximum(vertex_areas(mesh), LEAST)[:, None]  # 2 H n
     return 0.5 * (normal * mesh.normals).sum(1)

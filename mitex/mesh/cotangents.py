@@ -1,4 +1,4 @@
-"""Cotangent weights of edges: the Laplacian of functions that are linear on each triangle."""
+"""The Laplacian of functions that are linear on each triangle: weights of edges and areas of vertices."""
 
 from __future__ import annotations
 
@@ -9,6 +9,12 @@ from mitex.mesh.mesh import Mesh
 from mitex.mesh.topology import face_edges
 
 LEAST = 1e-12  # area of a face, at least, relative to the largest
+
+
+def vertex_areas(mesh: Mesh) -> np.ndarray:
+    """(V,) float64 a third of the areas of the faces around each vertex [mesh units^2]."""
+    thirds = np.repeat(mesh.face_areas.astype(np.float64) / 3, 3)
+    return np.bincount(mesh.faces.ravel(), thirds, len(mesh.vertices))
 
 
 def cotangent_weights(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:

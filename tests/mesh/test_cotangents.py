@@ -1,9 +1,10 @@
 """Cotangent weights against finite elements, triangle by triangle."""
 
 import numpy as np
+import pytest
 
-from mitex.mesh import scattered_sphere
-from mitex.mesh.cotangents import cotangent_weights
+from mitex.mesh import Mesh, scattered_sphere
+from mitex.mesh.cotangents import cotangent_weights, vertex_areas
 
 
 def test_energy_is_that_of_the_linear_interpolants(rng):
@@ -24,3 +25,11 @@ def test_weights_do_not_depend_on_size():
     mesh = scattered_sphere(40)
     small = mesh.with_vertices(1e-9 * mesh.vertices)
     np.testing.assert_allclose(cotangent_weights(small)[1], cotangent_weights(mesh)[1], rtol=1e-4)
+
+
+def test_areas_share_out_the_whole():
+    """One triangle gives its corners a third each; vertices without faces have none."""
+    corner = Mesh(np.array([[0, 0, 0], [3, 0, 0], [0, 2, 0], [9, 9, 9]]), np.array([[0, 1, 2]]))
+    np.testing.assert_allclose(vertex_areas(corner), [1, 1, 1, 0])
+    mesh = scattered_sphere(80)
+    assert vertex_areas(mesh).sum() == pytest.approx(mesh.face_areas.sum(dtype=np.float64))

@@ -12,12 +12,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from mitex.geometry.vectors import dot
 from mitex.mesh import Mesh
-from mitex.methods.geometric.low_pass import blurred, low_pass
+from mitex.mesh.low_pass import blurred, low_pass
 from mitex.methods.geometric.placement import even_places, separate_tops
 
 # Widths of filters, half an octave apart [mean edges]: the last leaves the shape without its relief, and the
@@ -59,6 +60,18 @@ class CoarseRelief:
             return mesh.vertices + heights[:, None] * mesh.normals
 
         return drawn
+
+
+class Start(NamedTuple):
+    """What a training begins with on its first level, on the mesh without relief.
+
+    Attributes:
+        own: (V, 3) displacements, the coarse part of the reference's relief.
+        drawn: (V, 3) vertices each, with others like it.
+    """
+
+    own: np.ndarray
+    drawn: Sequence[np.ndarray]
 
 
 def split(mesh: Mesh) -> tuple[Mesh, np.ndarray, CoarseRelief]:

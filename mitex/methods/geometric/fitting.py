@@ -14,12 +14,12 @@ from mitex.cache import cached, content_key
 from mitex.errors import ConfigError
 from mitex.mesh import Mesh
 from mitex.mesh.fields import vector_field
-from mitex.methods.geometric.coarse_relief import CoarseRelief, split
+from mitex.mesh.low_pass import blurred
+from mitex.methods.geometric.coarse_relief import CoarseRelief, Start, split
 from mitex.methods.geometric.config import PRESETS, GeometricConfig
 from mitex.methods.geometric.directions import level_fields
 from mitex.methods.geometric.files import LINE, VECTOR
 from mitex.methods.geometric.hierarchy import Hierarchy
-from mitex.methods.geometric.low_pass import blurred
 from mitex.methods.geometric.references import find_reference
 from mitex.methods.geometric.report import FitReport, report
 from mitex.methods.geometric.task import GeometricTask, betas, inputs, learning_rate
@@ -82,9 +82,9 @@ def fit(
     run.check_inputs(source)
     keep_freed_memory()
     meshes, reports = training_meshes(shape, start, config, run.control, keep=run.folder is not None)
-    coarse, own = None, None
+    coarse, relief = None, None
     if config.first_level:
-        start, meshes, own, coarse = _from_level(config.first_level, start, meshes)
+        start, meshes, relief, coarse = _from_level(start, meshes, config)
     hierarchy, fields = Hierarchy.of(start, config.levels), []
     if vectors is not None:
         placed = [
@@ -93,11 +93,7 @@ def fit(
         ]
         fields = level_fields(shape, vectors, placed)
         hierarchy = hierarchy.directed(fields, config.symmetric)
-    drawn: list[np.ndarray] = []
-    if coarse is not None:
-        draw = coarse.on(start)
-        drawn = [draw(config.seed + k) for k in range(DRAWN)]
-    task = GeometricTask(config, hierarchy, torch.tensor(start.vertices), meshes, shape, source, own, drawn)
+    task = GeometricTask(config, hierarchy, torch.tensor(start.vertices), meshes, shape, source, relief)
     origin = {key: getattr(config, key) for key in ("levels", "noise", "remeasure", "first_level")}
     origin |= {"field": field_kind(vectors, config.symmetric), "fit": [vars(r) for r in reports]}
     origin |= {"coarse": None if coarse is None else vars(coarse)}
@@ -117,19 +113,22 @@ def fit(
 
 
 def _from_level(
-    level: int, template: Mesh, meshes: list[torch.Tensor]
-) -> tuple[Mesh, list[torch.Tensor], np.ndarray, CoarseRelief]:
-    """What a training that begins on a higher level has for its template and training meshes.
+    template: Mesh, meshes: list[torch.Tensor], config: GeometricConfig
+) -> tuple[Mesh, list[torch.Tensor], Start, CoarseRelief]:
+    """What a training that begins on `first_level` has for its template and training meshes.
 
     Returns:
-        The training mesh of that level without its relief, mean edge 1, those from that level on, the
-        coarse part of the relief as displacements (V, 3), and its distribution.
+        The training mesh of that level without its relief, mean edge 1, those from that level on, what the
+        training begins with, and the distribution of the coarse part of the relief.
     """
+    level = config.first_level
     finest = Hierarchy.of(template, level + 1).meshes[-1]
-    base, relief, coarse = split(finest.with_vertices(meshes[level].numpy()))
+    base, own, coarse = split(finest.with_vertices(meshes[level].numpy()))
     unit = float(base.edge_lengths.mean())
-    scaled = [vertices / unit for vertices in meshes[level:]]
-    return base.with_vertices(base.vertices / unit), scaled, relief / unit, coarse
+    base = base.with_vertices(base.vertices / unit)
+    draw = coarse.on(base)
+    start = Start(own / unit, [draw(config.seed + k) for k in range(DRAWN)])
+    return base, [vertices / unit for vertices in meshes[level:]], start, coarse
 
 
 def field_kind(field: np.ndarray | None, symmetric: bool) -> str | None:

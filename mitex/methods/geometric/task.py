@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -11,6 +10,7 @@ import torch
 
 from mitex.cache import content_key
 from mitex.mesh import Mesh
+from mitex.methods.geometric.coarse_relief import Start
 from mitex.methods.geometric.config import MAX_LEVELS, GeometricConfig
 from mitex.methods.geometric.features import face_features
 from mitex.methods.geometric.gan import adversarial_loss, critic_loss, generate
@@ -37,9 +37,7 @@ class GeometricTask:
         meshes: vertices of the training mesh of each level.
         reference: what they were fitted to; previews show it.
         source: what the training is of, see `inputs`.
-        relief: (V, 3) the coarse part of the reference's relief on the template, if the training begins with
-            one, see `coarse_relief`.
-        drawn: vertices (V, 3) of the template with others like it, from which random samples start then.
+        relief: coarse reliefs on the template, if the training begins with such, see `coarse_relief`.
 
     Attributes:
         generators, critics: a network for each possible level, so that a resumed run may go on to more.
@@ -56,8 +54,7 @@ class GeometricTask:
         meshes: list[torch.Tensor],
         reference: Mesh,
         source: dict[str, str],
-        relief: np.ndarray | None = None,
-        drawn: Sequence[np.ndarray] = (),
+        relief: Start | None = None,
     ) -> None:
         self.device = config.device
         self.config, self.hierarchy = config, hierarchy.to(self.device)
@@ -73,9 +70,9 @@ class GeometricTask:
             self.fixed = self.first_noise = self._noise(template, rng)
             self.own, self.starts = self.template, [self.template]
         else:
-            self.fixed, self.first_noise = torch.tensor(relief).float().to(self.device), 0.0
+            self.fixed, self.first_noise = torch.tensor(relief.own).float().to(self.device), 0.0
             self.own = self.template + self.fixed
-            self.starts = [torch.tensor(vertices).float().to(self.device) for vertices in drawn]
+            self.starts = [torch.tensor(vertices).float().to(self.device) for vertices in relief.drawn]
         self.optimizers = [Adam(critic.parameters, betas(config)) for critic in self.critics]
         with torch.no_grad():
             graphs = self.hierarchy.graphs

@@ -166,12 +166,13 @@ class GeometricTexture:
             end_level: as in `apply`.
         """
         rollout = self.rollout(self.template, 0, end_level)
-        fixed, vertices = self.fixed, None
+        noise, vertices = rollout.noise(seed), self.template.vertices
+        noise[:start_level] = [torch.zeros(())] * len(noise[:start_level])
         if self.coarse is not None:
-            own = self.template.vertices + self.fixed.numpy()
-            fixed, vertices = torch.zeros(()), own if start_level else self.coarse.on(self.template)(seed)
-        reconstruction = [fixed, *[torch.zeros(())] * (len(rollout.generators) - 1)]
-        noise = [*reconstruction[:start_level], *rollout.noise(seed)[start_level:]]
+            own = vertices + self.fixed.numpy()
+            vertices = own if start_level else self.coarse.on(self.template)(seed)
+        elif start_level:
+            noise[0] = self.fixed
         *_, result = rollout.run(noise, vertices)
         return result
 

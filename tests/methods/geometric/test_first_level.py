@@ -1,5 +1,6 @@
 """A training that begins on a higher level, from the coarse part of the relief."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -69,8 +70,6 @@ def test_variations_of_the_reference(run):
 
 def test_the_reference_is_learned_from_its_own_coarse_relief(run):
     """Longer, the rebuilt mesh comes nearer to the training mesh; metrics tell."""
-    import json
-
     folder, _ = run
     longer = folder.parent / "longer"
     geometric.fit(bumpy(), longer, set=[*FINE, "level_steps=40", "steps=40"])

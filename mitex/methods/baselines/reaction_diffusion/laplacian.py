@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from mitex.mesh import Mesh
-from mitex.mesh.cotangents import cotangent_weights
+from mitex.mesh.cotangents import cotangent_weights, vertex_areas
 
 LARGEST = 8.0  # share of a cell that a rate of 1 takes from it, at most; pixels: 4
 
@@ -29,7 +29,7 @@ def mesh_laplacian(mesh: Mesh) -> csr_array:
     """
     count = len(mesh.vertices)
     pairs, weights = cotangent_weights(mesh)
-    area = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas.astype(np.float64) / 3, 3), count)
+    area = vertex_areas(mesh)
     mean = area.sum() / count
     both = np.concatenate([pairs, pairs[:, ::-1]])
     values = np.tile(np.maximum(weights, 0.0), 2) * (mean / np.maximum(area, 1e-12 * mean))[both[:, 0]]

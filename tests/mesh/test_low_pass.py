@@ -5,7 +5,7 @@ import pytest
 from numpy.polynomial import Legendre
 
 from mitex.mesh import Mesh, icosphere
-from mitex.methods.geometric.low_pass import blurred, low_pass
+from mitex.mesh.low_pass import blurred, low_pass
 
 BALL = icosphere(24)
 

@@ -1,4 +1,4 @@
-"""Low-pass filters on meshes: the reference without what a coarse mesh could not show."""
+"""Low-pass filters on meshes: of what vertices have, and of their places."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from scipy.sparse import coo_array, diags_array
 
-from mitex.mesh import Mesh
 from mitex.mesh.connection import solver
-from mitex.mesh.cotangents import cotangent_weights
+from mitex.mesh.cotangents import cotangent_weights, vertex_areas
+from mitex.mesh.mesh import Mesh
 
 LEAST = 1e-12  # area around a vertex, at least, relative to the largest
 
@@ -54,7 +54,5 @@ def blurred(mesh: Mesh, width: float) -> Mesh:
 
 
 def _areas(mesh: Mesh) -> np.ndarray:
-    """(V,) float64: a third of the area of the faces around each vertex."""
-    thirds = np.repeat(mesh.face_areas.astype(np.float64) / 3, 3)
-    area = np.bincount(mesh.faces.ravel(), thirds, len(mesh.vertices))
+    area = vertex_areas(mesh)
     return np.maximum(area, LEAST * area.max())
