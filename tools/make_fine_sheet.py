@@ -4,8 +4,8 @@ usage: python tools/make_fine_sheet.py RUNS FINE[,...] REFERENCE ...
 
 geometric-blur.jpg shows references behind the low-pass filter of each level of training meshes. RUNS holds a
 finished run of `mitex fit geometric --preset fine` for each reference of FINE: geometric-coarse.jpg has a row
-for each, with the reference, the coarse part of its relief, what the generators complete it to, a coarse
-relief that is drawn, and what they complete that to.
+for each, with the reference, the coarse part of its relief, what the generators complete it to, the coarse part
+laid anew, and what they complete that to.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def blurs(names: list[str]) -> np.ndarray:
 
 
 def completions(runs: Path, names: list[str]) -> np.ndarray:
-    """A row for each run: reference, coarse part and its completion, a drawn one and its completion."""
+    """A row for each run: reference, coarse part and its completion, one laid anew and its completion."""
     cells, labels = [], []
     for name in names:
         texture = GeometricTexture.load(runs / name)
@@ -49,8 +49,8 @@ def completions(runs: Path, names: list[str]) -> np.ndarray:
             name: find_reference(name),
             "coarse part": base.with_vertices(base.vertices + texture.fixed.numpy()),
             "completed": texture.generate(start_level=texture.levels),
-            "drawn": base.with_vertices(coarse.on(base)(0)),
-            "drawn, completed": texture.generate(0),
+            "laid anew": base.with_vertices(coarse.on(base)(0)),
+            "anew, completed": texture.generate(0),
         }
         cells += [picture(mesh) for mesh in shapes.values()]
         labels += list(shapes)

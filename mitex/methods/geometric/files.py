@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import fields as attributes
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
 
 from mitex.mesh import Mesh
 from mitex.mesh.topology import face_edges
 from mitex.methods.geometric import METHOD
-from mitex.methods.geometric.coarse_relief import WIDTHS, CoarseRelief
 from mitex.methods.geometric.config import MAX_LEVELS
 from mitex.methods.geometric.model import network
 from mitex.methods.geometric.network import FaceNetwork
@@ -68,9 +65,8 @@ def load(
             raise ValueError("noise that is no number, or features of another kind")
         # Models of before have none of the keys that are taken by `get`.
         levels, kind, first = int(about["levels"]), about.get("field"), int(about.get("first_level", 0))
-        coarse = about.get("coarse")
-        if not 0 <= first < MAX_LEVELS or (coarse is not None and not _sound(coarse)):
-            raise ValueError("levels, or a coarse relief, of another kind")
+        if not 0 <= first < MAX_LEVELS:
+            raise ValueError("levels that cannot be")
         if kind not in (None, VECTOR, LINE):
             raise ValueError("a field of another kind")
         fields = [tensors[f"field/{level}"] for level in range(levels)] if kind else []
@@ -89,14 +85,6 @@ def _vertex_counts(mesh: Mesh, levels: int) -> list[int]:
         counts.append(vertices)
         vertices, edges, faces = vertices + edges, 2 * edges + 3 * faces, 4 * faces
     return counts
-
-
-def _sound(coarse: Any) -> bool:
-    """Whether these are the finite attributes of a `CoarseRelief`."""
-    names = {attribute.name for attribute in attributes(CoarseRelief)}
-    if set(coarse) != names or len(coarse["bands"]) != len(WIDTHS) - 1:
-        return False
-    return all(math.isfinite(float(value)) for key in names for value in np.atleast_1d(coarse[key]))
 
 
 def _generators(tensors: Mapping[str, torch.Tensor], levels: range, directed: bool) -> list[FaceNetwork]:

@@ -27,6 +27,7 @@ from mitex.methods.geometric.template import find_template, normalised
 from mitex.methods.geometric.texture import GeometricTexture
 from mitex.methods.geometric.training_meshes import fit_level
 from mitex.paths import cache_dir
+from mitex.progress import counted, listening
 from mitex.runtime import keep_freed_memory
 from mitex.training.control import ALONE, Control
 from mitex.training.fit import Run
@@ -34,7 +35,7 @@ from mitex.training.optim import Adam
 from mitex.training.settings import RunOptions
 
 VERSION = 1  # of the training meshes in the cache
-DRAWN = 48  # coarse reliefs that samples of a training start from
+LAID = 24  # coarse reliefs that samples of a training start from
 log = logging.getLogger(__name__)
 
 
@@ -82,9 +83,9 @@ def fit(
     run.check_inputs(source)
     keep_freed_memory()
     meshes, reports = training_meshes(shape, start, config, run.control, keep=run.folder is not None)
-    coarse, relief = None, None
+    relief = None
     if config.first_level:
-        start, meshes, relief, coarse = _from_level(start, meshes, config)
+        start, meshes, relief = _from_level(start, meshes, config, run.control)
     hierarchy, fields = Hierarchy.of(start, config.levels), []
     if vectors is not None:
         placed = [
@@ -96,7 +97,6 @@ def fit(
     task = GeometricTask(config, hierarchy, torch.tensor(start.vertices), meshes, shape, source, relief)
     origin = {key: getattr(config, key) for key in ("levels", "noise", "remeasure", "first_level")}
     origin |= {"field": field_kind(vectors, config.symmetric), "fit": [vars(r) for r in reports]}
-    origin |= {"coarse": None if coarse is None else vars(coarse)}
     return run.train(
         task,
         shape.name,
@@ -113,22 +113,27 @@ def fit(
 
 
 def _from_level(
-    template: Mesh, meshes: list[torch.Tensor], config: GeometricConfig
-) -> tuple[Mesh, list[torch.Tensor], Start, CoarseRelief]:
+    template: Mesh, meshes: list[torch.Tensor], config: GeometricConfig, control: Control
+) -> tuple[Mesh, list[torch.Tensor], Start]:
     """What a training that begins on `first_level` has for its template and training meshes.
 
     Returns:
-        The training mesh of that level without its relief, mean edge 1, those from that level on, what the
-        training begins with, and the distribution of the coarse part of the relief.
+        The training mesh of that level without its relief, mean edge 1, those from that level on, and what
+        the training begins with.
     """
     level = config.first_level
     finest = Hierarchy.of(template, level + 1).meshes[-1]
-    base, own, coarse = split(finest.with_vertices(meshes[level].numpy()))
-    unit = float(base.edge_lengths.mean())
-    base = base.with_vertices(base.vertices / unit)
-    draw = coarse.on(base)
-    start = Start(own / unit, [draw(config.seed + k) for k in range(DRAWN)])
-    return base, [vertices / unit for vertices in meshes[level:]], start, coarse
+    whole = split(finest.with_vertices(meshes[level].numpy()))
+    unit = float(whole.base.edge_lengths.mean())
+    coarse = CoarseRelief(whole.base.with_vertices(whole.base.vertices / unit), whole.heights / unit)
+    lay = coarse.on(coarse.base)
+    laid = []
+    for k in counted("laying coarse reliefs", range(LAID), LAID):
+        control.check()
+        with listening(None):
+            laid.append(lay(config.seed + k))
+    start = Start(coarse.displacements, laid)
+    return coarse.base, [vertices / unit for vertices in meshes[level:]], start
 
 
 def field_kind(field: np.ndarray | None, symmetric: bool) -> str | None:

@@ -72,7 +72,7 @@ class GeometricTask:
         else:
             self.fixed, self.first_noise = torch.tensor(relief.own).float().to(self.device), 0.0
             self.own = self.template + self.fixed
-            self.starts = [torch.tensor(vertices).float().to(self.device) for vertices in relief.drawn]
+            self.starts = [torch.tensor(vertices).float().to(self.device) for vertices in relief.laid]
         self.optimizers = [Adam(critic.parameters, betas(config)) for critic in self.critics]
         with torch.no_grad():
             graphs = self.hierarchy.graphs

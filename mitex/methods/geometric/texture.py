@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, get_args
 
@@ -13,6 +14,7 @@ import torch
 
 from mitex.asset import Asset, clay
 from mitex.errors import ConfigError
+from mitex.geometry.vectors import dot
 from mitex.mesh import Mesh, subdivide_midpoint
 from mitex.mesh.fields import vector_field
 from mitex.mesh.untangling import untangled
@@ -44,8 +46,8 @@ class GeometricTexture:
         template: the mesh that training started from, mean edge 1.
         fixed: (V, 3) the noise on it from which the reference comes, or the coarse part of its relief.
         about: how it was made; `levels`, `noise` and `remeasure` at least. `field` is "vector" if the relief
-            follows a field, "line" if a vector of it and its opposite are the same. `coarse` has the
-            attributes of its `CoarseRelief` if growth begins with one.
+            follows a field, "line" if a vector of it and its opposite are the same. `first_level` is above 0
+            if growth begins with the coarse part of the relief.
         fields: of such a relief, (V, 3) unit vectors or zero on the template of each level.
     """
 
@@ -60,11 +62,12 @@ class GeometricTexture:
         """Number of generators."""
         return len(self.generators)
 
-    @property
+    @cached_property
     def coarse(self) -> CoarseRelief | None:
         """What the first generator completes, if it has learned to."""
-        values = self.about.get("coarse")
-        return None if values is None else CoarseRelief(**values)
+        if not self.about.get("first_level"):
+            return None
+        return CoarseRelief(self.template, dot(self.fixed.numpy().astype(np.float64), self.template.normals))
 
     @property
     def first(self) -> int:
@@ -114,9 +117,9 @@ class GeometricTexture:
                 `mitex.mesh.fields`.
             placement: where bumps and dents go that are larger than a face of the first level: "even" spreads
                 them as densely as on the reference (`geometric.placement`) if a relief has such and follows
-                no field, or draws its coarse part (`geometric.coarse_relief`) if it begins with one; dents
-                that would meet in thin walls are drawn back (`geometric.thickness`). "none" leaves all to
-                the generators, as published.
+                no field, or lays its coarse part anew (`geometric.coarse_relief`) if it begins with one;
+                dents that would meet in thin walls are drawn back (`geometric.thickness`). "none" leaves all
+                to the generators, as published.
 
         Returns:
             The displaced mesh in light grey, in the mesh's own units and place; UVs are interpolated.

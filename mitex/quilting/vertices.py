@@ -1,0 +1,109 @@
+"""Quilting from vertices to vertices: patches of what those of one mesh have, and another mesh's to cover."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import LinearNDInterpolator
+
+from mitex.mesh import Mesh
+from mitex.mesh.frames import vertex_directions
+from mitex.quilting.flattening import Flattening
+from mitex.quilting.matching import ArraySource
+from mitex.quilting.target import REACH
+
+FEWEST = 3  # points of a triangle
+
+
+class VertexTarget:
+    """The vertices of a mesh as a `Target`; those without faces stay as they are.
+
+    Args:
+        mesh: V vertices, with edges that are short beside a patch.
+        patch: side of a patch [texels].
+        gap: between texels of a patch, on the surface [mesh units].
+    """
+
+    def __init__(self, mesh: Mesh, patch: int, gap: float) -> None:
+        self.mesh, self.patch, self.gap = mesh, patch, gap
+        self.flattening = Flattening(mesh, vertex_directions(mesh), REACH * patch * gap)
+        self.vertices, corner = np.unique(mesh.faces, return_index=True)
+        self.face, self.corner = np.divmod(corner, 3)
+        self.number = np.full(len(mesh.vertices), -1)
+        self.number[self.vertices] = np.arange(len(self.vertices))
+
+    @property
+    def count(self) -> int:
+        """N, how many vertices have faces."""
+        return len(self.vertices)
+
+    @property
+    def area(self) -> float:
+        """See `Target`."""
+        return float(self.mesh.face_areas.sum()) / (self.gap**2 * max(self.count, 1))
+
+    def flat(self, vertex: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The surroundings of one of the N in the plane, somewhat farther than a patch reaches.
+
+        Returns:
+            (M,) of the N, (M, 2) columns and rows from it [texels], and (M,) angles as of `Target.around`.
+        """
+        weights = np.eye(3)[self.corner[vertex]]
+        faces, corners = self.flattening(int(self.face[vertex]), weights)
+        around, first = np.unique(self.mesh.faces[faces], return_index=True)
+        place = corners.reshape(-1, 2)[first] * np.array([1.0, -1.0]) / self.gap
+        return self.number[around], place, self.flattening.turns(faces, corners)[first // 3]
+
+    def around(self, texel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """See `Target`."""
+        vertices, place, angle = self.flat(texel)
+        half = 0.5 * self.patch
+        inside = (np.abs(place + np.finfo(np.float32).eps) < half).all(1)
+        return vertices[inside], place[inside] + (half - 0.5), angle[inside]
+
+    def in_order(self) -> np.ndarray:
+        """(N,) those first that are near to where their part of the mesh begins."""
+        return np.argsort(self.flattening.distances()[self.face], kind="stable")
+
+    def map(self, values: np.ndarray) -> np.ndarray:
+        """(V, ...) with the values (N, ...), and zeros where there are no faces."""
+        whole = np.zeros((len(self.mesh.vertices), *values.shape[1:]), values.dtype)
+        whole[self.vertices] = values
+        return whole
+
+
+def vertex_patches(
+    mesh: Mesh, values: np.ndarray, size: int, gap: float, places: int, turns: int, rng: np.random.Generator
+) -> ArraySource:
+    """Patches of what vertices have, around some of them, in several directions.
+
+    Args:
+        mesh: V vertices.
+        values: (V, C).
+        size: side of a patch [texels].
+        gap: between texels [mesh units].
+        places: vertices to take patches around, at most.
+        turns: patches around each, turned by equal angles from a random one on.
+        rng: of places and angles.
+
+    Returns:
+        The patches that lie on the mesh entirely, possibly none; their centres are in texels.
+    """
+    target = VertexTarget(mesh, size, gap)
+    middle = np.arange(size) - 0.5 * (size - 1)
+    grid = np.stack(np.meshgrid(middle, middle), axis=2)
+    squares, centres = [], []
+    for vertex in rng.permutation(target.count)[:places]:
+        vertices, place, _ = target.flat(int(vertex))
+        angles = rng.uniform(0, 2 * np.pi) + 2 * np.pi * np.arange(turns) / turns
+        if len(vertices) <= FEWEST:
+            continue
+        between = LinearNDInterpolator(place, values[target.vertices[vertices]])
+        for cos, sin in zip(np.cos(angles), np.sin(angles), strict=True):
+            square = between(grid @ np.array([[cos, sin], [-sin, cos]]))
+            if np.isfinite(square).all():
+                squares.append(square)
+                centres.append(mesh.vertices[target.vertices[vertex]] / gap)
+    shape = (len(squares), size, size, values.shape[1])
+    return ArraySource(
+        np.reshape(squares, shape).astype(np.float32), np.reshape(centres, (-1, 3)), float(size)
+    )
