@@ -4,7 +4,7 @@ usage: python tools/make_fine_sheet.py RUNS FINE[,...] REFERENCE ...
 
 geometric-blur.jpg shows references behind the low-pass filter of each level of training meshes. RUNS holds a
 finished run of `mitex fit geometric --preset fine` for each reference of FINE: geometric-coarse.jpg has a row
-for each, with the reference, the coarse part of its relief, what the generators complete it to, the coarse part
+for each, with the reference, the coarse part of its relief, what the generators complete it to, that part
 laid anew, and what they complete that to.
 """
 

@@ -12,6 +12,7 @@ from mitex.quilting.matching import ArraySource
 from mitex.quilting.target import REACH
 
 FEWEST = 3  # points of a triangle
+BEYOND = 2  # how much farther to look, so that vertices lie around all of a patch [mean edges]
 
 
 class VertexTarget:
@@ -25,7 +26,8 @@ class VertexTarget:
 
     def __init__(self, mesh: Mesh, patch: int, gap: float) -> None:
         self.mesh, self.patch, self.gap = mesh, patch, gap
-        self.flattening = Flattening(mesh, vertex_directions(mesh), REACH * patch * gap)
+        reach = REACH * patch * gap + BEYOND * float(mesh.edge_lengths.mean())
+        self.flattening = Flattening(mesh, vertex_directions(mesh), reach)
         self.vertices, corner = np.unique(mesh.faces, return_index=True)
         self.face, self.corner = np.divmod(corner, 3)
         self.number = np.full(len(mesh.vertices), -1)

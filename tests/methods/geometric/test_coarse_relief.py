@@ -1,18 +1,25 @@
-"""The coarse part of a relief: what is measured, and what is drawn like it."""
-
-from itertools import pairwise
+"""The coarse part of a relief: what of it is taken, and what is laid like it."""
 
 import numpy as np
 import pytest
-from numpy.polynomial import Legendre
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from mitex.errors import ConfigError
 from mitex.geometry.vectors import unit
-from mitex.mesh import Mesh, icosphere
-from mitex.methods.geometric.coarse_relief import WIDTHS, CoarseRelief, split
+from mitex.mesh import Mesh, icosphere, torus
+from mitex.methods.geometric.coarse_relief import FINE, PATCH, RATE, WIDE, CoarseRelief, split
 
 BALL = icosphere(16)
 EDGE = float(BALL.edge_lengths.mean())
+TORUS = torus(64, 28, tube=0.45)
+
+
+@pytest.fixture(autouse=True)
+def few_patches(monkeypatch):
+    """Which take seconds."""
+    monkeypatch.setattr("mitex.methods.geometric.coarse_relief.PLACES", 100)
 
 
 def with_heights(heights: np.ndarray) -> Mesh:
@@ -29,68 +36,109 @@ def bumps(side: float, count: int = 40, width: float = 3.0) -> Mesh:
     return with_heights(side * np.exp(-((away / (0.5 * width * EDGE)) ** 2)))
 
 
-def waves(cycles: float) -> Mesh:
-    """Waves of random directions, so many around the ball."""
+def waves(length: float, count: int = 80) -> Mesh:
+    """Waves so many edges long, of random directions."""
     rng = np.random.default_rng(1)
-    ways = cycles * unit(rng.normal(size=(80, 3)))
-    return with_heights(np.cos(BALL.vertices @ ways.T + rng.uniform(0, 6.3, 80)).sum(1) / np.sqrt(40))
+    ways = 2 * np.pi / (length * EDGE) * unit(rng.normal(size=(count, 3)))
+    phases = rng.uniform(0, 2 * np.pi, count)
+    return with_heights(np.cos(BALL.vertices @ ways.T + phases).sum(1) / np.sqrt(0.5 * count))
+
+
+def stripes(length: float) -> Mesh:
+    """Circles of latitude, so many edges from one to the next."""
+    return with_heights(np.cos(2 * np.pi / (length * EDGE) * np.arcsin(np.clip(BALL.vertices[:, 1], -1, 1))))
+
+
+def laid(coarse: CoarseRelief, mesh: Mesh, seed: int = 0) -> np.ndarray:
+    """Heights of what is laid on a mesh [mean edges]."""
+    moves = coarse.on(mesh)(seed) - mesh.vertices
+    return (moves * mesh.normals).sum(1) / mesh.edge_lengths.mean()
+
+
+def islands(mesh: Mesh, heights: np.ndarray) -> int:
+    """How many parts of a mesh are higher than half of the highest hundredth."""
+    high = heights > 0.5 * np.quantile(heights, 0.99)
+    i, j = mesh.edges.rows, mesh.edges.indices
+    both = high[i] & high[j]
+    graph = coo_array((np.ones(both.sum()), (i[both], j[both])), shape=(len(high),) * 2)
+    label = connected_components(graph, directed=False)[1]
+    return len(np.unique(label[high]))
 
 
 def test_a_ball_has_no_relief():
-    base, relief, coarse = split(BALL)
-    assert np.allclose(base.vertices, BALL.vertices, atol=2e-3)
-    assert np.abs(relief).max() < 0.05 * EDGE and coarse.spread < 0.02
+    coarse = split(BALL)
+    assert np.allclose(coarse.base.vertices, BALL.vertices, atol=2e-3)
+    assert np.abs(coarse.heights).max() < 0.05 * EDGE
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_bumps_and_dents_are_counted(side):
-    base, relief, coarse = split(bumps(side))
-    assert coarse.side == side and coarse.faces == len(BALL.faces) / 40
-    assert np.linalg.norm(base.vertices, axis=1).std() < 0.1 * EDGE
-    assert 0.05 < coarse.spread < 0.5
-    assert np.allclose(np.cross(relief, base.normals), 0, atol=1e-6)  # along the normals
+def test_the_relief_is_taken_off(side):
+    coarse = split(bumps(side))
+    assert np.linalg.norm(coarse.base.vertices, axis=1).std() < 0.1 * EDGE
+    assert 0.05 < coarse.heights.std() / EDGE < 0.5 and abs(coarse.heights.mean()) < 1e-6
+    assert np.sign(np.mean(coarse.heights**3)) == side
+    assert np.allclose(np.cross(coarse.displacements, coarse.base.normals), 0, atol=1e-6)
+    assert np.allclose((coarse.displacements * coarse.base.normals).sum(1), coarse.heights, atol=1e-6)
 
 
-def test_waves_are_no_bumps():
-    assert split(waves(20))[2].faces == 0
+def spread(length: float) -> float:
+    mesh = waves(length)
+    return float(split(mesh).heights.std() / mesh.edge_lengths.mean())
 
 
 def test_only_the_band_between_both_filters_counts():
-    """Waves in it, half as long as the finest filter keeps, and much longer than the widest one lets by."""
-    lengths = 7, 2.2 * WIDTHS[0], 12 * WIDTHS[-1]
-    middle, short, long = (split(waves(2 * np.pi / (length * EDGE)))[2].spread for length in lengths)
+    """Waves in it, half as long as the fine filter keeps, and much longer than the wide one lets by."""
+    middle, short, long = map(spread, (7, 2.2 * FINE, 12 * WIDE))
     assert middle > 1.9 * short and middle > 9 * long
 
 
-def test_waves_are_in_the_band_of_their_length():
-    """Spherical harmonics of degree n; between two filters, the length pi sqrt(2 fine wide) passes best."""
-    for band, (fine, wide) in enumerate(pairwise(WIDTHS)):
-        degree = round(2 * np.pi / (np.pi * np.sqrt(2 * fine * wide) * EDGE) - 0.5)
-        bands = split(with_heights(Legendre.basis(degree)(BALL.vertices[:, 1])))[2].bands
-        assert np.argmax(bands) == band
+@pytest.mark.parametrize("mesh", [BALL, TORUS], ids=["ball", "torus"])
+@pytest.mark.parametrize("side", [1, -1])
+def test_bumps_and_dents_are_as_many_on_an_area(side, mesh):
+    coarse = split(bumps(side))
+    heights = laid(coarse, mesh)
+    assert (
+        heights.std() == pytest.approx(coarse.heights.std() / EDGE, rel=0.02) and abs(heights.mean()) < 1e-3
+    )
+    own, others = islands(coarse.base, side * coarse.heights), islands(mesh, side * heights)
+    assert len(mesh.faces) / others == pytest.approx(len(BALL.faces) / own, rel=0.15)
 
 
-SHARES = (0.5, 0.4, 0.2, 0.1)
+def test_stripes_run_on():
+    """Along the steepest slope they rise and fall, across it hardly; random waves do both."""
+    shares = []
+    for mesh in (stripes(8), waves(8)):
+        heights = laid(split(mesh), TORUS)
+        crosses = np.asarray(TORUS.face_crosses, float)
+        points = TORUS.vertices[TORUS.faces].astype(float)
+        sides = np.roll(points, 1, axis=1) - np.roll(points, -1, axis=1)
+        turned = np.cross(crosses[:, None], sides) / (crosses**2).sum(1)[:, None, None]
+        slopes = (turned * heights[TORUS.faces][..., None]).sum(1)
+        # Of the slopes around each face, those along the strongest direction.
+        _, near = KDTree(points.mean(1)).query(points.mean(1), k=60)
+        values = np.linalg.eigvalsh(slopes[near].swapaxes(1, 2) @ slopes[near])
+        shares.append((values[:, 2] / values.sum(1)).mean())
+    assert shares[0] > 0.8 and shares[0] > shares[1] + 0.1
 
 
-@pytest.mark.parametrize(
-    "coarse", [CoarseRelief(0.2, SHARES), CoarseRelief(0.3, SHARES, 80, 1), CoarseRelief(0.3, SHARES, 80, -1)]
-)
-def test_what_is_drawn_is_like_what_was_measured(coarse):
-    draw = coarse.on(BALL)
-    heights = ((draw(0) - BALL.vertices) * BALL.normals).sum(1) / EDGE
-    assert heights.std() == pytest.approx(coarse.spread, rel=1e-3) and abs(heights.mean()) < 1e-3
-    skewness = np.mean(heights**3) / heights.std() ** 3
-    assert skewness * coarse.side > 0.5 if coarse.faces else abs(skewness) < 0.3
+def test_seeds_give_others():
+    draw = split(waves(8)).on(BALL)
     assert np.array_equal(draw(0), draw(0)) and not np.allclose(draw(0), draw(1))
-    again = split(BALL.with_vertices(draw(0)))[2]
-    assert bool(again.faces) == bool(coarse.faces)
-    assert np.argsort(again.bands)[:2].tolist() == [3, 2]
-    if coarse.faces:
-        assert again.faces == pytest.approx(coarse.faces, rel=0.02) and again.side == coarse.side
 
 
-def test_what_is_drawn_has_the_size_of_edges():
-    coarse = CoarseRelief(0.3, SHARES)
-    large = BALL.with_vertices(5 * BALL.vertices)
-    assert np.allclose(coarse.on(large)(2), 5 * coarse.on(BALL)(2), atol=1e-4)
+def test_what_is_laid_has_the_size_of_edges():
+    coarse = split(waves(8))
+    large = BALL.with_vertices(4 * BALL.vertices)  # whose choices rounding does not change
+    assert np.allclose(coarse.on(large)(2), 4 * coarse.on(BALL)(2), atol=1e-4)
+
+
+def test_patches_are_smaller_on_a_small_reference():
+    assert split(waves(8)).patches.length == PATCH * RATE
+    small = icosphere(6)
+    assert 8 <= CoarseRelief(small, np.zeros(len(small.vertices))).patches.length < PATCH * RATE
+
+
+def test_a_reference_without_room_for_a_patch_is_refused():
+    tiny = icosphere(1)
+    with pytest.raises(ConfigError, match="no square 4 edges wide lies flat on .*; begin on a higher level"):
+        _ = CoarseRelief(tiny, np.zeros(len(tiny.vertices))).patches
