@@ -22,12 +22,14 @@ class VertexTarget:
         mesh: V vertices, with edges that are short beside a patch.
         patch: side of a patch [texels].
         gap: between texels of a patch, on the surface [mesh units].
+        directions: (V, 3) where a patch's right shall point; None for `vertex_directions`.
     """
 
-    def __init__(self, mesh: Mesh, patch: int, gap: float) -> None:
+    def __init__(self, mesh: Mesh, patch: int, gap: float, directions: np.ndarray | None = None) -> None:
         self.mesh, self.patch, self.gap = mesh, patch, gap
         reach = REACH * patch * gap + BEYOND * float(mesh.edge_lengths.mean())
-        self.flattening = Flattening(mesh, vertex_directions(mesh), reach)
+        right = vertex_directions(mesh) if directions is None else directions
+        self.flattening = Flattening(mesh, right, reach)
         self.vertices, corner = np.unique(mesh.faces, return_index=True)
         self.face, self.corner = np.divmod(corner, 3)
         self.number = np.full(len(mesh.vertices), -1)
@@ -74,7 +76,14 @@ class VertexTarget:
 
 
 def vertex_patches(
-    mesh: Mesh, values: np.ndarray, size: int, gap: float, places: int, turns: int, rng: np.random.Generator
+    mesh: Mesh,
+    values: np.ndarray,
+    size: int,
+    gap: float,
+    places: int,
+    turns: int,
+    rng: np.random.Generator,
+    directions: np.ndarray | None = None,
 ) -> ArraySource:
     """Patches of what vertices have, around some of them, in several directions.
 
@@ -84,21 +93,23 @@ def vertex_patches(
         size: side of a patch [texels].
         gap: between texels [mesh units].
         places: vertices to take patches around, at most.
-        turns: patches around each, turned by equal angles from a random one on.
-        rng: of places and angles.
+        turns: patches around each, turned by equal angles, from `directions` on.
+        rng: of places and, without directions, of the first angles.
+        directions: (V, 3) where a patch's right shall point; None for anywhere.
 
     Returns:
         The patches that lie on the mesh entirely, possibly none; their centres are in texels.
     """
-    target = VertexTarget(mesh, size, gap)
+    target = VertexTarget(mesh, size, gap, directions)
     middle = np.arange(size) - 0.5 * (size - 1)
     grid = np.stack(np.meshgrid(middle, middle), axis=2)
     squares, centres = [], []
     for vertex in rng.permutation(target.count)[:places]:
         vertices, place, _ = target.flat(int(vertex))
-        angles = rng.uniform(0, 2 * np.pi) + 2 * np.pi * np.arange(turns) / turns
         if len(vertices) <= FEWEST:
             continue
+        first = rng.uniform(0, 2 * np.pi) if directions is None else 0.0
+        angles = first + 2 * np.pi * np.arange(turns) / turns
         between = LinearNDInterpolator(place, values[target.vertices[vertices]])
         for cos, sin in zip(np.cos(angles), np.sin(angles), strict=True):
             square = between(grid @ np.array([[cos, sin], [-sin, cos]]))

@@ -4,8 +4,8 @@ Coarse levels cannot show features that are narrower than about four of their ed
 instead is arbitrary. So generators may begin on the first level that resolves the features (`first_level`).
 Something else has to say then where each of them goes, and which way it runs: the coarse part of the relief,
 which lies between two low-pass filters. The first generator learns to complete that of the reference. For
-other meshes it is quilted: patches of it, turned in many directions, are joined where they fit (Efros and
-Freeman 2001, on the surface).
+other meshes it is quilted: patches of it, turned in many directions, or along a field, are joined where they
+fit (Efros and Freeman 2001, on the surface).
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 from mitex.errors import ConfigError
 from mitex.geometry.vectors import dot
 from mitex.mesh import Mesh
+from mitex.mesh.frames import vertex_directions
 from mitex.mesh.low_pass import blurred, low_pass
 from mitex.quilting.matching import ArraySource
 from mitex.quilting.surface import quilt_on
@@ -39,10 +40,14 @@ class CoarseRelief:
     Attributes:
         base: V vertices, the reference without its relief.
         heights: (V,) of the coarse part above it [mesh units].
+        field: (V, 3) the vectors that it follows; None for a relief without a direction.
+        symmetric: whether a vector and its opposite are the same.
     """
 
     base: Mesh
     heights: np.ndarray
+    field: np.ndarray | None = None
+    symmetric: bool = False
 
     @property
     def displacements(self) -> np.ndarray:
@@ -61,7 +66,9 @@ class CoarseRelief:
         size = 8 * max(round(side / edge * RATE / 8), 1)
         heights = (self.heights / edge)[:, None]
         rng = np.random.default_rng(0)
-        patches = vertex_patches(self.base, heights, size, edge / RATE, PLACES, TURNS, rng)
+        turns = TURNS if self.field is None else 1 + self.symmetric
+        right = _right(self.base, self.field)
+        patches = vertex_patches(self.base, heights, size, edge / RATE, PLACES, turns, rng, right)
         if not len(patches.values):
             raise ConfigError(
                 f"no square {size // RATE} edges wide lies flat on {self.base.name}",
@@ -69,10 +76,15 @@ class CoarseRelief:
             )
         return patches
 
-    def on(self, mesh: Mesh) -> Callable[[int], np.ndarray]:
-        """What lays it on a mesh: from a seed to vertices (V', 3) float64, moved along the normals."""
+    def on(self, mesh: Mesh, field: np.ndarray | None = None) -> Callable[[int], np.ndarray]:
+        """What lays it on a mesh: from a seed to vertices (V', 3) float64, moved along the normals.
+
+        Args:
+            mesh: V' vertices.
+            field: (V', 3) that it shall follow, if it follows one.
+        """
         patches, edge = self.patches, _mean_edge(mesh)
-        target = VertexTarget(mesh, int(patches.length), edge / RATE)
+        target = VertexTarget(mesh, int(patches.length), edge / RATE, _right(mesh, field))
         spread = float(self.heights.std()) / _mean_edge(self.base)
 
         def laid(seed: int) -> np.ndarray:
@@ -105,6 +117,11 @@ def split(mesh: Mesh) -> CoarseRelief:
     fine, wide = (low_pass(base, width * _mean_edge(base))(offsets) for width in (FINE, WIDE))
     heights = fine - wide
     return CoarseRelief(base, heights - heights.mean())
+
+
+def _right(mesh: Mesh, field: np.ndarray | None) -> np.ndarray | None:
+    """(V, 3) across a field and the normals."""
+    return None if field is None else vertex_directions(mesh, field=field)
 
 
 def _mean_edge(mesh: Mesh) -> float:

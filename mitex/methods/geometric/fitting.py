@@ -76,23 +76,17 @@ def fit(
     if field is None and config.symmetric:
         raise ConfigError("a relief without a `field` has no ends that look alike", "leave `symmetric` out")
     vectors = None if field is None else vector_field(shape, field)
-    if field is not None and config.first_level:
-        raise ConfigError("a relief with a `field` begins on the coarsest level", "leave `first_level` at 0")
     shape, start = normalised(shape, find_template(shape, template))
     source = inputs(shape, start, vectors)
     run.check_inputs(source)
     keep_freed_memory()
     meshes, reports = training_meshes(shape, start, config, run.control, keep=run.folder is not None)
+    fields = [] if vectors is None else _fields(shape, vectors, start, meshes)[config.first_level :]
     relief = None
     if config.first_level:
-        start, meshes, relief = _from_level(start, meshes, config, run.control)
-    hierarchy, fields = Hierarchy.of(start, config.levels), []
-    if vectors is not None:
-        placed = [
-            mesh.with_vertices(vertices.numpy() / 2**level)
-            for level, (mesh, vertices) in enumerate(zip(hierarchy.meshes, meshes, strict=True))
-        ]
-        fields = level_fields(shape, vectors, placed)
+        start, meshes, relief = _from_level(start, meshes, fields, config, run.control)
+    hierarchy = Hierarchy.of(start, config.levels)
+    if fields:
         hierarchy = hierarchy.directed(fields, config.symmetric)
     task = GeometricTask(config, hierarchy, torch.tensor(start.vertices), meshes, shape, source, relief)
     origin = {key: getattr(config, key) for key in ("levels", "noise", "remeasure", "first_level")}
@@ -112,8 +106,21 @@ def fit(
     )
 
 
+def _fields(
+    reference: Mesh, vectors: np.ndarray, template: Mesh, meshes: list[torch.Tensor]
+) -> list[torch.Tensor]:
+    """The reference's field (V, 3) on the training mesh of each level."""
+    levels = enumerate(zip(Hierarchy.of(template, len(meshes)).meshes, meshes, strict=True))
+    placed = [mesh.with_vertices(vertices.numpy() / 2**level) for level, (mesh, vertices) in levels]
+    return level_fields(reference, vectors, placed)
+
+
 def _from_level(
-    template: Mesh, meshes: list[torch.Tensor], config: GeometricConfig, control: Control
+    template: Mesh,
+    meshes: list[torch.Tensor],
+    fields: list[torch.Tensor],
+    config: GeometricConfig,
+    control: Control,
 ) -> tuple[Mesh, list[torch.Tensor], Start]:
     """What a training that begins on `first_level` has for its template and training meshes.
 
@@ -125,15 +132,17 @@ def _from_level(
     finest = Hierarchy.of(template, level + 1).meshes[-1]
     whole = split(finest.with_vertices(meshes[level].numpy()))
     unit = float(whole.base.edge_lengths.mean())
-    coarse = CoarseRelief(whole.base.with_vertices(whole.base.vertices / unit), whole.heights / unit)
-    lay = coarse.on(coarse.base)
+    base = whole.base.with_vertices(whole.base.vertices / unit)
+    field = fields[0].numpy() if fields else None
+    coarse = CoarseRelief(base, whole.heights / unit, field, config.symmetric)
+    lay = coarse.on(base, field)
     laid = []
     for k in counted("laying coarse reliefs", range(LAID), LAID):
         control.check()
         with listening(None):
             laid.append(lay(config.seed + k))
     start = Start(coarse.displacements, laid)
-    return coarse.base, [vertices / unit for vertices in meshes[level:]], start
+    return base, [vertices / unit for vertices in meshes[level:]], start
 
 
 def field_kind(field: np.ndarray | None, symmetric: bool) -> str | None:

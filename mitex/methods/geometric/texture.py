@@ -67,7 +67,9 @@ class GeometricTexture:
         """What the first generator completes, if it has learned to."""
         if not self.about.get("first_level"):
             return None
-        return CoarseRelief(self.template, dot(self.fixed.numpy().astype(np.float64), self.template.normals))
+        heights = dot(self.fixed.numpy().astype(np.float64), self.template.normals)
+        field = self.fields[0].numpy() if self.fields else None
+        return CoarseRelief(self.template, heights, field, self.about.get("field") == files.LINE)
 
     @property
     def first(self) -> int:
@@ -130,7 +132,7 @@ class GeometricTexture:
             MeshError: a face names a vertex twice.
         """
         rollout = self.rollout(mesh, start_level, end_level, field, placement)
-        *_, last = rollout.run(rollout.noise(seed), self._placed(mesh, rollout.level, placement, seed))
+        *_, last = rollout.run(rollout.noise(seed), self._placed(mesh, rollout.level, placement, seed, field))
         return clay(untangled(rollout.hierarchy.meshes[-1], last) if untangle else last)
 
     def interpolate(
@@ -153,7 +155,7 @@ class GeometricTexture:
         """
         rollout = self.rollout(mesh, start_level, end_level, field, placement)
         first, last = (rollout.noise(seed) for seed in seeds)
-        start, stop = (self._placed(mesh, rollout.level, placement, seed) for seed in seeds)
+        start, stop = (self._placed(mesh, rollout.level, placement, seed, field) for seed in seeds)
         for t in np.linspace(0, 1, frames):
             noise = [slerp(a, b, float(t)) for a, b in zip(first, last, strict=True)]
             *_, result = rollout.run(noise, (1 - t) * start + t * stop)
@@ -173,7 +175,7 @@ class GeometricTexture:
         noise[:start_level] = [torch.zeros(())] * len(noise[:start_level])
         if self.coarse is not None:
             own = vertices + self.fixed.numpy()
-            vertices = own if start_level else self.coarse.on(self.template)(seed)
+            vertices = own if start_level else self.coarse.on(self.template, self.coarse.field)(seed)
         elif start_level:
             noise[0] = self.fixed
         *_, result = rollout.run(noise, vertices)
@@ -195,7 +197,7 @@ class GeometricTexture:
         Arguments as in `apply`. The last of a level's meshes is displaced by the whole of it.
         """
         rollout = self.rollout(mesh, start_level, end_level, field, placement)
-        before, vertices = mesh, self._placed(mesh, rollout.level, placement, seed)
+        before, vertices = mesh, self._placed(mesh, rollout.level, placement, seed, field)
         for level, after in enumerate(rollout.run(rollout.noise(seed), vertices)):
             start = subdivide_midpoint(before) if level else before
             for t in np.linspace(0, 1, frames + 1)[0 if level == 0 else 1 :]:
@@ -243,7 +245,14 @@ class GeometricTexture:
         thick = None if placement == "none" or mesh is self.template else thickness(mesh)
         return Rollout(generators, hierarchy, start, noise, remeasure, thick)
 
-    def _placed(self, mesh: Mesh, level: int, placement: Placement, seed: int) -> np.ndarray:
+    def _placed(
+        self,
+        mesh: Mesh,
+        level: int,
+        placement: Placement,
+        seed: int,
+        field: str | Path | np.ndarray | None,
+    ) -> np.ndarray:
         """Vertices (V, 3) of a mesh with bumps like those that the generators up to a level make.
 
         On the template, lower levels place them.
@@ -251,10 +260,13 @@ class GeometricTexture:
         in_range("`seed`", seed, *SEEDS)
         if placement not in get_args(Placement):
             raise ConfigError(f"placement {placement!r}", f"use {' or '.join(get_args(Placement))}")
-        if placement == "none" or mesh is self.template or self.about.get("field"):
+        if placement == "none" or mesh is self.template:
             return mesh.vertices
         if self.coarse is not None:
-            return mesh.vertices if level else self.coarse.on(mesh)(seed)
+            vectors = None if field is None else vector_field(mesh, field)
+            return mesh.vertices if level else self.coarse.on(mesh, vectors)(seed)
+        if self.about.get("field"):
+            return mesh.vertices
         with listening(None):
             reference = self.generate(start_level=self.levels, end_level=level)
         texture = bumps(reference, 0.5**level)
