@@ -57,6 +57,27 @@ def test_patches_show_what_is_around_their_middle_turned():
     np.testing.assert_allclose(turns, np.tile(0.5 * np.pi * np.arange(1, 4), (len(turns), 1)), rtol=1e-3)
 
 
+@pytest.mark.parametrize(("right", "slope"), [((1, 0, 0), 1 + 2j), ((0, 1, 0), 2 - 1j)], ids=["x", "y"])
+def test_patches_lie_as_directions_say(right, slope):
+    values = SQUARE.vertices[:, :2] @ [[1.0], [2.0]] / GAP
+    directions = np.tile(np.array(right, float), (len(SQUARE.vertices), 1))
+    for turns in (1, 2):
+        source = vertex_patches(SQUARE, values, PATCH, GAP, 30, turns, np.random.default_rng(0), directions)
+        down, across = (np.diff(source.values[..., 0], axis=k).mean((1, 2)) for k in (1, 2))
+        np.testing.assert_allclose((across - 1j * down)[::turns], slope, rtol=1e-3)
+        np.testing.assert_allclose(
+            (across - 1j * down)[turns - 1 :: turns], slope * (-1) ** (turns - 1), rtol=1e-3
+        )
+
+
+def test_a_patch_covers_what_directions_say():
+    directions = np.tile([0.0, 1.0, 0.0], (len(SQUARE.vertices), 1))
+    vertices, place, _ = VertexTarget(SQUARE, PATCH, GAP, directions).around(MIDDLE)
+    offset = (SQUARE.vertices[vertices] - SQUARE.vertices[MIDDLE])[:, :2] / GAP
+    expected = np.stack([offset[:, 1], offset[:, 0]], axis=1)  # right is y, down is x
+    np.testing.assert_allclose(place - 0.5 * (PATCH - 1), expected, atol=1e-4)
+
+
 def test_chance_decides_on_places_and_angles():
     def patches(seed: int) -> np.ndarray:
         return vertex_patches(SQUARE, SQUARE.vertices, PATCH, GAP, 5, 2, np.random.default_rng(seed)).values

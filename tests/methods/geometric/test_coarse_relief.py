@@ -9,6 +9,7 @@ from scipy.spatial import KDTree
 from mitex.errors import ConfigError
 from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh, icosphere, torus
+from mitex.mesh.fields import vector_field
 from mitex.methods.geometric.coarse_relief import FINE, PATCH, RATE, WIDE, CoarseRelief, split
 
 BALL = icosphere(16)
@@ -104,36 +105,60 @@ def test_bumps_and_dents_are_as_many_on_an_area(side, mesh):
     assert len(mesh.faces) / others == pytest.approx(len(BALL.faces) / own, rel=0.15)
 
 
+def slopes(mesh: Mesh, heights: np.ndarray) -> np.ndarray:
+    """(F, 3) gradients of what vertices have."""
+    crosses = np.asarray(mesh.face_crosses, float)
+    points = mesh.vertices[mesh.faces].astype(float)
+    sides = np.roll(points, 1, axis=1) - np.roll(points, -1, axis=1)
+    turned = np.cross(crosses[:, None], sides) / (crosses**2).sum(1)[:, None, None]
+    return (turned * heights[mesh.faces][..., None]).sum(1)
+
+
 def test_stripes_run_on():
     """Along the steepest slope they rise and fall, across it hardly; random waves do both."""
     shares = []
+    middles = TORUS.vertices[TORUS.faces].mean(1)
+    _, near = KDTree(middles).query(middles, k=60)
     for mesh in (stripes(8), waves(8)):
-        heights = laid(split(mesh), TORUS)
-        crosses = np.asarray(TORUS.face_crosses, float)
-        points = TORUS.vertices[TORUS.faces].astype(float)
-        sides = np.roll(points, 1, axis=1) - np.roll(points, -1, axis=1)
-        turned = np.cross(crosses[:, None], sides) / (crosses**2).sum(1)[:, None, None]
-        slopes = (turned * heights[TORUS.faces][..., None]).sum(1)
-        # Of the slopes around each face, those along the strongest direction.
-        _, near = KDTree(points.mean(1)).query(points.mean(1), k=60)
-        values = np.linalg.eigvalsh(slopes[near].swapaxes(1, 2) @ slopes[near])
+        around = slopes(TORUS, laid(split(mesh), TORUS))[near]
+        values = np.linalg.eigvalsh(around.swapaxes(1, 2) @ around)
         shares.append((values[:, 2] / values.sum(1)).mean())
     assert shares[0] > 0.8 and shares[0] > shares[1] + 0.1
 
 
-def test_seeds_give_others():
-    draw = split(waves(8)).on(BALL)
-    assert np.array_equal(draw(0), draw(0)) and not np.allclose(draw(0), draw(1))
+@pytest.mark.parametrize("name", ["about-y", "up"])
+def test_a_relief_follows_its_field(name):
+    """Of the slopes of circles of latitude, which follow `up`, most are along the field that is given."""
+    whole = split(stripes(8))
+    coarse = CoarseRelief(whole.base, whole.heights, vector_field(whole.base, "up"), symmetric=True)
+    field = vector_field(TORUS, name)
+    heights = ((coarse.on(TORUS, field)(0) - TORUS.vertices) * TORUS.normals).sum(1)
+    steep = slopes(TORUS, heights)
+    there = np.linalg.norm(field, axis=1)[TORUS.faces].min(1) > 0.5
+    ahead = unit(field[TORUS.faces].mean(1).astype(float))
+    along = np.square((steep * ahead).sum(1))[there].sum()
+
+    assert along / np.square(steep)[there].sum() > 0.8
 
 
-def test_what_is_laid_has_the_size_of_edges():
+def test_patches_lie_both_ways_if_ends_look_alike():
+    whole = split(stripes(8))
+    field = vector_field(whole.base, "up")
+    one, both = (CoarseRelief(whole.base, whole.heights, field, ends).patches for ends in (False, True))
+    assert len(both.values) == 2 * len(one.values)
+
+
+def test_seeds_and_edges_decide_what_is_laid():
+    """Other seeds give others; on a mesh four times as large, all is four times as large."""
     coarse = split(waves(8))
+    lay = coarse.on(BALL)
+    assert np.array_equal(lay(0), lay(0)) and not np.allclose(lay(0), lay(1))
     large = BALL.with_vertices(4 * BALL.vertices)  # whose choices rounding does not change
-    assert np.allclose(coarse.on(large)(2), 4 * coarse.on(BALL)(2), atol=1e-4)
+    assert np.allclose(coarse.on(large)(2), 4 * lay(2), atol=1e-4)
+    assert coarse.patches.length == PATCH * RATE
 
 
 def test_patches_are_smaller_on_a_small_reference():
-    assert split(waves(8)).patches.length == PATCH * RATE
     small = icosphere(6)
     assert 8 <= CoarseRelief(small, np.zeros(len(small.vertices))).patches.length < PATCH * RATE
 

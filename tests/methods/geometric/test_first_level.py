@@ -88,10 +88,20 @@ def test_resuming_changes_nothing(tmp_path, run):
     assert_same_checkpoint(tmp_path / "parts", run[0])
 
 
-def test_directed_reliefs_begin_on_the_coarsest(tmp_path):
-    with pytest.raises(ConfigError, match="`field` begins on the coarsest level; leave `first_level` at 0"):
-        geometric.fit(bumpy(), tmp_path / "run", field="up", set=FINE)
-    assert not (tmp_path / "run").exists()
+def test_a_directed_relief_is_laid_along_the_field(tmp_path):
+    folder = tmp_path / "run"
+    texture = geometric.fit(bumpy(), folder, field="up", set=FINE)
+    assert [len(field) for field in texture.fields] == [162, 642]  # vertices of the levels from the first on
+    assert texture.coarse is not None and texture.coarse.field is not None and not texture.coarse.symmetric
+    with pytest.raises(ConfigError, match="follows a vector field"):
+        texture.apply(MESH)
+    again = GeometricTexture.load(folder)
+    start = [again.rollout(MESH, None, None, field) for field in ("up", "about-y")]
+    laid = [again._placed(MESH, 0, "even", 0, field) for field in ("up", "about-y")]
+    assert start[0].hierarchy.graphs[0].directions is not None
+    assert not np.allclose(*laid, atol=1e-3)
+    grown = [t.apply(MESH, field="up", seed=1).mesh.vertices for t in (texture, again)]
+    assert np.array_equal(*grown)
 
 
 def test_too_many_levels(tmp_path):
