@@ -4,9 +4,10 @@ usage: python tools/make_geometric_gallery.py RUNS MESHES SHEET ROW[,...] MESH~F
        python tools/make_geometric_gallery.py RUNS MESHES SHEET REFERENCE:levels MESH~FACES ...
 
 RUNS holds a finished run of `mitex fit geometric` for each reference, MESHES is a folder; meshes are named
-as for make_surface_gallery.py, so that they are remeshed first. A ROW is REFERENCE[@LEVEL][:map|:none].
-Each mesh is displaced from LEVEL on (2; of a `fine` one 0), and rendered: docs/gallery/SHEET.jpg has a row
-for each reference, which stands first, and above them the meshes alone. For every pair the Wasserstein-1
+as for make_surface_gallery.py, so that they are remeshed first. A ROW is
+REFERENCE[@LEVEL][=FIELD][:map|:none]. Each mesh is displaced from LEVEL on (2; of a `fine` one 0), along a
+FIELD, and rendered: docs/gallery/SHEET.jpg has a row for each reference, which stands first, and above them
+the meshes alone. For every pair the Wasserstein-1
 distances between the local statistics of result and reference are printed, and those of the mesh itself,
 remeshed to as many vertices as the result has, which takes minutes for finer results than those of five
 levels: there they are left out. REFERENCE:map makes a row of displacement maps, REFERENCE:none one without
@@ -56,10 +57,13 @@ def coarse_mesh(word: str, level: int, meshes: Path) -> Mesh:
     return find_mesh(f"{name}~{int(4.0 ** (level - START) * int(faces))}", meshes)
 
 
-def displaced(texture: GeometricTexture, reference: Mesh, mesh: Mesh, level: int, kind: str) -> Mesh:
+def displaced(
+    texture: GeometricTexture, reference: Mesh, mesh: Mesh, level: int, field: str | None, kind: str
+) -> Mesh:
     """The mesh with its texture, or with a displacement map of the reference, features as large."""
     if kind != "map":
-        return texture.apply(mesh, start_level=level, placement="none" if kind == "none" else "even").mesh
+        placement = "none" if kind == "none" else "even"
+        return texture.apply(mesh, start_level=level, placement=placement, field=field).mesh
     size, _ = texture.relative_size(mesh)
     return DisplacementMap.bake(reference).apply(mesh, scale=size, subdivide=texture.levels - 1 - START).mesh
 
@@ -95,6 +99,7 @@ def main() -> None:
     cells, labels = [np.ones((CELL, CELL, 3)), *map(picture, originals)], ["", *(m.name for m in originals)]
     for word in references.split(","):
         row, _, kind = word.partition(":")
+        row, _, field = row.partition("=")
         reference, _, start_level = row.partition("@")
         texture = GeometricTexture.load(Path(runs) / reference)
         level = int(start_level or texture.first)
@@ -102,11 +107,11 @@ def main() -> None:
         # The reference with edges as long as the results'.
         reconstruction = texture.generate(start_level=texture.levels)
         cells.append(picture(find_reference(reference)))
-        labels.append(LABELS[kind].format(reference))
+        labels.append(LABELS[kind].format(f"{reference}, {field}" if field else reference))
         for mesh, mesh_word in zip(originals, words, strict=True):
             even = coarse_mesh(mesh_word, finer, Path(meshes))
             start = time.perf_counter()
-            grown = displaced(texture, find_reference(reference), even, level, kind)
+            grown = displaced(texture, find_reference(reference), even, level, field or None, kind)
             seconds = time.perf_counter() - start
             print(f"{word} on {mesh.name}, {len(grown.faces):,} faces, {seconds:.1f} s", flush=True)
             key = mesh.name, len(grown.vertices)

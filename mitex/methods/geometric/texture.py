@@ -20,16 +20,15 @@ from mitex.mesh.fields import vector_field
 from mitex.mesh.untangling import untangled
 from mitex.methods.checks import in_range
 from mitex.methods.geometric import files
-from mitex.methods.geometric.borders import REACH, with_borders
 from mitex.methods.geometric.coarse_relief import CoarseRelief
 from mitex.methods.geometric.config import Placement
 from mitex.methods.geometric.directions import spread
-from mitex.methods.geometric.hierarchy import Hierarchy, mean_edge
-from mitex.methods.geometric.model import grow
+from mitex.methods.geometric.hierarchy import Hierarchy
 from mitex.methods.geometric.network import FaceNetwork
 from mitex.methods.geometric.placement import bumps, placed
-from mitex.methods.geometric.thickness import shallow, thickness
-from mitex.progress import counted, listening
+from mitex.methods.geometric.rollout import Rollout, slerp
+from mitex.methods.geometric.thickness import thickness
+from mitex.progress import listening
 from mitex.ranges import SEEDS
 from mitex.runtime import keep_freed_memory
 
@@ -298,62 +297,3 @@ class GeometricTexture:
                 f"levels {start} to {end} are out of range", f"this texture has the levels 0 to {last}"
             )
         return start, end
-
-
-@dataclass(frozen=True, eq=False)
-class Rollout:
-    """Generators of successive levels, to run on one mesh.
-
-    Attributes:
-        generators: of the levels.
-        hierarchy: of the mesh, with as many levels.
-        level: of the first generator.
-        noise_scale: standard deviation of the noise [mean edges].
-        remeasure: as in `generate`.
-        thick: (V,) the thickness of the mesh, beside which dents stay shallow; None for any depth.
-    """
-
-    generators: Sequence[FaceNetwork]
-    hierarchy: Hierarchy
-    level: int
-    noise_scale: float
-    remeasure: bool
-    thick: np.ndarray | None
-
-    def noise(self, seed: int) -> list[torch.Tensor]:
-        """Noise (V, 3) for each level."""
-        rng = torch.Generator().manual_seed(seed)
-        counts = [len(mesh.vertices) for mesh in self.hierarchy.meshes]
-        return [self.noise_scale * torch.randn(count, 3, generator=rng) for count in counts]
-
-    @torch.no_grad()
-    def run(self, noises: Sequence[torch.Tensor], vertices: np.ndarray | None = None) -> Iterator[Mesh]:
-        """The mesh after each level, in its own units and place; its borders, if any, have not moved.
-
-        Args:
-            noises: (V, 3) of each level [mean edges].
-            vertices: (V, 3) to start from, in place of the mesh's own.
-        """
-        mesh, graph = self.hierarchy.meshes[0], self.hierarchy.graphs[0]
-        centre = mesh.vertices.mean(0, dtype=np.float64)
-        given = mesh.vertices if vertices is None else vertices
-        centred, start = (torch.from_numpy((v - centre).astype(np.float32)) for v in (mesh.vertices, given))
-        unit = float(mean_edge(centred, graph))
-        steps, thick = grow(self.generators, self.hierarchy, start / unit, noises, self.remeasure), self.thick
-        for level, grown in enumerate(counted("growing levels", steps, len(self.generators))):
-            positions = grown.numpy().astype(np.float64) * (unit / 2**level) + centre
-            before = self.hierarchy.meshes[level]
-            after = before.with_vertices(positions)
-            if thick is not None and level:
-                thick = np.concatenate([thick, thick[self.hierarchy.pairs[level - 1].numpy()].mean(1)])
-            after = after if thick is None else shallow(before, after, thick)
-            yield with_borders(before, after, REACH * unit)
-
-
-def slerp(a: torch.Tensor, b: torch.Tensor, t: float) -> torch.Tensor:
-    """From a (t = 0) to b (t = 1) along the great circle through their directions (Shoemake 1985)."""
-    norms = a.norm() * b.norm()
-    angle = torch.arccos((a * b).sum().div(norms.clamp_min(1e-12)).clamp(-1, 1))
-    if angle < 1e-4:
-        return torch.lerp(a, b, t)
-    return (torch.sin((1 - t) * angle) * a + torch.sin(t * angle) * b) / torch.sin(angle)

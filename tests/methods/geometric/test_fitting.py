@@ -13,8 +13,9 @@ from mitex.methods import geometric
 from mitex.methods.geometric import METHOD
 from mitex.methods.geometric.references import find_reference
 from mitex.methods.geometric.report import report
+from mitex.methods.geometric.rollout import slerp
 from mitex.methods.geometric.template import normalised, topology
-from mitex.methods.geometric.texture import GeometricTexture, slerp
+from mitex.methods.geometric.texture import GeometricTexture
 from mitex.methods.registry import method_of
 from mitex.training import checkpoint
 from mitex.training.locate import NAME
