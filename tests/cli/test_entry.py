@@ -313,7 +313,7 @@ class TestSettings:
     def test_the_first_preset_is_shown_and_the_others_are_named(self, capsys):
         assert main(["fit", "geometric", "--settings"]) == 0
         text = capsys.readouterr().out
-        assert text.startswith("preset = fast ") and text.endswith("further presets: paper, fine\n")
+        assert text.startswith("preset = fast ") and text.endswith("further presets: paper, fine, finest\n")
 
 
 def test_the_command_line_knows_no_method_by_name():

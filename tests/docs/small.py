@@ -5,6 +5,7 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
 - fits: their settings are resolved as they were asked for, which checks them; then they get 2 steps, 3 if the
   run is resumed, and the tiny settings of their method;
 - meshes that ship with Mitex are balls of 362 vertices, as large as they and under their names;
+- coarse parts of reliefs are laid once in a fit, from the patches of 30 places;
 - automata grow for 2 steps on the mesh as it is, are not healed, and are baked at 64 texels, as the textures
   of baselines are;
 - films have 4 frames of 32 pixels, of automata on the mesh as it is;
@@ -121,6 +122,8 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
         patch.setattr(f"mitex.comparison.look_pair.{name}", 1)
     patch.setattr(NcaTexture, "tile", _small_tile(NcaTexture.tile))
     patch.setattr("mitex.methods.geometric.references.FREQUENCY", 12)
+    patch.setattr("mitex.methods.geometric.fitting.LAID", 1)
+    patch.setattr("mitex.methods.geometric.coarse_relief.PLACES", 30)
     patch.setattr(fitting, "find_base", lambda *_, **__: _ball_as_base())
     patch.setattr(NerfTexture, "synthesize", _small_quilt(NerfTexture.synthesize))
     patch.setattr(NerfTexture, "synthesize_on", _small_quilt_on(NerfTexture.synthesize_on))

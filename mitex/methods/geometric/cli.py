@@ -37,7 +37,7 @@ class Fit(DeviceOptions):
       mitex fit geometric --reference spikes
       mitex fit geometric --reference craters --preset fine
       mitex fit geometric --reference cactus.obj --out runs/cactus
-      mitex fit geometric --reference cactus --field up --set symmetric=true
+      mitex fit geometric --reference bricks --field about-y --preset finest --set symmetric=true
       mitex fit geometric --reference ring.obj --template coarse-ring.obj --preset paper
       mitex fit geometric --reference cactus.obj --out runs/cactus --resume --steps 12000   (one more level)
     """
@@ -47,10 +47,10 @@ class Fit(DeviceOptions):
     craters, warts, cactus, shingles, bricks, woven."""
 
     preset: Annotated[
-        PlainText | None, arg(metavar="fast|paper|fine", help_behavior_hint="(default: fast)")
+        PlainText | None, arg(metavar="fast|paper|fine|finest", help_behavior_hint="(default: fast)")
     ] = None
-    """Settings to start from: `fast`; `paper`, which follows the publication; or `fine`, for features too
-    small for the coarse levels, such as craters and ridges."""
+    """Settings to start from: `fast`; `paper`, which follows the publication; `fine`, for features too small
+    for the coarse levels, such as craters and ridges; or `finest`, for strands, bricks and shingles."""
 
     template: Annotated[str | None, arg(metavar="MESH", help_behavior_hint="(default: by genus)")] = None
     """Coarse mesh of the reference's topology from which its training meshes are made."""
@@ -77,9 +77,9 @@ class Fit(DeviceOptions):
 class GrowthOptions:
     """How a geometric texture grows on a mesh."""
 
-    start_level: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 2, of `fine` 0)")] = (
-        None
-    )
+    start_level: Annotated[
+        int | None, arg(metavar="N", help_behavior_hint="(default: 2, of `fine` and `finest` 0)")
+    ] = None
     """The generator to begin with; low ones change the shape. With --mesh template (default: 0), `apply`
     rebuilds the levels below it without noise, and `animate` leaves them out."""
 

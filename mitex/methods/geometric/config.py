@@ -79,4 +79,5 @@ PRESETS = {
     DEFAULT.preset: DEFAULT,
     "paper": replace(DEFAULT, preset="paper", steps=30_000, level_steps=6_000),
     "fine": replace(DEFAULT, preset="fine", steps=2_000, level_steps=1_000, first_level=4, fit_blur=1.0),
+    "finest": replace(DEFAULT, preset="finest", steps=1_000, level_steps=1_000, first_level=5, fit_blur=0.5),
 }

@@ -59,7 +59,7 @@ def fit(
         field: the vector field on the reference that its relief follows, see `mitex.mesh.fields`; the texture
             then needs one wherever it is grown. With `symmetric` among the settings, a vector and its
             opposite are the same. None for a relief without a direction.
-        options: preset ("fast", "paper" or "fine"), and those of `RunOptions`.
+        options: preset ("fast", "paper", "fine" or "finest"), and those of `RunOptions`.
 
     Returns:
         The texture, also saved as `texture.safetensors` in `out` if that is given.

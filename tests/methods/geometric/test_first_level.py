@@ -107,7 +107,8 @@ def test_a_directed_relief_is_laid_along_the_field(tmp_path):
 def test_too_many_levels(tmp_path):
     with pytest.raises(ConfigError, match=f"set steps to {MAX_LEVELS - 4} or less"):
         geometric.fit(bumpy(), tmp_path / "run", preset="fine", set=["steps=4", "level_steps=1"])
-    assert PRESETS["fine"].first_level + PRESETS["fine"].levels <= MAX_LEVELS
+    for name in ("fine", "finest"):
+        assert PRESETS[name].first_level + PRESETS[name].levels <= MAX_LEVELS
 
 
 @pytest.mark.parametrize(
