@@ -1,4 +1,4 @@
-"""Draws docs/gallery/baselines.jpg: one exemplar on one mesh, by methods and what they are compared with.
+"""Draws a sheet of docs/gallery: one exemplar on one mesh, by methods and what they are compared with.
 
     python tools/make_baselines_sheet.py --exemplar lava --mesh vase --methods surface nca ... -- out/lava ...
 
@@ -25,6 +25,7 @@ def main() -> None:
     parser.add_argument("--exemplar", required=True)
     parser.add_argument("--mesh", required=True)
     parser.add_argument("--methods", nargs="+", required=True, help="in this order")
+    parser.add_argument("--sheet", default="baselines", help="its name (baselines)")
     parser.add_argument("folders", nargs="+", type=Path)
     arguments = parser.parse_args()
     pair = arguments.exemplar, arguments.mesh
@@ -35,7 +36,8 @@ def main() -> None:
     pictures = [picture_of(arguments.exemplar)]
     pictures += [read_image(Path(first[method]["picture"])) for method in arguments.methods]
     labels = ["exemplar", *arguments.methods]
-    path = write_image(GALLERY / "baselines.jpg", sheet(pictures, columns=5, labels=labels, cell=CELL))
+    image = sheet(pictures, columns=min(len(pictures), 5), labels=labels, cell=CELL)
+    path = write_image(GALLERY / f"{arguments.sheet}.jpg", image)
     print(path)
 
 
