@@ -103,20 +103,17 @@ def vertex_patches(
     target = VertexTarget(mesh, size, gap, directions)
     middle = np.arange(size) - 0.5 * (size - 1)
     grid = np.stack(np.meshgrid(middle, middle), axis=2)
-    squares, centres = [], []
+    squares, centres = [np.zeros((0, size, size, values.shape[1]), np.float32)], [np.zeros((0, 3))]
     for vertex in rng.permutation(target.count)[:places]:
         vertices, place, _ = target.flat(int(vertex))
         if len(vertices) <= FEWEST:
             continue
         first = rng.uniform(0, 2 * np.pi) if directions is None else 0.0
         angles = first + 2 * np.pi * np.arange(turns) / turns
-        between = LinearNDInterpolator(place, values[target.vertices[vertices]])
-        for cos, sin in zip(np.cos(angles), np.sin(angles), strict=True):
-            square = between(grid @ np.array([[cos, sin], [-sin, cos]]))
-            if np.isfinite(square).all():
-                squares.append(square)
-                centres.append(mesh.vertices[target.vertices[vertex]] / gap)
-    shape = (len(squares), size, size, values.shape[1])
-    return ArraySource(
-        np.reshape(squares, shape).astype(np.float32), np.reshape(centres, (-1, 3)), float(size)
-    )
+        cos, sin = np.cos(angles), np.sin(angles)
+        turned = grid @ np.array([[cos, sin], [-sin, cos]]).transpose(2, 0, 1)[:, None]
+        around = LinearNDInterpolator(place, values[target.vertices[vertices]])(turned)
+        whole = around[np.isfinite(around).all((1, 2, 3))]
+        squares.append(whole.astype(np.float32))
+        centres.append(np.tile(mesh.vertices[target.vertices[vertex]] / gap, (len(whole), 1)))
+    return ArraySource(np.concatenate(squares), np.concatenate(centres), float(size))

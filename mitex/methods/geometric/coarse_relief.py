@@ -30,7 +30,7 @@ FINE, WIDE = 1.0, 4.0  # widths of the filters [mean edges]; behind the wide one
 PATCH = 16  # side of a patch [mean edges]
 SHARE = 0.34  # of the side of a square as large as the mesh, at most
 RATE = 2  # texels of a patch on an edge
-PLACES, TURNS = 400, 8  # that patches are taken at, and directions
+PLACES, TURNS = 250, 8  # that patches are taken at, and directions
 
 
 @dataclass(frozen=True, eq=False)
