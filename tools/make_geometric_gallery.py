@@ -10,8 +10,8 @@ FIELD, and rendered: docs/gallery/SHEET.jpg has a row for each reference, which 
 the meshes alone. For every pair the Wasserstein-1
 distances between the local statistics of result and reference are printed, and those of the mesh itself,
 remeshed to as many vertices as the result has, which takes minutes for finer results than those of five
-levels: there they are left out. REFERENCE:map makes a row of displacement maps, REFERENCE:none one without
-bumps that are placed (`mitex.methods.geometric.placement`).
+levels: there they are left out; with a FIELD, how far ridges are turned from it, too. REFERENCE:map makes a
+row of displacement maps, REFERENCE:none one without bumps that are placed (`mitex.methods.geometric.placement`).
 
 REFERENCE:levels makes a sheet of start levels: a row for the reference and each mesh, which stand first, then
 what grows from levels 0, 1, 2 and 3 on: on the meshes, and, for the reference, on its own template, whose
@@ -29,9 +29,11 @@ import numpy as np
 from make_surface_gallery import find_mesh
 
 from mitex.asset import clay
+from mitex.evaluation.relief_direction import relief_direction
 from mitex.evaluation.surface_statistics import statistic_distances
 from mitex.images import write_image
-from mitex.mesh import Mesh, remesh
+from mitex.mesh import Mesh, remesh, subdivide_midpoint
+from mitex.mesh.fields import vector_field
 from mitex.methods.baselines.displacement import DisplacementMap
 from mitex.methods.geometric import GeometricTexture
 from mitex.methods.geometric.references import find_reference
@@ -66,6 +68,14 @@ def displaced(
         return texture.apply(mesh, start_level=level, placement=placement, field=field).mesh
     size, _ = texture.relative_size(mesh)
     return DisplacementMap.bake(reference).apply(mesh, scale=size, subdivide=texture.levels - 1 - START).mesh
+
+
+def ridges(mesh: Mesh, grown: Mesh, field: str) -> str:
+    """Which way they run, on a mesh whose faces were split."""
+    while len(mesh.faces) < len(grown.faces):
+        mesh = subdivide_midpoint(mesh)
+    run = relief_direction(mesh, grown, vector_field(mesh, field))
+    return f"ridges {run.turn:.0f} degrees from {field} ({run.coherence:.2f}), {run.error:.0f} on average"
 
 
 def level_sheet(texture: GeometricTexture, reference: str, meshes: Path, words: list[str]) -> np.ndarray:
@@ -120,6 +130,8 @@ def main() -> None:
                     fine[key] = remesh(mesh, key[1])
                 ours, theirs = (statistic_distances(m, reconstruction) for m in (grown, fine[key]))
                 print(", ".join(f"{k} {ours[k]:.3f} of {theirs[k]:.3f}" for k in ours), flush=True)
+            if field:
+                print(ridges(even, grown, field), flush=True)
             cells.append(picture(grown))
             labels.append(mesh.name)
     write_image(GALLERY / f"{name}.jpg", sheet(cells, columns=1 + len(originals), labels=labels, cell=CELL))
