@@ -7,11 +7,11 @@ RUNS holds a finished run of `mitex fit geometric` for each reference, MESHES is
 as for make_surface_gallery.py, so that they are remeshed first. A ROW is
 REFERENCE[@LEVEL][=FIELD][:map|:none]. Each mesh is displaced from LEVEL on (2; of a `fine` one 0), along a
 FIELD, and rendered: docs/gallery/SHEET.jpg has a row for each reference, which stands first, and above them
-the meshes alone. For every pair the Wasserstein-1
-distances between the local statistics of result and reference are printed, and those of the mesh itself,
-remeshed to as many vertices as the result has, which takes minutes for finer results than those of five
-levels: there they are left out; with a FIELD, how far ridges are turned from it, too. REFERENCE:map makes a
-row of displacement maps, REFERENCE:none one without bumps that are placed (`mitex.methods.geometric.placement`).
+the meshes alone. For every pair the Wasserstein-1 distances between the local statistics of result and
+reference are printed, and those of the mesh itself, remeshed to as many vertices as the result has, which
+takes minutes for finer results than those of five levels: there they are left out; with a FIELD, how far
+ridges are turned from it, too. REFERENCE:map makes a row of displacement maps, REFERENCE:none one without
+bumps that are placed (`mitex.methods.geometric.placement`).
 
 REFERENCE:levels makes a sheet of start levels: a row for the reference and each mesh, which stand first, then
 what grows from levels 0, 1, 2 and 3 on: on the meshes, and, for the reference, on its own template, whose
