@@ -100,8 +100,8 @@ def test_a_directed_relief_is_laid_along_the_field(tmp_path):
     laid = [again._placed(MESH, 0, "even", 0, field) for field in ("up", "about-y")]
     assert start[0].hierarchy.graphs[0].directions is not None
     assert not np.allclose(*laid, atol=1e-3)
-    grown = [t.apply(MESH, field="up", seed=1).mesh.vertices for t in (texture, again)]
-    assert np.array_equal(*grown)
+    first, second = (t.apply(MESH, field="up", seed=1).mesh.vertices for t in (texture, again))
+    assert np.array_equal(first, second)
 
 
 def test_too_many_levels(tmp_path):
