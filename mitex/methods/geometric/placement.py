@@ -50,14 +50,14 @@ def bumps(mesh: Mesh, edge: float) -> Bumps | None:
     """
     heights = _heights(mesh) / edge
     side = 1.0 if np.mean((heights - heights.mean()) ** 3) > 0 else -1.0  # a minority is up, or down
-    tops = _separate_tops(mesh, side * heights)
+    tops = separate_tops(mesh, side * heights)
     if tops is None:
         return None
     faces, height = len(mesh.faces) / len(tops), float(np.median(tops))
     return Bumps(faces, side * height) if faces <= WIDEST and height >= LOWEST else None
 
 
-def _separate_tops(mesh: Mesh, heights: np.ndarray) -> np.ndarray | None:
+def separate_tops(mesh: Mesh, heights: np.ndarray) -> np.ndarray | None:
     """How high each separate bump is (N,), by heights (V,) above the ground; None if they run together."""
     raised = np.flatnonzero(heights > 0.5 * np.quantile(heights, TOP))
     graph = edge_lengths(mesh.faces, mesh.vertices)[raised][:, raised]
@@ -79,13 +79,13 @@ def placed(mesh: Mesh, texture: Bumps, seed: int) -> np.ndarray:
     """
     vertices = mesh.vertices.astype(np.float64)
     edge = edge_lengths(mesh.faces, vertices).data.mean()
-    where = _even_places(mesh, texture.faces, seed)
+    where = even_places(mesh, texture.faces, seed)
     height = max(SHARE_UP * texture.height, 0) + min(SHARE_DOWN * texture.height, 0)
     vertices[where] += height * edge * mesh.normals[where]
     return vertices
 
 
-def _even_places(mesh: Mesh, faces: float, seed: int) -> np.ndarray:
+def even_places(mesh: Mesh, faces: float, seed: int) -> np.ndarray:
     """Vertices of a mesh, evenly spread: one for so many faces, each farthest from those before."""
     used = np.unique(mesh.faces)
     graph = sparse.csr_array(edge_lengths(mesh.faces, mesh.vertices.astype(np.float64))[used][:, used])

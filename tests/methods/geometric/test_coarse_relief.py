@@ -10,7 +10,7 @@ from mitex.errors import ConfigError
 from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh, icosphere, torus
 from mitex.mesh.fields import vector_field
-from mitex.methods.geometric.coarse_relief import FINE, PATCH, RATE, WIDE, CoarseRelief, split
+from mitex.methods.geometric.coarse_relief import PATCH, RATE, WIDTHS, CoarseRelief, split
 
 BALL = icosphere(16)
 EDGE = float(BALL.edge_lengths.mean())
@@ -56,6 +56,13 @@ def laid(coarse: CoarseRelief, mesh: Mesh, seed: int = 0) -> np.ndarray:
     return (moves * mesh.normals).sum(1) / mesh.edge_lengths.mean()
 
 
+def test_other_reliefs_and_those_along_a_field_have_no_bumps():
+    dents = split(bumps(-1))
+    field = vector_field(dents.base, "up")
+    assert dents.bumps == -40 and CoarseRelief(dents.base, dents.heights, field).bumps == 0
+    assert split(waves(8)).bumps == 0
+
+
 def islands(mesh: Mesh, heights: np.ndarray) -> int:
     """How many parts of a mesh are higher than half of the highest hundredth."""
     high = heights > 0.5 * np.quantile(heights, 0.99)
@@ -89,7 +96,7 @@ def spread(length: float) -> float:
 
 def test_only_the_band_between_both_filters_counts():
     """Waves in it, half as long as the fine filter keeps, and much longer than the wide one lets by."""
-    middle, short, long = map(spread, (7, 2.2 * FINE, 12 * WIDE))
+    middle, short, long = map(spread, (7, 2.2 * WIDTHS[0], 12 * WIDTHS[-1]))
     assert middle > 1.9 * short and middle > 9 * long
 
 
@@ -97,6 +104,7 @@ def test_only_the_band_between_both_filters_counts():
 @pytest.mark.parametrize("side", [1, -1])
 def test_bumps_and_dents_are_as_many_on_an_area(side, mesh):
     coarse = split(bumps(side))
+    assert coarse.bumps == 40 * side
     heights = laid(coarse, mesh)
     assert (
         heights.std() == pytest.approx(coarse.heights.std() / EDGE, rel=0.02) and abs(heights.mean()) < 1e-3
