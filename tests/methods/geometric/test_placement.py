@@ -117,7 +117,7 @@ def test_growth_begins_with_the_bumps_unless_told_otherwise(texture, monkeypatch
     raised = placed(mesh, Bumps(12.0, 2.0), 0)
     seen = []
     monkeypatch.setattr(
-        "mitex.methods.geometric.texture.grow", lambda g, h, v, *a: seen.append(v) or iter([v])
+        "mitex.methods.geometric.rollout.grow", lambda g, h, v, *a: seen.append(v) or iter([v])
     )
     texture.apply(mesh, end_level=2)
     lengths = graph(mesh)
@@ -129,11 +129,11 @@ def test_reliefs_without_bumps_and_those_that_follow_a_field_start_as_published(
     mesh = icosphere(6)
     none = texture.apply(mesh, placement="none").mesh.vertices
     monkeypatch.setattr("mitex.methods.geometric.texture.bumps", lambda mesh, edge: None)
-    monkeypatch.setattr("mitex.methods.geometric.texture.shallow", lambda before, after, thick: after)
+    monkeypatch.setattr("mitex.methods.geometric.rollout.shallow", lambda before, after, thick: after)
     assert np.array_equal(texture.apply(mesh).mesh.vertices, none)
     directed = replace(texture, about={**texture.about, "field": "vector"})
     monkeypatch.setattr("mitex.methods.geometric.texture.placed", None)
-    assert directed._placed(mesh, 2, "even", 0) is mesh.vertices
+    assert directed._placed(mesh, 2, "even", 0, "up") is mesh.vertices
 
 
 def test_seeds_out_of_range_are_refused(texture):

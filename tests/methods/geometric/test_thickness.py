@@ -59,7 +59,7 @@ def dented(generators, hierarchy, vertices, noises, remeasure):
 
 def test_dents_on_both_sides_of_a_wall_do_not_meet(texture, monkeypatch):
     """Of two edges each in a wall of three. As published, and on the template, none is drawn back."""
-    monkeypatch.setattr("mitex.methods.geometric.texture.grow", dented)
+    monkeypatch.setattr("mitex.methods.geometric.rollout.grow", dented)
     monkeypatch.setattr("mitex.methods.geometric.texture.bumps", lambda mesh, edge: None)
     wall, middle = shell(0.8), 0.9
     for level in (2, 3):
