@@ -5,7 +5,8 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
 - fits: their settings are resolved as they were asked for, which checks them; then they get 2 steps, 3 if the
   run is resumed, and the tiny settings of their method;
 - meshes that ship with Mitex are balls of 362 vertices, as large as they and under their names;
-- coarse parts of reliefs are laid once in a fit, from the patches of 30 places;
+- reliefs that begin on a finer level begin on 320 faces, and their coarse parts are laid once in a fit, from
+  the patches of 30 places;
 - automata grow for 2 steps on the mesh as it is, are not healed, and are baked at 64 texels, as the textures
   of baselines are;
 - films have 4 frames of 32 pixels, of automata on the mesh as it is;
@@ -35,6 +36,7 @@ from tests.methods.nerf.tiny import tiny_capture, write_capture
 
 STEPS, RESUMED_STEPS = 2, 3
 GROWTH = 2  # steps of an automaton
+FIRST_LEVEL = 2  # of reliefs that begin on a finer level
 TEXELS = 64
 SIDE = 16  # of a picture [pixels]
 EVERY_FIT = {"checkpoint_every": 1, "preview_every": 0}
@@ -148,6 +150,8 @@ def _with_few_steps(resolve: Callable[..., Any]) -> Callable[..., Any]:
         name = next(name for name, default in defaults.items() if type(default) is type(config))
         steps = STEPS if file is None or file.name != CONFIG else RESUMED_STEPS
         training = {"steps": steps, **EVERY_FIT} if hasattr(config, "steps") else {}
+        if getattr(config, "first_level", 0):
+            training["first_level"] = FIRST_LEVEL
         return replace(config, **training, **TINY.get(name, {}))
 
     return small
