@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-import xatlas
 from scipy.ndimage import distance_transform_edt
 
+from mitex.charts import Packing, packed_charts
 from mitex.errors import ConfigError, MeshError
 from mitex.flat_charts import projected_charts, sides
 from mitex.geometry.constant import constant, sealed
@@ -220,33 +220,24 @@ def _unwrapped(mesh: Mesh, resolution: int, padding: int) -> np.ndarray:
     extent = float(np.ptp(mesh.vertices, axis=0).max())
     if extent > 0:
         mesh = mesh.with_vertices(mesh.vertices * 2.0 ** -np.rint(np.log2(extent / 2)))
-    pack = xatlas.PackOptions()
-    pack.resolution = resolution
     # xatlas only estimates the texel size and packs into up to 1.4 times the side asked for.
-    pack.padding = int(np.ceil(1.4 * padding))
-    pack.bilinear = True
+    packing = Packing(resolution, int(np.ceil(1.4 * padding)))
     if len(mesh.faces) > HUGE:
-        return projected_charts(mesh, pack)[0]
-    return _flattened(mesh, pack)
+        return projected_charts(mesh, packing)[0]
+    return _flattened(mesh, packing)
 
 
-def _flattened(mesh: Mesh, pack: xatlas.PackOptions) -> np.ndarray:
+def _flattened(mesh: Mesh, packing: Packing) -> np.ndarray:
     """The charts of xatlas, in the unit square (F, 3, 2)."""
-    atlas = xatlas.Atlas()
-    pieces, positions = _pieces(mesh), _rough(mesh)
+    pieces, positions, parts = _pieces(mesh), _rough(mesh), []
     for piece in pieces:
         used, faces = np.unique(mesh.faces[piece], return_inverse=True)
-        atlas.add_mesh(positions[used], faces.reshape(-1, 3).astype(np.uint32))
-    chart = xatlas.ChartOptions()
+        parts.append((positions[used], faces.reshape(-1, 3)))
     # Flattening a chart takes more than linear time; this keeps a mesh of 20k faces at one or two seconds.
-    chart.max_chart_area = 0.1 * float(mesh.face_areas.sum())
-    atlas.generate(chart, pack)
-    # Back to texels and down by one factor, so that texels stay square.
-    side = np.array([atlas.width, atlas.height], np.float32)
+    packing = replace(packing, largest=0.1 * float(mesh.face_areas.sum()))
     result = np.empty((len(mesh.faces), 3, 2), np.float32)
-    for k, piece in enumerate(pieces):
-        _, corners, uv = atlas.get_mesh(k)
-        result[piece] = np.clip(uv * side / side.max(), 0.0, 1.0)[corners.astype(np.int64)]
+    for piece, corners in zip(pieces, packed_charts(parts, packing, mesh.name), strict=True):
+        result[piece] = corners
     return result
 
 

@@ -7,10 +7,10 @@ linear time. Faces that look between three axes are then shown 1.7 times smaller
 from __future__ import annotations
 
 import numpy as np
-import xatlas
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from mitex.charts import Packing, packed_charts
 from mitex.geometry.raster import covered_texels
 from mitex.geometry.vectors import scatter_add
 from mitex.mesh import Mesh
@@ -31,12 +31,12 @@ def sides(mesh: Mesh) -> np.ndarray:
     return _along(normals[mesh.faces].sum(1))
 
 
-def projected_charts(mesh: Mesh, pack: xatlas.PackOptions) -> tuple[np.ndarray, np.ndarray]:
+def projected_charts(mesh: Mesh, packing: Packing) -> tuple[np.ndarray, np.ndarray]:
     """Charts without overlaps, packed side by side.
 
     Args:
         mesh: any mesh.
-        pack: how xatlas packs them.
+        packing: how they are packed.
 
     Returns:
         (F, 3, 2) float32 coordinates of the corners in [0, 1], and the chart of each face (F,).
@@ -48,7 +48,7 @@ def projected_charts(mesh: Mesh, pack: xatlas.PackOptions) -> tuple[np.ndarray, 
     depth = np.take_along_axis(corners.mean(1), axis[:, None], axis=1)[:, 0]
     for _ in range(ROUNDS):
         charts = _connected(6 * half + side, pairs)
-        uv = _packed(mesh, flat, charts, pack)
+        uv = _packed(mesh, flat, charts, packing)
         overlapping = _overlapping(uv, charts)
         if not overlapping.any():
             break
@@ -85,7 +85,7 @@ def _connected(group: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     return connected_components(graph, directed=False)[1]
 
 
-def _packed(mesh: Mesh, flat: np.ndarray, charts: np.ndarray, pack: xatlas.PackOptions) -> np.ndarray:
+def _packed(mesh: Mesh, flat: np.ndarray, charts: np.ndarray, packing: Packing) -> np.ndarray:
     """Corners (F, 3, 2) in [0, 1] of charts, put apart first: xatlas takes vertices at one place for one."""
     low = np.full((charts.max() + 1, 2), np.inf)
     np.minimum.at(low, charts, flat.min(1))
@@ -95,13 +95,8 @@ def _packed(mesh: Mesh, flat: np.ndarray, charts: np.ndarray, pack: xatlas.PackO
     apart = flat - (low - places)[charts][:, None, :]
     keys = charts[:, None].astype(np.int64) * len(mesh.vertices) + mesh.faces
     _, first, corner = np.unique(keys, return_index=True, return_inverse=True)
-    atlas = xatlas.Atlas()
-    uv = apart.reshape(-1, 2)[first].astype(np.float32)
-    atlas.add_uv_mesh(uv, corner.reshape(-1, 3).astype(np.uint32))
-    atlas.generate(pack_options=pack)
-    _, faces, placed = atlas.get_mesh(0)
-    size = np.array([atlas.width, atlas.height], np.float32)  # texels stay square
-    return np.clip(placed * size / size.max(), 0.0, 1.0)[faces.astype(np.int64)]
+    part = (apart.reshape(-1, 2)[first], corner.reshape(-1, 3))
+    return packed_charts([part], packing, mesh.name)[0]
 
 
 def _overlapping(uv: np.ndarray, charts: np.ndarray) -> np.ndarray:

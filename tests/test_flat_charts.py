@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-import xatlas
 
 from mitex import flat_charts
 from mitex.atlas import unwrap, usable_uv
+from mitex.charts import Packing
 from mitex.flat_charts import projected_charts
 from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh, embedded, icosphere
@@ -13,10 +13,7 @@ from mitex.mesh import Mesh, embedded, icosphere
 TURNS, AROUND = 3, 24
 
 
-def packing() -> xatlas.PackOptions:
-    pack = xatlas.PackOptions()
-    pack.resolution, pack.padding, pack.bilinear = 512, 4, True
-    return pack
+PACKING = Packing(512, 4)
 
 
 def ramp() -> Mesh:
@@ -36,7 +33,7 @@ def ramp() -> Mesh:
 
 @pytest.mark.parametrize("mesh", [icosphere(12), embedded("shaderball"), ramp()], ids=lambda mesh: mesh.name)
 def test_no_texel_is_covered_twice_and_no_face_is_missing(mesh):
-    uv, _ = projected_charts(mesh, packing())
+    uv, _ = projected_charts(mesh, PACKING)
     assert usable_uv(mesh, uv)
     seen = np.abs(twice_area(uv))
     whole = mesh.face_areas > 1e-6 * mesh.face_areas.mean()
@@ -45,7 +42,7 @@ def test_no_texel_is_covered_twice_and_no_face_is_missing(mesh):
 
 def test_faces_are_shown_in_proportion_to_how_much_they_look_along_their_axis():
     mesh = icosphere(12)
-    uv, charts = projected_charts(mesh, packing())
+    uv, charts = projected_charts(mesh, PACKING)
     assert charts.max() == 5
     cosines = np.abs(mesh.face_normals).max(1)
     scale = 0.5 * np.abs(twice_area(uv)) / (mesh.face_areas * cosines)
@@ -54,7 +51,7 @@ def test_faces_are_shown_in_proportion_to_how_much_they_look_along_their_axis():
 
 
 def test_turns_of_a_spiral_are_cut_apart():
-    _, charts = projected_charts(ramp(), packing())
+    _, charts = projected_charts(ramp(), PACKING)
     assert charts.max() + 1 >= TURNS
 
 
@@ -66,7 +63,7 @@ def test_a_face_that_looks_away_from_its_neighbours_has_a_chart_of_its_own():
     )
     flat[14, 2] = 8.0  # a spike of six steep faces
     mesh = Mesh(flat.astype(np.float32), faces.astype(np.int32), name="spike")
-    uv, charts = projected_charts(mesh, packing())
+    uv, charts = projected_charts(mesh, PACKING)
     steep = (mesh.faces == 14).any(1)
     assert len(set(charts[~steep]) & set(charts[steep])) == 0
     assert usable_uv(mesh, uv)
