@@ -4,7 +4,8 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
 
 - fits: their settings are resolved as they were asked for, which checks them; then they get 2 steps, 3 if the
   run is resumed, and the tiny settings of their method;
-- meshes that ship with Mitex are balls of 362 vertices, as large as they and under their names;
+- meshes that ship with Mitex are balls of 362 vertices, as large as they and under their names, and `--remesh`
+  gives 600 vertices at most;
 - reliefs that begin on a finer level begin on 320 faces, and their coarse parts are laid once in a fit, from
   the patches of 30 places;
 - automata grow for 2 steps on the mesh as it is, are not healed, and are baked at 64 texels, as the textures
@@ -26,7 +27,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mitex.mesh import Mesh, embedded, icosphere
+from mitex.mesh import Mesh, embedded, icosphere, remesh
 from mitex.methods.registry import methods
 from mitex.training.run import CONFIG
 from tests.batch.in_this_process import InThisProcess
@@ -37,6 +38,7 @@ from tests.methods.nerf.tiny import tiny_capture, write_capture
 STEPS, RESUMED_STEPS = 2, 3
 GROWTH = 2  # steps of an automaton
 FIRST_LEVEL = 2  # of reliefs that begin on a finer level
+REMESHED = 600  # vertices
 TEXELS = 64
 SIDE = 16  # of a picture [pixels]
 EVERY_FIT = {"checkpoint_every": 1, "preview_every": 0}
@@ -108,6 +110,7 @@ def shrink(patch: pytest.MonkeyPatch) -> None:
 
     patch.setattr(fit, "resolve", _with_few_steps(fit.resolve))
     patch.setattr("mitex.mesh.load.embedded", lambda name: _ball_in_place_of(embedded(name)))
+    patch.setattr("mitex.mesh.remesh", lambda mesh, vertices: remesh(mesh, min(vertices, REMESHED)))
     few_steps = _with_few_growth_steps(texture.grown_state)
     for module in (texture, page):
         patch.setattr(module, "grown_state", few_steps)

@@ -35,7 +35,7 @@ def coarse(rng: np.random.Generator) -> Mesh:
     hull = ConvexHull(points)
     used, faces = np.unique(hull.simplices, return_inverse=True)
     mesh = Mesh(points[used].astype(np.float32), faces.reshape(-1, 3), name="hull")
-    return subdivide_midpoint(mesh, int(np.ceil(np.log(2500 / len(used)) / np.log(4))))
+    return subdivide_midpoint(mesh, int(np.ceil(np.log(1000 / len(used)) / np.log(4))))
 
 
 def fan(spokes: int, rng: np.random.Generator) -> Mesh:

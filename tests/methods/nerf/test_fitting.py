@@ -325,7 +325,7 @@ def test_wrong_cameras_find_back(run, base):
     wrong = replace(training, poses=poses.astype(np.float32))
     task = trained_task(run, base, wrong, "refine_cameras=true")
     generator, optimizer = torch.Generator().manual_seed(0), torch.optim.Adam([task.named["poses"]], lr=0.03)
-    for step in range(90):
+    for step in range(60):
         loss = run_step(task, step, generator).value
         (task.named["poses"].grad,) = torch.autograd.grad(loss, [task.named["poses"]])
         optimizer.step()

@@ -124,7 +124,7 @@ def test_optimizers_and_spaces(mesh, exemplar, tmp_path):
     """After the same steps principal components are nearer than channels, and L-BFGS than Adam."""
     colours, last = Exemplar({"albedo": exemplar.maps["albedo"]}), {}
     for setting in ("whitened=false noise=0.2 lr=0.1", "optimizer=adam", "optimizer=lbfgs lr=1"):
-        overrides = [*SMALL, "start=patches", "steps=40", *setting.split()]
+        overrides = [*SMALL, "start=patches", "steps=25", *setting.split()]
         surface.fit(colours, mesh, tmp_path / setting, set=overrides)
         last[setting] = losses(tmp_path / setting)[-1]
     channels, adam, lbfgs = last.values()

@@ -176,8 +176,8 @@ def test_a_base_shape_is_found_in_photos_alone(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(coarse, "GRID", 128)
     monkeypatch.setattr(coarse, "base_shape", partial(base_shape, edge=0.02))
-    photos = captured(dented_egg(24), views=14, side=64, spp=8)
-    base = find_base(photos, replace(PRESETS["fast"], base_steps=400))
+    photos = captured(dented_egg(24), views=12, side=64, spp=8)
+    base = find_base(photos, replace(PRESETS["fast"], base_steps=300))
     true = dented_egg(80).vertices
     report = quality(base.mesh)
     assert (report.components, report.boundary_edges, report.genus) == (1, 0, 0)
