@@ -4,8 +4,8 @@ Nothing of a command or a snippet is changed. What takes minutes is made small b
 
 - fits: their settings are resolved as they were asked for, which checks them; then they get 2 steps, 3 if the
   run is resumed, and the tiny settings of their method;
-- meshes that ship with Mitex are balls of 362 vertices, as large as they and under their names, and `--remesh`
-  gives 600 vertices at most;
+- meshes that ship with Mitex are balls of 362 vertices, as large as they and under their names;
+- `--remesh` gives 600 vertices at most;
 - reliefs that begin on a finer level begin on 320 faces, and their coarse parts are laid once in a fit, from
   the patches of 30 places;
 - automata grow for 2 steps on the mesh as it is, are not healed, and are baked at 64 texels, as the textures
