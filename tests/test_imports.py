@@ -37,6 +37,7 @@ ORDER = [
     "atlas",
     "texels",
     "flat_charts",
+    "charts",
     "mesh",
     "triples",
     "exemplar",

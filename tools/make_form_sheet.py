@@ -67,7 +67,7 @@ def main() -> None:
         reference, _, kind = word.partition(":")
         original = find_reference(reference)
         measure = ReliefForm(original)
-        print(f"{reference}, other patches: {measure.distance(original, seed=1):.2f}", flush=True)
+        print(f"{reference}, other patches: {measure.at(original, seed=1).distance:.2f}", flush=True)
         reliefs = [grown(runs, reference, mesh, kind == "map") for mesh in meshes]
         names = ["other cut", *(f"on {word.split('~')[0]}" for word in (first, second)), "lumps", "ball"]
         cells.append(original)
@@ -75,7 +75,8 @@ def main() -> None:
         for label, mesh in zip(names, [cut(original), *reliefs, lumps(), icosphere(FREQUENCY)], strict=True):
             form, local = measure.of(mesh), statistic_distances(mesh, original)
             summary = ", ".join(f"{key} {value:.2f}" for key, value in local.items())
-            print(f"{reference}, {label}: form {form.distance:.2f} at {form.size}, {summary}", flush=True)
+            looks = f"form {form.distance:.2f}, coarse {form.coarse:.2f} at {form.size}"
+            print(f"{reference}, {label}: {looks}, {summary}", flush=True)
             cells.append(mesh)
             labels.append(f"{label}: {form.distance:.2f}")
     pictures = [tone(still(clay(mesh), resolution=CELL, spp=96, azimuth=20)) for mesh in cells]

@@ -120,6 +120,12 @@ RELIEFS = (
         "they are most alike. 0: the reference; 1: as far as a plane.",
     ),
     Measure(
+        "form_coarse",
+        "Form, coarse",
+        LOWER,
+        "The same at relu4_1 alone, whose features see 60 pixels of 96: whether whole shapes are right.",
+    ),
+    Measure(
         "relief_size",
         "Relief size",
         "",

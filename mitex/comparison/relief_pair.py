@@ -79,22 +79,23 @@ class ReliefPair:
     def floor(self) -> dict[str, float]:
         """The form of other patches of the reference; all else is 0, since it is compared as a whole."""
         try:
-            return {"form": self._form.distance(self.reference, seed=1)}
+            form = self._form.at(self.reference, seed=1)
         except ImageError:
             return {}
+        return {"form": form.distance, "form_coarse": form.coarse}
 
     def pictures(self, asset: Asset, run: Path) -> dict[str, np.ndarray]:
         """As of `mitex.comparison.inputs.lit_picture`."""
         return {LIT: lit_picture(asset, self.mesh)}
 
     def _form_of(self, mesh: Mesh) -> dict[str, float]:
-        """Distance and size; nothing for meshes so thin that patches show too little of them."""
+        """Distances and size; nothing for meshes so thin that patches show too little of them."""
         try:
             form = self._form.of(mesh)
         except ImageError as e:
             log.info("%s: %s", mesh.name, e)
             return {}
-        return {"form": form.distance, "relief_size": form.size}
+        return {"form": form.distance, "form_coarse": form.coarse, "relief_size": form.size}
 
     @cached_property
     def _form(self) -> ReliefForm:

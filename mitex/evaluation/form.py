@@ -25,10 +25,12 @@ class Form:
 
     Attributes:
         distance: 0 for the reference itself; 1 is the distance of a plane.
+        coarse: the same by the last of the layers alone: shapes as a whole and how they are arranged.
         size: of the relief beside the mesh, in relation to the size that it has beside the reference.
     """
 
     distance: float
+    coarse: float
     size: float
 
 
@@ -58,28 +60,31 @@ class ReliefForm:
         forms = []
         for size in SIZES:
             try:
-                forms.append(Form(self.distance(mesh, size), size))
+                forms.append(self.at(mesh, size))
             except ImageError:
                 continue
         if not forms:
             raise ImageError(f"patches of {mesh.name} show too little of it", "compare a less thin mesh")
         return min(forms, key=lambda form: form.distance)
 
-    def distance(self, mesh: Mesh, size: float = 1.0, seed: int = 0) -> float:
-        """The distance of a relief of a known size; `seed` is that of the places.
+    def at(self, mesh: Mesh, size: float = 1.0, seed: int = 0) -> Form:
+        """A relief at a known size; `seed` is that of the places.
 
         Raises:
             ImageError: patches show too little of the mesh.
         """
-        return float(np.sqrt(self._distances(_features(mesh, size, seed)) / self._unit).mean())
+        distances = np.sqrt(self._distances(_features(mesh, size, seed)) / self._unit)
+        return Form(float(distances.mean()), float(distances[:, -1].mean()), size)
 
     def _distances(self, features: dict[str, Vectors]) -> np.ndarray:
-        """Frechet distances of each kind of pictures and layer."""
+        """Frechet distances of each kind of pictures and layer (2, L)."""
         return np.array(
             [
-                frechet_distance(features[kind][layer].double(), self._features[kind][layer].double())
+                [
+                    frechet_distance(features[kind][layer].double(), self._features[kind][layer].double())
+                    for layer in LAYERS
+                ]
                 for kind in PLANE
-                for layer in LAYERS
             ]
         )
 

@@ -59,7 +59,7 @@ def of_reference(reference):
 def test_the_reference_itself_and_a_plane(of_reference, reference):
     itself = of_reference.of(reference)
     assert itself.distance == pytest.approx(0, abs=1e-3) and itself.size == 1.0
-    assert of_reference.distance(grid(4, 4), 0.25) == pytest.approx(1, abs=0.05)
+    assert of_reference.at(grid(4, 4), 0.25).distance == pytest.approx(1, abs=0.05)
 
 
 def test_another_cut_is_nearer_than_hills_and_hills_are_nearer_than_nothing(of_reference, reference):
@@ -71,9 +71,17 @@ def test_another_cut_is_nearer_than_hills_and_hills_are_nearer_than_nothing(of_r
     assert of_cut > of_hills
 
 
+def test_the_coarse_distance_is_that_of_the_last_layer(of_reference, reference, monkeypatch):
+    hills = _sphere(DENSE, _waves)
+    both = of_reference.at(hills)
+    monkeypatch.setattr(form, "LAYERS", form.LAYERS[-1:])
+    alone = ReliefForm(reference).at(hills)
+    assert alone.distance == alone.coarse == pytest.approx(both.coarse) and both.coarse != both.distance
+
+
 def test_where_and_how_large_the_mesh_is_does_not_matter(of_reference, reference):
     moved = reference.with_vertices(0.1 * reference.vertices + 5)
-    assert of_reference.distance(moved) == pytest.approx(0, abs=0.05)
+    assert of_reference.at(moved).distance == pytest.approx(0, abs=0.05)
 
 
 def test_the_size_of_the_relief_comes_out(of_reference):
@@ -82,7 +90,7 @@ def test_the_size_of_the_relief_comes_out(of_reference):
 
 
 def test_other_places_give_another_distance(of_reference, reference):
-    assert 0.02 < of_reference.distance(reference, seed=1) < 0.4
+    assert 0.02 < of_reference.at(reference, seed=1).distance < 0.4
 
 
 def test_a_thread_shows_nothing(of_reference, reference):

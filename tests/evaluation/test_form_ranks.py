@@ -28,7 +28,7 @@ def test_ranks_of_a_reference(tool, name):
     pytest.importorskip("pymeshlab")
     reference = find_reference(name)
     measure = ReliefForm(reference)
-    itself = measure.distance(reference, seed=1)
+    itself = measure.at(reference, seed=1).distance
     copy = measure.of(tool.cut(reference)).distance
     others = [measure.of(find_reference(other)).distance for other in NAMES if other != name]
     lumps, ball = measure.of(tool.lumps()).distance, measure.of(icosphere(tool.FREQUENCY)).distance
