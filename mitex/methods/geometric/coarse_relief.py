@@ -6,7 +6,7 @@ Something else has to say then where each of them goes, and which way it runs: t
 which lies between two low-pass filters. The first generator learns to complete that of the reference. For
 other meshes it is quilted: patches of it, turned in many directions, or along a field, are joined where they
 fit (Efros and Freeman 2001, on the surface). Separate bumps or dents, which would run together there, are
-spread evenly instead.
+spread evenly instead, each with the mean profile of all.
 """
 
 from __future__ import annotations
@@ -14,29 +14,29 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse.csgraph import dijkstra
 
 from mitex.errors import ConfigError
 from mitex.geometry.vectors import dot
 from mitex.mesh import Mesh
 from mitex.mesh.frames import vertex_directions
 from mitex.mesh.low_pass import blurred, low_pass
+from mitex.mesh.matrices import edge_lengths
 from mitex.methods.geometric.placement import even_places, separate_tops
 from mitex.quilting.matching import ArraySource
 from mitex.quilting.surface import quilt_on
 from mitex.quilting.vertices import VertexTarget, vertex_patches
 
-# Widths of filters, half an octave apart [mean edges]: the last leaves the shape without its relief, and the
-# difference of two successive ones is a band.
-WIDTHS = (1.0, 2.0**0.5, 2.0, 8.0**0.5, 4.0)
+FINE, WIDE = 1.0, 4.0  # widths of filters [mean edges]: what is wider than the second is shape
 SKEWED = 0.5  # skewness of heights from which on they are bumps, or dents, on a ground
 PATCH = 16  # side of a patch [mean edges]
 SHARE = 0.34  # of the side of a square as large as the mesh, at most
 RATE = 2  # texels of a patch on an edge
 PLACES, TURNS = 250, 8  # that patches are taken at, and directions
+RING = 0.5  # width of a ring around a bump in which heights are averaged [mean edges]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,14 +83,15 @@ class CoarseRelief:
         return patches
 
     @cached_property
-    def bumps(self) -> int:
-        """How many separate ones there are; below 0, dents; 0 along a field, or for other forms."""
+    def bumps(self) -> np.ndarray:
+        """The vertices (N,) amid separate bumps or dents; none along a field, or for other forms."""
         skewness = float(np.mean(self.heights**3)) / max(float(self.heights.std()), 1e-12) ** 3
         if self.field is not None or abs(skewness) < SKEWED:
-            return 0
-        side = 1 if skewness > 0 else -1
-        tops = separate_tops(self.base, side * self.heights)
-        return 0 if tops is None else side * len(tops)
+            return np.zeros(0, np.int64)
+        tops = separate_tops(self.base, np.sign(skewness) * self.heights) or []
+        points = self.base.vertices
+        away = (np.linalg.norm(points[top] - points[top].mean(0), axis=1) for top in tops)
+        return np.array([top[a.argmin()] for top, a in zip(tops, away, strict=True)], np.int64)
 
     def on(self, mesh: Mesh, field: np.ndarray | None = None) -> Callable[[int], np.ndarray]:
         """What lays it on a mesh: from a seed to vertices (V', 3) float64, moved along the normals.
@@ -101,7 +102,7 @@ class CoarseRelief:
         """
         edge = _mean_edge(mesh)
         spread = float(self.heights.std()) / _mean_edge(self.base)
-        heights_of = self._spread(mesh) if self.bumps else self._quilted(mesh, field)
+        heights_of = self._spread(mesh) if len(self.bumps) else self._quilted(mesh, field)
 
         def laid(seed: int) -> np.ndarray:
             heights = heights_of(seed)
@@ -122,19 +123,17 @@ class CoarseRelief:
         return heights
 
     def _spread(self, mesh: Mesh) -> Callable[[int], np.ndarray]:
-        """From a seed to heights (V',): bumps or dents, as many on an area, each with the bands of all."""
-        faces, side = len(self.base.faces) / abs(self.bumps), np.sign(self.bumps)
-        own, bands = _bands(self.base), _bands(mesh)
-        once = own(self.heights)
-        # What was left of each band by the filters, they leave of it again.
-        strengths = once.std(1) ** 2 / np.maximum(own(once.sum(0)).std(1), 1e-12)
-        smooth = low_pass(mesh, WIDTHS[0] * _mean_edge(mesh))  # impulses have more below the finest band
+        """From a seed to heights (V',): bumps or dents, as many on an area, each with the mean profile."""
+        faces = len(self.base.faces) / len(self.bumps)
+        away = _distances(self.base, self.bumps) / _mean_edge(self.base)
+        ring = np.round(away / RING).astype(np.int64)
+        count = np.bincount(ring)
+        radii = RING * np.flatnonzero(count)
+        profile = np.bincount(ring, self.heights)[count > 0] / count[count > 0]
 
         def heights(seed: int) -> np.ndarray:
-            impulses = np.zeros(len(mesh.vertices))
-            impulses[even_places(mesh, faces, seed)] = side
-            parts = bands(smooth(impulses))
-            return strengths @ (parts / np.maximum(parts.std(1, keepdims=True), 1e-12))
+            away = _distances(mesh, even_places(mesh, faces, seed)) / _mean_edge(mesh)
+            return np.interp(away, radii, profile)
 
         return heights
 
@@ -152,22 +151,33 @@ class Start(NamedTuple):
 
 
 def split(mesh: Mesh) -> CoarseRelief:
-    """The coarse part of the relief of a training mesh, on the mesh without relief; its mean is 0."""
-    base = blurred(mesh, WIDTHS[-1] * _mean_edge(mesh))
-    heights = _bands(base)(dot(mesh.vertices - base.vertices.astype(np.float64), base.normals)).sum(0)
-    return CoarseRelief(base, heights)
+    """The coarse part of the relief of a training mesh, on the mesh without relief; its mean is 0.
+
+    What is wider than `WIDE` is shape, unless separate bumps lie farther apart.
+    """
+    relief = _between(mesh, FINE, WIDE)
+    if len(relief.bumps):
+        apart = (float(mesh.face_areas.sum()) / len(relief.bumps)) ** 0.5
+        relief = _between(mesh, FINE, max(WIDE, apart / _mean_edge(mesh)))
+    return relief
 
 
-def _bands(mesh: Mesh) -> Callable[[np.ndarray], np.ndarray]:
-    """What splits heights (V,) into bands (N, V), the finest first, each with a mean of 0."""
+def _between(mesh: Mesh, fine: float, wide: float) -> CoarseRelief:
+    """What lies between two low-pass filters [mean edges]."""
     edge = _mean_edge(mesh)
-    filters = [low_pass(mesh, width * edge) for width in WIDTHS]
+    base = blurred(mesh, wide * edge)
+    heights = dot(mesh.vertices - base.vertices.astype(np.float64), base.normals)
+    passed = [low_pass(base, width * _mean_edge(base))(heights) for width in (fine, wide)]
+    heights = passed[0] - passed[1]
+    return CoarseRelief(base, heights - heights.mean())
 
-    def bands(heights: np.ndarray) -> np.ndarray:
-        parts = np.array([fine - wide for fine, wide in pairwise(f(heights) for f in filters)])
-        return parts - parts.mean(1, keepdims=True)
 
-    return bands
+def _distances(mesh: Mesh, places: np.ndarray) -> np.ndarray:
+    """(V,) straight to that of the vertices `places` that is nearest along the edges [mesh units]."""
+    graph = edge_lengths(mesh.faces, mesh.vertices.astype(np.float64))
+    _, _, nearest = dijkstra(graph, indices=places, min_only=True, return_predecessors=True)
+    nearest = np.where(nearest < 0, np.arange(len(mesh.vertices)), nearest)  # without faces
+    return np.linalg.norm(mesh.vertices - mesh.vertices[nearest], axis=1)
 
 
 def _right(mesh: Mesh, field: np.ndarray | None) -> np.ndarray | None:

@@ -53,20 +53,24 @@ def bumps(mesh: Mesh, edge: float) -> Bumps | None:
     tops = separate_tops(mesh, side * heights)
     if tops is None:
         return None
-    faces, height = len(mesh.faces) / len(tops), float(np.median(tops))
+    faces = len(mesh.faces) / len(tops)
+    height = float(np.median([(side * heights)[top].max() for top in tops]))
     return Bumps(faces, side * height) if faces <= WIDEST and height >= LOWEST else None
 
 
-def separate_tops(mesh: Mesh, heights: np.ndarray) -> np.ndarray | None:
-    """How high each separate bump is (N,), by heights (V,) above the ground; None if they run together."""
+def separate_tops(mesh: Mesh, heights: np.ndarray) -> list[np.ndarray] | None:
+    """The vertices of the upper half of each separate bump; None if bumps run together.
+
+    Args:
+        mesh: V vertices.
+        heights: (V,) of these above the ground.
+    """
     raised = np.flatnonzero(heights > 0.5 * np.quantile(heights, TOP))
     graph = edge_lengths(mesh.faces, mesh.vertices)[raised][:, raised]
     count, label = connected_components(graph, directed=False)
     if count < FEWEST or np.bincount(label).max() > LARGEST * len(raised):
         return None
-    tops = np.zeros(count)
-    np.maximum.at(tops, label, heights[raised])
-    return tops
+    return [raised[label == k] for k in range(count)]
 
 
 def placed(mesh: Mesh, texture: Bumps, seed: int) -> np.ndarray:
