@@ -10,7 +10,8 @@ from mitex.errors import ConfigError
 from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh, icosphere, torus
 from mitex.mesh.fields import vector_field
-from mitex.methods.geometric.coarse_relief import PATCH, RATE, WIDTHS, CoarseRelief, split
+from mitex.mesh.low_pass import blurred
+from mitex.methods.geometric.coarse_relief import FINE, PATCH, RATE, WIDE, CoarseRelief, split
 
 BALL = icosphere(16)
 EDGE = float(BALL.edge_lengths.mean())
@@ -27,13 +28,17 @@ def with_heights(heights: np.ndarray) -> Mesh:
     return BALL.with_vertices(BALL.vertices * (1 + EDGE * heights[:, None]))
 
 
-def bumps(side: float, count: int = 40, width: float = 3.0) -> Mesh:
-    """Round ones around points that are evenly spread, one edge high and so many wide."""
+def middles(count: int) -> np.ndarray:
+    """Points evenly spread on the ball."""
     k = np.arange(count)
     angle, y = np.pi * (3 - 5**0.5) * k, 1 - 2 * (k + 0.5) / count
     ring = np.sqrt(1 - y * y)
-    centres = np.stack([ring * np.sin(angle), y, ring * np.cos(angle)], 1)
-    away, _ = KDTree(centres).query(BALL.vertices)
+    return np.stack([ring * np.sin(angle), y, ring * np.cos(angle)], 1)
+
+
+def bumps(side: float, count: int = 40, width: float = 3.0) -> Mesh:
+    """Round ones around points that are evenly spread, one edge high and so many wide."""
+    away, _ = KDTree(middles(count)).query(BALL.vertices)
     return with_heights(side * np.exp(-((away / (0.5 * width * EDGE)) ** 2)))
 
 
@@ -59,8 +64,14 @@ def laid(coarse: CoarseRelief, mesh: Mesh, seed: int = 0) -> np.ndarray:
 def test_other_reliefs_and_those_along_a_field_have_no_bumps():
     dents = split(bumps(-1))
     field = vector_field(dents.base, "up")
-    assert dents.bumps == -40 and CoarseRelief(dents.base, dents.heights, field).bumps == 0
-    assert split(waves(8)).bumps == 0
+    assert len(dents.bumps) == 40 and len(CoarseRelief(dents.base, dents.heights, field).bumps) == 0
+    assert len(split(waves(8)).bumps) == 0
+
+
+def test_bumps_are_found_in_their_middles():
+    relief = split(bumps(1))
+    away, _ = KDTree(middles(40)).query(unit(relief.base.vertices[relief.bumps].astype(float)))
+    assert away.max() < 1.2 * EDGE
 
 
 def islands(mesh: Mesh, heights: np.ndarray) -> int:
@@ -96,7 +107,7 @@ def spread(length: float) -> float:
 
 def test_only_the_band_between_both_filters_counts():
     """Waves in it, half as long as the fine filter keeps, and much longer than the wide one lets by."""
-    middle, short, long = map(spread, (7, 2.2 * WIDTHS[0], 12 * WIDTHS[-1]))
+    middle, short, long = map(spread, (7, 2.2 * FINE, 12 * WIDE))
     assert middle > 1.9 * short and middle > 9 * long
 
 
@@ -104,13 +115,41 @@ def test_only_the_band_between_both_filters_counts():
 @pytest.mark.parametrize("side", [1, -1])
 def test_bumps_and_dents_are_as_many_on_an_area(side, mesh):
     coarse = split(bumps(side))
-    assert coarse.bumps == 40 * side
+    assert len(coarse.bumps) == 40
     heights = laid(coarse, mesh)
     assert (
         heights.std() == pytest.approx(coarse.heights.std() / EDGE, rel=0.02) and abs(heights.mean()) < 1e-3
     )
     own, others = islands(coarse.base, side * coarse.heights), islands(mesh, side * heights)
     assert len(mesh.faces) / others == pytest.approx(len(BALL.faces) / own, rel=0.15)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_bumps_have_the_profile_of_the_references(side):
+    """As high in the middle, and as wide at half of that."""
+    coarse = split(bumps(side, width=4))
+    own, other = side * coarse.heights / EDGE, side * laid(coarse, TORUS)
+    ground = [np.median(heights) for heights in (own, other)]
+    top = [np.quantile(h, 0.99) - g for h, g in zip((own, other), ground, strict=True)]
+    assert top[1] == pytest.approx(top[0], rel=0.15)
+    share = [(h - g > 0.5 * top[0]).mean() for h, g in zip((own, other), ground, strict=True)]
+    assert share[1] == pytest.approx(share[0], rel=0.2)
+
+
+def test_bumps_that_lie_far_apart_are_taken_off():
+    """Which are wider than what else counts as relief."""
+    high = bumps(1, count=12, width=9)
+    meshes = split(high).base, blurred(high, WIDE * EDGE), high
+    taken, still, before = (np.linalg.norm(mesh.vertices, axis=1).std() for mesh in meshes)
+    assert taken < 0.25 * before and taken < 0.5 * still
+
+
+def test_a_bump_does_not_show_on_the_other_side_of_a_wall():
+    wall = BALL.with_vertices(BALL.vertices * np.array([1, 1, 0.02]))
+    heights = laid(split(bumps(1)), wall)
+    _, behind = KDTree(BALL.vertices).query(BALL.vertices * np.array([1, 1, -1]))
+    inner = np.linalg.norm(BALL.vertices[:, :2], axis=1) < 0.8
+    assert np.corrcoef(heights[inner], heights[behind][inner])[0, 1] < 0.3
 
 
 def slopes(mesh: Mesh, heights: np.ndarray) -> np.ndarray:
