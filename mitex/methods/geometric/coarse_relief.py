@@ -126,10 +126,11 @@ class CoarseRelief:
         """From a seed to heights (V',): bumps or dents, as many on an area, each with the mean profile."""
         faces = len(self.base.faces) / len(self.bumps)
         away = _distances(self.base, self.bumps) / _mean_edge(self.base)
-        ring = np.round(away / RING).astype(np.int64)
+        near = np.isfinite(away)
+        ring = np.round(away[near] / RING).astype(np.int64)
         count = np.bincount(ring)
         radii = RING * np.flatnonzero(count)
-        profile = np.bincount(ring, self.heights)[count > 0] / count[count > 0]
+        profile = np.bincount(ring, self.heights[near])[count > 0] / count[count > 0]
 
         def heights(seed: int) -> np.ndarray:
             away = _distances(mesh, even_places(mesh, faces, seed)) / _mean_edge(mesh)
@@ -173,11 +174,15 @@ def _between(mesh: Mesh, fine: float, wide: float) -> CoarseRelief:
 
 
 def _distances(mesh: Mesh, places: np.ndarray) -> np.ndarray:
-    """(V,) straight to that of the vertices `places` that is nearest along the edges [mesh units]."""
+    """(V,) straight to that of the vertices `places` that is nearest along the edges [mesh units].
+
+    Infinite in parts of the mesh that have none.
+    """
     graph = edge_lengths(mesh.faces, mesh.vertices.astype(np.float64))
     _, _, nearest = dijkstra(graph, indices=places, min_only=True, return_predecessors=True)
-    nearest = np.where(nearest < 0, np.arange(len(mesh.vertices)), nearest)  # without faces
-    return np.linalg.norm(mesh.vertices - mesh.vertices[nearest], axis=1)
+    away, there = np.full(len(nearest), np.inf), nearest >= 0
+    away[there] = np.linalg.norm(mesh.vertices[there] - mesh.vertices[nearest[there]], axis=1)
+    return away
 
 
 def _right(mesh: Mesh, field: np.ndarray | None) -> np.ndarray | None:

@@ -152,6 +152,17 @@ def test_a_bump_does_not_show_on_the_other_side_of_a_wall():
     assert np.corrcoef(heights[inner], heights[behind][inner])[0, 1] < 0.3
 
 
+def test_parts_without_a_bump_are_ground():
+    """Sixty small balls have faces enough for nine bumps."""
+    small = icosphere(1)
+    shifts = 3.0 * np.arange(60)[:, None]
+    points = (small.vertices + (shifts * np.array([1, 0, 0]))[:, None]).reshape(-1, 3)
+    faces = (small.faces + len(small.vertices) * np.arange(60)[:, None, None]).reshape(-1, 3)
+    balls = Mesh(points.astype(np.float32), faces.astype(np.int32), name="balls")
+    highest = laid(split(bumps(1)), balls).reshape(60, -1).max(1)
+    assert (highest > np.median(highest) + 0.01).sum() == 9
+
+
 def slopes(mesh: Mesh, heights: np.ndarray) -> np.ndarray:
     """(F, 3) gradients of what vertices have."""
     crosses = np.asarray(mesh.face_crosses, float)
