@@ -14,7 +14,6 @@ from mitex.lazy import load
 from mitex.methods.registry import methods
 
 MESHES = ("knot", "shaderball", "octopus")
-RING = (24, 10)  # vertices around and across it: few, since some textures split its faces
 SIDE = 144  # of a thumbnail [px]
 
 
@@ -67,13 +66,11 @@ def _thumbnail(model: dict[str, Any]) -> str | None:
 
 
 def _stills(models: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Models as they are on a ring."""
-    from mitex.asset import Asset
-    from mitex.mesh import torus
+    """Models as an example of their method shows them."""
     from mitex.page.still import still_data
 
     for model in models:
-        texture = methods()[model["method"]].load_texture().load(model["path"])
-        asset = texture.apply(torus(*RING))
-        if isinstance(asset, Asset):
+        method = methods()[model["method"]]
+        if method.example is not None:
+            asset = load(method.example)(method.load_texture().load(model["path"]))
             yield still_data(replace(asset, name=model["name"])) | {"thumbnail": _thumbnail(model)}

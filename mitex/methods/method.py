@@ -27,6 +27,8 @@ class Method:
         animate: reference to the options of `mitex animate`, for textures that grow or change.
         page: reference to a function from names of its models and from meshes to what a page shows
             (`mitex.page.Content`), for textures that live in a browser.
+        example: reference to a function from a texture to an asset that shows it in the gallery, for textures
+            that do not live in a browser.
         commands: further commands of its own: word -> reference to the dataclass of the options, and the line
             in the overview.
         tensors: names of the tensors in weights that the authors published: such files tell nothing else of
@@ -42,6 +44,7 @@ class Method:
     texture: str
     animate: str | None = None
     page: str | None = None
+    example: str | None = None
     commands: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     tensors: frozenset[str] = frozenset()
     baseline: bool = False

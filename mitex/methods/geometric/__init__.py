@@ -13,6 +13,7 @@ METHOD = Method(
     apply="mitex.methods.geometric.cli:Apply",
     texture="mitex.methods.geometric.texture:GeometricTexture",
     animate="mitex.methods.geometric.animation:Animate",
+    example="mitex.methods.geometric.example:on_ring",
 )
 
 __all__ = ["METHOD", "PRESETS", "REFERENCES", "GeometricConfig", "GeometricTexture", "fit"]
