@@ -23,7 +23,7 @@ from benchmarks.nca import best, cpu
 from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
 from mitex.losses import gram_matrix
-from mitex.methods.baselines.gatys import GatysConfig
+from mitex.methods.baselines.multi_view_gram import MultiViewConfig
 from mitex.methods.baselines.solid_texture import SolidConfig, generator
 from mitex.methods.baselines.solid_texture.task import SolidTask
 
@@ -32,7 +32,7 @@ Work = Callable[[], object]
 
 def gram_matrices(side: int) -> tuple[Work, Work]:
     """Of a picture, with the gradient: ours, and the ordinary way."""
-    network, layers = Vgg16(), GatysConfig().layers
+    network, layers = Vgg16(), MultiViewConfig().layers
     picture = torch.rand(1, side, side, 3, generator=torch.Generator().manual_seed(0), requires_grad=True)
 
     def backward(grams: dict[str, torch.Tensor]) -> None:

@@ -69,7 +69,7 @@ def test_options_matter(exemplar):
     numbers = {"size": 64}, {"exemplar_size": 40}, {"noise": 0.4}, {"seed": 1}
     for options in (
         *numbers,
-        {"periodic": False},
+        {"periodic": True},
         {"layers": ("relu1_1",)},
         {"layers": ("relu1_1", "pool1")},
     ):

@@ -18,7 +18,7 @@ class Fit(PlanarFitOptions):
 
     examples:
       mitex fit gatys --exemplar lava --out runs/flat-lava
-      mitex fit gatys --exemplar pebbles.png --preset paper --set size=1024
+      mitex fit gatys --exemplar pebbles.png --set size=512 periodic=true
       mitex fit gatys --exemplar lava --out runs/flat-lava --resume
     """
 
