@@ -2,15 +2,15 @@
 
 import pytest
 
-from mitex.methods.nca import NcaTexture
+from mitex.methods.nca import METHOD, NcaTexture
+from mitex.methods.registry import bundled
 from tools.make_models import MODELS, PARENT, RECIPES, record
 
 OF_A_RUN = {"seconds", "family", "loss", "maps", "palette", "growth_steps"}
 
 
 def test_every_bundled_rule_is_in_the_table():
-    bundled = {path.stem for path in MODELS.glob("*.safetensors")} - {"scales", "spikes"}  # `geometric`
-    assert bundled == set(RECIPES)
+    assert set(bundled(METHOD)) == set(RECIPES)
     assert {recipe.parent for recipe in RECIPES.values()} <= {None, *RECIPES} and PARENT in RECIPES
 
 
