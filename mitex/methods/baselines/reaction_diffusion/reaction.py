@@ -51,7 +51,7 @@ class Reaction:
     def speed(self, state: torch.Tensor) -> torch.Tensor:
         """f(x) of states (N, K)."""
         hidden = F.linear(state, SLOPE * self.tensors["inner"], SLOPE * self.tensors["bias"])
-        return PACE * F.linear(F.silu(hidden) / SLOPE, self.tensors["outer"])
+        return F.linear(F.silu(hidden), PACE / SLOPE * self.tensors["outer"])
 
     def evolve(self, state: torch.Tensor, laplacian: LinearMap, steps: int) -> torch.Tensor:
         """States (N, K) after explicit steps of time of length 1."""
