@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import cache
 
 import torch
 
@@ -10,11 +11,12 @@ from mitex.errors import ConfigError
 from mitex.features.frozen import FrozenStack, GramTap, Operation, Tap
 from mitex.features.vgg import MEAN_RGB, Weights, convolutions
 from mitex.methods.surface.levels import Levels
-from mitex.methods.surface.operations import BilinearConv, SurfaceConv, SurfacePool
+from mitex.methods.surface.operations import BilinearConv, Kernel, SurfaceConv, SurfacePool
 from mitex.methods.surface.regions import bisect
 from mitex.runtime import uses_bfloat16
 
 POOLED = tuple(f"pool{n}" for n in range(1, 6))
+FIRST = "relu1_1"  # reads the texels
 
 
 class SurfaceVgg:
@@ -28,6 +30,7 @@ class SurfaceVgg:
         scale: how often the texels are pooled before the network sees them. The first convolution then reads
             nearest ones.
         weights: layer -> weight, bias, of VGG-16, VGG-19 or random ones; None takes the package's VGG-16.
+        normalised: of the package's weights, as of `Vgg16`.
 
     Attributes:
         texels: number of texels N.
@@ -42,6 +45,7 @@ class SurfaceVgg:
         bilinear: bool = True,
         scale: int = 0,
         weights: Weights | None = None,
+        normalised: bool = False,
     ) -> None:
         self.dtype = torch.bfloat16 if uses_bfloat16(precision) else torch.float32
         self.texels = len(levels.order)
@@ -51,17 +55,17 @@ class SurfaceVgg:
         self._levels = levels
         self._depth: dict[str, int] = {}
         self._regions: dict[tuple[str, int], list[torch.Tensor]] = {}
-        layers = convolutions(pool, normalised=False) if weights is None else weights
+        kernels = _kernels(weights, self.dtype) if weights else _shipped(pool, normalised, self.dtype)
         for level in levels.levels[:scale]:
             self.operations.append(SurfacePool("average", level.sizes))
         for n, level in enumerate(levels.levels[scale : scale + len(POOLED)]):
             around, count = level.neighbourhood, len(level.taps)
-            for name in (name for name in layers if name.startswith(f"relu{n + 1}_")):
-                if name != "relu1_1":
-                    self._append(name, SurfaceConv(*layers[name], self.dtype, around), count, scale + n)
+            for name in (name for name in kernels if name.startswith(f"relu{n + 1}_")):
+                if name != FIRST:
+                    self._append(name, SurfaceConv(kernels[name], around), count, scale + n)
                     continue
                 lookup = level.nearest if scale or not bilinear else levels.lookup
-                self._append(name, BilinearConv(*layers[name], self.dtype, lookup), count, scale + n)
+                self._append(name, BilinearConv(kernels[name], self.dtype, lookup), count, scale + n)
             self._append(POOLED[n], SurfacePool(pool, level.sizes), len(level.sizes), scale + n + 1)
 
     def features(self, texels: torch.Tensor, layers: Iterable[str]) -> dict[str, torch.Tensor]:
@@ -102,3 +106,15 @@ class SurfaceVgg:
         self.index[name] = len(self.operations)
         self.operations.append(operation)
         self.counts[name], self._depth[name] = count, level
+
+
+def _kernels(weights: Weights, dtype: torch.dtype) -> dict[str, Kernel]:
+    """Layer -> its kernel for values of a type; the first one's are float32."""
+    types = {FIRST: torch.float32}
+    return {name: Kernel.of(*layer, types.get(name, dtype)) for name, layer in weights.items()}
+
+
+@cache
+def _shipped(pool: str, normalised: bool, dtype: torch.dtype) -> Mapping[str, Kernel]:
+    """Kernels of the package's weights, which networks on all scales and surfaces share: up to 118 MB."""
+    return _kernels(convolutions(pool, normalised), dtype)

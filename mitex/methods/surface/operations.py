@@ -55,26 +55,40 @@ class Neighbourhood:
         return Neighbourhood(*(torch.from_numpy(np.ascontiguousarray(a)) for a in arrays))
 
 
+@dataclass(frozen=True, eq=False)
+class Kernel:
+    """The weights of a 3 x 3 convolution with I inputs and O outputs, tap by tap.
+
+    Attributes:
+        weight: (9 I, O).
+        adjoint: (9 O, I), those of its transpose.
+        bias: (O,).
+    """
+
+    weight: torch.Tensor
+    adjoint: torch.Tensor
+    bias: torch.Tensor
+
+    @staticmethod
+    def of(weight: torch.Tensor, bias: torch.Tensor, dtype: torch.dtype) -> Kernel:
+        """The kernel of weights (O, I, 3, 3) and a bias (O,), for values of a type."""
+        forward, back = (weight.permute(2, 3, *ends).flatten(0, 2).to(dtype) for ends in ((1, 0), (0, 1)))
+        return Kernel(forward, back, bias.to(dtype))
+
+
 class SurfaceConv:
     """A 3 x 3 convolution with bias and ReLU of values (n, I) on the elements of a level (equation 2).
 
     Args:
-        weight: (O, I, 3, 3).
-        bias: (O,).
-        dtype: of the values.
+        kernel: of the values' type.
         around: whom each element reads.
     """
 
     needs_input = False
 
-    def __init__(
-        self, weight: torch.Tensor, bias: torch.Tensor, dtype: torch.dtype, around: Neighbourhood
-    ) -> None:
-        outputs, inputs = weight.shape[:2]
-        self.weight = weight.permute(2, 3, 1, 0).reshape(9 * inputs, outputs).to(dtype)
-        self.adjoint = weight.permute(2, 3, 0, 1).reshape(9 * outputs, inputs).to(dtype)
-        self.bias, self.around = bias.to(dtype), around
-        self.rows, self.back_rows = _rows(inputs), _rows(outputs)
+    def __init__(self, kernel: Kernel, around: Neighbourhood) -> None:
+        self.weight, self.adjoint, self.bias, self.around = kernel.weight, kernel.adjoint, kernel.bias, around
+        self.rows, self.back_rows = (_rows(len(weight) // 9) for weight in (self.weight, self.adjoint))
         # Where the chunks of the backward pass begin in the lists of irregular slots.
         starts = 9 * torch.arange(0, len(around.taps) + self.back_rows, self.back_rows)
         self.starts = [torch.searchsorted(slots, starts).tolist() for slots in (around.empty, around.slot)]
@@ -106,21 +120,15 @@ class BilinearConv:
     """The first convolution: its taps interpolate the texels (section 3.1); float32 in, `output_dtype` out.
 
     Args:
-        weight, bias: as in `SurfaceConv`.
+        kernel: float32.
         output_dtype: dtype of the output.
         lookup: (9 n, n) CSR, the shares that each tap reads; row 9 i + k is tap k of element i.
     """
 
     needs_input = False
 
-    def __init__(
-        self,
-        weight: torch.Tensor,
-        bias: torch.Tensor,
-        output_dtype: torch.dtype,
-        lookup: scipy.sparse.csr_array,
-    ) -> None:
-        self.weight, self.bias, self.output_dtype = weight.permute(0, 2, 3, 1).flatten(1), bias, output_dtype
+    def __init__(self, kernel: Kernel, output_dtype: torch.dtype, lookup: scipy.sparse.csr_array) -> None:
+        self.weight, self.bias, self.output_dtype = kernel.weight.t(), kernel.bias, output_dtype
         self.matrix, self.adjoint = csr_tensor(lookup), csr_tensor(lookup.T.tocsr())
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:

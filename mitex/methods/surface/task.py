@@ -83,7 +83,7 @@ class SurfaceTask(ParameterTask):
         generator = torch.Generator().manual_seed(config.seed)
         self.space = self._space()
         seen = exemplar is not None or content is not None
-        weights = network_weights(config, generator) if seen else {}  # what is missing is missed at once
+        weights = network_weights(config, generator) if seen else None  # what is missing is missed at once
         super().__init__({"coordinates": self._start(generator, content, resumed)})
         self.coordinates = self.named["coordinates"]
         self.networks: list[SurfaceVgg] = []
@@ -225,15 +225,23 @@ class SurfaceTask(ParameterTask):
             return ColourSpace.of(self.exemplar, self.layout)
         return ColourSpace.plain(self.channels)
 
-    def _network(self, scale: int, weights: Weights) -> SurfaceVgg:
-        config = self.config
-        return SurfaceVgg(self.levels, config.pooling, bilinear=config.bilinear, scale=scale, weights=weights)
+    def _network(self, scale: int, weights: Weights | None) -> SurfaceVgg:
+        config, levels = self.config, self.levels
+        return SurfaceVgg(
+            levels, config.pooling, "auto", config.bilinear, scale, weights, normalised=self._normalised
+        )
 
-    def _comparisons(self, exemplar: Exemplar, weights: Weights) -> list[Comparison]:
+    @property
+    def _normalised(self) -> bool:
+        """Moments are not scale free; Gram matrices want the published scale."""
+        return self.config.loss == "transport"
+
+    def _comparisons(self, exemplar: Exemplar, weights: Weights | None) -> list[Comparison]:
         """With the exemplar, on each scale."""
         announce("comparing the exemplar with itself on every scale")
         # The image network has the same weights: what differs is only where it looks.
-        config, network = self.config, Vgg16(self.config.pooling, weights=weights)
+        config = self.config
+        network = Vgg16(config.pooling, normalised=self._normalised, weights=weights)
         comparisons = []
         for scale in range(config.scales + 1):
             size = max(self.domain.exemplar_side(config) >> scale, 16)

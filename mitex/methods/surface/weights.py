@@ -10,14 +10,11 @@ from mitex.features.vgg19 import vgg19_convolutions
 from mitex.methods.surface.config import SurfaceConfig
 
 
-def network_weights(config: SurfaceConfig, generator: torch.Generator) -> Weights:
-    """Layer -> weight and bias, as the settings say; random ones are drawn by the generator."""
+def network_weights(config: SurfaceConfig, generator: torch.Generator) -> Weights | None:
+    """Layer -> weight and bias, drawn by the generator or of the user's file; None for the package's."""
     if config.weights == "random":
         return random_weights(generator)
-    if config.weights == "vgg19":
-        return vgg19_convolutions()
-    # Moments are not scale free; Gram matrices want the published scale.
-    return convolutions(config.pooling, normalised=config.loss == "transport")
+    return vgg19_convolutions() if config.weights == "vgg19" else None
 
 
 def random_weights(generator: torch.Generator) -> Weights:

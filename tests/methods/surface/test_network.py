@@ -14,7 +14,7 @@ from mitex.methods.surface import operations as room
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.levels import Level
 from mitex.methods.surface.network import SurfaceVgg
-from mitex.methods.surface.operations import Neighbourhood, SurfaceConv, SurfacePool
+from mitex.methods.surface.operations import Kernel, Neighbourhood, SurfaceConv, SurfacePool
 from mitex.methods.surface.taps import Surroundings, build
 from mitex.methods.surface.weights import random_weights
 from mitex.texels import Texels
@@ -56,13 +56,19 @@ def as_image(levels, values, layer):
 
 
 @pytest.mark.parametrize(
-    ("kind", "pool"), [("levels", "average"), ("levels", "max"), ("traced_levels", "average")]
+    ("kind", "pool", "normalised"),
+    [
+        ("levels", "average", False),
+        ("levels", "average", True),
+        ("levels", "max", False),
+        ("traced_levels", "average", False),
+    ],
 )
-def test_every_layer_equals_the_image_network_on_a_grid(request, kind, image, pool):
+def test_every_layer_equals_the_image_network_on_a_grid(request, kind, image, pool, normalised):
     levels = request.getfixturevalue(kind)
-    ours = SurfaceVgg(levels, pool=pool, precision="float32")
+    ours = SurfaceVgg(levels, pool=pool, precision="float32", normalised=normalised)
     features = ours.features(image.view(-1, 3)[levels.order], LAYERS)
-    expected = Vgg16(pool=pool, precision="float32", normalised=False).features(image[None], LAYERS)
+    expected = Vgg16(pool=pool, precision="float32", normalised=normalised).features(image[None], LAYERS)
     for layer in LAYERS:
         inner = slice(MARGIN[int(layer[4])], -MARGIN[int(layer[4])])
         a = as_image(levels, features[layer], layer)[inner, inner]
@@ -113,7 +119,7 @@ def test_convolution_against_autograd(irregular, chunk, monkeypatch):
     x = torch.randn(len(taps), 8, generator=generator, requires_grad=True)
     gathered = x[torch.from_numpy(taps).long()]
     expected = torch.relu(torch.einsum("nki,oik->no", gathered, weight.flatten(2)) + bias)
-    conv = SurfaceConv(weight, bias, torch.float32, Neighbourhood.of(taps))
+    conv = SurfaceConv(Kernel.of(weight, bias, torch.float32), Neighbourhood.of(taps))
     output = conv.forward(x.detach())
     assert torch.allclose(output, expected, atol=1e-4)
     upstream = torch.randn(output.shape, generator=generator)
