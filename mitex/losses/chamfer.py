@@ -8,6 +8,8 @@ import numpy as np
 import torch
 from scipy.spatial import KDTree
 
+from mitex.runtime.workers import tree_threads
+
 
 @dataclass(frozen=True, eq=False)
 class Samples:
@@ -63,5 +65,5 @@ def _nearest(points: torch.Tensor, others: torch.Tensor) -> torch.Tensor:
     """For each point the index of the nearest of the others."""
     # Unbalanced trees are built three times as fast, and random samples do not need balance.
     tree = KDTree(others.detach().numpy(), balanced_tree=False, compact_nodes=False)
-    _, index = tree.query(points.detach().numpy(), workers=-1)
+    _, index = tree.query(points.detach().numpy(), workers=tree_threads(len(points)))
     return torch.from_numpy(np.asarray(index))

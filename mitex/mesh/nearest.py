@@ -9,6 +9,7 @@ from scipy.spatial import KDTree
 
 from mitex.geometry.triangles import nearest_on_triangles
 from mitex.mesh.mesh import Mesh
+from mitex.runtime.workers import tree_threads
 
 CANDIDATES, MORE_CANDIDATES = 8, 64  # faces whose distance is computed
 NEAR = 1e-5  # distance of points on the surface [extents of the mesh], by rounding
@@ -51,7 +52,7 @@ def _candidates(
     if mesh not in _trees:
         _trees[mesh] = KDTree(centres)
     count = min(count, len(corners))
-    _, faces = _trees[mesh].query(points, k=count, workers=-1)
+    _, faces = _trees[mesh].query(points, k=count, workers=tree_threads(len(points)))
     faces = np.asarray(faces).reshape(len(points), count)
     large = np.argsort(-mesh.face_areas)[:largest]
     faces = np.column_stack([faces, np.broadcast_to(large, (len(points), len(large)))])

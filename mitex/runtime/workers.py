@@ -1,4 +1,4 @@
-"""The threads of torch and of Dr.Jit: how many, and which of the two gives way."""
+"""The threads of torch, of Dr.Jit and of k-d trees: how many, and which of the first two gives way."""
 
 import os
 import sys
@@ -15,6 +15,7 @@ THREADS = (
 WORKER_NAME = "nt ["  # what Dr.Jit calls its worker threads, with a number
 WORKER_NICENESS = 10  # added to the process's when they are to give way
 WORKER_IDLE_TIME = 0.05  # after which they sleep [s]
+MANY = 2000  # points that a tree is asked for in threads, which take milliseconds to begin
 
 _threads: int | None = None
 
@@ -39,11 +40,20 @@ def is_set() -> bool:
     return _threads is not None
 
 
-def apply_thread_count() -> None:
-    """Gives Dr.Jit, once it is loaded, the number of threads that `threads` was called with before, or that
-    the environment's MITEX_THREADS says."""
+def allowed() -> int | None:
+    """How many threads there may be, as `threads` or MITEX_THREADS of the environment says; None for any."""
     text = os.environ.get(THREADS, "")
-    count = _threads or (int(text) if text.isdecimal() else 0)
+    return _threads or (int(text) if text.isdecimal() else 0) or None
+
+
+def tree_threads(points: int) -> int:
+    """How many threads SciPy's k-d trees get for a number of points, as their argument `workers`."""
+    return (allowed() or -1) if points >= MANY else 1
+
+
+def apply_thread_count() -> None:
+    """Gives Dr.Jit, once it is loaded, the threads that are `allowed`."""
+    count = allowed()
     if count and count != import_module("drjit").thread_count():
         set_workers(count)
 

@@ -9,6 +9,7 @@ from scipy.spatial import KDTree
 
 from mitex.runtime.jit import dr, mi
 from mitex.runtime.upload import upload
+from mitex.runtime.workers import tree_threads
 
 CELL = 1.5  # side of a cell [spacings]
 EXTRA = 3  # vertices looked up at a cell's corners beyond the K nearest
@@ -16,7 +17,6 @@ LENGTH = 5  # of a list, at most, in vertices looked up at a corner
 MARGIN = 0.25  # the grid goes beyond the vertices by this [diagonals of their bounding box]
 SIDE = 192  # cells along a side, at most
 CELLS = 1 << 19  # with a list, at most: 100 MB for 8 neighbours
-MANY = 2000  # points that the tree is asked for in threads, which take milliseconds to begin
 CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
 
 UNLISTED, FAR, NEW = -1, -2, -3
@@ -89,7 +89,7 @@ class NearestVertices:
     def _from_tree(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """As `__call__`, by the tree."""
         near = np.arange(len(points))
-        workers = -1 if len(points) >= MANY else 1
+        workers = tree_threads(len(points))
         if math.isfinite(self.limit):
             distance, _ = self._tree.query(points, k=1, distance_upper_bound=self.limit, workers=workers)
             near = np.flatnonzero(np.isfinite(distance))
@@ -134,7 +134,7 @@ class NearestVertices:
         corners, used = np.unique(corners, return_inverse=True)
         used = used.reshape(-1, 8)
         points = self._low + self._cell * np.stack(np.unravel_index(corners, self._shape + 1), axis=1)
-        distance, index = self._tree.query(points, k=self._lookup, workers=-1)
+        distance, index = self._tree.query(points, k=self._lookup, workers=tree_threads(len(points)))
         distance, index = (a.reshape(len(corners), -1) for a in (distance, index.astype(np.uint32)))
         # No place in a cell is farther from the nearest corner than half a diagonal.
         far = distance[used, 0].min(axis=1) - 0.5 * math.sqrt(3.0) * self._cell > self.limit

@@ -23,6 +23,7 @@ from mitex.mesh.topology import mesh_edges
 from mitex.quilting.matching import HORIZONTAL, VERTICAL
 from mitex.runtime import init
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.workers import tree_threads
 from mitex.scenes.shapes import mesh_shape
 
 SIZE = 128  # side of a patch [texels]
@@ -259,7 +260,8 @@ class _Caster:
         if self.scan is None:
             return np.ones(len(plane), bool)
         some = plane[:, SPARSE // 2 :: SPARSE, SPARSE // 2 :: SPARSE]
-        distance, _ = self.scan.query(some, distance_upper_bound=self.reach, workers=-1)
+        workers = tree_threads(some.size // 3)
+        distance, _ = self.scan.query(some, distance_upper_bound=self.reach, workers=workers)
         return np.isfinite(distance).all((1, 2))
 
 
