@@ -1,15 +1,21 @@
-"""What the tests of a module share: features of exemplars, which most tasks compare with the same ones."""
+"""What the tests of a module share: features of exemplars and hulls of captures, which many tasks ask for."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 import torch
 
 from mitex.features import Vgg16
 from mitex.features.frozen import FrozenConv
+from mitex.methods.nerf.capture.capture import Capture
+from mitex.methods.nerf.field.occupancy import hull_cells
+from mitex.methods.nerf.training import plain, task
 from mitex.methods.surface import comparison
+
+HULLS: dict[tuple[str, int], np.ndarray] = {}
 
 
 @pytest.fixture(scope="module")
@@ -28,6 +34,22 @@ def known_exemplars() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(comparison, "exemplar_features", features)
+        yield
+
+
+@pytest.fixture(scope="module")
+def known_hulls() -> Iterator[None]:
+    """What the masks of a capture leave takes a second, and is asked for by each of many tasks."""
+
+    def cached(capture: Capture, side: int) -> np.ndarray:
+        key = capture.metadata()["capture_key"], side
+        if key not in HULLS:
+            HULLS[key] = hull_cells(capture, side)
+        return HULLS[key].copy()
+
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (plain, task):
+            patch.setattr(module, "hull_cells", cached)
         yield
 
 

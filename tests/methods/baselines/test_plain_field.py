@@ -200,7 +200,7 @@ def test_refusals(ball):
         "seed=1",
     ],
 )
-def test_every_setting_changes_the_first_step(change):
+def test_every_setting_changes_the_first_step(change, known_hulls):
     losses = []
     for settings in (SMALL, [*SMALL, change]):
         config = resolve(PRESETS, overrides=settings)

@@ -2,39 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 from filelock import FileLock
 
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.nerf import NerfTexture, fit
-from mitex.methods.nerf.capture.capture import Capture
-from mitex.methods.nerf.field.occupancy import hull_cells
 from mitex.methods.nerf.synthesis.maps import LatentMaps
-from mitex.methods.nerf.training import plain, task
 from mitex.training.locate import NAME
 from tests.methods.nerf.tiny import SETTINGS, tiny_capture
 
-HULLS: dict[tuple[str, int], np.ndarray] = {}
-
 
 @pytest.fixture(scope="module", autouse=True)
-def _hulls_are_computed_once() -> Iterator[None]:
-    """What the masks of a capture leave takes a second, and is asked for by each of many tasks."""
-
-    def cached(capture: Capture, side: int) -> np.ndarray:
-        key = capture.metadata()["capture_key"], side
-        if key not in HULLS:
-            HULLS[key] = hull_cells(capture, side)
-        return HULLS[key].copy()
-
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (plain, task):
-            patch.setattr(module, "hull_cells", cached)
-        yield
+def _known_hulls(known_hulls: None) -> None:
+    """For all tests of the method."""
 
 
 @pytest.fixture(scope="session")
