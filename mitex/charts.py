@@ -1,8 +1,7 @@
 """Charts that xatlas flattens and packs, in a process of its own.
 
 A mesh that xatlas cannot cope with crashes it, and as it ends it may wait forever for one of its own threads
-(they can miss their last wake-up). In another process neither harms the one that asked. What it gave is kept
-on disk: large meshes take a minute.
+(they can miss their last wake-up). In another process neither harms the one that asked.
 """
 
 from __future__ import annotations
@@ -13,19 +12,13 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
-from pathlib import Path
 
 import numpy as np
-from safetensors.numpy import load, load_file, save, save_file
+from safetensors.numpy import load, save
 
-from mitex.cache import cached, content_key
 from mitex.errors import MeshError
-from mitex.paths import cache_dir
 
 Part = tuple[np.ndarray, np.ndarray]
-VERSION = "1"  # part of the keys; to be raised when charts are computed in another way
-FILE = "corners.safetensors"
 
 
 @dataclass(frozen=True)
@@ -44,7 +37,7 @@ class Packing:
 
 
 def packed_charts(parts: Sequence[Part], packing: Packing, name: str) -> list[np.ndarray]:
-    """Cuts parts of a surface into charts, flattens them and packs all into one square; kept in the cache.
+    """Cuts parts of a surface into charts, flattens them and packs all into one square.
 
     Args:
         parts: of the surface, each its (V, 3) vertices and (F, 3) faces; with (V, 2) vertices, charts that
@@ -62,22 +55,6 @@ def packed_charts(parts: Sequence[Part], packing: Packing, name: str) -> list[np
     for k, (vertices, faces) in enumerate(parts):
         arrays[f"vertices.{k}"] = np.ascontiguousarray(vertices, np.float32)
         arrays[f"faces.{k}"] = np.ascontiguousarray(faces, np.uint32)
-    key = content_key(VERSION, version("xatlas"), packing, *arrays.values())
-    place = cache_dir() / "charts" / key
-    corners = cached(place, lambda: _generated(arrays, packing, name), _read, _write)
-    return [corners[str(k)] for k in range(len(parts))]
-
-
-def _read(place: Path) -> dict[str, np.ndarray]:
-    return load_file(place / FILE)
-
-
-def _write(folder: Path, corners: dict[str, np.ndarray]) -> None:
-    save_file(corners, folder / FILE)
-
-
-def _generated(arrays: dict[str, np.ndarray], packing: Packing, name: str) -> dict[str, np.ndarray]:
-    """What the other process gives."""
     process = subprocess.run(
         [sys.executable or "python3", "-P", "-m", __name__, json.dumps(asdict(packing))],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(entry for entry in sys.path if entry)},
@@ -92,7 +69,8 @@ def _generated(arrays: dict[str, np.ndarray], packing: Packing, name: str) -> di
             f"{name} cannot be unwrapped: xatlas failed ({reason})",
             "give the mesh UVs, or repair or simplify it",
         )
-    return load(process.stdout)
+    result = load(process.stdout)
+    return [result[str(k)] for k in range(len(parts))]
 
 
 def _generate(arrays: dict[str, np.ndarray], packing: Packing) -> dict[str, np.ndarray]:

@@ -103,14 +103,9 @@ def _set_variant(variant: str) -> None:
 
 @pytest.fixture(scope="module")
 def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """A cache for the tests of a module, in place of the user's; only UV layouts are shared by all tests."""
-    base, home = tmp_path_factory.getbasetemp(), tmp_path_factory.mktemp("cache")
-    charts = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "charts"
-    charts.mkdir(exist_ok=True)
-    (home / "mitex").mkdir()
-    (home / "mitex/charts").symlink_to(charts)
+    """An empty cache folder for the tests of a module, in place of the user's."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(home))
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         yield
 
 

@@ -1,7 +1,6 @@
-"""xatlas in a process of its own: the same charts, kept on disk, and an error where it crashes."""
+"""xatlas in a process of its own: the same charts, and an error where it crashes."""
 
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from mitex.charts import Packing, packed_charts
 from mitex.errors import MeshError
 from mitex.mesh import icosphere, torus
 
-PACKING = Packing(128, 2)
 # An xatlas whose thread waits forever.
 SLEEPY = """
 from threading import Event, Thread
@@ -26,13 +24,6 @@ class Atlas:
 
 ChartOptions = PackOptions = SimpleNamespace
 """
-
-
-@pytest.fixture(autouse=True)
-def cache(tmp_path, monkeypatch):
-    """An empty one."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    return tmp_path / "cache/mitex/charts"
 
 
 def directly(parts, packing):
@@ -58,32 +49,6 @@ def test_charts_are_those_of_xatlas(packing):
         np.testing.assert_allclose(corners, expected, atol=1e-6)
 
 
-def test_charts_are_kept(cache, monkeypatch):
-    """For the same surface, and for no other, nor for another packing."""
-    mesh = torus(12, 8)
-
-    def charts(vertices=mesh.vertices, faces=mesh.faces, packing=PACKING):
-        return packed_charts([(vertices, faces)], packing, "ring")[0]
-
-    def places():
-        return {place.name for place in cache.iterdir()}
-
-    kept, first = charts(), places()
-    assert len(first) == 1
-    for others in (
-        {"vertices": mesh.vertices * 2},
-        {"faces": mesh.faces[::-1]},
-        {"packing": replace(PACKING, resolution=64)},
-        {"packing": replace(PACKING, padding=1)},
-        {"packing": replace(PACKING, largest=0.5)},
-    ):
-        before = places()
-        charts(**others)
-        assert len(places() - before) == 1, others
-    monkeypatch.setattr("subprocess.run", None)
-    np.testing.assert_array_equal(charts(), kept)
-
-
 def test_a_mesh_that_crashes_xatlas_is_an_error():
     """It exhausts the stack on fine spheres (its issue 146)."""
     sphere = icosphere(66)
@@ -91,10 +56,9 @@ def test_a_mesh_that_crashes_xatlas_is_an_error():
         packed_charts([(sphere.vertices, sphere.faces)], Packing(512, 2), "ball")
 
 
-def test_what_the_process_says_last_is_told(cache):
+def test_what_the_process_says_last_is_told():
     with pytest.raises(MeshError, match=r"xatlas failed \(.*[a-z].*\)"):
         packed_charts([(np.zeros((3, 3)), np.array([[0, 1, 7]]))], Packing(64, 2), "broken")
-    assert not cache.exists()
 
 
 def test_nobody_waits_for_threads_of_xatlas_that_never_end(monkeypatch, tmp_path):
