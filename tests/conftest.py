@@ -5,13 +5,16 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from mitex import atlas, flat_charts
+from mitex.cache import content_key
+from mitex.charts import Packing, Part, packed_charts
 from tests.browser import Browser
 from tests.firefox import Firefox
 
@@ -99,6 +102,23 @@ def _set_drjit(count: int) -> None:
 
 def _set_variant(variant: str) -> None:
     sys.modules["mitsuba"].set_variant(variant)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _known_charts() -> Iterator[None]:
+    """Many tests unwrap the same few meshes, which takes a process of its own and up to a second each."""
+    known: dict[str, list[np.ndarray]] = {}
+
+    def charts(parts: Sequence[Part], packing: Packing, name: str) -> list[np.ndarray]:
+        key = content_key(packing, *(array for part in parts for array in part))
+        if key not in known:
+            known[key] = packed_charts(parts, packing, name)
+        return [corners.copy() for corners in known[key]]
+
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (atlas, flat_charts):
+            patch.setattr(module, "packed_charts", charts)
+        yield
 
 
 @pytest.fixture(scope="module")
