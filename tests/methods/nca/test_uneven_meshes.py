@@ -16,7 +16,6 @@ from mitex.methods.nca.palette import Palette
 from mitex.methods.registry import bundled
 
 STEPS = 100
-PARTS = 3
 surface = cache(Surface)  # of a mesh, for all looks
 LOOKS = [name for name in bundled(METHOD) if "palette" in NcaTexture.load(name).about]
 
@@ -60,24 +59,13 @@ def meshes() -> list[Mesh]:
     return every + [fan(spokes, rng) for spokes in (3, 4, 5, 8, 15, 30)]
 
 
-@pytest.mark.parametrize(
-    ("name", "part"),
-    [
-        pytest.param(name, part, marks=() if (number - part) % PARTS == 0 else pytest.mark.slow)
-        for number, name in enumerate(LOOKS)
-        for part in range(PARTS)
-    ],
-)
-def test_no_region_has_foreign_colours(name, part, monkeypatch):
-    """Not even before colours are held within the exemplar's; after it, no vertex has.
-
-    Each look on all meshes takes long; without the slow tests each is on a part of them, in turn.
-    """
+@pytest.mark.parametrize("name", LOOKS)
+def test_no_region_has_foreign_colours(name, monkeypatch):
+    """Not even before colours are held within the exemplar's; after it, no vertex has."""
     monkeypatch.setattr(bake, "Surface", surface)
     texture = NcaTexture.load(name)
     palette = Palette.from_record(texture.about["palette"])
-    for number in range(part, len(meshes()), PARTS):
-        mesh = meshes()[number]
+    for number, mesh in enumerate(meshes()):
         state = texture.grow(mesh, steps=STEPS, seed=number)
         colours = GrownTexture(texture.look, state, Cells(mesh, 0, mesh)).at_vertices()["albedo"]
         assert not inner(mesh, palette.unlike(colours)).any(), f"mesh {number}, {mesh}"
