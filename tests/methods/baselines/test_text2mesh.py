@@ -10,11 +10,13 @@ from mitex.asset import Asset
 from mitex.cli import main
 from mitex.errors import CheckpointError, ConfigError, ImageError
 from mitex.exemplar import Exemplar
+from mitex.features import Vgg16, normalise_colours
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.baselines import text2mesh
 from mitex.methods.baselines.text2mesh import Text2MeshConfig, Text2MeshTexture
 from mitex.methods.baselines.text2mesh.config import PRESETS, share_open
 from mitex.methods.baselines.text2mesh.task import Text2MeshTask
+from mitex.methods.exemplar_pictures import albedo
 from mitex.methods.layout import with_layout
 from mitex.methods.neural_style.cameras import cameras_of
 from mitex.runtime import threads
@@ -76,6 +78,60 @@ class TestViews:
         np.testing.assert_allclose(front[0], [0, 0, 2], atol=1e-6)
         assert front[:, 2].mean() > 0.3 and abs(around[:, 2].mean()) < 0.3
 
+    def test_cameras_are_spread_as_published(self):
+        """Azimuths by a standard deviation of 90 degrees, elevations by 45, up to 80 (Michel et al. 2022)."""
+        config, generator = replace(CONFIG, views=64, cameras="anchored"), torch.Generator().manual_seed(0)
+        x, y, z = np.concatenate([cameras_of(config, generator).origin[1:] for _ in range(64)]).T / 2
+        elevation = np.degrees(np.arcsin(y))
+        assert np.abs(elevation).max() == pytest.approx(80, abs=0.01)
+        assert np.percentile(np.abs(elevation), 50) == pytest.approx(0.6745 * 45, rel=0.06)
+        wrapped = np.random.default_rng(0).normal(0, 90, 1_000_000)
+        wrapped = np.abs((wrapped + 180) % 360 - 180)
+        assert np.median(np.abs(np.degrees(np.arctan2(x, z)))) == pytest.approx(np.median(wrapped), rel=0.06)
+
+
+class TestLoss:
+    def test_it_is_that_of_meshnca(self, ball, exemplar):
+        """A view by hand, of all samples: cosine and squared distance of normalised colours, cosine of features."""
+        side = SMALL["view"]
+        options = {"samples": side * side, "moment_weight": 0.0, "layers": ("relu1_1",), "pooling": "average"}
+        task = Text2MeshTask(replace(CONFIG, colour_histogram=False, **options), exemplar, ball)
+        picture = torch.rand(side, side, 3, generator=torch.Generator().manual_seed(1))
+        mask = torch.ones(side, side, dtype=torch.bool)
+        theirs = Vgg16().features(albedo(exemplar, side)[None], ("relu1_1",))["relu1_1"][0].flatten(0, 1)
+        task.picture, task.targets = (
+            normalise_colours(albedo(exemplar, side).flatten(0, 1)),
+            {"relu1_1": theirs},
+        )
+        value = task._view_loss(picture, mask, torch.Generator().manual_seed(0))
+
+        def cost(a, b, euclidean):
+            table = 1 - torch.nn.functional.normalize(a, dim=1) @ torch.nn.functional.normalize(b, dim=1).T
+            if euclidean:
+                table = table + (torch.cdist(a, b) ** 2).clamp(1e-5, 1e5) / 3
+            return torch.maximum(table.min(1).values.mean(), table.min(0).values.mean())
+
+        scale = torch.tensor([0.229, 0.224, 0.225])
+        mean = torch.tensor([0.485, 0.456, 0.406])
+        ours = Vgg16().features(picture[None], ("relu1_1",))["relu1_1"][0].flatten(0, 1)
+        assert task.network.extent("relu1_1", side, side) == (side, side)
+        wanted = cost(
+            (picture.flatten(0, 1) - mean) / scale,
+            (albedo(exemplar, side).flatten(0, 1) - mean) / scale,
+            True,
+        )
+        assert float(value) == pytest.approx(float(wanted + cost(ours, theirs, False)), rel=1e-2)
+
+    def test_half_as_bright_is_far(self, ball, exemplar):
+        """Colours decide: what is half as bright is farther by far than another draw of the same."""
+        task = Text2MeshTask(replace(CONFIG, samples=1024), exemplar, ball)
+        raw = albedo(exemplar, task.exemplar_side).flatten(0, 1)
+        same, dark = (
+            float(task._colour_distance(*task._samples(normalise_colours(k * raw), task.picture, g)))
+            for k, g in ((1.0, torch.Generator().manual_seed(0)), (0.5, torch.Generator().manual_seed(0)))
+        )
+        assert dark > 0.2 > 3 * same
+
 
 class TestTask:
     def test_the_contract(self, ball, exemplar):
@@ -98,6 +154,7 @@ class TestTask:
         for options in (
             *({"sigma": 2.0}, {"views": 3}, {"cameras": "anchored"}, {"fov": 40.0}, {"distance": 3.0}),
             *({"layers": ("relu1_1",)}, {"samples": 32}, {"moment_weight": 1.0}, {"seed": 1}),
+            *({"colour_histogram": False}, {"pooling": "average"}),
             *({"frequencies": 9}, {"width": 17}, {"exemplar_size": 64}, {"view": 56}),
         ):
             assert value(**options) != plain, options

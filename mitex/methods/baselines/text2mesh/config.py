@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from mitex.features.layers import check_layers
 from mitex.methods.neural_style.config import EMBEDDED, StyleConfig
@@ -20,8 +21,10 @@ class Text2MeshConfig(StyleConfig):
     layers: tuple[str, ...] = key(
         ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "VGG-16's that are compared"
     )
+    pooling: Literal["average", "max"] = key("max", "pooling of VGG-16")
     samples: int = key(1024, "feature vectors a layer and picture", 1)
-    moment_weight: float = key(0.1, "weight of the moments", 0)
+    colour_histogram: bool = key(True, "compare the histograms of the channels too")
+    moment_weight: float = key(0.1, "weight of the moments of features", 0)
     open_waves: int = key(
         0, "steps in which the waves are opened, the slowest first; 0: all are open from the start", 0
     )
@@ -42,6 +45,12 @@ PAPER = replace(
     DEFAULT,
     preset="paper",
     steps=1500,
+    layers=(
+        *("relu1_1", "relu1_2", "relu2_1", "relu2_2", "relu3_1", "relu3_2", "relu3_3"),
+        *("relu4_3", "relu5_3"),
+    ),
+    pooling="average",
+    colour_histogram=False,
     sigma=5.0,
     views=5,
     cameras="anchored",

@@ -7,10 +7,10 @@ import torch
 
 from mitex.cache import content_key
 from mitex.exemplar import Exemplar
-from mitex.features import Vgg16
+from mitex.features import Vgg16, normalise_colours
 from mitex.features.coverage import fully_covered
 from mitex.features.frozen import Tap
-from mitex.losses import moment_distance, relaxed_transport
+from mitex.losses import channel_transport, moment_distance, relaxed_transport
 from mitex.mesh import Mesh
 from mitex.methods.baselines.text2mesh.config import Text2MeshConfig, share_open
 from mitex.methods.exemplar_pictures import albedo, framed, side_in_view
@@ -29,8 +29,8 @@ CHUNK = 1 << 16  # places at a time
 class Text2MeshTask(ParameterTask):
     """A network whose colours shall make views of a mesh look like an exemplar.
 
-    As MeshNCA compares with it: the target is an image, the loss relaxed transport (MeshNCA, equation 6), and
-    the geometry stays. Colours are those of the places that pixels see, where the authors interpolate them
+    As MeshNCA compares with it: the target is an image, the loss that of `nca` (MeshNCA, equation 6), and the
+    geometry stays. Colours are those of the places that pixels see, where the authors interpolate them
     from the vertices: so they are as fine on coarse meshes. With anchored cameras (the preset `paper`) the
     anchor view is the front, and elevations end at 80 degrees; waves are opened the slowest first.
 
@@ -51,9 +51,9 @@ class Text2MeshTask(ParameterTask):
         assert mesh.uv is not None
         self.texels = Texels.rasterize(self.ball, mesh.uv, config.resolution)
         self.stage = Stage(self.ball)
-        self.network = Vgg16()
+        self.network = Vgg16(config.pooling)
         picture = albedo(exemplar, self.exemplar_side)
-        self.picture = picture.flatten(0, 1)
+        self.picture = normalise_colours(picture.flatten(0, 1))
         features = self.network.features(picture[None], config.layers)
         self.targets = {layer: values[0].flatten(0, 1) for layer, values in features.items()}
 
@@ -64,7 +64,7 @@ class Text2MeshTask(ParameterTask):
         return side_in_view(config.exemplar_size * self.texels.size, config.view, frame_height(config))
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
-        """Relaxed transport and moments of the features of some views, and of their colours."""
+        """Relaxed transport and moments of the features of some views, and transport of their colours."""
         weights = opened(self.waves, share_open(self.config, step))
         views, masks = self.views(cameras_of(self.config, generator), weights)
         losses = [self._view_loss(*pair, generator) for pair in zip(views, masks, strict=True)]
@@ -125,9 +125,10 @@ class Text2MeshTask(ParameterTask):
             ours, targets[layer] = self._samples(inside.flatten().nonzero()[:, 0], theirs, generator)
             taps[layer] = Tap(self.network.index_of(layer), ours[None])
         values = self.network.read(picture[None], taps)
-        total = self._distance(*self._samples(picture[mask], self.picture, generator), True)
+        colours = normalise_colours(picture[mask])
+        total = self._colour_distance(*self._samples(colours, self.picture, generator))
         for layer, theirs in targets.items():
-            total = total + self._distance(values[layer][0], theirs, False)
+            total = total + self._feature_distance(values[layer][0], theirs)
         return total
 
     def _samples(
@@ -138,9 +139,17 @@ class Text2MeshTask(ParameterTask):
         a, b = (rows[torch.randperm(len(rows), generator=generator)[:count]] for rows in (ours, theirs))
         return a, b
 
-    def _distance(self, ours: torch.Tensor, theirs: torch.Tensor, euclidean: bool) -> torch.Tensor:
-        """Of vectors (n, C), as many of both; 0 if they are too few."""
+    def _colour_distance(self, ours: torch.Tensor, theirs: torch.Tensor) -> torch.Tensor:
+        """Of colours (n, 3), as many of both, in ImageNet's units; 0 if there are none."""
+        if not len(ours):
+            return torch.zeros(())
+        a, b = ours[None], theirs[None]
+        cost = relaxed_transport(a, b, euclidean=True)
+        return (cost + channel_transport(a, b) if self.config.colour_histogram else cost).sum()
+
+    def _feature_distance(self, ours: torch.Tensor, theirs: torch.Tensor) -> torch.Tensor:
+        """Of features (n, C), as many of both; 0 if they are too few."""
         if len(ours) < 2:
             return torch.zeros(())
         a, b = ours[None], theirs[None]
-        return (relaxed_transport(a, b, euclidean) + self.config.moment_weight * moment_distance(a, b)).sum()
+        return (relaxed_transport(a, b) + self.config.moment_weight * moment_distance(a, b)).sum()
