@@ -11,9 +11,15 @@ from mitex.exemplar import Exemplar
 from mitex.mesh import Mesh, icosphere
 from mitex.methods.baselines import style_mesh
 from mitex.methods.baselines.style_mesh import StyleMeshConfig, StyleMeshTexture
-from mitex.methods.baselines.style_mesh.layered import fine_energy, sum_of, zero_textures
+from mitex.methods.baselines.style_mesh.layered import fine_energy, keep_in_range, sum_of, zero_textures
 from mitex.methods.baselines.style_mesh.task import StyleMeshTask
-from mitex.methods.baselines.style_mesh.visible import Visible, cameras_around, shares
+from mitex.methods.baselines.style_mesh.visible import (
+    Counting,
+    Visible,
+    cameras_around,
+    places_in,
+    shares,
+)
 from mitex.methods.layout import with_layout
 from mitex.runtime import threads
 from mitex.scenes.stage import Stage
@@ -74,11 +80,17 @@ class TestTextures:
         assert torch.allclose(texture[3, :, 1], expected, atol=1e-6)
         assert torch.allclose(texture[0, 0], torch.tensor(0.3), atol=1e-6)
 
-    def test_colours_stay_in_range(self):
-        assert (
-            sum_of([torch.full((3, 4, 4), 9.0)]).max() == 1
-            and sum_of([torch.full((3, 4, 4), -9.0)]).max() == 0
-        )
+    def test_each_stays_in_range_and_their_sum_is_free(self):
+        """A texel of the sum that has left it gets the gradient that brings it back."""
+        textures = [torch.full((3, 4, 4), 9.0), torch.full((3, 4, 4), -9.0)]
+        keep_in_range(textures)
+        assert sum_of([textures[0]]).min() == sum_of([textures[0]]).max() == 1
+        assert torch.allclose(sum_of([textures[1]]), torch.zeros(4, 4, 3), atol=1e-7)
+        dark = torch.full((3, 4, 4), -0.4, requires_grad=True)
+        total = sum_of([dark, dark])
+        assert total.max() < 0
+        total.sum().backward()
+        assert dark.grad is not None and bool((dark.grad == 2).all())
 
     def test_finer_textures_cost_more(self):
         values = [torch.full((3, 2, 2), 0.5) for _ in range(5)]
@@ -117,6 +129,27 @@ class TestVisible:
         for height, share in (expected | {256: (0, 0, 1), np.inf: (0, 0, 1)}).items():
             assert [float(shares(np.array(height), heights, k)) for k in range(3)] == pytest.approx(share)
 
+    def test_areas_and_weights(self):
+        """Three pixels that are seen at 0, 45 and 80 degrees, and one that does not count."""
+        cosine = np.cos(np.radians([[0.0, 45.0, 80.0, 0.0]]))
+        visible, share = Visible(np.ones((1, 4)), cosine), np.array([[1, 0.5, 1, 0]], np.float32)
+        pixels = Counting.of(visible, share, 30.0)
+        np.testing.assert_allclose(pixels.weight, share * cosine, rtol=1e-6)
+        assert [area.tolist() for area in pixels.areas] == [
+            [[True, False, False, False]],
+            [[False, True, True, False]],
+        ]
+        plain = Counting.of(visible, share, None)
+        assert torch.equal(plain.weight, torch.from_numpy(share))
+        assert [area.tolist() for area in plain.areas] == [[[True, True, True, False]]]
+
+    def test_places_in_an_area(self):
+        area = torch.zeros(4, 4, dtype=torch.bool)
+        area[0, 0] = area[2, 2] = area[3, 3] = True
+        assert places_in(area, (4, 4)).tolist() == [0, 10, 15]
+        assert places_in(area, (2, 2)).tolist() == [0, 3]
+        assert places_in(torch.zeros(4, 4, dtype=torch.bool), (2, 2)).tolist() == []
+
     def test_cameras_are_evenly_around(self):
         cameras = cameras_around(100, 2.5, 60.0, 8)
         np.testing.assert_allclose(np.linalg.norm(cameras.origin, axis=1), 2.5, rtol=1e-6)
@@ -132,9 +165,9 @@ class TestTask:
         task.named["texture0"].data.normal_(0, 0.1, generator=torch.Generator().manual_seed(0))
 
         def gradient(weight: torch.Tensor) -> torch.Tensor:
-            monkeypatch.setattr(task, "_weight", lambda visible, k: weight)
+            pixels = Counting(weight, weight, [torch.ones(64, 64, dtype=torch.bool)])
             task.named["texture0"].grad = None
-            task._picture_loss(task.texture, 0, 0).backward()
+            task._picture_loss(task.texture, 0, 0, pixels).backward()
             result = task.named["texture0"].grad
             assert result is not None
             return result
@@ -144,8 +177,34 @@ class TestTask:
         whole, once, twice = gradient(torch.ones(64, 64)), gradient(half), gradient(2 * half)
         assert torch.allclose(twice, 2 * once, atol=1e-5 * float(once.abs().max()))
         assert 0.2 < float(once.abs().sum() / whole.abs().sum()) < 0.8
-        monkeypatch.setattr(task, "_weight", lambda visible, k: torch.zeros(64, 64))
-        assert not task._picture_loss(task.texture, 0, 0).requires_grad
+        nothing = Counting.of(
+            Visible(np.ones((64, 64)), np.ones((64, 64))), np.zeros((64, 64), np.float32), None
+        )
+        monkeypatch.setattr(task, "_counting", lambda view, k: nothing)
+        assert task.loss(0, torch.Generator()).metrics["gram"] == 0
+
+    def test_the_distance_is_that_of_each_area_at_each_height(self, ball, exemplar):
+        """By hand: Gram matrices of the features in an area, at the share of its height."""
+        task = StyleMeshTask(replace(CONFIG, views=1, coarse_first=0.0), exemplar, ball)
+        task.named["texture0"].data.normal_(0, 0.1, generator=torch.Generator().manual_seed(0))
+        value = float(task.loss(0, torch.Generator()).value.detach())
+        parts, total = [task._counting(0, k).share.mean() for k in range(2)], 0.0
+        for k, part in enumerate(parts):
+            pixels = task._counting(0, k)
+            picture = task.pictures[k].picture(sum_of(task.parameters).detach(), task._camera(0, k))[0]
+            for layer in CONFIG.layers:
+                maps = task.network.features(picture[None], (layer,))[layer][0]
+                step = len(picture) // len(maps)
+                for n, area in enumerate(pixels.areas):
+                    rows = maps[area[::step, ::step]].float()
+                    if not len(rows):
+                        continue
+                    gram = rows.T @ rows / len(rows)
+                    distance = (gram - task.targets[layer]).square().mean()
+                    if n == 0 and layer in CONFIG.small_layers:
+                        distance += (gram - task.small_targets[layer]).square().mean()
+                    total += float(part / sum(parts) * distance)
+        assert value == pytest.approx(total, rel=0.02)
 
     def test_the_contract(self, ball, exemplar):
         threads(1)

@@ -92,7 +92,7 @@ class TestViews:
 
 class TestLoss:
     def test_it_is_that_of_meshnca(self, ball, exemplar):
-        """A view by hand, of all samples: cosine and squared distance of normalised colours, cosine of features."""
+        """A view by hand, of all samples: normalised colours by angle and distance, features by angle."""
         side = SMALL["view"]
         options = {"samples": side * side, "moment_weight": 0.0, "layers": ("relu1_1",), "pooling": "average"}
         task = Text2MeshTask(replace(CONFIG, colour_histogram=False, **options), exemplar, ball)

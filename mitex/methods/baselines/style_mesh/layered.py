@@ -18,12 +18,24 @@ def zero_textures(resolution: int, count: int) -> dict[str, torch.Tensor]:
 
 
 def sum_of(textures: Sequence[torch.Tensor]) -> torch.Tensor:
-    """(R, R, 3) sRGB in [0, 1]: ImageNet's mean colour and the sum of all, interpolated bilinearly."""
+    """(R, R, 3) sRGB: ImageNet's mean colour and the sum of all, interpolated bilinearly.
+
+    It may leave [0, 1], since only each texture alone is kept in range. If it was clamped, texels that have
+    left would get no gradient that brings them back.
+    """
     side = textures[0].shape[-1]
     total = textures[0]
     for texture in textures[1:]:
         total = total + F.interpolate(texture[None], size=(side, side), mode="bilinear")[0]
-    return (total.movedim(0, -1) + total.new_tensor(MEAN)).clamp(0, 1)
+    return total.movedim(0, -1) + total.new_tensor(MEAN)
+
+
+@torch.no_grad()
+def keep_in_range(textures: Sequence[torch.Tensor]) -> None:
+    """Clamps each texture (3, s, s), in place, to where it alone gives colours in [0, 1], as published."""
+    for texture in textures:
+        low = -texture.new_tensor(MEAN)[:, None, None]
+        texture.clamp_(low, low + 1)
 
 
 def fine_energy(textures: Sequence[torch.Tensor]) -> torch.Tensor:

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import torch
 
 from mitex.cache import content_key
 from mitex.exemplar import Exemplar
-from mitex.features.coverage import covered_places
 from mitex.features.frozen import GramTap
 from mitex.features.vgg19 import named_vgg
 from mitex.losses.gram import gram_distance, gram_targets
 from mitex.mesh import Mesh
 from mitex.methods.baselines.style_mesh.config import StyleMeshConfig
-from mitex.methods.baselines.style_mesh.layered import fine_energy, sum_of, zero_textures
-from mitex.methods.baselines.style_mesh.visible import Visible, cameras_around, shares
+from mitex.methods.baselines.style_mesh.layered import fine_energy, keep_in_range, sum_of, zero_textures
+from mitex.methods.baselines.style_mesh.visible import Counting, Visible, cameras_around, places_in, shares
 from mitex.methods.exemplar_pictures import albedo, framed
 from mitex.methods.texture_views import TextureViews, boxed
 from mitex.runtime import keep_freed_memory
@@ -40,7 +39,7 @@ class StyleMeshTask(ParameterTask):
     half as wide as the exemplar, not 256 pixels; the height of the picture in which a pixel counts is that at
     which it is as large as a texel; views are drawn with replacement, not each once an epoch. Gram matrices
     are compared at five layers, `relu1_1` to `relu5_1`, those of the smaller picture at the last two. How
-    large the exemplar is, and where cameras stand, is ours.
+    large the exemplar is, where cameras stand, and how many there are, is ours.
 
     Args:
         config: settings.
@@ -71,17 +70,25 @@ class StyleMeshTask(ParameterTask):
     @property
     def texture(self) -> torch.Tensor:
         """(R, R, 3) sRGB in [0, 1], row 0 on top."""
-        return sum_of(self.parameters)
+        return sum_of(self.parameters).clamp(0, 1)
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
-        """Gram matrices of one view at all its heights, and what holds the finer textures near zero."""
+        """Gram matrices of one view at all its heights, and what holds the finer textures near zero.
+
+        Each height's distance is weighted by its share of all pixels that count.
+        """
         view = int(torch.randint(self.config.views, (), generator=generator))
-        texture, total = self.texture, torch.zeros(())
-        for k in range(len(self.heights)):
-            total = total + self._picture_loss(texture, view, k)
+        texture, total = sum_of(self.parameters), torch.zeros(())
+        counting = [self._counting(view, k) for k in range(len(self.heights))]
+        whole = sum(pixels.share.mean() for pixels in counting)
+        for k, pixels in enumerate(counting):
+            if pixels.share.mean() > LEAST:
+                distance = self._picture_loss(texture, view, k, pixels)
+                total = total + float(pixels.share.mean() / whole) * distance
         energy = fine_energy(self.parameters)
         terms = {"gram": total.item(), "fine": energy.item()}
-        return Step(total + self.config.coarse_first * energy, terms)
+        commit = partial(keep_in_range, self.parameters)
+        return Step(total + self.config.coarse_first * energy, terms, commit)
 
     @torch.no_grad()
     def preview(self, step: int) -> np.ndarray:
@@ -98,50 +105,43 @@ class StyleMeshTask(ParameterTask):
         key = content_key(self.mesh.vertices, self.mesh.faces, self.mesh.uv)
         return {"method": "style_mesh", "mesh": self.mesh.name, "mesh_key": key} | exemplar
 
-    def _picture_loss(self, texture: torch.Tensor, view: int, k: int) -> torch.Tensor:
-        """Of the picture of one height; its gradients are weighted by what its pixels count for."""
-        camera = self._camera(view, k)
-        visible = Visible.of(self.stage, self.box, camera)
-        weight = self._weight(visible, k)
-        if weight.mean() < LEAST:
-            return torch.zeros(())
-        picture, coverage = self.pictures[k].picture(texture, camera)
+    def _picture_loss(self, texture: torch.Tensor, view: int, k: int, pixels: Counting) -> torch.Tensor:
+        """Of the picture of one height, in which pixels count; their gradients are weighted by how much.
+
+        What is seen frontally and what is seen at a slant have Gram matrices of their own, and only the
+        former are compared with the smaller exemplar's, too.
+        """
+        picture, _ = self.pictures[k].picture(texture, self._camera(view, k))
         if picture.requires_grad:
-            picture.register_hook(lambda gradient: gradient * weight[..., None])
-        frontal = coverage * torch.from_numpy(visible.cosine > self._frontal).float()
-        small = self.small_targets if self.config.by_angle and frontal.mean() > LEAST else {}
-        masks = {layer: [coverage, frontal][: 1 + (layer in small)] for layer in self.config.layers}
-        grams = self._masked_grams(picture, masks)
-        total = gram_distance({layer: gram[0] for layer, gram in grams.items()}, self.targets, self.weights)
-        if small:
-            total = total + gram_distance({layer: grams[layer][1] for layer in small}, small, self.weights)
+            picture.register_hook(lambda gradient: gradient * pixels.weight[..., None])
+        taps, wanted = {}, {}
+        for layer in self.config.layers:
+            targets = [self.targets[layer]]
+            if self.config.by_angle and layer in self.small_targets:
+                targets.append(self.small_targets[layer])
+            size = self.network.extent(layer, *picture.shape[:2])
+            areas = [
+                (places_in(area, size), targets[:n]) for area, n in zip(pixels.areas, (2, 1), strict=False)
+            ]
+            areas = [(places, theirs) for places, theirs in areas if len(places)]
+            if areas:
+                taps[layer] = GramTap(self.network.index_of(layer), [places for places, _ in areas])
+                wanted[layer] = [theirs for _, theirs in areas]
+        total = torch.zeros(())
+        for layer, grams in self.network.read(picture[None], taps).items():
+            for gram, theirs in zip(grams, wanted[layer], strict=True):
+                for target in theirs:
+                    total = total + gram_distance({layer: gram}, {layer: target}, self.weights)
         return total
 
-    def _masked_grams(
-        self, picture: torch.Tensor, masks: Mapping[str, list[torch.Tensor]]
-    ) -> dict[str, torch.Tensor]:
-        """For each layer the Gram matrices of a picture (H, W, 3) within its masks (H, W)."""
-        taps = {}
-        for layer, regions in masks.items():
-            size = self.network.extent(layer, *picture.shape[:2])
-            taps[layer] = GramTap(
-                self.network.index_of(layer), [covered_places(mask, size) for mask in regions]
-            )
-        return self.network.read(picture[None], taps)
-
-    def _weight(self, visible: Visible, k: int) -> torch.Tensor:
-        """(H, W) what pixels count for."""
-        weight = (visible.cosine > 0).astype(np.float32)
+    def _counting(self, view: int, k: int) -> Counting:
+        """What the pixels of a view count for in the picture of one height."""
+        visible = Visible.of(self.stage, self.box, self._camera(view, k))
+        share = (visible.cosine > 0).astype(np.float32)
         if self.config.by_depth:
             wanted = visible.height(self.config.fov, self.texels.size)
-            weight *= shares(wanted, self.heights, k).astype(np.float32)
-        if self.config.by_angle:
-            weight *= visible.cosine.astype(np.float32)
-        return torch.from_numpy(weight)
-
-    @property
-    def _frontal(self) -> float:
-        return math.cos(math.radians(self.config.frontal))
+            share *= shares(wanted, self.heights, k).astype(np.float32)
+        return Counting.of(visible, share, self.config.frontal if self.config.by_angle else None)
 
     def _camera(self, view: int, k: int) -> Cameras:
         """One view, at one height."""

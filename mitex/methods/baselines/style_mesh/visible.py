@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import torch
+import torch.nn.functional as F
 
 from mitex.geometry.vectors import unit
 from mitex.mesh import Mesh
@@ -43,6 +46,47 @@ class Visible:
     def height(self, fov: float, texel: float) -> np.ndarray:
         """(H, W) how high a picture [px] must be for a pixel there to be as large as a texel [mesh units]."""
         return 2 * math.tan(0.5 * math.radians(fov)) * self.depth / texel
+
+
+@dataclass(frozen=True, eq=False)
+class Counting:
+    """What the pixels of a picture count for.
+
+    Attributes:
+        share: (H, W) float32, how much of each belongs to the picture's height.
+        weight: (H, W) float32 of the gradients: the share, and the cosine if angles matter.
+        areas: one or two of (H, W) bool: the pixels that count; or, if angles matter, those that are seen
+            frontally and those that are seen at a slant.
+    """
+
+    share: torch.Tensor
+    weight: torch.Tensor
+    areas: Sequence[torch.Tensor]
+
+    @staticmethod
+    def of(visible: Visible, share: np.ndarray, frontal: float | None) -> Counting:
+        """Of a view whose pixels have shares (H, W).
+
+        Args:
+            frontal: up to which angle a surface is seen frontally [degrees]; None: angles do not matter.
+        """
+        own, seen = torch.from_numpy(share), torch.from_numpy(share > 0)
+        if frontal is None:
+            return Counting(own, own, [seen])
+        cosine = torch.from_numpy(visible.cosine.astype(np.float32))
+        facing = cosine > math.cos(math.radians(frontal))
+        return Counting(own, own * cosine, [seen & facing, seen & ~facing])
+
+
+def places_in(area: torch.Tensor, size: tuple[int, int]) -> torch.Tensor:
+    """Indices of a feature map's places, row by row, whose nearest pixel lies in an area.
+
+    Args:
+        area: (H, W) bool.
+        size: (h, w) of the map.
+    """
+    near = F.interpolate(area[None, None].float(), size, mode="nearest")
+    return near.flatten().nonzero()[:, 0]
 
 
 def shares(wanted: np.ndarray, heights: list[int], index: int) -> np.ndarray:
