@@ -32,7 +32,7 @@ class StyleConfig(WordsConfig, ScheduledConfig):
     )
     text_relief: float = key(0.1, "largest displacement of a vertex [radii]", 0, 1)
     text_each: bool = key(
-        False, "compare the text with each picture; false: with their mean embedding (the paper)"
+        False, "compare the text with each picture; false: with the views' mean embedding (the paper)"
     )
     text_relief_weight: float = key(
         1.0, "weight of the distance of close-ups without colours from the text", 0
@@ -45,6 +45,9 @@ class StyleConfig(WordsConfig, ScheduledConfig):
         super().__post_init__()
         check_words(self, "text_whole_weight", "text_close_weight", "text_relief_weight")
 
+
+# Each of the four close-ups weighs as much as a whole view (Text2Mesh's and X-Mesh's code).
+PUBLISHED_WEIGHTS: dict[str, Any] = {"text_close_weight": 4.0, "text_relief_weight": 4.0}
 
 # For the model that ships with the package: it knows patterns that fill small pictures, but no reliefs.
 # White around the mesh would count as a colour of the text.

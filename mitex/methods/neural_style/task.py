@@ -103,10 +103,15 @@ class StyleTask(ParameterTask):
         }
 
     def _distance(self, embeddings: torch.Tensor) -> torch.Tensor:
-        """Of the pictures with these embeddings (N, D) from the text."""
+        """Of the pictures with these embeddings (N, D), view by view, from the text.
+
+        As published, the n-th close-ups of all views have a mean embedding; the distances of these means are
+        averaged here and summed there, which the weights of the presets make up for.
+        """
         if self.config.text_each:
             return text_distance(mean_direction(embeddings), self.text[0])
-        return embedding_distance(embeddings, self.text[0])
+        squares = embeddings.unflatten(0, (self.config.views, -1)).unbind(1)
+        return torch.stack([embedding_distance(views, self.text[0]) for views in squares]).mean()
 
     @torch.no_grad()
     def shape(self) -> Mesh:

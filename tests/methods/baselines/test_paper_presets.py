@@ -26,8 +26,8 @@ STYLE_TEXT = {
     "text_relief_crop_area": 0.1,
     "text_tilt": 0.5,
     "text_whole_weight": 1.0,
-    "text_close_weight": 1.0,
-    "text_relief_weight": 1.0,
+    "text_close_weight": 4.0,
+    "text_relief_weight": 4.0,
 }
 EVERY_HUNDRED = tuple(range(100, 1500, 100))
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from scipy.spatial import cKDTree
 
 from mitex.asset import Asset
 from mitex.errors import CheckpointError, ConfigError, WeightsError
@@ -94,7 +95,9 @@ def test_the_loss_by_hand(each):
     def distance(pictures, augmentation) -> float:
         squares = augmentation(pictures, 16)
         rows = [task.model.encode_images(one[None])[0] for one in squares]
-        rows = rows if each else [torch.stack(rows).sum(0)]
+        if not each:  # the n-th squares of the two views have one embedding
+            count = len(rows) // 2
+            rows = [rows[n] + rows[count + n] for n in range(count)]
         cosines = [row @ task.text[0] / row.norm() / task.text[0].norm() for row in rows]
         return 1 - torch.stack(cosines).mean().item()
 
@@ -141,16 +144,12 @@ def test_the_exported_mesh_is_the_one_that_was_trained(name, tmp_path, monkeypat
     np.testing.assert_allclose(asset.mesh.vertices, expected, atol=1e-4)
     assert np.abs(expected - task.fine.vertices).max() > 0.01 and len(expected) == 162
     again = Asset.load(asset.export(tmp_path / "ball.glb")).mesh
-    np.testing.assert_allclose(_sorted(again.vertices), _sorted(expected), atol=1e-4)
+    for one, other in ((again.vertices, expected), (expected, again.vertices)):  # the file splits seams
+        assert cKDTree(one).query(other)[0].max() < 1e-4
     albedo = texture.image[task.baked().std(2) > 0].mean(0)
     np.testing.assert_allclose(albedo, colours.detach().mean(0), atol=0.03)
     with pytest.raises(ConfigError, match="belongs to mesh"):
         texture.apply(icosphere(3))
-
-
-def _sorted(vertices: np.ndarray) -> np.ndarray:
-    """Without the order, and what a file splits at seams."""
-    return np.unique(vertices.round(3), axis=0)
 
 
 @names

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from mitex.features.layers import check_layers
-from mitex.methods.neural_style.config import EMBEDDED, StyleConfig
+from mitex.methods.neural_style.config import EMBEDDED, PUBLISHED_WEIGHTS, StyleConfig
 from mitex.training.settings import key
 
 
@@ -70,7 +70,8 @@ PRESETS = {
         cameras="anchored",
         milestones=tuple(range(100, 600, 100)),
         text_crops=2,
+        **PUBLISHED_WEIGHTS,
     ),
     "text-words": replace(WORDS, preset="text-words", sigma=3.0, **EMBEDDED),
-    "text-paper": replace(PAPER, preset="text-paper", text=WORDS.text),
+    "text-paper": replace(PAPER, preset="text-paper", text=WORDS.text, **PUBLISHED_WEIGHTS),
 }

@@ -16,8 +16,8 @@ class Text2MeshTextTask(StyleTask):
     As published, but: waves are opened the slowest first, where the authors' code sorts their axes in place
     of them; outlines have no derivatives, shading alone; a lamp beside the camera stands for their light of
     spherical harmonics; the anchor view is the front, where theirs is the one that CLIP finds nearest to the
-    text; elevations end at 80 degrees; meshes are split until they have 10,000 vertices; corners of squares
-    are moved outwards, where theirs go inwards.
+    text; elevations end at 80 degrees; meshes are split until they have 10,000 vertices; corners of all
+    squares are moved outwards, where theirs go inwards, in four of five.
     """
 
     method = METHOD.name

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from mitex.methods.neural_style.config import EMBEDDED, StyleConfig
+from mitex.methods.neural_style.config import EMBEDDED, PUBLISHED_WEIGHTS, StyleConfig
 from mitex.training.settings import key
 
 
@@ -23,6 +23,8 @@ class XMeshConfig(StyleConfig):
     text_crops: int = 2
     text_crop_area: float = 0.4
     text_relief_crop_area: float = 0.4
+    text_close_weight: float = PUBLISHED_WEIGHTS["text_close_weight"]
+    text_relief_weight: float = PUBLISHED_WEIGHTS["text_relief_weight"]
     mirror: bool = key(False, "the same on both sides of the plane z = 0 (the paper)")
     gate_width: int = key(32, "width of the hidden layers of the gates", 1, 4096)
     rank: int = key(30, "rank of the gates' weights", 1, 4096)
@@ -35,7 +37,13 @@ class XMeshConfig(StyleConfig):
 DEFAULT = XMeshConfig()
 PRESETS = {
     DEFAULT.preset: DEFAULT,
-    "text-words": replace(DEFAULT, preset="text-words", sigma=0.8, gate_width=16, **EMBEDDED | {"lr": 3e-4}),
+    "text-words": replace(
+        DEFAULT,
+        preset="text-words",
+        sigma=0.8,
+        gate_width=16,
+        **EMBEDDED | {"lr": 3e-4, "text_close_weight": 1.0},
+    ),
     "text-paper": replace(
         DEFAULT,
         preset="text-paper",
