@@ -77,8 +77,8 @@ def render(
     Returns:
         (H, W, C) float32; linear radiance where light is traced. Gradients to every tensor are exact for
         `feature`, and estimates without bias, from as many other paths, where light is traced. They are those
-        of the image even if the scene has changed since in other tensors than these. There are none to
-        geometry and cameras, and no second derivatives (torch says so).
+        of the image, whatever parameters of the scene have been set since, its cameras' among them. There
+        are none to geometry and cameras, and no second derivatives (torch says so).
 
     Raises:
         ConfigError: for an unknown parameter, one of the wrong size, and a tensor that is not float32 on the
@@ -99,7 +99,9 @@ def render(
         target.check(tensor)
 
     if not by_feature:
-        image = _Image(scene, mi.traverse(scene), targets, sensor, renderer, spp, seed)
+        image = _Image(
+            scene, mi.traverse(scene), targets, _parts(scene, sensor, renderer), sensor, renderer, spp, seed
+        )
         return cast(torch.Tensor, _Traced.apply(image, *tensors))
 
     def attached(*arrays: mi.TensorXf) -> mi.TensorXf:
@@ -165,12 +167,6 @@ class _Target:
                 f"'{self.name}' has shape {tuple(tensor.shape)}", f"give a tensor of shape {shape}"
             )
 
-    @property
-    def value(self) -> mi.TensorXf:
-        """The parameter, detached, in the shape of the tensors that may become its value."""
-        current: Any = dr.detach(self.params[self.key])
-        return current if dr.is_tensor_v(current) else mi.TensorXf(dr.ravel(current))
-
     def assign(self, array: mi.TensorXf) -> None:
         """Sets the parameter from an `mi.TensorXf`."""
         array_type: Any = type(self.params[self.key])
@@ -184,11 +180,17 @@ class _Target:
 
 @dataclass(frozen=True)
 class _Image:
-    """What is rendered: parameters of a scene whose light is traced, and how."""
+    """What is rendered: parameters of a scene whose light is traced, and how.
+
+    Attributes:
+        targets: the parameters that are given as tensors.
+        parts: all parameters of the scene, and of a sensor and an integrator that are not its own.
+    """
 
     scene: mi.Scene
     params: mi.SceneParameters
     targets: Sequence[_Target]
+    parts: Sequence[mi.SceneParameters]
     sensor: mi.Sensor | int
     integrator: mi.Integrator
     spp: int
@@ -203,6 +205,18 @@ class _Image:
             target.assign(array)
         return arrays
 
+    def state(self) -> list[dict[str, Any]]:
+        """The values of all parameters as they are, for each of the parts."""
+        return [{key: _copy(part[key]) for key in part.keys()} for part in self.parts]  # noqa: SIM118
+
+    def restore(self, state: Sequence[Mapping[str, Any]]) -> None:
+        """Sets those parameters that have other values now."""
+        for part, values in zip(self.parts, state, strict=True):
+            for key, value in values.items():
+                if not _same(part[key], value):
+                    part[key] = _copy(value)
+            part.update()
+
 
 class _Traced(torch.autograd.Function):
     """An image of traced light. Its integrator computes gradients itself, when they are asked for.
@@ -215,6 +229,7 @@ class _Traced(torch.autograd.Function):
         ctx.image = image
         ctx.save_for_backward(*tensors)
         image.assign(tensors)
+        ctx.state = image.state()
         with dr.suspend_grad(), raise_causes():
             traced = image.integrator.render(image.scene, image.sensor, seed=image.seed, spp=image.spp)
             return torch.from_numpy(np.array(traced))
@@ -224,9 +239,10 @@ class _Traced(torch.autograd.Function):
     def backward(ctx: Any, grad: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
         image: _Image = ctx.image
         other = mi.sample_tea_32(image.seed, 1)[0]
-        now = [torch.from_numpy(np.array(target.value)) for target in image.targets]
+        now = image.state()
         try:
             with raise_causes():
+                image.restore(ctx.state)
                 arrays = image.assign(ctx.saved_tensors, attached=True)
                 upstream = upload(mi.TensorXf, grad.contiguous().numpy())
                 image.integrator.render_backward(
@@ -234,8 +250,34 @@ class _Traced(torch.autograd.Function):
                 )
                 gradients = [torch.from_numpy(np.array(dr.grad(array))) for array in arrays]
         finally:
-            image.assign(now)
+            image.restore(now)
         return (None, *gradients)
+
+
+def _parts(scene: mi.Scene, sensor: mi.Sensor | int, integrator: mi.Integrator) -> list[mi.SceneParameters]:
+    """Parameters of the scene, and of the sensor and the integrator if they are no part of it."""
+    others = [] if isinstance(sensor, int) else [sensor]
+    if scene.integrator() is not integrator:
+        others.append(integrator)
+    return [mi.traverse(part) for part in (scene, *others)]
+
+
+def _copy(value: Any) -> Any:
+    """A parameter's value, detached, that stays when the parameter gets another one."""
+    return dr.detach(type(value)(value))
+
+
+def _same(a: Any, b: Any) -> bool:
+    """Whether two values of a parameter are one variable of Dr.Jit's, or equal numbers; costs nothing."""
+    if hasattr(a, "matrix"):
+        return _same(a.matrix, b.matrix)
+    if dr.is_tensor_v(a):
+        return dr.shape(a) == dr.shape(b) and a.array.index == b.array.index
+    if dr.is_jit_v(a) and dr.depth_v(a) == 1:
+        return a.index == b.index
+    if dr.is_array_v(a):
+        return all(_same(x, y) for x, y in zip(a, b, strict=True))
+    return a == b
 
 
 def _parameters(scene: mi.Scene, integrator: mi.Integrator) -> dict[str, _Target]:

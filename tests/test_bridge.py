@@ -215,6 +215,16 @@ def test_render_a_hundred_times_does_not_grow(mi, stage, field):
     assert counts[-1] <= max(counts[2:10])
 
 
+def aside(mi) -> dict:
+    """A camera that looks at the origin from the side of the ball."""
+    return {
+        "type": "perspective",
+        "fov": 40,
+        "to_world": mi.ScalarTransform4f().look_at([0.5, -1, 3], [0, 0, 0], [0, 1, 0]),
+        "film": {"type": "hdrfilm", "width": 32, "height": 32, "rfilter": {"type": "box"}},
+    }
+
+
 @pytest.fixture
 def lit(mi):
     """A textured square under a lamp and a sky, beside a ball whose colour it reflects."""
@@ -233,12 +243,7 @@ def lit(mi):
         "ball": {"type": "sphere", "radius": 0.4, "center": [0.5, 0.5, 0.5], "bsdf": ball},
         "lamp": {"type": "rectangle", "to_world": lamp, "emitter": {"type": "area", "radiance": 3.0}},
         "sky": {"type": "constant", "radiance": 0.3},
-        "sensor": {
-            "type": "perspective",
-            "fov": 40,
-            "to_world": look([0.5, -1, 3], [0, 0, 0], [0, 1, 0]),
-            "film": {"type": "hdrfilm", "width": 32, "height": 32, "rfilter": {"type": "box"}},
-        },
+        "sensor": aside(mi),
     }
     return mi.load_dict(scene)
 
@@ -305,6 +310,36 @@ def test_gradients_of_an_earlier_picture_of_traced_light(mi, lit):
     render(lit, {BALL: kept}, spp=16)
     early.sum().backward()
     np.testing.assert_allclose(np.ravel(mi.traverse(lit)[BALL]), kept, rtol=1e-6)
+
+
+@pytest.mark.parametrize("other", ["lamp", "camera", "sensor", "texels", "geometry"])
+def test_gradients_of_an_earlier_picture_when_something_else_has_changed(other, mi, lit):
+    """They are those of the scene as it was seen, which keeps what it has got since."""
+    params, sensor = mi.traverse(lit), mi.load_dict(aside(mi))
+    moved = mi.Transform4f().look_at([2, 1, 3], [0, 0, 0], [0, 1, 0])
+    texels = next(key for key in params.keys() if key.endswith(".data"))  # noqa: SIM118
+    changes = {
+        "lamp": (params, "lamp.emitter.radiance.value", 0.5),
+        "camera": (params, "sensor.to_world", moved),
+        "sensor": (mi.traverse(sensor), "to_world", moved),
+        "texels": (params, texels, upload(mi.TensorXf, np.full((8, 8, 3), 0.05, np.float32))),
+        "geometry": (params, "ball.to_world", mi.Transform4f().translate([-0.8, -0.2, 0.4]).scale(0.3)),
+    }
+
+    def picture(colour: torch.Tensor) -> torch.Tensor:
+        return render(lit, {BALL: colour}, sensor if other == "sensor" else 0, spp=16)
+
+    expected, early = (torch.tensor([0.2, 0.2, 0.2], requires_grad=True) for _ in range(2))
+    picture(expected).sum().backward()
+    first = picture(early)
+    table, key, value = changes[other]
+    table[key] = value
+    table.update()
+    second = picture(torch.tensor([0.2, 0.2, 0.2]))
+    assert float((second - first).abs().max()) > 0.01
+    first.sum().backward()
+    np.testing.assert_allclose(gradient(early), gradient(expected), rtol=1e-4)
+    np.testing.assert_allclose(picture(torch.tensor([0.2, 0.2, 0.2])), second, atol=1e-6)
 
 
 def test_torch_s_tensors_become_arrays_of_llvm(field, monkeypatch):
