@@ -16,6 +16,17 @@ EXEMPLAR_WIDTH = 0.5  # of the exemplar, unless something else is asked for [sid
 PADDING = 2  # texels between charts: bilinear taps of one never see the other
 
 
+def exemplar_texels(size: int, resolution: int, least: int = 32) -> int:
+    """Side of the exemplar on a mesh [texels].
+
+    Args:
+        size: what is asked for; 0: `EXEMPLAR_WIDTH` of the layout's square, however many texels that has.
+        resolution: side of the layout's square [texels].
+        least: below which the square's share is not taken.
+    """
+    return size or max(round(EXEMPLAR_WIDTH * resolution), least)
+
+
 def with_layout(mesh: Mesh, resolution: int, keep_uvs: bool = False) -> Mesh:
     """The mesh with the UVs that its texels shall have.
 

@@ -179,6 +179,15 @@ class TestTask:
         height = 2 * 11 * math.tan(math.radians(5))
         assert MultiViewTask(config, exemplar, square).exemplar_side == round(100 / height)
 
+    def test_it_is_as_large_on_a_finer_texture(self, exemplar):
+        """Half as wide as the layout's square, unless texels are asked for."""
+        square, sides = flat_square(2), {}
+        for resolution in (64, 128):
+            for size in (0, 32):
+                config = replace(CONFIG, resolution=resolution, exemplar_size=size, view=200)
+                sides[resolution, size] = MultiViewTask(config, exemplar, square).exemplar_side
+        assert sides[64, 0] == sides[128, 0] == sides[64, 32] > 1.9 * sides[128, 32]
+
     def test_options_matter(self, ball, exemplar):
         def value(content=None, **options) -> float:
             task = MultiViewTask(replace(CONFIG, **options), exemplar, ball, content)

@@ -60,7 +60,7 @@ PUBLISHED: dict[tuple[str, str], dict[str, Any]] = {
         "views": 100,
         "resolution": 4096,
         "textures": 4,
-        "exemplar_size": 2048,  # this, distance and fov are ours: the paper is of scanned rooms
+        "exemplar_size": 0,  # this, views, distance and fov are ours: the paper is of scanned rooms
         "distance": 2.5,
         "fov": 60.0,
         "view": 256,

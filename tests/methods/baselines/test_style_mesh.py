@@ -206,6 +206,12 @@ class TestTask:
                     total += float(part / sum(parts) * distance)
         assert value == pytest.approx(total, rel=0.02)
 
+    def test_the_exemplar_is_as_large_on_a_finer_texture(self, ball, exemplar):
+        """Half as wide as the layout's square, unless texels are asked for."""
+        for resolution, size, side in ((128, 0, 64), (256, 0, 128), (256, 64, 64)):
+            config = replace(CONFIG, resolution=resolution, exemplar_size=size, heights=1)
+            assert StyleMeshTask(config, exemplar, ball).exemplar_side == side
+
     def test_the_contract(self, ball, exemplar):
         threads(1)
         assert_loss_is_pure(StyleMeshTask(CONFIG, exemplar, ball), 1)

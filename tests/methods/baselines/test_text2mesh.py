@@ -90,6 +90,18 @@ class TestViews:
         assert np.median(np.abs(np.degrees(np.arctan2(x, z)))) == pytest.approx(np.median(wrapped), rel=0.06)
 
 
+class TestSize:
+    def test_the_exemplar_is_as_large_on_a_finer_texture(self, ball, exemplar):
+        """Half as wide as the layout's square, unless texels are asked for."""
+
+        def side(resolution: int, size: int) -> int:
+            config = replace(CONFIG, resolution=resolution, exemplar_size=size)
+            return Text2MeshTask(config, exemplar, ball).exemplar_side
+
+        assert side(64, 0) == side(128, 0) == side(64, 32)
+        assert side(128, 32) == pytest.approx(side(64, 32) / 2, abs=1)
+
+
 class TestLoss:
     def test_it_is_that_of_meshnca(self, ball, exemplar):
         """A view by hand, of all samples: normalised colours by angle and distance, features by angle."""

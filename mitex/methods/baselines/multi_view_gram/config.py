@@ -17,7 +17,7 @@ class MultiViewConfig(TrainingConfig):
     steps: int = 400
     resolution: int = key(512, "side of the texture [texels]", 16, 4096)
     exemplar_size: int = key(
-        256, "side of the exemplar's central square on the mesh [texels], as of surface", 32, 2048
+        0, "side of the exemplar's central square on the mesh [texels]; 0: half of the resolution", 0, 2048
     )
     view: int = key(256, "side of the picture that a step compares [px]", 32, 2048)
     fov: float = key(10.0, "field of view [degrees]", 1, 120)
@@ -52,7 +52,5 @@ class MultiViewConfig(TrainingConfig):
 DEFAULT = MultiViewConfig()
 PRESETS = {
     DEFAULT.preset: DEFAULT,
-    "paper": replace(
-        DEFAULT, preset="paper", resolution=1024, exemplar_size=512, view=512, antialias=1, masked=False
-    ),
+    "paper": replace(DEFAULT, preset="paper", resolution=1024, view=512, antialias=1, masked=False),
 }

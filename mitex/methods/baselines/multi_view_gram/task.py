@@ -21,6 +21,7 @@ from mitex.methods.baselines.multi_view_gram.config import MultiViewConfig
 from mitex.methods.baselines.multi_view_gram.gram_average import GramAverage
 from mitex.methods.baselines.multi_view_gram.spectrum import image_of, random_spectrum
 from mitex.methods.exemplar_pictures import albedo, framed, side_in_view
+from mitex.methods.layout import exemplar_texels
 from mitex.methods.texture_views import TextureViews, boxed, random_view
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras, orbit
@@ -75,7 +76,8 @@ class MultiViewTask(ParameterTask):
         """Of the exemplar, so that a texel of it is as large as one on the mesh at the mean distance [px]."""
         config = self.config
         height = (config.nearest + config.farthest) * math.tan(0.5 * math.radians(config.fov))
-        return side_in_view(config.exemplar_size * self.texels.size, config.view, height)
+        width = exemplar_texels(config.exemplar_size, config.resolution)
+        return side_in_view(width * self.texels.size, config.view, height)
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
         """Mean absolute differences of averaged Gram matrices, and of the content's features if any."""

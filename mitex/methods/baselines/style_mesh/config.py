@@ -18,7 +18,7 @@ class StyleMeshConfig(ScheduledConfig):
     resolution: int = key(512, "side of the texture [texels]", 32, 4096)
     textures: int = key(4, "textures whose sum is the result, each half as fine as the one before", 1, 6)
     exemplar_size: int = key(
-        256, "side of the exemplar's central square on the mesh [texels], as of surface", 64, 2048
+        0, "side of the exemplar's central square on the mesh [texels]; 0: half of the resolution", 0, 2048
     )
     views: int = key(24, "cameras, evenly around the mesh", 1, 10_000)
     view: int = key(256, "height of the lowest pictures [px]", 64, 2048)
@@ -74,7 +74,6 @@ PRESETS = {
         preset="paper",
         steps=14_000,
         resolution=4096,
-        exemplar_size=2048,
         views=100,
         heights=4,
         antialias=1,

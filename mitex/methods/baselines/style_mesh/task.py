@@ -19,6 +19,7 @@ from mitex.methods.baselines.style_mesh.config import StyleMeshConfig
 from mitex.methods.baselines.style_mesh.layered import fine_energy, keep_in_range, sum_of, zero_textures
 from mitex.methods.baselines.style_mesh.visible import Counting, Visible, cameras_around, places_in, shares
 from mitex.methods.exemplar_pictures import albedo, framed
+from mitex.methods.layout import exemplar_texels
 from mitex.methods.texture_views import TextureViews, boxed
 from mitex.runtime import keep_freed_memory
 from mitex.scenes.cameras import Cameras
@@ -64,8 +65,9 @@ class StyleMeshTask(ParameterTask):
         ]
         self.network = named_vgg(config.network, "max", normalised=False)
         self.weights = dict(zip(config.layers, config.weights, strict=True))
-        self.targets = self._grams(config.exemplar_size, config.layers)
-        self.small_targets = self._grams(config.exemplar_size // 2, config.small_layers)
+        self.exemplar_side = exemplar_texels(config.exemplar_size, config.resolution, 64)
+        self.targets = self._grams(self.exemplar_side, config.layers)
+        self.small_targets = self._grams(self.exemplar_side // 2, config.small_layers)
 
     @property
     def texture(self) -> torch.Tensor:
@@ -94,7 +96,7 @@ class StyleMeshTask(ParameterTask):
     def preview(self, step: int) -> np.ndarray:
         """The exemplar, and the mesh from two sides, unlit."""
         side = self.config.view
-        beside = framed(self.exemplar, min(self.config.exemplar_size, side), side)
+        beside = framed(self.exemplar, min(self.exemplar_side, side), side)
         texture, middle = self.texture, self.config.views // 2
         views = {middle, min(middle + 1, self.config.views - 1)}
         pictures = [self.pictures[0].picture(texture, self._camera(k, 0))[0].numpy() for k in sorted(views)]

@@ -16,7 +16,7 @@ class Text2MeshConfig(StyleConfig):
 
     steps: int = 400
     exemplar_size: int = key(
-        256, "side of the exemplar's central square on the mesh [texels], as of surface", 32, 2048
+        0, "side of the exemplar's central square on the mesh [texels]; 0: half of the resolution", 0, 2048
     )
     layers: tuple[str, ...] = key(
         ("relu1_1", "relu2_1", "relu3_1", "relu4_1", "relu5_1"), "VGG-16's that are compared"

@@ -14,6 +14,7 @@ from mitex.losses import channel_transport, moment_distance, relaxed_transport
 from mitex.mesh import Mesh
 from mitex.methods.baselines.text2mesh.config import Text2MeshConfig, share_open
 from mitex.methods.exemplar_pictures import albedo, framed, side_in_view
+from mitex.methods.layout import exemplar_texels
 from mitex.methods.neural_style.cameras import cameras_of, frame_height
 from mitex.methods.neural_style.field import colours, encoded, head, opened, random_waves, trunk
 from mitex.runtime import keep_freed_memory
@@ -61,7 +62,8 @@ class Text2MeshTask(ParameterTask):
     def exemplar_side(self) -> int:
         """Of the exemplar, so that a texel of it is as large as one on the mesh at the mean distance [px]."""
         config = self.config
-        return side_in_view(config.exemplar_size * self.texels.size, config.view, frame_height(config))
+        width = exemplar_texels(config.exemplar_size, config.resolution)
+        return side_in_view(width * self.texels.size, config.view, frame_height(config))
 
     def loss(self, step: int, generator: torch.Generator) -> Step:
         """Relaxed transport and moments of the features of some views, and transport of their colours."""
