@@ -15,13 +15,13 @@ STABLE = 0.125  # rate of diffusion up to which no explicit step overshoots, see
 class ReactionDiffusionConfig(ScheduledConfig):
     """Everything that shapes a training; every key can be set from a TOML file or with `--set`."""
 
-    steps: int = 1500
+    steps: int = 4000
     channels: int = key(32, "chemicals; the first three are red, green and blue", 3, 256)
     hidden: int = key(128, "width of the hidden layer of the reaction", 1, 4096)
     slowest: float = key(0.008, "rate of diffusion of the first chemical [cells^2 a step]", 0, STABLE)
     fastest: float = key(STABLE, "rate of the last one; those between grow evenly in ratio", 1e-6, STABLE)
-    grid: int = key(64, "side of the square that is trained on, whose borders are joined [cells]", 16, 1024)
-    exemplar_size: int = key(64, "side of the exemplar [cells]", 16, 1024)
+    grid: int = key(128, "side of the square that is trained on, whose borders are joined [cells]", 16, 1024)
+    exemplar_size: int = key(128, "side of the exemplar [cells]", 16, 1024)
     width: float = key(
         0.5, "side of the exemplar on a mesh, of that of a layout's square: surface's 256 of 512", 0.01, 10
     )
@@ -33,8 +33,8 @@ class ReactionDiffusionConfig(ScheduledConfig):
         ("relu1_1", "relu2_1", "relu3_1", "relu4_1"), "VGG-16's whose Gram matrices are compared"
     )
     overflow_weight: float = key(100.0, "weight of the overflow loss", 0)
-    lr: float = 4e-3
-    milestones: tuple[int, ...] = (500, 1000, 1300)
+    lr: float = 1e-3
+    milestones: tuple[int, ...] = (2400, 3400)
     decay: float = 0.3
 
     def __post_init__(self) -> None:
@@ -51,8 +51,6 @@ PRESETS = {
         DEFAULT,
         preset="paper",
         steps=20_000,
-        grid=128,
-        exemplar_size=128,
         pool=256,
         min_steps=32,
         max_steps=64,
