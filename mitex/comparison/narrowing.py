@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from mitex.batch import Plan
-from mitex.comparison.plan import add_setting
+from mitex.comparison.plan import add_setting, label_of
 from mitex.errors import ConfigError
 from mitex.suggestions import suggestion
 
@@ -26,7 +26,7 @@ def narrowed(
         plan: of all.
         exemplars, meshes: which of its own, as the plan has them or by name without folder and suffix; all if
             none are given.
-        labels: of its methods; dashes stand for underscores; all if none are given.
+        labels: of its methods; dashes may stand for underscores; all if none are given.
         settings: `LABEL:KEY=VALUE`, as of `comparison_plan`.
 
     Raises:
@@ -34,7 +34,7 @@ def narrowed(
     """
     tables: dict[str, dict[str, Any]] = plan.content()["methods"]
     if labels:
-        names = [label.strip().replace("-", "_") for label in labels]
+        names = [label_of(label, tables) for label in labels]
         tables = {label: tables[label] for label in _selection(list(tables), names, "method")}
     for setting in settings:
         add_setting(tables, setting)

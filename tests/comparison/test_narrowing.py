@@ -97,6 +97,16 @@ def test_its_methods_with_other_settings(plan):
     assert (second.fit["preset"], second.fit["steps"], second.apply["resolution"]) == ("paper", 7, 64)
 
 
+def test_a_label_may_have_a_dash(place):
+    labels = {name: {"method": "gatys"} for name in ("small-one", "small_one", "large_one")}
+    plan = Plan.of({**CONTENT, "exemplars": ["lava"], "methods": labels})
+    part = narrowed(plan, labels=["small-one", "large-one"], settings=["small-one:size=32"])
+    assert [(part.label, part.fit) for part in part.methods] == [
+        ("small-one", {"size": "32"}),
+        ("large_one", {}),
+    ]
+
+
 @pytest.mark.parametrize(
     ("part", "message"),
     [
