@@ -125,6 +125,17 @@ class TestOneAfterTheOther:
         workshop.run(workshop.plan(("a.png",)))
         assert workshop.log.read_text().splitlines()[0].split()[2] == "1"
 
+    @pytest.mark.parametrize("link", [False, True])
+    def test_results_in_an_input_are_refused(self, workshop, link):
+        """They would make it another one."""
+        (workshop.folder / "look").mkdir()
+        (workshop.folder / "look" / "albedo.png").write_text("a")
+        (workshop.folder / "link").symlink_to("look")
+        before = sorted(workshop.folder.rglob("*"))
+        with pytest.raises(OutputError, match="/out' lies in the input '.*/look'; name a folder elsewhere"):
+            workshop.run(workshop.plan(("look",)), "link/out" if link else "look/out")
+        assert sorted(workshop.folder.rglob("*")) == before and workshop.told("start") == []
+
 
 class TestFailures:
     def test_a_poisoned_exemplar_fails_alone(self, workshop, capsys):
