@@ -264,6 +264,23 @@ def test_files_that_are_none(tmp_path):
             read_answers(CASES, [tmp_path / name])
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[" * 100_000,
+        json.dumps({"id": "x", "questions": [{"exemplar": "lava", "mesh": ["ball"], "methods": ["a", "b"]}]}),
+        json.dumps({"id": "x", "questions": [{"exemplar": "lava", "mesh": "ball", "methods": ["a"]}]}),
+        json.dumps({"id": "x", "questions": [{"exemplar": "lava", "mesh": "ball", "methods": ["a", "a"]}]}),
+        json.dumps({"id": "x", "questions": [["lava", "ball", ["a", "b"]]]}),
+        json.dumps({"id": 3, "questions": []}),
+    ],
+)
+def test_studies_that_are_none(tmp_path, text):
+    (tmp_path / KEY).write_text(text)
+    with pytest.raises(ConfigError, match="holds no study"):
+        Study.load(tmp_path)
+
+
 def test_a_persons_answers_count_once_whatever_their_file_is_called(tmp_path):
     """Also those that a person saved twice, the second time with more."""
     first = saved(tmp_path / "1.json", entries=((0, 0),))
