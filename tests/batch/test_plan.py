@@ -188,6 +188,7 @@ class TestPlaces:
         ("plan.toml --out out --engine ray", "--engine"),
         ("plan.toml --out out --address tcp://x:1", "add --engine dask"),
         ("plan.toml --out out --engine dask --address tcp://x:1 --jobs 2", "contradict"),
+        ("plan.toml --out out --engine dask --address=", "scheduler is empty; name one"),
         ("plan.toml --out out --slurm time=3", "add --engine slurm"),
         ("plan.toml --out out --engine slurm --slurm time", "write KEY=VALUE"),
         ("plan.toml --out out --engine dask --address tcp://127.0.0.1:1", "no Dask scheduler answers"),
