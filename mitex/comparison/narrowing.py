@@ -30,7 +30,7 @@ def narrowed(
         settings: `LABEL:KEY=VALUE`, as of `comparison_plan`.
 
     Raises:
-        ConfigError: The plan has none of that name, or a setting does not fit.
+        ConfigError: The plan has none of that name, or several, or a setting does not fit.
     """
     tables: dict[str, dict[str, Any]] = plan.content()["methods"]
     if labels:
@@ -50,9 +50,16 @@ def narrowed(
 
 def _selection(own: Sequence[str], names: Sequence[str], kind: str) -> list[str]:
     """The texts that are named, in their own order."""
-    known = {text: text for text in own} | {Path(text).stem: text for text in own}
-    for name in names:
-        if name not in known:
-            raise ConfigError(f"the comparison has no {kind} '{name}'", suggestion(name, sorted(known)))
-    selection = {known[name] for name in names}
+    selection = {_named(name, own, kind) for name in names}
     return [text for text in own if text in selection]
+
+
+def _named(name: str, own: Sequence[str], kind: str) -> str:
+    """The text that is named, as it stands or without folder and suffix."""
+    named = [name] if name in own else [text for text in own if Path(text).stem == name]
+    if not named:
+        known = sorted({*own, *(Path(text).stem for text in own)})
+        raise ConfigError(f"the comparison has no {kind} '{name}'", suggestion(name, known))
+    if len(named) > 1:
+        raise ConfigError(f"the comparison has more than one {kind} '{name}'", f"name {' or '.join(named)}")
+    return named[0]

@@ -123,6 +123,14 @@ def test_what_a_plan_does_not_have(plan, part, message):
         narrowed(plan, **part)
 
 
+def test_inputs_of_one_name_are_named_in_full(plan):
+    plan = Plan.of({**CONTENT, "exemplars": ["x/t.png", "y/t.png", "z/lava.png", "lava"]})
+    with pytest.raises(ConfigError, match=r"more than one exemplar 't'; name x/t.png or y/t.png"):
+        narrowed(plan, exemplars=["t"])
+    part = narrowed(plan, exemplars=["y/t.png", "lava"])
+    assert named(part)["gatys"][0] == ("y/t.png", "lava")
+
+
 def test_every_preset_is_run():
     assert set(PARTS) == set(presets())
 
