@@ -157,8 +157,13 @@ def _exemplars(part: MethodPlan, plan: Plan) -> list[Input]:
 
 
 def _option(name: str, value: Input | None) -> list[Input]:
-    """The words of an option; none without a value."""
-    return [] if value is None else [Input(f"--{name.replace('_', '-')}", None), value]
+    """The words of an option; none without a value, and one word if it begins with a dash."""
+    if value is None:
+        return []
+    option = f"--{name.replace('_', '-')}"
+    if value.text.startswith("-"):
+        return [Input(f"{option}={value.text}", None)]
+    return [Input(option, None), value]
 
 
 def _texts(inputs: Iterable[Input]) -> list[str]:

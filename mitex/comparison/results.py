@@ -94,6 +94,10 @@ def _result(folder: Path, chain: Sequence[Row], source: str) -> Result:
 def _argument(job: Job, option: str) -> str:
     """The value of an option in the words of a job."""
     words: Sequence[str] = job.words
+    joined = f"--{option}="
+    for word in words:
+        if word.startswith(joined):
+            return word.removeprefix(joined)
     return words[words.index(f"--{option}") + 1]
 
 

@@ -22,7 +22,7 @@ from tests.comparison.conftest import words_plan
 from tests.comparison.test_summary import result
 
 DOCS = Path(__file__).parents[2] / "docs"
-WORDS = ("red bricks", "green marble")
+WORDS = ("red bricks", "-green/blue marble")
 EXEMPLARS = {"lava": np.zeros((4, 4, 3))}
 
 
