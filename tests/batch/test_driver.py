@@ -157,6 +157,9 @@ class TestFailures:
         workshop.run(plan, retry=True)
         assert workshop.told("start").count("fit-stripes-p") == 2
 
+        workshop.run(workshop.plan(("a.png",)), "serial")
+        assert workshop.files() == workshop.files("serial")
+
     def test_a_crash_is_tried_again_a_few_times(self, workshop):
         (workshop.folder / "c.png").write_text("crash")
         report = workshop.run(workshop.plan(("c.png",)))
