@@ -73,7 +73,7 @@ class Slurm(Engine):
                 timeout_min=MINUTES, cpus_per_task=self.threads, stderr_to_stdout=True, **self._options
             )
         except (NameError, TypeError, ValueError) as e:
-            reason = str(e).splitlines()[0].partition(". ")[0]  # lists of all options follow
+            reason = str(e).partition("\n")[0].partition(". ")[0]  # lists of all options follow
             raise ConfigError(
                 f"submitit refuses the options of Slurm ({reason})", "mend or leave out the one that it names"
             ) from e
