@@ -15,7 +15,7 @@ from mitex.errors import ImageError
 from mitex.geometry.normal_maps import is_normal_map, slope_agreement
 from mitex.geometry.vectors import unit
 from mitex.images import SUFFIXES, read_image, resize
-from mitex.paths import expanded
+from mitex.paths import encodable, expanded
 from mitex.progress import announce
 from mitex.suggestions import suggestion
 
@@ -101,7 +101,7 @@ class Exemplar:
         if not os.path.exists(source):  # unlike Path.exists, also answers for impossible names
             otherwise = f"give an image, a folder of maps or one of {', '.join(names())}"
             raise ImageError(f"there is no exemplar {path}", suggestion(str(path), names(), otherwise))
-        return Exemplar({"albedo": _check_side(read_image(source), source)}, source.stem)
+        return Exemplar({"albedo": _check_side(read_image(source), source)}, encodable(source.stem))
 
     @staticmethod
     def of(source: Exemplar | str | os.PathLike[str]) -> Exemplar:
@@ -156,7 +156,7 @@ def _from_folder(folder: Path) -> Exemplar:
         if name == "normal_dx":
             array, name = _turned(array), "normal"
         arrays[name] = _upright(array, file) if name == "normal" else array
-    return Exemplar(_one_size(arrays, folder), folder.resolve().name)
+    return Exemplar(_one_size(arrays, folder), encodable(folder.resolve().name))
 
 
 def _upright(normals: np.ndarray, file: Path) -> np.ndarray:

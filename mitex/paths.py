@@ -190,6 +190,11 @@ def expanded(path: str | os.PathLike[str]) -> Path:
     return Path(os.path.expanduser(path))
 
 
+def encodable(name: str) -> str:
+    """A file's name as UTF-8 files can hold it: bytes that are none become escapes such as `\\udcff`."""
+    return name.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
 def cache_dir() -> Path:
     """The user's folder for things that Mitex can make again (not created here)."""
     if sys.platform == "darwin":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -18,6 +19,7 @@ from mitex.batch.jobs import Job, jobs_of
 from mitex.batch.plan import Plan
 from mitex.batch.report import Report, report_of
 from mitex.batch.task import RETRIES, Outcome, Task
+from mitex.errors import OutputError
 from mitex.progress import announce
 from mitex.runtime.signals import StopSignals
 from mitex.training.progress import clock
@@ -75,11 +77,12 @@ def run_plan(
 
     Raises:
         ConfigError: An input does not exist, or a job is there twice.
-        OutputError: The folder holds other files, or cannot be written to.
+        OutputError: The folder holds other files, lies in an input, or cannot be written to.
         KeyboardInterrupt: Ctrl-C or SIGTERM; the fits that were running have saved their checkpoints.
     """
     jobs = jobs_of(plan)
     batch_folder = BatchFolder.checked(folder)
+    _check_outside(batch_folder.path, jobs)
     with StopSignals() as signals, engine or Local() as workers, batch_folder.driver(jobs) as driver:
         if retry:
             for job in jobs:
@@ -93,6 +96,14 @@ def run_plan(
             f"interrupted with {report.count('done')} of {len(jobs)} jobs done; the same command goes on"
         )
     return report
+
+
+def _check_outside(folder: Path, jobs: Sequence[Job]) -> None:
+    """Refuses to write into a folder that is an input: its content, and so the jobs, would change."""
+    for word in dict.fromkeys(word for job in jobs for word in job.words):
+        is_input = os.path.isabs(word) and os.path.isdir(word)
+        if is_input and folder.resolve().is_relative_to(Path(word).resolve()):
+            raise OutputError(f"'{folder}' lies in the input '{word}'", "name a folder elsewhere with `out`")
 
 
 @dataclass

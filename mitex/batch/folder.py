@@ -66,7 +66,7 @@ class BatchFolder:
         """Whether its plan.jsonl is one that Mitex wrote."""
         try:
             return bool(self.jobs())
-        except (OSError, ValueError, TypeError, KeyError):
+        except (OSError, ValueError, TypeError, KeyError, RecursionError):
             return False
 
     def jobs(self) -> list[Job]:
@@ -191,6 +191,6 @@ def _is_there(path: Path) -> bool:
 def _read(path: Path) -> dict[str, Any] | None:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-    except (FileNotFoundError, NotADirectoryError, ValueError):
+    except (FileNotFoundError, NotADirectoryError, ValueError, RecursionError):
         return None
     return content if isinstance(content, dict) else None

@@ -16,8 +16,11 @@ from mitex.batch.plan import MethodPlan, Plan
 from mitex.errors import ConfigError
 from mitex.methods.method import Method
 from mitex.methods.registry import methods
+from mitex.training import values
 
 RESULTS = "results"  # folder of what the jobs write, in the batch folder
+KINDS = {"id": str, "words": tuple[str, ...], "resumed": tuple[str, ...], "result": str, "needs": str | None}
+ABOUT = {"method": str, "exemplar": str, "seed": int | None, "mesh": str}
 LONGEST_NAME = 40  # of a part of a job's name [characters]
 
 
@@ -57,8 +60,11 @@ class Job:
         Raises:
             TypeError, ValueError, KeyError: It is no record of a job.
         """
-        words, resumed = (tuple(map(str, record[key])) for key in ("words", "resumed"))
-        return Job(**{**record, "words": words, "resumed": resumed, "about": dict(record["about"])})
+        own = {key: values.check(record[key], kind) for key, kind in KINDS.items()}
+        about = dict(record["about"])
+        for key in about:
+            values.check(about[key], ABOUT[key])
+        return Job(**{**record, **own, "about": about})
 
 
 def jobs_of(plan: Plan) -> list[Job]:
@@ -151,8 +157,13 @@ def _exemplars(part: MethodPlan, plan: Plan) -> list[Input]:
 
 
 def _option(name: str, value: Input | None) -> list[Input]:
-    """The words of an option; none without a value."""
-    return [] if value is None else [Input(f"--{name.replace('_', '-')}", None), value]
+    """The words of an option; none without a value, and one word if it begins with a dash."""
+    if value is None:
+        return []
+    option = f"--{name.replace('_', '-')}"
+    if value.text.startswith("-"):
+        return [Input(f"{option}={value.text}", None)]
+    return [Input(option, None), value]
 
 
 def _texts(inputs: Iterable[Input]) -> list[str]:

@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 
 SIDE = 256  # of the exemplar, at most [px]
 PATCHES, SHARE = 16, 0.375  # patches, and their width [widths of the exemplar]
-WINDOWS = 6  # as wide as the exemplar, for the repetition
+WINDOWS = 6  # as wide as the exemplar, for the repetition; shifts go up to half of that
 
 
 @read_once

@@ -87,8 +87,9 @@ LOOKS = (
         "Repetition",
         TO_ZERO,
         "The highest peak of the autocorrelation beside the one at no shift, minus that of the exemplar. "
-        "Above 0: it repeats more than the exemplar; below: it is less regular. Under the mean stands the "
-        "mean distance from 0, by which methods are sorted and marked. No network is involved.",
+        "Above 0: it repeats more than the exemplar; below: it is less regular. Shifts go up to half the "
+        "exemplar's width: whole exemplars laid side by side as tiles are not seen. Under the mean stands "
+        "the mean distance from 0, by which methods are sorted and marked. No network is involved.",
     ),
 )
 TEXTS = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from html import escape
 
 import numpy as np
@@ -13,7 +14,7 @@ from mitex import __version__
 from mitex.comparison.html import DASH, QUALITY, count_text, items, picture, template, text_of
 from mitex.comparison.measures import Measure
 from mitex.comparison.provenance import Provenance
-from mitex.comparison.results import LIT, VIEW, Result, label, title_of
+from mitex.comparison.results import LIT, VIEW, Result, labels
 from mitex.comparison.summary import Summary
 from mitex.comparison.tables import meaning_html, table_html
 from mitex.page import jpeg
@@ -70,6 +71,11 @@ class Page:
             footer=f"Mitex {escape(__version__)}, {time.strftime('%-d %B %Y')}",
         )
 
+    @cached_property
+    def labels(self) -> dict[str, str]:
+        """What exemplars and meshes are called."""
+        return labels(self.exemplars) | labels(r.mesh for r in self.results if r.mesh is not None)
+
     @property
     def methods(self) -> list[str]:
         """Labels, in the plan's order."""
@@ -92,8 +98,8 @@ class Page:
         return f"Comparing {', '.join(names)} and {last}" if names else f"Measuring {last}"
 
     def _subtitle(self) -> str:
-        exemplars = ", ".join(map(label, self.exemplars))
-        meshes = ", ".join(dict.fromkeys(label(r.mesh) for r in self.results if r.mesh is not None))
+        exemplars = ", ".join(self.labels[text] for text in self.exemplars)
+        meshes = ", ".join(dict.fromkeys(self.labels[r.mesh] for r in self.results if r.mesh is not None))
         inputs = " on ".join(filter(None, (exemplars, meshes)))
         fewest, most = self.seed_counts or (0, 0)
         seeds = count_text(most, "seed")
@@ -119,13 +125,13 @@ class Page:
         """The pictures for an exemplar: a row for a view and for each mesh, a column for each method."""
         results = [result for result in self.results if result.exemplar == exemplar]
         meshes = dict.fromkeys(result.mesh for result in results if result.mesh is not None)
-        rows = [self._row(label(m), LIT, [r for r in results if r.mesh in (m, None)]) for m in meshes]
+        rows = [self._row(self.labels[m], LIT, [r for r in results if r.mesh in (m, None)]) for m in meshes]
         if any(VIEW in result.pictures for result in results):
             rows.insert(0, self._row("view held out", VIEW, results))
         images = [self._exemplar(exemplar), *[""] * len(rows)]
         body = "".join(f"<tr><td>{image}</td>{row}</tr>" for image, row in zip(images, rows, strict=False))
         heads = "".join(f"<th>{escape(name)}</th>" for name in self.methods)
-        head = f"<tr><th>{escape(label(exemplar))}</th><th></th>{heads}</tr>"
+        head = f"<tr><th>{escape(self.labels[exemplar])}</th><th></th>{heads}</tr>"
         content = f"<thead>{head}</thead><tbody>{body}</tbody>"
         columns = f"--columns: {len(self.methods) + 1}"
         return f'<div class="wide"><table class="looks" style="{columns}">{content}</table></div>'
@@ -136,7 +142,7 @@ class Page:
 
     def _exemplar(self, exemplar: str) -> str:
         image = self.exemplars[exemplar]
-        return "" if image is None else picture(jpeg(image, QUALITY), f"exemplar {label(exemplar)}")
+        return "" if image is None else picture(jpeg(image, QUALITY), f"exemplar {self.labels[exemplar]}")
 
     def _cell(self, kind: str, results: Sequence[Result]) -> str:
         """A cell with a method's picture of each seed, of which one is shown: the page's, or the first."""
@@ -151,7 +157,7 @@ class Page:
         images = [
             picture(
                 result.pictures[kind].read_bytes(),
-                _description(result, kind),
+                self._description(result, kind),
                 f' data-seed="{_seed_text(seed)}"' + (" hidden" if seed != visible_seed else ""),
             )
             for seed, result in by_seed.items()
@@ -179,12 +185,17 @@ class Page:
         """That of the means over all pairs first."""
         ordered = sorted(self.tables, key=lambda table: table.pair is not None)
         floors = [self.floors.get(table.pair, {}) if table.pair else {} for table in ordered]
-        return "".join(map(table_html, ordered, floors))
+        titles = ["Means over all of them" if t.pair is None else self._title_of(*t.pair) for t in ordered]
+        return "".join(map(table_html, ordered, floors, titles))
 
+    def _title_of(self, exemplar: str, mesh: str | None) -> str:
+        return self.labels[exemplar] if mesh is None else f"{self.labels[exemplar]} on {self.labels[mesh]}"
 
-def _description(result: Result, kind: str) -> str:
-    what = f"{label(result.exemplar)}, view held out," if kind == VIEW else title_of(*result.pair)
-    return f"{what} by {result.method}, seed {_seed_text(result.seed)}"
+    def _description(self, result: Result, kind: str) -> str:
+        """What a picture shows."""
+        view = f"{self.labels[result.exemplar]}, view held out,"
+        what = view if kind == VIEW else self._title_of(*result.pair)
+        return f"{what} by {result.method}, seed {_seed_text(result.seed)}"
 
 
 def _seed_text(seed: int | None) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from mitex.batch import MethodPlan, Plan
 from mitex.batch.options import apply_kinds, fit_kinds
+from mitex.batch.plan import OWN_KEYS
 from mitex.comparison.kinds import KINDS, Kind
 from mitex.errors import ConfigError
 from mitex.methods.checks import in_range
@@ -135,16 +136,25 @@ def add_setting(tables: Mapping[str, dict[str, Any]], setting: str) -> None:
     key, equals, text = rest.partition("=")
     if not (colon and equals and key.strip()):
         raise ConfigError(f"'{setting}' is not a setting", "write METHOD:KEY=VALUE, such as nca:steps=300")
-    label = name.strip().replace("-", "_")
+    label = label_of(name, tables)
     if label not in tables:
         raise ConfigError(f"'{setting}' is of no method that is compared", suggestion(label, tables))
     key, table = key.strip().replace("-", "_"), tables[label]
+    if key in (*OWN_KEYS, "apply"):
+        problem = f"'{setting}' is no setting of a method: '{key}' belongs to plans"
+        raise ConfigError(problem, "write it into a plan")
     method = methods()[table.get("method", label)]
     if key.startswith("apply."):
         key, table = key.removeprefix("apply."), table.setdefault("apply", {})
         table[key] = _value(key, text.strip(), apply_kinds(method), label)
     else:
         table[key] = _value(key, text.strip(), fit_kinds(method), label)
+
+
+def label_of(name: str, labels: Container[str]) -> str:
+    """The label that is meant: the name as it stands if it is one, otherwise with underscores for dashes."""
+    name = name.strip()
+    return name if name in labels else name.replace("-", "_")
 
 
 def _value(key: str, text: str, kinds: Mapping[str, Any], label: str) -> Any:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -93,14 +94,24 @@ def _result(folder: Path, chain: Sequence[Row], source: str) -> Result:
 def _argument(job: Job, option: str) -> str:
     """The value of an option in the words of a job."""
     words: Sequence[str] = job.words
+    joined = f"--{option}="
+    for word in words:
+        if word.startswith(joined):
+            return word.removeprefix(joined)
     return words[words.index(f"--{option}") + 1]
 
 
-def title_of(exemplar: str, mesh: str | None) -> str:
-    """What people call a pair."""
-    return label(exemplar) if mesh is None else f"{label(exemplar)} on {label(mesh)}"
+def labels(texts: Iterable[str]) -> dict[str, str]:
+    """What people call absolute paths and names: path or name -> label.
 
-
-def label(text: str) -> str:
-    """What people call a path or a name; words are called as they are."""
-    return Path(text).stem if os.sep in text else text
+    A path is called by its stem; where others are called the same, by its folder and name, or as a whole.
+    Names and words are called as they are.
+    """
+    own = {text: Path(text).stem if os.path.isabs(text) else text for text in texts}
+    for longer in (lambda text: os.path.join(*Path(text).parts[-2:]), str):
+        counts = Counter(own.values())
+        own = {
+            text: longer(text) if os.path.isabs(text) and counts[label] > 1 else label
+            for text, label in own.items()
+        }
+    return own

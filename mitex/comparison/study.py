@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import combinations
 from pathlib import Path
+from typing import Any, get_type_hints
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from mitex.errors import ConfigError
 from mitex.page import jpeg
 from mitex.paths import atomic_write, expanded
 from mitex.records import write_json
+from mitex.training import values
 
 PAGE, KEY = "study.html", "study.json"
 MOST = 40  # questions to one person, as MeshNCA asked
@@ -64,11 +66,18 @@ class Study:
         """
         try:
             record = json.loads((expanded(folder) / KEY).read_text(encoding="utf-8"))
-            questions = [Question(**{**q, "methods": tuple(q["methods"])}) for q in record["questions"]]
-            return Study(str(record["id"]), tuple(questions))
-        except (OSError, ValueError, TypeError, KeyError) as e:
+            return Study(values.check(record["id"], str), tuple(map(_question, record["questions"])))
+        except (OSError, ValueError, TypeError, KeyError, RecursionError) as e:
             problem = f"'{folder}' holds no study of `mitex compare`"
             raise ConfigError(problem, "name the folder of a comparison that was made with a study") from e
+
+
+def _question(record: Mapping[str, Any]) -> Question:
+    kinds = get_type_hints(Question)
+    question = Question(**{key: values.check(record[key], kind) for key, kind in kinds.items()})
+    if len(set(question.methods)) < 2:
+        raise ValueError(record)
+    return question
 
 
 def check_study(plan: Plan) -> None:

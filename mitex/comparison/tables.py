@@ -7,18 +7,17 @@ from html import escape
 
 from mitex.comparison.html import DASH, count_text, number_text
 from mitex.comparison.measures import Measure
-from mitex.comparison.results import title_of
 from mitex.comparison.summary import Cell, Summary
 
 
-def table_html(table: Summary, floor: Mapping[str, float]) -> str:
+def table_html(table: Summary, floor: Mapping[str, float], title: str) -> str:
     """A table with its title.
 
     Args:
         table: means and spreads.
         floor: measure -> value of the exemplar beside itself, for the last row; empty for none.
+        title: what it is of.
     """
-    title = "Means over all of them" if table.pair is None else title_of(*table.pair)
     names = "<th><button>method</button></th><th><button>seeds</button><small>&nbsp;</small></th>"
     head = f"<tr>{names}{''.join(map(_head, table.measures))}</tr>"
     rows = "".join(_row(table, method) for method in table.methods)

@@ -17,7 +17,7 @@ from mitex.mesh.readers import SUFFIXES, Budget, Soup, read
 from mitex.mesh.readers.soup import near_origin
 from mitex.mesh.topology import welded
 from mitex.mesh.validate import validate
-from mitex.paths import expanded
+from mitex.paths import encodable, expanded
 from mitex.progress import announce
 from mitex.suggestions import suggestion
 
@@ -68,7 +68,7 @@ def load(path: str | os.PathLike[str], max_vertices: int = 2_000_000) -> Mesh:
         corner_normals=soup.normals,
         polygons=_polygons(soup, len(vertices)),
     )
-    return replace(mesh, name=source.stem)
+    return replace(mesh, name=encodable(source.stem))
 
 
 def weld(soup: Soup) -> tuple[np.ndarray, np.ndarray]:

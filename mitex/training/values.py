@@ -63,7 +63,7 @@ def check(value: Any, kind: Any) -> Any:
     if kind is types.NoneType:
         return None if value is None else _one_of({"none": None}, value)
     if kind is float and type(value) in (int, float):
-        return _finite(float(value))
+        return _finite(value)
     if kind in NAMES and type(value) is kind:  # an exact match, since True would pass as an int
         return value
     if get_origin(kind) is Literal:
@@ -121,9 +121,12 @@ def _one_of(choices: dict[str, Any], text: Any) -> Any:
 
 
 def _finite(number: float) -> float:
-    if not math.isfinite(number):
-        raise ValueError(number)
-    return number
+    try:
+        if math.isfinite(number):
+            return float(number)
+    except OverflowError:  # an integer beyond all floats
+        pass
+    raise ValueError(number)
 
 
 def _each(reader: Reader, items: Sequence[Any], kind: Any) -> tuple[Any, ...]:

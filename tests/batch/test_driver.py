@@ -125,6 +125,17 @@ class TestOneAfterTheOther:
         workshop.run(workshop.plan(("a.png",)))
         assert workshop.log.read_text().splitlines()[0].split()[2] == "1"
 
+    @pytest.mark.parametrize("link", [False, True])
+    def test_results_in_an_input_are_refused(self, workshop, link):
+        """They would make it another one."""
+        (workshop.folder / "look").mkdir()
+        (workshop.folder / "look" / "albedo.png").write_text("a")
+        (workshop.folder / "link").symlink_to("look")
+        before = sorted(workshop.folder.rglob("*"))
+        with pytest.raises(OutputError, match="/out' lies in the input '.*/look'; name a folder elsewhere"):
+            workshop.run(workshop.plan(("look",)), "link/out" if link else "look/out")
+        assert sorted(workshop.folder.rglob("*")) == before and workshop.told("start") == []
+
 
 class TestFailures:
     def test_a_poisoned_exemplar_fails_alone(self, workshop, capsys):
@@ -145,6 +156,9 @@ class TestFailures:
         assert workshop.told("start").count("fit-stripes-p") == 1
         workshop.run(plan, retry=True)
         assert workshop.told("start").count("fit-stripes-p") == 2
+
+        workshop.run(workshop.plan(("a.png",)), "serial")
+        assert workshop.files() == workshop.files("serial")
 
     def test_a_crash_is_tried_again_a_few_times(self, workshop):
         (workshop.folder / "c.png").write_text("crash")

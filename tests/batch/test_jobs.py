@@ -129,6 +129,11 @@ class TestCommands:
             *("--out", f"{apply.result}/m/"),
         )
 
+    def test_words_that_begin_with_a_dash_are_one_with_their_option(self, jobs):
+        fit, _ = jobs({"nca": {"source": "text"}}, exemplars=["-dark wood"])
+        assert fit.words[:5] == ("fit", "nca", "--quiet", "--text=-dark wood", "--out")
+        assert fit.resumed[3] == "--text=-dark wood" and fit.about["exemplar"] == "-dark wood"
+
     def test_names_and_words_stay_even_where_files_are_called_like_them(self, jobs, workshop):
         for name in ("paper", "bricks", "red bricks"):
             (workshop.folder / name).mkdir()

@@ -1,12 +1,14 @@
 """Plans that cannot be run: code 2, one line, and nothing is written."""
 
 import errno
+import json
 import os
 from pathlib import Path
 
 import pytest
 
 from mitex.batch import Plan
+from mitex.batch.jobs import jobs_of
 from mitex.cli import main
 
 GOOD = """exemplars = ["a.png"]
@@ -186,6 +188,7 @@ class TestPlaces:
         ("plan.toml --out out --engine ray", "--engine"),
         ("plan.toml --out out --address tcp://x:1", "add --engine dask"),
         ("plan.toml --out out --engine dask --address tcp://x:1 --jobs 2", "contradict"),
+        ("plan.toml --out out --engine dask --address=", "scheduler is empty; name one"),
         ("plan.toml --out out --slurm time=3", "add --engine slurm"),
         ("plan.toml --out out --engine slurm --slurm time", "write KEY=VALUE"),
         ("plan.toml --out out --engine dask --address tcp://127.0.0.1:1", "no Dask scheduler answers"),
@@ -200,6 +203,19 @@ def test_options(words, message, workshop, check, monkeypatch):
 def test_status_of_another_folder(workshop, capsys):
     assert main(["batch", "status", str(workshop.folder)]) == 2
     assert "is no folder of `mitex batch`" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "change", [{"result": 5}, {"words": "fit"}, {"needs": [1]}, {"about": {"method": ["a"]}}, {"more": 1}]
+)
+def test_status_of_a_plan_that_is_none(change, workshop, capsys):
+    record = jobs_of(workshop.plan())[0].record()
+    (workshop.folder / "plan.jsonl").write_text(json.dumps(record))
+    assert main(["batch", "status", str(workshop.folder)]) == 0
+    for text in (json.dumps(record | change), "[" * 100_000):
+        (workshop.folder / "plan.jsonl").write_text(text)
+        assert main(["batch", "status", str(workshop.folder)]) == 2
+        assert "is no folder of `mitex batch`" in capsys.readouterr().err
 
 
 def test_a_good_plan(workshop):

@@ -57,7 +57,10 @@ def wearing(plane, image):
 
 @pytest.mark.usefixtures("few_patches")
 def test_repetition_is_beyond_that_of_the_exemplar(pair_of, plane):
-    """Dots in rows have a regularity near 1, noise near 0: the difference is told, with its sign."""
+    """Dots in rows have a regularity near 1, noise near 0: the difference is told, with its sign.
+
+    The plane wears the whole image several times: that is beyond the shifts, and not seen.
+    """
     of_dots, of_noise = pair_of(dots()), pair_of(noise())
     of = {
         (name, worn): pair.numbers(wearing(plane, image))["repetition"]

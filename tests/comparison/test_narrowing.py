@@ -97,6 +97,16 @@ def test_its_methods_with_other_settings(plan):
     assert (second.fit["preset"], second.fit["steps"], second.apply["resolution"]) == ("paper", 7, 64)
 
 
+def test_a_label_may_have_a_dash(place):
+    labels = {name: {"method": "gatys"} for name in ("small-one", "small_one", "large_one")}
+    plan = Plan.of({**CONTENT, "exemplars": ["lava"], "methods": labels})
+    part = narrowed(plan, labels=["small-one", "large-one"], settings=["small-one:size=32"])
+    assert [(part.label, part.fit) for part in part.methods] == [
+        ("small-one", {"size": "32"}),
+        ("large_one", {}),
+    ]
+
+
 @pytest.mark.parametrize(
     ("part", "message"),
     [
@@ -111,6 +121,14 @@ def test_its_methods_with_other_settings(plan):
 def test_what_a_plan_does_not_have(plan, part, message):
     with pytest.raises(ConfigError, match=re.escape(message)):
         narrowed(plan, **part)
+
+
+def test_inputs_of_one_name_are_named_in_full(plan):
+    plan = Plan.of({**CONTENT, "exemplars": ["x/t.png", "y/t.png", "z/lava.png", "lava"]})
+    with pytest.raises(ConfigError, match=r"more than one exemplar 't'; name x/t.png or y/t.png"):
+        narrowed(plan, exemplars=["t"])
+    part = narrowed(plan, exemplars=["y/t.png", "lava"])
+    assert named(part)["gatys"][0] == ("y/t.png", "lava")
 
 
 def test_every_preset_is_run():

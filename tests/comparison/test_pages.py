@@ -13,7 +13,7 @@ from mitex.comparison.answers import read_answers
 from mitex.comparison.measures import BY_KEY
 from mitex.comparison.page import Page
 from mitex.comparison.provenance import Provenance
-from mitex.comparison.results import LIT
+from mitex.comparison.results import LIT, labels
 from mitex.comparison.study import Study, write_study
 from mitex.comparison.summary import summaries
 from tests.cli import bad_files as bad
@@ -42,12 +42,12 @@ def test_a_report_of_nothing_says_so():
     assert "<li>gatys: it failed</li>" in html
 
 
-def report(results):
+def report(results, exemplars=("lava",)):
     """The text of a report with two columns."""
     measures = BY_KEY["seams"], BY_KEY["gram"]
     plan = Plan.of({"exemplars": ["lava"], "meshes": ["vase"], "methods": {"gatys": {}}})
-    exemplars, tables = {"lava": np.zeros((4, 4, 3))}, summaries(results, measures)
-    return Page(results, tables, exemplars, {}, (), measures, (), Provenance(plan, {})).html()
+    pictures, tables = dict.fromkeys(exemplars, np.zeros((4, 4, 3))), summaries(results, measures)
+    return Page(results, tables, pictures, {}, (), measures, (), Provenance(plan, {})).html()
 
 
 def with_seeds(folder, seeds):
@@ -62,6 +62,25 @@ def rows_of(html):
     """Method -> the contents of its other cells."""
     rows = re.findall(r'<tr><td data-value="(.)">.</td>(.*?)</tr>', html)
     return {name: re.findall(r"<td[^>]*>(.*?)</td>", cells) for name, cells in rows}
+
+
+def test_inputs_of_one_name_are_told_apart_by_their_folders(tmp_path):
+    """Also those whose folders and names are the same; names and words stay as they are."""
+    files = ["/x/t.png", "/y/t.png", "/a/s/u.png", "/b/s/u.png", "/a/v.png"]
+    names = ["x/t.png", "y/t.png", "/a/s/u.png", "/b/s/u.png", "v"]
+    words = "black/white tiles"
+    assert labels([*files, words]) == dict(zip([*files, words], [*names, words], strict=True))
+    picture = bad.image(tmp_path / "a.jpg", (8, 8), "JPEG")
+    results = [
+        replace(result("a", 0, mesh), exemplar=exemplar, pictures={LIT: picture})
+        for exemplar in files[:2]
+        for mesh in ("/m/ball.obj", "/n/ball.obj")
+    ]
+    html = report(results, files[:2])
+    for title in ("x/t.png on m/ball.obj", "y/t.png on n/ball.obj"):
+        assert f"<h3>{title}</h3>" in html and f'alt="{title} by a, seed 0"' in html
+    assert "x/t.png, y/t.png on m/ball.obj, n/ball.obj; 1 seed</p>" in html
+    assert "<th>x/t.png</th>" in html and "<th>n/ball.obj</th>" in html
 
 
 class TestUnequalSeeds:

@@ -63,6 +63,11 @@ BROKEN = {
         {"--set": "image-quilting:apply.scale=big"},
         "scale of image_quilting cannot be 'big'; give a finite number",
     ),
+    "a key of plans": (
+        {"--set": "image-quilting:method=gatys"},
+        "'method' belongs to plans; write it into a plan",
+    ),
+    "a table of plans": ({"--set": "image-quilting:apply=x"}, "'apply' belongs to plans"),
     "a study of one method": ({"--study": ""}, "a study of one method that is put on meshes asks nothing"),
     "no seeds": ({"--seeds": "0"}, "--seeds 0 is out of range"),
     "a folder of something else": ({"--out": "."}, "'.' holds other files"),

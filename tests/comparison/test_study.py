@@ -13,7 +13,7 @@ import scipy.stats
 
 from mitex.cli import main
 from mitex.comparison import compare
-from mitex.comparison.answers import Answer, evaluate, holm, read_answers, wilson_interval
+from mitex.comparison.answers import Answer, blocked_anova, evaluate, holm, read_answers, wilson_interval
 from mitex.comparison.results import LIT, VIEW
 from mitex.comparison.study import KEY, PAGE, Question, Study, write_study
 from mitex.errors import ConfigError
@@ -22,7 +22,7 @@ from tests.comparison.conftest import words_plan
 from tests.comparison.test_summary import result
 
 DOCS = Path(__file__).parents[2] / "docs"
-WORDS = ("red bricks", "green marble")
+WORDS = ("red bricks", "-green/blue marble")
 EXEMPLARS = {"lava": np.zeros((4, 4, 3))}
 
 
@@ -140,23 +140,46 @@ class TestEvaluation:
         expected = scipy.stats.binomtest(wins, count).proportion_ci(method="wilson")
         assert wilson_interval(wins / count, count) == pytest.approx((expected.low, expected.high), abs=1e-12)
 
-    def test_the_spread_is_over_cases_and_the_published_test_takes_them_as_samples(self):
+    def test_the_spread_is_over_cases_and_the_published_test_takes_them_as_blocks(self):
         """a was preferred by all on the ball, by half on the vase and the knot."""
         done = evaluate(CASES, {"x": answers(0, 0, 1), "y": answers(0, 1, 0)})
         a, b = [1.0, 0.5, 0.5], [0.0, 0.5, 0.5]
         assert done.preferences[0].mean == pytest.approx(2 / 3)
         assert done.preferences[0].spread == pytest.approx(np.std(a, ddof=1))
-        between, within = 3 * 2 * (1 / 6) ** 2 / 1, 2 * (1 / 9 + 2 / 36) / 4  # mean squares
-        assert done.f == pytest.approx(between / within)
-        t: Any = scipy.stats.ttest_ind(a, b)
-        assert done.published_p == pytest.approx(t.pvalue)  # of two groups both tests are one
+        t: Any = scipy.stats.ttest_rel(a, b)  # of two methods both tests are one
+        assert (done.f, done.published_p) == pytest.approx((t.statistic**2, t.pvalue))
+
+    def test_the_analysis_of_variance_is_that_of_sums_of_squares(self):
+        """What cases and methods do not explain is the error; cases that lack a method do not count."""
+        shares = np.random.default_rng(0).random((5, 3))
+        of_all, of_cases, of_methods = shares.mean(), shares.mean(1), shares.mean(0)
+        total = sum((value - of_all) ** 2 for value in shares.flat)
+        cases = sum(3 * (value - of_all) ** 2 for value in of_cases)
+        between = sum(5 * (value - of_all) ** 2 for value in of_methods)
+        f = (between / 2) / ((total - cases - between) / 8)
+        expected = f, scipy.stats.f(2, 8).sf(f)
+        assert blocked_anova(shares) == pytest.approx(expected)
+        assert blocked_anova(np.vstack([shares, [0.9, np.nan, 0.1]])) == pytest.approx(expected)
+
+    @pytest.mark.parametrize(
+        ("f", "p"), [(8.44196, 0.001028), (6.2159, 0.004376), (15.08026, 0.000037), (13.77907, 0.000065)]
+    )
+    def test_p_is_the_papers(self, f, p):
+        """Of four methods in seven cases (Kovacs et al. 2024): shares whose F is theirs."""
+        residuals = np.random.default_rng(0).normal(size=(7, 4))
+        residuals -= residuals.mean(0)
+        residuals -= residuals.mean(1, keepdims=True)
+        effects = np.array([3.0, -1.0, -1.0, -1.0])
+        unscaled, _ = blocked_anova(residuals + effects)
+        done = blocked_anova(residuals + effects * np.sqrt(f / unscaled))
+        assert done[0] == pytest.approx(f) and done[1] == pytest.approx(p, abs=6e-7)
 
     def test_one_method_that_wins_every_case_has_p_of_all_signs_alike(self):
         """Of n cases 2 of 2 ** n relabellings differ as much; cases without a difference say nothing."""
         study = many_cases(6)
         done = evaluate(study, {"x": answers(*[0] * 6)})
         assert done.p == done.pairs["a", "b"] == 2 / 2**6
-        assert np.isnan([done.f, done.published_p]).all()  # no share varies
+        assert np.isnan([done.f, done.published_p]).all()  # all cases are alike
         done = evaluate(study, {"x": answers(*[0] * 5, None)})
         assert done.p == 2 / 2**5
 
@@ -194,8 +217,8 @@ class TestEvaluation:
         )
         assert done.untested == ("c",) and done.pairs.keys() == {("a", "b")}
         a, b = [1.0, 0.5, 0.5, 0.5], [0.0, 0.5, 0.5]
-        f: Any = scipy.stats.f_oneway(a, b)
-        assert (done.f, done.published_p) == pytest.approx((f.statistic, f.pvalue))
+        t: Any = scipy.stats.ttest_rel(a[:3], b)
+        assert (done.f, done.published_p) == pytest.approx((t.statistic**2, t.pvalue))
         assert done.p == 1  # one case of three differs, either way as much
         text = "of a single case, and not tested: c\n"
         assert text in done.text() and other.untested == () and text not in other.text()
@@ -239,6 +262,23 @@ def test_files_that_are_none(tmp_path):
     for name in ("bad.json", "missing.json", "."):
         with pytest.raises(ConfigError, match="answers"):
             read_answers(CASES, [tmp_path / name])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[" * 100_000,
+        json.dumps({"id": "x", "questions": [{"exemplar": "lava", "mesh": ["ball"], "methods": ["a", "b"]}]}),
+        json.dumps({"id": "x", "questions": [{"exemplar": "lava", "mesh": "ball", "methods": ["a"]}]}),
+        json.dumps({"id": "x", "questions": [{"exemplar": "lava", "mesh": "ball", "methods": ["a", "a"]}]}),
+        json.dumps({"id": "x", "questions": [["lava", "ball", ["a", "b"]]]}),
+        json.dumps({"id": 3, "questions": []}),
+    ],
+)
+def test_studies_that_are_none(tmp_path, text):
+    (tmp_path / KEY).write_text(text)
+    with pytest.raises(ConfigError, match="holds no study"):
+        Study.load(tmp_path)
 
 
 def test_a_persons_answers_count_once_whatever_their_file_is_called(tmp_path):

@@ -64,7 +64,7 @@ def test_a_distance_is_the_mean_of_distances_and_its_spread_is_theirs():
 
 def test_a_table_tells_distances_where_values_lie_on_both_sides_of_the_best():
     results = [result("a", 0, mesh, repetition=v, gram=2.0) for mesh, v in (("ball", 0.4), ("vase", -0.2))]
-    html = table_html(summaries(results)[-1], {})
+    html = table_html(summaries(results)[-1], {}, "all")
     assert (
         '<td data-value="0.3">0.100<span class="spread"></span><span class="spread">distance 0.300</' in html
     )

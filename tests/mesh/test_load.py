@@ -48,6 +48,12 @@ def test_shared_meshes_match_their_table(name):
     )
 
 
+def test_a_file_name_that_is_no_utf_8_is_escaped(tmp_path):
+    path = tmp_path / "\udcff.ply"
+    path.write_bytes(exported_by_trimesh(icosphere(1), "ply"))
+    assert Mesh.load(path).name == "\\udcff"
+
+
 @pytest.mark.parametrize("kind", ["obj", "ply", "stl", "glb", "gltf", "off"])
 def test_reads_what_trimesh_writes(kind, tmp_path):
     mesh = icosphere(3)

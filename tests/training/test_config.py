@@ -158,6 +158,7 @@ def test_toml_values_of_every_type(tmp_path):
         "steps = [5]",
         "lr = nan",
         "lr = inf",
+        "lr = 1" + 400 * "0",
         "lr = true",
         "cull = 1",
         'cull = "true"',

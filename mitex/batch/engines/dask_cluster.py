@@ -29,11 +29,17 @@ class Dask(Engine):
     Args:
         address: of a scheduler, as tcp://10.0.0.1:8786; None starts a cluster here.
         jobs: how many workers that one has.
+
+    Raises:
+        ConfigError: The address is empty; as a context, no scheduler answers.
     """
 
     pause = 0.1
 
     def __init__(self, address: str | None = None, jobs: int = 1) -> None:
+        if address == "":
+            problem = "the address of the Dask scheduler is empty"
+            raise ConfigError(problem, "name one, as tcp://10.0.0.1:8786, or leave it out")
         self._address, self._jobs = address, jobs
         self.at_once: int | None = jobs if address is None else None
         self.threads = max(1, cores() // jobs)

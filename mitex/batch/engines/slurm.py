@@ -32,7 +32,9 @@ class Slurm(Engine):
         cluster: "slurm"; "local" stands in for it on one machine, for tests.
 
     Raises:
-        ConfigError: An option is no KEY=VALUE.
+        ConfigError: An option is no KEY=VALUE; as a context, submitit knows none of that name.
+        RuntimeUnavailable: As a context, this is no machine of a Slurm cluster; on submission, Slurm refuses
+            the job.
     """
 
     def __init__(
@@ -45,13 +47,22 @@ class Slurm(Engine):
         self._executor: Any = None
 
     def __enter__(self) -> Slurm:
-        if self._cluster == "slurm" and shutil.which("sbatch") is None:
-            raise RuntimeUnavailable("there is no sbatch here", "run this on a machine of the Slurm cluster")
+        for program in ("sbatch", "srun") if self._cluster == "slurm" else ():
+            if shutil.which(program) is None:
+                solution = "run this on a machine of the Slurm cluster"
+                raise RuntimeUnavailable(f"there is no {program} here", solution)
+        self._opened(Path(FOLDER))  # refuses bad options before any work; it writes nothing
         return self
 
     def submit(self, task: Task) -> _Queued:
         self._executor = self._executor or self._opened(task.folder.path / FOLDER)
-        return _Queued(self._executor.submit(Requeueable(task)))
+        from submitit.core.utils import FailedJobError, FailedSubmissionError
+
+        try:
+            return _Queued(self._executor.submit(Requeueable(task)))
+        except (FailedJobError, FailedSubmissionError) as e:
+            problem = f"Slurm refuses a job ({_last_line(e)})"
+            raise RuntimeUnavailable(problem, "mend the options, and type the same command") from e
 
     def _opened(self, folder: Path) -> Any:
         executor = optional("submitit", "cluster").AutoExecutor(
@@ -62,8 +73,9 @@ class Slurm(Engine):
                 timeout_min=MINUTES, cpus_per_task=self.threads, stderr_to_stdout=True, **self._options
             )
         except (NameError, TypeError, ValueError) as e:
+            reason = str(e).partition("\n")[0].partition(". ")[0]  # lists of all options follow
             raise ConfigError(
-                f"submitit refuses the options of Slurm ({e})", "mend or leave out the one that it names"
+                f"submitit refuses the options of Slurm ({reason})", "mend or leave out the one that it names"
             ) from e
         return executor
 
@@ -101,11 +113,16 @@ class _Queued:
         try:
             return self.job.result()
         except (FailedJobError, UncompletedJobError) as e:
-            lines = str(e).strip().splitlines() or ["it says nothing"]
-            raise WorkerLost(f"job {self.job.job_id} of Slurm ended without a result ({lines[-1]})") from e
+            raise WorkerLost(
+                f"job {self.job.job_id} of Slurm ended without a result ({_last_line(e)})"
+            ) from e
 
     def cancel(self) -> None:
         self.job.cancel(check=False)
+
+
+def _last_line(error: Exception) -> str:
+    return (str(error).strip().splitlines() or ["it says nothing"])[-1]
 
 
 def _option(text: str) -> tuple[str, int | str]:

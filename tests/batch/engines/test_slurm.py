@@ -28,6 +28,9 @@ def test_a_job_that_has_to_give_way_comes_back_and_goes_on(workshop, wait_for, m
     assert report.count("done") == 2
     assert workshop.told("start").count("fit-stripes-a") == 2
     assert workshop.told("step") == ["fit-stripes-a"] * STEPS
+    monkeypatch.delenv("STRIPES_PACE")
+    workshop.run(plan, "serial")
+    assert workshop.files() == workshop.files("serial")
 
 
 def test_options_are_those_of_sbatch(monkeypatch, tmp_path):
@@ -39,6 +42,37 @@ def test_options_are_those_of_sbatch(monkeypatch, tmp_path):
     assert executor._executor.max_num_timeout == MOST_RETURNS
     with pytest.raises(ConfigError, match="submitit refuses"):
         Slurm(["partitoin=cpu"])._opened(tmp_path)
+
+
+@pytest.fixture
+def cluster(tmp_path, monkeypatch):
+    """Programs that stand in for those of a cluster; sbatch refuses all."""
+    programs = tmp_path / "programs"
+    programs.mkdir()
+    for name in ("sbatch", "srun"):
+        (programs / name).write_text("#!/bin/sh\necho sorry >&2\necho no such partition >&2\nexit 1\n")
+        (programs / name).chmod(0o755)
+    monkeypatch.setenv("PATH", str(programs), prepend=os.pathsep)
+    return programs
+
+
+def test_what_slurm_refuses(workshop, cluster):
+    with pytest.raises(RuntimeUnavailable, match=r"Slurm refuses a job \(no such partition\); mend"):
+        workshop.run(workshop.plan(), engine=Slurm())
+    assert not list((workshop.folder / "out" / "drivers").iterdir()) and workshop.told("start") == []
+
+
+def test_options_are_checked_before_anything_is_written(workshop, cluster):
+    with pytest.raises(ConfigError, match=r"refuses .* \(Unknown argument 'foo' .{,60}\); mend"):
+        workshop.run(workshop.plan(), engine=Slurm(["foo=bar"]))
+    assert not (workshop.folder / "out").exists()
+
+
+def test_without_srun(workshop, cluster, monkeypatch):
+    (cluster / "srun").unlink()
+    with pytest.raises(RuntimeUnavailable, match="there is no srun here"):
+        workshop.run(workshop.plan(), engine=Slurm())
+    assert not (workshop.folder / "out").exists()
 
 
 def test_without_submitit(monkeypatch, tmp_path):

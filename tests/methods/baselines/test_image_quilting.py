@@ -1,7 +1,10 @@
 """Quilted pictures: errors against a slow sum, blocks that go on, and the choice among the best."""
 
+import tomllib
+
 import numpy as np
 import pytest
+from PIL import Image
 
 from mitex.errors import ConfigError, ImageError
 from mitex.exemplar import Exemplar
@@ -74,6 +77,20 @@ def test_settings_reach_the_picture(tmp_path):
         words = [f"{key}={value}" for key, value in small.items() if not setting.startswith(key)]
         assert not np.array_equal(image_quilting.fit(lava, set=[*words, setting]).image, texture.image)
     assert image_quilting.PRESETS["paper"].soft is False
+
+
+def test_a_file_name_that_is_no_utf_8_is_escaped(tmp_path):
+    """Whether the exemplar is a file or a folder; what is written down can be read."""
+    picture = (np.random.default_rng(0).random((40, 40, 3)) * 255).astype(np.uint8)
+    file, folder = tmp_path / "\udcff.png", tmp_path / "\udcfe"
+    folder.mkdir()
+    for path in (file, folder / "albedo.png"):
+        Image.fromarray(picture).save(path)
+    for path, name in ((file, "\\udcff"), (folder, "\\udcfe")):
+        run = tmp_path / f"run {name}"
+        image_quilting.fit(path, run, set={"size": 48, "exemplar_size": 32, "block": 12})
+        content = tomllib.loads((run / "config.toml").read_text(encoding="utf-8"))
+        assert content["run"]["exemplar"] == name and QuiltedPicture.load(run).image.shape == (48, 48, 3)
 
 
 def test_what_is_refused():

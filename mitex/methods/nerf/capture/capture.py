@@ -21,7 +21,7 @@ from mitex.methods.nerf.capture.colmap import photo_frames
 from mitex.methods.nerf.capture.distortion import folds, undistort
 from mitex.methods.nerf.capture.transforms import Frame, no_mask, read_frames, transforms_files
 from mitex.methods.nerf.capture.visual_hull import Hull, View, project, visual_hull
-from mitex.paths import expanded
+from mitex.paths import encodable, expanded
 from mitex.progress import announce, counted
 
 MIN_VIEWS = 8
@@ -128,7 +128,7 @@ def load_capture(folder: str | Path) -> Capture:
         raise CaptureError(f"{folder} is not a folder", "give the folder of a capture")
     files = transforms_files(folder)
     frames = [frame for path in files for frame in read_frames(path)] if files else photo_frames(folder)
-    return assemble(frames, folder.resolve().name)
+    return assemble(frames, encodable(folder.resolve().name))
 
 
 def assemble(frames: Sequence[Frame], name: str) -> Capture:
