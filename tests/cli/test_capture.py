@@ -17,6 +17,7 @@ from mitex.errors import CaptureError, ConfigError
 from mitex.methods.nerf import load_capture
 from mitex.methods.nerf.footage import site
 from mitex.methods.nerf.footage.making import make_capture
+from mitex.methods.nerf.footage.pictures import footage
 from tests.cli import bad_files as bad
 from tests.cli.refusals import check_refused, tree
 from tests.methods.nerf.footage import onnx_files, stage
@@ -174,6 +175,19 @@ BAD = {
         "",
         "p03.jpg is damaged or cut short",
     ),
+    "a tiny photo": (
+        lambda d: bad.image(shots(d) / "p99.png", (1, 1)),
+        "photos",
+        "",
+        "p99.png gives pictures of 1 x 1 pixels",
+    ),
+    "a narrow photo": (
+        lambda d: bad.image(shots(d) / "p99.png", (9000, 20)),
+        "photos",
+        "--resolution 128",
+        "p99.png gives pictures of 128 x 1 pixels",
+    ),
+    "a long name": (lambda d: None, 300 * "a", "", "cannot be read (File name too long)"),
     "no such way": (shots, "photos", "--mask magic", "'magic' is no way to mask"),
     "a box outside": (shots, "photos", "--mask box:80,0,40,10", "not inside the picture"),
     "a colour that is nowhere": (shots, "photos", "--mask colour:#ff00ff", "have the background's colour"),
@@ -225,6 +239,18 @@ def test_what_cannot_be_captured(cameras, name, files, capsys):
     make(files)
     out = [] if "--out" in words else ["--out", "out/new/capture"]
     check_refused(files, ["capture", source, *out, *words.split(), "--quiet"], message, capsys)
+
+
+def test_a_folder_that_may_not_be_read(files, monkeypatch):
+    """Root may read everything, so the system's answer is given here."""
+    shots(files)
+
+    def refuse(folder):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "iterdir", refuse)
+    with pytest.raises(CaptureError, match=r"photos cannot be read \(Permission denied\); check its name"):
+        footage("photos", 1600)
 
 
 @pytest.mark.parametrize(

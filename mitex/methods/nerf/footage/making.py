@@ -83,7 +83,7 @@ def make_capture(
     Raises:
         CaptureError: no video or photos, too few that are sharp, have a camera or a mask.
         ConfigError: an option out of range.
-        ImageError: a photo is damaged.
+        ImageError: a photo is damaged, or has a side below 16 pixels.
         MissingPackage: the extra `nerf` is not installed.
         OutputError: `out` exists, or cannot be written.
         WeightsError: the network that is to mask cannot be used.
