@@ -229,6 +229,7 @@ BAD = {
         "--out out/run",
         "exists; name a new folder",
     ),
+    "a long name to write": (shots, "photos", f"--out {300 * 'b'}", "is too long; use a shorter one"),
     "among the photos": (shots, "photos", "--out photos/capture", "is among the photos"),
 }
 
@@ -239,6 +240,22 @@ def test_what_cannot_be_captured(cameras, name, files, capsys):
     make(files)
     out = [] if "--out" in words else ["--out", "out/new/capture"]
     check_refused(files, ["capture", source, *out, *words.split(), "--quiet"], message, capsys)
+
+
+def test_the_current_folder_is_refused_before_any_work(files, monkeypatch, capsys):
+    """Although it is empty: it would be replaced under the feet of who works in it."""
+    shots(files)
+    monkeypatch.chdir(files / "out")
+    message = "out' is the current folder; name a new one"
+    check_refused(files, ["capture", "../no.mp4", "--out", "."], message, capsys)
+
+
+def test_a_link_to_an_empty_folder_stays(cameras, files):
+    shots(files)
+    (files / "link").symlink_to("out")
+    assert main(["capture", "photos", "--out", "link", "--quiet"]) == 0
+    assert (files / "link").is_symlink() and (files / "out" / "transforms.json").is_file()
+    assert not list(files.glob(".filling-*"))
 
 
 def test_a_folder_that_may_not_be_read(files, monkeypatch):

@@ -166,11 +166,16 @@ def _entry(frame: Frame) -> dict[str, object]:
 @contextmanager
 def _new_folder(out: Path, source: Path) -> Iterator[Path]:
     """A folder to fill, which becomes `out` when all went well and is removed otherwise."""
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise OutputError(f"'{out}' exists", "name a new folder")
-    if out.resolve().is_relative_to(source.resolve()):
-        raise OutputError(f"'{out}' is among the photos", "name a folder elsewhere")
     check_writable(out)
+    out = Path(os.path.realpath(out))  # through a link, which stays
+    with writing(out), suppress(FileNotFoundError):
+        out.lstat()  # also finds a name that is too long
+        if not out.is_dir() or any(out.iterdir()):
+            raise OutputError(f"'{out}' exists", "name a new folder")
+    if out == Path.cwd():  # would be gone for who works in it
+        raise OutputError(f"'{out}' is the current folder", "name a new one")
+    if out.is_relative_to(source.resolve()):
+        raise OutputError(f"'{out}' is among the photos", "name a folder elsewhere")
     created = missing_folders(out.parent)
     with writing(out):
         out.parent.mkdir(parents=True, exist_ok=True)
