@@ -103,7 +103,7 @@ def reconstruct(folder: Path, names: Sequence[str], masked: bool = False) -> Str
         ImageError: a photo is damaged.
         MissingPackage: pycolmap is not installed.
     """
-    announce("finding the cameras, some minutes")
+    announce("finding the cameras, minutes to hours")
     with tempfile.TemporaryDirectory(prefix="mitex-") as temporary:
         work = Path(temporary)
         (work / "images").mkdir()
