@@ -17,6 +17,7 @@ from mitex.errors import CaptureError, ConfigError
 from mitex.methods.nerf import load_capture
 from mitex.methods.nerf.footage import site
 from mitex.methods.nerf.footage.making import make_capture
+from mitex.methods.nerf.footage.pictures import footage
 from tests.cli import bad_files as bad
 from tests.cli.refusals import check_refused, tree
 from tests.methods.nerf.footage import onnx_files, stage
@@ -174,6 +175,19 @@ BAD = {
         "",
         "p03.jpg is damaged or cut short",
     ),
+    "a tiny photo": (
+        lambda d: bad.image(shots(d) / "p99.png", (1, 1)),
+        "photos",
+        "",
+        "p99.png gives pictures of 1 x 1 pixels",
+    ),
+    "a narrow photo": (
+        lambda d: bad.image(shots(d) / "p99.png", (9000, 20)),
+        "photos",
+        "--resolution 128",
+        "p99.png gives pictures of 128 x 1 pixels",
+    ),
+    "a long name": (lambda d: None, 300 * "a", "", "cannot be read (File name too long)"),
     "no such way": (shots, "photos", "--mask magic", "'magic' is no way to mask"),
     "a box outside": (shots, "photos", "--mask box:80,0,40,10", "not inside the picture"),
     "a colour that is nowhere": (shots, "photos", "--mask colour:#ff00ff", "have the background's colour"),
@@ -215,6 +229,7 @@ BAD = {
         "--out out/run",
         "exists; name a new folder",
     ),
+    "a long name to write": (shots, "photos", f"--out {300 * 'b'}", "is too long; use a shorter one"),
     "among the photos": (shots, "photos", "--out photos/capture", "is among the photos"),
 }
 
@@ -225,6 +240,34 @@ def test_what_cannot_be_captured(cameras, name, files, capsys):
     make(files)
     out = [] if "--out" in words else ["--out", "out/new/capture"]
     check_refused(files, ["capture", source, *out, *words.split(), "--quiet"], message, capsys)
+
+
+def test_the_current_folder_is_refused_before_any_work(files, monkeypatch, capsys):
+    """Although it is empty: it would be replaced under the feet of who works in it."""
+    shots(files)
+    monkeypatch.chdir(files / "out")
+    message = "out' is the current folder; name a new one"
+    check_refused(files, ["capture", "../no.mp4", "--out", "."], message, capsys)
+
+
+def test_a_link_to_an_empty_folder_stays(cameras, files):
+    shots(files)
+    (files / "link").symlink_to("out")
+    assert main(["capture", "photos", "--out", "link", "--quiet"]) == 0
+    assert (files / "link").is_symlink() and (files / "out" / "transforms.json").is_file()
+    assert not list(files.glob(".filling-*"))
+
+
+def test_a_folder_that_may_not_be_read(files, monkeypatch):
+    """Root may read everything, so the system's answer is given here."""
+    shots(files)
+
+    def refuse(folder):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "iterdir", refuse)
+    with pytest.raises(CaptureError, match=r"photos cannot be read \(Permission denied\); check its name"):
+        footage("photos", 1600)
 
 
 @pytest.mark.parametrize(
@@ -241,22 +284,22 @@ def test_numbers_out_of_range_in_python(option, message, tmp_path):
         make_capture(tmp_path, tmp_path / "capture", **option)
 
 
-@pytest.mark.parametrize(("mask", "first"), [("box:25,15,50,70", 0), ("plane", 1)])
-def test_the_photo_that_a_box_is_in_is_kept(mask, first, monkeypatch, tmp_path):
-    """Of more photos than asked for, where the first is not the sharpest of its part."""
+def test_another_way_to_mask_needs_no_other_cameras(monkeypatch, tmp_path):
+    """Of more photos than asked for, where the first, which a box is in, is not the sharpest of its part."""
     blurred = ndimage.gaussian_filter(PICTURES[0], (1.0, 1.0, 0.0))
     write_photos(tmp_path / "photos", [blurred, *(p for p in PICTURES for _ in range(2))][:-1])
-    names = []
+    asked = []
 
-    def stop(folder, sharp):
-        names.extend(sharp)
-        raise CaptureError("enough", "stop")
+    def reconstruct(folder, names):
+        asked.append(names)
+        return stage.structure(names, np.random.default_rng(0))
 
-    monkeypatch.setattr("mitex.methods.nerf.footage.making.find_site", stop)
-    with pytest.raises(CaptureError, match="enough"):
-        make_capture(tmp_path / "photos", tmp_path / "a", mask, frames=stage.VIEWS)
-    photos = sorted(path.stem for path in (tmp_path / "photos").iterdir())
-    assert Path(names[0]).stem == photos[first] and len(names) == stage.VIEWS
+    monkeypatch.setattr(site, "VERSION", "another way to mask")  # of what is in the cache
+    monkeypatch.setattr(site, "reconstruct", reconstruct)
+    for place, mask in (("a", "plane"), ("b", "box:25,15,50,70")):
+        make_capture(tmp_path / "photos", tmp_path / place, mask, frames=stage.VIEWS)
+    (names,) = asked
+    assert Path(names[0]).stem == "p00" and len(names) == stage.VIEWS
 
 
 def test_a_box_in_a_picture_without_a_camera(monkeypatch, files, capsys):

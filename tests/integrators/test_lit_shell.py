@@ -8,15 +8,19 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mitex.colour import srgb_to_linear
 from mitex.mesh import Similarity
+from mitex.methods.nerf.field.lighting import reflectances
 from mitex.plugins import init
 from mitex.runtime.jit import dr, mi
+from mitex.runtime.upload import upload
 
 init()
 
 from mitex.textures.phong import Phong  # noqa: E402
 from mitex.textures.shell_field import shell_field  # noqa: E402
 from tests.integrators.test_shell import Ball  # noqa: E402
+from tests.scenes.helpers import shell_scene  # noqa: E402
 
 RADIUS = 0.5
 KD = (0.2, 0.6, 0.4)
@@ -95,6 +99,25 @@ def test_thin_matter_shows_its_share_of_the_light():
     # Light that was scattered once: kd of what falls there, a little less where the ball shades itself.
     expected = 1 - opacity + opacity * np.array(KD)
     np.testing.assert_allclose(image[1, 1], expected, rtol=0.1)
+
+
+def test_matter_that_was_learned_from_a_photo_looks_like_it_in_an_even_light():
+    """Under the light that it was learned in, of mean 1, it has the photo's colours in both integrators."""
+    photo = np.array([0.25, 0.45, 0.15])
+    light = upload(mi.TensorXf, np.array([math.sqrt(4 * math.pi), *[0.0] * 15], np.float32))
+
+    class Learned(Matt):
+        def reflection(self, points, view):
+            index, phong = super().reflection(points, view)
+            phong.diffuse, phong.specular = reflectances(phong.diffuse, phong.specular, light)
+            return index, phong
+
+    field = Learned(kd=(photo**2.4).tolist())
+    field.colour = tuple(photo.tolist())
+    own = mi.render(shell_scene(field, fov=20, side=17), spp=16)
+    lit = picture(field, sky={"type": "constant", "radiance": 1.0})
+    np.testing.assert_allclose(np.array(own)[8, 8], srgb_to_linear(photo), rtol=0.02)
+    np.testing.assert_allclose(lit[8, 8], srgb_to_linear(photo), rtol=0.05)
 
 
 def test_what_stands_in_the_light_shades_the_field():

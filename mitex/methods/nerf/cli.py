@@ -39,7 +39,7 @@ class Fit(TrainingOptions):
     preset: Annotated[PlainText | None, arg(metavar="fast|paper", help_behavior_hint="(default: fast)")] = (
         None
     )
-    """Settings to start from: `fast`, or `paper`, which follows the publication."""
+    """Settings to start from: `fast`, or `paper`, as published for the most part, never trained whole."""
 
     base_mesh: Annotated[str | None, arg(metavar="MESH", help_behavior_hint="(default: found)")] = None
     """The shape without its texture, in the cameras' world."""

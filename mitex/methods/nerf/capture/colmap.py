@@ -21,6 +21,7 @@ from mitex.methods.nerf.capture.transforms import ONE_FILE, Frame, find_mask, no
 from mitex.optional import optional
 from mitex.paths import cache_dir
 from mitex.progress import announce
+from mitex.runtime.workers import allowed
 
 if TYPE_CHECKING:
     import pycolmap
@@ -102,7 +103,7 @@ def reconstruct(folder: Path, names: Sequence[str], masked: bool = False) -> Str
         ImageError: a photo is damaged.
         MissingPackage: pycolmap is not installed.
     """
-    announce("finding the cameras, some minutes")
+    announce("finding the cameras, minutes to hours")
     with tempfile.TemporaryDirectory(prefix="mitex-") as temporary:
         work = Path(temporary)
         (work / "images").mkdir()
@@ -138,10 +139,13 @@ def _largest(work: Path, one_camera: bool) -> pycolmap.Reconstruction | None:
     """COLMAP's model with the most photos, or None; always the same for the same photos."""
     colmap = optional("pycolmap", "nerf")
     level, colmap.logging.minloglevel = colmap.logging.minloglevel, colmap.logging.FATAL
+    threads = allowed() or -1  # which is all
+    extraction, matching = colmap.FeatureExtractionOptions(), colmap.FeatureMatchingOptions()
+    extraction.num_threads = matching.num_threads = threads
     verification = colmap.TwoViewGeometryOptions()
     verification.ransac.random_seed = 0
     mapping = colmap.IncrementalPipelineOptions()
-    mapping.random_seed, mapping.min_model_size = 0, MIN_PHOTOS
+    mapping.random_seed, mapping.min_model_size, mapping.num_threads = 0, MIN_PHOTOS, threads
     # COLMAP's own limits are for large photos: small, noisy frames of a video have fewer matches.
     mapping.mapper.init_min_num_inliers, mapping.mapper.init_min_tri_angle = FIRST_PAIR
     mapping.mapper.abs_pose_min_num_inliers = FURTHER
@@ -150,8 +154,11 @@ def _largest(work: Path, one_camera: bool) -> pycolmap.Reconstruction | None:
     models.mkdir()
     try:
         colmap.set_random_seed(0)
-        colmap.extract_features(database, images, camera_mode=mode, device=colmap.Device.cpu)
-        colmap.match_exhaustive(database, verification_options=verification, device=colmap.Device.cpu)
+        device = colmap.Device.cpu
+        colmap.extract_features(
+            database, images, camera_mode=mode, extraction_options=extraction, device=device
+        )
+        colmap.match_exhaustive(database, matching, verification_options=verification, device=device)
         reconstructions = colmap.incremental_mapping(database, images, models, mapping)
     except (RuntimeError, ValueError) as error:
         reason = " ".join(str(error).split())

@@ -71,6 +71,33 @@ def to_display(linear: A) -> A:
     return dr.select(linear < TOE, line, dr.maximum(linear, TOE) ** POWER)
 
 
+def reflectances(kd: mi.Color3f, ks: mi.Float, light: mi.TensorXf) -> tuple[mi.Color3f, mi.Float]:
+    """The linear shares of light that matter reflects which was learned in display values under a light.
+
+    The display curve is applied to coefficients times radiance, so these are no linear reflectances. Those
+    returned are, beside a white surface in an even light of the same mean: under it a renderer sees what the
+    own light shows.
+
+    Args:
+        kd, ks: coefficients in [0, 1] as of `shade`.
+        light: that they were learned under, as of `shade`.
+
+    Returns:
+        Diffuse `mi.Color3f` and specular `mi.Float`.
+    """
+    mean = mi.Color3f(_coefficients(light, 1, 1)[0]) / math.sqrt(4 * math.pi)
+    mean = dr.maximum(mean, TOE)  # a light that was driven to black has no colour
+    learned = mi.Color3f(kd + ks)
+    both = _decoded(learned * mean) / _decoded(mean)
+    specular = mi.Float(ks * dr.min(both / dr.maximum(learned, 1e-6)))
+    return mi.Color3f(both - specular), specular
+
+
+def _decoded(linear: mi.Color3f) -> mi.Color3f:
+    """Radiance that a renderer takes from the display values of linear ones."""
+    return mi.Color3f(mi.math.srgb_to_linear(to_display(linear)))
+
+
 def project_environment(image: np.ndarray) -> np.ndarray:
     """The light of an environment map.
 

@@ -12,7 +12,7 @@ from scipy import ndimage
 from mitex.errors import ConfigError
 from mitex.methods.nerf.field.decoder import HIGHEST, Decoder
 from mitex.methods.nerf.field.encoding import Encoding
-from mitex.methods.nerf.field.lighting import shade, to_display
+from mitex.methods.nerf.field.lighting import reflectances, shade, to_display
 from mitex.methods.nerf.field.occupancy import sample_grid
 from mitex.methods.nerf.field.projection import Projection, Projections
 from mitex.methods.nerf.field.tensors import channels, rows
@@ -221,7 +221,7 @@ class Shell:
         normal = values.normal(*self.latents.frame(coords))
         along = dr.gather(mi.Vector3f, view, index)
         specular = values.specular_at(dr.clip(-dr.dot(normal, along), 0, 1))
-        return index, Phong(normal, values.diffuse, specular, values.glossiness)
+        return index, Phong(normal, *reflectances(values.diffuse, specular, self.light), values.glossiness)
 
     def evaluate(self, points: mi.Point3f, view: mi.Vector3f) -> tuple[mi.UInt32, mi.Float, mi.Color3f]:
         """Density and colour of those of N points that are in the shell.

@@ -16,7 +16,7 @@ class MakeCapture:
     """Make a capture of a phone's video or of photos, for `mitex fit nerf --capture`.
 
     Picks sharp frames, finds the cameras, cuts the object out, and tells which sides to film again. The
-    object stands still, before still surroundings with some pattern. It takes some minutes.
+    object stands still, before still surroundings with some pattern. It takes minutes to hours.
 
     examples:
       mitex capture vase.mp4 --out captures/vase

@@ -15,7 +15,8 @@ SECTORS = (
     "the front", "the front right", "the right side", "the back right",
     "the back", "the back left", "the left side", "the front left",
 )  # fmt: skip
-FAR = 35.0  # from the nearest camera, at which a side counts as not filmed [degrees]
+# From the nearest camera, at which a side counts as not filmed [degrees]: less than from ring to ring.
+FAR = 24.0
 SMALL = 0.4  # part of the picture's shorter side that the object should fill
 CUT = 0.3  # part of the pictures in which the frame may cut the object
 

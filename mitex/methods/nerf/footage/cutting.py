@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 
 import cv2
@@ -18,6 +19,7 @@ from mitex.methods.nerf.footage.network import Network, half
 from mitex.methods.nerf.footage.silhouette import disc, silhouette
 from mitex.methods.nerf.footage.site import Site
 from mitex.progress import counted
+from mitex.runtime.workers import allowed
 
 ROUNDS = (400, 800)  # longer side of the pictures [pixels]; each within what the masks before agree on
 ITERATIONS = 3  # of GrabCut in a round
@@ -26,6 +28,18 @@ DIFFERENT = (12.0, 40.0)  # distance in CIELAB from which a colour is not the ba
 AGREED = 0.5  # part of the silhouette of what all agree on that a mask must fill
 
 
+@contextmanager
+def _allowed_threads() -> Iterator[None]:
+    """Within the context OpenCV uses as many threads as there may be."""
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(allowed() or before)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before)
+
+
+@_allowed_threads()
 def cut_out(
     site: Site, pictures: Sequence[np.ndarray], method: MaskMethod, network: Network | None = None
 ) -> list[np.ndarray]:

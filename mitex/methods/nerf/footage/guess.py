@@ -30,13 +30,11 @@ class Guess:
     Attributes:
         volume: that contains it.
         on, off: (P,) bool, sparse points that are on the object, and that are not.
-        table: below it, where there is one.
     """
 
     volume: Hull
     on: np.ndarray
     off: np.ndarray
-    table: Plane | None = None
 
 
 def on_table(site: Site) -> Guess:
@@ -114,7 +112,7 @@ def _around(
     if table is not None:
         inside &= table.height(places) > 0.0
         off |= table.height(site.points) < 0.5 * CLEAR * site.distance
-    return Guess(Hull(inside.reshape((RESOLUTION,) * 3), centre - radius, edge), on, off & ~on, table)
+    return Guess(Hull(inside.reshape((RESOLUTION,) * 3), centre - radius, edge), on, off & ~on)
 
 
 def _largest_group(points: np.ndarray, gap: float) -> np.ndarray:

@@ -83,7 +83,7 @@ def make_capture(
     Raises:
         CaptureError: no video or photos, too few that are sharp, have a camera or a mask.
         ConfigError: an option out of range.
-        ImageError: a photo is damaged.
+        ImageError: a photo is damaged, or has a side below 16 pixels.
         MissingPackage: the extra `nerf` is not installed.
         OutputError: `out` exists, or cannot be written.
         WeightsError: the network that is to mask cannot be used.
@@ -97,7 +97,7 @@ def make_capture(
         network = optional("mitex.methods.nerf.footage.network", "nerf").read_network(method.network)
     with _new_folder(expanded(out), expanded(source)) as folder:
         taken = footage(source, resolution)
-        names, why = _picked(taken, frames, folder, first=method.kind == "box")
+        names, why = _picked(taken, frames, folder)
         site = find_site(folder, names)
         if method.kind == "box" and site.frames[0].name != names[0]:
             raise CaptureError("the first picture, which the box is in, got no camera", "mask in another way")
@@ -113,21 +113,21 @@ def make_capture(
         return Report(taken.count, len(names), why, len(masks), len(kept), advice(views, middle))
 
 
-def _picked(taken: Footage, frames: int, folder: Path, first: bool) -> tuple[list[str], str]:
+def _picked(taken: Footage, frames: int, folder: Path) -> tuple[list[str], str]:
     """Writes the pictures to work with; their names, and why others were left out, in words.
 
-    With `first`, the first picture is one of them.
+    The first picture is one of them, since a box would be in it: no way to mask asks for cameras of its own.
     """
     images, qualities = [], []
     parts = min(frames, taken.count)
-    work = counted("picking sharp pictures", sharpest(taken.read(), taken.count, parts, first), parts)
+    work = counted("picking sharp pictures", sharpest(taken.read(), taken.count, parts), parts)
     for picture, quality in work:
         name = f"images/{picture.name}.jpg"
         write_image(folder / name, picture.pixels.astype(np.float32) / 255.0)
         images.append(name)
         qualities.append(quality)
     verdicts = (faults if taken.video else blurred_photos)(qualities)
-    verdicts[:first] = [""] * first
+    verdicts[:1] = [""]
     names = [name for name, verdict in zip(images, verdicts, strict=True) if not verdict]
     why = reasons(verdicts)
     if len(names) < MIN_VIEWS:
@@ -166,11 +166,16 @@ def _entry(frame: Frame) -> dict[str, object]:
 @contextmanager
 def _new_folder(out: Path, source: Path) -> Iterator[Path]:
     """A folder to fill, which becomes `out` when all went well and is removed otherwise."""
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise OutputError(f"'{out}' exists", "name a new folder")
-    if out.resolve().is_relative_to(source.resolve()):
-        raise OutputError(f"'{out}' is among the photos", "name a folder elsewhere")
     check_writable(out)
+    out = Path(os.path.realpath(out))  # through a link, which stays
+    with writing(out), suppress(FileNotFoundError):
+        out.lstat()  # also finds a name that is too long
+        if not out.is_dir() or any(out.iterdir()):
+            raise OutputError(f"'{out}' exists", "name a new folder")
+    if out == Path.cwd():  # would be gone for who works in it
+        raise OutputError(f"'{out}' is the current folder", "name a new one")
+    if out.is_relative_to(source.resolve()):
+        raise OutputError(f"'{out}' is among the photos", "name a folder elsewhere")
     created = missing_folders(out.parent)
     with writing(out):
         out.parent.mkdir(parents=True, exist_ok=True)

@@ -13,7 +13,7 @@ from typing import IO
 import numpy as np
 from PIL import Image
 
-from mitex.errors import CaptureError
+from mitex.errors import CaptureError, ImageError
 from mitex.images import SUFFIXES, read_bytes
 from mitex.paths import expanded
 
@@ -24,6 +24,7 @@ TO_SRGB = (
     "zscale=t=linear:npl=203,format=gbrpf32le,zscale=p=bt709,tonemap=mobius:desat=0,"
     "zscale=t=iec61966-2-1:m=gbr,format=gbrp"
 )
+SMALLEST = 16  # side of a picture [pixels]
 VIDEO = "give an MP4 or MOV video, or a folder of PNG or JPEG photos"
 
 
@@ -67,13 +68,19 @@ def footage(source: str | Path, size: int) -> Footage:
         size: longer side of the pictures, at most.
 
     Raises:
-        CaptureError: there is none, it is no video, or the folder holds no photos.
+        CaptureError: there is none, it cannot be read, it is no video, or the folder holds no photos.
+        ImageError: while they are read, one that is damaged, or scaled down has a side below 16 pixels.
     """
     path = expanded(source)
-    if path.is_dir():
-        return _photos(path, size)
-    if not path.is_file():
-        raise CaptureError(f"{source} does not exist", VIDEO)
+    try:
+        if path.is_dir():
+            return _photos(path, size)
+        if not path.is_file():
+            raise CaptureError(f"{source} does not exist", VIDEO)
+    except OSError as error:
+        raise CaptureError(
+            f"{str(source)[:80]} cannot be read ({error.strerror})", "check its name and its permissions"
+        ) from error
     count, is_hdr = _stream(path)
     return Footage(path, count, True, lambda: _frames(path, size, is_hdr))
 
@@ -93,9 +100,16 @@ def _photos(folder: Path, size: int) -> Footage:
         for path in paths:
             image = Image.fromarray(np.ascontiguousarray(read_bytes(path)[..., :3]))
             image.thumbnail((size, size), Image.Resampling.LANCZOS)
-            yield Picture(path.stem, np.asarray(image))
+            yield Picture(path.stem, _large_enough(np.asarray(image), path))
 
     return Footage(folder, len(paths), False, read)
+
+
+def _large_enough(pixels: np.ndarray, path: Path) -> np.ndarray:
+    height, width = pixels.shape[:2]
+    if min(height, width) < SMALLEST:
+        raise ImageError(f"{path} gives pictures of {width} x {height} pixels", "leave out what is so narrow")
+    return pixels
 
 
 def _stream(path: Path) -> tuple[int, bool]:
@@ -135,7 +149,7 @@ def _frames(path: Path, size: int, is_hdr: bool) -> Iterator[Picture]:
         assert decoder.stdout is not None
         try:
             for number, pixels in enumerate(_portable_pixmaps(decoder.stdout)):
-                yield Picture(f"{number:05}", pixels)
+                yield Picture(f"{number:05}", _large_enough(pixels, path))
         finally:
             decoder.kill()
 

@@ -49,12 +49,10 @@ def frame_quality(pixels: np.ndarray) -> FrameQuality:
     return FrameQuality(sharpness, brightness, thumbnail)
 
 
-def sharpest(
-    pictures: Iterable[Picture], count: int, frames: int, first: bool = False
-) -> Iterator[tuple[Picture, FrameQuality]]:
+def sharpest(pictures: Iterable[Picture], count: int, frames: int) -> Iterator[tuple[Picture, FrameQuality]]:
     """The sharpest picture of each of `frames` equal parts of `count` pictures, with its quality.
 
-    With `first`, the very first one stands for its part, whatever its quality.
+    The very first one stands for its part, whatever its quality.
     """
     best: tuple[Picture, FrameQuality] | None = None
     window = 0
@@ -62,7 +60,7 @@ def sharpest(
         if number * frames // count > window and best is not None:
             yield best
             best, window = None, number * frames // count
-        if best is not None and first and not window:
+        if best is not None and not window:
             continue
         quality = frame_quality(picture.pixels)
         if best is None or quality.sharpness > best[1].sharpness:

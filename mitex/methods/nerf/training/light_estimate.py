@@ -27,37 +27,64 @@ ALBEDO = 0.25  # assumed mean of k_d: what is up to four times as bright keeps i
 PRIOR = 1e-3  # how much an even light is preferred [of the weight of all pixels]
 DARKEST = 0.01  # mean radiance of photos that a light is made for, at least
 SHADE = 0.25  # light on the darkest side, at least [of the mean]
+ROUNDS = 100  # in which light and exposures are solved for in turn
 DIRECTIONS = 2000  # in which the light is evaluated for that
 
 
-def estimated_light(mesh: Mesh, capture: Capture) -> np.ndarray:
+def estimated_light(mesh: Mesh, capture: Capture, exposures: bool = False) -> np.ndarray:
     """The light under which a base shape of k_d = 1/4 looks as in its photos, by least squares.
 
     Args:
         mesh: base shape in the scene cube.
         capture: its photos.
+        exposures: whether each photo was exposed in its own way, by an unknown factor; the geometric mean of
+            all is 1.
 
     Returns:
         (16,) float32 spherical harmonics, see `lighting`; zero above l = 2. No side is darker than a quarter
         of the mean. Dim even light where the photos are black or do not see the mesh.
     """
+    grams, brights = _normal_equations(mesh, capture)
+    light = np.zeros(COEFFICIENTS)
+    if len(grams):
+        first = _solution(grams, brights, np.ones(len(grams)))
+        light[: BANDS**2] = (_exposed(grams, brights, first) if exposures else first) / ALBEDO
+    light[0] = max(light[0], DARKEST / ALBEDO * math.sqrt(4 * math.pi))
+    return _softened(light).astype(np.float32)
+
+
+def _normal_equations(mesh: Mesh, capture: Capture) -> tuple[np.ndarray, np.ndarray]:
+    """Those of the light of each of the V photos that see the mesh: (V, 9, 9) and (V, 9)."""
     raycaster = Raycaster(mesh, capture)
-    count = BANDS**2
-    gram, bright = np.zeros((count, count)), np.zeros(count)
+    grams, brights = [], []
     for view in range(len(capture)):
         hits = raycaster(view, STRIDE)
         image = capture.images[view][::STRIDE, ::STRIDE].astype(np.float64) / 255
         valid = (hits.angle < STEEP) & (image[..., 3] > SOLID)
         if valid.any():
             basis = _irradiance(hits.normals[valid])
-            gram += basis.T @ basis
-            bright += basis.T @ (image[valid][:, :3] ** (1 / POWER)).mean(1)
-    light = np.zeros(COEFFICIENTS)
-    if gram[0, 0]:
-        prior = PRIOR * gram[0, 0] * np.diag(np.arange(count) > 0)
-        light[:count] = np.linalg.solve(gram + prior, bright) / ALBEDO
-    light[0] = max(light[0], DARKEST / ALBEDO * math.sqrt(4 * math.pi))
-    return _softened(light).astype(np.float32)
+            grams.append(basis.T @ basis)
+            brights.append(basis.T @ (image[valid][:, :3] ** (1 / POWER)).mean(1))
+    return np.array(grams), np.array(brights)
+
+
+def _solution(grams: np.ndarray, brights: np.ndarray, gains: np.ndarray) -> np.ndarray:
+    """The light (9,) of photos with known exposures (V,)."""
+    gram, bright = np.einsum("v,vij->ij", gains**2, grams), gains @ brights
+    prior = PRIOR * gram[0, 0] * np.diag(np.arange(len(bright)) > 0)
+    return np.linalg.solve(gram + prior, bright)
+
+
+def _exposed(grams: np.ndarray, brights: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """The light (9,) of photos with unknown exposures, from the one of equal ones: alternating least squares.
+
+    Where a photo is brighter on one side than on the other does not depend on its exposure.
+    """
+    for _ in range(ROUNDS):
+        gains = (brights @ light) / np.maximum(np.einsum("i,vij,j->v", light, grams, light), 1e-12)
+        gains = np.maximum(gains, 1e-3)
+        light = _solution(grams, brights, gains / np.exp(np.log(gains).mean()))
+    return light
 
 
 def brightness(light: np.ndarray, normals: np.ndarray) -> np.ndarray:

@@ -304,7 +304,7 @@ def _initial_parameters(
     for k, shape in enumerate(weight_shapes(config)):
         bound = weight_bound(shape) * (FLAT if k == ELEVATION else 1)
         parameters[f"weights/{k}"] = uniform(shape, -bound, bound)
-    parameters["light"] = torch.from_numpy(estimated_light(base, capture))
+    parameters["light"] = torch.from_numpy(estimated_light(base, capture, config.exposures))
     parameters["centres"] = uniform((len(encoding.levels(0)), CLUSTERS, 2), -1e-4, 1e-4)
     if config.refine_cameras:
         parameters["poses"] = torch.zeros(len(capture), 6)

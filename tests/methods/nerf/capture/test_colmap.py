@@ -172,6 +172,24 @@ def test_colmap_fails(photos, monkeypatch, kind):
     assert pycolmap.logging.minloglevel == level
 
 
+@pytest.mark.parametrize(("count", "threads"), [(3, 3), (None, -1)])
+def test_colmap_uses_as_many_threads_as_there_may_be(photos, monkeypatch, count, threads):
+    pycolmap = pytest.importorskip("pycolmap")
+    given = []
+
+    def note(*arguments, **options):
+        options = (*arguments, *options.values())
+        given.extend(one.num_threads for one in options if hasattr(one, "num_threads"))
+        return {}
+
+    for name in ("extract_features", "match_exhaustive", "incremental_mapping"):
+        monkeypatch.setattr(pycolmap, name, note)
+    monkeypatch.setattr(colmap, "VERSION", f"threads {count}")
+    monkeypatch.setattr(colmap, "allowed", lambda: count)
+    assert_refused(photos, "only 0 of 24 photos")
+    assert given == [threads] * 3
+
+
 def test_too_few_photos(tmp_path):
     (tmp_path / "images").mkdir()
     Image.new("RGB", (8, 8)).save(tmp_path / "images" / "one.jpg")

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mitex.colour import srgb_to_linear
 from mitex.mesh import Mesh, grid, icosphere
 from mitex.methods.nerf.config import PRESETS
 from mitex.methods.nerf.field.decoder import Decoder, Reflection
@@ -154,6 +155,23 @@ def test_colours_teach_normals_unless_these_are_detached():
     more, less = (rows(surface_appearance(view, light, value)[0]).sum() for value in (0.31, 0.29))
     assert abs(more - less) > 5e-3
     np.testing.assert_allclose(np.array(dr.grad(theta)), (more - less) / 0.02, rtol=1e-2)
+
+
+@pytest.mark.parametrize("mean", [(0.1,), (1.0,), (1.3, 0.8, 0.5)])
+def test_reflectances_are_those_that_the_own_light_shows_when_it_is_even(mean):
+    """Of an even light that shows a white surface as the own one does, the own colours are sent back."""
+    one = shell()
+    light = np.zeros((16, len(mean)), np.float32)
+    light[0] = np.sqrt(4 * np.pi) * np.array(mean)
+    one.light = upload(mi.TensorXf, light)
+    points = channels(mi.Point3f, (np.eye(3) * (0.57, 0.6, 0.63)).astype(np.float32))
+    view = channels(mi.Vector3f, -np.eye(3, dtype=np.float32))
+    _, _, colour = one.evaluate(points, view)
+    _, phong = one.reflection(points, view)
+    white = srgb_to_linear(np.array(mean) ** (1 / 2.4))
+    assert (rows(phong.diffuse) >= 0).all()
+    back = rows(phong.diffuse) + np.array(phong.specular)[:, None]
+    np.testing.assert_allclose(back * white, srgb_to_linear(rows(colour)), rtol=1e-3)
 
 
 def test_a_larger_texture_is_as_opaque_in_all():

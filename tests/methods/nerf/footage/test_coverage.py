@@ -28,8 +28,27 @@ def test_three_rings_are_enough():
 
 
 def test_a_missing_ring():
-    (line,) = said([place for place in RINGS if place[1] < 60][:24])
-    assert line == "film it all around from above: no picture within 55 degrees"
+    (line,) = said([place for place in RINGS if place[1] < 60])
+    assert line == "film it all around from above: no picture within 27 degrees"
+    (line,) = said([place for place in RINGS if place[1] != 38])
+    assert line == "film it all around from half above: no picture within 27 degrees"
+
+
+def test_one_ring_is_not_all_around():
+    lines = said([(a, 38) for a in range(0, 360, 45)])
+    assert [line.split(":")[0] for line in lines] == [
+        "film it all around level with it",
+        "film it all around from above",
+    ]
+
+
+def test_two_rings_leave_a_gap_between_them():
+    (line,) = said([(a, e) for e in (12, 65) for a in range(0, 360, 45)])
+    assert line.startswith("film it all around from half above: no picture within 26")
+
+
+def test_eight_pictures_make_a_ring():
+    assert said([(a, e) for e in (12, 38, 65) for a in range(0, 360, 45)]) == []
 
 
 def test_a_missing_side():

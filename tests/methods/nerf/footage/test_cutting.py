@@ -5,11 +5,13 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from mitex.errors import CaptureError, ConfigError
 from mitex.methods.nerf.capture.visual_hull import Hull, View
+from mitex.methods.nerf.footage import cutting
 from mitex.methods.nerf.footage.cutting import cut_out
 from mitex.methods.nerf.footage.guess import on_table
 from mitex.methods.nerf.footage.mask_method import mask_method
@@ -50,6 +52,21 @@ def first_box():
     return "box:" + ",".join(
         f"{100 * part:.1f}" for part in (left - 0.03, top - 0.03, wide + 0.06, tall + 0.06)
     )
+
+
+def test_opencv_uses_as_many_threads_as_there_may_be(site, monkeypatch):
+    """While it cuts; afterwards as many as before."""
+    before, seen = cv2.getNumThreads(), []
+
+    def guess(*_):
+        seen.append(cv2.getNumThreads())
+        raise CaptureError("enough", "stop")
+
+    monkeypatch.setattr(cutting, "_guess", guess)
+    monkeypatch.setattr(cutting, "allowed", lambda: 3)
+    with pytest.raises(CaptureError, match="enough"):
+        masks(site, "plane")
+    assert seen == [3] and cv2.getNumThreads() == before
 
 
 @pytest.mark.parametrize("words", ["plane", "hull", first_box()])

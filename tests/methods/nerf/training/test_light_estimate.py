@@ -62,6 +62,23 @@ def test_colours_that_do_not_know_the_normals_average_out(ball, rng):
     np.testing.assert_allclose(even, [LEVEL, *[0.0] * 15], atol=0.01 * LEVEL)
 
 
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_exposures_that_go_with_the_direction_are_no_light(ball, axis):
+    """Photos from one side are up to twice as bright as from the other, half a stop at most from the mean."""
+    a = np.array([0.3, -0.2, 0.25])
+    capture = photographed(lambda n: 0.2 * (1 + 2 / 3 * n @ a))
+    plain = estimated_light(ball, capture)
+    places = capture.poses[:, axis, 3] / np.linalg.norm(capture.poses[:, :, 3], axis=1)
+    gains = np.exp(0.35 * (places - places.mean()))
+    images = [
+        np.concatenate([np.round(image[..., :3] * gain ** (1 / 2.4)), image[..., 3:]], axis=2)
+        for image, gain in zip(capture.images, gains, strict=True)
+    ]
+    drifted = replace(capture, images=tuple(image.clip(0, 255).astype(np.uint8) for image in images))
+    assert np.abs(estimated_light(ball, drifted) - plain).max() > 0.1 * plain[0]
+    np.testing.assert_allclose(estimated_light(ball, drifted, exposures=True), plain, atol=0.03 * plain[0])
+
+
 def test_no_side_is_darker_than_a_quarter_of_the_mean(ball):
     """Light from one side alone, max(n . z, 0): what is black under it could never get a colour."""
     light = estimated_light(ball, photographed(lambda n: np.maximum(n[:, 2], 0.0)))
@@ -81,11 +98,12 @@ def test_no_side_is_darker_than_a_quarter_of_the_mean(ball):
     assert shades.min() == pytest.approx(0.25 * shades.mean(), rel=0.02)
 
 
+@pytest.mark.parametrize("exposures", [False, True])
 @pytest.mark.parametrize("alpha", [0, 255])
-def test_black_photos_and_empty_ones_give_a_dim_even_light(ball, alpha):
+def test_black_photos_and_empty_ones_give_a_dim_even_light(ball, alpha, exposures):
     capture = photographed(lambda n: 0 * n[:, 0])
     for image in capture.images:
         image[..., 3] = np.minimum(image[..., 3], alpha)
-    light = estimated_light(ball, capture)
+    light = estimated_light(ball, capture, exposures)
     assert 0 < light[0] < 1
     assert (light[1:] == 0).all()
