@@ -152,9 +152,11 @@ def _synthesized(
     domain.exemplar_side(config)  # refuses a size that the exemplar cannot have
     check_memory(domain.mesh, config, 1 if exemplar is None else len(exemplar.maps), domain.steps)
     start = None if content is None else content_colours(content, domain)
-    inputs = {"content_key": content_key(start), "orientation_key": content_key(domain.orientation)}
-    if domain.factors is not None:
-        inputs["scale_map_key"] = content_key(domain.factors)
+    inputs = {
+        "content_key": content_key(start),
+        "orientation_key": content_key(domain.orientation),
+        "scale_map_key": content_key(domain.factors),
+    }
     words = None if model is None else Words(config, model, domain)
     task = SurfaceTask(config, exemplar, domain, start, inputs, words, run.resume)
     origin: dict[str, Any] = {key: getattr(config, key) for key in ("resolution", "frames", "angle")}

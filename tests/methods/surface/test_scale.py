@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from mitex.errors import ConfigError
+from mitex.errors import CheckpointError, ConfigError
 from mitex.exemplar import Exemplar
 from mitex.images import write_image
 from mitex.mesh import Mesh, icosphere, torus
@@ -21,6 +21,7 @@ from mitex.methods.surface.taps import Surroundings, build
 from mitex.texels import Texels
 from mitex.training import resolve
 from tests.methods.surface.grids import flat_square
+from tests.methods.surface.small import SHALLOW
 
 pytestmark = pytest.mark.usefixtures("own_cache")
 SIDE = 64
@@ -191,6 +192,17 @@ def test_the_map_changes_the_texture():
     sizes = np.where(mesh.vertices[:, 1] > 0, 1.0, 0.5)
     plain, mapped = (surface.fit(exemplar, mesh, set=small, scale_map=m).values for m in (None, sizes))
     assert np.abs(plain - mapped).max() > 1e-2
+
+
+@pytest.mark.parametrize(("before", "after"), [(None, 0.5), (0.5, None), (0.5, 2.0)])
+def test_resuming_with_another_map_is_refused(before, after, tmp_path):
+    mesh = flat_square(2)
+    maps = {factor: np.linspace(factor, 1, 9) for factor in (0.5, 2.0)}
+    fit = partial(surface.fit, Exemplar.load("cobblestone").of_albedo(), mesh, tmp_path / "run")
+    fit(set=[*SHALLOW, "steps=1"], scale_map=maps.get(before))
+    with pytest.raises(CheckpointError, match="the scale_map is not the one that the run began with"):
+        fit(set=["steps=2"], scale_map=maps.get(after), resume=True)
+    fit(set=["steps=2"], scale_map=maps.get(before), resume=True)
 
 
 @pytest.mark.parametrize(
