@@ -27,6 +27,7 @@ def with_layout(mesh: Mesh, resolution: int, keep_uvs: bool = False) -> Mesh:
 
     Raises:
         ConfigError: its own are wanted but missing, out of range or overlapping.
+        MeshError: the mesh cannot be unwrapped, as `unwrap`.
     """
     if not keep_uvs:
         return replace(mesh, uv=unwrap(mesh, min(resolution, RESOLUTION), PADDING))
