@@ -141,12 +141,12 @@ def _synthesized(
         domain: SurfaceDomain = TileDomain.flat(config)
     else:
         given = Mesh.of(mesh)
+        upwards = None if orientation is None else vector_field(given, orientation)
+        sizes = None if scale_map is None else ScaleMap.of(scale_map, given)
         image = content is not None and str(content) != AO
         keeps = keep_uvs or image
         surface = with_layout(given, config.resolution, keeps)
         ratio = layout_ratio(given, surface, config.resolution, keeps)
-        upwards = None if orientation is None else vector_field(surface, orientation)
-        sizes = None if scale_map is None else ScaleMap.of(scale_map, given)
         domain = SurfaceDomain.of(surface, config, upwards, sizes, run.folder is not None, ratio)
     run.control.check()
     domain.exemplar_side(config)  # refuses a size that the exemplar cannot have

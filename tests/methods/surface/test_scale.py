@@ -2,11 +2,12 @@
 
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
 
-from mitex.errors import CheckpointError, ConfigError
+from mitex.errors import CheckpointError, ConfigError, ImageError, MitexError
 from mitex.exemplar import Exemplar
 from mitex.images import write_image
 from mitex.mesh import Mesh, icosphere, torus
@@ -225,5 +226,16 @@ def test_bad_maps(source, message, tmp_path):
 
 def test_a_picture_needs_uvs(tmp_path):
     bare = Mesh(flat_square(4).vertices, flat_square(4).faces)
+    with pytest.raises(ImageError, match="does not exist"):
+        ScaleMap.of(tmp_path / "a.png", bare)
     with pytest.raises(ConfigError, match="has no UVs for the scale map"):
         ScaleMap.of(write_image(tmp_path / "a.png", np.ones((4, 4))), bare)
+
+
+@pytest.mark.parametrize("option", ["orientation", "scale_map"])
+@pytest.mark.parametrize("source", ["no.npy", np.zeros((92, 1))], ids=["missing", "invalid"])
+def test_bad_files_are_refused_before_the_mesh_is_unwrapped(option, source, monkeypatch):
+    monkeypatch.delattr("mitex.methods.surface.fitting.with_layout")
+    bad: dict[str, Any] = {option: source}
+    with pytest.raises(MitexError, match=r"no\.npy|\(92, 1\)"):
+        surface.fit(Exemplar.load("cobblestone").of_albedo(), icosphere(3), **bad)
