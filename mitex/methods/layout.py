@@ -31,13 +31,29 @@ def with_layout(mesh: Mesh, resolution: int, keep_uvs: bool = False) -> Mesh:
     """
     if not keep_uvs:
         return replace(mesh, uv=unwrap(mesh, min(resolution, RESOLUTION), PADDING))
+    return _with_own(mesh, "to keep", "leave out `keep_uvs` to have it unwrapped")
+
+
+def with_content_layout(mesh: Mesh, instead: str = "") -> Mesh:
+    """The mesh, whose own UVs a content picture lies on.
+
+    Args:
+        mesh: any mesh.
+        instead: what else can be done without usable UVs, for the message.
+
+    Raises:
+        ConfigError: they are missing, out of range or overlapping.
+    """
+    return _with_own(mesh, "for the content picture", f"give a mesh with usable UVs{instead}")
+
+
+def _with_own(mesh: Mesh, purpose: str, remedy: str) -> Mesh:
+    """The mesh, if its own UVs can carry a texture."""
     if mesh.uv is None:
-        raise ConfigError(f"mesh '{mesh.name}' has no UVs to keep", "leave out `keep_uvs`")
+        raise ConfigError(f"mesh '{mesh.name}' has no UVs {purpose}", remedy)
     if not usable_uv(mesh, mesh.uv):
-        raise ConfigError(
-            f"the UVs of mesh '{mesh.name}' overlap, leave [0, 1] or are incomplete",
-            "leave out `keep_uvs` to have it unwrapped",
-        )
+        problem = f"the UVs of mesh '{mesh.name}' overlap, leave [0, 1] or are incomplete"
+        raise ConfigError(problem, remedy)
     return mesh
 
 

@@ -18,9 +18,9 @@ from mitex.features.text_model import text_image_model
 from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh
 from mitex.mesh.fields import vector_field
-from mitex.methods.layout import layout_ratio, with_layout
+from mitex.methods.layout import layout_ratio, with_content_layout, with_layout
 from mitex.methods.surface.config import PRESETS, WORDS, SurfaceConfig
-from mitex.methods.surface.content import AO, content_colours
+from mitex.methods.surface.content import content_colours, content_picture
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.scale_map import ScaleMap
 from mitex.methods.surface.task import SurfaceTask
@@ -135,6 +135,7 @@ def _synthesized(
 ) -> SurfaceTexture:
     """The texture of a fit from an exemplar, from words in the eyes of a model, or from both."""
     config = run.config
+    picture = None if content is None else content_picture(content)
     if mesh is None:
         if keep_uvs or any(option is not None for option in (content, orientation, scale_map)):
             raise ConfigError("a tile takes no UVs, content, orientation or scale map", "leave them out")
@@ -143,15 +144,16 @@ def _synthesized(
         given = Mesh.of(mesh)
         upwards = None if orientation is None else vector_field(given, orientation)
         sizes = None if scale_map is None else ScaleMap.of(scale_map, given)
-        image = content is not None and str(content) != AO
-        keeps = keep_uvs or image
-        surface = with_layout(given, config.resolution, keeps)
-        ratio = layout_ratio(given, surface, config.resolution, keeps)
+        if picture is None:
+            surface = with_layout(given, config.resolution, keep_uvs)
+        else:
+            surface = with_content_layout(given, ", or `content=ao`")
+        ratio = layout_ratio(given, surface, config.resolution, keep_uvs or picture is not None)
         domain = SurfaceDomain.of(surface, config, upwards, sizes, run.folder is not None, ratio)
     run.control.check()
     domain.exemplar_side(config)  # refuses a size that the exemplar cannot have
     check_memory(domain.mesh, config, 1 if exemplar is None else len(exemplar.maps), domain.steps)
-    start = None if content is None else content_colours(content, domain)
+    start = None if content is None else content_colours(picture, domain)
     inputs = {
         "content_key": content_key(start),
         "orientation_key": content_key(domain.orientation),
