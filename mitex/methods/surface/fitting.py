@@ -116,6 +116,10 @@ def fit_text(
     check_text(config.text, config.preset, WORDS)
     if exemplar is None and (orientation is not None or scale_map is not None):
         raise ConfigError("an orientation or a scale map turns and scales an exemplar", "give `exemplar` too")
+    if exemplar is None:
+        _check_scale(config)
+    else:
+        config.exemplar_side()
     model = text_image_model(config.text_model)
     given = Mesh.of(mesh)
     model.encode_texts([config.prompt(given.name)])  # refuses unknown words before the mesh is unwrapped
@@ -151,7 +155,8 @@ def _synthesized(
         ratio = layout_ratio(given, surface, config.resolution, keep_uvs or picture is not None)
         domain = SurfaceDomain.of(surface, config, upwards, sizes, run.folder is not None, ratio)
     run.control.check()
-    domain.exemplar_side(config)  # refuses a size that the exemplar cannot have
+    if exemplar is not None:
+        domain.exemplar_side(config)  # refuses a size that it cannot have
     check_memory(domain.mesh, config, 1 if exemplar is None else len(exemplar.maps), domain.steps)
     start = None if content is None else content_colours(picture, domain)
     inputs = {
@@ -171,6 +176,13 @@ def _synthesized(
         **config.schedule,
         optimizer=Lbfgs if config.optimizer == "lbfgs" else partial(Adam, shared=config.shared_moment),
     )
+
+
+def _check_scale(config: SurfaceConfig) -> None:
+    """Refuses a scale for words alone that nothing follows."""
+    if config.scale != SurfaceConfig.scale and not config.text_width:
+        problem = f"a scale of {config.scale:g} changes nothing without an exemplar, as text_width is 0"
+        raise ConfigError(problem, "leave out `scale`, or set text_width")
 
 
 def check_memory(mesh: Mesh, config: SurfaceConfig, maps: int = 1, steps: np.ndarray | None = None) -> None:
