@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from mitex.atlas import unwrap, usable_uv
-from mitex.errors import ConfigError
+from mitex.errors import ConfigError, MeshError
 from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh
 
@@ -27,8 +27,10 @@ def with_layout(mesh: Mesh, resolution: int, keep_uvs: bool = False) -> Mesh:
 
     Raises:
         ConfigError: its own are wanted but missing, out of range or overlapping.
-        MeshError: the mesh cannot be unwrapped, as `unwrap`.
+        MeshError: no face has an area (in float32), or as `unwrap`.
     """
+    if not mesh.face_areas.any():
+        raise MeshError(f"no face of {mesh.name} has an area", "scale it up, or check how it was exported")
     if not keep_uvs:
         return replace(mesh, uv=unwrap(mesh, min(resolution, RESOLUTION), PADDING))
     return _with_own(mesh, "to keep", "leave out `keep_uvs` to have it unwrapped")
