@@ -144,6 +144,7 @@ class Atlas:
 
         Raises:
             ConfigError: resolution or padding out of range.
+            MeshError: as `laid_out`, unless there is a layout.
         """
         least, most = TEXELS
         if not least <= resolution <= most:
@@ -206,6 +207,9 @@ def unwrap(mesh: Mesh, resolution: int, padding: int) -> np.ndarray:
 
     Returns:
         (F, 3, 2) float32 in [0, 1], v upwards, read-only. Charts may be mirrored.
+
+    Raises:
+        MeshError: as `mitex.charts.packed_charts`.
     """
     layouts = _layouts.setdefault(mesh, {})
     if (resolution, padding) not in layouts:
@@ -280,7 +284,7 @@ def laid_out(mesh: Mesh, resolution: int, padding: int = PADDING) -> Mesh:
         padding: gap between new charts [texels].
 
     Raises:
-        MeshError: the mesh has no area.
+        MeshError: the mesh has no area, or as `unwrap`.
     """
     if not mesh.face_areas.sum() > 0.0:
         raise MeshError(f"{mesh.name} has no area to put a texture on", "give a surface")

@@ -18,7 +18,6 @@ from mitex.mesh import Mesh
 SMOOTHINGS = 8  # rounds over the neighbours before faces are sorted by the direction that they look in
 STEEPEST = 0.25  # cosine between a face's normal and its axis, below which it takes an axis of its own
 OVERLAP = 1e-3  # share of a chart's texels that may be covered twice
-ROUNDS = 6  # of cutting charts that overlap themselves, each in two
 GRID = 1024  # side of the raster that overlaps are looked for on [texels]
 PLANES = np.array([(1, 2), (0, 2), (0, 1)])  # coordinates that are left when one is projected away
 
@@ -32,7 +31,7 @@ def sides(mesh: Mesh) -> np.ndarray:
 
 
 def projected_charts(mesh: Mesh, packing: Packing) -> tuple[np.ndarray, np.ndarray]:
-    """Charts without overlaps, packed side by side.
+    """Charts without overlaps, packed side by side: those that overlap themselves are halved until none does.
 
     Args:
         mesh: any mesh.
@@ -40,21 +39,24 @@ def projected_charts(mesh: Mesh, packing: Packing) -> tuple[np.ndarray, np.ndarr
 
     Returns:
         (F, 3, 2) float32 coordinates of the corners in [0, 1], and the chart of each face (F,).
+
+    Raises:
+        MeshError: as `packed_charts`.
     """
     side = _own_where_steep(mesh, sides(mesh))
-    axis, half, pairs = side // 2, np.zeros(len(side), np.int64), _neighbours(mesh)
+    axis, pairs = side // 2, _neighbours(mesh)
     corners = mesh.vertices[mesh.faces]
     flat = np.take_along_axis(corners, PLANES[axis][:, None, :], axis=2)
     depth = np.take_along_axis(corners.mean(1), axis[:, None], axis=1)[:, 0]
-    for _ in range(ROUNDS):
-        charts = _connected(6 * half + side, pairs)
+    rank = depth.argsort(kind="stable").argsort()  # unlike depths, no two are equal: each cut parts faces
+    charts = _connected(side, pairs)
+    while True:
         uv = _packed(mesh, flat, charts, packing)
-        overlapping = _overlapping(uv, charts)
-        if not overlapping.any():
-            break
-        middle = _means(charts, depth)
-        half = 2 * half + (overlapping[charts] & (depth > middle[charts]))
-    return uv, charts
+        cut = _overlapping(uv, charts) & (np.bincount(charts) > 1)
+        if not cut.any():
+            return uv, charts
+        upper = rank > _means(charts, rank)[charts]
+        charts = _connected(2 * charts + (cut[charts] & upper), pairs)
 
 
 def _own_where_steep(mesh: Mesh, side: np.ndarray) -> np.ndarray:

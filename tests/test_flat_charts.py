@@ -16,9 +16,9 @@ TURNS, AROUND = 3, 24
 PACKING = Packing(512, 4)
 
 
-def ramp() -> Mesh:
+def ramp(turns: int = TURNS, around: int = AROUND) -> Mesh:
     """A spiral ramp, whose turns lie above each other."""
-    angle = np.arange(TURNS * AROUND + 1) * 2 * np.pi / AROUND
+    angle = np.arange(turns * around + 1) * 2 * np.pi / around
     rings = [
         np.stack((radius * np.cos(angle), 0.05 * angle, radius * np.sin(angle)), axis=1)
         for radius in (0.5, 1.0)
@@ -31,7 +31,15 @@ def ramp() -> Mesh:
     return Mesh(np.concatenate(rings).astype(np.float32), faces.astype(np.int32), name="ramp")
 
 
-@pytest.mark.parametrize("mesh", [icosphere(12), embedded("shaderball"), ramp()], ids=lambda mesh: mesh.name)
+def folded() -> Mesh:
+    """Two squares of two triangles that share an edge and lie on each other."""
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [1, 0, 0], [1, 1, 0]], np.float32)
+    return Mesh(vertices, np.array([[0, 1, 2], [1, 3, 2], [0, 4, 2], [4, 5, 2]]), name="folded")
+
+
+@pytest.mark.parametrize(
+    "mesh", [icosphere(12), embedded("shaderball"), ramp(), folded()], ids=lambda mesh: mesh.name
+)
 def test_no_texel_is_covered_twice_and_no_face_is_missing(mesh):
     uv, _ = projected_charts(mesh, PACKING)
     assert usable_uv(mesh, uv)
@@ -53,6 +61,13 @@ def test_faces_are_shown_in_proportion_to_how_much_they_look_along_their_axis():
 def test_turns_of_a_spiral_are_cut_apart():
     _, charts = projected_charts(ramp(), PACKING)
     assert charts.max() + 1 >= TURNS
+
+
+def test_charts_are_cut_until_none_overlaps(monkeypatch):
+    """Forty turns, which takes six rounds of cuts; on a coarse raster, which takes less time."""
+    monkeypatch.setattr(flat_charts, "GRID", 256)
+    mesh = ramp(40, 6)
+    assert usable_uv(mesh, projected_charts(mesh, PACKING)[0])
 
 
 def test_a_face_that_looks_away_from_its_neighbours_has_a_chart_of_its_own():

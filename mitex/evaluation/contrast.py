@@ -61,21 +61,6 @@ def contrast(image: np.ndarray, mask: np.ndarray | None = None) -> Contrast:
     )
 
 
-def share_of_colour(
-    image: np.ndarray, colour: np.ndarray, other: np.ndarray, mask: np.ndarray | None = None
-) -> float:
-    """The share of texels that are nearer to one colour than to another: of lines, beside what they enclose.
-
-    Args:
-        image: (H, W, 3) sRGB.
-        colour, other: (3,) sRGB.
-        mask: (H, W) bool, which texels count; all if None.
-    """
-    texels = image[np.ones(image.shape[:2], bool) if mask is None else mask].astype(np.float64)
-    nearer = np.linalg.norm(texels - colour, axis=1) < np.linalg.norm(texels - other, axis=1)
-    return float(nearer.mean())
-
-
 def _squares(image: np.ndarray) -> np.ndarray:
     """(N, SQUARE^2, C): the whole squares of a picture (H, W, C), from its corner on."""
     rows, columns = (n // SQUARE for n in image.shape[:2])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from mitex.atlas import unwrap, usable_uv
-from mitex.errors import ConfigError
+from mitex.errors import ConfigError, MeshError
 from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh
 
@@ -38,16 +38,35 @@ def with_layout(mesh: Mesh, resolution: int, keep_uvs: bool = False) -> Mesh:
 
     Raises:
         ConfigError: its own are wanted but missing, out of range or overlapping.
+        MeshError: no face has an area (in float32), or as `unwrap`.
     """
+    if not mesh.face_areas.any():
+        raise MeshError(f"no face of {mesh.name} has an area", "scale it up, or check how it was exported")
     if not keep_uvs:
         return replace(mesh, uv=unwrap(mesh, min(resolution, RESOLUTION), PADDING))
+    return _with_own(mesh, "to keep", "leave out `keep_uvs` to have it unwrapped")
+
+
+def with_content_layout(mesh: Mesh, instead: str = "") -> Mesh:
+    """The mesh, whose own UVs a content picture lies on.
+
+    Args:
+        mesh: any mesh.
+        instead: what else can be done without usable UVs, for the message.
+
+    Raises:
+        ConfigError: they are missing, out of range or overlapping.
+    """
+    return _with_own(mesh, "for the content picture", f"give a mesh with usable UVs{instead}")
+
+
+def _with_own(mesh: Mesh, purpose: str, remedy: str) -> Mesh:
+    """The mesh, if its own UVs can carry a texture."""
     if mesh.uv is None:
-        raise ConfigError(f"mesh '{mesh.name}' has no UVs to keep", "leave out `keep_uvs`")
+        raise ConfigError(f"mesh '{mesh.name}' has no UVs {purpose}", remedy)
     if not usable_uv(mesh, mesh.uv):
-        raise ConfigError(
-            f"the UVs of mesh '{mesh.name}' overlap, leave [0, 1] or are incomplete",
-            "leave out `keep_uvs` to have it unwrapped",
-        )
+        problem = f"the UVs of mesh '{mesh.name}' overlap, leave [0, 1] or are incomplete"
+        raise ConfigError(problem, remedy)
     return mesh
 
 

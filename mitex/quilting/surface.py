@@ -6,7 +6,7 @@ any outline, in blocks of texels. It is joined along the cheapest cut of any for
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +26,7 @@ from mitex.quilting.target import Target
 FINE_CELL = 2  # side of the cells that a cut goes between, where texels are so fine [texels of a patch]
 FINE_TEXELS = 2.0  # area of a texel [texels of a patch] up to which nearly each such cell has one
 OUTWARD = 3 / 16  # by which a patch's middle is moved away from what is there; half less an overlap [sides]
+ENLARGED = 1.1  # size of a patch above which its values are always interpolated
 MARGIN = 2  # cells between a cut and what was empty, over which the seam is averaged
 
 
@@ -49,7 +50,7 @@ def quilt_on(
         evenness: how much repetition is avoided, see `Repetition`; None: nothing with a guide, which may ask
             for a few patches all over, else `EVENNESS`.
         interpolated: values lie between those of a patch's texels, which takes fine grain from pictures;
-            instead of being the nearest ones.
+            instead of being the nearest ones, unless a patch is enlarged: these would be blocks then.
         guide: a picture that the texture shall resemble.
 
     Returns:
@@ -68,7 +69,7 @@ def quilt_on(
             f"a guide of {guide.count} patches for {len(matcher.centres)}", "give the colours of all of them"
         )
     repetition = Repetition(matcher.centres, source.length, evenness)
-    canvas = _Canvas(source, target, matcher.shape, _between if interpolated else _nearest)
+    canvas = _Canvas(source, target, matcher.shape, interpolated)
     for texel in canvas.empty():
         place = canvas.beside(texel)
         costs = matcher.distances(*place.blocks())
@@ -92,6 +93,7 @@ class _Place:
         texels: (M,).
         where: (M, 2) column and row in the patch.
         angle: (M,) from where the texture's right shall point to the patch's [rad].
+        interpolated: whether a patch's values are interpolated there.
         known: (M,) bool, which have values already.
         cell: side of the cells [texels of a patch].
         counts: (G, G) texels in the cells; those that have values:
@@ -102,6 +104,7 @@ class _Place:
     texels: np.ndarray
     where: np.ndarray
     angle: np.ndarray
+    interpolated: bool
     known: np.ndarray
     cell: int
     counts: np.ndarray
@@ -133,13 +136,9 @@ class _Canvas:
     """A texture in the making on a surface of N texels."""
 
     def __init__(
-        self,
-        source: Source,
-        target: Target,
-        shape: tuple[int, int, int],
-        sampled: Callable[[np.ndarray, np.ndarray], np.ndarray],
+        self, source: Source, target: Target, shape: tuple[int, int, int], interpolated: bool
     ) -> None:
-        self.source, self.target, self.side, self.sampled = source, target, shape[0], sampled
+        self.source, self.target, self.side, self.interpolated = source, target, shape[0], interpolated
         self.cell = FINE_CELL if target.area < FINE_TEXELS else BLOCK
         count = target.count
         self.features = np.zeros((count, shape[2]), np.float32)
@@ -181,11 +180,12 @@ class _Canvas:
         values = self.features[texels[known], : self.source.matched]
         counts, filled = (np.bincount(n, minlength=cells**2) for n in (number, number[known]))
         sums = scatter_add(number[known], values, cells**2)
-        shape = (cells, cells)
+        shape, sizes = (cells, cells), self.target.sizes
         return _Place(
             texels,
             where,
             angle,
+            self.interpolated or (sizes is not None and sizes[texel] > ENLARGED),
             known,
             self.cell,
             counts.reshape(shape),
@@ -204,8 +204,8 @@ class _Canvas:
         share = feather(np.kron(new, np.ones((self.cell,) * 2, bool)))
         column, row = np.clip(np.rint(place.where).astype(np.int16), 0, self.side - 1).T
         weights = np.where(place.known, share[row, column], 1.0)[:, None]
-        values = self.features[place.texels]
-        self.features[place.texels] = values + weights * (self.sampled(patch, place.where) - values)
+        values, sampled = self.features[place.texels], _between if place.interpolated else _nearest
+        self.features[place.texels] = values + weights * (sampled(patch, place.where) - values)
         shown = weights[:, 0] > 0.5
         self.patch[place.texels[shown]] = index
         self.texel[place.texels[shown]] = np.stack([row, column], axis=1)[shown]

@@ -30,6 +30,11 @@ class Target(Protocol):
         """Of a texel, in the mean [texels of a patch]."""
         ...
 
+    @property
+    def sizes(self) -> np.ndarray | None:
+        """(N,) factors of the size of the patches whose middles lie on the texels; None where all are 1."""
+        ...
+
     def around(self, texel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The texels that a patch covers whose middle lies on one of them.
 
@@ -126,7 +131,7 @@ class TileTarget:
     """A square whose opposite sides are joined, as a `Target`.
 
     Attributes:
-        area: 1, since its texels are those of a patch.
+        area, sizes: its texels are those of a patch.
 
     Args:
         side: of the square, at least the patch's [texels].
@@ -134,6 +139,7 @@ class TileTarget:
     """
 
     area = 1.0
+    sizes = None
 
     def __init__(self, side: int, patch: int) -> None:
         self.side, self.patch = side, patch

@@ -18,12 +18,17 @@ BEYOND = 2  # how much farther to look, so that vertices lie around all of a pat
 class VertexTarget:
     """The vertices of a mesh as a `Target`; those without faces stay as they are.
 
+    Attributes:
+        sizes: patches have one size.
+
     Args:
         mesh: V vertices, with edges that are short beside a patch.
         patch: side of a patch [texels].
         gap: between texels of a patch, on the surface [mesh units].
         directions: (V, 3) where a patch's right shall point; None for `vertex_directions`.
     """
+
+    sizes = None
 
     def __init__(self, mesh: Mesh, patch: int, gap: float, directions: np.ndarray | None = None) -> None:
         self.mesh, self.patch, self.gap = mesh, patch, gap

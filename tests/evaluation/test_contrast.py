@@ -5,7 +5,7 @@ import pytest
 from scipy import ndimage
 
 from mitex.errors import ImageError
-from mitex.evaluation.contrast import contrast, share_of_colour
+from mitex.evaluation.contrast import contrast
 
 ROWS, COLUMNS = np.indices((64, 80))
 CHECKS = np.repeat(((ROWS + COLUMNS) % 2)[..., None], 3, axis=2).astype(np.float32)
@@ -48,16 +48,6 @@ def test_what_does_not_count():
     image[:, 40:] = 1
     assert contrast(image, mask) == contrast(NOISE, mask)
     assert contrast(image).squares[0] > 2 * contrast(image, mask).squares[0]
-
-
-def test_the_share_of_lines():
-    image = np.full((10, 10, 3), (0.9, 0.5, 0.1))
-    image[::5] = (0.1, 0.1, 0.2)
-    line, fill = np.array([0.0, 0.0, 0.0]), np.array([1.0, 0.5, 0.0])
-    assert share_of_colour(image, line, fill) == pytest.approx(0.2)
-    mask = np.zeros((10, 10), bool)
-    mask[0] = mask[1] = True
-    assert share_of_colour(image, line, fill, mask) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(

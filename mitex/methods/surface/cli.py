@@ -68,11 +68,12 @@ class Fit(ExemplarOrWordsOptions):
     (.npy .ply .json). For one angle everywhere: --set angle=DEG."""
 
     scale: Annotated[float | None, arg(metavar="X", help_behavior_hint="(default: the preset's)")] = None
-    """Size of the pattern."""
+    """Size of the pattern; with --keep-uvs it follows their layout."""
 
     scale_map: Annotated[Path | None, arg(metavar="IMAGE|FILE", help_behavior_hint="")] = None
-    """Where the pattern's size varies: a picture over the mesh's own UVs, white as large as --scale says and
-    middle grey half as large; or a factor for each vertex (.npy)."""
+    """Where the pattern's size varies: a picture over the mesh's own UVs, white as large as --scale says,
+    middle grey half as large, and the darkest that is allowed, 64, a quarter; or a factor from 0.25 to 4 for
+    each vertex (.npy), which can make it larger, too."""
 
     keep_uvs: Annotated[bool, arg(help_behavior_hint="")] = False
     """Use the mesh's own UVs, which must not overlap."""

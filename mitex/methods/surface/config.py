@@ -122,12 +122,15 @@ class TexelConfig(ScheduledConfig):
         if self.optimizer == "lbfgs" and (self.loss != "gram" or self.scales):
             problem = "lbfgs needs a loss without randomness, the same throughout"
             raise ConfigError(problem, "set loss=gram and scales=0, or optimizer=adam")
-        self.exemplar_side()
 
     @property
     def compared(self) -> tuple[str, ...]:
         """The layers that are compared, by name."""
         return self.layers or with_poolings(LAYERS_19 if self.weights == "vgg19" else LAYERS)
+
+    def wanted_side(self, factor: float = 1.0) -> int:
+        """What `exemplar_side` is computed from [px], also if no exemplar can be so small or large."""
+        return round(self.scale * factor * (self.exemplar_size or EXEMPLAR_WIDTH * self.resolution))
 
     def exemplar_side(self, factor: float = 1.0, layout_ratio: float = 1.0) -> int:
         """Side that the exemplar's central square is resized to [px]; a pixel becomes a texel.
@@ -140,7 +143,7 @@ class TexelConfig(ScheduledConfig):
         Raises:
             ConfigError: it is not from 16 to 2048.
         """
-        side = round(self.scale * factor * (self.exemplar_size or EXEMPLAR_WIDTH * self.resolution))
+        side = self.wanted_side(factor)
         least, most = SIDES
         if least <= side <= most:
             return side if self.exemplar_size else max(round(side / layout_ratio), least)
@@ -174,7 +177,9 @@ class SurfaceConfig(WordsConfig, TexelConfig):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_words(self, "text_whole_weight", "text_close_weight")
-        if self.text is not None and self.optimizer == "lbfgs":
+        if self.text is None:  # words alone have no exemplar
+            self.exemplar_side()
+        elif self.optimizer == "lbfgs":
             raise ConfigError("lbfgs needs a loss without randomness", "set optimizer=adam for words")
 
 

@@ -15,7 +15,7 @@ from mitex.mesh import Mesh
 from mitex.mesh.frames import interpolate_frames, vertex_directions
 from mitex.methods.surface.borders import Border
 from mitex.methods.surface.cache import VERSION, cached_levels
-from mitex.methods.surface.config import SurfaceConfig
+from mitex.methods.surface.config import SIDES, SurfaceConfig
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.levels import POOLS, Levels
 from mitex.methods.surface.palette import square_depth
@@ -74,7 +74,7 @@ class SurfaceDomain:
             config.correct,
             config.continued,
             scale_map,
-            max(POOLS + config.scales, square_depth(config.exemplar_side())),
+            max(POOLS + config.scales, square_depth(min(config.wanted_side(), SIDES[1]))),
             keep,
             layout_ratio,
         )

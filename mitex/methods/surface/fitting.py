@@ -18,9 +18,9 @@ from mitex.features.text_model import text_image_model
 from mitex.geometry.triangles import twice_area
 from mitex.mesh import Mesh
 from mitex.mesh.fields import vector_field
-from mitex.methods.layout import layout_ratio, with_layout
+from mitex.methods.layout import layout_ratio, with_content_layout, with_layout
 from mitex.methods.surface.config import PRESETS, WORDS, SurfaceConfig
-from mitex.methods.surface.content import AO, content_colours
+from mitex.methods.surface.content import content_colours, content_picture
 from mitex.methods.surface.domain import SurfaceDomain
 from mitex.methods.surface.scale_map import ScaleMap
 from mitex.methods.surface.task import SurfaceTask
@@ -116,6 +116,10 @@ def fit_text(
     check_text(config.text, config.preset, WORDS)
     if exemplar is None and (orientation is not None or scale_map is not None):
         raise ConfigError("an orientation or a scale map turns and scales an exemplar", "give `exemplar` too")
+    if exemplar is None:
+        _check_scale(config)
+    else:
+        config.exemplar_side()
     model = text_image_model(config.text_model)
     given = Mesh.of(mesh)
     model.encode_texts([config.prompt(given.name)])  # refuses unknown words before the mesh is unwrapped
@@ -135,26 +139,31 @@ def _synthesized(
 ) -> SurfaceTexture:
     """The texture of a fit from an exemplar, from words in the eyes of a model, or from both."""
     config = run.config
+    picture = None if content is None else content_picture(content)
     if mesh is None:
         if keep_uvs or any(option is not None for option in (content, orientation, scale_map)):
             raise ConfigError("a tile takes no UVs, content, orientation or scale map", "leave them out")
         domain: SurfaceDomain = TileDomain.flat(config)
     else:
         given = Mesh.of(mesh)
-        image = content is not None and str(content) != AO
-        keeps = keep_uvs or image
-        surface = with_layout(given, config.resolution, keeps)
-        ratio = layout_ratio(given, surface, config.resolution, keeps)
-        upwards = None if orientation is None else vector_field(surface, orientation)
+        upwards = None if orientation is None else vector_field(given, orientation)
         sizes = None if scale_map is None else ScaleMap.of(scale_map, given)
+        if picture is None:
+            surface = with_layout(given, config.resolution, keep_uvs)
+        else:
+            surface = with_content_layout(given, ", or `content=ao`")
+        ratio = layout_ratio(given, surface, config.resolution, keep_uvs or picture is not None)
         domain = SurfaceDomain.of(surface, config, upwards, sizes, run.folder is not None, ratio)
     run.control.check()
-    domain.exemplar_side(config)  # refuses a size that the exemplar cannot have
+    if exemplar is not None:
+        domain.exemplar_side(config)  # refuses a size that it cannot have
     check_memory(domain.mesh, config, 1 if exemplar is None else len(exemplar.maps), domain.steps)
-    start = None if content is None else content_colours(content, domain)
-    inputs = {"content_key": content_key(start), "orientation_key": content_key(domain.orientation)}
-    if domain.factors is not None:
-        inputs["scale_map_key"] = content_key(domain.factors)
+    start = None if content is None else content_colours(picture, domain)
+    inputs = {
+        "content_key": content_key(start),
+        "orientation_key": content_key(domain.orientation),
+        "scale_map_key": content_key(domain.factors),
+    }
     words = None if model is None else Words(config, model, domain)
     task = SurfaceTask(config, exemplar, domain, start, inputs, words, run.resume)
     origin: dict[str, Any] = {key: getattr(config, key) for key in ("resolution", "frames", "angle")}
@@ -167,6 +176,13 @@ def _synthesized(
         **config.schedule,
         optimizer=Lbfgs if config.optimizer == "lbfgs" else partial(Adam, shared=config.shared_moment),
     )
+
+
+def _check_scale(config: SurfaceConfig) -> None:
+    """Refuses a scale for words alone that nothing follows."""
+    if config.scale != SurfaceConfig.scale and not config.text_width:
+        problem = f"a scale of {config.scale:g} changes nothing without an exemplar, as text_width is 0"
+        raise ConfigError(problem, "leave out `scale`, or set text_width")
 
 
 def check_memory(mesh: Mesh, config: SurfaceConfig, maps: int = 1, steps: np.ndarray | None = None) -> None:

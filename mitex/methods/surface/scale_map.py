@@ -39,18 +39,20 @@ class ScaleMap:
             mesh: V vertices.
 
         Raises:
-            ConfigError: not one finite number for each vertex, or a picture for a mesh without UVs.
+            ConfigError: not one finite number from 0.25 to 4 for each vertex of a face, or a picture for a
+                mesh without UVs.
             ImageError: the picture cannot be read.
         """
         if isinstance(source, str | Path):
             place = expanded(source)
             if place.suffix.lower() != ".npy":
+                picture = read_image(place, "L")
                 if mesh.uv is None:
                     raise ConfigError(
                         f"mesh '{mesh.name}' has no UVs for the scale map '{place}'",
                         "give a mesh with UVs, or a .npy file with a number for each vertex",
                     )
-                return ScaleMap(read_image(place, "L"), mesh.uv)
+                return ScaleMap(picture, mesh.uv)
             source = read_array(place, "a scale map")
         shape = (len(mesh.vertices),)
         if source.dtype.kind not in "fiu" or source.shape != shape:
@@ -60,7 +62,9 @@ class ScaleMap:
             )
         if not np.isfinite(source).all():
             raise ConfigError("the scale map has numbers that are NaN or infinite", "give finite ones")
-        return ScaleMap(np.array(source, np.float64))
+        values = np.array(source, np.float64)
+        _check_range(values[mesh.faces], mesh.name)
+        return ScaleMap(values)
 
     def at(self, mesh: Mesh, face: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """The factors (M,) float64 at points of the mesh that the map was read for.
@@ -71,7 +75,7 @@ class ScaleMap:
             barycentric: (M, 3) where on the faces.
 
         Raises:
-            ConfigError: one of them is not from 0.25 to 4.
+            ConfigError: one of them, of a picture, is not from 0.25 to 4.
         """
         if self.uv is None:
             factors = interpolate(barycentric, self.values[mesh.faces[face]][..., None])[:, 0]
@@ -79,9 +83,13 @@ class ScaleMap:
             uv = interpolate(barycentric, self.uv[face].astype(np.float64))
             uv = np.where((uv < 0) | (uv > 1), uv % 1, uv)
             factors = bilinear(self.values, uv)[:, 0].astype(np.float32)
-        if factors.min() < SMALLEST - 1e-6 or factors.max() > LARGEST + 1e-6:
-            raise ConfigError(
-                f"the scale map goes from {factors.min():.3g} to {factors.max():.3g} on '{mesh.name}'",
-                f"use factors from {SMALLEST:g} to {LARGEST:g} (in a picture: greys of 64 to 255)",
-            )
+        _check_range(factors, mesh.name)
         return factors.astype(np.float64)
+
+
+def _check_range(factors: np.ndarray, name: str) -> None:
+    if factors.min() < SMALLEST - 1e-6 or factors.max() > LARGEST + 1e-6:
+        raise ConfigError(
+            f"the scale map goes from {factors.min():.3g} to {factors.max():.3g} on '{name}'",
+            f"use factors from {SMALLEST:g} to {LARGEST:g} (in a picture: greys of 64 to 255)",
+        )

@@ -295,7 +295,7 @@ class TestRefused:
 
     def test_a_content_without_uvs(self, exemplar, tmp_path):
         write_image(tmp_path / "a.png", np.zeros((32, 32, 3)))
-        with pytest.raises(ConfigError, match="no UVs to keep"):
+        with pytest.raises(ConfigError, match="no UVs for the content picture"):
             multi_view_gram.fit(exemplar, icosphere(4), content=tmp_path / "a.png")
 
     def test_another_mesh(self, ball):

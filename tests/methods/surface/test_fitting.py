@@ -10,7 +10,7 @@ import torch
 
 from mitex.asset import Asset
 from mitex.atlas import usable_uv
-from mitex.errors import CheckpointError, ConfigError
+from mitex.errors import CheckpointError, ConfigError, MeshError
 from mitex.exemplar import Exemplar
 from mitex.features.layers import LAYERS, with_poolings
 from mitex.geometry.vectors import unit
@@ -270,6 +270,12 @@ class TestLayouts:
     def test_missing_uvs(self, mesh):
         with pytest.raises(ConfigError, match="no UVs to keep"):
             with_layout(mesh, self.CONFIG.resolution, True)
+
+    def test_a_mesh_whose_areas_vanish_is_not_unwrapped(self, monkeypatch):
+        monkeypatch.delattr("mitex.methods.layout.unwrap")
+        tiny = icosphere(2).with_vertices(icosphere(2).vertices * 1e-30)
+        with pytest.raises(MeshError, match="no face of icosphere2 has an area; scale it up"):
+            with_layout(tiny, self.CONFIG.resolution)
 
     @pytest.mark.parametrize("damage", ["overlap", "outside", "nan"])
     def test_unusable_uvs(self, mesh, damage):

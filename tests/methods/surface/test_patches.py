@@ -70,6 +70,17 @@ def test_stripes_follow_a_field_and_a_map_of_sizes():
     assert abs(upper - PERIODS / 2) <= 1 and abs(lower - PERIODS * 2) <= 2
 
 
+def test_enlarged_patches_have_no_blocks():
+    """Pixels of the exemplar are two texels wide in the upper half, and half a texel in the lower one."""
+    noise = Exemplar({"albedo": np.random.default_rng(0).random((SIDE, SIDE, 3), np.float32)}, "noise")
+    mesh, chosen = flat_square(SIDE), config()
+    factors = np.where(mesh.vertices[:, 1] > 0.5, 2.0, 0.5)
+    domain = SurfaceDomain.of(mesh, chosen, None, ScaleMap(factors), keep=False)
+    values = joined_patches(noise, map_layout(["albedo"]), domain, chosen)
+    upper = domain.texels.image(values)[4 : SIDE // 2 - 8]
+    assert (np.diff(upper, axis=1) == 0).mean() < 0.05
+
+
 class TurnedTarget(TileTarget):
     """As if the texels' right were the patches' down."""
 

@@ -2,11 +2,12 @@
 
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
 
-from mitex.errors import ConfigError
+from mitex.errors import CheckpointError, ConfigError, ImageError, MitexError
 from mitex.exemplar import Exemplar
 from mitex.images import write_image
 from mitex.mesh import Mesh, icosphere, torus
@@ -21,6 +22,7 @@ from mitex.methods.surface.taps import Surroundings, build
 from mitex.texels import Texels
 from mitex.training import resolve
 from tests.methods.surface.grids import flat_square
+from tests.methods.surface.small import SHALLOW
 
 pytestmark = pytest.mark.usefixtures("own_cache")
 SIDE = 64
@@ -193,6 +195,17 @@ def test_the_map_changes_the_texture():
     assert np.abs(plain - mapped).max() > 1e-2
 
 
+@pytest.mark.parametrize(("before", "after"), [(None, 0.5), (0.5, None), (0.5, 2.0)])
+def test_resuming_with_another_map_is_refused(before, after, tmp_path):
+    mesh = flat_square(2)
+    maps = {factor: np.linspace(factor, 1, 9) for factor in (0.5, 2.0)}
+    fit = partial(surface.fit, Exemplar.load("cobblestone").of_albedo(), mesh, tmp_path / "run")
+    fit(set=[*SHALLOW, "steps=1"], scale_map=maps.get(before))
+    with pytest.raises(CheckpointError, match="the scale_map is not the one that the run began with"):
+        fit(set=["steps=2"], scale_map=maps.get(after), resume=True)
+    fit(set=["steps=2"], scale_map=maps.get(before), resume=True)
+
+
 @pytest.mark.parametrize(
     ("source", "message"),
     [
@@ -213,5 +226,16 @@ def test_bad_maps(source, message, tmp_path):
 
 def test_a_picture_needs_uvs(tmp_path):
     bare = Mesh(flat_square(4).vertices, flat_square(4).faces)
+    with pytest.raises(ImageError, match="does not exist"):
+        ScaleMap.of(tmp_path / "a.png", bare)
     with pytest.raises(ConfigError, match="has no UVs for the scale map"):
         ScaleMap.of(write_image(tmp_path / "a.png", np.ones((4, 4))), bare)
+
+
+@pytest.mark.parametrize("option", ["orientation", "scale_map"])
+@pytest.mark.parametrize("source", ["no.npy", np.zeros((92, 1))], ids=["missing", "invalid"])
+def test_bad_files_are_refused_before_the_mesh_is_unwrapped(option, source, monkeypatch):
+    monkeypatch.delattr("mitex.methods.surface.fitting.with_layout")
+    bad: dict[str, Any] = {option: source}
+    with pytest.raises(MitexError, match=r"no\.npy|\(92, 1\)"):
+        surface.fit(Exemplar.load("cobblestone").of_albedo(), icosphere(3), **bad)

@@ -282,6 +282,10 @@ class TestFit:
         alone, *others = (fit("red dots", steps=1, **given).values for given in options)
         assert all(np.isfinite(v).all() and np.abs(v - alone).max() > 1e-3 for v in others)
 
+    @pytest.mark.parametrize("scale", [0.05, 20])
+    def test_words_alone_have_no_exemplar_that_could_be_too_narrow_or_wide(self, scale):
+        fit("red dots", steps=1, set=[f"scale={scale}", "text_width=0.05"])
+
     @pytest.mark.parametrize(
         ("text", "options", "error", "problem"),
         [
@@ -297,6 +301,18 @@ class TestFit:
                 {"exemplar": Exemplar({"height": np.ones((32, 32, 1), np.float32)})},
                 ConfigError,
                 "no albedo",
+            ),
+            (
+                "red",
+                {"set": ["scale=0.5", "text_width=0"]},
+                ConfigError,
+                "0.5 changes nothing without an exem",
+            ),
+            (
+                "red",
+                {"exemplar": exemplar(), "set": ["scale=0.05", "text_width=0.5"]},
+                ConfigError,
+                "texels wide with a scale of 0.05",
             ),
             ("red", {"set": ["optimizer=lbfgs", "scales=0"]}, ConfigError, "adam for words"),
             ("red", {"set": ["text_prompt=stone"]}, ConfigError, "leaves out the text"),

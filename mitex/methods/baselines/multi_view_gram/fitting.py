@@ -13,7 +13,7 @@ from mitex.mesh import Mesh
 from mitex.methods.baselines.multi_view_gram.config import PRESETS
 from mitex.methods.baselines.multi_view_gram.task import MultiViewTask
 from mitex.methods.baselines.multi_view_gram.texture import MultiViewTexture
-from mitex.methods.layout import with_layout
+from mitex.methods.layout import with_content_layout, with_layout
 from mitex.paths import expanded
 from mitex.training.fit import Run
 from mitex.training.settings import RunOptions
@@ -50,10 +50,12 @@ def fit(
     target = Exemplar.of(exemplar).of_albedo()
     side = run.config.resolution
     given = Mesh.of(mesh)
-    surface = with_layout(given, side, keep_uvs or content is not None)
     original: np.ndarray | None = None
-    if content is not None:
+    if content is None:
+        surface = with_layout(given, side, keep_uvs)
+    else:
         original = resize(read_image(expanded(content)), side, side)
+        surface = with_content_layout(given)
     run.control.check()
     task = MultiViewTask(run.config, target, surface, original)
     return run.train(
