@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -96,6 +97,37 @@ def test_the_citation_is_of_this_version():
     declared = re.search(r'^__version__ = "(.*)"', (ROOT / "mitex" / "__init__.py").read_text(), re.MULTILINE)
     cited = re.search(r"^version: (.*)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
     assert declared and cited and declared[1] == cited[1]
+
+
+@pytest.mark.parametrize(
+    ("pythons", "chosen"),
+    [
+        ({"python3": 11}, "python3"),
+        ({"python3": 14}, "python3"),
+        ({"python3": 14, "python3.14": 14, "python3.12": 12}, "python3.12"),
+        ({"python3": 9, "python3.13": 13, "python3.14": 14}, "python3.13"),
+        ({"python3": 9, "python3.14": 14}, "python3.14"),
+        ({"python3": 9}, ""),
+    ],
+)
+def test_make_prefers_pythons_that_need_no_compiler(tmp_path: Path, pythons: dict[str, int], chosen: str):
+    make = shutil.which("make")
+    if make is None:
+        pytest.skip("needs make")
+    for name, minor in pythons.items():
+        script = (
+            f"""#!/bin/sh\nexec {sys.executable} -c "import sys; sys.version_info = (3, {minor}); $2"\n"""
+        )
+        (tmp_path / name).write_text(script)
+        (tmp_path / name).chmod(0o755)
+    done = subprocess.run(
+        [make, "--no-print-directory", "--eval=chosen: ; @: $(info $(PYTHON))", "chosen"],
+        cwd=ROOT,
+        env={"PATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0 and done.stdout.strip() == chosen, done.stderr
 
 
 def test_pins_agree_with_the_declared_ranges():
