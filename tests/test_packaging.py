@@ -133,6 +133,7 @@ def test_make_prefers_pythons_that_need_no_compiler(tmp_path: Path, pythons: dic
 def test_pins_agree_with_the_declared_ranges():
     pins = (ROOT / "constraints.txt").read_text().split()
     assert pins == ["torch==2.13.0"]
+    assert f"pip install {pins[0]} " in (ROOT / "CONTRIBUTING.md").read_text()
     assert (
         "torch>=2.13,<2.14" in tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
     )
