@@ -64,6 +64,18 @@ def test_everything_in_the_package_is_in_the_wheel_and_nothing_else(wheel: Path)
     assert {name for name in names if not re.match(r"mitex(-[\d.]+\.dist-info)?/", name)} == set()
 
 
+def test_the_source_archive_has_all_but_the_settings_of_tools():
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True)
+    if listed.returncode != 0 or not listed.stdout:
+        pytest.skip("not a git checkout")
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"][
+        "sdist"
+    ]
+    tracked = {name.partition("/")[0] for name in listed.stdout.splitlines()}
+    always = {"pyproject.toml", ".gitignore"}
+    assert tracked - always - set(declared["include"]) == {".github", ".pre-commit-config.yaml"}
+
+
 def test_data_comes_with_its_license(wheel: Path):
     names = zipfile.ZipFile(wheel).namelist()
     folders = {name.rsplit("/", 1)[0] for name in names if name.startswith("mitex/data/weights/")}
