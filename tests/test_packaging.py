@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import mitex
+from mitex.methods.registry import methods
 
 ROOT = Path(__file__).parents[1]
 
@@ -109,6 +110,17 @@ def test_the_citation_is_of_this_version():
     declared = re.search(r'^__version__ = "(.*)"', (ROOT / "mitex" / "__init__.py").read_text(), re.MULTILINE)
     cited = re.search(r"^version: (.*)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
     assert declared and cited and declared[1] == cited[1]
+
+
+def test_methods_are_cited():
+    """All papers that the page of attributions names, and each method but parts of others."""
+    page = (ROOT / "docs" / "attributions.md").read_text().partition("## Methods")[2]
+    citation = (ROOT / "CITATION.cff").read_text()
+    titles = {" ".join(title.split()) for title in re.findall(r"\*(.*?)\*", page, re.DOTALL)}
+    assert titles and titles <= set(re.findall(r'^    title: "?(.*?)"?$', citation, re.MULTILINE))
+    parts = {"displacement", "plain_field", "quilted"}  # of the papers of `geometric` and `nerf`
+    named = {name for name, method in methods().items() if method.presets.startswith("mitex.")} - parts
+    assert named <= set(re.findall(r"^- `(\w+)`", page, re.MULTILINE))
 
 
 @pytest.mark.parametrize(
