@@ -37,13 +37,13 @@ class Evaluate:
     asset: Annotated[Positional[Path], arg(metavar="ASSET")]
     """File written by `mitex apply` (.glb .obj .ply)."""
 
-    exemplar: Annotated[str | None, arg(metavar="IMAGE|DIR|NAME")] = None
+    exemplar: Annotated[str | None, arg(metavar="IMAGE|DIR|NAME", help_behavior_hint="")] = None
     """Picture that the texture was made from."""
 
-    reference: Annotated[str | None, arg(metavar="MESH|NAME")] = None
+    reference: Annotated[str | None, arg(metavar="MESH|NAME", help_behavior_hint="")] = None
     """Mesh, or reference by formula, that its relief was made from."""
 
-    text: Annotated[str | None, arg(metavar="WORDS")] = None
+    text: Annotated[str | None, arg(metavar="WORDS", help_behavior_hint="")] = None
     """What it shall be made of."""
 
     object: Annotated[str | None, arg(metavar="WORD", help_behavior_hint="(default: object)")] = None
