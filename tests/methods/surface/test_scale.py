@@ -10,7 +10,6 @@ from mitex.errors import ConfigError
 from mitex.exemplar import Exemplar
 from mitex.images import write_image
 from mitex.mesh import Mesh, icosphere, torus
-from mitex.mesh.frames import tangent_frames
 from mitex.methods import surface
 from mitex.methods.layout import layout_ratio, layout_side, with_layout
 from mitex.methods.surface.config import PRESETS
@@ -20,6 +19,7 @@ from mitex.methods.surface.scale_map import ScaleMap
 from mitex.methods.surface.taps import Surroundings, build
 from mitex.texels import Texels
 from mitex.training import resolve
+from tests.mesh.examples import tangent_frames
 from tests.methods.surface.grids import flat_square
 
 pytestmark = pytest.mark.usefixtures("own_cache")
