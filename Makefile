@@ -1,8 +1,10 @@
 # `make demo`, `make test` and the others prepare .venv by themselves on a fresh machine.
-# Needs Python 3.11 or newer; name another one with `make setup PYTHON=python3.12`.
+# Needs Python 3.11 or newer; name another one with `make setup PYTHON=python3.12`. Those after 3.13 come last:
+# xatlas has no wheels for them, and is compiled.
 
-PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
-	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+PYTHON ?= $(shell for newest in 13 99; do for p in python3 python3.13 python3.12 python3.11 python3.14; do \
+	$$p -c "import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, $$newest))" 2>/dev/null \
+	&& echo $$p && exit; done; done)
 VENV := .venv
 STAMP := $(VENV)/.installed
 

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import mitex
+from mitex.methods.registry import methods
 
 ROOT = Path(__file__).parents[1]
 
@@ -63,6 +65,18 @@ def test_everything_in_the_package_is_in_the_wheel_and_nothing_else(wheel: Path)
     assert {name for name in names if not re.match(r"mitex(-[\d.]+\.dist-info)?/", name)} == set()
 
 
+def test_the_source_archive_has_all_but_the_settings_of_tools():
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True)
+    if listed.returncode != 0 or not listed.stdout:
+        pytest.skip("not a git checkout")
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"][
+        "sdist"
+    ]
+    tracked = {name.partition("/")[0] for name in listed.stdout.splitlines()}
+    always = {"pyproject.toml", ".gitignore"}
+    assert tracked - always - set(declared["include"]) == {".github", ".pre-commit-config.yaml"}
+
+
 def test_data_comes_with_its_license(wheel: Path):
     names = zipfile.ZipFile(wheel).namelist()
     folders = {name.rsplit("/", 1)[0] for name in names if name.startswith("mitex/data/weights/")}
@@ -98,9 +112,52 @@ def test_the_citation_is_of_this_version():
     assert declared and cited and declared[1] == cited[1]
 
 
+def test_methods_are_cited():
+    """All papers that the page of attributions names, and each method but parts of others."""
+    page = (ROOT / "docs" / "attributions.md").read_text().partition("## Methods")[2]
+    citation = (ROOT / "CITATION.cff").read_text()
+    titles = {" ".join(title.split()) for title in re.findall(r"\*(.*?)\*", page, re.DOTALL)}
+    assert titles and titles <= set(re.findall(r'^    title: "?(.*?)"?$', citation, re.MULTILINE))
+    parts = {"displacement", "plain_field", "quilted"}  # of the papers of `geometric` and `nerf`
+    named = {name for name, method in methods().items() if method.presets.startswith("mitex.")} - parts
+    assert named <= set(re.findall(r"^- `(\w+)`", page, re.MULTILINE))
+
+
+@pytest.mark.parametrize(
+    ("pythons", "chosen"),
+    [
+        ({"python3": 11}, "python3"),
+        ({"python3": 14}, "python3"),
+        ({"python3": 14, "python3.14": 14, "python3.12": 12}, "python3.12"),
+        ({"python3": 9, "python3.13": 13, "python3.14": 14}, "python3.13"),
+        ({"python3": 9, "python3.14": 14}, "python3.14"),
+        ({"python3": 9}, ""),
+    ],
+)
+def test_make_prefers_pythons_that_need_no_compiler(tmp_path: Path, pythons: dict[str, int], chosen: str):
+    make = shutil.which("make")
+    if make is None:
+        pytest.skip("needs make")
+    for name, minor in pythons.items():
+        script = (
+            f"""#!/bin/sh\nexec {sys.executable} -c "import sys; sys.version_info = (3, {minor}); $2"\n"""
+        )
+        (tmp_path / name).write_text(script)
+        (tmp_path / name).chmod(0o755)
+    done = subprocess.run(
+        [make, "--no-print-directory", "--eval=chosen: ; @: $(info $(PYTHON))", "chosen"],
+        cwd=ROOT,
+        env={"PATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0 and done.stdout.strip() == chosen, done.stderr
+
+
 def test_pins_agree_with_the_declared_ranges():
     pins = (ROOT / "constraints.txt").read_text().split()
     assert pins == ["torch==2.13.0"]
+    assert f"pip install {pins[0]} " in (ROOT / "CONTRIBUTING.md").read_text()
     assert (
         "torch>=2.13,<2.14" in tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
     )

@@ -20,11 +20,6 @@ THREAD_VARIABLES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"
 KERNELS = "DRJIT_CACHE_DIR"  # Dr.Jit's variable: where it keeps compiled kernels
 
 
-def cores() -> int:
-    """The processor cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def environment(threads: int) -> dict[str, str]:
     """The environment of a job: how many threads it has is read when libraries are imported.
 

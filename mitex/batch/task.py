@@ -20,6 +20,7 @@ from mitex.batch.folder import DONE, FAILED, LOG, STARTS, BatchFolder
 from mitex.batch.jobs import Job
 from mitex.batch.process import Process, environment
 from mitex.paths import writing
+from mitex.runtime.signals import signal_name
 from mitex.training.locate import METRICS, checkpoints
 
 HEARTBEAT = 0.5  # between two looks at claim and driver [s]
@@ -101,7 +102,8 @@ class Task:
             self.folder.write(self.job, STARTS, start)
             if code > 0:
                 return self._failure(_last_error(self.folder.of(self.job) / LOG), code)
-            reason = f"ended by {_signal_name(code)}"
+            reason = f"ended by {signal_name(-code)}"
+            reason += ", out of memory?" if code == -signal.SIGKILL else ""
         return Outcome("interrupted")
 
     def _write_stop(self, start: dict[str, Any]) -> None:
@@ -199,11 +201,6 @@ def _last_error(log: Path) -> str:
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     errors = [line.removeprefix("error: ") for line in lines if line.startswith("error: ")]
     return (errors or lines or ["it said nothing"])[-1]
-
-
-def _signal_name(code: int) -> str:
-    name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
-    return f"{name}, out of memory?" if name == "SIGKILL" else name
 
 
 def _last_metrics(file: Path) -> dict[str, Any]:

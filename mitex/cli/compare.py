@@ -29,10 +29,10 @@ class Compare(JobOptions):
       mitex compare --exemplar lava --mesh vase --methods gatys --set gatys:steps=300 --out out/compare
     """
 
-    exemplar: Annotated[tuple[str, ...], arg(metavar="IMAGE|DIR|NAME ...")] = ()
+    exemplar: Annotated[tuple[str, ...], arg(metavar="IMAGE|DIR|NAME ...", help_behavior_hint="")] = ()
     """Images, folders of maps or captures, patterns such as "photos/*.png", or names that ship with Mitex."""
 
-    mesh: Annotated[tuple[str, ...], arg(metavar="MESH|NAME ...")] = ()
+    mesh: Annotated[tuple[str, ...], arg(metavar="MESH|NAME ...", help_behavior_hint="")] = ()
     """Mesh files, patterns, or names that ship with Mitex."""
 
     methods: Annotated[str | None, arg(metavar="NAME,NAME,...", help_behavior_hint="")] = None
@@ -133,7 +133,7 @@ class Answers:
     folder: Annotated[Positional[Path], arg(metavar="DIR")]
     """What was given as --out."""
 
-    files: Annotated[Positional[tuple[Path, ...]], arg(metavar="FILE ...")]
+    files: Annotated[Positional[tuple[Path, ...]], arg(metavar="FILE ...", help_behavior_hint="")]
     """What people saved."""
 
     def run(self) -> None:

@@ -24,8 +24,9 @@ class Evaluate:
     With --exemplar, patches of the surface are compared with the picture: Frechet distances, transport, Gram
     matrices, seams and repetition, as in the reports of `mitex compare`. With --reference, the form and the
     local statistics of its relief are compared with those of a mesh. With --text, a vision-language model
-    looks at it from 24 sides: MES and MES-dir of the MeshNCA paper, in which more is better. Take another
-    model than the one that it was trained with.
+    looks at it from 24 sides: MES (multi-view expert score, how well it fits) and MES-dir (the same of its
+    change from grey), as in the MeshNCA paper; more is better. Take another model than the one that it was
+    trained with.
 
     examples:
       mitex evaluate vase.glb --exemplar lava
@@ -36,13 +37,13 @@ class Evaluate:
     asset: Annotated[Positional[Path], arg(metavar="ASSET")]
     """File written by `mitex apply` (.glb .obj .ply)."""
 
-    exemplar: Annotated[str | None, arg(metavar="IMAGE|DIR|NAME")] = None
+    exemplar: Annotated[str | None, arg(metavar="IMAGE|DIR|NAME", help_behavior_hint="")] = None
     """Picture that the texture was made from."""
 
-    reference: Annotated[str | None, arg(metavar="MESH|NAME")] = None
+    reference: Annotated[str | None, arg(metavar="MESH|NAME", help_behavior_hint="")] = None
     """Mesh, or reference by formula, that its relief was made from."""
 
-    text: Annotated[str | None, arg(metavar="WORDS")] = None
+    text: Annotated[str | None, arg(metavar="WORDS", help_behavior_hint="")] = None
     """What it shall be made of."""
 
     object: Annotated[str | None, arg(metavar="WORD", help_behavior_hint="(default: object)")] = None

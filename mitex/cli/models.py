@@ -27,7 +27,7 @@ class Models:
     json: Annotated[bool, arg(help_behavior_hint="")] = False
     """For programs: a JSON list of objects."""
 
-    like: str | None = None
+    like: Annotated[str | None, arg(metavar="WORDS", help_behavior_hint="")] = None
     """The most similar first, by a small model of pictures and words: it knows common colours, patterns and
     materials, and says so when it does not know a word."""
 

@@ -1,1 +1,1 @@
-"""How good a result is: measures, and the experiments of the papers."""
+"""How good a result is: measures."""

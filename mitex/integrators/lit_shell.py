@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from mitex.errors import ConfigError
 from mitex.integrators.field_paths import FieldPaths, evaluate, first_segment
-from mitex.integrators.sources import sampled_light, source_met
+from mitex.integrators.sources import reflection_at, sampled_light, source_met
 from mitex.runtime.jit import dr, mi
 from mitex.textures.scattering import ReflectingField
 from mitex.textures.variant import for_variant
@@ -123,11 +123,7 @@ class LitShellIntegrator(FieldPaths):
         """Scattering by the BSDF where rays meet a shape."""
         context, bsdf = mi.BSDFContext(), si.bsdf(mi.RayDifferential3f(ray))
         smooth = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-
-        def reflected(direction: mi.Vector3f) -> tuple[mi.Spectrum, mi.Float]:
-            return bsdf.eval_pdf(context, si, si.to_local(direction), smooth)
-
-        light = self._light(scene, sampler, si, reflected, smooth)
+        light = self._light(scene, sampler, si, reflection_at(context, bsdf, si, smooth), smooth)
         scattered, weight = bsdf.sample(context, si, sampler.next_1d(active), sampler.next_2d(active), active)
         delta = mi.has_flag(scattered.sampled_type, mi.BSDFFlags.Delta)
         return Vertex(mi.Interaction3f(si), light, si.to_world(scattered.wo), weight, scattered.pdf, delta)

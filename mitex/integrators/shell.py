@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mitex.errors import ConfigError
 from mitex.integrators.field_paths import FieldPaths, evaluate, first_segment
-from mitex.integrators.sources import sampled_light, source_met
+from mitex.integrators.sources import reflection_at, sampled_light, source_met
 from mitex.runtime.jit import dr, mi
 from mitex.textures.variant import for_variant
 
@@ -88,12 +88,10 @@ class ShellIntegrator(FieldPaths):
         """Light from a sampled source, weighted against the BSDF's own sampling; the field casts shadows."""
         smooth = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
 
-        def reflected(direction: mi.Vector3f) -> tuple[mi.Spectrum, mi.Float]:
-            return bsdf.eval_pdf(context, si, si.to_local(direction), smooth)
-
         def passing(ray: mi.Ray3f, active: mi.Bool) -> mi.Float:
             return self.field.march(ray, sampler.next_1d(active), active).transmittance
 
+        reflected = reflection_at(context, bsdf, si, smooth)
         return sampled_light(scene, si, sampler.next_2d(smooth), reflected, passing, smooth)
 
 

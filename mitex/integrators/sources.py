@@ -33,6 +33,13 @@ def sampled_light(
     return dr.select(active, value * weight * share * passing(interaction.spawn_ray_to(ds.p), active), 0)
 
 
+def reflection_at(
+    context: mi.BSDFContext, bsdf: mi.BSDFPtr, si: mi.SurfaceInteraction3f, active: mi.Bool
+) -> Callable[[mi.Vector3f], tuple[mi.Spectrum, mi.Float]]:
+    """The argument `reflected` of `sampled_light`, of the BSDF of a shape."""
+    return lambda direction: bsdf.eval_pdf(context, si, si.to_local(direction), active)
+
+
 def source_met(
     scene: mi.Scene,
     si: mi.SurfaceInteraction3f,

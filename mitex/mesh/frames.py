@@ -28,13 +28,8 @@ LEVEL_PULL = 0.05  # how strongly level places are pulled to w', relative to upr
 FAINT = 1e-6  # vectors shorter than that have no direction
 
 
-def tangent_frames(
-    mesh: Mesh,
-    face: np.ndarray,
-    barycentric: np.ndarray,
-    kind: str = "smooth",
-    angle: float = 0.0,
-    field: np.ndarray | None = None,
+def interpolate_frames(
+    mesh: Mesh, face: np.ndarray, barycentric: np.ndarray, directions: np.ndarray, angle: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """The exemplar's right and up at points of the surface.
 
@@ -45,28 +40,13 @@ def tangent_frames(
         mesh: V vertices, F faces.
         face: (M,) the faces that the points lie on.
         barycentric: (M, 3) where on them.
-        kind: "fixed", as in the paper: right is y x normal. "smooth": alike where the surface is upright,
-            smooth elsewhere.
+        directions: (V, 3) unit, where right points at the vertices (`vertex_directions`).
         angle: turns both counter-clockwise seen from outside [rad].
-        field: (V, 3) where up should point, of any length and direction, in place of `kind`. Where it is zero
-            or along the normal, the fixed frame is taken.
 
     Returns:
         Right and up, (M, 3) float64 each, orthonormal, across the face's normal; right x up is the outward
         normal. Faces without an area have frames across +z.
-
-    Raises:
-        ConfigError: unknown kind; a field that does not fit or is not finite; an angle that is not finite.
     """
-    if not np.isfinite(angle):
-        raise ConfigError(f"an orientation of {angle}", "give a finite angle")
-    return interpolate_frames(mesh, face, barycentric, vertex_directions(mesh, kind, field), angle)
-
-
-def interpolate_frames(
-    mesh: Mesh, face: np.ndarray, barycentric: np.ndarray, directions: np.ndarray, angle: float = 0.0
-) -> tuple[np.ndarray, np.ndarray]:
-    """`tangent_frames` from the `vertex_directions` (V, 3)."""
     face = np.asarray(face)
     normal = unit_normals(mesh.face_crosses[face])
     right = interpolate(np.asarray(barycentric), directions[mesh.faces[face]])
@@ -75,9 +55,16 @@ def interpolate_frames(
 
 
 def vertex_directions(mesh: Mesh, kind: str = "smooth", field: np.ndarray | None = None) -> np.ndarray:
-    """(V, 3) float64 unit vectors across the vertex normals: where right points; see `tangent_frames`.
+    """(V, 3) float64 unit vectors across the vertex normals: where right points.
 
     Vertices at one place have one normal and one direction.
+
+    Args:
+        mesh: V vertices.
+        kind: "fixed", as in the paper: right is y x normal. "smooth": alike where the surface is upright,
+            smooth elsewhere.
+        field: (V, 3) where up should point, of any length and direction, in place of `kind`. Where it is zero
+            or along the normal, the fixed direction is taken.
 
     Raises:
         ConfigError: an unknown kind, or a field of another shape or with numbers that are not finite.

@@ -54,6 +54,11 @@ class Target(Protocol):
         ...
 
 
+def mean_area(mesh: Mesh, gap: float, count: int) -> float:
+    """Of a texel [texels of a patch], where `count` share a mesh and those of a patch are `gap` apart."""
+    return float(mesh.face_areas.sum()) / (gap**2 * max(count, 1))
+
+
 class SurfaceTarget:
     """A mesh as a `Target`.
 
@@ -103,7 +108,7 @@ class SurfaceTarget:
     @property
     def area(self) -> float:
         """See `Target`."""
-        return float(self.mesh.face_areas.sum()) / (self.gap**2 * max(self.count, 1))
+        return mean_area(self.mesh, self.gap, self.count)
 
     def around(self, texel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """See `Target`."""

@@ -9,7 +9,7 @@ from mitex.mesh import Mesh
 from mitex.mesh.frames import vertex_directions
 from mitex.quilting.flattening import Flattening
 from mitex.quilting.matching import ArraySource
-from mitex.quilting.target import REACH
+from mitex.quilting.target import REACH, mean_area
 
 FEWEST = 3  # points of a triangle
 BEYOND = 2  # how much farther to look, so that vertices lie around all of a patch [mean edges]
@@ -48,7 +48,7 @@ class VertexTarget:
     @property
     def area(self) -> float:
         """See `Target`."""
-        return float(self.mesh.face_areas.sum()) / (self.gap**2 * max(self.count, 1))
+        return mean_area(self.mesh, self.gap, self.count)
 
     def flat(self, vertex: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The surroundings of one of the N in the plane, somewhat farther than a patch reaches.

@@ -227,7 +227,7 @@ def _surface(
         offset = displacement * asset.vertex_maps["height"] ** 2
         mesh = mesh.with_vertices(mesh.vertices + offset * mesh.normals)
         normals = mesh.normals[split.source]
-        if textured or "normal" not in asset.vertex_maps:
+        if "normal" not in (asset.texture_maps or asset.vertex_maps):
             detail = normals
     positions = mesh.vertices[split.source]
     return positions.astype(np.float64), normals.astype(np.float64), detail.astype(np.float64)

@@ -10,7 +10,6 @@ import json
 import os
 import platform
 import re
-import signal
 import site
 import subprocess
 import sys
@@ -23,6 +22,7 @@ from pathlib import Path
 
 from mitex.errors import OutputError, RuntimeUnavailable
 from mitex.paths import atomic_write, cache_dir
+from mitex.runtime.signals import signal_name
 
 VARIABLE = "DRJIT_LIBLLVM_PATH"
 OLDEST = 17  # 14 is refused by Dr.Jit 1.5, 15 and 16 abort: "Cannot select: fminimum"
@@ -178,18 +178,11 @@ def _read_probe(process: "subprocess.CompletedProcess[str]") -> tuple[Verdict, b
     if "version" in answer and answer["version"] is None:
         return Verdict(False, "", "older than 16"), True
     if process.returncode < 0:
-        return Verdict(False, number, f"it ends the process ({_signal_name(-process.returncode)})"), True
+        return Verdict(False, number, f"it ends the process ({signal_name(-process.returncode)})"), True
     if process.returncode == 0 and number:
         return Verdict(False, number, f"older than {OLDEST}"), True
     last = (process.stderr.strip().splitlines() or ["no message"])[-1]
     return Verdict(False, number, f"the probe failed: {last[:200]}"), False
-
-
-def _signal_name(number: int) -> str:
-    try:
-        return signal.Signals(number).name
-    except ValueError:
-        return f"signal {number}"
 
 
 def _matches(pattern: str) -> Iterator[str]:

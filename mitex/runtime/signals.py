@@ -11,6 +11,14 @@ from typing import Any, ClassVar
 log = logging.getLogger(__name__)
 
 
+def signal_name(number: int) -> str:
+    """Such as "SIGKILL"; "signal 99" for one that has no name here."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
+
+
 class StopSignals:
     """Context where the first SIGINT or SIGTERM sets `requested`, and the second raises KeyboardInterrupt.
 

@@ -45,23 +45,11 @@ def studio_image(height: int = 128) -> np.ndarray:
     return image.astype(np.float32)
 
 
-def environment(strength: float = 1.0, azimuth: float = 90.0, height: int = 128) -> dict[str, Any]:
-    """A Mitsuba `envmap` of `studio_image`, which needs no file.
-
-    Args:
-        strength: factor on the radiance.
-        azimuth: turns the studio about +y [degrees]; the light then follows a camera that turns by the same
-            angle.
-        height: rows of the image.
-    """
+def environment() -> dict[str, Any]:
+    """A Mitsuba `envmap` of `studio_image`, which needs no file; it belongs to a camera on +z."""
     from mitex.runtime.jit import mi
 
-    return {
-        "type": "envmap",
-        "bitmap": mi.Bitmap(studio_image(height)),
-        "scale": strength,
-        "to_world": mi.ScalarTransform4f().rotate([0, 1, 0], 90 - azimuth),
-    }
+    return {"type": "envmap", "bitmap": mi.Bitmap(studio_image())}
 
 
 def key_light(strength: float = 1.0, radius: float = 1.0) -> dict[str, Any]:

@@ -19,10 +19,10 @@ from mitex.batch.engines import WorkerLost
 from mitex.batch.engines.local import Local
 from mitex.batch.folder import BatchFolder
 from mitex.batch.jobs import jobs_of
-from mitex.batch.process import cores
 from mitex.batch.task import RETRIES, Outcome, Task
 from mitex.cli import main
 from mitex.errors import OutputError
+from mitex.runtime import cores
 
 PLAN = """exemplars = ["a.png", "b.png"]
 meshes = ["m.obj"]
@@ -120,8 +120,15 @@ class TestOneAfterTheOther:
         assert lines[0].endswith("host,result,last_loss,last_step") and lines[1].endswith(",0.5,2")
         assert not list(report.folder.rglob("claim*")) and not list((report.folder / "drivers").iterdir())
 
+    @pytest.mark.parametrize(("quota", "threads"), [("50000 100000", 1), ("250000 100000", 2)])
+    def test_threads_within_the_quota_of_a_container(self, tmp_path, monkeypatch, quota, threads):
+        monkeypatch.setattr(cores, "QUOTA", tmp_path / "cpu.max")
+        monkeypatch.setattr(cores.os, "sched_getaffinity", lambda process: set(range(8)), raising=False)
+        (tmp_path / "cpu.max").write_text(quota)
+        assert Local(1).threads == threads
+
     def test_threads_are_shared(self, workshop):
-        assert Local(1).threads == cores() and Local(10_000).threads == 1
+        assert Local(1).threads == max(1, int(cores.cores())) and Local(10_000).threads == 1
         workshop.run(workshop.plan(("a.png",)))
         assert workshop.log.read_text().splitlines()[0].split()[2] == "1"
 

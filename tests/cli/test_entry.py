@@ -151,6 +151,8 @@ class TestHelp:
         text = capsys.readouterr().out
         examples = [line for line in text.split("examples:")[1].splitlines() if line.startswith("  ")]
         assert examples[0].strip().startswith(f"mitex {name}") and "--help" in text
+        words = " ".join(re.sub("[│─╭╮╰╯]", " ", text).split())  # without the frames, and line breaks
+        assert not re.findall(r"\S*\{None\}\S*|.{60}\(default: (?:None)?\)", words)
 
     def test_overview_lists_every_command(self, capsys):
         for words in (["--help"], ["-h"], ["help"]):

@@ -87,3 +87,10 @@ def test_the_reference_has_every_method():
         r"^## mitex\.methods\.(\S+)$", read(DOCS / "reference" / "methods.md"), re.MULTILINE
     )
     assert set(methods()) <= {name.rpartition(".")[2] for name in headings}
+
+
+def test_contributing_says_what_every_part_of_the_package_is():
+    package, table = DOCS.parent / "mitex", read(DOCS.parent / "CONTRIBUTING.md")
+    parts = {f"{path.parent.name}/" for path in package.glob("*/__init__.py")}
+    parts |= {path.name for path in package.glob("*.py") if not path.name.startswith("__")}
+    assert {part for part in parts if f"`{part}`" not in table} == set()

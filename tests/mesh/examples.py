@@ -9,6 +9,7 @@ import trimesh
 from hypothesis import strategies as st
 
 from mitex.mesh import Mesh
+from mitex.mesh.frames import interpolate_frames, vertex_directions
 
 # One corner of a cube and a bit more: three triangles around vertex 0, open.
 FAN = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1]])
@@ -19,6 +20,18 @@ OCTAHEDRON_POINTS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 
 OCTAHEDRON = np.array(
     [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]]
 )
+
+
+def tangent_frames(
+    mesh: Mesh,
+    face: np.ndarray,
+    barycentric: np.ndarray,
+    kind: str = "smooth",
+    angle: float = 0.0,
+    field: np.ndarray | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Right and up at points of the surface, from the directions of its vertices."""
+    return interpolate_frames(mesh, face, barycentric, vertex_directions(mesh, kind, field), angle)
 
 
 def tetrahedron() -> Mesh:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 
+from mitex.exemplar import Exemplar
 from mitex.features import Vgg16
 from mitex.features.frozen import FrozenConv
 from mitex.methods.nerf.capture.capture import Capture
@@ -16,6 +17,12 @@ from mitex.methods.nerf.training import plain, task
 from mitex.methods.surface import comparison
 
 HULLS: dict[tuple[str, int], np.ndarray] = {}
+
+
+@pytest.fixture(scope="module")
+def exemplar() -> Exemplar:
+    """A small picture, for whoever has no other one."""
+    return Exemplar.load("lava").resized(48).of_albedo()
 
 
 @pytest.fixture(scope="module")

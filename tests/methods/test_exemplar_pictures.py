@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from mitex.exemplar import Exemplar
 from mitex.methods.exemplar_pictures import LEAST, albedo, framed, side_in_view
-
-
-@pytest.fixture(scope="module")
-def exemplar() -> Exemplar:
-    return Exemplar.load("lava").resized(48).of_albedo()
 
 
 def test_a_frame_shows_what_fits_of_the_exemplar(exemplar):

@@ -9,7 +9,7 @@ import pytest
 
 from mitex.asset import Asset
 from mitex.errors import ConfigError
-from mitex.geometry.tangents import split_at_hard_edges
+from mitex.geometry.tangents import split_at_hard_edges, split_at_seams
 from mitex.mesh import Mesh, icosphere
 from mitex.render.renderer import OrbitRenderer, _facing, _material, _surface
 
@@ -116,6 +116,19 @@ def test_displacement_moves_along_the_normals_by_the_squared_height():
     positions, _, detail = _surface(asset, split, SPHERE.normalised()[1], 0.1)
     np.testing.assert_allclose(np.linalg.norm(positions, axis=1), 1 + 0.1 * height[:, 0] ** 2, atol=1e-4)
     assert np.abs(detail - SPHERE.normals).max() > 0.01  # no normal map: relief from the surface itself
+
+
+@pytest.mark.parametrize("bake", [False, True])
+def test_displacement_beside_a_normal_map_keeps_the_normals(bake):
+    """The map holds the relief already."""
+    height, flat = np.linspace(0, 1, len(SPHERE.vertices))[:, None], bent(0.0, 0.0)
+    asset = Asset(SPHERE, {**flat.vertex_maps, "height": height}, flat.tangents)
+    if bake:
+        asset = asset.baked(64)
+    split = split_at_hard_edges(SPHERE) if asset.atlas is None else split_at_seams(SPHERE, asset.atlas.uv)
+    plain, moved = (_surface(asset, split, SPHERE.normalised()[1], b) for b in (0.0, 0.1))
+    assert np.abs(moved[0] - plain[0]).max() > 0.05
+    np.testing.assert_array_equal(moved[2], plain[2])
 
 
 def cube() -> Mesh:

@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-from mitex.runtime.signals import StopSignals, deferred, terminable
+from mitex.runtime.signals import StopSignals, deferred, signal_name, terminable
 
 
 @pytest.fixture(autouse=True)
@@ -131,3 +131,7 @@ class TestTerminable:
             os.kill(os.getpid(), signal.SIGTERM)
             assert signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
         assert signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
+
+
+def test_names_of_signals():
+    assert [signal_name(number) for number in (9, 15, 250)] == ["SIGKILL", "SIGTERM", "signal 250"]

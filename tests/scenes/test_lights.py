@@ -1,7 +1,6 @@
 """Lights: they load, they light, and the studio is where it says."""
 
 import numpy as np
-import pytest
 
 from mitex.scenes.lights import environment, key_light, studio_image
 
@@ -35,28 +34,19 @@ def radiance_from(mi, light: dict, direction: tuple[float, float, float]) -> flo
     return mi.load_dict(light).eval(si)[1][0]
 
 
-@pytest.mark.parametrize("azimuth", [90, 17, -115])
-def test_softboxes_are_where_the_studio_says(mi, azimuth: float):
-    """Relative to a camera at the azimuth: key to its left, fill to its right, rim opposite."""
-    angle = np.radians(azimuth)
-    forward = np.array((np.cos(angle), 0, np.sin(angle)))  # from the object to the camera
-    right = np.cross((0, 1, 0), forward)
-    light = environment(azimuth=azimuth)
-    key, fill, rim, wall = (
-        radiance_from(mi, light, tuple(x * right + (0, y, 0) + z * forward))
-        for x, y, z in ((-0.8, 0.9, 0.9), (1.2, 0.3, 0.7), (0.9, 1.6, -0.9), (0.0, 0.0, -1.0))
-    )
+def test_softboxes_are_where_the_studio_says(mi):
+    """Relative to a camera on +z: key to its left, fill to its right, rim opposite."""
+    light = environment()
+    directions = ((-0.8, 0.9, 0.9), (1.2, 0.3, 0.7), (0.9, 1.6, -0.9), (0.0, 0.0, -1.0))
+    key, fill, rim, wall = (radiance_from(mi, light, direction) for direction in directions)
     assert key > rim > 4
     assert 1 < fill < 2
     assert wall < 0.5
 
 
-def test_environment_strength_and_key_on_the_left(mi):
+def test_the_environment_has_its_key_on_the_left(mi):
     picture = sphere_picture(mi, {"light": environment()})[..., 1]
     assert picture[5:10, 6:11].mean() > 1.3 * picture[14:19, 13:18].mean()
-    np.testing.assert_allclose(
-        sphere_picture(mi, {"light": environment(2.0)})[..., 1], 2 * picture, rtol=1e-3
-    )
 
 
 def test_key_is_upper_left_at_any_size(mi):

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from mitex.batch.engines import Engine, WorkerLost
-from mitex.batch.process import cores
 from mitex.batch.task import Outcome, Task
 from mitex.errors import ConfigError, RuntimeUnavailable
 from mitex.optional import optional
+from mitex.runtime.cores import cores
 
 PATIENCE = 10.0  # with a scheduler that does not answer [s]
 NO_LIMIT = 1_000_000
@@ -42,7 +42,7 @@ class Dask(Engine):
             raise ConfigError(problem, "name one, as tcp://10.0.0.1:8786, or leave it out")
         self._address, self._jobs = address, jobs
         self.at_once: int | None = jobs if address is None else None
-        self.threads = max(1, cores() // jobs)
+        self.threads = max(1, int(cores() // jobs))
 
     def __enter__(self) -> Dask:
         optional("dask.config", "cluster").set(SETTINGS)
@@ -76,7 +76,7 @@ class Dask(Engine):
             tasks[worker["host"]] += worker["nthreads"]
         machines: Any = self._client.run(cores)
         shares = (
-            count // tasks[workers[name]["host"]] for name, count in machines.items() if name in workers
+            int(count // tasks[workers[name]["host"]]) for name, count in machines.items() if name in workers
         )
         return max(1, min(shares, default=1))
 

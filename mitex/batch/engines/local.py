@@ -6,8 +6,8 @@ import signal
 from concurrent.futures import Future, ThreadPoolExecutor
 
 from mitex.batch.engines import Engine
-from mitex.batch.process import cores
 from mitex.batch.task import Outcome, Task, stop_processes
+from mitex.runtime.cores import cores
 
 
 class Local(Engine):
@@ -21,7 +21,7 @@ class Local(Engine):
 
     def __init__(self, jobs: int = 1) -> None:
         self.at_once: int | None = jobs
-        self.threads = max(1, cores() // jobs)
+        self.threads = max(1, int(cores() // jobs))
         self._pool = ThreadPoolExecutor(jobs, "job")
 
     def submit(self, task: Task) -> Future[Outcome]:

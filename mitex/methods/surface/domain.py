@@ -33,7 +33,7 @@ class SurfaceDomain:
     Attributes:
         mesh: with the UVs of the texture.
         resolution: side of the texture [texels].
-        frames: "smooth" or "fixed", see `tangent_frames`.
+        frames: "smooth" or "fixed", see `vertex_directions`.
         angle: turns the frames counter-clockwise, seen from outside [degrees].
         orientation: (V, 3) where the exemplar's up shall point, in place of `frames`.
         correct, continued: how levels are computed, see `SurfaceConfig`.

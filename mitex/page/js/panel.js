@@ -109,7 +109,7 @@ class Panel {
         text: (k) => `${SPEEDS[k]} steps/s` }, (k) => { clock.rate = SPEEDS[k]; }),
       slider("Orientation", { low: -180, high: 180, step: 1, value: Math.round((page.turn * 180) / Math.PI),
         text: (x) => `${x}°` }, (x) => page.orient((x * Math.PI) / 180)),
-      this._upwards(), this._density());
+      this._upwards(), this._subdivision());
   }
 
   // Orientation may be counted from a field instead of from +y.
@@ -124,12 +124,12 @@ class Panel {
   }
 
   // Cells: each level of subdivision has four times as many, and patterns of half the size.
-  _density() {
+  _subdivision() {
     const { page } = this;
     const levels = [0, 1, 2, 3, 4, 5, 6].filter((k) => page.base.count * 4 ** k <= MOST_VERTICES);
     if (levels.length < 2) return "";
     const cells = (k) => `${Math.round((page.base.count * 4 ** k) / 100) / 10} k cells`;
-    return slider("Density", { low: 0, high: levels.at(-1), step: 1, value: page.levels, text: cells },
+    return slider("Subdivide", { low: 0, high: levels.at(-1), step: 1, value: page.levels, text: cells },
       (k) => page.setMesh(page.base, k));
   }
 

@@ -11,8 +11,8 @@ import pytest
 
 from mitex.batch import Event, status
 from mitex.batch.engines.dask_cluster import NO_LIMIT, Dask
-from mitex.batch.process import cores
 from mitex.errors import MissingPackage, RuntimeUnavailable
+from mitex.runtime.cores import cores
 
 CLUSTER = """
 import time
@@ -71,7 +71,7 @@ def test_the_scheduler_is_killed(workshop, plan, wait_for, monkeypatch):
     cluster = subprocess.Popen([sys.executable, "-c", CLUSTER], stdout=subprocess.PIPE, text=True)
     assert cluster.stdout
     with cluster, Dask(cluster.stdout.readline().strip()) as engine:
-        assert engine.threads == max(1, cores() // 2) and engine.at_once is None
+        assert engine.threads == max(1, int(cores() // 2)) and engine.at_once is None
         on_event = when_both_run(workshop, wait_for, cluster.kill)
         with pytest.raises(RuntimeUnavailable, match="the Dask scheduler does not answer any more; start it"):
             workshop.run(plan, engine=engine, on_event=on_event)
@@ -95,6 +95,7 @@ def test_a_cluster_of_ours_bears_the_death_of_many_workers():
         ([("a", 1, 8), ("a", 3, 8), ("b", 2, 12)], 2),
         ([("a", 1, 8), ("b", 4, 12), ("c", 1, 5)], 3),
         ([("a", 4, 2)], 1),
+        ([("a", 2, 3.5)], 1),  # a container's quota
     ],
 )
 def test_tasks_share_the_cores_of_the_smallest_machine(workers, share):

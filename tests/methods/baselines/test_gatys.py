@@ -24,11 +24,6 @@ CONFIG = GatysConfig(steps=4, size=48, exemplar_size=32, layers=("relu1_1", "rel
 SMALL = {"size": 48, "exemplar_size": 32, "layers": CONFIG.layers, "checkpoint_every": 4, "preview_every": 0}
 
 
-@pytest.fixture(scope="module")
-def exemplar() -> Exemplar:
-    return Exemplar.load("lava").resized(48).of_albedo()
-
-
 def value(task: GatysTask) -> float:
     return float(task.loss(0, torch.Generator()).value.detach())
 

@@ -49,11 +49,6 @@ SMALL = {
 
 
 @pytest.fixture(scope="module")
-def exemplar() -> Exemplar:
-    return Exemplar.load("lava").resized(48).of_albedo()
-
-
-@pytest.fixture(scope="module")
 def ball() -> Mesh:
     return with_layout(icosphere(4), 64)
 

@@ -48,11 +48,6 @@ SMALL = [
 ]
 
 
-@pytest.fixture(scope="module")
-def exemplar() -> Exemplar:
-    return Exemplar.load("lava").resized(48).of_albedo()
-
-
 def pixel_lattice(side: int) -> Mesh:
     """Pixels as vertices, each square of four cut into two triangles."""
     y, x = np.indices((side, side)).reshape(2, -1)

@@ -50,11 +50,6 @@ SMALL = {
 }
 
 
-@pytest.fixture(scope="module")
-def exemplar() -> Exemplar:
-    return Exemplar.load("lava").resized(48).of_albedo()
-
-
 @pytest.fixture
 def generator() -> Generator:
     """With gains, shifts and statistics of all kinds."""

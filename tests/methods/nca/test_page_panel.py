@@ -73,12 +73,12 @@ def test_the_view_of_a_graft_shows_where_it_is(tab):
     tab.run("page.panel.show('light'); page.setShare(0)")
 
 
-def test_density_subdivides_the_mesh(tab):
-    tab.page.get_by_role("slider", name="Density").fill("1")
+def test_the_slider_subdivides_the_mesh(tab):
+    tab.page.get_by_role("slider", name="Subdivide").fill("1")
     assert tab.run("return page.surface.mesh.count") == 4 * len(BALL.vertices) - 6
     tab.run("await page.step(60)")
     assert tab.picture().std() > 0.05
-    tab.page.get_by_role("slider", name="Density").fill("0")
+    tab.page.get_by_role("slider", name="Subdivide").fill("0")
     assert tab.run("return [page.surface.mesh.count, page.automaton.steps]") == [len(BALL.vertices), 0]
     tab.run("await page.step(60)")
 

@@ -5,11 +5,11 @@ import pytest
 
 from mitex.atlas import unwrap
 from mitex.mesh import Mesh, icosphere
-from mitex.mesh.frames import tangent_frames
 from mitex.methods.surface.borders import Border
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.taps import Surroundings, build
 from mitex.texels import Texels
+from tests.mesh.examples import tangent_frames
 
 
 def folded() -> tuple[Mesh, np.ndarray]:

@@ -9,7 +9,6 @@ from mitex.features import Vgg16
 from mitex.features.frozen import GramTap
 from mitex.features.layers import LAYERS
 from mitex.features.vgg import convolutions
-from mitex.mesh.frames import tangent_frames
 from mitex.methods.surface import operations as room
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.levels import Level
@@ -18,6 +17,7 @@ from mitex.methods.surface.operations import Kernel, Neighbourhood, SurfaceConv,
 from mitex.methods.surface.taps import Surroundings, build
 from mitex.methods.surface.weights import random_weights
 from mitex.texels import Texels
+from tests.mesh.examples import tangent_frames
 from tests.methods.surface.grids import flat_square, grid_levels
 
 SIDE = 224

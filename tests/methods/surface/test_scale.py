@@ -11,7 +11,6 @@ from mitex.errors import CheckpointError, ConfigError, ImageError, MitexError
 from mitex.exemplar import Exemplar
 from mitex.images import write_image
 from mitex.mesh import Mesh, icosphere, torus
-from mitex.mesh.frames import tangent_frames
 from mitex.methods import surface
 from mitex.methods.layout import layout_ratio, layout_side, with_layout
 from mitex.methods.surface.config import PRESETS
@@ -21,6 +20,7 @@ from mitex.methods.surface.scale_map import ScaleMap
 from mitex.methods.surface.taps import Surroundings, build
 from mitex.texels import Texels
 from mitex.training import resolve
+from tests.mesh.examples import tangent_frames
 from tests.methods.surface.grids import flat_square
 from tests.methods.surface.small import SHALLOW
 

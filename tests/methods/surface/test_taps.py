@@ -10,12 +10,12 @@ from scipy.sparse.csgraph import connected_components
 
 from mitex.atlas import unwrap
 from mitex.mesh import Mesh, embedded
-from mitex.mesh.frames import tangent_frames
 from mitex.methods.surface.exponential import GeodesicTracer
 from mitex.methods.surface.levels import Levels
 from mitex.methods.surface.network import SurfaceVgg
 from mitex.methods.surface.taps import Surroundings, build, representatives
 from mitex.texels import Texels
+from tests.mesh.examples import tangent_frames
 
 
 def surroundings(mesh: Mesh, uv: np.ndarray, resolution: int, **options) -> Surroundings:

@@ -34,9 +34,8 @@ def shade(
     ks: mi.Color3f | mi.Float,
     glossiness: mi.Float,
     light: mi.TensorXf,
-    bands: int = BANDS,
 ) -> mi.Color3f:
-    """Radiance that points, at least one, send back along view rays; differentiable in all but `bands`.
+    """Radiance that points, at least one, send back along view rays; differentiable in all arguments.
 
     The diffuse part is kd times the light convolved with the clamped cosine over pi, exactly; the specular
     part is ks times the light convolved with a lobe of coefficients exp(-l^2 / 2g) around the mirrored ray,
@@ -49,14 +48,13 @@ def shade(
         ks: specular coefficients in [0, 1], likewise.
         glossiness: g, positive; the larger, the sharper the mirrored light, `mi.Float`.
         light: `mi.TensorXf` of shape (16,), (16, 1) or (16, 3), linear.
-        bands: values of l that are rendered, from 0 on; 1 to 4.
 
     Returns:
         `mi.Color3f`, linear, at least 0; see `to_display`.
     """
-    radiance = _coefficients(light, bands, dr.width(normal, view))
-    lobe = [dr.exp(-degree * degree / (2 * glossiness)) for degree in range(bands)]
-    diffuse = kd * _expand(radiance, COSINE[:bands], normal)
+    radiance = _coefficients(light, dr.width(normal, view))
+    lobe = [dr.exp(-degree * degree / (2 * glossiness)) for degree in range(BANDS)]
+    diffuse = kd * _expand(radiance, COSINE[:BANDS], normal)
     specular = ks * _expand(radiance, lobe, view - 2 * dr.dot(normal, view) * normal)
     return dr.maximum(mi.Color3f(diffuse + specular), 0)
 
@@ -151,11 +149,11 @@ def _harmonics(directions: np.ndarray) -> np.ndarray:
     return np.stack([np.broadcast_to(np.array(y), len(directions)) for y in values], axis=1)
 
 
-def _coefficients(light: mi.TensorXf, bands: int, count: int) -> list[mi.Float | mi.Color3f]:
-    """The first `bands` squared coefficients for `count` points, `mi.Float`s or `mi.Color3f`s."""
+def _coefficients(light: mi.TensorXf, count: int) -> list[mi.Float | mi.Color3f]:
+    """The coefficients that are rendered, for `count` points, `mi.Float`s or `mi.Color3f`s."""
     kind = mi.Color3f if light.shape[-1] == 3 else mi.Float
     # One index a point, not one for all: the gradients are then summed where they arise, five times as fast.
-    return [dr.gather(kind, light.array, dr.full(mi.UInt32, k, count)) for k in range(bands * bands)]
+    return [dr.gather(kind, light.array, dr.full(mi.UInt32, k, count)) for k in range(BANDS**2)]
 
 
 def _expand(
