@@ -174,7 +174,7 @@ class GeometricTexture:
         noise[:start_level] = [torch.zeros(())] * len(noise[:start_level])
         if self.coarse is not None:
             own = vertices + self.fixed.numpy()
-            vertices = own if start_level else self.coarse.on(self.template, self.coarse.field)(seed)
+            vertices = own if start_level else self._laid(self.coarse, seed)
         elif start_level:
             noise[0] = self.fixed
         *_, result = rollout.run(noise, vertices)
@@ -254,11 +254,13 @@ class GeometricTexture:
     ) -> np.ndarray:
         """Vertices (V, 3) of a mesh with bumps like those that the generators up to a level make.
 
-        On the template, lower levels place them.
+        On the template, lower levels place them; where there are none, its coarse relief is laid anew.
         """
         in_range("`seed`", seed, *SEEDS)
         if placement not in get_args(Placement):
             raise ConfigError(f"placement {placement!r}", f"use {' or '.join(get_args(Placement))}")
+        if mesh is self.template and self.coarse is not None and not level:
+            return self._laid(self.coarse, seed)
         if placement == "none" or mesh is self.template:
             return mesh.vertices
         if self.coarse is not None:
@@ -270,6 +272,10 @@ class GeometricTexture:
             reference = self.generate(start_level=self.levels, end_level=level)
         texture = bumps(reference, 0.5**level)
         return mesh.vertices if texture is None else placed(mesh, texture, seed)
+
+    def _laid(self, coarse: CoarseRelief, seed: int) -> np.ndarray:
+        """Vertices (V, 3) of the template with its coarse relief laid anew, along its own field if any."""
+        return coarse.on(self.template, coarse.field)(seed)
 
     def _directed(self, hierarchy: Hierarchy, mesh: Mesh, field: str | Path | np.ndarray | None) -> Hierarchy:
         """The hierarchy of a mesh with the directions that the relief follows, if it follows any."""
