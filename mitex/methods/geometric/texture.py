@@ -26,7 +26,7 @@ from mitex.methods.geometric.directions import spread
 from mitex.methods.geometric.hierarchy import Hierarchy
 from mitex.methods.geometric.network import FaceNetwork
 from mitex.methods.geometric.placement import bumps, placed
-from mitex.methods.geometric.rollout import Rollout, slerp
+from mitex.methods.geometric.rollout import Rollout, between, slerp
 from mitex.methods.geometric.thickness import thickness
 from mitex.progress import listening
 from mitex.ranges import SEEDS
@@ -145,7 +145,9 @@ class GeometricTexture:
         field: str | Path | np.ndarray | None = None,
         placement: Placement = "even",
     ) -> Iterator[Mesh]:
-        """Meshes between those of two seeds: the noise goes along a great circle, so that its variance stays.
+        """Meshes between those of two seeds.
+
+        Noise, and the heights that growth begins with, go along great circles, so that their variances stay.
 
         Args:
             mesh, start_level, end_level, field, placement: as in `apply`.
@@ -157,7 +159,7 @@ class GeometricTexture:
         start, stop = (self._placed(mesh, rollout.level, placement, seed, field) for seed in seeds)
         for t in np.linspace(0, 1, frames):
             noise = [slerp(a, b, float(t)) for a, b in zip(first, last, strict=True)]
-            *_, result = rollout.run(noise, (1 - t) * start + t * stop)
+            *_, result = rollout.run(noise, between(mesh, start, stop, float(t)))
             yield result
 
     def generate(self, seed: int = 0, start_level: int = 0, end_level: int | None = None) -> Mesh:
