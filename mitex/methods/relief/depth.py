@@ -27,8 +27,8 @@ def with_depth(exemplar: Exemplar, depth: float = 0.0) -> tuple[Exemplar, float]
         The exemplar, and the depth.
 
     Raises:
-        ConfigError: there is neither map; the depth is neither given nor said by normals; the relief is flat, as a
-            height map of one grey is.
+        ConfigError: there is neither map; the depth is neither given nor said by normals; the relief is flat,
+            as that of a height map of one grey.
     """
     maps = dict(exemplar.maps)
     if "height" not in maps and "normal" not in maps:
