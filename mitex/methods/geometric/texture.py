@@ -232,19 +232,47 @@ class GeometricTexture:
 
         The template has its own field, and dents of any depth.
         """
+        own = mesh is self.template and self.fields and field is None
+        self.check(
+            mesh.name, len(mesh.faces), start_level, end_level, self.fields[0].numpy() if own else field
+        )
         start, end = self._range(start_level, end_level)
-        faces = len(mesh.faces) * 4 ** (end - start)
-        if faces > MOST_FACES:
-            raise ConfigError(
-                f"{mesh.name} would have {faces:,} faces after level {end}",
-                f"stay below {MOST_FACES:,}: remesh it more coarsely, or use fewer levels",
-            )
         keep_freed_memory()
         generators = self.generators[start : end + 1]
         hierarchy = self._directed(Hierarchy.of(mesh, len(generators)), mesh, field)
         noise, remeasure = float(self.about["noise"]), bool(self.about["remeasure"])
         thick = None if placement == "none" or mesh is self.template else thickness(mesh)
         return Rollout(generators, hierarchy, start, noise, remeasure, thick)
+
+    def check(
+        self,
+        name: str,
+        faces: int,
+        start_level: int | None = None,
+        end_level: int | None = None,
+        field: str | Path | np.ndarray | None = None,
+    ) -> None:
+        """Refuses what is wrong with a growth on any mesh of a number of faces.
+
+        Args:
+            name: of the mesh, for messages.
+            faces: that it has, or will have once it is remeshed.
+            start_level, end_level, field: as in `apply`.
+
+        Raises:
+            ConfigError: levels out of range, too many faces, or a field that is missing or of no use.
+        """
+        start, end = self._range(start_level, end_level)
+        faces *= 4 ** (end - start)
+        if faces > MOST_FACES:
+            raise ConfigError(
+                f"{name} would have {faces:,} faces after level {end}",
+                f"stay below {MOST_FACES:,}: remesh it more coarsely, or use fewer levels",
+            )
+        if field is not None and self.about.get("field") is None:
+            raise ConfigError("this relief has no direction and follows no `field`", "leave it out")
+        if field is None and self.about.get("field") is not None:
+            raise ConfigError("this relief follows a vector field", "give a `field`, such as up")
 
     def _placed(
         self,
@@ -280,19 +308,15 @@ class GeometricTexture:
         return coarse.on(self.template, coarse.field)(seed)
 
     def _directed(self, hierarchy: Hierarchy, mesh: Mesh, field: str | Path | np.ndarray | None) -> Hierarchy:
-        """The hierarchy of a mesh with the directions that the relief follows, if it follows any."""
+        """The hierarchy of a mesh with the directions that the relief follows; the template has its own."""
         kind = self.about.get("field")
         if kind is None:
-            if field is not None:
-                raise ConfigError("this relief has no direction and follows no `field`", "leave it out")
             return hierarchy
         symmetric = kind == files.LINE
-        if field is not None:
-            fields = spread(vector_field(mesh, field), hierarchy.pairs, symmetric)
-        elif mesh is self.template:
+        if field is None:
             fields = self.fields[: len(hierarchy.meshes)]
         else:
-            raise ConfigError("this relief follows a vector field", "give a `field`, such as up")
+            fields = spread(vector_field(mesh, field), hierarchy.pairs, symmetric)
         return hierarchy.directed(fields, symmetric)
 
     def _range(self, start_level: int | None, end_level: int | None) -> tuple[int, int]:
