@@ -5,9 +5,11 @@ from __future__ import annotations
 import weakref
 
 import numpy as np
+from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import KDTree
 
 from mitex.geometry.triangles import nearest_on_triangles
+from mitex.mesh.matrices import edge_lengths
 from mitex.mesh.mesh import Mesh
 from mitex.runtime.workers import tree_threads
 
@@ -67,3 +69,20 @@ def _candidates(
         row = maybe[closer]
         best[row], face[row], barycentric[row] = distance[closer], candidate[row], weights[closer]
     return face, barycentric, best
+
+
+def distances(mesh: Mesh, places: np.ndarray, limit: float = np.inf) -> np.ndarray:
+    """(V,) straight to that of some vertices that is nearest along the edges [mesh units].
+
+    Infinite where none of them is near enough, as in parts of the mesh that have none.
+
+    Args:
+        mesh: V vertices.
+        places: (N,) those vertices.
+        limit: of the way along the edges [mesh units].
+    """
+    graph = edge_lengths(mesh.faces, mesh.vertices.astype(np.float64))
+    _, _, nearest = dijkstra(graph, indices=places, min_only=True, limit=limit, return_predecessors=True)
+    away, there = np.full(len(nearest), np.inf), nearest >= 0
+    away[there] = np.linalg.norm(mesh.vertices[there] - mesh.vertices[nearest[there]], axis=1)
+    return away

@@ -15,6 +15,8 @@ from mitex.mesh.topology import components, mesh_edges, opposed_edges
 
 # A face is degenerate if its height is below this part of its longest side.
 FLAT = 1e-10
+# Longest side of the box: its squares stay in single precision.
+SMALLEST, LARGEST = 1e-15, 1e15
 OPPOSITE = 0.01  # part of the area where normals may look away from the faces
 
 
@@ -50,7 +52,7 @@ def validate(
 
     Raises:
         MeshError: no vertices, no faces, over budget, wrong shape, an index out of range, NaN or infinite
-            positions, no face with an area.
+            positions, no face with an area, a box whose longest side is not from 1e-15 to 1e15.
     """
     if not len(vertices):
         raise MeshError(f"{name} is empty: it has no vertices", "check how it was exported")
@@ -64,9 +66,20 @@ def validate(
         _warn(name, "some texture coordinates are NaN or infinite, so all were left out")
         uv = None
     normals = None if corner_normals is None else _of_unit_length(name, corner_normals)
-    mesh = _drop_unused(_drop_faces(Mesh(vertices, faces, uv, name, normals, polygons)))
+    mesh = Mesh(vertices, faces, uv, name, normals, polygons)
+    _check_size(mesh)
+    mesh = _drop_unused(_drop_faces(mesh))
     _report_structure(mesh)
     return _normals_checked(mesh)
+
+
+def _check_size(mesh: Mesh) -> None:
+    size = float(np.ptp(mesh.vertices.astype(np.float64), axis=0).max())
+    if size and not SMALLEST <= size <= LARGEST:  # without any, all faces are degenerate
+        raise MeshError(
+            f"{mesh.name} is {size:.2g} units large, beyond what single precision can square",
+            f"scale it to between {SMALLEST:g} and {LARGEST:g}",
+        )
 
 
 def _of_unit_length(name: str, normals: np.ndarray) -> np.ndarray | None:

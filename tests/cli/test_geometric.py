@@ -331,6 +331,18 @@ def test_too_many_faces(files, run, capsys, monkeypatch):
     check_refused(files, apply("--start-level 0"), "remesh it more coarsely", capsys)
 
 
+@pytest.mark.parametrize("command", ["apply", "animate"])
+def test_what_can_be_told_before_remeshing(files, run, capsys, monkeypatch, command):
+    monkeypatch.setattr("mitex.mesh.remesh", None)
+    words = apply if command == "apply" else animate
+    for options, message in {
+        "--remesh 2000000 --start-level 0": "would have 16,000,000 faces after level 1",
+        "--remesh 200 --end-level 5": "levels",
+        "--remesh 200 --start-level 0 --field up": "leave it out",
+    }.items():
+        check_refused(files, words(options), message, capsys)
+
+
 def test_an_unfinished_run(files, run, capsys):
     (run / "texture.safetensors").unlink()
     check_refused(files, apply(), "which can be resumed", capsys)

@@ -90,7 +90,7 @@ class Animate(GrowthOptions):
         if self.mesh == TEMPLATE:
             mesh, field, start = texture.template, None, self.start_level or 0
         else:
-            (mesh, field), start = self.even_mesh(self.mesh), self.start_level
+            (mesh, field), start = self.even_mesh(texture, self.mesh), self.start_level
         meshes = list(self._sequence(texture, mesh, field, start))
         check_video(out, len(meshes), self.fps, self.resolution)
         if self.meshes is not None:

@@ -112,12 +112,20 @@ class GrowthOptions:
             "--mesh template", "--placement none", mesh == TEMPLATE and self.placement == "none"
         )
 
-    def even_mesh(self, name: str) -> tuple[Mesh, np.ndarray | None]:
-        """The mesh to be displaced, remeshed if that is asked for, and the field on it."""
+    def even_mesh(self, texture: GeometricTexture, name: str) -> tuple[Mesh, np.ndarray | None]:
+        """The mesh to be displaced, remeshed if that is asked for, and the field on it.
+
+        Raises:
+            ConfigError, MeshError: there is none; or, before the mesh is remeshed, what `check` refuses.
+        """
         from mitex.mesh import Mesh, remesh
-        from mitex.mesh.fields import carried_field
+        from mitex.mesh.fields import carried_field, vector_field
 
         given = Mesh.load(name)
+        faces = len(given.faces) if self.remesh is None else 2 * self.remesh
+        texture.check(given.name, faces, self.start_level, self.end_level, self.field)
+        if self.field is not None:
+            vector_field(given, self.field)
         mesh = given if self.remesh is None else remesh(given, self.remesh)
         return mesh, None if self.field is None else carried_field(given, mesh, self.field)
 
@@ -166,7 +174,7 @@ class Apply(GrowthOptions, MeshOptions):
         texture = GeometricTexture.load(self.model)
         if self.mesh == TEMPLATE:
             return clay(texture.generate(self.seed, self.start_level or 0, self.end_level))
-        mesh, field = self.even_mesh(self.mesh)
+        mesh, field = self.even_mesh(texture, self.mesh)
         asset = texture.apply(
             mesh,
             seed=self.seed,

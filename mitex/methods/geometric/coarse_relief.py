@@ -17,14 +17,13 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse.csgraph import dijkstra
 
 from mitex.errors import ConfigError
 from mitex.geometry.vectors import dot
 from mitex.mesh import Mesh
 from mitex.mesh.frames import vertex_directions
 from mitex.mesh.low_pass import blurred, low_pass
-from mitex.mesh.matrices import edge_lengths
+from mitex.mesh.nearest import distances
 from mitex.methods.geometric.placement import even_places, separate_tops
 from mitex.quilting.matching import ArraySource
 from mitex.quilting.surface import quilt_on
@@ -125,7 +124,7 @@ class CoarseRelief:
     def _spread(self, mesh: Mesh) -> Callable[[int], np.ndarray]:
         """From a seed to heights (V',): bumps or dents, as many on an area, each with the mean profile."""
         faces = len(self.base.faces) / len(self.bumps)
-        away = _distances(self.base, self.bumps) / _mean_edge(self.base)
+        away = distances(self.base, self.bumps) / _mean_edge(self.base)
         near = np.isfinite(away)
         ring = np.round(away[near] / RING).astype(np.int64)
         count = np.bincount(ring)
@@ -133,7 +132,7 @@ class CoarseRelief:
         profile = np.bincount(ring, self.heights[near])[count > 0] / count[count > 0]
 
         def heights(seed: int) -> np.ndarray:
-            away = _distances(mesh, even_places(mesh, faces, seed)) / _mean_edge(mesh)
+            away = distances(mesh, even_places(mesh, faces, seed)) / _mean_edge(mesh)
             return np.interp(away, radii, profile)
 
         return heights
@@ -171,18 +170,6 @@ def _between(mesh: Mesh, fine: float, wide: float) -> CoarseRelief:
     passed = [low_pass(base, width * _mean_edge(base))(heights) for width in (fine, wide)]
     heights = passed[0] - passed[1]
     return CoarseRelief(base, heights - heights.mean())
-
-
-def _distances(mesh: Mesh, places: np.ndarray) -> np.ndarray:
-    """(V,) straight to that of the vertices `places` that is nearest along the edges [mesh units].
-
-    Infinite in parts of the mesh that have none.
-    """
-    graph = edge_lengths(mesh.faces, mesh.vertices.astype(np.float64))
-    _, _, nearest = dijkstra(graph, indices=places, min_only=True, return_predecessors=True)
-    away, there = np.full(len(nearest), np.inf), nearest >= 0
-    away[there] = np.linalg.norm(mesh.vertices[there] - mesh.vertices[nearest[there]], axis=1)
-    return away
 
 
 def _right(mesh: Mesh, field: np.ndarray | None) -> np.ndarray | None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from mitex.geometry.vectors import dot
 from mitex.mesh import Mesh
 from mitex.methods.geometric.borders import REACH, with_borders
 from mitex.methods.geometric.hierarchy import Hierarchy, mean_edge
@@ -74,3 +75,20 @@ def slerp(a: torch.Tensor, b: torch.Tensor, t: float) -> torch.Tensor:
     if angle < 1e-4:
         return torch.lerp(a, b, t)
     return (torch.sin((1 - t) * angle) * a + torch.sin(t * angle) * b) / torch.sin(angle)
+
+
+def between(mesh: Mesh, start: np.ndarray, stop: np.ndarray, t: float) -> np.ndarray:
+    """From one relief of a mesh (t = 0) to another (t = 1); the spread of heights stays where theirs agree.
+
+    Args:
+        mesh: V vertices.
+        start, stop: (V, 3) those, moved along their normals.
+        t: from 0 to 1.
+    """
+    if t in (0.0, 1.0):
+        return stop if t else start
+    a, b = (
+        torch.from_numpy(dot(end - mesh.vertices, mesh.normals.astype(np.float64))) for end in (start, stop)
+    )
+    heights = torch.lerp(a.mean(), b.mean(), t) + slerp(a - a.mean(), b - b.mean(), t)
+    return mesh.vertices + heights.numpy()[:, None] * mesh.normals

@@ -27,13 +27,14 @@ def find_template(reference: Mesh, template: Mesh | None = None) -> Mesh:
         template: of the user's, or None.
 
     Raises:
-        ConfigError: its topology is not the reference's, or the reference's is not that of a surface.
+        ConfigError: its topology is not the reference's, the reference's is not that of a surface, or is lost
+            when it is simplified.
     """
     expected = topology(reference)
     if template is None:
         if expected == (1, 0, 0):
             return _around(icosphere(1), reference)
-        template = _ring(reference) if expected == (1, 1, 0) else _simplified(reference)
+        template = _ring(reference) if expected == (1, 1, 0) else _simplified(reference, expected)
     actual = topology(template)
     if actual != expected:
         raise ConfigError(
@@ -105,7 +106,19 @@ def _ring(reference: Mesh) -> Mesh:
     return replace(ring, vertices=ring.vertices @ turn.T + centre)
 
 
-def _simplified(reference: Mesh) -> Mesh:
+def _simplified(reference: Mesh, expected: tuple[int, int, int]) -> Mesh:
+    """The reference with few faces, and with its topology, or a ConfigError."""
     from mitex.mesh.remesh import simplified
 
-    return simplified(reference, COARSE)
+    coarse = simplified(reference, COARSE)
+    try:
+        kept = topology(coarse) == expected
+    except ConfigError:
+        kept = False
+    if not kept:
+        raise ConfigError(
+            f"{reference.name}, simplified to {len(coarse.faces)} faces as a template, has another topology, "
+            "as where sheets lie on each other",
+            "give a `template`",
+        )
+    return coarse

@@ -26,7 +26,7 @@ from mitex.methods.geometric.directions import spread
 from mitex.methods.geometric.hierarchy import Hierarchy
 from mitex.methods.geometric.network import FaceNetwork
 from mitex.methods.geometric.placement import bumps, placed
-from mitex.methods.geometric.rollout import Rollout, slerp
+from mitex.methods.geometric.rollout import Rollout, between, slerp
 from mitex.methods.geometric.thickness import thickness
 from mitex.progress import listening
 from mitex.ranges import SEEDS
@@ -145,7 +145,9 @@ class GeometricTexture:
         field: str | Path | np.ndarray | None = None,
         placement: Placement = "even",
     ) -> Iterator[Mesh]:
-        """Meshes between those of two seeds: the noise goes along a great circle, so that its variance stays.
+        """Meshes between those of two seeds.
+
+        Noise, and the heights that growth begins with, go along great circles, so that their variances stay.
 
         Args:
             mesh, start_level, end_level, field, placement: as in `apply`.
@@ -157,7 +159,7 @@ class GeometricTexture:
         start, stop = (self._placed(mesh, rollout.level, placement, seed, field) for seed in seeds)
         for t in np.linspace(0, 1, frames):
             noise = [slerp(a, b, float(t)) for a, b in zip(first, last, strict=True)]
-            *_, result = rollout.run(noise, (1 - t) * start + t * stop)
+            *_, result = rollout.run(noise, between(mesh, start, stop, float(t)))
             yield result
 
     def generate(self, seed: int = 0, start_level: int = 0, end_level: int | None = None) -> Mesh:
@@ -174,7 +176,7 @@ class GeometricTexture:
         noise[:start_level] = [torch.zeros(())] * len(noise[:start_level])
         if self.coarse is not None:
             own = vertices + self.fixed.numpy()
-            vertices = own if start_level else self.coarse.on(self.template, self.coarse.field)(seed)
+            vertices = own if start_level else self._laid(self.coarse, seed)
         elif start_level:
             noise[0] = self.fixed
         *_, result = rollout.run(noise, vertices)
@@ -230,19 +232,47 @@ class GeometricTexture:
 
         The template has its own field, and dents of any depth.
         """
+        own = mesh is self.template and self.fields and field is None
+        self.check(
+            mesh.name, len(mesh.faces), start_level, end_level, self.fields[0].numpy() if own else field
+        )
         start, end = self._range(start_level, end_level)
-        faces = len(mesh.faces) * 4 ** (end - start)
-        if faces > MOST_FACES:
-            raise ConfigError(
-                f"{mesh.name} would have {faces:,} faces after level {end}",
-                f"stay below {MOST_FACES:,}: remesh it more coarsely, or use fewer levels",
-            )
         keep_freed_memory()
         generators = self.generators[start : end + 1]
         hierarchy = self._directed(Hierarchy.of(mesh, len(generators)), mesh, field)
         noise, remeasure = float(self.about["noise"]), bool(self.about["remeasure"])
         thick = None if placement == "none" or mesh is self.template else thickness(mesh)
         return Rollout(generators, hierarchy, start, noise, remeasure, thick)
+
+    def check(
+        self,
+        name: str,
+        faces: int,
+        start_level: int | None = None,
+        end_level: int | None = None,
+        field: str | Path | np.ndarray | None = None,
+    ) -> None:
+        """Refuses what is wrong with a growth on any mesh of a number of faces.
+
+        Args:
+            name: of the mesh, for messages.
+            faces: that it has, or will have once it is remeshed.
+            start_level, end_level, field: as in `apply`.
+
+        Raises:
+            ConfigError: levels out of range, too many faces, or a field that is missing or of no use.
+        """
+        start, end = self._range(start_level, end_level)
+        faces *= 4 ** (end - start)
+        if faces > MOST_FACES:
+            raise ConfigError(
+                f"{name} would have {faces:,} faces after level {end}",
+                f"stay below {MOST_FACES:,}: remesh it more coarsely, or use fewer levels",
+            )
+        if field is not None and self.about.get("field") is None:
+            raise ConfigError("this relief has no direction and follows no `field`", "leave it out")
+        if field is None and self.about.get("field") is not None:
+            raise ConfigError("this relief follows a vector field", "give a `field`, such as up")
 
     def _placed(
         self,
@@ -254,11 +284,13 @@ class GeometricTexture:
     ) -> np.ndarray:
         """Vertices (V, 3) of a mesh with bumps like those that the generators up to a level make.
 
-        On the template, lower levels place them.
+        On the template, lower levels place them; where there are none, its coarse relief is laid anew.
         """
         in_range("`seed`", seed, *SEEDS)
         if placement not in get_args(Placement):
             raise ConfigError(f"placement {placement!r}", f"use {' or '.join(get_args(Placement))}")
+        if mesh is self.template and self.coarse is not None and not level:
+            return self._laid(self.coarse, seed)
         if placement == "none" or mesh is self.template:
             return mesh.vertices
         if self.coarse is not None:
@@ -271,20 +303,20 @@ class GeometricTexture:
         texture = bumps(reference, 0.5**level)
         return mesh.vertices if texture is None else placed(mesh, texture, seed)
 
+    def _laid(self, coarse: CoarseRelief, seed: int) -> np.ndarray:
+        """Vertices (V, 3) of the template with its coarse relief laid anew, along its own field if any."""
+        return coarse.on(self.template, coarse.field)(seed)
+
     def _directed(self, hierarchy: Hierarchy, mesh: Mesh, field: str | Path | np.ndarray | None) -> Hierarchy:
-        """The hierarchy of a mesh with the directions that the relief follows, if it follows any."""
+        """The hierarchy of a mesh with the directions that the relief follows; the template has its own."""
         kind = self.about.get("field")
         if kind is None:
-            if field is not None:
-                raise ConfigError("this relief has no direction and follows no `field`", "leave it out")
             return hierarchy
         symmetric = kind == files.LINE
-        if field is not None:
-            fields = spread(vector_field(mesh, field), hierarchy.pairs, symmetric)
-        elif mesh is self.template:
+        if field is None:
             fields = self.fields[: len(hierarchy.meshes)]
         else:
-            raise ConfigError("this relief follows a vector field", "give a `field`, such as up")
+            fields = spread(vector_field(mesh, field), hierarchy.pairs, symmetric)
         return hierarchy.directed(fields, symmetric)
 
     def _range(self, start_level: int | None, end_level: int | None) -> tuple[int, int]:

@@ -27,7 +27,8 @@ def with_depth(exemplar: Exemplar, depth: float = 0.0) -> tuple[Exemplar, float]
         The exemplar, and the depth.
 
     Raises:
-        ConfigError: there is neither map; the depth is neither given nor said by normals; the relief is flat.
+        ConfigError: there is neither map; the depth is neither given nor said by normals; the relief is flat,
+            as that of a height map of one grey.
     """
     maps = dict(exemplar.maps)
     if "height" not in maps and "normal" not in maps:
@@ -47,7 +48,7 @@ def with_depth(exemplar: Exemplar, depth: float = 0.0) -> tuple[Exemplar, float]
         told = high - low
     else:
         told = depth or _told(maps["height"][..., 0], slopes(maps["normal"]))
-        _check_depth(told, exemplar.name)
+        _check_depth(told * float(np.ptp(maps["height"])), exemplar.name)
     if depth:
         maps["normal"] = of_slopes(depth * _rises(maps["height"][..., 0]))
     return Exemplar(dict(sorted(maps.items())), exemplar.name), depth or told
@@ -95,5 +96,5 @@ def _check_depth(depth: float, name: str) -> None:
     if not depth > FLATTEST:
         raise ConfigError(
             f"the relief of exemplar {name} is {depth:.2g} of its width deep",
-            "set the depth, such as depth=0.05",
+            "set the depth, such as depth=0.05; a height map must not be of one grey",
         )

@@ -38,6 +38,24 @@ def test_a_closed_mesh_is_as_it_was():
     assert with_borders(ball, grown, 0.5) is grown
 
 
+def test_only_what_is_near_along_the_surface_stays():
+    """Neither another part beside the border, nor the other side of a fold."""
+    sheet, ball = grid(4, 4), icosphere(4)
+    vertices = np.concatenate([sheet.vertices, 0.1 * ball.vertices + np.float32([0, 1.15, 0])])
+    both = Mesh(vertices, np.concatenate([sheet.faces, ball.faces + len(sheet.vertices)]))
+    up = both.with_vertices(both.vertices + np.float32([0, 0, 0.1]))
+    after = with_borders(both, up, 0.5).vertices
+    assert np.array_equal(after[len(sheet.vertices) :], up.vertices[len(sheet.vertices) :])
+    assert not np.allclose(after[: len(sheet.vertices)], up.vertices[: len(sheet.vertices)])
+    flat = grid(32, 32)
+    x, y, _ = flat.vertices.astype(np.float64).T
+    hairpin = np.stack([x, np.where(y < -0.4, -0.8 - y, y), 0.1 * (y < -0.4)], axis=1)
+    folded = flat.with_vertices(hairpin)
+    over = np.flatnonzero((np.abs(x) < 0.4) & (np.abs(y - 0.2) < 0.05))  # beside the lower border
+    up = folded.with_vertices(hairpin + [0, 0, 0.3])
+    assert np.allclose(with_borders(folded, up, 0.3).vertices[over], up.vertices[over])
+
+
 @pytest.mark.parametrize("placement", ["even", "none"])
 def test_borders_of_a_mesh_stay(spikes, placement):
     """Its loop is the same polygon afterwards; far from it the relief is that of the whole ball."""

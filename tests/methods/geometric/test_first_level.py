@@ -70,6 +70,15 @@ def test_variations_of_the_reference(run):
     assert not np.allclose(texture.generate(0).vertices, texture.generate(1).vertices, atol=1e-3)
 
 
+def test_a_film_of_the_template_grows_a_variation_of_the_reference(run):
+    texture = run[1]
+    *_, last = texture.growth(texture.template, frames=1, seed=1, start_level=0)
+    assert np.allclose(last.vertices, texture.generate(1).vertices, atol=1e-5)
+    ends = list(texture.interpolate(texture.template, (0, 1), 2, start_level=0))
+    for seed, end in enumerate(ends):
+        assert np.allclose(end.vertices, texture.generate(seed).vertices, atol=1e-4)
+
+
 def test_the_reference_is_learned_from_its_own_coarse_relief(run):
     """Longer, the rebuilt mesh comes nearer to the training mesh; metrics tell."""
     folder, _ = run

@@ -8,10 +8,12 @@ import torch
 from scipy.sparse.csgraph import dijkstra
 
 from mitex.errors import ConfigError
+from mitex.geometry.vectors import dot
 from mitex.mesh import Mesh, grid, icosphere
 from mitex.mesh.topology import mesh_edges
 from mitex.methods.geometric.network import FaceNetwork
 from mitex.methods.geometric.placement import SHARE_DOWN, SHARE_UP, Bumps, bumps, placed
+from mitex.methods.geometric.rollout import between
 from mitex.methods.geometric.texture import GeometricTexture
 
 BALL = icosphere(12)
@@ -174,3 +176,23 @@ def test_growths_and_changes_end_with_the_same_bumps(texture):
     assert not np.allclose(bare[0], results[0], atol=1e-2)
     *_, bare_growth = texture.growth(mesh, frames=1, seed=1, placement="none")
     assert np.allclose(bare_growth.vertices, bare[1], atol=1e-5)
+
+
+def test_heights_between_two_seeds_keep_their_spread():
+    start, stop = (placed(BALL, Bumps(24.0, 1.5), seed) for seed in (0, 1))
+    assert between(BALL, start, stop, 0.0) is start
+    assert between(BALL, start, stop, 1.0) is stop
+    spread = [
+        dot(between(BALL, start, stop, t) - BALL.vertices, BALL.normals).std() for t in (0.0, 0.25, 0.5, 1.0)
+    ]
+    assert spread == pytest.approx(spread[:1] * 4, rel=0.01)
+    assert between(BALL, BALL.vertices, BALL.vertices, 0.5) == pytest.approx(BALL.vertices)
+
+
+def test_films_between_two_seeds_go_along_them(texture, monkeypatch):
+    seen = []
+    monkeypatch.setattr(
+        "mitex.methods.geometric.texture.between", lambda mesh, a, b, t: seen.append(t) or mesh.vertices
+    )
+    list(texture.interpolate(icosphere(2), (0, 1), 3))
+    assert seen == [0, 0.5, 1]

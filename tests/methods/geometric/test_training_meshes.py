@@ -91,6 +91,16 @@ def test_open_references_are_simplified():
     assert topology(template) == (1, 0, 1) and len(template.faces) < 100
 
 
+def test_a_reference_that_loses_its_topology_when_simplified():
+    """Two sheets on each other, which are joined."""
+    sheet = grid(12, 12)
+    vertices = np.concatenate([sheet.vertices, sheet.vertices])
+    double = Mesh(vertices, np.concatenate([sheet.faces, sheet.faces + len(sheet.vertices)]), name="double")
+    with pytest.raises(ConfigError, match="double, simplified to .* as a template") as error:
+        find_template(double)
+    assert error.value.remedy == "give a `template`"
+
+
 def test_a_template_of_another_genus_is_refused():
     with pytest.raises(
         ConfigError, match=r"template torus has 1 pieces, genus 1.*reference egg has .* genus 0"

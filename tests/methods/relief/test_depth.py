@@ -109,3 +109,10 @@ def test_other_maps_stay():
 def test_what_is_refused(exemplar, depth, problem):
     with pytest.raises(ConfigError, match=problem):
         with_depth(exemplar, depth)
+
+
+def test_a_height_map_of_one_grey_is_refused_at_any_depth():
+    maps = waves("height", "normal").maps
+    for flat in ({"height": 0 * maps["height"] + 0.5}, maps | {"height": 0 * maps["height"]}):
+        with pytest.raises(ConfigError, match="of one grey"):
+            with_depth(Exemplar(flat, "flat"), 0.05)
