@@ -12,7 +12,7 @@ from mitex.methods.nca import NcaTexture
 from mitex.render import sheet, still, tone
 
 
-def main(out: str = "relief.png", vertices: int = 800, resolution: int = 384, spp: int = 64) -> None:
+def main(out: str = "relief.png", vertices: int = 10_000, resolution: int = 384, spp: int = 64) -> None:
     """Shows the mesh's relief alone, and with colours of a bundled texture."""
     mesh = remesh(embedded("vase"), vertices)  # fewer vertices, larger scales
     relief = GeometricTexture.load("scales").apply(mesh, seed=1)

@@ -42,12 +42,13 @@ def test_every_model_has_a_picture_to_click(tab):
 
 def test_a_click_shows_a_geometric_texture_and_another_one_grows_on(tab):
     """The relief is the mesh itself: its shading varies where the ring's own is smooth. Each is on a ring as
-    fine as what it learned: on the coarsest, which it splits twice, or on the finest, split once."""
+    fine as what it learned: on the coarsest, which it splits twice, on a finer one, split once, or on the
+    finest, which stays as it is."""
     tab.run("page.setMesh(page.base, 1); await page.step(20)")
     states = tab.array("page.automaton.read()")
     grown = tab.picture()
-    coarsest, finest = 16 * 2 * 24 * 10, 4 * 2 * 96 * 40
-    for name, faces in (("scales", coarsest), ("knobs", finest), ("spikes", coarsest)):
+    coarsest, finer, finest = 16 * 2 * 24 * 10, 4 * 2 * 96 * 40, 2 * 160 * 64
+    for name, faces in (("scales", finest), ("knobs", finer), ("spikes", coarsest)):
         tab.page.locator(".gallery button", has_text=name).click()
         tab.run(
             "while (page.panel.page.look.name !== argument) await new Promise((go) => setTimeout(go, 10))",

@@ -8,7 +8,8 @@ from mitex.asset import Asset
 from mitex.mesh import torus
 from mitex.methods.geometric.texture import GeometricTexture
 
-RINGS = ((24, 10), (48, 20), (96, 40))  # vertices around and across: few, since growth splits the faces
+# Vertices around and across: few, since growth splits the faces of most.
+RINGS = ((24, 10), (48, 20), (96, 40), (160, 64))
 
 
 def on_ring(texture: GeometricTexture) -> Asset:

@@ -24,7 +24,9 @@ class ReliefConfig(ScheduledConfig):
     resolution: int = key(SURFACE.resolution, "side of the maps [texels]", 16, 4096)
     scale: float = key(1.0, "size of the pattern, as of surface", *SCALES)
     surface_steps: int = key(SURFACE.steps, "steps of surface", 1)
-    faces: int = key(200_000, "faces of the relief, about; at most twice as many", 1, 2_000_000)
+    faces: int = key(
+        200_000, "faces of the relief, about: half to twice as many, or fewer for coarse maps", 1, 2_000_000
+    )
     depth: float = key(
         0.0,
         "depth of the relief, from black to white in the height map [widths of the exemplar]; 0: what the "
