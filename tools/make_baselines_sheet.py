@@ -13,7 +13,7 @@ from pathlib import Path
 from make_comparison_sheet import GALLERY, rows_of
 
 from mitex.comparison.look_pair import picture_of
-from mitex.comparison.results import label
+from mitex.comparison.results import labels
 from mitex.images import read_image, write_image
 from mitex.render import sheet
 
@@ -30,13 +30,14 @@ def main() -> None:
     arguments = parser.parse_args()
     pair = arguments.exemplar, arguments.mesh
     rows = [row for folder in arguments.folders for row in rows_of(folder)]
+    names = labels(row[key] for row in rows for key in ("exemplar", "mesh"))
     first = {
-        row["method"]: row for row in reversed(rows) if (label(row["exemplar"]), label(row["mesh"])) == pair
+        row["method"]: row for row in reversed(rows) if (names[row["exemplar"]], names[row["mesh"]]) == pair
     }
     pictures = [picture_of(arguments.exemplar)]
     pictures += [read_image(Path(first[method]["picture"])) for method in arguments.methods]
-    labels = ["exemplar", *arguments.methods]
-    image = sheet(pictures, columns=min(len(pictures), 5), labels=labels, cell=CELL)
+    captions = ["exemplar", *arguments.methods]
+    image = sheet(pictures, columns=min(len(pictures), 5), labels=captions, cell=CELL)
     path = write_image(GALLERY / f"{arguments.sheet}.jpg", image)
     print(path)
 

@@ -23,7 +23,7 @@ import numpy as np
 from mitex.comparison.html import DASH, number_text
 from mitex.comparison.look_pair import picture_of
 from mitex.comparison.measures import COSTS, LOOKS, Measure
-from mitex.comparison.results import label
+from mitex.comparison.results import labels
 from mitex.comparison.summary import mean_and_spread
 from mitex.images import read_image, write_image
 from mitex.render import sheet
@@ -86,15 +86,16 @@ def table(
 
 def _grouped(rows: Sequence[Row], key: str) -> list[tuple[str, Sequence[Row]]]:
     """The rows of each exemplar or of each mesh, with its label."""
-    values = dict.fromkeys(row[key] for row in rows)
-    return [(label(value), [row for row in rows if row[key] == value]) for value in values]
+    names = labels(row[key] for row in rows)
+    return [(name, [row for row in rows if row[key] == value]) for value, name in names.items()]
 
 
 def pictures(
     rows: Sequence[Row], exemplars: Sequence[str], methods: Sequence[str], meshes: Sequence[str]
 ) -> np.ndarray:
     """The sheet; each method's first seed."""
-    first = {(row["exemplar"], row["method"], label(row["mesh"])): row for row in reversed(rows)}
+    names = labels(row["mesh"] for row in rows)
+    first = {(row["exemplar"], row["method"], names[row["mesh"]]): row for row in reversed(rows)}
     pairs = zip(exemplars, cycle(meshes), strict=False)
     images = [read_image(Path(first[e, method, mesh]["picture"])) for e, mesh in pairs for method in methods]
     originals = [picture_of(exemplar) for exemplar in exemplars]

@@ -12,9 +12,9 @@ import pytest
 
 import mitex.plugins
 import mitex.runtime
-from mitex.batch.process import cores
 from mitex.errors import ConfigError
 from mitex.runtime import llvm
+from mitex.runtime.cores import cores
 from mitex.runtime.upload import upload
 
 
@@ -223,7 +223,7 @@ def test_commands_multiply_with_one_thread_in_numpy_unless_the_user_says_otherwi
         "a @ a\n"
         "print(len(os.listdir('/proc/self/task')))"
     )
-    assert run(code, **environment).stdout.split()[-1] == str(min(blas, cores()))
+    assert run(code, **environment).stdout.split()[-1] == str(min(blas, int(cores())))
 
 
 def test_fitting_radiance_fields_asks_torch_to_yield_before_it_is_loaded():

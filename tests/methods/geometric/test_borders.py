@@ -41,9 +41,9 @@ def test_a_closed_mesh_is_as_it_was():
 def test_only_what_is_near_along_the_surface_stays():
     """Neither another part beside the border, nor the other side of a fold."""
     sheet, ball = grid(4, 4), icosphere(4)
-    vertices = np.concatenate([sheet.vertices, 0.1 * ball.vertices + np.float32([0, 1.15, 0])])
+    vertices = np.concatenate([sheet.vertices, 0.1 * ball.vertices + np.array([0, 1.15, 0], np.float32)])
     both = Mesh(vertices, np.concatenate([sheet.faces, ball.faces + len(sheet.vertices)]))
-    up = both.with_vertices(both.vertices + np.float32([0, 0, 0.1]))
+    up = both.with_vertices(both.vertices + np.array([0, 0, 0.1], np.float32))
     after = with_borders(both, up, 0.5).vertices
     assert np.array_equal(after[len(sheet.vertices) :], up.vertices[len(sheet.vertices) :])
     assert not np.allclose(after[: len(sheet.vertices)], up.vertices[: len(sheet.vertices)])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from mitex.asset import Asset
 from mitex.errors import CheckpointError, ConfigError, WeightsError
@@ -145,7 +145,7 @@ def test_the_exported_mesh_is_the_one_that_was_trained(name, tmp_path, monkeypat
     assert np.abs(expected - task.fine.vertices).max() > 0.01 and len(expected) == 162
     again = Asset.load(asset.export(tmp_path / "ball.glb")).mesh
     for one, other in ((again.vertices, expected), (expected, again.vertices)):  # the file splits seams
-        assert cKDTree(one).query(other)[0].max() < 1e-4
+        assert KDTree(one).query(other)[0].max() < 1e-4
     albedo = texture.image[task.baked().std(2) > 0].mean(0)
     np.testing.assert_allclose(albedo, colours.detach().mean(0), atol=0.03)
     with pytest.raises(ConfigError, match="belongs to mesh"):

@@ -83,7 +83,7 @@ def reflectances(kd: mi.Color3f, ks: mi.Float, light: mi.TensorXf) -> tuple[mi.C
     Returns:
         Diffuse `mi.Color3f` and specular `mi.Float`.
     """
-    mean = mi.Color3f(_coefficients(light, 1, 1)[0]) / math.sqrt(4 * math.pi)
+    mean = mi.Color3f(_coefficients(light, 1)[0]) / math.sqrt(4 * math.pi)
     mean = dr.maximum(mean, TOE)  # a light that was driven to black has no colour
     learned = mi.Color3f(kd + ks)
     both = _decoded(learned * mean) / _decoded(mean)
