@@ -15,6 +15,7 @@ import pytest
 from mitex import atlas, flat_charts
 from mitex.cache import content_key
 from mitex.charts import Packing, Part, packed_charts
+from mitex.runtime import workers
 from tests.browser import Browser
 from tests.firefox import Firefox
 
@@ -57,13 +58,13 @@ def _leave_no_trace() -> Iterator[None]:
     after = _process_state()
     for key, value in before.items():
         if after[key] != value:
-            {"torch": _set_torch, "drjit": _set_drjit, "variant": _set_variant}[key](value)
+            SETTERS[key](value)
     if "drjit" in sys.modules:
         sys.modules["drjit"].flush_malloc_cache()
 
 
 def _process_state() -> dict[str, Any]:
-    state: dict[str, Any] = {}
+    state: dict[str, Any] = {"allowed": workers._threads}
     if torch := sys.modules.get("torch"):
         state["torch"] = torch.get_num_threads()
     if dr := sys.modules.get("drjit"):
@@ -90,6 +91,10 @@ def _shape_count() -> int:
     return len(shapes)
 
 
+def _set_allowed(count: int | None) -> None:
+    workers._threads = count
+
+
 def _set_torch(count: int) -> None:
     sys.modules["torch"].set_num_threads(count)
 
@@ -102,6 +107,9 @@ def _set_drjit(count: int) -> None:
 
 def _set_variant(variant: str) -> None:
     sys.modules["mitsuba"].set_variant(variant)
+
+
+SETTERS = {"allowed": _set_allowed, "torch": _set_torch, "drjit": _set_drjit, "variant": _set_variant}
 
 
 @pytest.fixture(autouse=True, scope="session")
