@@ -99,9 +99,7 @@ def render(
         target.check(tensor)
 
     if not by_feature:
-        image = _Image(
-            scene, mi.traverse(scene), targets, _parts(scene, sensor, renderer), sensor, renderer, spp, seed
-        )
+        image = _Image(scene, _parts(scene, sensor, renderer), targets, sensor, renderer, spp, seed)
         return cast(torch.Tensor, _Traced.apply(image, *tensors))
 
     def attached(*arrays: mi.TensorXf) -> mi.TensorXf:
@@ -183,14 +181,13 @@ class _Image:
     """What is rendered: parameters of a scene whose light is traced, and how.
 
     Attributes:
-        targets: the parameters that are given as tensors.
         parts: all parameters of the scene, and of a sensor and an integrator that are not its own.
+        targets: the parameters that are given as tensors.
     """
 
     scene: mi.Scene
-    params: mi.SceneParameters
-    targets: Sequence[_Target]
     parts: Sequence[mi.SceneParameters]
+    targets: Sequence[_Target]
     sensor: mi.Sensor | int
     integrator: mi.Integrator
     spp: int
@@ -246,7 +243,7 @@ class _Traced(torch.autograd.Function):
                 arrays = image.assign(ctx.saved_tensors, attached=True)
                 upstream = upload(mi.TensorXf, grad.contiguous().numpy())
                 image.integrator.render_backward(
-                    image.scene, image.params, upstream, image.sensor, seed=other, spp=image.spp
+                    image.scene, image.parts[0], upstream, image.sensor, seed=other, spp=image.spp
                 )
                 gradients = [torch.from_numpy(np.array(dr.grad(array))) for array in arrays]
         finally:
@@ -255,7 +252,7 @@ class _Traced(torch.autograd.Function):
 
 
 def _parts(scene: mi.Scene, sensor: mi.Sensor | int, integrator: mi.Integrator) -> list[mi.SceneParameters]:
-    """Parameters of the scene, and of the sensor and the integrator if they are no part of it."""
+    """Parameters of the scene, first, and of the sensor and the integrator if they are no part of it."""
     others = [] if isinstance(sensor, int) else [sensor]
     if scene.integrator() is not integrator:
         others.append(integrator)

@@ -22,8 +22,13 @@ def exemplar_texels(size: int, resolution: int, least: int = 32) -> int:
     Args:
         size: what is asked for; 0: `EXEMPLAR_WIDTH` of the layout's square, however many texels that has.
         resolution: side of the layout's square [texels].
-        least: below which the square's share is not taken.
+        least: that is enough for the network; the square's share is not taken below.
+
+    Raises:
+        ConfigError: what is asked for is not enough.
     """
+    if 0 < size < least:
+        raise ConfigError(f"exemplar_size = {size} is out of range", f"choose 0, or {least} or more")
     return size or max(round(EXEMPLAR_WIDTH * resolution), least)
 
 

@@ -276,6 +276,7 @@ class TestRefused:
             ("layers=", "are none"),
             ("content_layer=x", "are x"),
             ("nearest=20", "beyond farthest"),
+            ("exemplar_size=31", "choose 0, or 32 or more"),
             ("view=8", "out of range"),
         ],
     )

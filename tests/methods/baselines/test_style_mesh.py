@@ -289,6 +289,7 @@ class TestRefused:
             ("small_layers=relu2_2", "small_layers holds relu2_2"),
             ("weights=1,2", "2 weights for 5 layers"),
             ("resolution=100", "use a multiple of 8"),
+            ("exemplar_size=63", "choose 0, or 64 or more"),
             ("view=8", "out of range"),
         ],
     )

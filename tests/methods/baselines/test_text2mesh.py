@@ -247,6 +247,7 @@ class TestRefused:
         [
             ("layers=relu9_1", "relu9_1; use some of"),
             ("cameras=inside", "inside"),
+            ("exemplar_size=31", "choose 0, or 32 or more"),
             ("view=8", "out of range"),
         ],
     )

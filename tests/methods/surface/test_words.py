@@ -284,7 +284,8 @@ class TestFit:
 
     @pytest.mark.parametrize("scale", [0.05, 20])
     def test_words_alone_have_no_exemplar_that_could_be_too_narrow_or_wide(self, scale):
-        fit("red dots", steps=1, set=[f"scale={scale}", "text_width=0.05"])
+        texture = fit("red dots", steps=1, set=[f"scale={scale}", "text_width=0.05"])
+        assert np.isfinite(texture.values).all() and texture.about["steps"] == 1
 
     @pytest.mark.parametrize(
         ("text", "options", "error", "problem"),

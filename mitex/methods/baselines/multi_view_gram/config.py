@@ -7,6 +7,7 @@ from typing import Literal
 
 from mitex.errors import ConfigError
 from mitex.features.layers import NETWORKS, check_layers
+from mitex.methods.layout import exemplar_texels
 from mitex.training.settings import TrainingConfig, key
 
 
@@ -43,6 +44,7 @@ class MultiViewConfig(TrainingConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        exemplar_texels(self.exemplar_size, self.resolution)
         for layers in (self.layers, [self.content_layer]):
             check_layers(layers, NETWORKS[self.network])
         if self.nearest > self.farthest:

@@ -7,7 +7,10 @@ from typing import Literal
 
 from mitex.errors import ConfigError
 from mitex.features.layers import NETWORKS, check_layers
+from mitex.methods.layout import exemplar_texels
 from mitex.training.settings import ScheduledConfig, key
+
+LEAST_SIDE = 64  # of the exemplar, of which half is looked at, too [px]
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,7 @@ class StyleMeshConfig(ScheduledConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        exemplar_texels(self.exemplar_size, self.resolution, LEAST_SIDE)
         check_layers(self.layers, NETWORKS[self.network])
         if len(self.weights) != len(self.layers):
             raise ConfigError(

@@ -15,7 +15,7 @@ from mitex.features.frozen import GramTap
 from mitex.features.vgg19 import named_vgg
 from mitex.losses.gram import gram_distance, gram_targets
 from mitex.mesh import Mesh
-from mitex.methods.baselines.style_mesh.config import StyleMeshConfig
+from mitex.methods.baselines.style_mesh.config import LEAST_SIDE, StyleMeshConfig
 from mitex.methods.baselines.style_mesh.layered import fine_energy, keep_in_range, sum_of, zero_textures
 from mitex.methods.baselines.style_mesh.visible import Counting, Visible, cameras_around, places_in, shares
 from mitex.methods.exemplar_pictures import albedo, framed
@@ -65,7 +65,7 @@ class StyleMeshTask(ParameterTask):
         ]
         self.network = named_vgg(config.network, "max", normalised=False)
         self.weights = dict(zip(config.layers, config.weights, strict=True))
-        self.exemplar_side = exemplar_texels(config.exemplar_size, config.resolution, 64)
+        self.exemplar_side = exemplar_texels(config.exemplar_size, config.resolution, LEAST_SIDE)
         self.targets = self._grams(self.exemplar_side, config.layers)
         self.small_targets = self._grams(self.exemplar_side // 2, config.small_layers)
 

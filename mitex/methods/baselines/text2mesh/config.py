@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from mitex.features.layers import check_layers
+from mitex.methods.layout import exemplar_texels
 from mitex.methods.neural_style.config import EMBEDDED, PUBLISHED_WEIGHTS, StyleConfig
 from mitex.training.settings import key
 
@@ -32,6 +33,7 @@ class Text2MeshConfig(StyleConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        exemplar_texels(self.exemplar_size, self.resolution)
         check_layers(self.layers)
 
 

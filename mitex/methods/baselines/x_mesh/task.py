@@ -21,8 +21,8 @@ class XMeshTask(StyleTask):
     As published, but, like Text2Mesh here: outlines have no derivatives, shading alone; a lamp beside the
     camera stands for their light of spherical harmonics; the anchor view is the front; elevations end at 80
     degrees; meshes are split until they have 10,000 vertices; corners of all squares are moved outwards,
-    where theirs go inwards, in four of five; shades are those of the flat faces' normals as they are moved,
-    where theirs are fitted into the unit ball again in each step.
+    where theirs go inwards, in four of five; the moved mesh is not fitted into the unit ball
+    again, as theirs is in each step.
     """
 
     method = METHOD.name
