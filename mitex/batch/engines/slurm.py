@@ -32,7 +32,8 @@ class Slurm(Engine):
         cluster: "slurm"; "local" stands in for it on one machine, for tests.
 
     Raises:
-        ConfigError: An option is no KEY=VALUE; as a context, submitit knows none of that name.
+        ConfigError: An option is no KEY=VALUE, or asks for several processes; as a context, submitit knows
+            none of that name.
         RuntimeUnavailable: As a context, this is no machine of a Slurm cluster; on submission, Slurm refuses
             the job.
     """
@@ -125,8 +126,13 @@ def _last_line(error: Exception) -> str:
     return (str(error).strip().splitlines() or ["it says nothing"])[-1]
 
 
-def _option(text: str) -> tuple[str, int | str]:
+def _option(text: str) -> tuple[str, int | str | list[str]]:
     key, equals, value = text.partition("=")
     if not (equals and key and value):
         raise ConfigError(f"'{text}' is no option of Slurm", "write KEY=VALUE, such as partition=cpu")
-    return f"slurm_{key.replace('-', '_')}", int(value) if value.isdecimal() else value
+    key = key.replace("-", "_")
+    if key in ("nodes", "ntasks_per_node"):
+        raise ConfigError(f"a job is one process, whose {key} cannot be set", "leave that option out")
+    if key in ("setup", "teardown", "srun_args"):
+        return f"slurm_{key}", [value]
+    return f"slurm_{key}", int(value) if value.isdecimal() else value

@@ -44,6 +44,18 @@ def test_options_are_those_of_sbatch(monkeypatch, tmp_path):
         Slurm(["partitoin=cpu"])._opened(tmp_path)
 
 
+def test_lines_before_a_job(monkeypatch, tmp_path):
+    monkeypatch.setattr("submitit.slurm.slurm.SlurmExecutor.affinity", lambda *_: 2)
+    executor = Slurm(["setup=module load python"])._opened(tmp_path)._executor
+    assert "\nmodule load python\n" in executor._make_submission_file_text("true", "uid")
+
+
+@pytest.mark.parametrize("option", ["nodes=2", "ntasks-per-node=x"])
+def test_a_job_is_one_process(option):
+    with pytest.raises(ConfigError, match="a job is one process"):
+        Slurm([option])
+
+
 @pytest.fixture
 def cluster(tmp_path, monkeypatch):
     """Programs that stand in for those of a cluster; sbatch refuses all."""
